@@ -1,0 +1,1 @@
+"""Export of motet models from torch to ONNX bundles."""

@@ -1,0 +1,1 @@
+"""motet: sequence models of human motion, run by numpy and onnxruntime."""

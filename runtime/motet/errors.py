@@ -1,0 +1,40 @@
+"""motet's own errors: each is also a builtin, and says what was wrong, where, and what would be right."""
+
+from pathlib import Path
+
+
+class MotetError(Exception):
+    """Base of every error that motet raises on purpose."""
+
+
+class MotionError(MotetError, ValueError):
+    """A motion or a skeleton that cannot be used for what was asked."""
+
+
+class FormatError(MotionError):
+    """A file that is not what its format promises: names the file, the line (from 1) and the reason."""
+
+    def __init__(self, path: str | Path, reason: str, line: int | None = None) -> None:
+        self.path, self.reason, self.line = Path(path), reason, line
+        place = f"{path}" if line is None else f"{path}, line {line}"
+        super().__init__(f"{place}: {reason}")
+
+
+class BundleError(MotetError, ValueError):
+    """A bundle that is unknown, damaged, altered or of another format version."""
+
+
+class ControlError(MotetError, ValueError):
+    """A control value, label or number of characters that the model cannot take."""
+
+
+class ScriptError(MotetError, ValueError):
+    """A control script that does not parse: shows the script and marks the place."""
+
+    def __init__(self, script: str, position: int, reason: str) -> None:
+        self.script, self.position = script, position
+        super().__init__(f"{reason}\n  {script}\n  {' ' * position}^")
+
+
+class OutputError(MotetError, OSError):
+    """A place that cannot be written to; nothing was written."""
