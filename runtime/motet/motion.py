@@ -94,8 +94,9 @@ class Motion:
             return 1.0
         if old in TURN and unit in TURN:
             return TURN[unit] / TURN[old]
-        if (old, unit) == ("length", "m") and self.skeleton is not None:
-            return self.skeleton.unit_factor(1.0)
+        if {old, unit} == {"length", "m"} and self.skeleton is not None:
+            metres = self.skeleton.unit_factor(1.0)
+            return metres if unit == "m" else 1 / metres
         raise MotionError(f"channel {self.channels[column]!r} is in {old!r}, which does not convert to {unit!r}")
 
     def scaled(self, metres_per_unit: float) -> "Motion":
@@ -105,6 +106,12 @@ class Motion:
         factor = self.skeleton.unit_factor(metres_per_unit)
         factors = [factor if unit == "length" else 1.0 for unit in self.units]
         return replace(self, values=self.values * factors, skeleton=self.skeleton.scaled(metres_per_unit))
+
+    def with_unit(self, metres_per_unit: float) -> "Motion":
+        """The same motion, its skeleton's length unit now known: for files that do not say it."""
+        if self.skeleton is None:
+            raise MotionError("a motion without a skeleton has no length unit")
+        return replace(self, skeleton=replace(self.skeleton, metres_per_unit=metres_per_unit))
 
     def resample(self, fps: float) -> "Motion":
         """The motion at another frame rate, starting at the same frame and as long.

@@ -67,7 +67,7 @@ class Skeleton:
     @cached_property
     def offsets(self) -> Array:
         """The joints' offsets (J, 3)."""
-        return np.array([joint.offset for joint in self.joints])
+        return np.array([joint.offset for joint in self.joints], dtype=np.float64)
 
     @cached_property
     def children(self) -> tuple[tuple[int, ...], ...]:

@@ -1,0 +1,37 @@
+"""``motet export`` and ``motet parity``."""
+
+import json
+from pathlib import Path
+
+import click
+
+from motet.bundle import Bundle
+from motet_export.bundles import export_run, parity_of
+from motet_train.runs import Run
+
+
+@click.command()
+@click.argument("run", type=Path)
+@click.option("--out", required=True, type=Path, help="Bundle to write: a .zip, or a new folder.")
+def export(run: Path, out: Path) -> None:
+    """Export the training run RUN to ONNX and pack it as a bundle, if ONNX Runtime gives what torch gives."""
+    report = export_run(Run.load(run), out)
+    click.echo(_lines(report))
+    click.echo(str(out))
+
+
+@click.command()
+@click.argument("run", type=Path)
+@click.argument("bundle")
+@click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
+def parity(run: Path, bundle: str, as_json: bool) -> None:
+    """Check again that BUNDLE computes what the training run RUN computes in torch."""
+    report = parity_of(Run.load(run), Bundle.open(bundle))
+    click.echo(json.dumps(report) if as_json else _lines(report))
+
+
+def _lines(report: dict[str, dict[str, float]]) -> str:
+    rungs = {name: rung for name, rung in report.items() if "bound" in rung}
+    return "\n".join(
+        f"parity {name:<18} {rung['error']:.1e} (bound {rung['bound']:.0e})" for name, rung in rungs.items()
+    )

@@ -1,0 +1,75 @@
+"""The parity ladder: what ONNX Runtime gives is what torch gave, from the contract up to whole runs.
+
+An error is the largest |a - b| of an output, over the root mean square of b where that is above 1 (frames in degrees).
+Every rung raises ExportError where its bound is not kept, so a bundle that differs is never written.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motet.decode.rollout import State, advance
+from motet.graph import Graph
+from motet_export.exporter import ExportError
+
+ONE_STEP, CARRIED = 1e-5, 1e-4
+"""Bounds on the error after one step, and after many carried steps or a whole run."""
+
+STEPS = 200
+Arrays = Mapping[str, NDArray[Any]]
+
+
+def error(found: Arrays, expected: Arrays) -> float:
+    """The largest |a - b| / max(1, RMS of b) over arrays of equal names; ExportError where shapes or dtypes differ."""
+    largest = 0.0
+    for name, array in expected.items():
+        if name not in found or found[name].shape != array.shape or found[name].dtype != array.dtype:
+            raise ExportError(f"output {name!r} has another shape or dtype than in torch")
+        if not np.isfinite(found[name]).all():
+            raise ExportError(f"output {name!r} has values that are not finite")
+        expected_values = array.astype(np.float64)
+        scale = max(1.0, float(np.sqrt(np.mean(expected_values**2))))
+        largest = max(largest, float(np.abs(found[name] - expected_values).max(initial=0)) / scale)
+    return largest
+
+
+def check_one_step(name: str, onnx: Graph, torch: Graph) -> dict[str, Any]:
+    """Rung 1 and 2: equal contracts, and one call at batch sizes 1, 1,000 and three random ones."""
+    if onnx.spec != torch.spec:
+        raise ExportError(f"{name}: the contracts differ: {onnx.spec} and {torch.spec}")
+    rng = np.random.default_rng(1)
+    batches = [1, 1000, *(int(batch) for batch in rng.integers(2, 100, 3))]
+    errors = []
+    for batch in batches:
+        feeds = {tensor.name: tensor.example(rng, batch) for tensor in torch.spec.inputs}
+        errors.append(error(onnx(feeds), torch(feeds)))
+    return _bounded(f"{name}.one_step", max(errors), ONE_STEP, batches=batches)
+
+
+def check_carried(onnx: Graph, torch: Graph, batch: int = 16) -> dict[str, Any]:
+    """Rung 3: the state carried over 200 steps by each on its own, under the same random inputs."""
+    rng = np.random.default_rng(2)
+    spec = torch.spec
+    start: State = {name: spec.input(name).example(rng, batch) for name in spec.feedback}
+    states, largest = [start, dict(start)], 0.0
+    for _ in range(STEPS):
+        given = {t.name: t.example(rng, batch) for t in spec.inputs if t.name not in spec.feedback}
+        (found, states[0]), (expected, states[1]) = (
+            advance(graph, state, given) for graph, state in zip((onnx, torch), states, strict=True)
+        )
+        largest = max(largest, error(found, expected))
+    return _bounded("step.carried", largest, CARRIED, steps=STEPS, batch=batch)
+
+
+def check_runs(runs: Mapping[str, Callable[[], tuple[Arrays, Arrays]]]) -> dict[str, Any]:
+    """Rung 4: whole decoded runs with the same seeds; each callable gives what ONNX and what torch decoded."""
+    errors = {name: error(*run()) for name, run in runs.items()}
+    return _bounded("runs", max(errors.values()), CARRIED, **errors)
+
+
+def _bounded(name: str, largest: float, bound: float, **details: Any) -> dict[str, Any]:
+    if not largest <= bound:
+        raise ExportError(f"parity {name}: the error is {largest:.2e}, the bound {bound:.0e} ({details})")
+    return {"error": largest, "bound": bound, **details}

@@ -1,0 +1,37 @@
+"""``motet bench``: how fast the models run on this machine."""
+
+import importlib
+import importlib.util
+import json
+
+import click
+
+from motet.bench import Row, control_figures, rows
+from motet.models import load
+
+
+@click.command()
+@click.option("--bundle", default="cmu-control", show_default=True, help="Name or path of a bundle.")
+@click.option("--threads", default=1, show_default=True, help="Threads of one call of a graph.")
+@click.option("--seconds", default=1.0, show_default=True, help="How long to measure each figure.")
+@click.option("--json", "as_json", is_flag=True, help="Print a list of rows.")
+def bench(bundle: str, threads: int, seconds: float, as_json: bool) -> None:
+    """Measure a bundle's speed, beside torch eager where torch is installed."""
+    model = load(bundle, threads)
+    figures = control_figures(model, seconds)
+    baseline = None
+    if importlib.util.find_spec("torch"):
+        # by name: the runtime does not depend on the training package
+        eager = importlib.import_module("motet_train.eager").control_model(model.manifest, threads)
+        baseline = control_figures(eager, seconds)
+    table = rows(figures, baseline)
+    click.echo(json.dumps([row.to_json() for row in table]) if as_json else "\n".join(map(_line, table)))
+
+
+def _line(row: Row) -> str:
+    text = f"{row.name:<28} {row.value:>12,.1f} {row.unit:<10}"
+    return text if row.baseline is None else f"{text} torch eager {row.baseline:>12,.1f}" + _ratio(row)
+
+
+def _ratio(row: Row) -> str:
+    return "" if row.ratio is None else f"  x{row.ratio:.2f}"

@@ -1,0 +1,57 @@
+"""The motion contract of a bundle: which channels, in which units, at which frame rate a model takes and gives."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from motet.errors import BundleError, MotionError
+from motet.motion import Motion
+from motet.rotations import Array
+from motet.skeleton import Skeleton
+
+
+@dataclass(frozen=True, eq=False)
+class MotionContract:
+    """Channels (D names), units (D), fps, mean and std of the training data (D,) and the skeleton for display."""
+
+    channels: tuple[str, ...]
+    units: tuple[str, ...]
+    fps: float
+    mean: Array
+    std: Array
+    skeleton: Skeleton
+
+    def motion(self, frames: ArrayLike) -> Motion:
+        """Frames (T, D) of a model as a motion."""
+        return Motion(np.asarray(frames, dtype=np.float64), self.channels, self.units, self.fps, self.skeleton)
+
+    def frames(self, motion: Motion) -> Array:
+        """The frames (T, D) float64 of a motion with the contract's channels, units and frame rate.
+
+        MotionError names the channels that the motion lacks.
+        """
+        return motion.select(self.channels, self.units).resample(self.fps).values
+
+    def to_json(self) -> dict[str, Any]:
+        """A JSON object; :meth:`from_json` is the inverse."""
+        return {
+            "channels": list(self.channels),
+            "units": list(self.units),
+            "fps": self.fps,
+            "mean": [round(float(value), 9) for value in self.mean],
+            "std": [round(float(value), 9) for value in self.std],
+            "skeleton": self.skeleton.to_json(),
+        }
+
+    @staticmethod
+    def from_json(data: Mapping[str, Any]) -> "MotionContract":
+        """Read what :meth:`to_json` wrote; BundleError where it is no contract."""
+        try:
+            mean, std = (np.array(data[key], dtype=np.float64) for key in ("mean", "std"))
+            channels, units = tuple(data["channels"]), tuple(data["units"])
+            return MotionContract(channels, units, float(data["fps"]), mean, std, Skeleton.from_json(data["skeleton"]))
+        except (KeyError, TypeError, ValueError, MotionError) as error:
+            raise BundleError(f"no motion contract: {error}") from error

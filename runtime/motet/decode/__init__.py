@@ -1,0 +1,1 @@
+"""Decoding loops: plain numpy over encoder and step graphs."""

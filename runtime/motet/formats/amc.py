@@ -1,0 +1,225 @@
+"""AMC motion with its ASF skeleton (Acclaim), the format of the CMU motion capture database."""
+
+import re
+from collections.abc import Iterator
+from contextlib import suppress
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+
+from motet.errors import FormatError
+from motet.files import check_place, write_whole
+from motet.formats.asf import CMU_METRES, ROOT, Asf, read_skeleton, write_skeleton
+from motet.formats.text import numbers, plain_names, read_text
+from motet.formats.writable import ANGLES, TRANSLATIONS, with_names, with_still_offsets
+from motet.kinematics import skeleton_of
+from motet.motion import Motion
+from motet.rotations import Array
+from motet.skeleton import Joint
+
+CMU_FPS = 120.0
+FPS_COMMENT = "# fps "
+EACH_LINE = r".+\n?|\n"
+"""Finds one line after the other: a file need not be split as a whole for the sake of its first lines."""
+
+FORBIDDEN = r"[\s#]|^(?=\d+$)|^(?=:)"
+"""What a bone's name cannot hold: blanks, comments; and it is neither a number nor a keyword."""
+
+Layout = list[tuple[str, int]]
+
+
+def read(path: str | Path, asf: str | Path | None = None, fps: float | None = None, partial: bool = False) -> Motion:
+    """Read an AMC file and the ASF file of its skeleton.
+
+    asf: the skeleton; if not given, the file of the same stem, else of the same subject (``39.asf`` for
+        ``39_14.amc``), else the only ASF file, looked for beside the motion and then in ``../asf``.
+    fps: AMC does not say. If not given: what the file's own comment ``# fps 60`` says (motet writes one), else 120,
+        the rate of nearly all of CMU.
+    partial: take the whole frames of a file that breaks off within its last one, which is refused otherwise.
+    Channels come in the file's order of bones, units "length" for translations, "deg" or "rad" as in the file.
+    FormatError names the file, and the line where it breaks off or does not fit the skeleton.
+    """
+    path = Path(path)
+    asf = Path(asf) if asf is not None else _find_asf(path)
+    skeleton = read_skeleton(asf)
+    text = read_text(path)
+    header, unit, said_fps = _header(path, text, skeleton)
+    layout = _layout(path, _frame_lines(text, header), skeleton.dofs)
+    values = _values(path, text, header, layout, partial)
+    channels = [(bone, dof) for bone, _ in layout for dof in skeleton.dofs[bone]]
+    names = tuple(f"{bone}.{dof}" for bone, dof in channels)
+    units = tuple("length" if dof[0] == "t" else unit for _, dof in channels)
+    return Motion(values, names, units, fps or said_fps, skeleton.skeleton)
+
+
+def _find_asf(path: Path) -> Path:
+    stems = list(dict.fromkeys([path.stem, path.stem.split("_")[0]]))
+    for folder in (path.parent, path.parent.parent / "asf"):
+        found = sorted(folder.iterdir()) if folder.is_dir() else []
+        by_stem = {file.stem: file for file in found if file.suffix.lower() == ".asf"}
+        for stem in stems:
+            if stem in by_stem:
+                return by_stem[stem]
+        if len(by_stem) == 1:
+            return next(iter(by_stem.values()))
+    names = " or ".join(f"{stem}.asf" for stem in stems)
+    raise FormatError(path, f"its skeleton is missing: no {names}, nor a single .asf, beside it or in ../asf")
+
+
+def _header(path: Path, text: str, asf: Asf) -> tuple[int, str, float]:
+    """The number of lines before the first frame, the unit of angles and the frame rate."""
+    unit, fps, line = asf.angle, CMU_FPS, -1
+    for line, content in enumerate(re.finditer(EACH_LINE, text)):
+        word = content[0].strip().lower()
+        if word in (":degrees", ":radians"):
+            unit = word[1:4]
+        elif word.startswith(FPS_COMMENT):
+            fps = numbers([word.removeprefix(FPS_COMMENT)], path, line + 1)[0]
+        elif word and word[0] not in "#:":
+            return line, unit, fps
+    return line + 1, unit, fps
+
+
+def _frame_lines(text: str, header: int) -> Iterator[tuple[int, list[str]]]:
+    """Every line with words behind the header, with its number."""
+    for line, content in enumerate(re.finditer(EACH_LINE, text), start=1):
+        words = content[0].split("#")[0].split()
+        if words and line > header:
+            yield line, words
+
+
+def _layout(path: Path, lines: Iterator[tuple[int, list[str]]], dofs: dict[str, tuple[str, ...]]) -> Layout:
+    """The first frame's bones, each with its number of values; those of the skeleton if there is no frame."""
+    line, words = next(lines, (0, [""]))
+    if not words[0]:
+        return [(bone, len(names)) for bone, names in dofs.items()]
+    if not _is_frame_number(words):
+        raise FormatError(path, f"a frame begins with its number alone on a line, not {' '.join(words)!r}", line)
+    layout: dict[str, int] = {}
+    for line, words in lines:
+        if _is_frame_number(words):
+            break
+        if words[0] in layout:
+            raise FormatError(path, f"bone {words[0]!r} comes twice in a frame", line)
+        if words[0] not in dofs:
+            raise FormatError(path, f"bone {words[0]!r} has no degrees of freedom in the skeleton file", line)
+        layout[words[0]] = len(dofs[words[0]])
+    return list(layout.items())
+
+
+def _is_frame_number(words: list[str]) -> bool:
+    return len(words) == 1 and words[0].isdigit()
+
+
+def _values(path: Path, text: str, header: int, layout: Layout, partial: bool) -> Array:
+    values = _values_at_once(text, header, layout)
+    if values is not None:
+        return values
+    try:
+        return _values_by_line(path, _frame_lines(text, header), layout)
+    except FormatError:
+        frames = [match.start() for match in re.finditer(r"^\d+\s*$", text, re.MULTILINE)]
+        if not (partial and frames):
+            raise
+    return _values_by_line(path, _frame_lines(text[: frames[-1]], header), layout)
+
+
+def _values_at_once(text: str, header: int, layout: Layout) -> Array | None:
+    """All values (T, D) of a file whose frames are all alike, else None: several times as fast as by line."""
+    words = "".join(text.split("\n", header)[header:]).split()
+    width = 1 + sum(1 + count for _, count in layout)
+    frames, rest = divmod(len(words), width)
+    if rest or not all(map(str.isdigit, words[::width])):
+        return None
+    columns: list[list[str]] = []
+    here = 1
+    for bone, count in layout:
+        if words[here::width] != [bone] * frames:
+            return None
+        columns += [words[column::width] for column in range(here + 1, here + 1 + count)]
+        here += 1 + count
+    # Python would read 1_000, which no other program does
+    if "_" in text and any("_" in word for column in columns for word in column):
+        return None
+    values = np.empty((frames, len(columns)))
+    with suppress(ValueError):
+        for i, column in enumerate(columns):
+            values[:, i] = np.fromiter(map(float, column), np.float64, frames)
+        if np.isfinite(values).all():
+            return values
+    return None
+
+
+def _values_by_line(path: Path, lines: Iterator[tuple[int, list[str]]], layout: Layout) -> Array:
+    """All values (T, D), with every line checked against the first frame."""
+    rows: list[list[float]] = []
+    expected: Layout = []
+    line = 0
+    for line, words in lines:
+        if _is_frame_number(words):
+            _refuse_rest(path, expected, line)
+            expected = layout[::-1]
+            rows.append([])
+            continue
+        if not expected or words[0] != expected[-1][0]:
+            wanted = f"bone {expected[-1][0]!r}" if expected else "a frame number"
+            raise FormatError(path, f"{words[0]!r} where the order of the first frame has {wanted}", line)
+        bone, count = expected.pop()
+        if len(words) - 1 != count:
+            raise FormatError(path, f"bone {bone!r} needs {count} values, not {len(words) - 1}", line)
+        rows[-1].extend(numbers(words[1:], path, line))
+    _refuse_rest(path, expected, line)
+    return np.array(rows).reshape(len(rows), sum(count for _, count in layout))
+
+
+def _refuse_rest(path: Path, expected: Layout, line: int) -> None:
+    if expected:
+        raise FormatError(path, f"the frame breaks off here: it lacks bone {expected[-1][0]!r}", line)
+
+
+def write(path: str | Path, motion: Motion) -> None:
+    """Write ``path`` and beside it, with the same stem, the ASF file of the skeleton; both are replaced if there.
+
+    The frame rate goes into a comment that :func:`read` understands. The root becomes "root"; characters that the
+    format cannot hold become ``_``. Values are written without loss, translations in the skeleton's unit; a skeleton
+    that knows its unit is written in CMU's, the only one that the format can name.
+    FormatError for channels other than Euler angles and translations, and for a joint besides the root that really
+    moves within its parent's frame; MotionError for a motion without skeleton.
+    """
+    path = check_place(path)
+    motion, moving = with_still_offsets(path, motion)
+    if moving:
+        raise FormatError(path, f"only the root can move in an AMC file, not {', '.join(moving)}")
+    if skeleton_of(motion).metres_per_unit not in (None, CMU_METRES):
+        motion = motion.scaled(CMU_METRES)
+    names = plain_names([ROOT, *skeleton_of(motion).names[1:]], FORBIDDEN)
+    motion = with_names(motion, names)
+    joints = skeleton_of(motion).joints
+    asf = Asf(skeleton_of(motion), {joint.name: dofs for joint in joints if (dofs := _dofs(motion, joint))}, "deg")
+    text = _text(motion, asf.dofs)
+    write_skeleton(path.with_suffix(".asf"), asf)
+    write_whole(path, text)
+
+
+def _dofs(motion: Motion, joint: Joint) -> tuple[str, ...]:
+    """The joint's channels in the motion's order if the rotation's order allows it: the first one turns first."""
+    prefix = f"{joint.name}."
+    dofs = tuple(name.removeprefix(prefix) for name in motion.channels if name.rpartition(".")[0] == joint.name)
+    turns = [f"r{axis}" for axis in reversed(joint.order) if f"r{axis}" in dofs]
+    if [dof for dof in dofs if dof in ANGLES] == turns:
+        return dofs
+    return (*(dof for dof in dofs if dof in TRANSLATIONS), *turns)
+
+
+def _text(motion: Motion, dofs: dict[str, tuple[str, ...]]) -> str:
+    bones = list(dict.fromkeys(channel.rpartition(".")[0] for channel in motion.channels))
+    unit = "rad" if "rad" in motion.units and "deg" not in motion.units else "deg"
+    channels = tuple(f"{bone}.{dof}" for bone in bones for dof in dofs[bone])
+    values = motion.select(channels, tuple("length" if name[-2] == "t" else unit for name in channels)).values
+    lines = [f"{FPS_COMMENT}{motion.fps!r}", ":FULLY-SPECIFIED", ":RADIANS" if unit == "rad" else ":DEGREES"]
+    for frame, row in enumerate(values.tolist(), start=1):
+        words = map(repr, row)
+        lines.append(str(frame))
+        lines += [" ".join([bone, *islice(words, len(dofs[bone]))]) for bone in bones]
+    return "\n".join([*lines, ""])

@@ -1,0 +1,72 @@
+"""CSV: a table of channels for spreadsheets and other programs. The skeleton is not kept.
+
+A comment ``# motet motion, fps 120.0``, a header ``time,root.tx [length],root.rx [deg],...`` and one row a frame, its
+time in seconds first. A table from elsewhere needs the header and, where it has no such comment, evenly spaced times.
+"""
+
+import csv
+import io
+import re
+from pathlib import Path
+
+import numpy as np
+
+from motet.errors import FormatError, MotionError
+from motet.files import write_whole
+from motet.formats.text import numbers, read_text
+from motet.motion import Motion
+
+TIME = "time"
+COMMENT = "# motet motion, fps "
+
+
+def read(path: str | Path) -> Motion:
+    """Read a table: values as they are written, no skeleton. FormatError names file and line of what is wrong."""
+    path = Path(path)
+    fps, header, rows = None, None, []
+    reader = csv.reader(io.StringIO(read_text(path)))
+    for row in reader:
+        if not row or row[0].startswith("#"):
+            fps = _said_fps(path, ",".join(row), reader.line_num) or fps
+        elif header is None:
+            header = row
+        elif len(row) == len(header):
+            rows.append(numbers(row, path, reader.line_num))
+        else:
+            raise FormatError(path, f"a row has {len(header)} values, this one {len(row)}", reader.line_num)
+    names, units = _columns(path, header or [])
+    table = np.array(rows).reshape(len(rows), 1 + len(names))
+    try:
+        return Motion(table[:, 1:], names, units, fps or _fps_of(path, table[:, 0]))
+    except MotionError as error:
+        raise FormatError(path, str(error)) from error
+
+
+def _said_fps(path: Path, text: str, line: int) -> float | None:
+    return numbers([text.removeprefix(COMMENT)], path, line)[0] if text.startswith(COMMENT) else None
+
+
+def _columns(path: Path, header: list[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    found = [re.fullmatch(r"(.+) \[(.+)\]", title) for title in header[1:]]
+    if header[:1] != [TIME] or None in found:
+        raise FormatError(path, "the header must be 'time,CHANNEL [UNIT],...', as in 'time,root.tx [length]'")
+    return tuple(match[1] for match in found if match), tuple(match[2] for match in found if match)
+
+
+def _fps_of(path: Path, times: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> float:
+    steps = np.diff(times)
+    if not len(steps) or steps.min() <= 0 or np.ptp(steps) > 0.01 * steps.mean():
+        raise FormatError(path, f"without evenly spaced times the frame rate needs a comment line '{COMMENT}30'")
+    return float(1 / steps.mean())
+
+
+def write(path: str | Path, motion: Motion) -> None:
+    """Write a table; values come back exactly, the skeleton does not. OutputError if it cannot be written."""
+    text = io.StringIO()
+    text.write(f"{COMMENT}{motion.fps!r}\n")
+    writer = csv.writer(text, lineterminator="\n")
+    titles = (f"{name} [{unit}]" for name, unit in zip(motion.channels, motion.units, strict=True))
+    writer.writerow([TIME, *titles])
+    for frame, row in enumerate(motion.values.tolist()):
+        writer.writerow([repr(frame / motion.fps), *map(repr, row)])
+    write_whole(path, text.getvalue())

@@ -1,0 +1,190 @@
+"""Write a motion as binary glTF 2.0: one node per joint, an animation, and a simple body skinned to the joints.
+
+Axes are glTF's and motet's own: y up, right-handed. Lengths are metres where the skeleton says how long its unit is,
+else its own unit. Times are seconds from 0. A joint is animated where it turns or moves, the root always. The rest
+pose of the file is the skeleton's (every angle 0). The body makes the file visible in any viewer and names the joints
+in a skin, by which viewers and Blender know them as bones.
+"""
+
+import json
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motet.errors import MotionError
+from motet.files import write_whole
+from motet.formats.body import COLOURS, Body, Bone
+from motet.kinematics import local_rotations, local_translations, skeleton_of
+from motet.motion import Motion
+from motet.rotations import Array, rotmat_to_quat
+from motet.skeleton import Skeleton
+
+FLOAT, UINT8, UINT16, UINT32 = 5126, 5121, 5123, 5125
+"""glTF's numbers for the types of components."""
+
+SHAPES: dict[tuple[int, ...], str] = {(): "SCALAR", (3,): "VEC3", (4,): "VEC4", (4, 4): "MAT4"}
+
+VERTICES, INDICES = 34962, 34963
+"""glTF's numbers for what a buffer of a mesh holds."""
+
+AROUND = 10
+"""Corners around a bone of the body."""
+
+
+class _Buffer:
+    """The binary part of the file: arrays put in, each as an accessor with its own view."""
+
+    def __init__(self) -> None:
+        self.content = bytearray()
+        self.views: list[dict[str, Any]] = []
+        self.accessors: list[dict[str, Any]] = []
+
+    def add(self, values: NDArray[Any], kind: int = FLOAT, target: int = 0, **more: Any) -> int:
+        """Index of the new accessor of values (N, ...) of a component type, for a use in a mesh or none."""
+        types = {FLOAT: "<f4", UINT8: "<u1", UINT16: "<u2", UINT32: "<u4"}
+        content = np.ascontiguousarray(values, dtype=types[kind])
+        view = {"buffer": 0, "byteOffset": len(self.content), "byteLength": content.nbytes}
+        self.views.append(view | ({"target": target} if target else {}))
+        self.content += content.tobytes() + bytes(-content.nbytes % 4)
+        shape = SHAPES[content.shape[1:]]
+        accessor = {"bufferView": len(self.views) - 1, "componentType": kind, "count": len(content), "type": shape}
+        self.accessors.append(accessor | more)
+        return len(self.accessors) - 1
+
+    def add_bounded(self, values: NDArray[Any], target: int = 0) -> int:
+        """The same for floats (N, ...) with their least and greatest values, which times and corners need."""
+        single = np.asarray(values, dtype="<f4").reshape(len(values), -1)
+        least, greatest = single.min(axis=0).tolist(), single.max(axis=0).tolist()
+        return self.add(values, FLOAT, target, min=least, max=greatest)
+
+
+def write(path: str | Path, motion: Motion) -> None:
+    """Write a motion; MotionError for one without skeleton or frames, OutputError if the file cannot be written."""
+    skeleton = skeleton_of(motion)
+    if not len(motion):
+        raise MotionError("this motion has no frames: glTF cannot hold an animation without any")
+    if skeleton.metres_per_unit is not None:
+        motion = motion.scaled(1.0)
+        skeleton = skeleton_of(motion)
+    buffer = _Buffer()
+    joints = len(skeleton.joints)
+    document = {
+        "asset": {"version": "2.0", "generator": "motet", "extras": _facts(motion, skeleton)},
+        "scene": 0,
+        "scenes": [{"nodes": [0, joints]}],
+        "nodes": [*_joint_nodes(skeleton), {"name": "body", "mesh": 0, "skin": 0}],
+        "animations": [_animation(buffer, motion, skeleton)],
+        "skins": [_skin(buffer, skeleton)],
+        "meshes": [{"name": "body", "primitives": [_body(buffer, skeleton)]}],
+        "materials": [{"name": "body", "pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 0.6}}],
+        "bufferViews": buffer.views,
+        "accessors": buffer.accessors,
+        "buffers": [{"byteLength": len(buffer.content)}],
+    }
+    write_whole(path, _container(document, bytes(buffer.content)))
+
+
+def _facts(motion: Motion, skeleton: Skeleton) -> dict[str, Any]:
+    return {"fps": motion.fps, "frames": len(motion), "length_unit": "m" if skeleton.metres_per_unit else "unknown"}
+
+
+def _container(document: dict[str, Any], content: bytes) -> bytes:
+    text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
+    text += b" " * (-len(text) % 4)
+    head = struct.pack("<4sII", b"glTF", 2, 12 + 8 + len(text) + 8 + len(content))
+    return head + struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(content), b"BIN\0") + content
+
+
+def _joint_nodes(skeleton: Skeleton) -> list[dict[str, Any]]:
+    nodes: list[dict[str, Any]] = []
+    for joint, children in zip(skeleton.joints, skeleton.children, strict=True):
+        node: dict[str, Any] = {"name": joint.name, "translation": list(joint.offset)}
+        nodes.append(node | ({"children": list(children)} if children else {}))
+    return nodes
+
+
+def _animation(buffer: _Buffer, motion: Motion, skeleton: Skeleton) -> dict[str, Any]:
+    times = buffer.add_bounded(np.arange(len(motion)) / motion.fps)
+    turns, moves = _continuous(rotmat_to_quat(local_rotations(motion))), local_translations(motion)
+    samplers: list[dict[str, Any]] = []
+    channels: list[dict[str, Any]] = []
+    for i, joint in enumerate(skeleton.joints):
+        tracks = {"rotation": (turns[:, i], [0, 0, 0, 1]), "translation": (moves[:, i], joint.offset)}
+        for name, (track, rest) in tracks.items():
+            if i == 0 or np.any(track != rest):
+                channels.append({"sampler": len(samplers), "target": {"node": i, "path": name}})
+                samplers.append({"input": times, "output": buffer.add(track), "interpolation": "LINEAR"})
+    return {"name": "motion", "channels": channels, "samplers": samplers}
+
+
+def _continuous(quats: Array) -> Array:
+    """The same rotations (T, ..., 4) with signs by which each quaternion is near the one before it."""
+    flips = np.sum(quats[1:] * quats[:-1], axis=-1, keepdims=True) < 0
+    signs = np.cumprod(np.where(flips, -1.0, 1.0), axis=0)
+    return np.concatenate([quats[:1], quats[1:] * signs])
+
+
+def _skin(buffer: _Buffer, skeleton: Skeleton) -> dict[str, Any]:
+    inverse = np.tile(np.eye(4), (len(skeleton.joints), 1, 1))
+    inverse[:, 3, :3] = -_rest(skeleton)  # glTF keeps columns, so the translation is the last row here
+    return {"joints": list(range(len(skeleton.joints))), "skeleton": 0, "inverseBindMatrices": buffer.add(inverse)}
+
+
+def _rest(skeleton: Skeleton) -> Array:
+    """Positions of the joints (J, 3) in the file's rest pose: as the skeleton's, but with the root at its offset."""
+    rest: Array = skeleton.rest_positions + skeleton.offsets[0]
+    return rest
+
+
+def _body(buffer: _Buffer, skeleton: Skeleton) -> dict[str, Any]:
+    """The primitive of the body: a tapered prism for each bone, whose ends move with the bone's carriers."""
+    body = Body(skeleton)
+    points = body.points(_rest(skeleton) / body.height)
+    prisms = [_prism(bone, points[bone.start], points[bone.end]) for bone in body.bones]
+    corners, normals = (np.concatenate(arrays) for arrays in zip(*prisms, strict=True))
+    joints = np.zeros((len(corners), 4))
+    joints[:, 0] = np.repeat([bone.carriers for bone in body.bones], AROUND + 1)
+    colours = np.repeat([COLOURS[bone.side] for bone in body.bones], 2 * AROUND + 2, axis=0)
+    triangles = _triangles() + (2 * AROUND + 2) * np.arange(len(body.bones))[:, None]
+    attributes = {
+        "POSITION": buffer.add_bounded(corners * body.height, VERTICES),
+        "NORMAL": buffer.add(normals, FLOAT, VERTICES),
+        "COLOR_0": buffer.add(_linear(colours), FLOAT, VERTICES),
+        "JOINTS_0": buffer.add(joints, UINT16, VERTICES),
+        "WEIGHTS_0": buffer.add(np.tile([1.0, 0, 0, 0], (len(corners), 1)), FLOAT, VERTICES),
+    }
+    return {"attributes": attributes, "indices": buffer.add(triangles.reshape(-1), UINT32, INDICES), "material": 0}
+
+
+def _linear(colours: NDArray[Any]) -> Array:
+    """sRGB colours (N, 3) of 0 to 255 to the linear ones of glTF."""
+    linear: Array = (colours / 255) ** 2.2
+    return linear
+
+
+def _prism(bone: Bone, start: Array, end: Array) -> tuple[Array, Array]:
+    """Corners and normals (2 * AROUND + 2, 3): tip and ring at the start, ring and tip at the end."""
+    axis = end - start
+    length = float(np.linalg.norm(axis))
+    axis = axis / length if length else np.array([0.0, 1.0, 0.0])
+    side = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    side /= np.linalg.norm(side)
+    angles = np.arange(AROUND)[:, None] * 2 * np.pi / AROUND
+    ring = np.cos(angles) * side + np.sin(angles) * np.cross(axis, side)
+    thick, thin = bone.start_radius, bone.end_radius
+    corners = [start - 0.7 * thick * axis, *(start + thick * ring), *(end + thin * ring), end + 0.7 * thin * axis]
+    return np.array(corners), np.array([-axis, *ring, *ring, axis])
+
+
+def _triangles() -> NDArray[np.int64]:
+    """Corners of the triangles of a prism, counterclockwise from outside."""
+    now = np.arange(AROUND)
+    after = (now + 1) % AROUND
+    low, high, tip = now + 1, now + 1 + AROUND, 2 * AROUND + 1
+    low_after, high_after = after + 1, after + 1 + AROUND
+    cap, lid = np.stack([0 * now, low_after, low]), np.stack([0 * now + tip, high, high_after])
+    wall = [np.stack([low, low_after, high]), np.stack([low_after, high_after, high])]
+    return np.concatenate([part.T.reshape(-1) for part in (cap, *wall, lid)])

@@ -1,0 +1,84 @@
+"""Write a motion as one HTML page that plays it: no network, no other file, any browser.
+
+The page is ``player.html`` with the figures put in as JSON. A figure holds the path of its root as float32 (T, 3) and
+its points relative to the root as int16 (T, P, 3) in steps of ``step`` body heights, both base64 of little-endian
+bytes. A step is 0.0001 heights (0.2 mm of a person) unless a point is further than 3.2 heights from the root.
+"""
+
+import json
+import math
+import re
+from base64 import b64encode
+from collections.abc import Sequence
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from motet.errors import MotionError
+from motet.files import write_whole
+from motet.formats.body import Bone
+from motet.formats.figure import figure_of
+from motet.motion import Motion
+
+Captions = Sequence[tuple[float, str]]
+"""What is shown when: (start in seconds, text), each until the next one starts."""
+
+STEP = 1e-4
+
+
+def write(path: str | Path, motion: Motion, captions: Captions | None = None, title: str | None = None) -> None:
+    """Write the page of one motion, with captions that change with time and a title (the file's name if None).
+
+    MotionError for a motion without skeleton or frames, OutputError if the file cannot be written.
+    """
+    title = Path(path).stem if title is None else title
+    write_whole(path, page([figure_data(motion, "", captions)], title))
+
+
+def write_many(path: str | Path, motions: Sequence[Motion], names: Sequence[str], title: str | None = None) -> None:
+    """Write one page of several motions side by side on one clock, each with its name; errors as :func:`write`."""
+    if not motions or len(motions) != len(names):
+        raise MotionError(f"a page needs motions and a name for each, not {len(motions)} and {len(names)} names")
+    title = Path(path).stem if title is None else title
+    write_whole(path, page([figure_data(m, name) for m, name in zip(motions, names, strict=True)], title))
+
+
+def page(figures: list[dict[str, Any]], title: str) -> str:
+    """The HTML of the figures, each from :func:`figure_data`."""
+    data = json.dumps({"figures": figures}, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    parts = {"TITLE": escape(title), "DATA": data}
+    template = (files("motet.formats") / "player.html").read_text(encoding="utf-8")
+    return re.sub(r"\{\{(TITLE|DATA)\}\}", lambda place: parts[place[1]], template)
+
+
+def figure_data(motion: Motion, name: str, captions: Captions | None = None) -> dict[str, Any]:
+    """A motion as the player reads it, ready for JSON; see the head of this module."""
+    figure = figure_of(motion)
+    root = figure.points[:, 0].astype("<f4")
+    relative = figure.points - root[:, None]
+    step = max(STEP, float(np.abs(relative).max()) / 32767)
+    return {
+        "name": name,
+        "fps": figure.fps,
+        "frames": len(motion),
+        "heading": figure.heading,
+        "bones": [_bone(bone) for bone in figure.bones],
+        "captions": _checked(captions or ()),
+        "step": step,
+        "root": b64encode(root.tobytes()).decode(),
+        "points": b64encode(np.round(relative / step).astype("<i2").tobytes()).decode(),
+    }
+
+
+def _bone(bone: Bone) -> list[int | float | str]:
+    return [bone.start, bone.end, round(bone.start_radius, 4), round(bone.end_radius, 4), bone.side]
+
+
+def _checked(captions: Captions) -> list[list[float | str]]:
+    starts = [start for start, _ in captions]
+    if not all(math.isfinite(start) for start in starts) or starts != sorted(starts):
+        raise MotionError(f"captions must start at seconds that do not decrease, not at {starts}")
+    return [[float(start), text] for start, text in captions]

@@ -1,0 +1,80 @@
+"""The exporter and the ladder on a model small enough to see through."""
+
+import numpy as np
+import onnx
+import pytest
+import torch
+from torch import Tensor, nn
+
+from motet.graph import GraphSpec, OnnxGraph, TensorSpec
+from motet_export.exporter import MAX_IR_VERSION, OPSET, ExportError, export_graph
+from motet_export.parity import check_carried, check_one_step, error
+from motet_train.torch_graph import TorchGraph
+
+SPEC = GraphSpec(
+    inputs=(TensorSpec("state", ("batch", 4)), TensorSpec("push", ("batch", 3))),
+    outputs=(TensorSpec("frame", ("batch", 2)), TensorSpec("next_state", ("batch", 4))),
+    feedback={"state": "next_state"},
+)
+
+
+class Cell(nn.Module):
+    """A leaky recurrent unit with an output."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        torch.manual_seed(0)
+        self.turn, self.push, self.out = nn.Linear(4, 4), nn.Linear(3, 4), nn.Linear(4, 2)
+
+    def forward(self, state: Tensor, push: Tensor) -> tuple[Tensor, Tensor]:
+        state = torch.tanh(self.turn(state) + self.push(push))
+        return self.out(state), state
+
+
+def exported(cell: Cell) -> bytes:
+    return export_graph(cell, SPEC, {"motet": "test", "role": "step"})
+
+
+def test_a_graph_is_dynamic_annotated_and_stripped() -> None:
+    data = exported(Cell())
+    model = onnx.load_from_string(data)
+    assert model.ir_version <= MAX_IR_VERSION
+    assert [(i.domain, i.version) for i in model.opset_import] == [("", OPSET)]
+    assert {p.key: p.value for p in model.metadata_props} == {"motet": "test", "role": "step"}
+    assert not any(node.metadata_props or node.doc_string for node in model.graph.node)
+    assert b".py" not in data
+    assert data == exported(Cell())
+
+
+def test_a_graph_computes_what_torch_computes_at_any_batch() -> None:
+    cell = Cell()
+    pair = OnnxGraph(exported(cell), SPEC), TorchGraph(cell, SPEC)
+    assert check_one_step("step", *pair)["error"] <= 1e-6
+    assert check_carried(*pair)["error"] <= 1e-5
+
+
+def test_another_model_fails_the_ladder() -> None:
+    cell = Cell()
+    graph = OnnxGraph(exported(cell), SPEC)
+    with torch.no_grad():
+        cell.turn.weight += 1e-3
+    with pytest.raises(ExportError, match="one_step"):
+        check_one_step("step", graph, TorchGraph(cell, SPEC))
+    with pytest.raises(ExportError, match="carried"):
+        check_carried(graph, TorchGraph(cell, SPEC))
+
+
+def test_the_contract_is_the_first_rung() -> None:
+    cell = Cell()
+    other = GraphSpec(SPEC.inputs, SPEC.outputs)
+    with pytest.raises(ExportError, match="contracts differ"):
+        check_one_step("step", OnnxGraph(exported(cell), SPEC), TorchGraph(cell, other))
+
+
+def test_error_is_relative_to_large_outputs_and_refuses_what_is_not_finite() -> None:
+    assert error({"a": np.array([0.3, 0.2])}, {"a": np.array([0.3, 0.1])}) == pytest.approx(0.1)
+    assert error({"a": np.array([30.0, -30.6])}, {"a": np.array([30.0, -30.0])}) == pytest.approx(0.02)
+    with pytest.raises(ExportError, match="not finite"):
+        error({"a": np.array([np.nan])}, {"a": np.array([0.0])})
+    with pytest.raises(ExportError, match="shape"):
+        error({"a": np.zeros(2)}, {"a": np.zeros(3)})

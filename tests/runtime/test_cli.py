@@ -1,0 +1,168 @@
+"""The command line as a user meets it: what it writes, and what it says when it cannot."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+from motet.bundle import list_bundles
+from motet.cli import main
+from motet.formats import read_motion
+from motet.kinematics import positions
+
+WALK = "39_14.amc"
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+def test_a_script_becomes_a_motion_that_travels(tmp_path: Path) -> None:
+    out = tmp_path / "out.bvh"
+    result = run("control", "walk 3s, walk>run 1s, run 3s", "-o", out)
+    assert (result.exit_code, result.stdout) == (0, f"{out}: 280 frames at 40 fps, 7 s\n")
+    motion = read_motion(out)
+    root = positions(motion)[:, 0]
+    assert len(motion) == 280
+    speed = np.linalg.norm(np.diff(root[:, [0, 2]], axis=0), axis=1) * motion.fps  # metres a second
+    assert 0.8 < np.median(speed[:100]) < 2
+    assert 2 < np.median(speed[-80:]) < 5
+    again = tmp_path / "again.bvh"
+    run("control", "walk 3s, walk>run 1s, run 3s", "-o", again)
+    assert again.read_bytes() == out.read_bytes()
+
+
+@pytest.mark.parametrize("extension", ["amc", "bvh", "npz", "csv", "html", "gif", "glb"])
+def test_control_writes_every_format(tmp_path: Path, extension: str) -> None:
+    out = tmp_path / f"out.{extension}"
+    assert run("control", "walk .5s", "-o", out, "--in-place").exit_code == 0
+    assert out.stat().st_size > 1000
+
+
+def test_control_starts_from_a_motion_and_varies(tmp_path: Path, clips: Path) -> None:
+    frames = []
+    for number, options in enumerate(
+        ([], ["--start", clips / WALK], ["--start", "bend"], ["--variety", 1, "--seed", 5])
+    ):
+        out = tmp_path / f"{number}.npz"
+        assert run("control", "walk 1s", "-o", out, *options).exit_code == 0
+        frames.append(read_motion(out).values)
+    for i in range(len(frames)):
+        for j in range(i):
+            assert np.abs(frames[i][:, 3:] - frames[j][:, 3:]).max() > 1
+
+
+def test_convert_cuts_resamples_scales_and_mirrors(tmp_path: Path, clips: Path) -> None:
+    out = tmp_path / "out.bvh"
+    assert run("convert", clips / WALK, out, "--from", 1, "--to", 2, "--fps", 30, "--unit", "cm").exit_code == 0
+    motion, source = read_motion(out), read_motion(clips / WALK)
+    assert (len(motion), round(motion.fps, 6)) == (30, 30.0)
+    np.testing.assert_allclose(positions(motion)[0, 0], positions(source)[120, 0] * 2.54 / 0.45, atol=1e-3)
+    mirrored = tmp_path / "mirrored.npz"
+    assert run("convert", clips / WALK, mirrored, "--mirror").exit_code == 0
+    other = read_motion(mirrored)
+    column = [m.channels.index(name) for m, name in ((other, "lfemur.rx"), (source, "rfemur.rx"))]
+    np.testing.assert_allclose(other.values[:, column[0]], source.values[:, column[1]], atol=1e-3)
+
+
+def test_view_prints_the_page_it_wrote(clips: Path) -> None:
+    result = run("view", clips / WALK)
+    assert result.exit_code == 0
+    assert Path(result.stdout.strip()).read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+
+
+def test_bundle_commands(tmp_path: Path) -> None:
+    rows = json.loads(run("bundle", "list", "--json").stdout)
+    assert [(row["name"], row["verb"]) for row in rows] == [("cmu-control", "control")]
+    assert "cmu-control" in run("bundle", "list").stdout
+    assert json.loads(run("bundle", "info", "cmu-control", "--json").stdout)["format"] == 1
+    assert "NSF EIA-0196217" in run("bundle", "info", "cmu-control").stdout
+    assert "2 files are as the manifest lists them" in run("bundle", "verify", "cmu-control").stdout
+    assert run("bundle", "pack", "cmu-control", "-o", tmp_path / "b.zip").exit_code == 0
+    assert (tmp_path / "b.zip").read_bytes() == list_bundles()["cmu-control"].read_bytes()
+
+
+def test_bench_prints_rows() -> None:
+    rows = json.loads(run("bench", "--seconds", 0.01, "--json").stdout)
+    assert {"name", "value", "unit", "baseline", "ratio"} == set(rows[0])
+    assert all(row["value"] > 0 for row in rows)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["control", "walk 3", "-o", "{out}/a.html"], "duration in seconds"),
+        (["control", "swim 3s", "-o", "{out}/a.html"], "known are walk, run, bend"),
+        (["control", "walk 3s", "-o", "{out}/no/a.html"], "does not exist"),
+        (["control", "walk 3s", "-o", "{out}/a.xyz"], "known are .amc"),
+        (["control", "walk 3s", "-o", "{out}"], "known are .amc"),
+        (["control", "walk 3s", "-o", "{out}/a.bvh", "--bundle", "cmu"], "known names are cmu-control"),
+        (["control", "walk 3s", "-o", "{out}/a.bvh", "--start", "fly"], "known are walk, run, bend"),
+        (["control", "walk 3s", "-o", "{out}/a.bvh", "--start", "fly.amc"], "no such file"),
+        (["control", "walk 3s", "-o", "{out}/a.bvh", "--variety", "2"], "between 0 and 1"),
+        (["control", "walk 3s", "-o", "{out}/a.bvh", "--temperature", "0"], "between 0.01 and 100"),
+        (["control", "walk 3s", "-o", "{out}/a.bvh", "--seed", "-1"], "seed of 0 or more"),
+        (["convert", "{clips}/none.amc", "{out}/a.bvh"], "no such file"),
+        (["convert", "{clips}/39_14.txt", "{out}/a.bvh"], "known are .amc"),
+        (["convert", "{clips}/39_14.amc", "{out}/a.bvh", "--from", "3", "--to", "9"], "cannot cut 3 to 9 s"),
+        (["convert", "{clips}/39_14.amc", "{out}/a.bvh", "--fps", "-1"], "positive number"),
+        (["convert", "{clips}/39_14.amc", "{out}/a.bvh", "--unit", "mile"], "is not one of"),
+        (["convert", "{bad}/broken.bvh", "{out}/a.npz"], "broken.bvh, line "),
+        (["convert", "{bad}/alone.amc", "{out}/a.npz"], "skeleton is missing"),
+        (["view", "{bad}/text.bvh"], "text.bvh, line 1: "),
+        (["bundle", "verify", "{bad}"], "no manifest.json"),
+        (["bundle", "pack", "cmu-control", "-o", "{out}/b.tar"], "is a .zip"),
+        (["bundle", "info", "nothing"], "known names are cmu-control"),
+    ],
+)
+def test_bad_input_gets_one_message_and_writes_nothing(
+    arguments: list[str], said: str, tmp_path: Path, clips: Path
+) -> None:
+    out, bad = tmp_path / "out", tmp_path / "bad"
+    out.mkdir()
+    bad.mkdir()
+    (bad / "broken.bvh").write_text(
+        "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 3 Zrotation Yrotation Xrotation\n"
+        "End Site\n{\nOFFSET 0 1 0\n}\n}\n"
+        "MOTION\nFrames: 1\nFrame Time: 0.1\n1 2 x\n"
+    )
+    (bad / "text.bvh").write_text("hello")
+    (bad / "alone.amc").write_bytes((clips / WALK).read_bytes())
+    result = run(*(argument.format(out=out, clips=clips, bad=bad) for argument in arguments))
+    assert result.exit_code == 2
+    assert said in result.stderr
+    assert "Traceback" not in result.stderr
+    assert result.stdout == ""
+    assert list(out.iterdir()) == []
+
+
+def test_the_runtime_imports_neither_torch_nor_onnx() -> None:
+    heavy = "{'torch', 'onnx', 'scipy', 'matplotlib'}"
+    code = f"import motet, motet.cli.control, motet.cli.convert, sys; print(sorted({heavy} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_a_command_without_its_extra_says_how_to_get_it(tmp_path: Path) -> None:
+    """As in an environment without torch: the import system finds no torch."""
+    (tmp_path / "sitecustomize.py").write_text(
+        "import importlib.util as u; find = u.find_spec\n"
+        "u.find_spec = lambda name, *rest: None if name == 'torch' else find(name, *rest)\n"
+    )
+    code = "from motet.cli import main; main()"
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    done = subprocess.run(
+        [sys.executable, "-c", code, "train"], capture_output=True, text=True, env=environment, check=False
+    )
+    assert done.returncode == 2
+    assert "pip install 'motet[train]'" in done.stderr
+    listed = subprocess.run(
+        [sys.executable, "-c", code, "--help"], capture_output=True, text=True, env=environment, check=True
+    )
+    assert "control" in listed.stdout
+    assert "train " not in listed.stdout

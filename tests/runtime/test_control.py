@@ -1,0 +1,197 @@
+import json
+import pickle
+import threading
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import onnxruntime
+import pytest
+
+from motet.bundle import list_bundles
+from motet.control import ControlModel
+from motet.errors import ControlError, MotionError
+from motet.formats import read_motion
+from motet.models import load
+from motet.motion import Motion
+from motet.script import control_track, parse_script
+
+SCRIPT = "walk .5s, walk>run .5s, run .5s, bend .5s"
+
+
+@pytest.fixture(scope="module")
+def model() -> ControlModel:
+    return load("cmu-control")
+
+
+def test_the_documented_loop_gives_the_same_frames(model: ControlModel) -> None:
+    """docs/bundle.md in plain onnxruntime: no code of motet between the bundle and the frames."""
+    with zipfile.ZipFile(list_bundles()["cmu-control"]) as archive:
+        manifest = json.loads(archive.read("manifest.json"))
+        encoder, step = (
+            onnxruntime.InferenceSession(
+                archive.read(manifest["graphs"][role]["file"]), providers=["CPUExecutionProvider"]
+            )
+            for role in ("encoder", "step")
+        )
+    start = np.array(manifest["control"]["starts"]["walk"], np.float32)
+    history = encoder.run(["codes"], {"frames": start})[0][None]
+    column = np.ones((1, 1), np.float32)
+    frames = []
+    for control in control_track(parse_script(SCRIPT, model.labels), model.labels, manifest["motion"]["fps"]):
+        feeds = {
+            "history": history,
+            "control": control[None],
+            "noise": np.zeros((1, history.shape[2]), np.float32),
+            "variety": column * 0,
+            "temperature": column * manifest["defaults"]["temperature"],
+        }
+        frame, history = step.run(["frame", "next_history"], feeds)
+        frames.append(frame[0])
+    np.testing.assert_array_equal(model.start().run(SCRIPT)[0].values, np.stack(frames))
+
+
+@pytest.mark.parametrize("variety", [0.0, 0.5, 1.0])
+def test_a_character_moves_as_it_would_alone(model: ControlModel, variety: float) -> None:
+    together = model.start(characters=5, seed=3, variety=variety).frames(_track(model))
+    alone = model.start(seed=5, variety=variety).frames(_track(model))
+    np.testing.assert_allclose(together[2], alone[0], atol=1e-3)  # degrees; a matrix product rounds by batch size
+
+
+def test_each_character_has_its_own_control(model: ControlModel) -> None:
+    session = model.start("walk", characters=3)
+    session.control(walk=[1, 0, 0.5], run=[0, 1, 0.5])
+    mixed = np.stack([session.step() for _ in range(60)], axis=1)
+    for row, values in enumerate(({"walk": 1.0}, {"run": 1.0}, {"walk": 0.5, "run": 0.5})):
+        alone = model.start("walk")
+        alone.control(**values)
+        np.testing.assert_allclose(mixed[row], np.concatenate([alone.step() for _ in range(60)]), atol=1e-3)
+
+
+def test_seeds_repeat_and_differ(model: ControlModel) -> None:
+    first, again, other = (model.start(seed=seed, variety=1.0).frames(_track(model)) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(first, again)
+    assert np.abs(first - other).max() > 1
+    quiet = [model.start(seed=seed).frames(_track(model)) for seed in (1, 2)]
+    np.testing.assert_array_equal(*quiet)
+
+
+def test_a_snapshot_continues_with_the_same_frames(model: ControlModel) -> None:
+    session = model.start(characters=2, seed=4, variety=1.0)
+    session.frames(_track(model)[:13])
+    session.control(walk=0.3, run=[0.7, 0.2])
+    saved = session.snapshot()
+    after = [session.step() for _ in range(40)]
+    session.control(bend=1.0)
+    session.restore(saved)
+    np.testing.assert_array_equal(after, [session.step() for _ in range(40)])
+
+
+def test_many_threads_share_a_model_bit_for_bit(model: ControlModel) -> None:
+    expected = model.start(characters=4, seed=1, variety=1.0).frames(_track(model))
+    results: list[np.ndarray] = []
+    threads = [
+        threading.Thread(
+            target=lambda: results.append(model.start(characters=4, seed=1, variety=1.0).frames(_track(model)))
+        )
+        for _ in range(8)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(results) == 8
+    for result in results:
+        np.testing.assert_array_equal(result, expected)
+
+
+def test_walking_and_running_have_their_training_periods(model: ControlModel, clips: Path) -> None:
+    for label, file in (("walk", "39_14.amc"), ("run", "09_07.amc")):
+        knee = model.start(label).run(f"{label} 20s")[0].select(("rtibia.rx",)).values[400:, 0]
+        data = read_motion(clips / file).select(("rtibia.rx",)).resample(model.fps).values[:, 0]
+        assert _period(knee) == pytest.approx(_period(data), abs=1.0)
+
+
+def test_a_motion_is_carried_on(model: ControlModel, clips: Path) -> None:
+    walk = read_motion(clips / "39_14.amc")
+    session = model.start(walk)
+    session.control(walk=1.0)
+    first = model.contract.motion(session.step())
+    last = walk.resample(model.fps).select(first.channels)[-1:]
+    moving = model.contract.std > 1
+    difference = (first.values - last.values)[0, moving] / model.contract.std[moving]
+    # the root's heading is taken out, all other angles go on where they were
+    assert np.sqrt(np.mean(difference[3:] ** 2)) < 0.6
+
+
+def test_a_model_from_a_bundle_pickles(model: ControlModel) -> None:
+    copy = pickle.loads(pickle.dumps(model))
+    np.testing.assert_array_equal(copy.start().frames(_track(model)), model.start().frames(_track(model)))
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        ({"characters": 0}, "at least one character"),
+        ({"characters": 2, "seed": [1]}, "as many seeds"),
+        ({"seed": -1}, "seed of 0 or more"),
+        ({"variety": 1.5}, "between 0 and 1"),
+        ({"variety": float("nan")}, "between 0 and 1"),
+        ({"temperature": 0}, "between 0.01 and 100"),
+        ({"iterations": 2}, "without free hidden units"),
+        ({"start": "swim"}, "known are walk, run, bend"),
+    ],
+)
+def test_a_start_out_of_range_is_refused(model: ControlModel, options: dict[str, object], reason: str) -> None:
+    with pytest.raises(ControlError, match=reason):
+        model.start(**options)  # type: ignore[arg-type]
+
+
+def test_a_control_out_of_range_changes_nothing(model: ControlModel) -> None:
+    session = model.start(characters=2)
+    session.control(run=0.5)
+    before = session.snapshot().control
+    for values, reason in (
+        ({"fly": 1.0}, "unknown control fly; known are walk, run, bend"),
+        ({"walk": 1.1}, "between 0 and 1"),
+        ({"walk": [0.1, float("nan")]}, "between 0 and 1"),
+        ({"walk": [0.1, 0.2, 0.3]}, "2 characters"),
+        ({"walk": "fast"}, "needs a number"),
+    ):
+        with pytest.raises(ControlError, match=reason):
+            session.control(**values)
+    np.testing.assert_array_equal(session.snapshot().control, before)
+    with pytest.raises(ControlError, match="shape"):
+        session.set_control(np.zeros((3, 3)))
+    with pytest.raises(ControlError, match="one value for each"):
+        session.set_control([1.0])
+
+
+def test_a_motion_that_does_not_fit_is_refused(model: ControlModel, clips: Path) -> None:
+    walk = read_motion(clips / "39_14.amc")
+    with pytest.raises(MotionError, match="needs 3 frames at 40 fps, this motion has 1"):
+        model.start(walk[:3])
+    with pytest.raises(MotionError, match=r"lacks 1 of 59 channels: rtoes.rx"):
+        model.start(walk.select(tuple(name for name in walk.channels if name != "rtoes.rx")))
+
+
+def test_frames_come_in_the_contract(model: ControlModel) -> None:
+    session = model.start(characters=3)
+    frame = session.step()
+    assert frame.dtype == np.float32
+    assert frame.shape == (3, 59)
+    motions = session.run("walk 1s")
+    assert [type(motion) for motion in motions] == [Motion] * 3
+    assert (motions[0].fps, len(motions[0]), set(motions[0].units)) == (40.0, 40, {"deg"})
+    assert session.frames(np.zeros((0, 3))).shape == (3, 0, 59)
+
+
+def _track(model: ControlModel) -> np.ndarray:
+    return control_track(parse_script(SCRIPT, model.labels), model.labels, model.fps)
+
+
+def _period(values: np.ndarray) -> float:
+    """Frames to the highest peak of the autocorrelation beyond a quarter of a second."""
+    signal = values - values.mean()
+    curve = np.array([np.mean(signal[lag:] * signal[: len(signal) - lag]) for lag in range(min(50, len(signal) - 8))])
+    return float(10 + np.argmax(curve[10:]))

@@ -1,0 +1,155 @@
+import json
+import re
+from base64 import b64decode
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from figures import walker
+
+from motet.errors import MotionError, OutputError
+from motet.formats import html, write_motion
+from motet.formats.body import Body, sides_of
+from motet.formats.figure import figure_of
+from motet.kinematics import positions
+from motet.motion import Motion
+from motet.skeleton import Joint, Skeleton
+
+
+def data_of(path):
+    text = path.read_text(encoding="utf-8")
+    return json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.S)[1])["figures"]
+
+
+def points_of(figure):
+    root = np.frombuffer(b64decode(figure["root"]), "<f4").reshape(-1, 1, 3)
+    steps = np.frombuffer(b64decode(figure["points"]), "<i2").reshape(len(root), -1, 3)
+    return root + figure["step"] * steps
+
+
+def expected(motion):
+    return positions(motion) / motion.skeleton.height
+
+
+@pytest.mark.parametrize("scale", [1.0, 39.37])
+def test_page_holds_the_positions_in_heights(tmp_path, scale):
+    motion = walker(scale=scale)
+    write_motion(tmp_path / "walk.html", motion)
+    (figure,) = data_of(tmp_path / "walk.html")
+    joints = len(motion.skeleton.joints)
+    assert (figure["fps"], figure["frames"], figure["step"]) == (40.0, 40, 1e-4)
+    assert points_of(figure).shape == (40, joints + 2, 3)
+    assert np.abs(points_of(figure)[:, :joints] - expected(motion)).max() < 0.6 * figure["step"]
+
+
+def test_page_needs_no_other_file(tmp_path):
+    html.write(tmp_path / "walk.html", walker(), title='a <b> & "c" {{DATA}} </script>')
+    text = (tmp_path / "walk.html").read_text(encoding="utf-8")
+    assert not re.search(r"https?:|//[a-z]+\.|@import|url\(|\ssrc=", text)
+    assert "<title>a &lt;b&gt; &amp; &quot;c&quot; {{DATA}} &lt;/script&gt;</title>" in text
+    assert text.count("</script>") == 2
+    assert "made with motet" in text
+
+
+def test_a_minute_is_small(tmp_path):
+    html.write(tmp_path / "long.html", walker(frames=2400))
+    assert (tmp_path / "long.html").stat().st_size < 400_000
+
+
+def test_joint_far_from_the_root_takes_a_larger_step():
+    skeleton = Skeleton((Joint("root", -1, (0, 0, 0)), Joint("a", 0, (0, 1, 0)), Joint("kite", 1, (0, 1, 0))))
+    motion = Motion([[0.0, 30.0], [0.0, -40.0]], ("root.ty", "kite.ty"), ("length", "length"), 10, skeleton)
+    figure = html.figure_data(motion, "")
+    assert figure["step"] == pytest.approx(19.5 / 32767, rel=2e-3)
+    lifted = expected(motion) + np.array([0, 19.5, 0])
+    assert np.abs(points_of(figure)[:, :3] - lifted).max() < 0.6 * figure["step"]
+
+
+def test_captions_and_many(tmp_path):
+    html.write(tmp_path / "one.html", walker(), [(0, "walk"), (0.5, "walk > run 40 %")], "title")
+    assert data_of(tmp_path / "one.html")[0]["captions"] == [[0, "walk"], [0.5, "walk > run 40 %"]]
+    html.write_many(tmp_path / "two.html", [walker(), walker(20, 10)], ["first", "</script>"])
+    assert [(f["name"], f["frames"], f["fps"]) for f in data_of(tmp_path / "two.html")] == [
+        ("first", 40, 40),
+        ("</script>", 20, 10),
+    ]
+    with pytest.raises(MotionError, match="do not decrease"):
+        html.write(tmp_path / "bad.html", walker(), [(1.0, "b"), (0.0, "a")])
+    with pytest.raises(MotionError, match="do not decrease"):
+        html.write(tmp_path / "bad.html", walker(), [(float("nan"), "b")])
+    with pytest.raises(MotionError, match="a name for each"):
+        html.write_many(tmp_path / "bad.html", [walker()], [])
+    assert not (tmp_path / "bad.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("motion", "reason"),
+    [
+        (replace(walker(), skeleton=None), "no skeleton"),
+        (walker()[:0], "no frames"),
+        (replace(walker(), values=walker().values + 1e200), "further than"),
+    ],
+)
+def test_what_cannot_be_shown_is_refused(tmp_path, motion, reason):
+    with pytest.raises(MotionError, match=reason):
+        html.write(tmp_path / "bad.html", motion)
+    assert not list(tmp_path.iterdir())
+
+
+def test_place_that_cannot_be_written(tmp_path):
+    with pytest.raises(OutputError):
+        html.write(tmp_path / "none" / "walk.html", walker())
+
+
+def test_ground():
+    near = walker()
+    assert figure_of(near).points[:, :14] == pytest.approx(expected(near))
+    values = np.array(near.values)
+    values[:, 1] += 5
+    assert figure_of(replace(near, values=values)).points[..., 1].min() == pytest.approx(0)
+    still = near.select(near.channels[3:])
+    assert figure_of(still).points[:, :14, 1].min() == pytest.approx(0)
+
+
+def test_heading_is_where_the_figure_faces():
+    motion = walker(frames=1)
+    values = np.zeros((1, len(motion.channels)))
+    assert figure_of(replace(motion, values=values)).heading == pytest.approx(0)
+    values[0, motion.channels.index("hips.ry")] = 90
+    assert figure_of(replace(motion, values=values)).heading == pytest.approx(np.pi / 2)
+
+
+def test_sides_follow_from_mirrored_names():
+    cmu = ("root", "lhipjoint", "rhipjoint", "lowerback", "rfoot", "lfoot", "lthumb")
+    assert sides_of(cmu) == ("middle", "left", "right", "middle", "right", "left", "middle")
+    assert sides_of(("m:Hips", "m:LeftLeg", "m:RightLeg")) == ("middle", "left", "right")
+    assert sides_of(("LSx_joint", "RSx_joint", "hand.R", "hand.L")) == ("left", "right", "right", "left")
+
+
+def test_body_gets_thinner_towards_its_tips():
+    body = Body(walker().skeleton)
+    names = (*body.skeleton.names, "jaw", "crown")
+    bones = {(names[bone.start], names[bone.end]): bone for bone in body.bones}
+    assert ("head", "head_end") not in bones
+    assert {bones[pair].side for pair in [("hips", "left_leg"), ("left_arm", "hips"), ("jaw", "crown")]} == {"middle"}
+    thigh, shin = bones["left_leg", "left_shin"], bones["left_shin", "left_shin_end"]
+    assert thigh.start_radius > thigh.end_radius == shin.start_radius > shin.end_radius > 0
+    assert (thigh.side, bones["right_shin", "right_shin_end"].side) == ("left", "right")
+
+
+def test_skeleton_without_extent_is_a_dot(tmp_path):
+    point = Motion([[0.0], [1.0]], ("a.tx",), ("length",), 10, Skeleton((Joint("a", -1, (0, 0, 0)),)))
+    html.write(tmp_path / "dot.html", point)
+    (figure,) = data_of(tmp_path / "dot.html")
+    assert [bone[:2] for bone in figure["bones"]] == [[0, 0]]
+
+
+def test_shoulders_of_a_motion_capture_skeleton_belong_to_the_trunk():
+    places = {"root": -1, "thorax": 0, "neck": 1, "lclavicle": 1, "lhumerus": 3, "lhumerus_end": 4, "rclavicle": 1}
+    offsets = [(0, 0, 0), (0, 0.2, 0), (0, 0.2, 0), (0, 0.2, 0), (0.2, 0, 0), (0.5, 0, 0), (0, 0.2, 0)]
+    joints = [Joint(name, parent, offset) for (name, parent), offset in zip(places.items(), offsets, strict=True)]
+    more = [Joint("rhumerus", 6, (-0.2, 0, 0)), Joint("rhumerus_end", 7, (-0.5, 0, 0))]
+    bones = [(bone.start, bone.end, bone.side) for bone in Body(Skeleton((*joints, *more))).bones[:-1]]
+    left = [(3, 4, "middle"), (4, 0, "middle"), (4, 5, "left")]
+    right = [(6, 7, "middle"), (7, 0, "middle"), (7, 8, "right")]
+    assert bones == [(0, 1, "middle"), (1, 2, "middle"), *left, *right]

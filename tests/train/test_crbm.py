@@ -1,0 +1,81 @@
+"""CRBM learning: without free units and with clamped control it is logistic regression on the past (thesis 4.1)."""
+
+import numpy as np
+import pytest
+import torch
+from torch.nn.functional import binary_cross_entropy_with_logits
+
+from motet_train.contrastive import Learning
+from motet_train.models.crbm import CRBM, train_crbm, windows
+
+
+def small_crbm(free: int = 0) -> CRBM:
+    crbm = CRBM(visible=4, taps=2, control=3, free=free)
+    generator = torch.Generator().manual_seed(0)
+    for value in crbm.parameters():
+        value.normal_(0, 0.3, generator=generator)
+    return crbm
+
+
+def sequences() -> list[list[torch.Tensor]]:
+    generator = torch.Generator().manual_seed(1)
+    return [
+        [torch.rand(7, 4, generator=generator), torch.rand(5, 4, generator=generator)],
+        [torch.rand(6, 4, generator=generator)],
+    ]
+
+
+def test_windows_against_loops() -> None:
+    expansion = torch.tensor([[1.0, 0.0, 0.0], [0.0, 1.0, 1.0]])
+    data = windows(sequences(), expansion, taps=2, onsets=(1.0, 16.0))
+    past, visible, control = [], [], []
+    for label, found in enumerate(sequences()):
+        for sequence in found:
+            for t in range(2, len(sequence)):
+                past.append(torch.cat([sequence[t - 2], sequence[t - 1]]))
+                visible.append(sequence[t])
+                control.append(expansion[label])
+    for name, rows in (("past", past), ("visible", visible), ("control", control)):
+        torch.testing.assert_close(getattr(data, name), torch.stack(rows), rtol=0, atol=0)
+    np.testing.assert_allclose(data.probabilities[:8], 1 / 16)
+    np.testing.assert_allclose(data.probabilities[8] / data.probabilities[11], 16, rtol=1e-5)
+
+
+def test_an_update_is_the_gradient_of_the_cross_entropy() -> None:
+    data = windows(sequences(), torch.eye(2, 3), taps=2, onsets=(1.0, 1.0))
+    crbm = small_crbm()
+    past_weight, hidden_weight, bias = (
+        p.detach().clone().requires_grad_() for p in (crbm.past_weight, crbm.hidden_weight, crbm.visible_bias)
+    )
+    learning = Learning(epochs=1, rate=0.1, batch=len(data.past), decay=0.0, temperature=(1.0, 1.0))
+    rows = torch.multinomial(
+        data.probabilities, len(data.past), replacement=True, generator=torch.Generator().manual_seed(5)
+    )
+    logits = bias + data.past[rows] @ past_weight + data.control[rows] @ hidden_weight
+    loss = binary_cross_entropy_with_logits(logits, data.visible[rows], reduction="sum") / len(rows)
+    loss.backward()  # type: ignore[no-untyped-call]
+    train_crbm(crbm, data, learning, torch.Generator().manual_seed(5), lambda *_: None, clamped=True, past_noise=0.0)
+    for learned, start in (
+        (crbm.past_weight, past_weight),
+        (crbm.hidden_weight, hidden_weight),
+        (crbm.visible_bias, bias),
+    ):
+        assert start.grad is not None
+        torch.testing.assert_close(learned.detach(), start.detach() - 0.1 * start.grad, rtol=1e-4, atol=1e-6)
+
+
+@pytest.mark.parametrize("free", [0, 5])
+def test_clamping_free_units_and_more_steps_each_change_what_is_learned(free: int) -> None:
+    data = windows(sequences(), torch.eye(2, 3), taps=2, onsets=(1.0, 1.0))
+    results = {}
+    for clamped, steps in ((True, 1), (False, 1), (True, 3)):
+        crbm = small_crbm(free)
+        learning = Learning(epochs=20, rate=0.05, steps=steps)
+        train_crbm(
+            crbm, data, learning, torch.Generator().manual_seed(2), lambda *_: None, clamped=clamped, past_noise=0.0
+        )
+        assert all(torch.isfinite(p).all() for p in crbm.parameters())
+        results[clamped, steps] = crbm.hidden_weight
+    assert not torch.equal(results[True, 1], results[False, 1])
+    # without free units there is nothing to sample, so more Gibbs steps are the same step
+    assert torch.equal(results[True, 1], results[True, 3]) == (free == 0)

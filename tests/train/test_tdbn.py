@@ -1,0 +1,73 @@
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from motet.control import ControlModel
+from motet_train.contrastive import Learning
+from motet_train.control import About, train_control
+from motet_train.data.body import body_parts
+from motet_train.data.clips import read_clips
+from motet_train.models.tdbn import TDBN, TDBNConfig, from_config, to_config
+from motet_train.runs import Run, RunError
+
+ABOUT = About("small", "a test", "MIT")
+SHORT = replace(TDBNConfig(), rbm=Learning(epochs=2), crbm=Learning(epochs=2))
+
+
+def train(config: TDBNConfig = SHORT, seed: int = 0) -> Run:
+    return train_control(read_clips(None, config.root_rotation), config, seed, ABOUT, lambda *_: None)
+
+
+def test_the_net_has_the_thesis_sizes() -> None:
+    clips = read_clips(None, root_rotation=False)
+    parts = body_parts(clips.skeleton, clips.channels)
+    assert sorted(np.bincount(parts.of_channel)) == [7, 7, 12, 12, 18]
+    net = TDBN(replace(TDBNConfig.thesis(), control_units=20), parts.of_channel.tolist(), labels=1)
+    assert net.crbm.past_weight.numel() == 67500  # thesis 4.1
+    assert net.rbm.mask.shape == (56, 150)
+    used = int(net.rbm.mask.sum()) + sum(p.numel() for p in net.parameters()) - net.rbm.weight.numel()
+    assert used == 56 * 30 + 56 + 150 + 67500 + 150 + 20 * 150 + 20  # "about 72 k parameters in all"
+
+
+def test_training_repeats_by_its_seed() -> None:
+    first, again, other = (train(seed=seed).model.state_dict() for seed in (1, 1, 2))
+    assert all(torch.equal(first[name], again[name]) for name in first)
+    assert not torch.equal(first["crbm.past_weight"], other["crbm.past_weight"])
+
+
+@pytest.mark.parametrize(
+    "config", [SHORT, replace(SHORT, free_units=8), replace(TDBNConfig.thesis(), rbm=SHORT.rbm, crbm=SHORT.crbm)]
+)
+def test_a_run_reads_back_as_it_was(config: TDBNConfig, tmp_path: Path) -> None:
+    run = train(config)
+    run.save(tmp_path)
+    other = Run.load(tmp_path)
+    assert other.manifest == run.manifest
+    assert to_config(from_config(other.manifest["config"])) == run.manifest["config"]
+    frames = [
+        ControlModel(r.manifest, r.torch_graphs()).start(seed=1, variety=0.5).frames(np.eye(3)) for r in (run, other)
+    ]
+    np.testing.assert_array_equal(*frames)
+
+
+def test_gibbs_iterations_run_where_there_are_free_units() -> None:
+    run = train(replace(SHORT, free_units=8))
+    model = ControlModel(run.manifest, run.torch_graphs())
+    once, twice = (model.start(variety=1.0, iterations=n).frames(np.eye(3)) for n in (1, 2))
+    assert once.shape == twice.shape == (1, 3, 59)
+    assert not np.array_equal(once, twice)
+
+
+def test_a_folder_that_is_no_run_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(RunError, match=r"no training run: it has no run.json"):
+        Run.load(tmp_path)
+    train().save(tmp_path)
+    (tmp_path / "weights.pt").write_bytes(b"no weights")
+    with pytest.raises(RunError, match="cannot be read"):
+        Run.load(tmp_path)
+    (tmp_path / "run.json").write_text("{}")
+    with pytest.raises(RunError, match="cannot be read"):
+        Run.load(tmp_path)

@@ -1,0 +1,119 @@
+"""Labelled clips: a few short motions, each with the name of what it shows; and sequences cut from them."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from motet.errors import MotetError
+from motet.formats import READABLE, read_motion
+from motet.heading import without_heading
+from motet.kinematics import skeleton_of
+from motet.motion import Motion
+from motet.rotations import Array
+from motet.skeleton import Skeleton
+
+CONSTANT = 1e-3
+"""Degrees: a channel with a smaller standard deviation is as good as constant."""
+
+CMU = Path(__file__).parent / "cmu"
+CMU_CLIPS = {"walk": "39_14.amc", "run": "09_07.amc", "bend": "02_06.amc"}
+"""The default clips (thesis 5.1): CMU trials 39_14 and 09_07, and the first bend of 02_06."""
+
+CMU_LICENCE = (
+    "CMU Graphics Lab Motion Capture Database (mocap.cs.cmu.edu), created with funding from NSF EIA-0196217: "
+    "free for all uses, may be included in products, may not be resold as such"
+)
+
+
+class DataError(MotetError, ValueError):
+    """Training data that a model cannot be trained on."""
+
+
+@dataclass(frozen=True, eq=False)
+class Clips:
+    """Motions by label, all with the same channels, and the skeleton that shows what is generated from them."""
+
+    motions: Mapping[str, Sequence[Motion]]
+    skeleton: Skeleton
+    licence: str
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The labels, in the order of control values."""
+        return tuple(self.motions)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The channels that all motions have."""
+        return next(iter(self.motions.values()))[0].channels
+
+
+def read_clips(folder: Path | None = None, root_rotation: bool = True) -> Clips:
+    """Read labelled clips: from ``folder``, or the three CMU trials that come with motet.
+
+    ``folder`` holds motion files, LABEL.bvh, and folders of them, LABEL/anything.bvh. Only joint angles are kept, in
+    degrees, and with ``root_rotation`` the root's rotation with its heading taken out. DataError or MotionError name
+    the file that does not fit.
+    """
+    paths = {label: [CMU / name] for label, name in CMU_CLIPS.items()} if folder is None else _find(folder)
+    read = {
+        label: [(path, _angles(read_motion(path), root_rotation)) for path in found] for label, found in paths.items()
+    }
+    first_path, first = next(iter(read.values()))[0]
+    motions = {
+        label: [_fit(path, motion, first_path, first) for path, motion in found] for label, found in read.items()
+    }
+    licence = CMU_LICENCE if folder is None else f"not stated (trained on {folder.name})"
+    return Clips(motions, _metric(skeleton_of(first)), licence)
+
+
+def sequences(motion: Motion, fps: float) -> list[Array]:
+    """A motion at the model's frame rate, as arrays (T, D): every phase of it where its rate is a multiple.
+
+    A 120 Hz clip gives three sequences at 40 fps (thesis 5.1 takes every third frame; the others are data too).
+    """
+    ratio = motion.fps / fps
+    if abs(ratio - round(ratio)) > 1e-9 or ratio < 1:
+        return [motion.resample(fps).values]
+    return [motion.values[phase :: round(ratio)] for phase in range(round(ratio))]
+
+
+def _find(folder: Path) -> dict[str, list[Path]]:
+    if not folder.is_dir():
+        raise DataError(f"no folder of clips: {folder}")
+    found: dict[str, list[Path]] = {}
+    for path in sorted(folder.iterdir()):
+        files = sorted(path.iterdir()) if path.is_dir() else [path]
+        clips = [file for file in files if file.suffix.lower() in READABLE]
+        if clips:
+            found.setdefault(path.name if path.is_dir() else path.stem, []).extend(clips)
+    bad = [label for label in found if not label.isidentifier()]
+    if bad:
+        raise DataError(f"labels are written in scripts: letters, digits and _ only, not {', '.join(map(repr, bad))}")
+    if not found:
+        raise DataError(
+            f"no clips in {folder}: it needs files LABEL.bvh or folders LABEL/ of {' '.join(READABLE)} files"
+        )
+    return found
+
+
+def _angles(motion: Motion, root_rotation: bool) -> Motion:
+    """The Euler channels of a motion in degrees, without heading and without leaps."""
+    level = without_heading(motion.continuous())
+    root = skeleton_of(motion).joints[0].name
+    wanted = {
+        c for joint, columns in level.rotation_columns().items() if root_rotation or joint != root for c in columns
+    }
+    channels = tuple(name for column, name in enumerate(level.channels) if column in wanted)
+    return level.select(channels, ("deg",) * len(channels))
+
+
+def _fit(path: Path, motion: Motion, first_path: Path, first: Motion) -> Motion:
+    different = sorted(set(motion.channels) ^ set(first.channels))
+    if different:
+        raise DataError(f"{path} does not go with {first_path}: only one of them has {', '.join(different)}")
+    return motion.select(first.channels)
+
+
+def _metric(skeleton: Skeleton) -> Skeleton:
+    return skeleton if skeleton.metres_per_unit is None else skeleton.scaled(1.0)

@@ -1,0 +1,1 @@
+"""The models: one file for each, with its configuration and its graphs."""

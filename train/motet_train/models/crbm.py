@@ -1,0 +1,124 @@
+"""Conditional restricted Boltzmann machine: the past as directed input, control and free units above (thesis 3.2, 4.1).
+
+Letters in shapes: B rows, N all rows, H visible units, K taps, C control units, F free hidden units.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+
+from motet_train.contrastive import Ascent, Learning, Progress, balanced, epochs, parameter
+
+
+class CRBM(nn.Module):
+    """Visible units driven by the past and by a second hidden layer (figure 3.5).
+
+    The second hidden layer is C control units, which are given, and F free units, which are inferred. Visible units
+    are binary, or with ``gaussian`` real with unit variance (Taylor 2007).
+    """
+
+    def __init__(self, visible: int, taps: int, control: int, free: int, gaussian: bool = False) -> None:
+        super().__init__()
+        self.control_units, self.free_units, self.gaussian = control, free, gaussian
+        self.past_weight = parameter(taps * visible, visible)
+        self.hidden_weight = parameter(control + free, visible)
+        self.visible_bias = parameter(visible)
+        self.hidden_bias = parameter(control + free)
+
+    def drive(self, past: Tensor, control: Tensor) -> Tensor:
+        """What the past (B, K H) and the control units (B, C) put on the visible units (B, H)."""
+        given = torch.addmm(self.visible_bias, past, self.past_weight)
+        return torch.addmm(given, control, self.hidden_weight[: self.control_units])
+
+    def visible(self, drive: Tensor, free: Tensor, temperature: Tensor | float) -> Tensor:
+        """Means of the visible units (B, H) given what drives them (B, H) and the free units (B, F)."""
+        total = torch.addmm(drive, free, self.hidden_weight[self.control_units :]) if self.free_units else drive
+        return total if self.gaussian else torch.sigmoid(total / temperature)
+
+    def hidden(self, visible: Tensor, temperature: Tensor | float) -> Tensor:
+        """Probabilities of control and free units (B, C+F) given the visible units (B, H)."""
+        return torch.sigmoid(torch.addmm(self.hidden_bias, visible, self.hidden_weight.T) / temperature)
+
+    def free(self, visible: Tensor, temperature: Tensor | float) -> Tensor:
+        """Probabilities of the free units (B, F) given the visible units (B, H)."""
+        return self.hidden(visible, temperature)[:, self.control_units :]
+
+
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """What a CRBM learns from: past (N, K H), visible (N, H), control (N, C), and probabilities (N,) to draw each."""
+
+    past: Tensor
+    visible: Tensor
+    control: Tensor
+    probabilities: Tensor
+
+
+def windows(codes: Sequence[Sequence[Tensor]], expansion: Tensor, taps: int, onsets: Sequence[float]) -> Windows:
+    """Cut the sequences (T, H) of each label into windows of K past frames and the one after them.
+
+    expansion: (L, C), the control units of each label. onsets: for each label how many times as often the first
+    window of a sequence is drawn as its last, geometric between: a motion that ends has to be entered at its start.
+    """
+    cut = [torch.cat([sequence.unfold(0, taps + 1, 1) for sequence in found]).transpose(1, 2) for found in codes]
+    weights = [
+        torch.cat([onset ** torch.linspace(1, 0, len(sequence) - taps) for sequence in found])
+        for onset, found in zip(onsets, codes, strict=True)
+    ]
+    every = torch.cat(cut)
+    control = torch.cat([units.expand(len(part), -1) for units, part in zip(expansion, cut, strict=True)])
+    return Windows(every[:, :taps].flatten(1), every[:, taps], control, balanced(weights))
+
+
+@torch.no_grad()
+def train_crbm(
+    crbm: CRBM,
+    data: Windows,
+    learning: Learning,
+    generator: torch.Generator,
+    progress: Progress,
+    *,
+    clamped: bool,
+    past_noise: float,
+) -> None:
+    """Train by contrastive divergence with the past held fixed (thesis 3.2, 5.2).
+
+    clamped: control units keep their values in the reconstruction; else they are inferred from it (thesis 5.3).
+    past_noise: standard deviation of Gaussian noise on the past, so that the net learns the way back to its data
+        (Taylor 2007).
+    """
+    past_weight, hidden_weight, bias, hidden_bias = (
+        Ascent(p, learning.decay) for p in (crbm.past_weight, crbm.hidden_weight, crbm.visible_bias, crbm.hidden_bias)
+    )
+    for number, epoch in enumerate(epochs(learning, data.probabilities, generator), start=1):
+        for rows in epoch.batches:
+            past, visible, control = data.past[rows], data.visible[rows], data.control[rows]
+            if past_noise:
+                past = past + past_noise * torch.randn(past.shape, generator=generator)
+            free = _sampled_free(crbm, visible, epoch.temperature, generator)
+            drive = crbm.drive(past, control)
+            end, end_free = settle(crbm, drive, free, learning.steps, epoch.temperature, generator)
+            end_control = control if clamped else crbm.hidden(end, epoch.temperature)[:, : crbm.control_units]
+            hidden, end_hidden = torch.cat([control, free], 1), torch.cat([end_control, end_free], 1)
+            past_weight.outer(past, visible - end, epoch)
+            hidden_weight.contrast((hidden, visible), (end_hidden, end), epoch)
+            hidden_bias.mean(hidden - end_hidden, epoch)
+            bias.mean(visible - end, epoch)
+        progress("CRBM", number, learning.epochs)
+
+
+def settle(
+    crbm: CRBM, drive: Tensor, free: Tensor, steps: int, temperature: float, generator: torch.Generator
+) -> tuple[Tensor, Tensor]:
+    """k Gibbs steps from free units (B, F): means of the visible (B, H) and of the free units (B, F)."""
+    for _ in range(steps - 1 if crbm.free_units else 0):
+        free = _sampled_free(crbm, crbm.visible(drive, free, temperature), temperature, generator)
+    end = crbm.visible(drive, free, temperature)
+    return end, crbm.free(end, temperature)
+
+
+def _sampled_free(crbm: CRBM, visible: Tensor, temperature: float, generator: torch.Generator) -> Tensor:
+    free = crbm.free(visible, temperature)
+    return torch.bernoulli(free, generator=generator) if crbm.free_units else free

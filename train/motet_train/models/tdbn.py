@@ -1,0 +1,134 @@
+"""Temporal deep belief net (thesis, chapter 4): a body-part RBM under a conditional RBM over its codes.
+
+Where the thesis' text and its author's code differ, the default follows what works (docs/control.md shows both):
+control units stay clamped in the reconstruction, binary layers are annealed, and the root's rotation is among the
+channels; :meth:`TDBNConfig.thesis` is the text.
+
+Letters in shapes: B rows, T frames, D channels, H codes, K taps, L labels, C control units, F free hidden units.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from motet_train.contrastive import Learning, Progress, balanced
+from motet_train.models.control_net import ControlNet, binary
+from motet_train.models.crbm import CRBM, train_crbm, windows
+from motet_train.models.rbm import RBM, block_mask, train_rbm
+
+Sequences = Sequence[Sequence[Tensor]]
+"""For each label its sequences of frames (T, D)."""
+
+
+@dataclass(frozen=True)
+class TDBNConfig:
+    """Sizes of the net and how it is trained; the defaults are the recipe of the shipped bundle."""
+
+    fps: float = 40.0
+    root_rotation: bool = True
+    """Whether the root's rotation is among the channels: 59 of CMU's skeleton, else the thesis' 56."""
+    hidden_per_part: int = 30
+    taps: int = 3
+    control_units: int = 26
+    """For each label."""
+    free_units: int = 0
+    clamped: bool = True
+    """Whether control units keep their values in the reconstruction."""
+    sigma: float = 0.38
+    """Standard deviation of a Gaussian visible unit, in units of its channel's own: smaller codes say more."""
+    past_noise: float = 0.3
+    onset: float = 60.0
+    """How many times as often the first window of a motion that ends is drawn as its last."""
+    temperature: float = 0.38
+    """Of the codes and of generation; learning anneals from 1 to it."""
+    initial: float = 0.01
+    """Standard deviation of the initial weights."""
+    rbm: Learning = field(default_factory=lambda: Learning(2000, rate=1e-2, final_rate=0.03, temperature=(1.0, 0.38)))
+    crbm: Learning = field(default_factory=lambda: Learning(55, rate=6e-3, final_rate=0.1, temperature=(1.0, 0.38)))
+
+    @staticmethod
+    def thesis() -> "TDBNConfig":
+        """The thesis' text: 56 angles, control units unclamped in the reconstruction, no annealing (5.2 to 5.4)."""
+        flat = (1.0, 1.0)
+        return TDBNConfig(
+            root_rotation=False,
+            control_units=7,
+            clamped=False,
+            sigma=1.0,
+            past_noise=0.0,
+            onset=1.0,
+            temperature=1.0,
+            rbm=Learning(epochs=1000, temperature=flat),
+            crbm=Learning(epochs=100, temperature=flat),
+        )
+
+    def unclamped(self) -> "TDBNConfig":
+        """The same recipe with control units inferred in the reconstruction, as the thesis' text has it (5.3)."""
+        return replace(self, clamped=False)
+
+
+class TDBN(ControlNet):
+    """The net with its normalisation: degrees in, codes as state, degrees out.
+
+    parts: the body part of each channel (D). labels: how many (L).
+    """
+
+    def __init__(self, config: TDBNConfig, parts: Sequence[int], labels: int) -> None:
+        mask = block_mask(parts, config.hidden_per_part)
+        control = labels * config.control_units
+        super().__init__(CRBM(mask.shape[1], config.taps, control, config.free_units), labels, len(parts), config.taps)
+        self.config = config
+        self.rbm = RBM(mask)
+
+    def encode(self, frames: Tensor) -> Tensor:
+        """Frames (B, D) to codes (B, H)."""
+        return self.rbm.encode((frames - self.mean) / self.scale, self.config.temperature)
+
+    def decode(self, codes: Tensor) -> Tensor:
+        """Codes (B, H) to frames (B, D)."""
+        return self.rbm.decode(codes) * self.scale + self.mean
+
+    def vary(self, mean: Tensor, noise: Tensor, variety: Tensor) -> Tensor:
+        """Between the probabilities (variety 0) and binary samples of them (variety 1)."""
+        return binary(mean, noise, variety)
+
+
+def from_config(config: Mapping[str, Any]) -> TDBN:
+    """An untrained net of the sizes that :func:`to_config` wrote."""
+    values = dict(config)
+    parts, labels = values.pop("parts"), values.pop("labels")
+    for layer in ("rbm", "crbm"):
+        learning = dict(values[layer])
+        values[layer] = Learning(**{**learning, "temperature": tuple(learning["temperature"])})
+    return TDBN(TDBNConfig(**values), parts, labels)
+
+
+def to_config(net: TDBN) -> dict[str, Any]:
+    """Everything that :func:`from_config` needs, ready for JSON."""
+    parts = net.rbm.mask[:, :: net.config.hidden_per_part].argmax(dim=1).tolist()
+    config: dict[str, Any] = json.loads(json.dumps(asdict(net.config)))
+    return {**config, "parts": parts, "labels": len(net.expansion)}
+
+
+@torch.no_grad()
+def train_tdbn(
+    net: TDBN, sequences: Sequences, onsets: Sequence[float], generator: torch.Generator, progress: Progress
+) -> None:
+    """Train RBM and CRBM, one after the other, on the sequences (T, D) of each label (thesis 3.3).
+
+    net.mean and net.scale must be set. onsets: see :func:`motet_train.models.crbm.windows`.
+    """
+    config = net.config
+    for weight in (net.rbm.weight, net.crbm.past_weight, net.crbm.hidden_weight):
+        weight.normal_(0.0, config.initial, generator=generator)
+    net.rbm.weight.mul_(net.rbm.mask)
+    frames = torch.cat([frames for found in sequences for frames in found])
+    uniform = balanced([torch.ones(sum(map(len, found))) for found in sequences])
+    train_rbm(net.rbm, (frames - net.mean) / net.scale, uniform, config.rbm, generator, progress)
+    codes = [[net.encode(frames) for frames in found] for found in sequences]
+    data = windows(codes, net.expansion, config.taps, onsets)
+    train_crbm(net.crbm, data, config.crbm, generator, progress, clamped=config.clamped, past_noise=config.past_noise)

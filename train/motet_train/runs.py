@@ -1,0 +1,68 @@
+"""A training run on disk: ``run.json``, which will be the bundle's manifest, and ``weights.pt``."""
+
+import io
+import json
+import pickle
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import nn
+
+from motet.errors import MotetError
+from motet.files import write_whole
+from motet.graph import Graph, GraphSpec
+from motet_train.models import tdbn
+from motet_train.torch_graph import TorchGraph
+
+MODELS: Mapping[str, Callable[[Mapping[str, Any]], nn.Module]] = {
+    "tdbn": tdbn.from_config,
+}
+"""Name of a model -> how it is built from the configuration in its manifest."""
+
+
+class RunError(MotetError, ValueError):
+    """A folder that is no training run."""
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A trained model with all that its bundle will say about it.
+
+    manifest: name, verb, model, the config that the model is built from, motion contract, defaults, licence,
+        training, quality and what the verb needs; ready for JSON.
+    """
+
+    manifest: Mapping[str, Any]
+    model: nn.Module
+
+    def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
+        """For each role the module to export and the contract that its forward keeps."""
+        found: dict[str, tuple[nn.Module, GraphSpec]] = self.model.graphs()  # type: ignore[operator]
+        return found
+
+    def torch_graphs(self) -> dict[str, Graph]:
+        """The same graphs, run by torch."""
+        return {role: TorchGraph(module, spec) for role, (module, spec) in self.graphs().items()}
+
+    def save(self, folder: Path) -> None:
+        """Write the run into an existing folder."""
+        buffer = io.BytesIO()
+        torch.save(self.model.state_dict(), buffer)
+        write_whole(folder / "weights.pt", buffer.getvalue())
+        write_whole(folder / "run.json", json.dumps(self.manifest, indent=1) + "\n")
+
+    @staticmethod
+    def load(folder: Path) -> "Run":
+        """Read what :meth:`save` wrote; RunError where that is not possible."""
+        try:
+            manifest = json.loads((folder / "run.json").read_text())
+            model = MODELS[manifest["model"]](manifest["config"])
+            model.load_state_dict(torch.load(folder / "weights.pt", weights_only=True))
+        except FileNotFoundError as error:
+            raise RunError(f"{folder} is no training run: it has no {Path(error.filename).name}") from error
+        except (KeyError, TypeError, ValueError, RuntimeError, OSError, pickle.UnpicklingError) as error:
+            raise RunError(f"the training run {folder} cannot be read: {error}") from error
+        return Run(manifest, model)
