@@ -33,18 +33,22 @@ REACH = 0.03  # m: how high a point of a foot can be and still well be on the gr
 SLIP = 0.2  # m/s: how far a vote may be off if it is slower than the rest
 FASTER = 3.0  # times as much for one that is faster
 TREMBLE = 0.015  # s: what is shorter is no movement but noise
+GENERATED = 0.05  # s: the same for motions that a model generated, whose feet tremble more
 CARRY = 0.05  # s: over which votes are brought together
 TAKE_OFF = 0.05  # s: over which the velocity upwards is measured
 ROUNDS = 10
 
 
-def lay_root_path(motion: Motion, feet: tuple[Sequence[str], Sequence[str]] | None = None) -> Motion:
+def lay_root_path(
+    motion: Motion, feet: tuple[Sequence[str], Sequence[str]] | None = None, tremble: float = TREMBLE
+) -> Motion:
     """The motion with root channels tx, ty, tz in "length" units, found from the feet's contact with the ground.
 
     The path begins at x = z = 0; y is such that the lowest joint of the feet touches the ground, y = 0, within
     millimetres, but in flight. A translation that the motion has already is replaced.
     feet: the names of the joints of each foot, toes included; if not given, the lowest joints that are paired left
         and right. MotionError for a motion without skeleton or one without such joints.
+    tremble: seconds over which the feet are smoothed; recorded motions need little, generated ones GENERATED.
     """
     skeleton = skeleton_of(motion)
     joints = _feet(skeleton) if feet is None else [skeleton.index(name) for name in (*feet[0], *feet[1])]
@@ -52,7 +56,11 @@ def lay_root_path(motion: Motion, feet: tuple[Sequence[str], Sequence[str]] | No
     places = positions(motion)
     points = (places[:, joints] - places[:, :1]) * metres
     height = _height(points[..., 1], motion.fps)
-    velocity = _velocity(points, height, motion.fps) if len(motion) > 1 else np.zeros((0, 2))
+    velocity = (
+        _velocity(_smooth(points[..., [0, 2]], tremble, motion.fps), points[..., 1] + height[:, None], motion.fps)
+        if len(motion) > 1
+        else np.zeros((0, 2))
+    )
     path = np.zeros((len(motion), 3))
     path[1:, [0, 2]] = np.cumsum(velocity, axis=0) / motion.fps
     path[:, 1] = height
@@ -75,7 +83,7 @@ def _height(points: Array, fps: float) -> Array:
     standing = -points.min(axis=1)
     # what jumps up forward in time falls down backward: only what both agree on is flight
     flight = np.minimum(_with_flight(standing, fps), _with_flight(standing[::-1], fps)[::-1])
-    return _smooth(flight[:, None, None], fps)[:, 0, 0]
+    return _smooth(flight[:, None, None], TREMBLE, fps)[:, 0, 0]
 
 
 def _with_flight(standing: Array, fps: float) -> Array:
@@ -91,12 +99,11 @@ def _with_flight(standing: Array, fps: float) -> Array:
     return np.array(heights)
 
 
-def _velocity(points: Array, height: Array, fps: float) -> Array:
-    """Horizontal velocity (T - 1, 2) of the root in m/s from one frame to the next."""
-    above = points[..., 1] + height[:, None]
+def _velocity(points: Array, above: Array, fps: float) -> Array:
+    """Velocity (T - 1, 2) in m/s of the root, from points of the feet (T, K, 2) and their heights (T, K)."""
     between = (above[1:] + above[:-1]) / 2
     near = np.exp(-0.5 * (between / REACH) ** 2)
-    votes = -np.diff(_smooth(points[..., [0, 2]], fps), axis=0) * fps
+    votes = -np.diff(points, axis=0) * fps
     velocity = _agreed(votes, near, fps)
     for _ in range(ROUNDS):
         off = votes - velocity[:, None]
@@ -106,12 +113,12 @@ def _velocity(points: Array, height: Array, fps: float) -> Array:
     return velocity
 
 
-def _smooth(points: Array, fps: float) -> Array:
+def _smooth(points: Array, tremble: float, fps: float) -> Array:
     """Points (T, ..., ...) through a Gaussian window in time, continued at both ends as they come in."""
     if len(points) < 2:
         return points
-    reach = round(3 * TREMBLE * fps)
-    window = np.exp(-0.5 * (np.arange(-reach, reach + 1) / (TREMBLE * fps)) ** 2)
+    reach = round(3 * tremble * fps)
+    window = np.exp(-0.5 * (np.arange(-reach, reach + 1) / (tremble * fps)) ** 2)
     padded = np.pad(points, ((reach, reach), (0, 0), (0, 0)), mode="reflect", reflect_type="odd")
     smoothed: Array = sum(weight * padded[i : i + len(points)] for i, weight in enumerate(window / window.sum()))
     return smoothed

@@ -30,7 +30,7 @@ def test_a_script_becomes_a_motion_that_travels(tmp_path: Path) -> None:
     root = positions(motion)[:, 0]
     assert len(motion) == 280
     speed = np.linalg.norm(np.diff(root[:, [0, 2]], axis=0), axis=1) * motion.fps  # metres a second
-    assert 0.8 < np.median(speed[:100]) < 2
+    assert 1 < np.median(speed[:100]) < 2  # the training walk goes at 1.4 m/s, the run at 3.4
     assert 2 < np.median(speed[-80:]) < 5
     again = tmp_path / "again.bvh"
     run("control", "walk 3s, walk>run 1s, run 3s", "-o", again)

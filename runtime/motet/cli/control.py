@@ -7,7 +7,7 @@ import click
 from motet.formats import check_writable, read_motion, write_motion
 from motet.formats.html import write as write_html
 from motet.models import load
-from motet.root_path import lay_root_path
+from motet.root_path import GENERATED, lay_root_path
 from motet.script import parse_script, starts_of
 
 
@@ -44,7 +44,7 @@ def control(
     )
     session = model.start(first, seed=seed, variety=variety, temperature=temperature)
     motion = session.run(script)[0]
-    motion = motion if in_place else lay_root_path(motion)
+    motion = motion if in_place else lay_root_path(motion, tremble=GENERATED)
     if out.suffix.lower() == ".html":
         write_html(out, motion, captions=starts_of(segments), title=script)
     else:

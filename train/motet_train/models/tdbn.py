@@ -41,7 +41,7 @@ class TDBNConfig:
     sigma: float = 0.38
     """Standard deviation of a Gaussian visible unit, in units of its channel's own: smaller codes say more."""
     past_noise: float = 0.3
-    onset: float = 60.0
+    onset: float = 100.0
     """How many times as often the first window of a motion that ends is drawn as its last."""
     temperature: float = 0.38
     """Of the codes and of generation; learning anneals from 1 to it."""
