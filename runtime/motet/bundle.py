@@ -5,6 +5,7 @@ ONNX Runtime as bytes. Nothing in a bundle is pickled or executed. docs/bundle.m
 """
 
 import hashlib
+import io
 import json
 import stat
 import zipfile
@@ -148,8 +149,6 @@ def write_bundle(path: str | Path, manifest: Mapping[str, Any], files: Mapping[s
 
 def zip_bytes(files: Mapping[str, bytes], manifest: bytes) -> bytes:
     """The zip of a bundle, the manifest first, with fixed dates so that equal content gives equal bytes."""
-    import io
-
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, data in {MANIFEST: manifest, **{name: files[name] for name in sorted(files)}}.items():

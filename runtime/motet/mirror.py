@@ -7,7 +7,6 @@ bit by bit. Else the rotation is turned into the joint's own Euler angles.
 """
 
 import re
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -16,33 +15,11 @@ from motet.errors import MotionError
 from motet.kinematics import AXES, euler_of, local_rotations, local_translations, skeleton_of, with_channels
 from motet.motion import TURN, Motion
 from motet.rotations import Array, continuous_euler
+from motet.sides import partners_of
 from motet.skeleton import Joint, Skeleton
 
 Channels = tuple[tuple[str, ...], Array, tuple[str, ...]]
 """Names, values (T, D) and units."""
-
-SIDES = {"l": "r", "L": "R", "r": "l", "R": "L", "left": "right", "Left": "Right", "LEFT": "RIGHT"}
-SIDES |= {right: left for left, right in SIDES.items()}
-
-PATTERNS = (
-    r"left|Left|LEFT|right|Right|RIGHT",  # LeftArm, arm_left, mixamorig:RightHand
-    r"(?<![A-Za-z])[lLrR](?![A-Za-z])",  # L_Arm, arm.R, "Bip01 L Thigh"
-    r"^[lr](?=[A-Za-z])|^[LR](?=[A-Z])",  # lfemur, RThigh
-    r"(?<=[a-z])[LR]$",  # armL
-)
-
-
-def mirrored_joints(skeleton: Skeleton) -> tuple[int, ...]:
-    """For each joint the index of its partner on the other side, or its own where there is none."""
-    places = {name: index for index, name in enumerate(skeleton.names)}
-    found = (next((places[other] for other in _other_names(n) if other in places), places[n]) for n in skeleton.names)
-    return tuple(found)
-
-
-def _other_names(name: str) -> Iterator[str]:
-    for pattern in PATTERNS:
-        for match in re.finditer(pattern, name):
-            yield name[: match.start()] + SIDES[match[0]] + name[match.end() :]
 
 
 def lateral_axis(skeleton: Skeleton) -> int:
@@ -50,7 +27,7 @@ def lateral_axis(skeleton: Skeleton) -> int:
 
     MotionError where no joints are paired, or where their places are no mirror images across a coordinate plane.
     """
-    partners = np.array(mirrored_joints(skeleton))
+    partners = np.array(partners_of(skeleton.names))
     rest = skeleton.rest_positions
     apart = np.abs(rest - rest[partners])
     if not apart.any():
@@ -79,7 +56,7 @@ def mirror(motion: Motion) -> Motion:
     """
     skeleton = skeleton_of(motion)
     _refuse_other_channels(motion, skeleton)
-    partners, axis = mirrored_joints(skeleton), lateral_axis(skeleton)
+    partners, axis = partners_of(skeleton.names), lateral_axis(skeleton)
     values, harder = np.array(motion.values), []
     for i, joint in enumerate(skeleton.joints):
         other = skeleton.joints[partners[i]]

@@ -22,9 +22,9 @@ import numpy as np
 
 from motet.errors import MotionError
 from motet.kinematics import positions, skeleton_of, with_channels
-from motet.mirror import mirrored_joints
 from motet.motion import Motion
 from motet.rotations import Array
+from motet.sides import partners_of
 from motet.skeleton import Skeleton
 
 GRAVITY = 9.81  # m/s^2
@@ -70,7 +70,7 @@ def lay_root_path(
 
 def _feet(skeleton: Skeleton) -> list[int]:
     """All joints of the two paired branches that lie no higher than a tenth of the figure above its lowest tip."""
-    partners, height = mirrored_joints(skeleton), skeleton.rest_positions[:, 1]
+    partners, height = partners_of(skeleton.names), skeleton.rest_positions[:, 1]
     paired = [i for i, partner in enumerate(partners) if partner != i]
     if not paired:
         raise MotionError("no joints in pairs, left and right, to find the feet among: name the joints of the feet")

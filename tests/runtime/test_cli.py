@@ -57,6 +57,16 @@ def test_control_starts_from_a_motion_and_varies(tmp_path: Path, clips: Path) ->
             assert np.abs(frames[i][:, 3:] - frames[j][:, 3:]).max() > 1
 
 
+def test_partial_takes_what_a_broken_file_has(tmp_path: Path, clips: Path) -> None:
+    out, broken = tmp_path / "out.npz", tmp_path / "39_14.amc"
+    broken.write_text((clips / WALK).read_text()[:-100])
+    (tmp_path / "39.asf").write_bytes(next(clips.glob("*.asf")).read_bytes())
+    assert run("convert", broken, out).exit_code == 2
+    assert not out.exists()
+    assert run("convert", "--partial", broken, out).exit_code == 0
+    assert len(read_motion(out)) == len(read_motion(clips / WALK)) - 1
+
+
 def test_convert_cuts_resamples_scales_and_mirrors(tmp_path: Path, clips: Path) -> None:
     out = tmp_path / "out.bvh"
     assert run("convert", clips / WALK, out, "--from", 1, "--to", 2, "--fps", 30, "--unit", "cm").exit_code == 0

@@ -214,9 +214,16 @@ def test_what_is_no_whole_file_is_refused(read, text):
         read(text)
 
 
-def test_partial_does_not_excuse_a_frame_that_breaks_off(read):
+def test_a_file_that_breaks_off_gives_its_whole_frames_when_asked_to(read):
+    broken, whole = PLAIN.rsplit(" ", 1)[0], read(PLAIN)
     with pytest.raises(FormatError, match="breaks off"):
-        read(PLAIN.rsplit(" ", 1)[0], partial=True)
+        read(broken)
+    assert read(broken, partial=True).values.tolist() == whole.values[:1].tolist()
+
+
+def test_partial_does_not_excuse_a_broken_frame_before_the_last(read):
+    with pytest.raises(FormatError, match="breaks off"):
+        read(f"{PLAIN.rsplit(' ', 1)[0]}\n{PLAIN.rstrip().rsplit(chr(10), 1)[1]}\n", partial=True)
 
 
 def same_positions(one, other, names=None):

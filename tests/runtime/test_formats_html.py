@@ -9,7 +9,7 @@ from figures import walker
 
 from motet.errors import MotionError, OutputError
 from motet.formats import html, write_motion
-from motet.formats.body import Body, sides_of
+from motet.formats.body import Body
 from motet.formats.figure import figure_of
 from motet.kinematics import positions
 from motet.motion import Motion
@@ -117,13 +117,6 @@ def test_heading_is_where_the_figure_faces():
     assert figure_of(replace(motion, values=values)).heading == pytest.approx(0)
     values[0, motion.channels.index("hips.ry")] = 90
     assert figure_of(replace(motion, values=values)).heading == pytest.approx(np.pi / 2)
-
-
-def test_sides_follow_from_mirrored_names():
-    cmu = ("root", "lhipjoint", "rhipjoint", "lowerback", "rfoot", "lfoot", "lthumb")
-    assert sides_of(cmu) == ("middle", "left", "right", "middle", "right", "left", "middle")
-    assert sides_of(("m:Hips", "m:LeftLeg", "m:RightLeg")) == ("middle", "left", "right")
-    assert sides_of(("LSx_joint", "RSx_joint", "hand.R", "hand.L")) == ("left", "right", "right", "left")
 
 
 def test_body_gets_thinner_towards_its_tips():

@@ -5,8 +5,9 @@ from figures import walker
 from motet.errors import MotionError
 from motet.formats import read_motion, write_motion
 from motet.kinematics import positions, with_channels
-from motet.mirror import lateral_axis, mirror, mirrored_joints
+from motet.mirror import lateral_axis, mirror
 from motet.motion import Motion
+from motet.sides import partners_of
 from motet.skeleton import Joint, Skeleton
 
 
@@ -14,37 +15,10 @@ def line_of(*names):
     return Skeleton(tuple(Joint(name, i - 1, (0.0, 1.0, 0.0)) for i, name in enumerate(names)))
 
 
-@pytest.mark.parametrize(
-    "pair",
-    [
-        ("lfemur", "rfemur"),
-        ("LeftArm", "RightArm"),
-        ("mixamorig:LeftArm", "mixamorig:RightArm"),
-        ("arm_left", "arm_right"),
-        ("LEFT_ARM", "RIGHT_ARM"),
-        ("L_Arm", "R_Arm"),
-        ("Arm.L", "Arm.R"),
-        ("upper_arm.L.001", "upper_arm.R.001"),
-        ("arm_l", "arm_r"),
-        ("Bip01 L Thigh", "Bip01 R Thigh"),
-        ("LThigh", "RThigh"),
-        ("thighL", "thighR"),
-        ("lShldr", "rShldr"),
-        ("left_leg_left_toe", "right_leg_left_toe"),
-    ],
-)
-def test_partners_by_name(pair):
-    assert mirrored_joints(line_of("root", *pair, "lowerback", "head")) == (0, 2, 1, 3, 4)
-
-
-def test_no_partner_where_no_such_name_is_there():
-    assert mirrored_joints(line_of("root", "lowerback", "rib", "LeftArm", "lib")) == (0, 1, 4, 3, 2)
-
-
 def mirrored_places(motion, axis=0):
     signs = np.ones(3)
     signs[axis] = -1
-    return positions(motion)[:, list(mirrored_joints(motion.skeleton))] * signs
+    return positions(motion)[:, list(partners_of(motion.skeleton.names))] * signs
 
 
 def symmetric(order, axis_angles, values, root_angles=(0.0, 0.0, 0.0)):

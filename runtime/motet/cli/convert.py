@@ -9,6 +9,8 @@ from motet.formats import check_writable, read_motion, write_motion
 from motet.mirror import mirror as mirrored
 from motet.motion import Motion
 
+_PARTIAL = click.option("--partial", is_flag=True, help="Take the whole frames of a file that breaks off.")
+
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254}
 
 
@@ -21,6 +23,7 @@ METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254}
 @click.option("--mirror", is_flag=True, help="Swap left and right.")
 @click.option("--unit", type=click.Choice(list(METRES)), help="Length unit to write.")
 @click.option("--unit-in", type=click.Choice(list(METRES)), help="Length unit of SOURCE, where the file does not say.")
+@_PARTIAL
 def convert(
     source: Path,
     out: Path,
@@ -30,13 +33,14 @@ def convert(
     mirror: bool,
     unit: str | None,
     unit_in: str | None,
+    partial: bool,
 ) -> None:
     """Convert the motion file SOURCE to OUT; the extensions say the formats.
 
     Reads .amc (with its .asf) .bvh .npz .csv; writes these and .html .gif .glb.
     """
     check_writable(out)
-    motion = read_motion(source)
+    motion = read_motion(source, partial)
     if start or stop is not None:
         motion = motion.cut(start, stop)
     motion = _in_unit(motion, unit, unit_in)
@@ -48,9 +52,10 @@ def convert(
 @click.command()
 @click.argument("source", type=Path)
 @click.option("-o", "--out", type=Path, help="Page to write. [default: a new file in the temporary folder]")
-def view(source: Path, out: Path | None) -> None:
+@_PARTIAL
+def view(source: Path, out: Path | None, partial: bool) -> None:
     """Write a self-contained page that plays the motion file SOURCE, and print its path."""
-    motion = read_motion(source)
+    motion = read_motion(source, partial)
     if out is None:
         out = Path(tempfile.mkdtemp(prefix="motet-")) / f"{source.stem}.html"
     check_writable(out)

@@ -23,17 +23,24 @@ MODULES = {
 }
 """Extension -> name of the module in this package."""
 
+BROKEN = (".amc", ".bvh")
+"""Formats whose files break off in practice; their ``read`` takes ``partial``."""
+
 READABLE = (".amc", ".bvh", ".npz", ".csv")
 WRITABLE = (".amc", ".bvh", ".npz", ".csv", ".html", ".gif", ".glb")
 
 
-def read_motion(path: str | Path) -> Motion:
-    """Read a motion file; FormatError for an unknown extension, a missing file or one that is no motion."""
+def read_motion(path: str | Path, partial: bool = False) -> Motion:
+    """Read a motion file; FormatError for an unknown extension, a missing file or one that is no motion.
+
+    partial: take the whole frames of a file that breaks off, which is refused otherwise.
+    """
     path = Path(path)
     module = _module(path, READABLE, "read")
     if not path.is_file():
         raise FormatError(path, "no such file")
-    motion: Motion = module.read(path)
+    options = {"partial": True} if partial and path.suffix.lower() in BROKEN else {}
+    motion: Motion = module.read(path, **options)
     return motion
 
 

@@ -11,9 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from motet.rotations import Array
+from motet.sides import LEFT, MIDDLE, RIGHT, sides_of
 from motet.skeleton import Skeleton
-
-LEFT, MIDDLE, RIGHT = "left", "middle", "right"
 
 COLOURS = {LEFT: (236, 122, 52), RIGHT: (58, 124, 226), MIDDLE: (176, 182, 196)}
 """sRGB of 0 to 255; ``player.html`` has the same."""
@@ -61,7 +60,7 @@ class Body:
 
     @cached_property
     def sides(self) -> tuple[str, ...]:
-        """The side of each joint, see :func:`sides_of`."""
+        """The side of each joint, told from its name."""
         return sides_of(self.skeleton.names)
 
     @cached_property
@@ -125,18 +124,6 @@ class Body:
         direction = direction / np.maximum(np.linalg.norm(direction, axis=-1, keepdims=True), 1e-9)
         skull = np.stack([head + along * direction for along, _ in SKULL], axis=-2)
         return np.concatenate([joints, skull], axis=-2)
-
-
-def sides_of(names: tuple[str, ...]) -> tuple[str, ...]:
-    """ "left", "right" or "middle" for each joint: a left one has a twin whose name has right for left, or r for l."""
-    lower = [name.lower() for name in names]
-    sides = [MIDDLE] * len(names)
-    for i, name in enumerate(lower):
-        twins = [name[:at] + "r" + name[at + 1 :] for at, letter in enumerate(name) if letter == "l"]
-        for twin in [name.replace("left", "right"), *twins]:
-            if twin != name and twin in lower:
-                sides[i], sides[lower.index(twin)] = LEFT, RIGHT
-    return tuple(sides)
 
 
 def _radius(beyond: float) -> float:

@@ -34,15 +34,16 @@ def read(path: str | Path, partial: bool = False) -> Motion:
 
     A frame time that is a whole number of frames per second as far as its digits tell is read as that rate:
     0.0083333 is 120 fps.
-    partial: take the whole frames that are there where the file declares another number, which is refused otherwise.
-    FormatError names file and line; a frame that breaks off is refused in any case.
+    partial: take the whole frames of a file that breaks off or declares another number, which is refused otherwise.
+    FormatError names file and line.
     """
     path = Path(path)
     lines = read_text(path).split("\n")
     nodes, motion_line = _hierarchy(path, lines)
     start, declared, fps = _motion_header(path, lines, motion_line)
     channels = [f"{node.name}.{kind}" for node in nodes for kind in node.channels]
-    values = _values(path, lines, start, len(channels)) if channels else np.zeros((declared, 0))
+    kept = _without_broken_end(lines, start, len(channels)) if partial else lines
+    values = _values(path, kept, start, len(channels)) if channels else np.zeros((declared, 0))
     if len(values) != declared and not partial:
         reason = f"the file declares {declared} frames and holds {len(values)}: correct the line 'Frames:'"
         raise FormatError(path, f"{reason}, or read it as partial", start)
@@ -150,6 +151,13 @@ def _fps(path: Path, word: str, line: int) -> float:
     last_digit = 10.0 ** int(Decimal(word).as_tuple().exponent)
     whole = max(1, round(1 / seconds))
     return whole if abs(1 / whole - seconds) <= 0.51 * last_digit else 1 / seconds
+
+
+def _without_broken_end(lines: list[str], start: int, width: int) -> list[str]:
+    """The lines without a last frame of which values are missing."""
+    last = max((n for n in range(start, len(lines)) if lines[n].strip()), default=start)
+    whole = last < len(lines) and len(lines[last].split()) == width
+    return lines if whole else lines[:last]
 
 
 def _values(path: Path, lines: list[str], start: int, width: int) -> Array:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.formats.body import LEFT, MIDDLE, sides_of
+from motet.sides import LEFT, MIDDLE, sides_of
 from motet.skeleton import Skeleton
 
 TRUNK = "trunk"
