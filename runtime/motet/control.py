@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from motet.bundle import Bundle
-from motet.contract import MotionContract
+from motet.bundled import Bundled
 from motet.decode.noise import RowNoise
 from motet.decode.rollout import State, advance
 from motet.errors import BundleError, ControlError, MotionError
@@ -20,7 +19,7 @@ from motet.script import control_track, parse_script
 Floats = NDArray[np.float32]
 
 
-class ControlModel:
+class ControlModel(Bundled):
     """A model of labelled motions that runs live; shared between any number of sessions and threads.
 
     manifest: of a control bundle, or of a training run with the same keys.
@@ -29,8 +28,7 @@ class ControlModel:
     """
 
     def __init__(self, manifest: Mapping[str, Any], graphs: Mapping[str, Graph]) -> None:
-        self.manifest = manifest
-        self.contract = MotionContract.from_json(manifest["motion"])
+        super().__init__(manifest, graphs)
         self.encoder, self.stepper = graphs["encoder"], graphs["step"]
         try:
             control = manifest["control"]
@@ -42,26 +40,6 @@ class ControlModel:
         history = self.stepper.spec.input("history")
         self.taps, self.codes = history.size(1), history.size(2)
         self.has_free_units = self.stepper.spec.takes("codes")
-
-    @staticmethod
-    def load(bundle: Bundle, threads: int = 1) -> "ControlModel":
-        """The model of an opened bundle; ``threads`` of one step pay from some hundred characters on."""
-        model = ControlModel(bundle.manifest, {role: bundle.graph(role, threads) for role in ("encoder", "step")})
-        model._source = (bundle.path, threads)
-        return model
-
-    _source: tuple[Any, int] | None = None
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        # sessions of ONNX Runtime do not pickle: another process loads the bundle again
-        if self._source is None:
-            raise TypeError("only a model loaded from a bundle can be pickled")
-        return _reload, self._source
-
-    @property
-    def fps(self) -> float:
-        """Frames, and so ticks, per second."""
-        return self.contract.fps
 
     def encode(self, frames: ArrayLike) -> Floats:
         """Frames (B, D) in the contract's units to codes (B, H) float32."""
@@ -76,7 +54,7 @@ class ControlModel:
         seed: int | Sequence[int] = 0,
         variety: float = 0.0,
         temperature: float | None = None,
-        iterations: int = 1,
+        iterations: int | None = None,
     ) -> "ControlSession":
         """A session of ``characters`` figures that start alike.
 
@@ -85,7 +63,8 @@ class ControlModel:
         seed: of the noise. Character i has seed + i (or seed[i]) and moves as it would alone with that seed.
         variety: 0 runs on probabilities, always alike; 1 draws binary codes; between, a blend.
         temperature: of the sigmoid, the bundle's by default; lower is more decided.
-        iterations: Gibbs iterations for each frame; more than 1 only in models with free hidden units.
+        iterations: Gibbs iterations for each frame, as many as the bundle says by default; more than 1 only in models
+            with free hidden units.
         Raises ControlError for values out of range, MotionError for a motion that does not fit.
         """
         seeds = _seeds(seed, characters)
@@ -95,6 +74,7 @@ class ControlModel:
             label = self.labels[0] if start is None else start
             history = self._history_at(label)
         temperature = self.defaults["temperature"] if temperature is None else temperature
+        iterations = int(self.defaults.get("iterations", 1)) if iterations is None else iterations
         settings = self._settings(variety, temperature, iterations)
         session = ControlSession(self, np.repeat(history[None], characters, axis=0), seeds, settings)
         if label is not None:
@@ -247,7 +227,3 @@ def _seeds(seed: int | Sequence[int], characters: int) -> list[int]:
     if len(seeds) != characters or min(seeds) < 0:
         raise ControlError(f"{characters} characters need a seed of 0 or more, or as many seeds, not {seed}")
     return seeds
-
-
-def _reload(path: Any, threads: int) -> ControlModel:
-    return ControlModel.load(Bundle.open(path), threads)

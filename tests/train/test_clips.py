@@ -9,7 +9,8 @@ from motet.formats import read_motion, write_motion
 from motet_train.contrastive import Learning
 from motet_train.control import About, train_control
 from motet_train.data.body import body_parts
-from motet_train.data.clips import CMU, DataError, read_clips, sequences
+from motet_train.data.clips import CMU, read_clips, sequences
+from motet_train.data.errors import DataError
 from motet_train.models.tdbn import TDBNConfig
 
 
@@ -50,8 +51,10 @@ def own_clips(folder: Path) -> Path:
 def test_a_folder_of_bvh_is_trained_on(tmp_path: Path) -> None:
     clips = read_clips(own_clips(tmp_path))
     assert clips.labels == ("jog", "stroll")
-    short = TDBNConfig(rbm=Learning(epochs=1), crbm=Learning(epochs=1))
+    short = TDBNConfig(restarts=2, tries=1, rbm=Learning(epochs=1), crbm=Learning(epochs=1))
     run = train_control(clips, short, 0, About("mine", "a test", "CC0"), lambda *_: None)
+    assert run.manifest["training"]["candidates"] == 2  # none of the untrained ones satisfies
+    assert "cycle.energy" in run.manifest["training"]["missed"]
     assert run.manifest["control"]["labels"] == ["jog", "stroll"]
     assert run.manifest["licence"]["weights"] == "CC0"
 

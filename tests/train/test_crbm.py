@@ -6,7 +6,7 @@ import torch
 from torch.nn.functional import binary_cross_entropy_with_logits
 
 from motet_train.contrastive import Learning
-from motet_train.models.crbm import CRBM, train_crbm, windows
+from motet_train.models.crbm import CRBM, Past, train_crbm, windows
 
 
 def small_crbm(free: int = 0) -> CRBM:
@@ -54,7 +54,7 @@ def test_an_update_is_the_gradient_of_the_cross_entropy() -> None:
     logits = bias + data.past[rows] @ past_weight + data.control[rows] @ hidden_weight
     loss = binary_cross_entropy_with_logits(logits, data.visible[rows], reduction="sum") / len(rows)
     loss.backward()  # type: ignore[no-untyped-call]
-    train_crbm(crbm, data, learning, torch.Generator().manual_seed(5), lambda *_: None, clamped=True, past_noise=0.0)
+    train_crbm(crbm, data, learning, torch.Generator().manual_seed(5), lambda *_: None, clamped=True, recall=Past())
     for learned, start in (
         (crbm.past_weight, past_weight),
         (crbm.hidden_weight, hidden_weight),
@@ -72,7 +72,7 @@ def test_clamping_free_units_and_more_steps_each_change_what_is_learned(free: in
         crbm = small_crbm(free)
         learning = Learning(epochs=20, rate=0.05, steps=steps)
         train_crbm(
-            crbm, data, learning, torch.Generator().manual_seed(2), lambda *_: None, clamped=clamped, past_noise=0.0
+            crbm, data, learning, torch.Generator().manual_seed(2), lambda *_: None, clamped=clamped, recall=Past()
         )
         assert all(torch.isfinite(p).all() for p in crbm.parameters())
         results[clamped, steps] = crbm.hidden_weight

@@ -14,7 +14,8 @@ from motet_train.control import About, train_control
 from motet_train.data.clips import Clips, read_clips
 from motet_train.evaluate.gaits import gait_transitions, limit_cycle
 from motet_train.evaluate.lab import Lab
-from motet_train.evaluate.report import GOALS, control_report, lab_of, reached
+from motet_train.evaluate.report import GOALS, control_report, lab_of
+from motet_train.evaluate.table import reached
 from motet_train.models.tdbn import TDBNConfig
 
 
@@ -27,7 +28,9 @@ def test_the_shipped_bundle_reaches_every_goal_and_says_what_is_measured(clips: 
     model = load("cmu-control")
     report = control_report(lab_of(model, clips), lambda _: None)
     missed = {
-        name: report[name.split(".")[0]][name.split(".")[1]] for name in GOALS if not reached(name, _of(report, name))
+        name: report[name.split(".")[0]][name.split(".")[1]]
+        for name in GOALS
+        if not reached(GOALS, name, _of(report, name))
     }
     assert missed == {}
     for name in GOALS:

@@ -14,7 +14,7 @@ from motet_train.models.tdbn import TDBN, TDBNConfig, from_config, to_config
 from motet_train.runs import Run, RunError
 
 ABOUT = About("small", "a test", "MIT")
-SHORT = replace(TDBNConfig(), rbm=Learning(epochs=2), crbm=Learning(epochs=2))
+SHORT = replace(TDBNConfig(), restarts=1, tries=1, rbm=Learning(epochs=2), crbm=Learning(epochs=2))
 
 
 def train(config: TDBNConfig = SHORT, seed: int = 0) -> Run:

@@ -3,14 +3,21 @@
 Letters in shapes: B rows of a mini-batch, N all rows, D visible units, H hidden units.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import torch
 from torch import Tensor
 
+from motet.errors import MotetError
+
 Progress = Callable[[str, int, int], None]
 """Called after each epoch with the layer's name, the epochs done and their number."""
+
+
+class DivergedError(MotetError, ArithmeticError):
+    """Learning whose weights left all bounds."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +37,11 @@ class Learning:
     """k of CD-k: Gibbs steps of the reconstruction."""
     temperature: tuple[float, float] = (1.0, 0.6)
     """Of the sigmoids in the first and the last epoch, geometric between."""
+
+    @staticmethod
+    def from_json(data: Mapping[str, Any]) -> "Learning":
+        """What asdict and JSON made of it."""
+        return Learning(**{**data, "temperature": tuple(data["temperature"])})
 
 
 @dataclass(frozen=True)
@@ -63,7 +75,10 @@ def balanced(weights: Sequence[Tensor]) -> Tensor:
 
 
 class Ascent:
-    """Gradient ascent with momentum and decay on one parameter, in place."""
+    """Gradient ascent with momentum and decay on one parameter, in place.
+
+    The parameter may be a stack of R; then the rows of what it climbs along have R in front.
+    """
 
     def __init__(self, value: Tensor, decay: float) -> None:
         self.value, self.decay = value, decay
@@ -71,20 +86,25 @@ class Ascent:
 
     def outer(self, left: Tensor, right: Tensor, epoch: Epoch) -> None:
         """Climb along the mean of left^T right, (B, N) and (B, M)."""
-        self.velocity.addmm_(left.T, right, beta=epoch.momentum, alpha=epoch.rate / len(left))
+        self._add(left, right, epoch.momentum, epoch.rate / left.shape[-2])
         self._climb(epoch)
 
     def contrast(self, data: tuple[Tensor, Tensor], model: tuple[Tensor, Tensor], epoch: Epoch) -> None:
         """Climb along <v h>data - <v h>model, each given as its two factors (B, N), (B, M)."""
-        step = epoch.rate / len(data[0])
-        self.velocity.addmm_(model[0].T, model[1], beta=epoch.momentum, alpha=-step)
-        self.velocity.addmm_(data[0].T, data[1], alpha=step)
+        step = epoch.rate / data[0].shape[-2]
+        self._add(*model, epoch.momentum, -step)
+        self._add(*data, 1.0, step)
         self._climb(epoch)
 
     def mean(self, rows: Tensor, epoch: Epoch) -> None:
         """Climb along the mean of rows (B, N): a bias, which does not decay."""
-        self.velocity.mul_(epoch.momentum).add_(rows.sum(0), alpha=epoch.rate / len(rows))
+        total = rows.sum(-2, keepdim=self.value.ndim > 1)
+        self.velocity.mul_(epoch.momentum).add_(total, alpha=epoch.rate / rows.shape[-2])
         self.value.add_(self.velocity)
+
+    def _add(self, left: Tensor, right: Tensor, momentum: float, step: float) -> None:
+        add = self.velocity.addmm_ if left.ndim == 2 else self.velocity.baddbmm_
+        add(left.mT, right, beta=momentum, alpha=step)
 
     def _climb(self, epoch: Epoch) -> None:
         self.value.mul_(1.0 - epoch.rate * self.decay).add_(self.velocity)

@@ -4,9 +4,10 @@ from pathlib import Path
 
 import click
 
+from motet.control import ControlModel
 from motet.formats import check_writable, read_motion, write_motion
 from motet.formats.html import write as write_html
-from motet.models import load
+from motet.models import load_as
 from motet.root_path import GENERATED, lay_root_path
 from motet.script import parse_script, starts_of
 
@@ -35,7 +36,7 @@ def control(
     Segments have commas between them: a label and seconds; a ramp "walk>run 5s"; a mix "walk*.3+run*.7 2s".
     """
     check_writable(out)
-    model = load(bundle)
+    model = load_as(ControlModel, bundle)
     segments = parse_script(script, model.labels)
     first = (
         read_motion(start)

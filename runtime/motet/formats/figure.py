@@ -5,10 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from motet.errors import MotionError
-from motet.formats.body import LEFT, RIGHT, Body, Bone
+from motet.formats.body import Body, Bone
 from motet.kinematics import positions, skeleton_of
 from motet.motion import Motion
 from motet.rotations import Array
+from motet.sides import LEFT, RIGHT
 
 NEAR_GROUND = 0.1
 """Within this height of y = 0 the lowest point of a motion is taken to stand on y = 0."""

@@ -1,16 +1,16 @@
 """Labelled clips: a few short motions, each with the name of what it shows; and sequences cut from them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from motet.errors import MotetError
 from motet.formats import READABLE, read_motion
 from motet.heading import without_heading
 from motet.kinematics import skeleton_of
 from motet.motion import Motion
 from motet.rotations import Array
 from motet.skeleton import Skeleton
+from motet_train.data.errors import DataError
 
 CONSTANT = 1e-3
 """Degrees: a channel with a smaller standard deviation is as good as constant."""
@@ -23,10 +23,6 @@ CMU_LICENCE = (
     "CMU Graphics Lab Motion Capture Database (mocap.cs.cmu.edu), created with funding from NSF EIA-0196217: "
     "free for all uses, may be included in products, may not be resold as such"
 )
-
-
-class DataError(MotetError, ValueError):
-    """Training data that a model cannot be trained on."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +42,13 @@ class Clips:
     def channels(self) -> tuple[str, ...]:
         """The channels that all motions have."""
         return next(iter(self.motions.values()))[0].channels
+
+    def only(self, labels: Sequence[str]) -> "Clips":
+        """The motions of some labels, in their order; DataError where there is no motion of one."""
+        missing = [label for label in labels if label not in self.motions]
+        if missing or not labels:
+            raise DataError(f"the clips show {', '.join(self.labels)}, not {', '.join(missing) or 'nothing'}")
+        return replace(self, motions={label: self.motions[label] for label in labels})
 
 
 def read_clips(folder: Path | None = None, root_rotation: bool = True) -> Clips:

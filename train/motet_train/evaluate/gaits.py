@@ -31,10 +31,15 @@ def limit_cycle(lab: Lab, role: str = "walk", seconds: float = 60.0) -> Figures:
         "period_s": period(last) / lab.fps,
         "training_period_s": training / lab.fps,
         "period_error": abs(period(last) / training - 1),
-        "drift": abs(period(last) / period(first) - 1),
-        "amplitude_drift": abs(amplitudes[1] / amplitudes[0] - 1),
+        "drift": _change(period(first), period(last)),
+        "amplitude_drift": _change(*amplitudes),
         "energy": lab.reference.energy_ratio(frames[-lab.frames(20) :], getattr(lab, role)),
     }
+
+
+def _change(first: float, last: float) -> float:
+    """Relative change; NaN from nothing, as of a figure that stands still."""
+    return abs(last / first - 1) if first > 0 else np.nan
 
 
 def convergence(lab: Lab, starts: int = 100, sigma: float = 1.0) -> Figures:
@@ -159,8 +164,10 @@ def constant_hysteresis(lab: Lab, points: int = 41, starts: int = 4) -> Figures:
     for role in ("walk", "run"):
         history = np.tile(lab.phases(role, starts)[0], (points, 1, 1))
         control = gait_control(lab, np.repeat(grid, starts))
-        frames = lab.play(lab.start(history), np.repeat(control[None], lab.frames(15.0), axis=0)).frames
-        running = nearer_to_run(lab, frames[-lab.frames(2.0) :]).mean(axis=0) > 0.5
+        session = lab.start(history)
+        lab.settle(session, control, 13.0)
+        frames = lab.play(session, np.repeat(control[None], lab.frames(2.0), axis=0)).frames
+        running = nearer_to_run(lab, frames).mean(axis=0) > 0.5
         kept[role] = (running == (role == "run")).reshape(points, starts).all(axis=1)
     walk, run = int(np.cumprod(kept["walk"]).sum()) - 1, points - int(np.cumprod(kept["run"][::-1]).sum())
     if walk < 0 or run == points:

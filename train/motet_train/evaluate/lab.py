@@ -39,21 +39,21 @@ class Leg:
     """Indices of a leg's channels, and of its codes."""
 
     channels: NDArray[np.intp]
-    codes: slice
+    codes: NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
 class Lab:
     """A control model beside its training motions, with the loops that several experiments need.
 
-    walk, run: the labels of two periodic motions; bend: of one that ends, or None.
+    walk, run: the labels of two periodic motions, run None where there is one; bend: of one that ends, or None.
     legs: the left and the right one, where the skeleton has legs.
     """
 
     model: ControlModel
     reference: Reference
     walk: str
-    run: str
+    run: str | None
     bend: str | None
     legs: tuple[Leg, Leg] | None
 
@@ -99,6 +99,12 @@ class Lab:
         """Run from histories under one label."""
         track = np.repeat(self.control(**{role: 1.0})[None], self.frames(seconds), axis=0)
         return self.play(self.start(history, **options), track)
+
+    def settle(self, session: ControlSession, control: Array, seconds: float) -> None:
+        """Run under constant control values (B, L), of which nothing is recorded."""
+        session.set_control(control)
+        for _ in range(self.frames(seconds)):
+            session.step()
 
     def training_history(self, role: str, frame: int = 0) -> Codes:
         """The history (1, K, H) of a training motion's frames from the given one on."""

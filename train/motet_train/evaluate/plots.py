@@ -10,8 +10,9 @@ from matplotlib.figure import Figure
 from sklearn.decomposition import PCA
 
 from motet.errors import OutputError
-from motet.kinematics import positions
+from motet.kinematics import positions, skeleton_of
 from motet.rotations import Array
+from motet_train.data.errors import DataError
 from motet_train.evaluate.bend import interrupted
 from motet_train.evaluate.gaits import gait_control, late_left_leg, ramp
 from motet_train.evaluate.lab import Lab
@@ -25,7 +26,9 @@ SPACING = 0.6
 
 
 def draw_all(lab: Lab, folder: Path) -> list[Path]:
-    """Draw every figure into an existing or a new folder; returns the files."""
+    """Draw every figure into an existing or a new folder; returns the files. DataError without a second gait."""
+    if lab.run is None:
+        raise DataError("the figures need clips of two periodic motions, such as walking and running")
     try:
         folder.mkdir(exist_ok=True)
     except OSError as error:
@@ -142,7 +145,7 @@ def bifurcation(lab: Lab) -> Figure:
 def interruption(lab: Lab) -> Figure:
     """Figure 5.10: walk, bend, run; the bend completed, and interrupted late, in the middle and early."""
     assert lab.bend is not None
-    training = [lab.reference.motions[label][0] for label in (lab.walk, lab.bend, lab.run)]
+    training = [lab.reference.motions[label][0] for label in (lab.walk, lab.bend, lab.run) if label]
     plane = _plane(lab, np.concatenate(training))
     start = lab.phases("walk", 1)[0]
     whole = np.repeat(
@@ -198,9 +201,9 @@ def _thighs(lab: Lab) -> list[int]:
 
 def _sticks(lab: Lab, axes: Axes, frames: Array) -> None:
     """Stick figures in profile, each a little to the right of the one before."""
-    points = positions(lab.model.contract.motion(frames))
-    skeleton = lab.model.contract.skeleton
-    points = points / skeleton.height
+    motion = lab.model.contract.motion(frames)
+    skeleton = skeleton_of(motion)
+    points = positions(motion) / skeleton.height
     for number, pose in enumerate(points):
         for i, joint in enumerate(skeleton.joints[1:], start=1):
             (_, y0, z0), (_, y1, z1) = pose[joint.parent], pose[i]

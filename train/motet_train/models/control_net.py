@@ -102,8 +102,9 @@ class Step(nn.Module):
     ) -> tuple[Tensor, Tensor, Tensor]:
         """One frame."""
         crbm, units = self.net.crbm, self.net.noise_units
-        drive = crbm.drive(history.flatten(1), control @ self.net.expansion)
-        free = drive[:, :0] if codes is None else binary(crbm.free(codes, temperature), noise[:, units:], variety)
+        past = history.flatten(1)
+        drive = crbm.drive(past, control @ self.net.expansion)
+        free = drive[:, :0] if codes is None else binary(crbm.free(codes, past, temperature), noise[:, units:], variety)
         new = self.net.vary(crbm.visible(drive, free, temperature), noise[:, :units], variety)
         return new, self.net.decode(new), torch.cat([history[:, 1:], new[:, None]], dim=1)
 

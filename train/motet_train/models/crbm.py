@@ -4,28 +4,34 @@ Letters in shapes: B rows, N all rows, H visible units, K taps, C control units,
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor, nn
 
-from motet_train.contrastive import Ascent, Learning, Progress, balanced, epochs, parameter
+from motet_train.contrastive import Ascent, DivergedError, Learning, Progress, balanced, epochs, parameter
+
+LARGEST = 1e3
+"""A weight beyond this is a sign that learning blew up; where it works, weights stay near 1."""
 
 
 class CRBM(nn.Module):
     """Visible units driven by the past and by a second hidden layer (figure 3.5).
 
     The second hidden layer is C control units, which are given, and F free units, which are inferred. Visible units
-    are binary, or with ``gaussian`` real with unit variance (Taylor 2007).
+    are binary, or with ``taylor`` real with unit variance, and then the past drives the free units too (Taylor 2007).
     """
 
-    def __init__(self, visible: int, taps: int, control: int, free: int, gaussian: bool = False) -> None:
+    free_past_weight: nn.Parameter | None
+
+    def __init__(self, visible: int, taps: int, control: int, free: int, taylor: bool = False) -> None:
         super().__init__()
-        self.control_units, self.free_units, self.gaussian = control, free, gaussian
+        self.control_units, self.free_units, self.gaussian = control, free, taylor
         self.past_weight = parameter(taps * visible, visible)
         self.hidden_weight = parameter(control + free, visible)
         self.visible_bias = parameter(visible)
         self.hidden_bias = parameter(control + free)
+        self.register_parameter("free_past_weight", parameter(taps * visible, free) if taylor else None)
 
     def drive(self, past: Tensor, control: Tensor) -> Tensor:
         """What the past (B, K H) and the control units (B, C) put on the visible units (B, H)."""
@@ -37,13 +43,19 @@ class CRBM(nn.Module):
         total = torch.addmm(drive, free, self.hidden_weight[self.control_units :]) if self.free_units else drive
         return total if self.gaussian else torch.sigmoid(total / temperature)
 
-    def hidden(self, visible: Tensor, temperature: Tensor | float) -> Tensor:
-        """Probabilities of control and free units (B, C+F) given the visible units (B, H)."""
-        return torch.sigmoid(torch.addmm(self.hidden_bias, visible, self.hidden_weight.T) / temperature)
+    def control(self, visible: Tensor, temperature: Tensor | float) -> Tensor:
+        """Probabilities of the control units (B, C) given the visible units (B, H)."""
+        units = self.control_units
+        total = torch.addmm(self.hidden_bias[:units], visible, self.hidden_weight[:units].T)
+        return torch.sigmoid(total / temperature)
 
-    def free(self, visible: Tensor, temperature: Tensor | float) -> Tensor:
-        """Probabilities of the free units (B, F) given the visible units (B, H)."""
-        return self.hidden(visible, temperature)[:, self.control_units :]
+    def free(self, visible: Tensor, past: Tensor, temperature: Tensor | float) -> Tensor:
+        """Probabilities of the free units (B, F) given the visible units (B, H) and the past (B, K H)."""
+        units = self.control_units
+        total = torch.addmm(self.hidden_bias[units:], visible, self.hidden_weight[units:].T)
+        if self.free_past_weight is not None:
+            total = torch.addmm(total, past, self.free_past_weight)
+        return torch.sigmoid(total / temperature)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +84,16 @@ def windows(codes: Sequence[Sequence[Tensor]], expansion: Tensor, taps: int, ons
     return Windows(every[:, :taps].flatten(1), every[:, taps], control, balanced(weights))
 
 
+@dataclass(frozen=True)
+class Past:
+    """How a CRBM learns from its past (Taylor 2007)."""
+
+    noise: float = 0.0
+    """Standard deviation of Gaussian noise on the past, so that the net learns the way back to its data."""
+    rate: float = 1.0
+    """Learning rate of the weights from the past to the visible units over that of the others."""
+
+
 @torch.no_grad()
 def train_crbm(
     crbm: CRBM,
@@ -81,44 +103,57 @@ def train_crbm(
     progress: Progress,
     *,
     clamped: bool,
-    past_noise: float,
+    recall: Past,
 ) -> None:
     """Train by contrastive divergence with the past held fixed (thesis 3.2, 5.2).
 
     clamped: control units keep their values in the reconstruction; else they are inferred from it (thesis 5.3).
-    past_noise: standard deviation of Gaussian noise on the past, so that the net learns the way back to its data
-        (Taylor 2007).
+    Raises DivergedError where the weights leave all bounds.
     """
     past_weight, hidden_weight, bias, hidden_bias = (
         Ascent(p, learning.decay) for p in (crbm.past_weight, crbm.hidden_weight, crbm.visible_bias, crbm.hidden_bias)
     )
+    free_past = None if crbm.free_past_weight is None else Ascent(crbm.free_past_weight, learning.decay)
     for number, epoch in enumerate(epochs(learning, data.probabilities, generator), start=1):
         for rows in epoch.batches:
             past, visible, control = data.past[rows], data.visible[rows], data.control[rows]
-            if past_noise:
-                past = past + past_noise * torch.randn(past.shape, generator=generator)
-            free = _sampled_free(crbm, visible, epoch.temperature, generator)
-            drive = crbm.drive(past, control)
-            end, end_free = settle(crbm, drive, free, learning.steps, epoch.temperature, generator)
-            end_control = control if clamped else crbm.hidden(end, epoch.temperature)[:, : crbm.control_units]
+            if recall.noise:
+                past = past + recall.noise * torch.randn(past.shape, generator=generator)
+            free = _sampled_free(crbm, visible, past, epoch.temperature, generator)
+            end, end_free = settle(crbm, past, control, free, learning.steps, epoch.temperature, generator)
+            end_control = control if clamped else crbm.control(end, epoch.temperature)
             hidden, end_hidden = torch.cat([control, free], 1), torch.cat([end_control, end_free], 1)
-            past_weight.outer(past, visible - end, epoch)
+            past_weight.outer(past, visible - end, replace(epoch, rate=epoch.rate * recall.rate))
+            if free_past is not None:
+                free_past.outer(past, free - end_free, epoch)
             hidden_weight.contrast((hidden, visible), (end_hidden, end), epoch)
             hidden_bias.mean(hidden - end_hidden, epoch)
             bias.mean(visible - end, epoch)
+        if not crbm.past_weight.abs().max() <= LARGEST:
+            raise DivergedError(f"learning blew up: the CRBM has weights beyond {LARGEST:g} after epoch {number}")
         progress("CRBM", number, learning.epochs)
 
 
 def settle(
-    crbm: CRBM, drive: Tensor, free: Tensor, steps: int, temperature: float, generator: torch.Generator
+    crbm: CRBM,
+    past: Tensor,
+    control: Tensor,
+    free: Tensor,
+    steps: int,
+    temperature: float,
+    generator: torch.Generator,
 ) -> tuple[Tensor, Tensor]:
     """k Gibbs steps from free units (B, F): means of the visible (B, H) and of the free units (B, F)."""
+    drive = crbm.drive(past, control)
     for _ in range(steps - 1 if crbm.free_units else 0):
-        free = _sampled_free(crbm, crbm.visible(drive, free, temperature), temperature, generator)
+        free = _sampled_free(crbm, crbm.visible(drive, free, temperature), past, temperature, generator)
     end = crbm.visible(drive, free, temperature)
-    return end, crbm.free(end, temperature)
+    return end, crbm.free(end, past, temperature)
 
 
-def _sampled_free(crbm: CRBM, visible: Tensor, temperature: float, generator: torch.Generator) -> Tensor:
-    free = crbm.free(visible, temperature)
-    return torch.bernoulli(free, generator=generator) if crbm.free_units else free
+def _sampled_free(crbm: CRBM, visible: Tensor, past: Tensor, temperature: float, generator: torch.Generator) -> Tensor:
+    free = crbm.free(visible, past, temperature)
+    if not crbm.free_units:
+        return free
+    # not torch.bernoulli: learning that blows up is noticed at the end of its epoch
+    return (torch.rand(free.shape, generator=generator) < free).to(free.dtype)

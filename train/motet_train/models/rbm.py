@@ -1,6 +1,6 @@
 """Gaussian-Bernoulli restricted Boltzmann machine, block-sparse by body part (thesis 3.1, 3.2, 4.1).
 
-Letters in shapes: B rows, D visible units, H hidden units.
+Letters in shapes: B rows, D visible units, H hidden units, R restarts.
 """
 
 from collections.abc import Sequence
@@ -15,24 +15,36 @@ class RBM(nn.Module):
     """Unit-variance Gaussian visible and binary hidden units.
 
     mask: (D, H), 1 where a visible and a hidden unit are connected (thesis figure 4.2).
+    restarts: R machines that learn side by side, in little more time than one; every shape then has R in front.
     """
 
     mask: Tensor
 
-    def __init__(self, mask: Tensor) -> None:
+    def __init__(self, mask: Tensor, restarts: int | None = None) -> None:
         super().__init__()
+        stack = () if restarts is None else (restarts,)
+        row = () if restarts is None else (restarts, 1)
         self.register_buffer("mask", mask)
-        self.weight = parameter(*mask.shape)
-        self.visible_bias = parameter(mask.shape[0])
-        self.hidden_bias = parameter(mask.shape[1])
+        self.weight = parameter(*stack, *mask.shape)
+        self.visible_bias = parameter(*row, mask.shape[0])
+        self.hidden_bias = parameter(*row, mask.shape[1])
 
     def encode(self, visible: Tensor, temperature: float) -> Tensor:
         """Visible (B, D) to probabilities of the hidden units (B, H)."""
-        return torch.sigmoid(torch.addmm(self.hidden_bias, visible, self.weight) / temperature)
+        return torch.sigmoid(_affine(self.hidden_bias, visible, self.weight) / temperature)
 
     def decode(self, hidden: Tensor) -> Tensor:
         """Hidden (B, H) to the means of the visible units (B, D)."""
-        return torch.addmm(self.visible_bias, hidden, self.weight.T)
+        return _affine(self.visible_bias, hidden, self.weight.mT)
+
+    def take(self, stack: "RBM", number: int) -> None:
+        """Become one of the restarts of ``stack``."""
+        for own, others in zip(self.parameters(), stack.parameters(), strict=True):
+            own.data.copy_(others.data[number].reshape(own.shape))
+
+
+def _affine(bias: Tensor, rows: Tensor, weight: Tensor) -> Tensor:
+    return torch.addmm(bias, rows, weight) if weight.ndim == 2 else torch.baddbmm(bias, rows, weight)
 
 
 def block_mask(visible_parts: Sequence[int], hidden_per_part: int) -> Tensor:
@@ -41,7 +53,7 @@ def block_mask(visible_parts: Sequence[int], hidden_per_part: int) -> Tensor:
     return (torch.tensor(visible_parts)[:, None] == parts).float()
 
 
-@torch.no_grad()
+@torch.inference_mode()
 def train_rbm(
     rbm: RBM,
     frames: Tensor,
@@ -54,15 +66,17 @@ def train_rbm(
 
     Hidden units are sampled in the positive phase; the reconstruction ends in a mean field.
     """
-    weight, bias, hidden_bias = (Ascent(p, learning.decay) for p in (rbm.weight, rbm.visible_bias, rbm.hidden_bias))
+    weight, bias, hidden_bias = (
+        Ascent(p.data, learning.decay) for p in (rbm.weight, rbm.visible_bias, rbm.hidden_bias)
+    )
     visible_units, hidden_units = rbm.mask.shape
     for number, epoch in enumerate(epochs(learning, probabilities, generator), start=1):
         # one draw for a whole epoch: small draws cost more than the arithmetic
-        shape = (len(epoch.batches), learning.steps + 1, learning.batch)
+        shape = (len(epoch.batches), learning.steps + 1, *rbm.weight.shape[:-2], learning.batch)
         uniform = torch.rand(*shape, hidden_units, generator=generator)
         normal = torch.randn(*shape, visible_units, generator=generator)
         for rows, noise, jitter in zip(epoch.batches, uniform, normal, strict=True):
-            visible = frames[rows]
+            visible = frames[rows].expand(*rbm.weight.shape[:-2], -1, -1)
             hidden = (noise[0] < rbm.encode(visible, epoch.temperature)).float()
             end, end_hidden = reconstruct(rbm, hidden, noise[1:], jitter[1:], epoch.temperature)
             weight.contrast((visible, hidden), (end, end_hidden), epoch)

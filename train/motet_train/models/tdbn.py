@@ -8,7 +8,7 @@ Letters in shapes: B rows, T frames, D channels, H codes, K taps, L labels, C co
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
@@ -17,7 +17,7 @@ from torch import Tensor
 
 from motet_train.contrastive import Learning, Progress, balanced
 from motet_train.models.control_net import ControlNet, binary
-from motet_train.models.crbm import CRBM, train_crbm, windows
+from motet_train.models.crbm import CRBM, Past, train_crbm, windows
 from motet_train.models.rbm import RBM, block_mask, train_rbm
 
 Sequences = Sequence[Sequence[Tensor]]
@@ -33,7 +33,7 @@ class TDBNConfig:
     """Whether the root's rotation is among the channels: 59 of CMU's skeleton, else the thesis' 56."""
     hidden_per_part: int = 30
     taps: int = 3
-    control_units: int = 26
+    control_units: int = 24
     """For each label."""
     free_units: int = 0
     clamped: bool = True
@@ -47,8 +47,12 @@ class TDBNConfig:
     """Of the codes and of generation; learning anneals from 1 to it."""
     initial: float = 0.01
     """Standard deviation of the initial weights."""
+    restarts: int = 2
+    """RBMs that learn side by side: which features they find decides how the net moves."""
+    tries: int = 3
+    """CRBMs learned on each of them at the most, while none satisfies."""
     rbm: Learning = field(default_factory=lambda: Learning(2000, rate=1e-2, final_rate=0.03, temperature=(1.0, 0.38)))
-    crbm: Learning = field(default_factory=lambda: Learning(55, rate=6e-3, final_rate=0.1, temperature=(1.0, 0.38)))
+    crbm: Learning = field(default_factory=lambda: Learning(80, rate=6e-3, final_rate=0.3, temperature=(1.0, 0.38)))
 
     @staticmethod
     def thesis() -> "TDBNConfig":
@@ -62,13 +66,15 @@ class TDBNConfig:
             past_noise=0.0,
             onset=1.0,
             temperature=1.0,
+            restarts=1,
+            tries=1,
             rbm=Learning(epochs=1000, temperature=flat),
             crbm=Learning(epochs=100, temperature=flat),
         )
 
     def unclamped(self) -> "TDBNConfig":
         """The same recipe with control units inferred in the reconstruction, as the thesis' text has it (5.3)."""
-        return replace(self, clamped=False)
+        return replace(self, clamped=False, restarts=1, tries=1)
 
 
 class TDBN(ControlNet):
@@ -102,8 +108,7 @@ def from_config(config: Mapping[str, Any]) -> TDBN:
     values = dict(config)
     parts, labels = values.pop("parts"), values.pop("labels")
     for layer in ("rbm", "crbm"):
-        learning = dict(values[layer])
-        values[layer] = Learning(**{**learning, "temperature": tuple(learning["temperature"])})
+        values[layer] = Learning.from_json(values[layer])
     return TDBN(TDBNConfig(**values), parts, labels)
 
 
@@ -114,21 +119,36 @@ def to_config(net: TDBN) -> dict[str, Any]:
     return {**config, "parts": parts, "labels": len(net.expansion)}
 
 
-@torch.no_grad()
 def train_tdbn(
     net: TDBN, sequences: Sequences, onsets: Sequence[float], generator: torch.Generator, progress: Progress
-) -> None:
+) -> Iterator[None]:
     """Train RBM and CRBM, one after the other, on the sequences (T, D) of each label (thesis 3.3).
 
-    net.mean and net.scale must be set. onsets: see :func:`motet_train.models.crbm.windows`.
+    Yields whenever ``net`` is trained, again and again with other random numbers: ``tries`` times on each of the
+    ``restarts`` of the RBM. net.mean and net.scale must be set. onsets: see :func:`motet_train.models.crbm.windows`.
     """
     config = net.config
-    for weight in (net.rbm.weight, net.crbm.past_weight, net.crbm.hidden_weight):
-        weight.normal_(0.0, config.initial, generator=generator)
-    net.rbm.weight.mul_(net.rbm.mask)
-    frames = torch.cat([frames for found in sequences for frames in found])
+    rbms = RBM(net.rbm.mask, config.restarts)
+    frames = (torch.cat([frames for found in sequences for frames in found]) - net.mean) / net.scale
     uniform = balanced([torch.ones(sum(map(len, found))) for found in sequences])
-    train_rbm(net.rbm, (frames - net.mean) / net.scale, uniform, config.rbm, generator, progress)
+    rbms.weight.normal_(0.0, config.initial, generator=generator).mul_(rbms.mask)
+    train_rbm(rbms, frames, uniform, config.rbm, generator, progress)
+    for number in list(range(config.restarts)) * config.tries:
+        net.rbm.take(rbms, number)
+        _train_upper(net, sequences, onsets, generator, progress)
+        yield
+
+
+@torch.no_grad()
+def _train_upper(
+    net: TDBN, sequences: Sequences, onsets: Sequence[float], generator: torch.Generator, progress: Progress
+) -> None:
+    """Train the CRBM anew on the codes that the RBM gives."""
+    config, crbm = net.config, net.crbm
+    for parameter in crbm.parameters():
+        parameter.zero_()
+    for weight in (crbm.past_weight, crbm.hidden_weight):
+        weight.normal_(0.0, config.initial, generator=generator)
     codes = [[net.encode(frames) for frames in found] for found in sequences]
     data = windows(codes, net.expansion, config.taps, onsets)
-    train_crbm(net.crbm, data, config.crbm, generator, progress, clamped=config.clamped, past_noise=config.past_noise)
+    train_crbm(crbm, data, config.crbm, generator, progress, clamped=config.clamped, recall=Past(config.past_noise))

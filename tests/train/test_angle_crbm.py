@@ -1,0 +1,98 @@
+"""The baseline straight on the angles: what it does well, and what it cannot (reference: models.md C.5)."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from motet.control import ControlModel
+from motet_export.bundles import export_run
+from motet_train.contrastive import DivergedError, Learning
+from motet_train.control import About, train_control
+from motet_train.data.clips import read_clips
+from motet_train.evaluate.gaits import limit_cycle, switch
+from motet_train.evaluate.report import experiments, lab_of
+from motet_train.models.angle_crbm import AngleCRBM, AngleCRBMConfig, from_config, to_config
+from motet_train.models.crbm import CRBM
+from motet_train.runs import Run
+
+ABOUT = About("small", "a test", "MIT")
+SHORT = replace(AngleCRBMConfig(), iterations=3, crbm=Learning(3, 3e-2, temperature=(1.0, 1.0)))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def one_thread() -> Iterator[None]:
+    """More threads only get into each other's way on a net of this size."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(threads)
+
+
+def train(*labels: str, config: AngleCRBMConfig = SHORT) -> Run:
+    return train_control(read_clips().only(labels), config, 0, ABOUT, lambda *_: None)
+
+
+def test_a_slow_rate_from_the_past_keeps_walking() -> None:
+    run = train("walk", config=replace(AngleCRBMConfig(), iterations=10))
+    lab = lab_of(ControlModel(run.manifest, run.torch_graphs()), read_clips())
+    assert lab.run is None
+    assert set(experiments(lab)) == {"cycle", "sync"}
+    figures = limit_cycle(lab, seconds=30.0)
+    assert figures["period_error"] < 0.05
+    assert figures["drift"] < 0.005
+    assert 0.6 < figures["energy"] < 1.1
+
+
+def test_with_one_control_unit_running_starts_and_never_ends() -> None:
+    config = replace(AngleCRBMConfig(), iterations=10)
+    run = train("walk", "run", config=replace(config, crbm=replace(config.crbm, epochs=150)))
+    lab = lab_of(ControlModel(run.manifest, run.torch_graphs()), read_clips())
+    assert np.isfinite(switch(lab, "walk", "run", 4)[0]).all()
+    assert not np.isfinite(switch(lab, "run", "walk", 4)[0]).any()
+
+
+@pytest.mark.parametrize("labels", [("walk",), ("walk", "run")])
+def test_a_fast_rate_from_the_past_blows_up(labels: tuple[str, ...]) -> None:
+    with pytest.raises(DivergedError, match="blew up"):
+        train(*labels, config=replace(AngleCRBMConfig(), past_rate=2e-2))
+
+
+def test_the_past_drives_free_units_and_visible_units_are_real() -> None:
+    crbm = CRBM(visible=3, taps=2, control=1, free=2, taylor=True)
+    generator = torch.Generator().manual_seed(0)
+    for value in crbm.parameters():
+        value.normal_(0, 1, generator=generator)
+    visible, past = torch.randn(4, 3, generator=generator), torch.randn(4, 6, generator=generator)
+    assert crbm.free_past_weight is not None
+    total = crbm.hidden_bias[1:] + visible @ crbm.hidden_weight[1:].T + past @ crbm.free_past_weight
+    torch.testing.assert_close(crbm.free(visible, past, 2.0), torch.sigmoid(total / 2))
+    free = torch.rand(4, 2, generator=generator)
+    drive = crbm.visible_bias + past @ crbm.past_weight + crbm.hidden_weight[0]
+    found = crbm.visible(crbm.drive(past, torch.ones(4, 1)), free, 2.0)
+    torch.testing.assert_close(found, drive + free @ crbm.hidden_weight[1:])
+
+
+def test_variety_is_normal_about_the_mean() -> None:
+    net = AngleCRBM(SHORT, channels=5, labels=1)
+    noise = torch.rand(20000, net.noise_units, generator=torch.Generator().manual_seed(0))
+    mean = torch.arange(5.0).expand(20000, 5)
+    assert torch.equal(net.vary(mean, noise, torch.zeros(20000, 1)), mean)
+    away = net.vary(mean, noise, torch.full((20000, 1), 0.5)) - mean
+    np.testing.assert_allclose(away.mean(dim=0), 0, atol=0.02)
+    np.testing.assert_allclose(away.T.cov(), 0.25 * np.eye(5), atol=0.02)
+
+
+def test_a_run_reads_back_exports_and_iterates_as_its_manifest_says(tmp_path: Path) -> None:
+    run = train("walk", "run")
+    run.save(tmp_path)
+    again = Run.load(tmp_path)
+    assert to_config(from_config(again.manifest["config"])) == run.manifest["config"]
+    export_run(again, tmp_path / "bundle.zip")
+    model = ControlModel(run.manifest, run.torch_graphs())
+    found, three, one = (model.start(iterations=n).frames(np.eye(2)) for n in (None, 3, 1))
+    np.testing.assert_array_equal(found, three)
+    assert not np.array_equal(found, one)
