@@ -13,10 +13,13 @@ from motet_train.runs import Run
 @click.command()
 @click.argument("run", type=Path)
 @click.option("--out", required=True, type=Path, help="Bundle to write: a .zip, or a new folder.")
-def export(run: Path, out: Path) -> None:
+@click.option("--int8", is_flag=True, help="Weights of 8 bits: a quarter of the size; says what changes.")
+def export(run: Path, out: Path, int8: bool) -> None:
     """Export the training run RUN to ONNX and pack it as a bundle, if ONNX Runtime gives what torch gives."""
-    report = export_run(Run.load(run), out)
+    report = export_run(Run.load(run), out, int8)
     click.echo(_lines(report))
+    for name, value in report.get("int8", {}).items():
+        click.echo(f"int8 {name:<20} {value:.3g}")
     click.echo(str(out))
 
 

@@ -31,7 +31,8 @@ def export_graph(module: nn.Module, spec: GraphSpec, metadata: Mapping[str, str]
     rng = np.random.default_rng(0)
     # a batch of 2: torch would take an axis of size 1 for a constant
     example = {tensor.name: torch.from_numpy(tensor.example(rng, batch=2)) for tensor in spec.inputs}
-    with warnings.catch_warnings(), _quiet():
+    # gradients off: torch does not export a scan over weights that ask for them
+    with warnings.catch_warnings(), _quiet(), torch.no_grad():
         warnings.simplefilter("ignore")
         program = torch.onnx.export(
             module.eval(),

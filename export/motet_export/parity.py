@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from motet.decode.rollout import State, advance
 from motet.graph import Graph
+from motet_export.examples import example
 from motet_export.exporter import ExportError
 
 ONE_STEP, CARRIED = 1e-5, 1e-4
@@ -35,27 +36,30 @@ def error(found: Arrays, expected: Arrays) -> float:
     return largest
 
 
-def check_one_step(name: str, onnx: Graph, torch: Graph) -> dict[str, Any]:
-    """Rung 1 and 2: equal contracts, and one call at batch sizes 1, 1,000 and three random ones."""
+def check_one_step(name: str, onnx: Graph, torch: Graph, vocabulary: int = 1) -> dict[str, Any]:
+    """Rung 1 and 2: equal contracts, and one call at batch sizes 1, 1,000 and three random ones.
+
+    vocabulary: how many words there are, where the graph takes their ids.
+    """
     if onnx.spec != torch.spec:
         raise ExportError(f"{name}: the contracts differ: {onnx.spec} and {torch.spec}")
     rng = np.random.default_rng(1)
     batches = [1, 1000, *(int(batch) for batch in rng.integers(2, 100, 3))]
     errors = []
     for batch in batches:
-        feeds = {tensor.name: tensor.example(rng, batch) for tensor in torch.spec.inputs}
+        feeds = example(torch.spec, rng, batch, vocabulary)
         errors.append(error(onnx(feeds), torch(feeds)))
     return _bounded(f"{name}.one_step", max(errors), ONE_STEP, batches=batches)
 
 
-def check_carried(onnx: Graph, torch: Graph, batch: int = 16) -> dict[str, Any]:
+def check_carried(onnx: Graph, torch: Graph, vocabulary: int = 1, batch: int = 16) -> dict[str, Any]:
     """Rung 3: the state carried over 200 steps by each on its own, under the same random inputs."""
     rng = np.random.default_rng(2)
     spec = torch.spec
     start: State = {name: spec.input(name).example(rng, batch) for name in spec.feedback}
     states, largest = [start, dict(start)], 0.0
     for _ in range(STEPS):
-        given = {t.name: t.example(rng, batch) for t in spec.inputs if t.name not in spec.feedback}
+        given = {k: v for k, v in example(spec, rng, batch, vocabulary).items() if k not in spec.feedback}
         (found, states[0]), (expected, states[1]) = (
             advance(graph, state, given) for graph, state in zip((onnx, torch), states, strict=True)
         )

@@ -7,24 +7,33 @@ from importlib.metadata import version
 
 from motet.bundle import Bundle, list_bundles
 from motet.control import ControlModel, ControlSession, Snapshot
+from motet.describe import DescribeModel, Description
 from motet.errors import (
     BundleError,
     ControlError,
+    DecodingError,
     FormatError,
     MotetError,
     MotionError,
     OutputError,
     ScriptError,
+    TextError,
+    TextWarning,
 )
 from motet.formats import read_motion as read
 from motet.formats import write_motion as write
+from motet.generate import Generated, GenerateModel
 from motet.heading import without_heading
 from motet.kinematics import positions
 from motet.mirror import mirror
 from motet.models import load
 from motet.motion import Motion
+from motet.predict import PredictModel, PredictSession
+from motet.root_block import from_root_block, to_root_block
 from motet.root_path import lay_root_path
 from motet.skeleton import Joint, Skeleton
+from motet.smooth import smooth_resample
+from motet.text import Vocabulary
 
 __version__ = version("motet")
 
@@ -34,21 +43,34 @@ __all__ = [
     "ControlError",
     "ControlModel",
     "ControlSession",
+    "DecodingError",
+    "DescribeModel",
+    "Description",
     "FormatError",
+    "GenerateModel",
+    "Generated",
     "Joint",
     "MotetError",
     "Motion",
     "MotionError",
     "OutputError",
+    "PredictModel",
+    "PredictSession",
     "ScriptError",
     "Skeleton",
     "Snapshot",
+    "TextError",
+    "TextWarning",
+    "Vocabulary",
+    "from_root_block",
     "lay_root_path",
     "list_bundles",
     "load",
     "mirror",
     "positions",
     "read",
+    "smooth_resample",
+    "to_root_block",
     "without_heading",
     "write",
 ]

@@ -1,16 +1,30 @@
 """How fast a model runs here: whole calls as a user makes them, Python included."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
+from motet.bundled import Bundled
 from motet.control import ControlModel
+from motet.describe import DescribeModel
+from motet.generate import GenerateModel
+from motet.graph import Arrays, Graph
+from motet.predict import PredictModel
+from motet.text import EOS, SPECIALS
 
 BATCHES = (64, 256, 512, 1024, 2048, 4096)
 """Numbers of characters among which the best is looked for."""
+
+BEAMS, WORDS, SECONDS = 5, 10, 7.0
+"""Of descriptions and of motions, all as long as these: so that a model's speed does not depend on what it says."""
+
+TIMES = ("us", "ms")
+"""Units of which less is better."""
+
+Figures = dict[str, tuple[float, str]]
 
 
 @dataclass(frozen=True)
@@ -28,23 +42,37 @@ class Row:
         return asdict(self)
 
 
-def durations(call: Callable[[], object], seconds: float) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    """Seconds of each call, over about ``seconds`` (at least ten calls) after a warm-up of a tenth of that."""
-    _until(call, seconds / 10)
-    return np.array(_until(call, seconds))
+def durations(
+    call: Callable[[], object], seconds: float, least: int = 10
+) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    """Seconds of each call, over about ``seconds`` (at least ``least`` calls) after a warm-up of a tenth of that."""
+    _until(call, seconds / 10, 1)
+    return np.array(_until(call, seconds, least))
 
 
-def _until(call: Callable[[], object], seconds: float) -> list[float]:
+def _until(call: Callable[[], object], seconds: float, least: int) -> list[float]:
     taken: list[float] = []
     end = time.perf_counter() + seconds
-    while len(taken) < 10 or time.perf_counter() < end:
+    while len(taken) < least or time.perf_counter() < end:
         start = time.perf_counter()
         call()
         taken.append(time.perf_counter() - start)
     return taken
 
 
-def control_figures(model: ControlModel, seconds: float) -> dict[str, tuple[float, str]]:
+def figures(model: Bundled, seconds: float) -> Figures:
+    """The figures of a model by name, each measured for about ``seconds``: values and units."""
+    if isinstance(model, ControlModel):
+        return control_figures(model, seconds)
+    if isinstance(model, DescribeModel):
+        return describe_figures(model, seconds)
+    if isinstance(model, PredictModel):
+        return predict_figures(model, seconds)
+    assert isinstance(model, GenerateModel)
+    return generate_figures(model, seconds)
+
+
+def control_figures(model: ControlModel, seconds: float) -> Figures:
     """One character's tick (median and 99th percentile) and the frame rate at the best batch, plain and sampled."""
     tick = durations(model.start().step, seconds) * 1e6
     figures = {
@@ -64,11 +92,84 @@ def _rate(model: ControlModel, batch: int, variety: float, seconds: float) -> fl
     return batch / float(np.median(durations(session.step, seconds)))
 
 
-def rows(figures: dict[str, tuple[float, str]], baseline: dict[str, tuple[float, str]] | None) -> list[Row]:
+def describe_figures(model: DescribeModel, seconds: float) -> Figures:
+    """Descriptions of :data:`WORDS` words a second, many at once and one alone; encoder and step of one alone."""
+    end = model.vocabulary.ids[EOS]
+    never = {"log_probabilities": lambda found: np.where(np.arange(found.shape[1]) == end, np.float32(-1e9), found)}
+    defaults = {"beams": BEAMS, "max_words": WORDS}
+    steady = DescribeModel({**model.manifest, "defaults": defaults}, _steady(model.graphs, never))
+    size = (round(SECONDS * model.fps), len(model.contract.channels))
+    motion = model.contract.motion(np.random.default_rng(0).normal(model.contract.mean, model.contract.std, size))
+    return {
+        "describe.descriptions": (_batch_rate(steady.describe, [motion], 128, seconds), "motions/s"),
+        "describe.one": (_milliseconds(lambda: steady.describe(motion), seconds), "ms"),
+        "describe.encoder": (_milliseconds(lambda: model.embed(motion), seconds), "ms"),
+        "describe.step": (_milliseconds(_step_call(model.graphs["step"]), seconds), "ms"),
+    }
+
+
+def generate_figures(model: GenerateModel, seconds: float) -> Figures:
+    """Motions of :data:`SECONDS` a second, many at once and one alone; encoder and step of one alone."""
+    always = {"active": np.ones_like}
+    defaults = {**model.defaults, "hypotheses": BEAMS, "max_seconds": SECONDS}
+    steady = GenerateModel({**model.manifest, "defaults": defaults}, _steady(model.graphs, always))
+    known = model.vocabulary.words[len(SPECIALS) :]
+    text = model.vocabulary.decode(range(len(SPECIALS), len(SPECIALS) + min(WORDS, len(known))))
+    return {
+        "generate.motions": (_batch_rate(steady.generate, [text], 64, seconds), "motions/s"),
+        "generate.one": (_milliseconds(lambda: steady.generate(text), seconds), "ms"),
+        "generate.encoder": (_milliseconds(lambda: model.embed(text), seconds), "ms"),
+        "generate.step": (_milliseconds(_step_call(model.graphs["step"]), seconds), "ms"),
+    }
+
+
+def predict_figures(model: PredictModel, seconds: float) -> Figures:
+    """The first frame after a new one, and one of a whole horizon, for one figure; figures' horizons a second."""
+    size = (512, model.seed_frames, len(model.contract.channels))
+    seeds = np.random.default_rng(0).normal(model.contract.mean, model.contract.std, size).astype(np.float32)
+    horizon = _milliseconds(lambda: model.next_frames(seeds[:1]), seconds)
+    return {
+        "predict.first_frame": (1e3 * _milliseconds(lambda: model.next_frames(seeds[:1], 1), seconds), "us"),
+        "predict.frame": (1e3 * horizon / model.horizon, "us"),
+        "predict.horizons": (len(seeds) / _milliseconds(lambda: model.next_frames(seeds), seconds) * 1e3, "figures/s"),
+    }
+
+
+class _Steady:
+    """A graph some of whose outputs are changed."""
+
+    def __init__(self, graph: Graph, changes: Mapping[str, Callable[..., Any]]) -> None:
+        self.spec, self._graph, self._changes = graph.spec, graph, changes
+
+    def __call__(self, feeds: Arrays) -> dict[str, Any]:
+        outputs = self._graph(feeds)
+        return {**outputs, **{name: change(outputs[name]) for name, change in self._changes.items()}}
+
+
+def _steady(graphs: Mapping[str, Graph], changes: Mapping[str, Callable[..., Any]]) -> dict[str, Graph]:
+    return {**graphs, "step": _Steady(graphs["step"], changes)}
+
+
+def _step_call(step: Graph) -> Callable[[], object]:
+    """One call of a step for all beams of one request."""
+    rng = np.random.default_rng(0)
+    feeds = {tensor.name: tensor.example(rng, BEAMS) for tensor in step.spec.inputs}
+    return lambda: step(feeds)
+
+
+def _milliseconds(call: Callable[[], object], seconds: float) -> float:
+    return float(np.median(durations(call, seconds))) * 1e3
+
+
+def _batch_rate(call: Callable[[list[Any]], object], given: list[Any], batch: int, seconds: float) -> float:
+    return batch / float(np.median(durations(lambda: call(given * batch), seconds, least=2)))
+
+
+def rows(figures: Figures, baseline: Figures | None) -> list[Row]:
     """Figures beside those of the baseline; a ratio above 1 is in favour of the figure, for times as for rates."""
     result = []
     for name, (value, unit) in figures.items():
         other = baseline[name][0] if baseline else None
-        ratio = None if other is None or unit == "characters" else (other / value if unit == "us" else value / other)
+        ratio = None if other is None or unit == "characters" else (other / value if unit in TIMES else value / other)
         result.append(Row(name, value, unit, other, ratio))
     return result

@@ -9,20 +9,21 @@ from numpy.typing import ArrayLike
 
 from motet.errors import BundleError, MotionError
 from motet.motion import Motion
+from motet.root_block import ROOT_BLOCK, to_root_block
 from motet.rotations import Array
 from motet.skeleton import Skeleton
 
 
 @dataclass(frozen=True, eq=False)
 class MotionContract:
-    """Channels (D names), units (D), fps, mean and std of the training data (D,) and the skeleton for display."""
+    """Channels (D names), units (D), fps, mean and std of the training data (D,) and the skeleton, if any."""
 
     channels: tuple[str, ...]
     units: tuple[str, ...]
     fps: float
     mean: Array
     std: Array
-    skeleton: Skeleton
+    skeleton: Skeleton | None
 
     def motion(self, frames: ArrayLike) -> Motion:
         """Frames (T, D) of a model as a motion."""
@@ -31,8 +32,12 @@ class MotionContract:
     def frames(self, motion: Motion) -> Array:
         """The frames (T, D) float64 of a motion with the contract's channels, units and frame rate.
 
-        MotionError names the channels that the motion lacks.
+        Where the contract has the root block (:mod:`motet.root_block`) and the motion has the root's path and rotation,
+        the block is computed at the contract's frame rate, from continuous angles. MotionError names the channels that
+        the motion lacks.
         """
+        if set(ROOT_BLOCK) & set(self.channels) - set(motion.channels):
+            motion = to_root_block(motion.continuous().resample(self.fps))
         return motion.select(self.channels, self.units).resample(self.fps).values
 
     def to_json(self) -> dict[str, Any]:
@@ -43,7 +48,7 @@ class MotionContract:
             "fps": self.fps,
             "mean": [round(float(value), 9) for value in self.mean],
             "std": [round(float(value), 9) for value in self.std],
-            "skeleton": self.skeleton.to_json(),
+            "skeleton": None if self.skeleton is None else self.skeleton.to_json(),
         }
 
     @staticmethod
@@ -52,6 +57,7 @@ class MotionContract:
         try:
             mean, std = (np.array(data[key], dtype=np.float64) for key in ("mean", "std"))
             channels, units = tuple(data["channels"]), tuple(data["units"])
-            return MotionContract(channels, units, float(data["fps"]), mean, std, Skeleton.from_json(data["skeleton"]))
+            skeleton = None if data["skeleton"] is None else Skeleton.from_json(data["skeleton"])
+            return MotionContract(channels, units, float(data["fps"]), mean, std, skeleton)
         except (KeyError, TypeError, ValueError, MotionError) as error:
             raise BundleError(f"no motion contract: {error}") from error

@@ -24,6 +24,18 @@ class BundleError(MotetError, ValueError):
     """A bundle that is unknown, damaged, altered or of another format version."""
 
 
+class TextError(MotetError, ValueError):
+    """A sentence that a model cannot take: empty, too long, or without a word it knows."""
+
+
+class TextWarning(UserWarning):
+    """A sentence holds words that the model does not know; it goes on with UNK in their place."""
+
+
+class DecodingError(MotetError, ValueError):
+    """A setting of decoding that is out of range: beams, hypotheses, candidates, temperature, seed, length."""
+
+
 class ControlError(MotetError, ValueError):
     """A control value, label or number of characters that the model cannot take."""
 

@@ -1,24 +1,54 @@
 """Loading a model: from a bundle's name or path to what its verb offers."""
 
 from pathlib import Path
+from typing import Literal, TypeVar, overload
 
 from motet.bundle import Bundle
+from motet.bundled import Bundled
 from motet.control import ControlModel
+from motet.describe import DescribeModel
 from motet.errors import BundleError
+from motet.generate import GenerateModel
+from motet.predict import PredictModel
 
-VERBS = {"control": ControlModel.load}
-"""Verb of a bundle -> how its model is loaded."""
+Model = ControlModel | DescribeModel | GenerateModel | PredictModel
+Kind = TypeVar("Kind", bound=Bundled)
+
+VERBS: dict[str, type[Model]] = {
+    "control": ControlModel,
+    "describe": DescribeModel,
+    "generate": GenerateModel,
+    "predict": PredictModel,
+}
+"""Verb of a bundle -> the class of its model."""
 
 
-def load(name_or_path: str | Path, threads: int = 1) -> ControlModel:
+@overload
+def load(name_or_path: Literal["cmu-control"], threads: int = 1) -> ControlModel: ...
+@overload
+def load(name_or_path: Literal["cmu-describe"], threads: int = 1) -> DescribeModel: ...
+@overload
+def load(name_or_path: Literal["cmu-generate"], threads: int = 1) -> GenerateModel: ...
+@overload
+def load(name_or_path: Literal["cmu-predict"], threads: int = 1) -> PredictModel: ...
+@overload
+def load(name_or_path: str | Path, threads: int = 1) -> Model: ...
+def load(name_or_path: str | Path, threads: int = 1) -> Model:
     """The model of a bundle: a name (``motet bundle list``), or the path of a folder or zip.
 
     threads: for one call of a graph. BundleError if there is no such bundle, or if it is damaged.
     """
     bundle = Bundle.open(name_or_path)
-    loader = VERBS.get(bundle.manifest["verb"])
-    if loader is None:
-        raise BundleError(
-            f"bundle {bundle.path} is for {bundle.manifest['verb']!r}; this motet runs {', '.join(VERBS)}"
-        )
-    return loader(bundle, threads)
+    verb = bundle.manifest["verb"]
+    if verb not in VERBS:
+        raise BundleError(f"bundle {bundle.path} is for {verb!r}; this motet runs {', '.join(VERBS)}")
+    return VERBS[verb].load(bundle, threads)
+
+
+def load_as(kind: type[Kind], name_or_path: str | Path, threads: int = 1) -> Kind:
+    """As :func:`load`, for one verb: BundleError where the bundle is for another."""
+    model = load(name_or_path, threads)
+    if not isinstance(model, kind):
+        wanted = next(verb for verb, known in VERBS.items() if known is kind)
+        raise BundleError(f"bundle {name_or_path} is for {model.manifest['verb']!r}, and one for {wanted!r} is needed")
+    return model

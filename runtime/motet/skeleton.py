@@ -115,7 +115,9 @@ class Skeleton:
     def unit_factor(self, metres_per_unit: float) -> float:
         """What a length in this skeleton's unit is multiplied by to be in the other unit."""
         if self.metres_per_unit is None:
-            raise MotionError("the file does not say how long a unit of its skeleton is: give metres_per_unit")
+            raise MotionError(
+                "the file does not say how long a unit of its skeleton is: give metres_per_unit (motet's --unit-in)"
+            )
         return self.metres_per_unit / metres_per_unit
 
     def to_json(self) -> dict[str, Any]:

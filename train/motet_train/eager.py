@@ -5,11 +5,13 @@ from typing import Any
 
 import torch
 
-from motet.control import ControlModel
+from motet.models import VERBS, Model
 from motet_train.runs import MODELS, Run
 
 
-def control_model(manifest: Mapping[str, Any], threads: int) -> ControlModel:
+def eager_model(manifest: Mapping[str, Any], threads: int) -> Model:
     """A bundle's model with the same sizes in torch, its weights untrained: speed does not depend on them."""
     torch.set_num_threads(threads)
-    return ControlModel(manifest, Run(manifest, MODELS[manifest["model"]](manifest["config"])).torch_graphs())
+    return VERBS[manifest["verb"]](
+        manifest, Run(manifest, MODELS[manifest["model"]](manifest["config"])).torch_graphs()
+    )

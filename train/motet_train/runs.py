@@ -14,11 +14,15 @@ from torch import nn
 from motet.errors import MotetError
 from motet.files import write_whole
 from motet.graph import Graph, GraphSpec
-from motet_train.models import tdbn
+from motet_train.models import angle_crbm, language_to_motion, motion_to_language, predictor, tdbn
 from motet_train.torch_graph import TorchGraph
 
 MODELS: Mapping[str, Callable[[Mapping[str, Any]], nn.Module]] = {
     "tdbn": tdbn.from_config,
+    "motion-to-language": motion_to_language.from_config,
+    "language-to-motion": language_to_motion.from_config,
+    "angle-crbm": angle_crbm.from_config,
+    "trajectory": predictor.from_config,
 }
 """Name of a model -> how it is built from the configuration in its manifest."""
 

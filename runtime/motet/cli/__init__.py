@@ -10,19 +10,24 @@ import click
 from motet.errors import MotetError
 
 COMMANDS = {
+    "describe": ("motet.cli.describe:describe", None),
+    "generate": ("motet.cli.generate:generate", None),
+    "predict": ("motet.cli.predict:predict", None),
     "control": ("motet.cli.control:control", None),
+    "embed": ("motet.cli.embed:embed", None),
     "convert": ("motet.cli.convert:convert", None),
     "view": ("motet.cli.convert:view", None),
     "bundle": ("motet.cli.bundle:bundle", None),
     "bench": ("motet.cli.bench:bench", None),
-    "train": ("motet_train.cli:train", "train"),
-    "evaluate": ("motet_train.cli:evaluate", "train"),
+    "prepare": ("motet_train.cli.prepare:prepare", "train"),
+    "train": ("motet_train.cli.train:train", "train"),
+    "evaluate": ("motet_train.cli.evaluate:evaluate", "train"),
     "export": ("motet_export.cli:export", "export"),
     "parity": ("motet_export.cli:parity", "export"),
 }
 """Command -> where it is, and the extra that it needs."""
 
-NEEDS = {"train": ("torch", "tqdm", "scipy", "sklearn"), "export": ("torch", "onnx", "onnxscript")}
+NEEDS = {"train": ("torch", "tqdm", "scipy", "sklearn", "sacrebleu"), "export": ("torch", "onnx", "onnxscript")}
 """Extra -> the packages by which it is recognised."""
 
 

@@ -6,7 +6,7 @@ import json
 
 import click
 
-from motet.bench import Row, control_figures, rows
+from motet.bench import Row, figures, rows
 from motet.models import load
 
 
@@ -18,13 +18,13 @@ from motet.models import load
 def bench(bundle: str, threads: int, seconds: float, as_json: bool) -> None:
     """Measure a bundle's speed, beside torch eager where torch is installed."""
     model = load(bundle, threads)
-    figures = control_figures(model, seconds)
+    found = figures(model, seconds)
     baseline = None
     if importlib.util.find_spec("torch"):
         # by name: the runtime does not depend on the training package
-        eager = importlib.import_module("motet_train.eager").control_model(model.manifest, threads)
-        baseline = control_figures(eager, seconds)
-    table = rows(figures, baseline)
+        eager = importlib.import_module("motet_train.eager").eager_model(model.manifest, threads)
+        baseline = figures(eager, seconds)
+    table = rows(found, baseline)
     click.echo(json.dumps([row.to_json() for row in table]) if as_json else "\n".join(map(_line, table)))
 
 

@@ -37,7 +37,7 @@ def convert(
 ) -> None:
     """Convert the motion file SOURCE to OUT; the extensions say the formats.
 
-    Reads .amc (with its .asf) .bvh .npz .csv; writes these and .html .gif .glb.
+    Reads .amc (with its .asf) .bvh .npz .csv .xml (MMM); writes .amc .bvh .npz .csv .html .gif .glb.
     """
     check_writable(out)
     motion = read_motion(source, partial)

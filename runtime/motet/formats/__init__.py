@@ -17,6 +17,7 @@ MODULES = {
     ".bvh": "bvh",
     ".npz": "npz",
     ".csv": "csv",
+    ".xml": "mmm",
     ".html": "html",
     ".gif": "gif",
     ".glb": "glb",
@@ -26,7 +27,7 @@ MODULES = {
 BROKEN = (".amc", ".bvh")
 """Formats whose files break off in practice; their ``read`` takes ``partial``."""
 
-READABLE = (".amc", ".bvh", ".npz", ".csv")
+READABLE = (".amc", ".bvh", ".npz", ".csv", ".xml")
 WRITABLE = (".amc", ".bvh", ".npz", ".csv", ".html", ".gif", ".glb")
 
 

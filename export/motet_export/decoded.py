@@ -1,0 +1,135 @@
+"""Whole runs of each verb, decoded by ONNX Runtime and by torch from the same inputs and seeds."""
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motet.control import ControlModel
+from motet.describe import DescribeModel
+from motet.generate import GenerateModel
+from motet.graph import Graph
+from motet.motion import Motion
+from motet.predict import PredictModel
+from motet.rotations import Array
+from motet.text import MAX_WORDS, SPECIALS
+
+Decoded = dict[str, NDArray[Any]]
+Runs = dict[str, Callable[[], tuple[Decoded, Decoded]]]
+"""By name of a run: what ONNX Runtime decoded, and what torch decoded."""
+
+Graphs = Mapping[str, Graph]
+
+
+def whole_runs(manifest: Mapping[str, Any], onnx: Graphs, torch: Graphs) -> Runs:
+    """The runs by which a bundle of the manifest's verb is judged, each by its name."""
+    return _RUNS[manifest["verb"]](manifest, onnx, torch)
+
+
+def _control(manifest: Mapping[str, Any], onnx: Graphs, torch: Graphs) -> Runs:
+    models = [ControlModel(manifest, graphs) for graphs in (onnx, torch)]
+    return _pairs(models, {"mean_field": partial(_controlled, 0.0), "sampled": partial(_controlled, 1.0)})
+
+
+def _controlled(variety: float, model: ControlModel) -> Decoded:
+    """Four characters go through all labels, one after the other, half a second of ramp between."""
+    labels = len(model.labels)
+    hold, ramp = round(2 * model.fps), round(model.fps / 2)
+    corners = np.repeat(np.eye(labels), hold + ramp, axis=0)
+    smooth = np.stack([np.convolve(column, np.ones(ramp) / ramp)[: len(corners)] for column in corners.T], axis=1)
+    iterations = 2 if model.has_free_units else 1
+    session = model.start(characters=4, seed=7, variety=variety, iterations=iterations)
+    return {"frames": session.frames(smooth.clip(0, 1))}
+
+
+def _describe(manifest: Mapping[str, Any], onnx: Graphs, torch: Graphs) -> Runs:
+    models = [DescribeModel(manifest, graphs) for graphs in (onnx, torch)]
+    return _pairs(
+        models, {"greedy": partial(_described, 1), "beam": partial(_described, 5), "scores": _sentence_scores}
+    )
+
+
+def _described(beams: int, model: DescribeModel) -> Decoded:
+    """Sentences of eight motions: ids of their words and log-probabilities, and the motions' contexts."""
+    found = [row for motion in model.describe(_motions(model), beams) for row in motion]
+    ids = np.zeros((len(found), MAX_WORDS), dtype=np.int64)
+    for row, description in zip(ids, found, strict=True):
+        if description.text:
+            words, _ = model.vocabulary.encode(description.text)
+            row[: len(words)] = words
+    scores = np.array([description.log_probability for description in found])
+    return {"words": ids, "log_probabilities": scores, "contexts": model.embed(_motions(model))}
+
+
+def _sentence_scores(model: DescribeModel) -> Decoded:
+    pairs = zip(_motions(model), _sentences(model), strict=True)
+    return {"scores": np.array([model.score(motion, sentence) for motion, sentence in pairs])}
+
+
+def _generate(manifest: Mapping[str, Any], onnx: Graphs, torch: Graphs) -> Runs:
+    models = [GenerateModel(manifest, graphs) for graphs in (onnx, torch)]
+    return _pairs(models, {"samples": partial(_generated, 1), "beam": partial(_generated, 4), "scores": _motion_scores})
+
+
+def _generated(candidates: int, model: GenerateModel) -> Decoded:
+    """Three motions of each of eight sentences: normalised frames, lengths and log-likelihoods, and the contexts."""
+    rows = model.generate(_sentences(model), hypotheses=3, candidates=candidates, seed=7, max_seconds=4)
+    found = [generated for row in rows for generated in row]
+    std = model.contract.std
+    return {
+        "frames": np.concatenate([(g.motion.values - model.contract.mean) / std for g in found]),
+        "lengths": np.array([len(g.motion.values) for g in found]),
+        "log_likelihoods": np.array([g.log_likelihood for g in found]),
+        "contexts": model.embed(_sentences(model)),
+    }
+
+
+def _motion_scores(model: GenerateModel) -> Decoded:
+    pairs = zip(_sentences(model), _motions(model), strict=True)
+    return {"scores": np.array([model.score(sentence, motion) for sentence, motion in pairs])}
+
+
+def _predict(manifest: Mapping[str, Any], onnx: Graphs, torch: Graphs) -> Runs:
+    models = [PredictModel(manifest, graphs) for graphs in (onnx, torch)]
+    return _pairs(models, {"horizon": partial(_predicted, 1), "beyond": partial(_predicted, 3)})
+
+
+def _predicted(horizons: int, model: PredictModel) -> Decoded:
+    """What follows eight random walks about the mean of the training data, normalised."""
+    rng, contract = np.random.default_rng(3), model.contract
+    std = np.maximum(contract.std, 1e-4)
+    steps = 0.1 * rng.normal(size=(8, model.seed_frames, len(std)))
+    found = model.next_frames(contract.mean + std * steps.cumsum(axis=1), horizons * model.horizon)
+    return {"frames": (found - contract.mean) / std}
+
+
+def _pairs(models: Sequence[Any], runs: Mapping[str, Callable[[Any], Decoded]]) -> Runs:
+    return {name: partial(_pair, models, run) for name, run in runs.items()}
+
+
+def _pair(models: Sequence[Any], run: Callable[[Any], Decoded]) -> tuple[Decoded, Decoded]:
+    return run(models[0]), run(models[1])
+
+
+def _motions(model: DescribeModel | GenerateModel) -> list[Motion]:
+    """Eight random walks of 5 to 75 frames about the mean of the training data."""
+    rng = np.random.default_rng(3)
+    contract = model.contract
+
+    def walk(frames: int) -> Array:
+        found: Array = 0.3 * rng.normal(size=(frames, len(contract.mean))).cumsum(axis=0)
+        return np.tanh(found) * 2 * contract.std + contract.mean
+
+    return [contract.motion(walk(frames)) for frames in range(5, 85, 10)]
+
+
+def _sentences(model: DescribeModel | GenerateModel) -> list[str]:
+    """Eight sentences of 1 to 15 words of the vocabulary."""
+    rng = np.random.default_rng(4)
+    words = model.vocabulary.words[len(SPECIALS) :]
+    return [" ".join(rng.choice(words, length)) for length in range(1, 17, 2)]
+
+
+_RUNS = {"control": _control, "describe": _describe, "generate": _generate, "predict": _predict}

@@ -1,0 +1,98 @@
+"""MMM motion (Master Motor Map), the XML files of the KIT Motion-Language data. The skeleton is not in the file.
+
+The first ``Motion`` is read: the angles of its ``JointOrder`` in radians, each channel called as the file calls the
+joint, and the root's pose. MMM has z up, millimetres, and figures that face y; here y is up, and they face z.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Literal
+from xml.etree import ElementTree
+
+import numpy as np
+
+from motet.errors import FormatError
+from motet.formats.text import numbers
+from motet.motion import Motion
+from motet.rotations import Array
+
+ROOT = ("root.tx", "root.ty", "root.tz", "root.rx", "root.ry", "root.rz")
+ROOT_UNITS = ("m",) * 3 + ("rad",) * 3
+MILLIMETRE = 0.001
+
+
+PARTS = {"Timestep": 1, "RootPosition": 3, "RootRotation": 3}
+"""Element of a frame -> how many numbers it has; behind these come the joints' angles."""
+
+
+def read(path: str | Path) -> Motion:
+    """Read the first motion of an MMM file, without skeleton.
+
+    Channels: "root.tx" to "root.tz" in "m", "root.rx" to "root.rz" in "rad" with R = Ry Rz Rx, then one for each joint
+    in "rad". The frame rate comes from the time steps. FormatError names the file, and the line or frame that is wrong.
+    """
+    path = Path(path)
+    joints: list[str] = []
+    frames: list[Array] = []
+    for element in _elements(path):
+        if element.tag == "JointOrder":
+            joints = [joint.get("name", "") for joint in element.iter("Joint")]
+        elif element.tag == "MotionFrame":
+            frames.append(_frame(path, element, len(joints), len(frames)))
+            element.clear()
+    if len(set(joints)) != len(joints) or not all(joints):
+        raise FormatError(path, "each joint of the JointOrder needs a name of its own")
+    if not joints or not frames:
+        raise FormatError(path, "this is no MMM motion: it needs a Motion with JointOrder and MotionFrames")
+    rows = np.array(frames)
+    values = np.column_stack([_root(rows[:, 1:4], rows[:, 4:7]), rows[:, 7:]])
+    return Motion(values, (*ROOT, *joints), ROOT_UNITS + ("rad",) * len(joints), _fps(path, rows[:, 0]))
+
+
+def motion_name(path: str | Path) -> str:
+    """The name of the first motion, which in KIT's files says who moved; empty if it has none."""
+    path = Path(path)
+    return next((element.get("name", "") for element in _elements(path, "start") if element.tag == "Motion"), "")
+
+
+def _elements(path: Path, event: Literal["start", "end"] = "end") -> Iterator[ElementTree.Element]:
+    """The elements up to the end of the first motion, as they come; nothing behind it is looked at."""
+    try:
+        for _, element in ElementTree.iterparse(path, events=[event]):
+            yield element
+            if element.tag == "Motion":
+                return
+    except ElementTree.ParseError as error:
+        raise FormatError(path, f"this is no whole XML file: {error.msg}", error.position[0]) from error
+    except OSError as error:
+        raise FormatError(path, f"cannot be read: {error.strerror}") from error
+
+
+def _frame(path: Path, element: ElementTree.Element, joints: int, number: int) -> Array:
+    """Time step, root position and rotation, and the joints' angles of one frame: (7 + J,)."""
+    found: list[float] = []
+    for tag, count in {**PARTS, "JointPosition": joints}.items():
+        words = (element.findtext(tag) or "").split()
+        if len(words) != count:
+            raise FormatError(path, f"frame {number}: {tag} needs {count} values, not {len(words)}")
+        try:
+            found += numbers(words, path, 0)
+        except FormatError as error:
+            raise FormatError(path, f"frame {number}: {tag}: {error.reason}") from error
+    return np.array(found)
+
+
+def _root(positions: Array, rotations: Array) -> Array:
+    """Root channels (T, 6) from positions (T, 3) in millimetres and angles (T, 3): roll, pitch, yaw, R = Rz Ry Rx."""
+    (x, y, z), (roll, pitch, yaw) = positions.T * MILLIMETRE, rotations.T
+    return np.column_stack([-x, z, y, -roll, yaw, pitch])
+
+
+def _fps(path: Path, times: Array) -> float:
+    steps = np.diff(times)
+    if not len(steps):
+        raise FormatError(path, "one frame alone does not say the frame rate")
+    uneven = np.flatnonzero(np.abs(steps - steps.mean()) > 0.5 * abs(steps.mean()))
+    if steps.mean() <= 0 or len(uneven):
+        raise FormatError(path, f"frame {uneven[0] + 1 if len(uneven) else 1}: the time steps are not even")
+    return round(float(1 / steps.mean()), 3)

@@ -1,0 +1,157 @@
+"""Both directions between motion and language as ONNX bundles: what torch computes, for sequences of any length."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from motet.bundle import Bundle
+from motet.describe import DescribeModel
+from motet.generate import GenerateModel
+from motet.models import load
+from motet.text import SPECIALS
+from motet_export.bundles import export_run, parity_of
+from motet_export.examples import example
+from motet_export.exporter import ExportError
+from motet_train.models import language_to_motion, motion_to_language
+from motet_train.models.language_to_motion import LanguageToMotion, LanguageToMotionConfig
+from motet_train.models.motion_to_language import MotionToLanguage, MotionToLanguageConfig
+from motet_train.runs import Run
+
+D = 3
+WORDS = [*SPECIALS, "a", "person", "walks", "runs", "left", "right", "slowly"]
+MOTION = {
+    "channels": ["hip", "knee", "ankle"],
+    "units": ["rad"] * D,
+    "fps": 10.0,
+    "mean": [0.1, 0.2, 0.3],
+    "std": [0.5, 1.0, 2.0],
+    "skeleton": None,
+}
+SIZES: dict[str, Any] = {"channels": D, "words": len(WORDS), "embedding": 4}
+SMALL: dict[str, Any] = {**SIZES, "encoder_units": (5,), "decoder_units": (6, 7)}
+
+
+def run(verb: str) -> Run:
+    torch.manual_seed(0)
+    net: MotionToLanguage | LanguageToMotion
+    if verb == "describe":
+        net = MotionToLanguage(MotionToLanguageConfig(**SMALL))
+        model, config = "motion-to-language", motion_to_language.to_config(net)
+        defaults: Mapping[str, float] = {"beams": 5, "max_words": 40}
+    else:
+        net = LanguageToMotion(LanguageToMotionConfig(**SMALL, components=2))
+        model, config = "language-to-motion", language_to_motion.to_config(net)
+        defaults = {"hypotheses": 5, "candidates": 4, "temperature": 1.0, "max_seconds": 15}
+    net.mean.copy_(torch.tensor(MOTION["mean"]))
+    net.scale.copy_(torch.tensor(MOTION["std"]))
+    manifest = {"name": f"small-{verb}", "verb": verb, "model": model, "motion": MOTION, "vocabulary": WORDS}
+    return Run({**manifest, "config": config, "defaults": defaults, "licence": {}, "training": {}}, net.train())
+
+
+@pytest.fixture(scope="module")
+def bundles(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    folder = tmp_path_factory.mktemp("bundles")
+    for verb in ("describe", "generate"):
+        export_run(run(verb), folder / f"{verb}.zip")
+    return {verb: folder / f"{verb}.zip" for verb in ("describe", "generate")}
+
+
+@pytest.mark.parametrize("verb", ["describe", "generate"])
+def test_a_bundle_keeps_its_contracts_and_carries_its_parity(bundles: dict[str, Path], verb: str) -> None:
+    bundle = Bundle.open(bundles[verb])
+    assert bundle.verify() == ["encoder.onnx", "score.onnx", "step.onnx"]
+    report = bundle.manifest["parity"]
+    rungs = {"encoder.one_step", "step.one_step", "score.one_step", "step.carried", "runs"}
+    assert rungs <= report.keys()
+    assert all(report[rung]["error"] < report[rung]["bound"] / 2 for rung in rungs)
+    names = {"describe": {"greedy", "beam", "scores"}, "generate": {"samples", "beam", "scores"}}[verb]
+    assert names < report["runs"].keys()
+    again = parity_of(run(verb), bundle)
+    assert {rung: again[rung] for rung in rungs} == {rung: report[rung] for rung in rungs}
+
+
+@pytest.mark.parametrize(("verb", "role"), [("describe", "encoder"), ("generate", "encoder"), ("describe", "score")])
+def test_a_row_of_a_padded_batch_gets_what_it_gets_alone(bundles: dict[str, Path], verb: str, role: str) -> None:
+    graph = Bundle.open(bundles[verb]).graph(role)
+    rng = np.random.default_rng(0)
+    feeds = example(graph.spec, rng, batch=6, vocabulary=len(WORDS))
+    padded, output = graph.spec.inputs[-1 if role == "score" else 0].name, graph.spec.outputs[0].name
+    lengths = feeds.get("lengths", np.full(6, feeds[padded].shape[1]))
+    together = graph(feeds)[output]
+    for row, length in enumerate(lengths):
+        single = {name: array[row : row + 1] for name, array in feeds.items()}
+        single[padded] = single[padded][:, :length]
+        np.testing.assert_allclose(graph(single)[output], together[row : row + 1], atol=1e-6)
+    longer = {**feeds, padded: np.concatenate([feeds[padded], np.zeros_like(feeds[padded])], axis=1)}
+    expected = together if role == "encoder" else np.concatenate([together, 0 * together], axis=1)
+    np.testing.assert_allclose(graph(longer)[output], expected, atol=1e-6)
+
+
+def test_normalisation_is_inside_the_encoder_of_motions(bundles: dict[str, Path]) -> None:
+    net = run("describe").model.eval()
+    frames = np.random.default_rng(0).normal(size=(2, 9, D)).astype(np.float32)
+    lengths = np.array([9, 9])
+    found = Bundle.open(bundles["describe"]).graph("encoder")({"frames": frames, "lengths": lengths})["context"]
+    normal = (frames - np.array(MOTION["mean"])) / np.array(MOTION["std"])
+    with torch.no_grad():
+        flagged = torch.cat([torch.tensor(normal).float(), torch.ones(2, 9, 1)], dim=-1)
+        expected = net.encoder(flagged, torch.tensor(lengths))
+    np.testing.assert_allclose(found, expected, atol=1e-5)
+
+
+def test_a_description_scores_what_its_beam_says(bundles: dict[str, Path]) -> None:
+    model = load(bundles["describe"])
+    assert isinstance(model, DescribeModel)
+    motion = model.contract.motion(np.random.default_rng(0).normal(size=(20, D)))
+    for found in model.describe(motion, beams=5)[0]:
+        if found.text:
+            assert model.score(motion, found.text) == pytest.approx(found.log_probability, abs=1e-4)
+
+
+def test_a_generated_motion_scores_what_its_beam_says(bundles: dict[str, Path]) -> None:
+    model = load(bundles["generate"])
+    assert isinstance(model, GenerateModel)
+    for found in model.generate("a person walks", hypotheses=4, candidates=2, seed=3)[0]:
+        if len(found.motion.values) > 1:
+            score = model.score("a person walks", found.motion)
+            assert score == pytest.approx(found.log_likelihood, rel=1e-3, abs=1e-2)
+
+
+def test_graphs_are_plain_and_hold_no_dropout(bundles: dict[str, Path]) -> None:
+    for verb, place in bundles.items():
+        bundle = Bundle.open(place)
+        for role in ("encoder", "step", "score"):
+            data = bundle.read(f"{role}.onnx")
+            assert b"Dropout" not in data, (verb, role)
+            assert (b"Scan" in data) == (role != "step"), (verb, role)
+
+
+def test_a_model_that_differs_leaves_no_bundle(
+    bundles: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stale, other = Bundle.open(bundles["describe"]), run("describe")
+    with torch.no_grad():
+        other.model.output.bias += 1e-3 * torch.arange(len(WORDS))
+    monkeypatch.setattr("motet_export.bundles.export_graph", lambda _, __, label: stale.read(f"{label['role']}.onnx"))
+    with pytest.raises(ExportError, match=r"step.one_step"):
+        export_run(other, tmp_path / "bundle.zip")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("verb", ["describe", "generate"])
+def test_weights_of_8_bits_load_and_their_difference_is_noted(
+    bundles: dict[str, Path], verb: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    exact = Bundle.open(bundles[verb])
+    monkeypatch.setattr("motet_export.bundles.export_graph", lambda _, __, label: exact.read(f"{label['role']}.onnx"))
+    report = export_run(run(verb), tmp_path / "int8.zip", int8=True)
+    bundle = Bundle.open(tmp_path / "int8.zip")
+    assert bundle.manifest["parity"]["int8"] == report["int8"]
+    assert 0 < report["int8"]["scores.score"] < 0.05
+    assert all(b"MatMulInteger" in bundle.read(f"{role}.onnx") for role in bundle.manifest["graphs"])
+    with pytest.raises(ExportError, match="8 bits"):
+        parity_of(run(verb), bundle)

@@ -1,0 +1,175 @@
+"""``motet describe``, ``generate`` and ``embed`` over small models whose graphs are numpy."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from fake_models import describe_model, generate_model, moving
+
+from motet.cli import main
+from motet.describe import DescribeModel
+from motet.formats import read_motion, write_motion
+from motet.generate import GenerateModel
+from motet.models import load, load_as
+from motet.motion import Motion
+
+
+@pytest.fixture(autouse=True)
+def bundles(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Small models in the place of the shipped ones."""
+    models = {"cmu-describe": describe_model(), "cmu-generate": generate_model()}
+    monkeypatch.setattr("motet.models.load", lambda name, threads=1: models.get(name) or load(name, threads))
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> list[Path]:
+    """Two motions that fit, the second at another frame rate."""
+    paths = [tmp_path / "one.npz", tmp_path / "two.npz"]
+    write_motion(paths[0], moving(20))
+    write_motion(paths[1], moving(60, fps=40.0, seed=1))
+    return paths
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+def test_describe_prints_json_for_every_file(files: list[Path]) -> None:
+    result = run("describe", *files, "--beams", 3, "--json")
+    assert result.exit_code == 0
+    rows = json.loads(result.stdout)
+    assert [row["input"] for row in rows] == [str(path) for path in files]
+    expected = describe_model().describe([read_motion(path) for path in files], 3)
+    for row, wanted in zip(rows, expected, strict=True):
+        assert [set(h) for h in row["hypotheses"]] == [{"text", "log_probability"}] * 3
+        assert [h["text"] for h in row["hypotheses"]] == [d.text for d in wanted]
+        np.testing.assert_allclose(
+            [h["log_probability"] for h in row["hypotheses"]], [d.log_probability for d in wanted], atol=1e-5
+        )
+
+
+def test_describe_says_that_it_resampled(files: list[Path]) -> None:
+    result = run("describe", *files)
+    assert result.stderr == f"motet: {files[1]}: resampled from 40 to 10 fps\n"
+    lines = result.stdout.splitlines()
+    assert (len(lines), lines[0], lines[6]) == (12, str(files[0]), str(files[1]))
+    assert run("describe", files[0]).stdout.splitlines() == lines[1:6]
+
+
+def test_generate_writes_the_same_bytes_every_time(tmp_path: Path) -> None:
+    outs = [tmp_path / name for name in ("a.bvh", "b.bvh", "c.bvh")]
+    for out, seed in zip(outs, (1, 1, 2), strict=True):
+        result = run("generate", "a person walks", "-o", out, "--seed", seed)
+        assert (result.exit_code, result.stderr) == (0, "")
+        assert result.stdout.startswith(f"{out}: {len(read_motion(out))} frames at 30 fps, ")
+    assert outs[0].read_bytes() == outs[1].read_bytes() != outs[2].read_bytes()
+    assert read_motion(outs[0]).fps == pytest.approx(30)
+
+
+def test_generate_numbers_the_files_of_several_motions(tmp_path: Path) -> None:
+    out = tmp_path / "out.npz"
+    options = ["--hypotheses", 2, "--candidates", 1, "--temperature", 0.5, "--max-seconds", 2, "--fps", 10, "--json"]
+    rows = json.loads(run("generate", "walks", "a person walks", "-o", out, "--all", "--seed", 3, *options).stdout)
+    found = generate_model().generate(
+        ["walks", "a person walks"], 2, candidates=1, temperature=0.5, max_seconds=2, seed=3
+    )
+    assert [row["input"] for row in rows] == ["walks", "a person walks"]
+    written = [h for row in rows for h in row["hypotheses"]]
+    assert [Path(h["output"]).name for h in written] == ["out-1.npz", "out-2.npz", "out-3.npz", "out-4.npz"]
+    for hypothesis, generated in zip(written, [g for row in found for g in row], strict=True):
+        motion = read_motion(hypothesis["output"])
+        np.testing.assert_allclose(motion.values, generated.motion.values, atol=1e-6)
+        assert hypothesis["log_likelihood"] == generated.log_likelihood
+        assert (hypothesis["frames"], hypothesis["fps"]) == (len(motion), 10)
+    assert run("generate", "walks", "walks", "-o", tmp_path / "best.npz").exit_code == 0
+    assert sorted(path.name for path in tmp_path.glob("best*")) == ["best-1.npz", "best-2.npz"]
+
+
+def test_unknown_words_are_said_and_the_rest_is_used(tmp_path: Path) -> None:
+    result = run("generate", "a zebra walks", "-o", tmp_path / "out.bvh")
+    assert result.exit_code == 0
+    assert result.stderr == "motet: the model does not know zebra (in 'a zebra walks')\n"
+    result = run("embed", "--text", "a zebra walks", "--text", "walks", "-o", tmp_path / "out.npy")
+    assert result.stderr == "motet: the model does not know zebra (in 'a zebra walks')\n"
+
+
+def test_embed(tmp_path: Path, files: list[Path]) -> None:
+    out = tmp_path / "out.npy"
+    assert run("embed", *files, "-o", out).exit_code == 0
+    vectors = np.load(out)
+    np.testing.assert_allclose(vectors, describe_model().embed([read_motion(path) for path in files]), atol=1e-5)
+    result = run("embed", "--text", "walks", "--text", "a person", "--text", "left", "-o", out)
+    assert result.stdout == f"{out}: 3 context vectors of 4 numbers\n"
+    np.testing.assert_array_equal(np.load(out), generate_model().embed(["walks", "a person", "left"]))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["describe", "{bad}/none.npz"], "none.npz: no such file"),
+        (["describe", "{bad}/good.npz", "{bad}/lacking.npz"], "lacking.npz: the motion lacks 2 of 3 channels: hips.ty"),
+        (["describe", "{bad}/frame.npz"], "frame.npz: the model needs two frames at 10 fps, and the motion has 1"),
+        (["describe", "{bad}/long.npz"], "long.npz: the motion lasts 31.0 s"),
+        (["describe", "{bad}/nan.csv"], "nan.csv"),
+        (["describe", "{bad}/good.npz", "--beams", "0"], "beams must be between 1 and 100"),
+        (["describe", "{bad}/good.npz", "--bundle", "nothing"], "unknown bundle 'nothing'"),
+        (["describe", "{bad}/good.npz", "--bundle", "cmu-generate"], "is for 'generate', and one for 'describe'"),
+        (["describe"], "Missing argument"),
+        (["generate", "", "-o", "{out}/a.bvh"], "has no words"),
+        (["generate", "walks", "zebra", "-o", "{out}/a.bvh"], "knows no word of 'zebra'"),
+        (["generate", "walks " * 41, "-o", "{out}/a.bvh"], "41 words, and at most 40"),
+        (["generate", "walks", "-o", "{out}/a.xyz"], "known are .amc"),
+        (["generate", "walks", "-o", "{out}/no/a.bvh"], "does not exist"),
+        (["generate", "walks", "-o", "{out}/a.bvh", "--seed", "-1"], "seed of 0 or more"),
+        (["generate", "walks", "-o", "{out}/a.bvh", "--temperature", "0"], "temperature must be between"),
+        (["generate", "walks", "-o", "{out}/a.bvh", "--candidates", "0"], "candidates must be between"),
+        (["generate", "walks", "-o", "{out}/a.bvh", "--hypotheses", "0"], "hypotheses must be between"),
+        (["generate", "walks", "-o", "{out}/a.bvh", "--max-seconds", "-3"], "max_seconds must be between"),
+        (["generate", "walks", "-o", "{out}/a.bvh", "--fps", "0"], "positive number"),
+        (["generate", "walks", "-o", "{out}/a.bvh", "--bundle", "cmu-control"], "is for 'control'"),
+        (["embed", "-o", "{out}/a.npy"], "either motion files or --text"),
+        (["embed", "{bad}/good.npz", "--text", "walks", "-o", "{out}/a.npy"], "either motion files or --text"),
+        (["embed", "{bad}/good.npz", "-o", "{out}/a.txt"], "written as .npy"),
+        (["embed", "{bad}/lacking.npz", "-o", "{out}/a.npy"], "lacking.npz: the motion lacks 2"),
+        (["embed", "--text", "zebra", "-o", "{out}/a.npy"], "knows no word"),
+        (["embed", "--text", "walks", "-o", "{out}/no/a.npy"], "does not exist"),
+    ],
+)
+def test_bad_input_gets_one_message_and_writes_nothing(arguments: list[str], said: str, tmp_path: Path) -> None:
+    out, bad = tmp_path / "out", tmp_path / "bad"
+    out.mkdir()
+    bad.mkdir()
+    motion = moving(20)
+    write_motion(bad / "good.npz", motion)
+    write_motion(bad / "lacking.npz", motion.select(("knee.ry", "knee.rz")))
+    write_motion(bad / "frame.npz", motion[:1])
+    write_motion(bad / "long.npz", moving(310))
+    write_motion(bad / "nan.csv", motion)
+    text = (bad / "nan.csv").read_text().splitlines()
+    (bad / "nan.csv").write_text("\n".join([*text[:-1], ",".join(["nan"] * len(text[-1].split(",")))]))
+    result = run(*(argument.format(out=out, bad=bad) for argument in arguments))
+    assert result.exit_code == 2
+    assert said in result.stderr
+    assert "Traceback" not in result.stderr
+    assert result.stdout == ""
+    assert list(out.iterdir()) == []
+
+
+def test_load_as_gives_models_of_one_verb() -> None:
+    assert isinstance(load_as(DescribeModel, "cmu-describe"), DescribeModel)
+    assert isinstance(load_as(GenerateModel, "cmu-generate"), GenerateModel)
+
+
+def test_a_file_without_a_unit_of_length_is_refused_until_it_is_told(tmp_path: Path) -> None:
+    write_motion(tmp_path / "a.bvh", without_unit())
+    result = run("describe", tmp_path / "a.bvh")
+    assert (result.exit_code, "--unit-in" in result.stderr) == (2, True)
+    assert run("describe", tmp_path / "a.bvh", "--unit-in", "m").exit_code == 0
+
+
+def without_unit() -> Motion:
+    """As many programs write it: BVH does not hold the unit."""
+    motion = moving(20)
+    return motion.select(("hips.ty", "knee.rx", "knee.ry"), ("length", "deg", "deg"))

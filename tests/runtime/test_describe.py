@@ -1,0 +1,150 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fake_models import CHANNELS, CONTRACT, FakeGraph, describe_model, moving
+
+from motet.bench import WORDS, describe_figures, figures
+from motet.describe import DescribeModel, Description
+from motet.errors import BundleError, DecodingError, MotionError, TextError, TextWarning
+from motet.language import batches, padded
+
+
+@pytest.fixture(scope="module")
+def model() -> DescribeModel:
+    return describe_model()
+
+
+def test_hypotheses_are_ranked_and_scored(model: DescribeModel) -> None:
+    motion = moving(20)
+    (row,) = model.describe(motion)
+    assert [type(d) for d in row] == [Description] * 5
+    scores = [d.log_probability for d in row]
+    assert scores == sorted(scores, reverse=True)
+    for description in row:
+        if description.text:
+            assert model.score(motion, description.text) == pytest.approx(description.log_probability, abs=1e-4)
+
+
+def test_a_motion_gets_what_it_gets_alone(model: DescribeModel) -> None:
+    motions = [moving(length, seed=length) for length in (5, 30, 2, 17, 30)]
+    together = model.describe(motions, beams=3)
+    for motion, row in zip(motions, together, strict=True):
+        (alone,) = model.describe(motion, beams=3)
+        assert [d.text for d in alone] == [d.text for d in row]
+        np.testing.assert_allclose([d.log_probability for d in alone], [d.log_probability for d in row], rtol=1e-5)
+    assert model.describe([]) == []
+
+
+def test_more_motions_than_fit_one_batch_come_back_in_order(
+    model: DescribeModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    motions = [moving(3 + i % 7, seed=i) for i in range(11)]
+    whole, vectors = model.describe(motions), model.embed(motions)
+    monkeypatch.setattr("motet.describe.BATCH", 4)
+    assert [[d.text for d in row] for row in model.describe(motions)] == [[d.text for d in row] for row in whole]
+    np.testing.assert_allclose(model.embed(motions), vectors, atol=1e-5)
+
+
+def test_context_vectors(model: DescribeModel) -> None:
+    motions = [moving(9, seed=1), moving(4, seed=2)]
+    wanted = [(model.frames(m) - CONTRACT.mean).mean(axis=0) / [0.5, 10, 1] for m in motions]
+    found = model.embed(motions)
+    assert (found.dtype, found.shape) == (np.float32, (2, 3))
+    np.testing.assert_allclose(found, wanted, atol=1e-5)
+
+
+def test_channels_in_another_order_and_unit_and_rate_are_the_same_motion(model: DescribeModel) -> None:
+    motion = moving(31)
+    frames = model.frames(motion)
+    np.testing.assert_allclose(frames[:, 1], np.degrees(motion.values[:, 3]))
+    assert frames.shape == (31, len(CHANNELS))
+    ordered = motion.select(CHANNELS)
+    np.testing.assert_array_equal(model.frames(ordered), frames)
+    fast = ordered.resample(40)
+    np.testing.assert_allclose(model.frames(fast), frames, atol=1e-9)
+    assert model.describe(fast)[0][0].text == model.describe(motion)[0][0].text
+
+
+def test_a_motion_that_does_not_fit(model: DescribeModel) -> None:
+    motion = moving(20)
+    lacking = motion.select(("knee.ry", "knee.rz"))
+    for bad, reason in (
+        (lacking, r"lacks 2 of 3 channels: hips.ty, knee.rx"),
+        (motion[:1], "needs two frames at 10 fps, and the motion has 1"),
+        (motion[:0], "has 0"),
+        (replace(motion, fps=200.0), "two frames at 10 fps"),
+        (moving(301), r"lasts 30.1 s, and the model takes at most 30 s"),
+        (replace(motion, units=("m", "deg", "m", "rad")), "does not convert"),
+    ):
+        with pytest.raises(MotionError, match=reason):
+            model.describe([motion, bad])
+    assert model.describe(moving(300))
+
+
+def test_frames_that_are_not_finite_never_become_a_motion() -> None:
+    values = np.array(moving(20).values)
+    values[3, 1] = np.nan
+    with pytest.raises(MotionError, match=r"frame 3, channel 'knee.rz' is nan"):
+        replace(moving(20), values=values)
+
+
+@pytest.mark.parametrize("beams", [0, -1, 101])
+def test_beams_out_of_range(model: DescribeModel, beams: int) -> None:
+    with pytest.raises(DecodingError, match=f"beams must be between 1 and 100, not {beams}"):
+        model.describe(moving(20), beams)
+
+
+def test_scored_sentences(model: DescribeModel) -> None:
+    motion = moving(20)
+    assert model.score(motion, "A person walks.") == model.score(motion, "a PERSON walks!")
+    assert model.score(motion, "a person walks") > model.score(motion, "a person walks a person walks")
+    with pytest.warns(TextWarning, match=r"does not know zebra \(in 'a zebra walks'\)"):
+        assert np.isfinite(model.score(motion, "a zebra walks"))
+    with pytest.raises(TextError, match="has no words"):
+        model.score(motion, "")
+
+
+def test_the_model_holds_no_state(model: DescribeModel) -> None:
+    before = dict(vars(model))
+    first = model.describe(moving(20))
+    model.describe([moving(9), moving(11)], beams=2)
+    assert model.describe(moving(20)) == first
+    assert vars(model) == before
+
+
+@pytest.mark.parametrize("key", ["vocabulary", "defaults"])
+def test_a_manifest_that_lacks_something(model: DescribeModel, key: str) -> None:
+    manifest = {name: value for name, value in model.manifest.items() if name != key}
+    with pytest.raises(BundleError, match=key):
+        DescribeModel(manifest, model.graphs)
+    with pytest.raises(BundleError, match="starts with PAD"):
+        DescribeModel({**model.manifest, "vocabulary": ["a"]}, model.graphs)
+
+
+def test_one_step_call_serves_the_batch(model: DescribeModel) -> None:
+    step = model.graphs["step"]
+    assert isinstance(step, FakeGraph)
+    step.calls = 0
+    model.describe([moving(20, seed=i) for i in range(9)])
+    assert step.calls <= 7
+
+
+def test_batches_and_padding() -> None:
+    assert list(batches([3, 1, 2, 1, 5], 2)) == [[1, 3], [2, 0], [4]]
+    values, lengths = padded([np.ones((2, 3)), np.ones((1, 3))], "float32")
+    assert (values.shape, values.dtype, lengths.tolist()) == ((2, 2, 3), np.float32, [2, 1])
+    assert (values[1, 1] == 0).all()
+
+
+def test_the_benchmark_measures_sentences_of_one_length() -> None:
+    model = describe_model()
+    found = figures(model, 0.001)
+    assert set(found) == {"describe.descriptions", "describe.one", "describe.encoder", "describe.step"}
+    assert all(value > 0 for value, _ in found.values())
+    step = model.graphs["step"]
+    assert isinstance(step, FakeGraph)
+    step.calls = 0
+    describe_figures(model, 0.0)
+    whole = 1 + 2 + 1 + 10  # searches: warm-up and two of a batch, warm-up and ten of one motion
+    assert step.calls == whole * (WORDS + 1) + 11

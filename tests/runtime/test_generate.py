@@ -1,0 +1,139 @@
+import pickle
+
+import numpy as np
+import pytest
+from fake_models import CONTRACT, generate_model, moving
+from figures import walker
+
+from motet.bench import figures
+from motet.cli.generate import playable
+from motet.errors import DecodingError, MotionError, TextError, TextWarning
+from motet.generate import Generated, GenerateModel
+from motet.kinematics import positions
+from motet.root_block import to_root_block
+
+TEXTS = ["a person walks", "walks", "a person walks left 80"]
+
+
+@pytest.fixture(scope="module")
+def model() -> GenerateModel:
+    return generate_model()
+
+
+def assert_same(one: list[Generated], other: list[Generated]) -> None:
+    assert [g.log_likelihood for g in one] == [g.log_likelihood for g in other]
+    for a, b in zip(one, other, strict=True):
+        np.testing.assert_array_equal(a.motion.values, b.motion.values)
+
+
+def test_motions_are_ranked_and_scored(model: GenerateModel) -> None:
+    for row in model.generate(TEXTS, 4, candidates=3):
+        rates = [g.log_likelihood / len(g.motion) for g in row]
+        assert rates == sorted(rates, reverse=True)
+        for generated in row:
+            motion = generated.motion
+            assert (motion.channels, motion.fps, motion.skeleton is None) == (CONTRACT.channels, 10.0, False)
+            assert 1 <= len(motion) <= 30
+
+
+def test_the_log_likelihood_is_the_score_of_the_motion(model: GenerateModel) -> None:
+    for text, row in zip(TEXTS, model.generate(TEXTS, 3, candidates=2, max_seconds=1), strict=True):
+        for generated in row:
+            if len(generated.motion) > 1:
+                assert model.score(text, generated.motion) == pytest.approx(generated.log_likelihood, abs=1e-3)
+
+
+def test_a_sentence_gets_what_it_gets_alone_with_its_seed(model: GenerateModel) -> None:
+    together = model.generate(TEXTS, seed=5)
+    for i, text in enumerate(TEXTS):
+        assert_same(model.generate(text, seed=5 + i)[0], together[i])
+        assert_same(model.generate([text], seed=[5 + i])[0], together[i])
+    assert len({row[0].log_likelihood for row in model.generate(["walks"] * 4)}) == 4
+    assert model.generate([]) == []
+
+
+def test_more_sentences_than_fit_one_batch_come_back_in_order(
+    model: GenerateModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    texts = [TEXTS[i % 3] for i in range(7)]
+    whole, vectors = model.generate(texts, seed=range(7)), model.embed(texts)
+    monkeypatch.setattr("motet.generate.BATCH", 2)
+    for one, other in zip(model.generate(texts, seed=range(7)), whole, strict=True):
+        assert_same(one, other)
+    np.testing.assert_allclose(model.embed(texts), vectors, atol=1e-6)
+
+
+def test_settings_are_the_bundles_unless_given(model: GenerateModel) -> None:
+    assert_same(
+        model.generate("walks")[0],
+        model.generate("walks", 3, candidates=4, temperature=1.0, max_seconds=3)[0],
+    )
+    assert max(len(g.motion) for g in model.generate("walks", 20, max_seconds=0.5)[0]) == 5
+    cold, hot = (
+        np.std([g.motion.values[0, 0] for g in model.generate("walks", 50, candidates=1, temperature=t)[0]])
+        for t in (0.05, 1.0)
+    )
+    assert cold < 0.7 * hot
+
+
+def test_unknown_words_are_named(model: GenerateModel) -> None:
+    with pytest.warns(TextWarning, match="does not know zebra, backwards"):
+        ((generated, *_),) = model.generate("a zebra walks backwards")
+    assert generated.unknown == ("zebra", "backwards")
+    assert model.unknown("a person") == []
+    with pytest.warns(TextWarning, match="zebra"):
+        model.embed(["a zebra"])
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"), [("", "no words"), ("zebra", "knows no word"), ("walks " * 41, "41 words, and at most 40")]
+)
+def test_a_sentence_that_cannot_be_moved(model: GenerateModel, text: str, reason: str) -> None:
+    with pytest.raises(TextError, match=reason):
+        model.generate(["a person walks", text])
+
+
+@pytest.mark.parametrize(
+    ("settings", "reason"),
+    [
+        ({"hypotheses": 0}, "hypotheses must be between 1 and 100"),
+        ({"candidates": 0}, "candidates must be between 1 and 100"),
+        ({"temperature": 0.0}, r"temperature must be between 0.01 and 100, not 0.0"),
+        ({"temperature": float("nan")}, "not nan"),
+        ({"max_seconds": 0}, "max_seconds must be between 0.1 and 600"),
+        ({"seed": -1}, "seed of 0 or more"),
+        ({"seed": [1, 2]}, "1 sentences need"),
+    ],
+)
+def test_settings_out_of_range(model: GenerateModel, settings: dict[str, float], reason: str) -> None:
+    with pytest.raises(DecodingError, match=reason):
+        model.generate("walks", **settings)
+
+
+def test_a_motion_to_score_must_fit(model: GenerateModel) -> None:
+    with pytest.raises(MotionError, match=r"lacks 1 of 3 channels: hips.ty"):
+        model.score("walks", moving(20).select(("knee.rx", "knee.ry")))
+    with pytest.raises(MotionError, match="two frames"):
+        model.score("walks", moving(1))
+
+
+def test_only_a_model_from_a_bundle_pickles(model: GenerateModel) -> None:
+    with pytest.raises(TypeError, match="loaded from a bundle"):
+        pickle.dumps(model)
+
+
+def test_a_file_gets_the_roots_path_and_a_smooth_frame_rate() -> None:
+    motion = walker(frames=30, fps=10.0)
+    found = playable(to_root_block(motion), 30.0)
+    assert (found.fps, len(found)) == (30.0, 88)
+    places, source = positions(found)[::3, 0], positions(motion)[:, 0]
+    travelled = np.linalg.norm(np.diff(places[:, [0, 2]], axis=0), axis=1).sum()
+    assert travelled == pytest.approx(np.linalg.norm(np.diff(source[:, [0, 2]], axis=0), axis=1).sum(), rel=1e-6)
+    np.testing.assert_allclose(places[:, 1], source[:, 1], atol=1e-9)
+    assert len(playable(to_root_block(motion), 5.0)) == 15
+
+
+def test_the_benchmark_measures_motions_of_one_length(model: GenerateModel) -> None:
+    found = figures(model, 0.001)
+    assert set(found) == {"generate.motions", "generate.one", "generate.encoder", "generate.step"}
+    assert all(value > 0 for value, _ in found.values())

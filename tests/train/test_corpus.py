@@ -1,0 +1,183 @@
+import json
+import shutil
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from kit_zip import JOINTS, mmm_xml, write_kit_zip
+
+from motet.formats import read_motion, write_motion
+from motet.formats.mmm import read
+from motet_train.data.clips import CMU
+from motet_train.data.corpus import read_corpus, read_table
+from motet_train.data.errors import DataError
+from motet_train.data.records import Record, Skipped
+from motet_train.data.representation import ANGLES, FULL
+
+
+def of(corpus: object) -> tuple[dict[str, Record], dict[str, str]]:
+    """Records by name, and the reasons of what was skipped."""
+    items = list(corpus)  # type: ignore[call-overload]
+    records = {item.name: item for item in items if isinstance(item, Record)}
+    return records, {item.name: item.reason for item in items if isinstance(item, Skipped)}
+
+
+def table(path: Path, *rows: str, header: str = "clip\tsentence") -> Path:
+    path.write_text("\n".join([header, *rows]) + "\n")
+    return path
+
+
+@pytest.fixture
+def own(tmp_path: Path) -> Path:
+    """Three recordings, two of them AMC with a skeleton in another folder, beside a table."""
+    folder = tmp_path / "own"
+    (folder / "amc").mkdir(parents=True)
+    (folder / "asf").mkdir()
+    for clip in ("02_06", "09_07"):
+        shutil.copy(CMU / f"{clip}.amc", folder / "amc" / f"{clip}.amc")
+        shutil.copy(CMU / f"{clip}.asf", folder / "asf" / f"{clip[:2]}.asf")
+    write_motion(folder / "stroll.npz", read_motion(CMU / "39_14.amc"))
+    rows = ("02_06\tbend\tSomeone bends.", "09_07\trun\tA person runs.", "09_07\trun\tSomebody runs fast.")
+    table(folder / "texts.tsv", *rows, "stroll\twalk\tA man walks.", header="clip\tdescription\tsentence")
+    return folder
+
+
+def zipped(folder: Path) -> Path:
+    path = folder.with_suffix(".zip")
+    with zipfile.ZipFile(path, "w") as archive:
+        for file in sorted(folder.rglob("*")):
+            if file.is_file() and file.suffix != ".tsv":
+                archive.write(file, file.relative_to(folder))
+        archive.writestr("__MACOSX/amc/._02_06.amc", b"\0")
+    shutil.move(folder / "texts.tsv", path.parent / "texts.tsv")
+    return path
+
+
+@pytest.mark.parametrize("pack", [lambda folder: folder, zipped])
+def test_a_folder_and_a_zip_give_the_same_records(own: Path, pack: object) -> None:
+    corpus = read_corpus(pack(own))  # type: ignore[operator]
+    records, skipped = of(corpus)
+    assert (len(corpus), list(records), skipped) == (3, ["02_06", "09_07", "stroll"], {})
+    assert corpus.representation == FULL
+    assert records["09_07"].sentences == ("A person runs.", "Somebody runs fast.")
+    assert [record.subject for record in records.values()] == ["02", "09", "stroll"]
+    for clip in ("02_06", "09_07"):
+        np.testing.assert_array_equal(records[clip].motion.values, read_motion(CMU / f"{clip}.amc").values)
+    assert [len(list(corpus)) for _ in range(2)] == [3, 3]
+
+
+def test_what_cannot_be_used_is_named_and_skipped(own: Path) -> None:
+    text = (own / "amc" / "02_06.amc").read_text()
+    (own / "amc" / "02_06.amc").write_text(text[: len(text) // 2])
+    (own / "asf" / "09.asf").rename(own / "asf" / "10.asf")
+    shutil.copy(own / "stroll.npz", own / "amc" / "stroll.npz")
+    shutil.copy(own / "stroll.npz", own / "silent.npz")
+    with (own / "texts.tsv").open("a") as file:
+        file.write("empty\tx\t  \nlost\tx\tA person is lost.\n\n")
+    records, skipped = of(read_corpus(zipped(own)))
+    assert list(records) == ["stroll"]
+    assert skipped["02_06"].startswith("amc/02_06.amc, line ")
+    assert set(skipped) == {"02_06", "09_07", "silent", "stroll", "lost"}
+    assert skipped["silent"] == "no sentence"
+    assert skipped["stroll"] == "a second motion of this name: stroll.npz"
+    assert skipped["lost"] == "no motion file of this name"
+
+
+def test_clips_of_one_name_in_two_folders_are_told_apart_by_their_path(tmp_path: Path) -> None:
+    for folder in ("ann", "bob"):
+        (tmp_path / folder).mkdir()
+        shutil.copy(CMU / "09_07.amc", tmp_path / folder / "run.amc")
+        shutil.copy(CMU / "09_07.asf", tmp_path / folder / "run.asf")
+    table(tmp_path / "texts.tsv", "ann/run\tAnn runs.", "bob/run\tBob runs.")
+    records, _ = of(read_corpus(tmp_path))
+    assert {name: record.sentences for name, record in records.items()} == {
+        "ann/run": ("Ann runs.",),
+        "bob/run": ("Bob runs.",),
+    }
+
+
+def test_a_length_unit_can_be_given(tmp_path: Path) -> None:
+    write_motion(tmp_path / "run.bvh", read_motion(CMU / "09_07.amc"))
+    table(tmp_path / "texts.tsv", "run\tA person runs.")
+    metres = [
+        next(iter(of(read_corpus(tmp_path, metres_per_unit=unit))[0].values())).motion.skeleton.metres_per_unit
+        for unit in (None, 0.01)
+    ]
+    assert metres == [None, 0.01]
+
+
+@pytest.mark.parametrize(
+    ("rows", "header", "reason"),
+    [
+        ((), "clip,sentence", "line 1: the header needs the columns clip and sentence"),
+        (("a\tb\tc",), "clip\tsentence", "line 2: 3 columns where the header has 2"),
+        (("a\tb", "", "c"), "clip\tsentence", "line 4: 1 columns"),
+    ],
+)
+def test_a_table_that_is_none_is_refused_with_its_line(
+    tmp_path: Path, rows: tuple[str, ...], header: str, reason: str
+) -> None:
+    with pytest.raises(DataError, match=reason):
+        read_table(table(tmp_path / "texts.tsv", *rows, header=header))
+
+
+def test_what_is_no_corpus_is_refused(tmp_path: Path, own: Path) -> None:
+    with pytest.raises(DataError, match="no such corpus"):
+        read_corpus(tmp_path / "none")
+    (tmp_path / "bad.zip").write_text("no zip")
+    with pytest.raises(DataError, match="neither a folder nor a whole zip"):
+        read_corpus(tmp_path / "bad.zip")
+    with zipfile.ZipFile(tmp_path / "silent.zip", "w") as archive:
+        archive.writestr("00001_mmm.xml", mmm_xml(10))
+    with pytest.raises(DataError, match=r"neither KIT's NNNNN_annotations\.json nor motion files"):
+        read_corpus(tmp_path / "silent.zip")
+    (own / "texts.tsv").unlink()
+    with pytest.raises(DataError, match=r"needs one table of sentences .*found: none"):
+        read_corpus(own)
+
+
+@pytest.mark.parametrize("inside", ["", "release/2016/"])
+def test_kit_is_read_from_a_zip_or_a_folder(tmp_path: Path, inside: str) -> None:
+    path = write_kit_zip(tmp_path / "kit.zip", 5, (0.1, 0.4))
+    folder = tmp_path / "kit" / inside
+    with zipfile.ZipFile(path) as archive:
+        archive.extractall(folder)
+    for place in (path, tmp_path / "kit"):
+        corpus = read_corpus(place)
+        records, skipped = of(corpus)
+        assert (len(corpus), corpus.representation, skipped) == (5, ANGLES, {})
+        assert list(records) == [f"{number:05}" for number in range(1, 6)]
+        for name, record in records.items():
+            np.testing.assert_array_equal(record.motion.values, read(folder / f"{name}_mmm.xml").values)
+            assert list(record.sentences) == json.loads((folder / f"{name}_annotations.json").read_text())
+        assert [record.subject for record in records.values()] == [f"subject_id_{n % 5}" for n in range(1, 6)]
+        assert records["00001"].motion.channels[6:] == JOINTS
+
+
+def test_bad_files_of_kit_are_named_and_skipped(tmp_path: Path) -> None:
+    path = tmp_path / "kit.zip"
+    texts = {"1": "[]", "2": '["A person walks."]', "3": '["   "]', "4": "[1]", "5": "no json", "6": '["Fine."]'}
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, text in texts.items():
+            archive.writestr(f"{name}_annotations.json", text)
+            archive.writestr(f"{name}_mmm.xml", mmm_xml(20) if name != "2" else mmm_xml(20)[:900])
+        archive.writestr("7_mmm.xml", mmm_xml(20))
+    records, skipped = of(read_corpus(path))
+    assert list(records) == ["6"]
+    assert [skipped[name] for name in "137"] == ["no sentence"] * 3
+    assert skipped["2"].startswith("2_mmm.xml, line ")
+    assert skipped["4"] == "4_annotations.json is no list of sentences"
+    assert skipped["5"].startswith("5_annotations.json is no JSON")
+
+
+def test_a_damaged_zip_member_is_skipped(tmp_path: Path) -> None:
+    path = write_kit_zip(tmp_path / "kit.zip", 3, (0.1, 0.4))
+    with zipfile.ZipFile(path) as archive:
+        info = archive.getinfo("00002_mmm.xml")
+    content = bytearray(path.read_bytes())
+    middle = info.header_offset + 60 + info.compress_size // 2
+    content[middle : middle + 20] = bytes(20)
+    path.write_bytes(content)
+    records, skipped = of(read_corpus(path))
+    assert (list(records), list(skipped)) == (["00001", "00003"], ["00002"])

@@ -1,0 +1,244 @@
+"""Measures of motions, prompts, the chain, and whole reports, against models whose answers are known."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from click.testing import CliRunner
+from language_data import SKELETON
+from language_models import (
+    CHANNELS,
+    FPS,
+    FRAMES,
+    KINDS,
+    UNITS,
+    FakeDescribe,
+    FakeGenerate,
+    manifest,
+    moving,
+    small_store,
+)
+
+from motet.cli import main
+from motet.motion import Motion
+from motet.text import Vocabulary
+from motet_train.data.store import FRAMES as FRAMES_FILE
+from motet_train.data.store import INDEX, Store
+from motet_train.evaluate.language.chain import answers, bounds_chained, chained, told
+from motet_train.evaluate.language.corpus import Corpus, corpus_of
+from motet_train.evaluate.language.motions import energy, feet_of, last_energy, measures, skate, speed
+from motet_train.evaluate.language.prompts import kinds, prompted, recognised, thresholds, travel
+from motet_train.evaluate.language.report import GOALS, describe_report, generate_report
+from motet_train.evaluate.table import json_ready, reached, table
+from motet_train.runs import MODELS, Run
+
+STORE = small_store()
+
+
+@pytest.fixture(scope="module")
+def corpus() -> Corpus:
+    return corpus_of(manifest(STORE, "generate"), STORE)
+
+
+def test_speed_turn_and_rise() -> None:
+    found = travel(moving(1.5, -90, 0.4))
+    assert found == pytest.approx((1.5, -90, 0.4))
+    assert speed(moving(1.5, 40, 0)) == pytest.approx(1.5)
+    assert travel(moving(1.5, -90, 0.4)[:1]) == (0, 0, 0)
+
+
+def test_feet_that_do_not_step_slide_as_fast_as_the_figure() -> None:
+    assert [SKELETON.names[i] for i in feet_of(SKELETON)] == ["left_leg_end", "right_leg_end"]
+    assert skate(moving(1.5, 0, 0, swing=0)) == pytest.approx(1.5)
+    assert skate(moving(0, 0, 0, swing=0)) == 0
+    # in the frame of the jump nothing is on the ground: both of its steps are left out
+    jump = moving(0.2, 0, 0.5, swing=0)
+    values = jump.values.copy()
+    values[10:12, 0] = 9.0
+    assert skate(replace(jump, values=values)) == pytest.approx(0.2)
+
+
+def test_a_leg_that_stands_while_the_other_swings_does_not_slide() -> None:
+    """The figure moves forward by what its left foot moves back; the right foot is in the air."""
+    angle = np.linspace(-5, 5, 11)
+    values = np.zeros((11, len(CHANNELS)))
+    values[:, 6], values[:, 7] = angle, 60
+    still = Motion(values, CHANNELS, UNITS, FPS, SKELETON)
+    values[:, 0] = skate(still)  # about even over so small an angle
+    assert values[0, 0] > 0.1
+    assert skate(replace(still, values=values)) < 0.02 * values[0, 0]
+
+
+def test_energy_of_a_ramp_and_of_a_motion_that_stops() -> None:
+    ramp = np.outer(np.arange(21) / FPS, [2.0, 0.0])  # 2 z/s in one of two channels
+    assert energy(ramp, FPS) == pytest.approx(2.0)
+    stopped = np.concatenate([ramp, np.repeat(ramp[-1:], 10, axis=0)])
+    assert last_energy(stopped, FPS) == 0
+    assert last_energy(stopped[:-5], FPS) == pytest.approx(1.0)
+    assert energy(ramp[:1], FPS) == 0
+
+
+def test_a_motion_that_freezes_is_counted(corpus: Corpus) -> None:
+    motion = moving(1, 0, 0)
+    frozen = replace(motion, values=np.repeat(motion.values[:1], FRAMES, axis=0))
+    found = measures([motion, frozen], corpus.contract, 1e-6)
+    assert (found["frozen"], found["seconds"], found["speed"]) == pytest.approx((0.5, 2.1, 1.0))
+
+
+def test_thresholds_lie_between_the_training_motions(corpus: Corpus) -> None:
+    limits = thresholds(kinds(corpus))
+    assert limits is not None
+    assert (limits.slow, limits.run, limits.turn, limits.rise) == pytest.approx((0.5, 2.0, 45, 0.25))
+    assert recognised(kinds(corpus), limits) == dict.fromkeys(("walks", "runs", "left", "right", "jumps"), 1.0)
+    assert thresholds(kinds(Corpus(replace(STORE, channels=tuple("abcdefgh")), corpus.parts))) is None
+
+
+def test_prompts_tell_the_kinds_apart(corpus: Corpus) -> None:
+    limits, model = thresholds(kinds(corpus)), FakeGenerate(STORE)
+    assert limits is not None
+    asked = ("walks", "runs", "left", "right", "jumps")
+    assert prompted(model, limits, 3) == dict.fromkeys(asked, 1.0)  # type: ignore[arg-type]
+    wrong = FakeGenerate(STORE)
+    wrong.motions = dict.fromkeys(wrong.motions, moving(*KINDS["walks"]))
+    assert prompted(wrong, limits, 3) == dict.fromkeys(asked, 0.0) | {"walks": 1.0}  # type: ignore[arg-type]
+
+
+def test_the_chain_of_perfect_models(corpus: Corpus) -> None:
+    generate: Any = FakeGenerate(STORE)
+    describe: Any = FakeDescribe(STORE)
+    found = answers(generate, corpus, corpus.parts.test)
+    assert len(found.rows) == 3 * len(corpus.parts.test)
+    assert found.records[:4] == (*[corpus.parts.test[0]] * 3, corpus.parts.test[1])
+    assert chained(describe, found, corpus) == dict.fromkeys("12345", 1.0)
+    assert bounds_chained(describe, found, corpus) == {"retrieval": 1.0, "data": 1.0}
+    assert told(describe, [moving(1, 0, 0)[:1], moving(9, 9, 9)]) == ["", "somebody dances"]
+
+
+def test_the_report_of_a_perfect_describe_model(corpus: Corpus) -> None:
+    parts: list[str] = []
+    model: Any = FakeDescribe(STORE)
+    report = describe_report(model, corpus, parts.append)
+    assert parts == ["describe train", "describe test", "floors", "likelihood"]
+    assert report["train"] == {"seconds": 1.5, "epochs": 3}
+    assert report["data"] == {
+        **{"train": 20, "validation": 5, "test": 5},
+        **{"test_unknown_words": 5, "test_people": 1, "test_people_unseen": 1},
+    }
+    for group in ("bleu_train", "bleu_test", "bleu_train_marked", "bleu_test_marked"):
+        assert report[group] == pytest.approx(dict.fromkeys("12345", 1.0))
+    assert report["words"] == {"verbs": 1, "sides": 1, "turns": 1, "verbs_of": 5, "sides_of": 2, "turns_of": 4}
+    assert report["gain"]["frequent"] == 1 - report["floor"]["frequent"]
+    assert report["likelihood"] == {"test": -2.0}
+    assert reached(GOALS, "words.verbs", report["words"]["verbs"])
+    assert "words.sides1>=0.8" in table({"fake": report}, GOALS).replace(" ", "").splitlines()
+
+
+def test_the_report_of_a_perfect_generate_model(corpus: Corpus) -> None:
+    model: Any = FakeGenerate(STORE)
+    describe: Any = FakeDescribe(STORE)
+    report = generate_report(model, corpus, describe)
+    assert report["relative_test"] == report["relative_train"] == dict.fromkeys("12345", 1.0)
+    assert set(report["bound"].values()) == {1.0}
+    assert report["likelihood"] == {"train": -3.0, "test": -3.0}
+    for key in ("seconds", "speed"):
+        assert report["motion"][key] == pytest.approx(report["motion_data"][key])
+    alone = generate_report(model, corpus)
+    assert set(report) - set(alone) == {"chain_train", "chain_test", "relative_train", "relative_test", "bound"}
+    rows = table({"with": report, "alone": alone}, GOALS).splitlines()
+    assert len(rows) == 1 + sum(map(len, report.values()))
+
+
+def test_without_a_root_block_nothing_is_said_of_the_path() -> None:
+    """The paper's representation: joint angles alone."""
+    angles = replace(STORE, frames=STORE.frames[:, 6:], channels=CHANNELS[6:], units=UNITS[6:], skeleton=None)
+    model: Any = FakeGenerate(angles)
+    report = generate_report(model, corpus_of(model.manifest, angles))
+    assert set(report["motion"]) == {"seconds", "energy", "end_energy", "frozen"}
+    assert (set(report["threshold"]), "asked" in report) == ({"quiet"}, False)
+
+
+def test_numbers_that_json_lacks_are_null() -> None:
+    assert json_ready({"a": {"b": np.nan, "c": 1 / 3}}) == {"a": {"b": None, "c": 0.333333}}
+    assert not reached(GOALS, "relative_test.1", np.nan)
+
+
+SIZES = {"encoder_units": [4], "decoder_units": [6], "embedding": 3}
+
+
+@pytest.fixture
+def runs(tmp_path: Path) -> Path:
+    """A store, and in the folders describe, unseen and generate runs of untrained nets."""
+    torch.manual_seed(0)
+    (tmp_path / "store").mkdir()
+    _write(STORE, tmp_path / "store")
+    vocabulary = Vocabulary.of(s for entry in STORE.records for s in entry.sentences).to_json()
+    shared = {"channels": len(CHANNELS), "words": len(vocabulary), **SIZES}
+    more = {"motion": STORE.contract(range(20)).to_json(), "vocabulary": vocabulary}
+    for name, verb, by in (("describe", "describe", "trial"), ("unseen", "describe", "subject")):
+        net = MODELS["motion-to-language"](shared | {"dropout": 0.4, "gates": "sigmoid"})
+        settings = {"model": "motion-to-language", "config": shared | {"dropout": 0.4, "gates": "sigmoid"}}
+        defaults = {"defaults": {"beams": 5, "max_words": 5}}
+        _save(Run(manifest(STORE, verb, by) | more | settings | defaults, net), tmp_path / name)
+    net = MODELS["language-to-motion"](shared | {"components": 2})
+    settings = {"model": "language-to-motion", "config": shared | {"components": 2}}
+    defaults = {"defaults": {"hypotheses": 2, "candidates": 2, "temperature": 1.0, "max_seconds": 1}}
+    _save(Run(manifest(STORE, "generate") | more | settings | defaults, net), tmp_path / "generate")
+    return tmp_path
+
+
+def test_evaluate_of_runs(runs: Path) -> None:
+    names = [str(runs / name) for name in ("describe", "unseen", "generate")]
+    result = CliRunner().invoke(main, ["evaluate", *names, "--data", str(runs / "store"), "--json", "--save"])
+    assert result.exit_code == 0, result.output
+    reports = json.loads(result.output)
+    for name in names:
+        assert json.loads((Path(name) / "run.json").read_text())["quality"] == reports[name]
+    assert reports[names[0]]["people_unseen"] == reports[names[1]]
+    assert set(reports[names[2]]) >= {"chain_test", "asked", "motion", "motion_data", "threshold"}
+
+
+def test_evaluate_draws_the_papers_figures(runs: Path) -> None:
+    names = [str(runs / name) for name in ("describe", "generate")]
+    result = CliRunner().invoke(
+        main, ["evaluate", *names, "--data", str(runs / "store"), "--plots", str(runs / "plots")]
+    )
+    assert result.exit_code == 0, result.output
+    assert "relative_test.1" in result.output
+    drawn = sorted(path.relative_to(runs / "plots").as_posix() for path in (runs / "plots").glob("*/*.png"))
+    assert [path.split("-contexts")[0] for path in drawn] == [
+        "describe/figure-10-walking.png",
+        "describe/figure-5-loss.png",
+        "describe/figure-6-descriptions.png",
+        "describe/figure-9a",
+        "generate/figure-7-loss.png",
+        "generate/figure-8-generated.png",
+        "generate/figure-9b",
+    ]
+
+
+def test_evaluate_says_what_it_lacks(runs: Path) -> None:
+    result = CliRunner().invoke(main, ["evaluate", str(runs / "describe")])
+    assert (result.exit_code, "need --data" in result.output) == (2, True)
+    result = CliRunner().invoke(main, ["evaluate", str(runs / "describe"), "cmu-control"])
+    assert (result.exit_code, "apart" in result.output) == (2, True)
+
+
+def _save(run: Run, folder: Path) -> None:
+    folder.mkdir()
+    run.save(folder)
+    (folder / "log.jsonl").write_text('{"epoch": 1, "train_loss": 2.0, "validation_loss": 3.0}\n')
+
+
+def _write(store: Store, folder: Path) -> None:
+    np.save(folder / FRAMES_FILE, store.frames)
+    assert store.skeleton is not None
+    index = {
+        **{"channels": store.channels, "units": store.units, "fps": store.fps, "skipped": []},
+        "skeleton": store.skeleton.to_json(),
+        "records": [vars(entry) for entry in store.records],
+    }
+    (folder / INDEX).write_text(json.dumps(index))

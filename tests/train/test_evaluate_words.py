@@ -1,0 +1,172 @@
+"""BLEU, what sentences say, and the floors that are looked up."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+from language_models import manifest, small_store
+
+from motet_train.data.errors import DataError
+from motet_train.evaluate.language.attributes import VERBS as TABLE
+from motet_train.evaluate.language.attributes import (
+    common_side,
+    said,
+    side,
+    sides_right,
+    turns,
+    turns_right,
+    verbs_right,
+)
+from motet_train.evaluate.language.bleu import agreement, bleu, ranks
+from motet_train.evaluate.language.corpus import Corpus, corpus_of
+from motet_train.evaluate.language.floors import (
+    frequent_bleu,
+    frequent_sentence,
+    nearest_bleu,
+    nearest_motions,
+    retrieved,
+)
+
+
+@pytest.fixture(scope="module")
+def corpus() -> Corpus:
+    store = small_store()
+    return corpus_of(manifest(store, "describe"), store)
+
+
+def naive_bleu(hypotheses: list[list[str]], references: list[list[list[str]]]) -> float:
+    """Papineni et al. 2002, literally: clipped precisions, closest reference length, the shorter of two as close."""
+    logs = 0.0
+    for n in range(1, 5):
+        hits = total = 0
+        for words, row in zip(hypotheses, references, strict=True):
+            grams = [Counter(tuple(text[i : i + n]) for i in range(len(text) - n + 1)) for text in (words, *row)]
+            hits += sum(min(count, max(one[gram] for one in grams[1:])) for gram, count in grams[0].items())
+            total += sum(grams[0].values())
+        if not hits:
+            return 0.0
+        logs += np.log(hits / total) / 4
+    length = sum(map(len, hypotheses))
+    closest = sum(
+        min((abs(len(one) - len(words)), len(one)) for one in row)[1]
+        for words, row in zip(hypotheses, references, strict=True)
+    )
+    return float(np.exp(logs + min(0.0, 1 - closest / length)))
+
+
+def test_bleu_is_that_of_a_naive_twin() -> None:
+    rng = np.random.default_rng(0)
+    seen = []
+    for _ in range(20):
+        sizes = rng.integers(4, 9, size=6)
+        hypotheses = [list(rng.choice(list("abc"), size)) for size in sizes]
+        references = [[list(rng.choice(list("abc"), rng.integers(3, 10))) for _ in range(1 + i % 3)] for i in range(6)]
+        expected = naive_bleu(hypotheses, references)
+        texts = [[" ".join(words) for words in row] for row in references]
+        assert bleu([" ".join(words) for words in hypotheses], texts) == pytest.approx(expected, abs=1e-6)
+        marked = [["SOS", *words, "EOS"] for words in hypotheses]
+        expected = naive_bleu(marked, [[["SOS", *words, "EOS"] for words in row] for row in references])
+        assert bleu([" ".join(words) for words in hypotheses], texts, True) == pytest.approx(expected, abs=1e-6)
+        seen.append(expected)
+    assert len(set(seen)) > 15
+
+
+def test_bleu_by_hand() -> None:
+    """5 of 6, 4 of 5, 3 of 4 and 2 of 3 n-grams; the hypothesis is as long as the reference."""
+    expected = (5 / 6 * 4 / 5 * 3 / 4 * 2 / 3) ** 0.25
+    assert bleu(["a person walks 4 steps back"], [["a person walks 4 steps ahead"]]) == pytest.approx(expected)
+    # too short by two words: the brevity penalty alone
+    assert bleu(["a person walks slowly"], [["a person walks slowly to somewhere"]]) == pytest.approx(np.exp(1 - 6 / 4))
+    assert bleu(["A person turns 90 degrees"], [["a person turns 9 0 degrees"]]) == 1.0
+    assert bleu(["", "a b c d"], [["x y"], ["a b c d"]]) == pytest.approx(np.exp(1 - 6 / 4))
+
+
+def test_ranks_are_columns_of_table_2() -> None:
+    references = [["a b c d e"], ["f g h i j"]]
+    found = ranks([["a b c d e", "x x x x x"], ["f g h i j"]], references)
+    assert found["1"] == 1.0
+    assert found["2"] == found["5"] == bleu(["x x x x x", "f g h i j"], references)
+    assert list(found) == ["1", "2", "3", "4", "5"]
+
+
+def test_agreement_holds_each_sentence_out() -> None:
+    assert agreement([["a b c d e"] * 2, ["f g h i j"] * 3, ["alone it does not count"]]) == pytest.approx(1)
+    assert agreement([["a b c d e", "v w x y z"]]) == 0
+    assert np.isnan(agreement([["a b c d e"]]))
+
+
+@pytest.mark.parametrize(
+    ("sentence", "verbs"),
+    [
+        ("A person walks.", {"walk"}),
+        ("Someone is jogging, then LEAPS", {"run", "jump"}),
+        ("he grabs the rungs", set()),
+        ("runs instead of walking", {"run"}),
+        ("A human goes forward on foot", {"walk"}),
+        ("chopping", set()),
+    ],
+)
+def test_verbs_that_a_sentence_says(sentence: str, verbs: set[str]) -> None:
+    assert said(TABLE, sentence) == verbs
+
+
+@pytest.mark.parametrize(
+    ("sentence", "expected"),
+    [
+        ("turns leftwards", {"left"}),
+        ("turns right at a right angle", {"right"}),
+        ("turns at a right angle", set()),
+        ("a right-angled turn to the left", {"left"}),
+        ("with the left and the right foot in turn", set()),
+    ],
+)
+def test_sides_that_a_sentence_says(sentence: str, expected: set[str]) -> None:
+    assert side(sentence) == expected
+
+
+def test_what_is_right_of_a_hypothesis() -> None:
+    references = [["a man runs", "he jogs and leaps"], ["she walks left", "she bears left"], ["a cartwheel", "a wheel"]]
+    assert verbs_right(["runs", "walks", "jumps"], references) == (2, 2)
+    assert verbs_right(["jumps", "walks and runs", ""], references) == (1, 2)  # half say jump; nobody says run
+    assert sides_right(["left", "walks left", "right"], references) == (1, 1)
+    assert sides_right(["left", "left or right", "right"], references) == (0, 1)
+    assert turns(references[1]) is True
+    assert turns(["a man walks", "he walks, using the left and the right foot in turn"]) is False
+    assert turns(["he jumps to the left"]) is None
+    assert turns_right(["", "turns around", ""], references) == (1, 1)  # the first one jumps, too
+    assert common_side(["left", "right"]) is None
+
+
+def test_the_nearest_motion_and_sentence(corpus: Corpus) -> None:
+    test = corpus.parts.test
+    kinds = [record % 5 for record in test]
+    assert [record % 5 for record in nearest_motions(corpus, corpus.motions(test))] == kinds
+    asked = corpus.parts.train[3:9]
+    assert nearest_motions(corpus, corpus.motions(asked)) == list(asked)
+    assert retrieved(corpus, [corpus.sentences(record)[2] for record in asked]) == list(asked)
+    assert [r % 5 for r in retrieved(corpus, ["someone jumps", "he turns right"])] == [4, 3]
+    # two of three sentences of a kind are the same, the third has a word of its own
+    references = corpus.references(test)
+    nearest = corpus.references(nearest_motions(corpus, corpus.motions(test)))
+    expected = np.mean([1.0, 1.0, bleu([said[2] for said in nearest], references)])
+    assert nearest_bleu(corpus, test) == pytest.approx(expected)
+
+
+def test_the_most_frequent_sentence(corpus: Corpus) -> None:
+    assert frequent_sentence(corpus) == "a person jumps"  # of five as frequent the first by name
+    references = [["a person jumps", "x"], ["a person walks"]]
+    assert frequent_bleu(corpus, references) == bleu(["a person jumps"] * 2, references)
+
+
+def test_a_model_of_other_data_is_refused() -> None:
+    store = small_store()
+    told = manifest(store, "describe")
+    told["training"]["split"]["train"] += 1
+    with pytest.raises(DataError, match="was not trained on this data: its 21 training"):
+        corpus_of(told, store)
+    with pytest.raises(DataError, match="does not say which motions"):
+        corpus_of({"name": "x"}, store)
+    told = manifest(store, "describe")
+    told["training"]["split"]["test"][0] = "elsewhere"
+    with pytest.raises(DataError, match="was not trained on this data"):
+        corpus_of(told, store)

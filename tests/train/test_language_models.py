@@ -1,0 +1,150 @@
+"""Both directions between motion and language: sizes, losses, and the three graphs of each."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import pytest
+import torch
+from torch import Tensor
+
+from motet_train.models import language_to_motion, motion_to_language
+from motet_train.models.batch import Batch
+from motet_train.models.language_to_motion import LanguageToMotion, LanguageToMotionConfig
+from motet_train.models.motion_to_language import EOS, PAD, SOS, MotionToLanguage, MotionToLanguageConfig
+from motet_train.runs import MODELS
+
+D, V = 3, 11
+DESCRIBE = MotionToLanguageConfig(D, V, encoder_units=(4, 5), decoder_units=(6, 7), embedding=4)
+GENERATE = LanguageToMotionConfig(D, V, encoder_units=(4, 5), decoder_units=(6, 7), embedding=4, components=2)
+
+
+def describer(config: MotionToLanguageConfig = DESCRIBE) -> MotionToLanguage:
+    torch.manual_seed(0)
+    return normalised(MotionToLanguage(config))
+
+
+def generator(config: LanguageToMotionConfig = GENERATE) -> LanguageToMotion:
+    torch.manual_seed(0)
+    return normalised(LanguageToMotion(config))
+
+
+def normalised(net: torch.nn.Module) -> torch.nn.Module:
+    net.mean.copy_(torch.tensor([1.0, 2.0, 3.0]))
+    net.scale.copy_(torch.tensor([1.0, 0.5, 2.0]))
+    return net
+
+
+def batch() -> Batch:
+    frames = torch.randn(3, 7, D, generator=torch.Generator().manual_seed(1)) + 2
+    words = torch.tensor([[5, 4, 3, 10], [6, PAD, PAD, PAD], [7, 7, 8, PAD]])
+    return Batch(frames, torch.tensor([7, 2, 5]), words)
+
+
+def alone(rows: Batch, row: int) -> Batch:
+    words = rows.words[row : row + 1, : int((rows.words[row] != PAD).sum())]
+    return Batch(rows.frames[row : row + 1, : int(rows.lengths[row])], rows.lengths[row : row + 1], words)
+
+
+def parameters(net: torch.nn.Module) -> dict[str, int]:
+    return {name: sum(p.numel() for p in part.parameters()) for name, part in net.named_children()}
+
+
+def test_parameters_are_exactly_those_of_the_paper() -> None:
+    with torch.device("meta"):
+        describe = MotionToLanguage(MotionToLanguageConfig.paper())
+        generate = LanguageToMotion(LanguageToMotionConfig.paper())
+    counts = parameters(describe)
+    assert counts == {"encoder": 116_352, "embedding": 86_016, "decoder": 295_680, "output": 345_408}
+    assert sum(counts.values()) == 843_456
+    counts = parameters(generate)
+    assert counts["head"] == 2_138_981
+    assert counts["encoder"] + counts["decoder"] == 123_648 + 3_080_400 + 17_472
+    assert sum(counts.values()) == 5_446_517
+    assert [layer.weight.shape[1] for layer in generate.decoder.layers] == [218, 573, 573]
+
+
+@pytest.mark.parametrize("net", [describer(), generator()])
+def test_a_row_of_a_batch_loses_what_it_loses_alone(net: MotionToLanguage | LanguageToMotion) -> None:
+    rows = batch()
+    found = net.eval().losses(rows)
+    single = torch.cat([net.losses(alone(rows, row)) for row in range(3)])
+    torch.testing.assert_close(found, single, atol=1e-5, rtol=1e-5)
+    assert net.loss(rows) == found.mean()
+
+
+def test_the_loss_of_words_is_the_cross_entropy_of_steps() -> None:
+    net, rows = describer().eval(), batch()
+    step, score = (net.graphs()[role][0] for role in ("step", "score"))
+    context = net.encode(rows.frames, rows.lengths)
+    sentences = [[SOS, *row[row != PAD].tolist(), EOS] for row in rows.words]
+    expected, scores = [], torch.zeros(3, 6)
+    for i, sentence in enumerate(sentences):
+        state = torch.zeros(1, 13)
+        for t, (word, following) in enumerate(pairwise(sentence)):
+            log_probabilities, state = step(torch.tensor([word]), context[i : i + 1], state)
+            assert log_probabilities.exp().sum().item() == pytest.approx(1, abs=1e-5)
+            scores[i, t + 1] = log_probabilities[0, following]
+            expected.append(-log_probabilities[0, following])
+    torch.testing.assert_close(net.losses(rows), torch.stack(expected), atol=1e-5, rtol=1e-5)
+    padded = torch.tensor([[*sentence, *[PAD] * (6 - len(sentence))] for sentence in sentences])
+    torch.testing.assert_close(score(context, padded), scores, atol=1e-5, rtol=1e-5)
+
+
+def test_the_likelihood_of_frames_is_that_of_steps() -> None:
+    net, rows = generator().eval(), batch()
+    step, score = (net.graphs()[role][0] for role in ("step", "score"))
+    context = net.encode(rows.words, (rows.words != PAD).sum(1))
+    expected = []
+    for i, length in enumerate(rows.lengths.tolist()):
+        state, frame = torch.zeros(1, 13), torch.ones(1, D + 1)
+        normal = torch.cat([(rows.frames[i, :length] - net.mean) / net.scale, torch.ones(length, 1)], dim=1)
+        sequence = torch.cat([normal, torch.zeros(1, D + 1)])
+        found = []
+        for target in sequence:
+            log_weights, means, stds, active, state = step(frame, context[i : i + 1], state)
+            density = torch.distributions.Normal(means[0], stds[0]).log_prob(target[:-1]).sum(-1)
+            density = torch.logsumexp(log_weights[0] + density, 0) + active[0].log()
+            found.append(density if target[-1] else (1 - active[0]).log())
+            frame = target[None]
+        scores = score(context[i : i + 1], sequence[None])[0]
+        torch.testing.assert_close(scores, torch.stack(found), atol=1e-4, rtol=1e-5)
+        expected += found
+    torch.testing.assert_close(net.likelihoods(rows), torch.stack(expected), atol=1e-4, rtol=1e-5)
+    true = generator(replace(GENERATE, loss="likelihood")).eval()
+    torch.testing.assert_close(true.losses(rows), -net.likelihoods(rows))
+
+
+@pytest.mark.parametrize("net", [describer(), generator(), generator(replace(GENERATE, loss="likelihood"))])
+def test_a_few_steps_lower_the_loss(net: MotionToLanguage | LanguageToMotion) -> None:
+    rows = batch()
+    optimiser = torch.optim.NAdam(net.parameters(), lr=1e-2)
+    losses: list[Tensor] = []
+    for _ in range(12):
+        losses.append(net.eval().loss(rows).detach())
+        net.train().zero_grad()
+        net.loss(rows).backward()
+        assert all(p.grad is not None and torch.isfinite(p.grad).all() for p in net.parameters())
+        optimiser.step()
+    assert losses[-1] < losses[0] - 0.05
+
+
+def test_training_drops_and_running_does_not() -> None:
+    for net in (describer(), generator()):
+        assert not torch.equal(net.losses(batch()), net.losses(batch()))
+        net.eval()
+        assert torch.equal(net.losses(batch()), net.losses(batch()))
+
+
+@pytest.mark.parametrize(
+    ("name", "module", "net"),
+    [
+        ("motion-to-language", motion_to_language, describer(replace(DESCRIBE, gates="hard"))),
+        ("language-to-motion", language_to_motion, generator(replace(GENERATE, loss="likelihood"))),
+    ],
+)
+def test_a_net_is_rebuilt_from_its_configuration(name: str, module: object, net: torch.nn.Module) -> None:
+    config = module.to_config(net)  # type: ignore[attr-defined]
+    other = MODELS[name](config)
+    assert other.config == net.config
+    other.load_state_dict(net.state_dict())
+    assert torch.equal(other.eval().losses(batch()), net.eval().losses(batch()))

@@ -1,0 +1,236 @@
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from kit_zip import JOINTS, write_kit_zip
+
+from motet.cli import main
+from motet.errors import OutputError
+from motet.formats import read_motion
+from motet.kinematics import positions
+from motet.motion import Motion
+from motet.root_block import ROOT_BLOCK
+from motet_train.data.clips import CMU
+from motet_train.data.corpus import read_corpus
+from motet_train.data.errors import DataError
+from motet_train.data.records import Record, Skipped
+from motet_train.data.representation import ANGLES, FULL, Representation
+from motet_train.data.split import split
+from motet_train.data.store import Entry, Store, prepare
+from motet_train.data.trim import trim
+
+PLAIN = Representation(root_block=True, trim=False)
+
+
+def cmu(clip: str = "09_07", name: str = "") -> Record:
+    return Record(name or clip, clip[:2], read_motion(CMU / f"{clip}.amc"), ("A person moves.",))
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
+    return prepare([cmu("02_06"), cmu("09_07")], tmp_path_factory.mktemp("store") / "cmu", PLAIN)
+
+
+def test_each_offset_is_a_sequence_of_the_contracts_frames(store: Store) -> None:
+    contract = store.contract([0, 1])
+    assert contract.channels[:6] == ROOT_BLOCK
+    assert (len(contract.channels), contract.fps, contract.skeleton.metres_per_unit) == (62, 10, 1)
+    for number, entry in enumerate(store.records):
+        motion = read_motion(CMU / f"{entry.name}.amc")
+        assert len(entry.spans) == 12
+        for offset in (0, 5, 11):
+            expected = contract.frames(motion[offset:])
+            np.testing.assert_array_equal(store.sequence(number, offset), expected.astype(np.float32))
+    assert np.shares_memory(store.sequence(1), store.frames)
+
+
+def test_mean_and_deviation_are_those_of_the_records_asked_for(store: Store) -> None:
+    for indices in ([0], [1], [0, 1]):
+        frames = np.concatenate([store.sequence(i, offset) for i in indices for offset in range(12)]).astype(np.float64)
+        contract = store.contract(indices)
+        np.testing.assert_allclose(contract.mean, frames.mean(axis=0), rtol=1e-6, atol=1e-9)
+        std = frames.std(axis=0)
+        np.testing.assert_allclose(contract.std, np.where(std < 1e-4, 1, std), rtol=1e-6)
+        assert contract.std.min() > 1e-4
+    with pytest.raises(DataError, match="at least one record"):
+        store.contract([])
+
+
+def test_the_store_is_what_numpy_reads(store: Store, tmp_path: Path) -> None:
+    prepare([cmu()], tmp_path / "one", PLAIN)
+    frames = np.load(tmp_path / "one" / "frames.npy")
+    assert (frames.dtype, frames.shape) == (np.float32, (138, 62))
+    np.testing.assert_array_equal(frames, store.frames[-138:])
+    assert sorted(file.name for file in (tmp_path / "one").iterdir()) == ["frames.npy", "store.json"]
+
+
+def test_another_rate_gives_one_interpolated_sequence(tmp_path: Path) -> None:
+    record = cmu("02_06")
+    odd = replace(record, motion=replace(record.motion, fps=59.94))
+    found = prepare([odd], tmp_path / "odd", PLAIN)
+    assert len(found.records[0].spans) == 1
+    assert len(found.sequence(0)) == round(len(record.motion) / 5.994)
+
+
+def test_kits_angles_are_stored_in_radians_without_the_root(tmp_path: Path) -> None:
+    corpus = read_corpus(write_kit_zip(tmp_path / "kit.zip", 4))
+    found = prepare(corpus, tmp_path / "store", corpus.representation)
+    contract = found.contract(range(4))
+    assert (found.channels, set(found.units), found.skeleton) == (JOINTS, {"rad"}, None)
+    for number, item in enumerate(corpus):
+        assert isinstance(item, Record)
+        assert len(found.records[number].spans) == 10
+        for offset in (0, 9):
+            expected = contract.frames(item.motion[offset:])
+            np.testing.assert_array_equal(found.sequence(number, offset), expected.astype(np.float32))
+
+
+def test_channels_in_another_order_are_put_in_order(store: Store, tmp_path: Path) -> None:
+    record = cmu()
+    turned = replace(record, name="turned", motion=record.motion.select(record.motion.channels[::-1]))
+    found = prepare([record, turned], tmp_path / "both", PLAIN)
+    np.testing.assert_array_equal(found.sequence(0, 3), found.sequence(1, 3))
+
+
+def lame(motion: Motion) -> Motion:
+    return motion.select(tuple(name for name in motion.channels if not name.startswith("lfoot")))
+
+
+def twisted(motion: Motion) -> Motion:
+    joints = [replace(j, axis=(0.0, 90.0, 0.0)) if j.name == "lfemur" else j for j in motion.skeleton.joints]
+    return replace(motion, skeleton=replace(motion.skeleton, joints=tuple(joints)))
+
+
+def test_what_does_not_fit_is_skipped_with_its_reason(tmp_path: Path) -> None:
+    run, bend = cmu(), cmu("02_06").motion
+    long = Motion(np.tile(bend.values, (11, 1)), bend.channels, bend.units, bend.fps, bend.skeleton)
+    others = {
+        "frame": (run.motion[:1], "0.00833 s (1 frames)"),
+        "long": (long, "31.3 s"),
+        "lame": (lame(run.motion), "another skeleton than 09_07: only one of them has lfoot.rx, lfoot.rz"),
+        "twisted": (twisted(run.motion), "another skeleton than 09_07: joint 'lfemur' turns about other axes"),
+        "rootless": (run.motion.select(run.motion.channels[3:]), "lacks root.tx, root.ty, root.tz"),
+    }
+    records = [replace(run, name=name, motion=motion) for name, (motion, _) in others.items()]
+    seen: list[object] = []
+    found = prepare([run, Skipped("gone", "it is gone"), *records], tmp_path / "store", PLAIN, seen.append)
+    assert [entry.name for entry in found.records] == ["09_07"]
+    assert len(found.frames) == 138
+    reasons = {item.name: item.reason for item in found.skipped}
+    assert reasons.pop("gone") == "it is gone"
+    for name, (_, reason) in others.items():
+        assert reason in reasons[name]
+    assert [item.name for item in seen] == ["09_07", "gone", *others]  # type: ignore[attr-defined]
+
+
+def test_a_store_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
+    def broken() -> Iterator[Record]:
+        yield cmu()
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        prepare(broken(), tmp_path / "store", PLAIN)
+    with pytest.raises(DataError, match="no motion can be used, 1 were skipped: x: because"):
+        prepare([Skipped("x", "because")], tmp_path / "store", PLAIN)
+    assert not list(tmp_path.iterdir())
+    (tmp_path / "store").mkdir()
+    with pytest.raises(OutputError, match="it exists"):
+        prepare([cmu()], tmp_path / "store", PLAIN)
+
+
+def test_a_folder_that_is_no_store_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="no store"):
+        Store.open(tmp_path)
+    prepare([cmu()], tmp_path / "store", PLAIN)
+    frames = np.load(tmp_path / "store" / "frames.npy")
+    np.save(tmp_path / "store" / "frames.npy", frames[:-1])
+    with pytest.raises(DataError, match="does not go with"):
+        Store.open(tmp_path / "store")
+
+
+def entries(sizes: list[int]) -> list[Entry]:
+    return [Entry(f"{s}_{n}", f"{s}", ("x",), ((0, 1),)) for s, size in enumerate(sizes) for n in range(size)]
+
+
+@pytest.mark.parametrize("by", ["trial", "subject"])
+def test_a_split_is_a_partition_of_about_80_10_10(by: str) -> None:
+    everything = entries([20, 5, 10, 3, 40, 7, 8, 2, 5])
+    for seed in range(20):
+        found = split(everything, seed, by)
+        assert found == split(everything, seed, by)
+        assert sorted(found.train + found.validation + found.test) == list(range(100))
+        sizes = [len(found.validation), len(found.test)]
+        assert sizes == [10, 10] if by == "trial" else 2 <= min(sizes) <= max(sizes) <= 10
+        if by == "subject":
+            people = [{everything[i].subject for i in part} for part in (found.train, found.validation, found.test)]
+            assert sum(map(len, people)) == len(set.union(*people)) == 9
+    assert split(everything, 0, by) != split(everything, 1, by)
+
+
+def test_a_split_of_too_little_is_refused() -> None:
+    with pytest.raises(DataError, match="2 motions of 2 trials are too few"):
+        split(entries([2]), 0)
+    with pytest.raises(DataError, match="100 motions of 2 subjects are too few"):
+        split(entries([50, 50]), 0, "subject")
+    assert [len(part) for part in (split(entries([3]), 0).validation, split(entries([3]), 0).test)] == [1, 1]
+    with pytest.raises(DataError, match="by trial or by subject"):
+        split(entries([30]), 0, "day")
+
+
+def still(motion: Motion, before: int, after: int) -> Motion:
+    values = np.concatenate([motion.values[:1].repeat(before, 0), motion.values, motion.values[-1:].repeat(after, 0)])
+    return replace(motion, values=values)
+
+
+def test_half_a_second_of_stillness_is_kept() -> None:
+    run = cmu().motion
+    np.testing.assert_array_equal(trim(run).values, run.values)
+    trimmed = trim(still(run, 360, 240))
+    # the first and last quarter of a second of movement show it, so that much more stillness may stay
+    assert 0 <= len(trimmed) - (len(run) + 120) <= 60
+    np.testing.assert_array_equal(trim(still(run, 10, 20)).values, still(run, 10, 20).values)
+    frozen = still(run[:1], 300, 300)
+    assert len(trim(frozen)) == len(frozen)
+
+
+def test_a_leap_from_another_pose_is_cut_off() -> None:
+    run = cmu().motion
+    away = np.array(run.values)
+    away[:7, :3] += 300
+    away[-4:, :3] -= 300
+    trimmed = trim(replace(run, values=away))
+    np.testing.assert_array_equal(trimmed.values, run.values[7:-4])
+    middle = np.array(run.values)
+    middle[66:, :3] += 300
+    assert len(trim(replace(run, values=middle))) == len(run)
+    assert len(trim(run[:1])) == 1
+
+
+def test_trimming_never_moves_a_joint() -> None:
+    bend = still(cmu("02_06").motion, 200, 0)
+    trimmed = trim(bend)
+    start = len(bend) - len(trimmed)
+    np.testing.assert_allclose(positions(trimmed), positions(bend)[start:])
+
+
+def test_the_command_prepares_and_names_what_it_skips(tmp_path: Path) -> None:
+    path = write_kit_zip(tmp_path / "kit.zip", 3)
+    out = tmp_path / "store"
+    result = CliRunner().invoke(main, ["prepare", str(path), "--out", str(out)])
+    assert result.exit_code == 0, result.output
+    assert "3 motions of" in result.output
+    assert "6 sentences, 44 channels at 10 fps; 0 skipped" in result.output
+    assert len(Store.open(out).records) == 3
+    again = CliRunner().invoke(main, ["prepare", str(path), "--out", str(out)])
+    assert again.exit_code == 2
+    assert "it exists" in again.output
+    assert json.loads((out / "store.json").read_text())["channels"] == list(JOINTS)
+
+
+def test_the_named_representations() -> None:
+    assert (ANGLES.root_block, ANGLES.trim, FULL.root_block, FULL.trim) == (False, False, True, True)
+    assert {ANGLES.fps, FULL.fps, ANGLES.longest, FULL.longest} == {10, 30}

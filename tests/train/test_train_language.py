@@ -1,0 +1,161 @@
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from click.testing import CliRunner, Result
+from language_data import records, small_store
+
+from motet.cli import main
+from motet.contract import MotionContract
+from motet.formats import write_motion
+from motet_train import describe, generate
+from motet_train.data.store import Store
+from motet_train.fit import CHECKPOINT, LOG, Fitting
+from motet_train.language import Recipe, material
+from motet_train.models.language_to_motion import LanguageToMotionConfig
+from motet_train.models.motion_to_language import MotionToLanguageConfig
+from motet_train.runs import Run
+
+VERBS = ("describe", "generate")
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("corpus")
+    small_store(folder)
+    return folder / "store"
+
+
+@pytest.fixture(autouse=True)
+def small_nets(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The nets of the default recipes with few units."""
+    sizes = {"encoder_units": (4, 4), "decoder_units": (6, 6), "embedding": 4}
+    for module, config in (
+        (describe, partial(MotionToLanguageConfig, **sizes)),  # type: ignore[arg-type]
+        (generate, partial(LanguageToMotionConfig, components=2, loss="likelihood", **sizes)),  # type: ignore[arg-type]
+    ):
+        recipe = replace(module.RECIPES["default"], config=config, fitting=Fitting(clip=8.0, epochs=3, batch=16))
+        monkeypatch.setitem(module.RECIPES, "default", recipe)
+
+
+def motet(*arguments: object) -> Result:
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+def trained(verb: str, store: Path, out: Path, *options: object) -> Run:
+    result = motet("train", verb, "--data", store, "--out", out, *options)
+    assert result.exit_code == 0, result.output
+    return Run.load(out)
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_the_manifest_says_all(verb: str, store: Path, tmp_path: Path) -> None:
+    run = trained(verb, store, tmp_path / "run", "--name", "mine", "--data-licence", "free", "--seed", 3, "--no-mirror")
+    manifest, training = run.manifest, run.manifest["training"]
+    found = material(Store.open(store), mirror=False)
+    assert (manifest["name"], manifest["verb"]) == ("mine", verb)
+    assert manifest["licence"] == {"weights": "MIT", "data": "free"}
+    assert manifest["vocabulary"] == list(found.vocabulary.words)
+    contract = MotionContract.from_json(manifest["motion"])
+    np.testing.assert_allclose(contract.mean, found.contract.mean, atol=1e-9)
+    np.testing.assert_allclose(run.model.scale.numpy(), contract.std, rtol=1e-6)  # type: ignore[union-attr, operator]
+    assert training["split"]["test"] == [f"{i:02}" for i in found.parts.test]
+    assert training["split"]["validation"] == [f"{i:02}" for i in found.parts.validation]
+    assert (training["seed"], training["epochs"], training["mirror"]) == (3, 3, False)
+    assert training["data"] == {
+        "name": "store",
+        "motions": 20,
+        "sentences": 60,
+        "skipped": 0,
+        "unusable_sentences": 0,
+    }
+    lines = [json.loads(line) for line in (tmp_path / "run" / LOG).read_text().splitlines()]
+    assert [line["epoch"] for line in lines] == [1, 2, 3]
+    assert lines[-1]["train_loss"] < lines[0]["train_loss"]
+    assert training["validation_loss"] == min(line["validation_loss"] for line in lines)
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_resumed_training_is_the_same_to_the_bit(verb: str, store: Path, tmp_path: Path) -> None:
+    whole = trained(verb, store, tmp_path / "whole")
+    trained(verb, store, tmp_path / "parts", "--epochs", 1)
+    parts = trained(verb, store, tmp_path / "parts", "--resume")
+    states = whole.model.state_dict(), parts.model.state_dict()
+    assert all(torch.equal(states[0][name], states[1][name]) for name in states[0])
+    other = trained(verb, store, tmp_path / "other", "--seed", 1)
+    assert any(not torch.equal(states[0][name], value) for name, value in other.model.state_dict().items())
+
+
+def test_a_stopped_run_says_how_it_goes_on(store: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    out = tmp_path / "run"
+    stop_at(monkeypatch, epoch=2)
+    result = motet("train", "describe", "--data", store, "--out", out)
+    assert result.exit_code == 1
+    assert "the same command with --resume goes on" in result.output
+    assert {path.name for path in out.iterdir()} == {CHECKPOINT, LOG, "run.json", "weights.pt"}
+    assert Run.load(out).manifest["verb"] == "describe"
+
+
+def test_nothing_is_left_of_a_run_without_an_epoch(
+    store: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stop_at(monkeypatch, epoch=1)
+    assert motet("train", "generate", "--data", store, "--out", tmp_path / "run").exit_code == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def stop_at(monkeypatch: pytest.MonkeyPatch, epoch: int) -> None:
+    def interrupt(bar: object, now: int, epochs: int) -> None:
+        if now == epoch:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("motet_train.cli.train_language._advance", interrupt)
+
+
+def test_refusals(store: Path, tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    (tmp_path / "empty").mkdir()
+    refused = ("train", "describe", "--data", store)
+    assert "it has no checkpoint.pt" in motet(*refused, "--out", tmp_path / "empty", "--resume").output
+    assert "no corpus in" in motet("train", "describe", "--data", tmp_path / "empty", "--out", out).output
+    trained("describe", store, out, "--epochs", 1)
+    before = (out / CHECKPOINT).read_bytes()
+    assert "it exists" in motet(*refused, "--out", out).output
+    result = motet(*refused, "--out", out, "--resume", "--seed", 1, "--batch", 8)
+    assert result.exit_code == 2
+    assert "cannot go on: seed, batch" in result.output
+    assert (out / CHECKPOINT).read_bytes() == before
+    if not torch.cuda.is_available():
+        assert "no CUDA device" in motet(*refused, "--out", tmp_path / "x", "--device", "cuda").output
+
+
+def test_a_corpus_is_prepared_beside_the_run(tmp_path: Path) -> None:
+    folder = tmp_path / "mocap"
+    folder.mkdir()
+    lines = ["clip\tsentence"]
+    for record in records(12):
+        write_motion(folder / f"{record.name}.npz", record.motion)
+        lines += [f"{record.name}\t{sentence}" for sentence in record.sentences]
+    (tmp_path / "said.tsv").write_text("\n".join(lines))
+    out = tmp_path / "runs" / "mine"
+    run = trained("describe", folder, out, "--sentences", tmp_path / "said.tsv", "--epochs", 1)
+    assert run.manifest["training"]["data"]["motions"] == 12
+    assert len(Store.open(tmp_path / "runs" / "mine-store").records) == 12
+
+
+PAPER: list[tuple[Recipe, Callable[[int, int], object], float]] = [
+    (describe.PAPER, MotionToLanguageConfig, 8.0),
+    (generate.PAPER, LanguageToMotionConfig, 25.0),
+]
+
+
+@pytest.mark.parametrize(("recipe", "config", "clip"), PAPER)
+def test_the_paper_preset_is_table_1(recipe: Recipe, config: Callable[[int, int], object], clip: float) -> None:
+    assert recipe.config(44, 1344) == config(44, 1344)
+    assert recipe.fitting == Fitting(clip=clip, epochs=100, batch=128, learning_rate=1e-3, offsets=None, decay=0.0)
+    assert not recipe.mirror

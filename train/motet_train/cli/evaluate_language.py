@@ -1,0 +1,69 @@
+"""``motet evaluate`` of models between motion and language."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import click
+from tqdm import tqdm
+
+from motet.describe import DescribeModel
+from motet.generate import GenerateModel
+from motet_train.data.store import Store
+from motet_train.evaluate.language.corpus import Corpus, corpus_of
+from motet_train.evaluate.language.report import describe_report, generate_report
+from motet_train.evaluate.table import Report
+
+Models = Mapping[str, DescribeModel | GenerateModel]
+
+
+def language_reports(models: Models, data: Path | None, plots: Path | None) -> dict[str, Report]:
+    """The report of each model. Generate models are chained with the first describe model that had the same split."""
+    if data is None:
+        raise click.UsageError("models between motion and language need --data: the store that they were trained on")
+    store = Store.open(data)
+    corpora = {name: corpus_of(model.manifest, store) for name, model in models.items()}
+    reports = {}
+    with tqdm(unit=" parts", disable=None, leave=False) as bar:
+        for name, model in models.items():
+            reports[name] = _report(name, models, corpora, bar)
+            if plots is not None:
+                bar.set_description(f"{name}: pictures")
+                _draw(name, model, corpora[name], plots if len(models) == 1 else plots / Path(name).name)
+    return reports
+
+
+def by_subject(models: Models, name: str) -> str | None:
+    """The model that shows how well this one would do with people never seen: the same verb, split by subject."""
+    by = {other: model.manifest["training"]["split"]["by"] for other, model in models.items()}
+    alike = (other for other, model in models.items() if model.manifest["verb"] == models[name].manifest["verb"])
+    return next((other for other in alike if by[other] == "subject" and by[name] != "subject"), None)
+
+
+def _report(name: str, models: Models, corpora: Mapping[str, Corpus], bar: "tqdm[Any]") -> Report:
+    def progress(part: str) -> None:
+        bar.set_description(f"{name}: {part}")
+        bar.update()
+
+    model, corpus = models[name], corpora[name]
+    if isinstance(model, DescribeModel):
+        return describe_report(model, corpus, progress)
+    describe = (
+        other
+        for key, other in models.items()
+        if isinstance(other, DescribeModel) and corpora[key].parts == corpus.parts
+    )
+    partner = next(describe, None)
+    if partner is None:
+        click.echo(f"{name}: tables 3 and 4 need a describe model of the same split too; they are left out", err=True)
+    return generate_report(model, corpus, partner, progress)
+
+
+def _draw(name: str, model: DescribeModel | GenerateModel, corpus: Corpus, folder: Path) -> None:
+    from motet_train.evaluate.language.pictures import draw_describe, draw_generate
+
+    run = Path(name) if (Path(name) / "log.jsonl").is_file() else None
+    if isinstance(model, DescribeModel):
+        draw_describe(model, corpus, run, folder)
+    else:
+        draw_generate(model, corpus, run, folder)

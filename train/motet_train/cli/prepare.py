@@ -1,0 +1,40 @@
+"""``motet prepare``: a corpus into a store that models are trained on."""
+
+from pathlib import Path
+
+import click
+from tqdm import tqdm
+
+from motet.cli.convert import METRES
+from motet_train.data.corpus import read_corpus
+from motet_train.data.records import Skipped
+from motet_train.data.store import Item
+from motet_train.data.store import prepare as prepare_store
+
+
+@click.command()
+@click.argument("data", type=Path)
+@click.option("--out", type=Path, required=True, help="Folder of the store to write; must not exist.")
+@click.option("--sentences", type=Path, help="Table of sentences. [default: the only .tsv in or beside DATA]")
+@click.option("--unit-in", type=click.Choice(list(METRES)), help="Length unit of motion files that do not say it.")
+def prepare(data: Path, out: Path, sentences: Path | None, unit_in: str | None) -> None:
+    """Prepare the corpus DATA once: a folder or zip of motions with sentences becomes a store to train on.
+
+    DATA is the KIT Motion-Language data, or motion files .amc (with .asf) .bvh .npz with a table of tabs between the
+    columns clip and sentence. A motion that cannot be used is named and skipped.
+    """
+    corpus = read_corpus(data, sentences, None if unit_in is None else METRES[unit_in])
+    with tqdm(total=len(corpus), unit="motion", disable=None) as bar:
+
+        def progress(item: Item) -> None:
+            bar.update()
+            if isinstance(item, Skipped):
+                bar.write(f"skipped {item.name}: {item.reason}")
+
+        store = prepare_store(corpus, out, corpus.representation, progress)
+    seconds = sum(stop - start for entry in store.records for start, stop in entry.spans[:1]) / store.fps
+    texts = sum(len(entry.sentences) for entry in store.records)
+    click.echo(
+        f"{out}: {len(store.records)} motions of {seconds:.0f} s with {texts} sentences, "
+        f"{len(store.channels)} channels at {store.fps:g} fps; {len(store.skipped)} skipped"
+    )

@@ -1,0 +1,16 @@
+"""``motet train``: the group of its commands."""
+
+import click
+
+from motet_train.cli.train_control import crbm, tdbn
+from motet_train.cli.train_language import describe, generate
+from motet_train.cli.train_predict import predict
+
+
+@click.group()
+def train() -> None:
+    """Train a model; the run goes into a new folder that evaluate and export take."""
+
+
+for command in (tdbn, crbm, describe, generate, predict):
+    train.add_command(command)

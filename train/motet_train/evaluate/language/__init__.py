@@ -1,0 +1,1 @@
+"""The experiments of Plappert et al. 2017 on describe and generate, and what they leave out."""

@@ -1,0 +1,60 @@
+"""What a model has to beat: answers that are looked up among the training motions."""
+
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.distance import cdist
+from sklearn.feature_extraction.text import TfidfVectorizer
+
+from motet.motion import Motion
+from motet.rotations import Array
+from motet_train.evaluate.language.bleu import References, bleu
+from motet_train.evaluate.language.corpus import Corpus
+
+
+def nearest_motions(corpus: Corpus, motions: Sequence[Motion]) -> list[int]:
+    """For each motion the training record with the most alike pose features: mean and deviation of each channel."""
+    train = corpus.described(corpus.parts.train)
+    known = np.array([_features(corpus, motion) for motion in corpus.motions(train)])
+    asked = np.array([_features(corpus, motion) for motion in motions])
+    return [train[i] for i in cdist(asked, known).argmin(axis=1)]
+
+
+def nearest_bleu(corpus: Corpus, records: Sequence[int]) -> float:
+    """BLEU of saying what was said about the nearest motion: the mean over which of its sentences that is."""
+    nearest = corpus.references(nearest_motions(corpus, corpus.motions(records)))
+    references = corpus.references(records)
+    most = max(map(len, nearest))
+    return float(np.mean([bleu([said[place % len(said)] for said in nearest], references) for place in range(most)]))
+
+
+def frequent_sentence(corpus: Corpus) -> str:
+    """The sentence that was said most often about training motions, the first by name of several."""
+    counts = Counter(sentence for said in corpus.references(corpus.parts.train) for sentence in said)
+    return min(counts, key=lambda sentence: (-counts[sentence], sentence))
+
+
+def frequent_bleu(corpus: Corpus, references: References) -> float:
+    """BLEU of always saying the most frequent training sentence."""
+    return bleu([frequent_sentence(corpus)] * len(references), references)
+
+
+def retrieved(corpus: Corpus, sentences: Sequence[str]) -> list[int]:
+    """For each sentence the training record about which the most alike sentence was said.
+
+    Alike by the cosine of their words, weighted by TF-IDF: what applications ship that take no risk.
+    """
+    known = [(record, said) for record in corpus.parts.train for said in corpus.sentences(record)]
+    vectors = TfidfVectorizer(token_pattern=r"\S+")
+    table = vectors.fit_transform([said for _, said in known])
+    alike: NDArray[np.float64] = (vectors.transform(sentences) @ table.T).toarray()
+    return [known[i][0] for i in alike.argmax(axis=1)]
+
+
+def _features(corpus: Corpus, motion: Motion) -> Array:
+    """(2 D,): mean and standard deviation over time of each channel, in the training motions' units of deviation."""
+    z = corpus.z(motion)
+    features: Array = np.concatenate([z.mean(axis=0), z.std(axis=0)])
+    return features

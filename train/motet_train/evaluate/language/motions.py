@@ -1,0 +1,95 @@
+"""Measures of motions, generated or recorded alike: speed, motion energy, foot skate, stillness at the end."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from motet.contract import MotionContract
+from motet.kinematics import positions, skeleton_of
+from motet.motion import Motion
+from motet.root_block import ROOT_BLOCK, from_root_block
+from motet.rotations import Array
+from motet.skeleton import Skeleton
+
+LOW = 0.05
+"""m: a joint of a foot no higher than this above the ground is on it."""
+
+GROUND = 10
+"""Per cent of the frames in which the lowest joint of the feet is below what is taken for the ground."""
+
+FEET = 0.1
+"""Of the figure's height: joints that lie no higher than this above its lowest one at rest are the feet."""
+
+QUIET = 5
+"""Per cent of the training motions whose last second has less energy than what counts as frozen."""
+
+
+def measures(motions: Sequence[Motion], contract: MotionContract, quiet: float) -> dict[str, float]:
+    """Means over motions of seconds, speed (m/s), energy, energy of the last second, and foot skate (m/s).
+
+    frozen: the share whose last second has less energy than ``quiet``. Energies are those of :func:`energy`.
+    What the channels do not tell, or without a skeleton, is left out.
+    """
+    z = [contract.frames(motion) / contract.std for motion in motions]
+    ends = [last_energy(frames, contract.fps) for frames in z]
+    found = {
+        "seconds": np.mean([motion.duration for motion in motions]),
+        "energy": np.mean([energy(frames, contract.fps) for frames in z]),
+        "end_energy": np.mean(ends),
+        "frozen": np.mean(np.array(ends) < quiet),
+    }
+    if moves(motions[0]):
+        found["speed"] = np.mean([speed(motion) for motion in motions])
+        slides = [slide for slide in map(skate, motions) if np.isfinite(slide)]
+        found["skate"] = np.mean(slides) if slides else np.float64(np.nan)
+    return {key: float(value) for key, value in found.items()}
+
+
+def moves(motion: Motion) -> bool:
+    """Whether a motion says how its figure moves over the ground: it has the root block and a skeleton with a unit."""
+    skeleton = motion.skeleton
+    return set(ROOT_BLOCK) <= set(motion.channels) and skeleton is not None and skeleton.metres_per_unit is not None
+
+
+def energy(z: Array, fps: float) -> float:
+    """Motion energy of frames (T, D) in standard deviations: the mean square of their velocities, 1/s^2."""
+    return float(((np.diff(z, axis=0) * fps) ** 2).mean()) if len(z) > 1 else 0.0
+
+
+def last_energy(z: Array, fps: float) -> float:
+    """:func:`energy` of the last second, or of all where there is less."""
+    return energy(z[-1 - round(fps) :], fps)
+
+
+def quiet_energy(motions: Sequence[Motion], contract: MotionContract) -> float:
+    """The energy of the last second below which QUIET per cent of the motions are."""
+    ends = [last_energy(contract.frames(motion) / contract.std, contract.fps) for motion in motions]
+    return float(np.percentile(ends, QUIET))
+
+
+def speed(motion: Motion) -> float:
+    """Mean speed over the ground, m/s, of a motion with the root block."""
+    velocity = motion.select(ROOT_BLOCK[:2], ("m/s", "m/s")).values
+    return float(np.hypot(*velocity[1:].T).mean()) if len(motion) > 1 else 0.0
+
+
+def skate(motion: Motion) -> float:
+    """How fast feet on the ground slide, m/s: the mean over all steps from one frame to the next.
+
+    A joint of a foot counts that is on the ground (LOW, GROUND) before and after the step; of several the slowest does,
+    since the others roll. NaN where none ever is.
+    """
+    skeleton = skeleton_of(motion)
+    feet = positions(from_root_block(motion))[:, feet_of(skeleton)] * skeleton.unit_factor(1.0)
+    low = feet[..., 1] <= np.percentile(feet[..., 1].min(axis=1), GROUND) + LOW
+    slides = np.linalg.norm(np.diff(feet[..., [0, 2]], axis=0), axis=-1) * motion.fps
+    slides[~(low[1:] & low[:-1])] = np.inf
+    slowest = slides.min(axis=1)
+    standing = np.isfinite(slowest)
+    return float(slowest[standing].mean()) if standing.any() else np.nan
+
+
+def feet_of(skeleton: Skeleton) -> list[int]:
+    """The joints of the feet: those that lie low at rest."""
+    height = skeleton.rest_positions[:, 1]
+    return [int(i) for i in np.flatnonzero(height <= height.min() + FEET * skeleton.height)]

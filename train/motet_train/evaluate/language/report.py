@@ -1,0 +1,178 @@
+"""All figures of a describe or generate model in one nested object with stable keys, and the goals of those we ship."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from motet.describe import DescribeModel
+from motet.errors import TextError
+from motet.generate import GenerateModel
+from motet_train.evaluate.language.attributes import Score, sides_right, turns_right, verbs_right
+from motet_train.evaluate.language.bleu import RANKS, References, agreement, bleu, ranks
+from motet_train.evaluate.language.chain import Answers, answers, bounds_chained, chained, likelihood, told
+from motet_train.evaluate.language.corpus import Corpus, unknown_words_allowed
+from motet_train.evaluate.language.floors import frequent_bleu, nearest_bleu
+from motet_train.evaluate.language.motions import measures, quiet_energy
+from motet_train.evaluate.language.prompts import kinds, prompted, recognised, thresholds
+from motet_train.evaluate.table import Goals, Report
+
+Progress = Callable[[str], object]
+
+GOALS: Goals = {
+    "gain.nearest": (0.10, None),
+    "gain.frequent": (0.10, None),
+    "words.verbs": (0.9, None),
+    "words.sides": (0.8, None),
+    "relative_test.1": (0.65, None),
+    "asked.walks": (0.9, None),
+    "asked.runs": (0.9, None),
+    "asked.left": (0.9, None),
+    "asked.right": (0.9, None),
+    "asked.jumps": (0.9, None),
+    "motion.frozen": (None, 0.1),
+}
+"""Figure -> (least, most) that the default recipes are to reach."""
+
+SAMPLE, CHAIN_SAMPLE = 200, 40
+"""Training motions, always the same, of which training BLEU is taken, and chained training BLEU."""
+
+TRAINING = ("seconds", "epochs", "best_epoch", "train_loss", "validation_loss", "steps_per_second")
+
+
+def describe_report(model: DescribeModel, corpus: Corpus, progress: Progress = lambda group: None) -> Report:
+    """Table 2, with and without SOS and EOS; floors and ceiling; what the best description of test motions says right.
+
+    A figure that does not exist is NaN. ``progress`` is called with the name of each part before it starts.
+    """
+    report = _origin(model.manifest, corpus)
+    test = corpus.described(corpus.parts.test)
+    references = corpus.references(test)
+    found: dict[str, list[list[str]]] = {}
+    for part, records in (("train", corpus.described(corpus.parts.train, SAMPLE)), ("test", test)):
+        progress(f"describe {part}")
+        found[part] = hypotheses(model, corpus, records)
+        said = corpus.references(records)
+        report[f"bleu_{part}"] = ranks(found[part], said)
+        report[f"bleu_{part}_marked"] = ranks(found[part], said, marks=True)
+    progress("floors")
+    report["floor"] = _floors(corpus, test, references)
+    best = report["bleu_test"]["1"]
+    report["gain"] = {key: best - report["floor"][key] for key in ("nearest", "frequent")}
+    report["words"] = _words([row[0] for row in found["test"]], references)
+    progress("likelihood")
+    report["likelihood"] = {"test": _log_probability(model, corpus, test)}
+    return report
+
+
+def generate_report(
+    model: GenerateModel,
+    corpus: Corpus,
+    describe: DescribeModel | None = None,
+    progress: Progress = lambda group: None,
+) -> Report:
+    """Tables 3 and 4 between their bounds; prompts; measures of generated motions beside the data's.
+
+    "motion" is measured on the likeliest motion for each test sentence, "motion_data" on the motions they are about.
+
+    describe: the model that closes the chain, trained on the same part of the corpus; without it the tables are left
+        out. Relative performance is chained BLEU over its first training BLEU, as in the paper (there .387).
+    """
+    report = _origin(model.manifest, corpus)
+    test = corpus.described(corpus.parts.test)
+    progress("generate test")
+    found = answers(model, corpus, test)
+    if describe is not None:
+        report |= _chain(model, describe, corpus, found, progress)
+    progress("prompts")
+    known = kinds(corpus)
+    limits, quiet = thresholds(known), quiet_energy(corpus.motions(corpus.parts.train), corpus.contract)
+    report["threshold"] = {"quiet": quiet}
+    if limits is not None:
+        report["asked"], report["asked_data"] = prompted(model, limits), recognised(known, limits)
+        report["threshold"] |= asdict(limits)
+    progress("motions")
+    report["motion"] = measures(found.best, corpus.contract, quiet)
+    report["motion_data"] = measures(corpus.motions(found.records), corpus.contract, quiet)
+    progress("likelihood")
+    parts = {"train": corpus.described(corpus.parts.train, CHAIN_SAMPLE), "test": test}
+    report["likelihood"] = {part: likelihood(model, corpus, records) for part, records in parts.items()}
+    return report
+
+
+def hypotheses(model: DescribeModel, corpus: Corpus, records: tuple[int, ...]) -> list[list[str]]:
+    """Five ranked descriptions of each record's motion."""
+    return [[found.text for found in row] for row in model.describe(corpus.motions(records), RANKS)]
+
+
+def _origin(manifest: Mapping[str, Any], corpus: Corpus) -> Report:
+    training, parts, store = manifest["training"], corpus.parts, corpus.store
+    people = [{store.records[i].subject for i in part} for part in (parts.train, parts.test)]
+    return {
+        "train": {key: float(training[key]) for key in TRAINING if key in training},
+        "data": {
+            "train": float(len(parts.train)),
+            "validation": float(len(parts.validation)),
+            "test": float(len(parts.test)),
+            "test_unknown_words": float(len(corpus.unknown_words(parts.test))),
+            "test_people": float(len(people[1])),
+            "test_people_unseen": float(len(people[1] - people[0])),
+        },
+    }
+
+
+def _floors(corpus: Corpus, test: tuple[int, ...], references: References) -> dict[str, float]:
+    return {
+        "nearest": nearest_bleu(corpus, test),
+        "frequent": frequent_bleu(corpus, references),
+        "human": agreement(references),
+    }
+
+
+def _words(texts: list[str], references: References) -> dict[str, float]:
+    """Shares that are right, and of how many."""
+    scores: dict[str, Score] = {
+        "verbs": verbs_right(texts, references),
+        "sides": sides_right(texts, references),
+        "turns": turns_right(texts, references),
+    }
+    shares = {key: right / count if count else np.nan for key, (right, count) in scores.items()}
+    return shares | {f"{key}_of": float(count) for key, (_, count) in scores.items()}
+
+
+def _log_probability(model: DescribeModel, corpus: Corpus, records: tuple[int, ...]) -> float:
+    """Log-probability of a word of the records' sentences given their motions, EOS included."""
+    total, count = 0.0, 0
+    with unknown_words_allowed():
+        for record in records:
+            motion = corpus.motion(record)
+            for sentence in corpus.sentences(record):
+                try:
+                    total += model.score(motion, sentence)
+                except TextError:  # of unknown words only
+                    continue
+                count += len(sentence.split()) + 1
+    return total / count if count else np.nan
+
+
+def _chain(model: GenerateModel, describe: DescribeModel, corpus: Corpus, found: Answers, progress: Progress) -> Report:
+    progress("describe train")
+    train = corpus.described(corpus.parts.train, SAMPLE)
+    base = bleu(told(describe, corpus.motions(train)), corpus.references(train))
+    progress("chain train")
+    some = answers(model, corpus, corpus.described(corpus.parts.train, CHAIN_SAMPLE))
+    rows = {"train": chained(describe, some, corpus)}
+    progress("chain test")
+    rows["test"] = chained(describe, found, corpus)
+    bounds = bounds_chained(describe, found, corpus)
+    report = {f"chain_{part}": row for part, row in rows.items()}
+    for part, row in rows.items():
+        report[f"relative_{part}"] = {rank: _ratio(value, base) for rank, value in row.items()}
+    relative = {f"{key}_relative": _ratio(value, base) for key, value in bounds.items()}
+    report["bound"] = {"describe_train": base, **bounds, **relative}
+    return report
+
+
+def _ratio(value: float, base: float) -> float:
+    return value / base if base else np.nan

@@ -1,0 +1,32 @@
+"""A padded batch of motions with their sentences: what both directions between motion and language train on."""
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """B motions of up to T frames, each with one sentence of up to W words, padded on the right.
+
+    frames: (B, T, D) float32 in the contract's units; finite, of any value, behind the motion's end.
+    lengths: (B,) int64, frames of each motion, at least 1.
+    words: (B, W) int64, ids without SOS and EOS; PAD = 0 behind the sentence's end.
+    ended: (B,) bool, whether the motion ends after its last frame and is no part of a longer one; None where all do.
+    """
+
+    frames: Tensor
+    lengths: Tensor
+    words: Tensor
+    ended: Tensor | None = None
+
+    def to(self, device: torch.device | str) -> "Batch":
+        """The same batch on a device."""
+        ended = None if self.ended is None else self.ended.to(device)
+        return Batch(self.frames.to(device), self.lengths.to(device), self.words.to(device), ended)
+
+
+def before(lengths: Tensor, steps: int) -> Tensor:
+    """Which of the first ``steps`` steps lie before the end of each row: lengths (B,) to bool (B, steps)."""
+    return torch.arange(steps, device=lengths.device) < lengths[:, None]
