@@ -14,7 +14,7 @@ PAPER = Recipe("describe", "motion-to-language", MotionToLanguageConfig, Fitting
 
 DEFAULT = replace(
     PAPER,
-    config=partial(MotionToLanguageConfig, dropout=0.2, frame_noise=0.5),
+    config=partial(MotionToLanguageConfig, dropout=0.2, frame_noise=0.3, summary=5.0),
     fitting=Fitting(clip=8.0, epochs=40, batch=32, learning_rate=2e-3, decay=0.5, keep="last"),
     mirror=True,
 )

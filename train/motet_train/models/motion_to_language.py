@@ -16,6 +16,7 @@ from motet_train.models.batch import Batch, before
 from motet_train.models.dropout import WordEmbedding
 from motet_train.models.gru import GRU
 from motet_train.models.sequence import Decoder, Encoder
+from motet_train.models.summary import SummaryHead
 
 PAD, SOS, EOS = 0, 1, 2
 """Ids of the special words."""
@@ -34,6 +35,8 @@ class MotionToLanguageConfig:
     gates: str = "sigmoid"
     frame_noise: float = 0.0
     """Standard deviation of what training adds to the frames, in normalised units."""
+    summary: float = 0.0
+    """Weight of the training-only loss of :mod:`motet_train.models.summary`; 0 leaves its head out."""
 
     @staticmethod
     def paper() -> "MotionToLanguageConfig":
@@ -59,6 +62,7 @@ class MotionToLanguage(nn.Module):
         self.output = nn.Linear(sum(config.decoder_units), config.words)
         nn.init.xavier_uniform_(self.output.weight)
         nn.init.zeros_(self.output.bias)
+        self.summary = SummaryHead(context, config.channels) if config.summary else None
 
     def encode(self, frames: Tensor, lengths: Tensor) -> Tensor:
         """Frames (B, T, D) in the contract's units, of lengths (B,), to contexts (B, C)."""
@@ -84,9 +88,14 @@ class MotionToLanguage(nn.Module):
         words = functional.pad(batch.words, (1, 0), value=SOS)
         targets = functional.pad(batch.words, (0, 1), value=PAD).scatter(1, lengths[:, None], EOS)
         active = before(lengths + 1, words.shape[1])
-        outputs = self.outputs(words, self.encode(batch.frames, batch.lengths))
+        context = self.encode(batch.frames, batch.lengths)
+        outputs = self.outputs(words, context)
         # padded steps are left out before the output layer, which is the largest product of all
-        return functional.nll_loss(self.log_probabilities(outputs[active]), targets[active], reduction="none")
+        losses = functional.nll_loss(self.log_probabilities(outputs[active]), targets[active], reduction="none")
+        if self.summary is None or not self.training:
+            return losses
+        normal = (batch.frames - self.mean) / self.scale
+        return losses + self.config.summary * self.summary.loss(context, normal, batch.lengths)
 
     def loss(self, batch: Batch) -> Tensor:
         """The mean over words of :meth:`losses` (eq. 7)."""
