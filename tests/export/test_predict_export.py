@@ -1,0 +1,59 @@
+"""A predictor as an ONNX bundle: what torch computes, for one figure and for many."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from motet.models import load
+from motet.predict import PredictModel
+from motet_export.bundles import export_run
+from motet_train.models.predictor import Predictor, PredictorConfig
+from motet_train.runs import Run
+
+CHANNELS = 9
+
+
+@pytest.fixture(scope="module")
+def run() -> Run:
+    torch.manual_seed(0)
+    config = PredictorConfig(
+        CHANNELS,
+        tuple(range(8)),
+        0,
+        (3, 4, 5, 0, 1, 2, 6, 7, 8),
+        (1.0, -1.0, -1.0) * 3,
+        frames=6,
+        polynomials=4,
+        hidden=12,
+    )
+    net = Predictor(config)
+    with torch.no_grad():
+        for parameter in net.parameters():
+            parameter.add_(0.1 * torch.randn_like(parameter))
+    motion = {
+        "channels": [f"joint{n}.e{axis}" for n in range(3) for axis in "xyz"],
+        "units": ["rad"] * CHANNELS,
+        "fps": 60.0,
+        "mean": [0.1] * CHANNELS,
+        "std": [0.5] * CHANNELS,
+        "skeleton": None,
+    }
+    manifest = {"name": "x", "verb": "predict", "model": "trajectory", "motion": motion, "defaults": {"horizon": 6}}
+    return Run({**manifest, "config": vars(config), "licence": {}}, net)
+
+
+def test_the_bundle_predicts_what_torch_predicts(run: Run, tmp_path: Path) -> None:
+    report = export_run(run, tmp_path / "x.zip")
+    assert set(report["runs"]) >= {"horizon", "beyond"}
+    assert max(rung["error"] for rung in report.values() if "bound" in rung) <= 1e-5
+    bundle, torch_model = load(tmp_path / "x.zip"), PredictModel(run.manifest, run.torch_graphs())
+    assert isinstance(bundle, PredictModel)
+    seeds = np.random.default_rng(0).normal(size=(7, 10, CHANNELS))
+    np.testing.assert_allclose(bundle.next_frames(seeds, 15), torch_model.next_frames(seeds, 15), rtol=1e-4, atol=1e-4)
+    np.testing.assert_array_equal(bundle.next_frames(seeds[:1], 15)[0], bundle.next_frames(seeds, 15)[0])
+    motion = bundle.contract.motion(seeds[0])
+    found = bundle.predict(motion, append=True)
+    assert (len(found), found.channels) == (16, motion.channels)
+    np.testing.assert_allclose(found.values[10:], bundle.next_frames(seeds[:1])[0], atol=1e-6)

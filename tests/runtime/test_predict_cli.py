@@ -1,0 +1,109 @@
+"""``motet predict`` with the shipped bundle, as a user meets it."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from figures import walker
+
+from motet.cli import main
+from motet.formats import read_motion, write_motion
+from motet.kinematics import positions
+from motet.models import load
+from motet.predict import ending
+
+WALK = "39_14.amc"
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+def test_a_walk_goes_on(clips: Path) -> None:
+    """Trial 39_14 is none of those that the bundle was trained on."""
+    walk = ending(read_motion(clips / WALK), 30.0)
+    model = load("cmu-predict")
+    truth = positions(walk)[60:85]
+    assert walk.skeleton is not None
+    metres = walk.skeleton.unit_factor(1.0)
+    off = np.linalg.norm(positions(model.predict(walk[:60])) - truth, axis=-1).mean(axis=1) * metres
+    still = np.linalg.norm(positions(walk)[59] - truth, axis=-1).mean(axis=1) * metres
+    assert off[0] < 0.02
+    assert off[-1] < 0.25 < still[-1]
+
+
+@pytest.mark.parametrize("extension", ["amc", "bvh", "npz", "csv", "html", "gif", "glb"])
+def test_predict_writes_every_format(tmp_path: Path, clips: Path, extension: str) -> None:
+    out = tmp_path / f"out.{extension}"
+    result = run("predict", clips / WALK, "-o", out, "--frames", 5)
+    assert (result.exit_code, result.stdout) == (0, f"{out}: 5 frames at 30 fps, 0.166667 s\n")
+    assert "resampled from 120 to 30 fps" in result.stderr
+    assert out.stat().st_size > 500
+
+
+def test_a_bvh_is_carried_on_as_the_amc_it_was_made_from(tmp_path: Path, clips: Path) -> None:
+    assert run("convert", clips / WALK, tmp_path / "a.bvh", "--unit", "m").exit_code == 0
+    assert run("predict", tmp_path / "a.bvh", "--unit-in", "m", "-o", tmp_path / "b.bvh").exit_code == 0
+    assert run("predict", clips / WALK, "-o", tmp_path / "c.npz").exit_code == 0
+    one, other = read_motion(tmp_path / "b.bvh"), read_motion(tmp_path / "c.npz")
+    assert one.channels == read_motion(tmp_path / "a.bvh").channels
+    assert (one.fps, len(one)) == (pytest.approx(30.0), 25)
+    assert other.skeleton is not None
+    places = [positions(one), positions(other) * other.skeleton.unit_factor(1.0)]
+    # an AMC file has no channel for some turns that the model predicts, by a degree or so
+    np.testing.assert_allclose(places[0][0], places[1][0], atol=0.03)
+
+
+def test_append_writes_the_motion_before_what_follows(tmp_path: Path, clips: Path) -> None:
+    out = tmp_path / "out.npz"
+    assert run("predict", clips / WALK, "-o", out, "--frames", 40, "--append").exit_code == 0
+    motion, walk = read_motion(out), ending(read_motion(clips / WALK), 30.0)
+    assert len(motion) == len(walk) + 40
+    np.testing.assert_allclose(positions(motion)[: len(walk)], positions(walk), atol=1e-5)
+    steps = np.linalg.norm(np.diff(positions(motion)[:, 0], axis=0), axis=1)
+    assert np.abs(np.diff(steps))[len(walk) - 3 : len(walk) + 3].max() < 0.3 * steps.mean()  # no jolt at the seam
+
+
+def test_bench_says_how_long_a_frame_takes() -> None:
+    rows = json.loads(run("bench", "--bundle", "cmu-predict", "--seconds", 0.01, "--json").stdout)
+    assert [row["name"] for row in rows] == ["predict.first_frame", "predict.frame", "predict.horizons"]
+    assert all(row["value"] > 0 for row in rows)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["{clips}/39_14.amc", "-o", "{out}/a.xyz"], "known are .amc"),
+        (["{clips}/39_14.amc", "-o", "{out}/no/a.bvh"], "does not exist"),
+        (["{clips}/none.amc", "-o", "{out}/a.bvh"], "no such file"),
+        (["{clips}/39_14.amc", "-o", "{out}/a.bvh", "--bundle", "cmu"], "unknown bundle 'cmu'"),
+        (["{clips}/39_14.amc", "-o", "{out}/a.bvh", "--bundle", "cmu-control"], "is for 'control'"),
+        (["{clips}/39_14.amc", "-o", "{out}/a.bvh", "--frames", "0"], "x>=1"),
+        (["{bad}/walker.npz", "-o", "{out}/a.bvh"], "joints that this motion lacks: lhipjoint"),
+        (["{bad}/short.npz", "-o", "{out}/a.bvh"], "needs 10 frames at 30 fps, and the motion has 9 (36 at 120 fps)"),
+        (["{bad}/unit.bvh", "-o", "{out}/a.bvh"], "--unit-in"),
+        (["{bad}/still.npz", "-o", "{out}/a.bvh"], "lacks root.tx"),
+        (["{bad}/nan.bvh", "-o", "{out}/a.bvh"], "nan.bvh, line "),
+    ],
+)
+def test_bad_input_gets_one_message_and_writes_nothing(
+    arguments: list[str], said: str, tmp_path: Path, clips: Path
+) -> None:
+    out, bad = tmp_path / "out", tmp_path / "bad"
+    out.mkdir()
+    bad.mkdir()
+    walk = read_motion(clips / WALK)
+    write_motion(bad / "walker.npz", walker())
+    write_motion(bad / "short.npz", walk[:36])
+    write_motion(bad / "unit.bvh", walk)
+    write_motion(bad / "still.npz", walk.select(walk.channels[3:]))
+    text = (bad / "unit.bvh").read_text().splitlines()
+    (bad / "nan.bvh").write_text("\n".join([*text[:-1], text[-1].replace(text[-1].split()[7], "nan", 1)]))
+    result = run("predict", *(argument.format(out=out, clips=clips, bad=bad) for argument in arguments))
+    assert result.exit_code == 2
+    assert said in result.stderr
+    assert "Traceback" not in result.stderr
+    assert result.stdout == ""
+    assert list(out.iterdir()) == []

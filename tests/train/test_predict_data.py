@@ -1,0 +1,221 @@
+"""Text files of exponential maps, the protocol that is measured on them, and windows of training data."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from motet.errors import FormatError
+from motet.formats import read_motion
+from motet.mirror import mirror
+from motet.rotations import rotmat_to_euler, rotmat_to_rotvec, rotvec_to_rotmat
+from motet_train.data.clips import CMU as CLIPS
+from motet_train.data.errors import DataError
+from motet_train.data.expmap_files import CMU, H36M, Scaling, is_expmap, parse, read_expmap, scaling_of
+from motet_train.data.predict_data import (
+    Trial,
+    _mirrored_joints,
+    expmap_material,
+    mocap_material,
+    phases,
+    read_trials,
+)
+from motet_train.data.predict_data import test_names as names_held_out
+from motet_train.evaluate.predict.protocol import (
+    REPORTED,
+    euler_frames,
+    evaluate,
+    rotmat_to_protocol_euler,
+    true_times,
+    window_errors,
+    window_starts,
+    windows,
+    zero_velocity,
+)
+from motet_train.predict import Recipe, Windows
+
+
+def write_files(folder: Path, frames: int = 200, actions: tuple[str, ...] = ("walking", "running")) -> Path:
+    """A corpus of two training files and a test file for each action; three joints do not move."""
+    rng = np.random.default_rng(0)
+    for action in actions:
+        for name in (f"train/{action}/{action}_1", f"train/{action}/{action}_2", f"test/{action}/{action}_1"):
+            phase = rng.uniform(0, 6, 117)
+            values = 0.3 * np.sin(np.arange(frames)[:, None] * np.linspace(0.02, 0.05, 117) + phase)
+            values[:, -9:] = 0.25
+            path = folder / f"{name}.txt"
+            path.parent.mkdir(parents=True, exist_ok=True)
+            np.savetxt(path, values, delimiter=",", fmt="%.7f")
+    return folder
+
+
+def test_rotations_are_scipys() -> None:
+    vectors = np.random.default_rng(0).normal(size=(500, 3))
+    vectors[0] = 0
+    matrices = rotvec_to_rotmat(vectors)
+    np.testing.assert_allclose(matrices, Rotation.from_rotvec(vectors).as_matrix(), atol=1e-12)
+    expected = Rotation.from_matrix(matrices).as_rotvec()
+    np.testing.assert_allclose(rotmat_to_rotvec(matrices), expected, atol=1e-9)
+    # the protocol's formula: the angles of Rz Ry Rx = the transposed matrix, the one about x first
+    angles = rotmat_to_protocol_euler(matrices)
+    np.testing.assert_allclose(angles, Rotation.from_matrix(matrices).inv().as_euler("xyz"), atol=1e-9)
+    np.testing.assert_allclose(angles, -rotmat_to_euler(matrices, "xyz"), atol=1e-9)
+
+
+@pytest.mark.parametrize(("sign", "first"), [(1.0, 0.0), (-1.0, np.pi)])
+def test_gimbal_lock_is_as_in_the_code_of_the_papers(sign: float, first: float) -> None:
+    matrix = np.array([[0.0, 0.0, sign], [0.6, 0.8, 0.0], [-sign * 0.8, sign * 0.6, 0.0]])
+    np.testing.assert_allclose(rotmat_to_protocol_euler(matrix), [first, -sign * np.pi / 2, 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("length", "starts"),
+    [
+        (180, [2, 102, 47, 12, 51, 33, 43, 60]),
+        (82, [2, 6, 4, 3, 1, 3, 1, 4]),
+        (299, [130, 102, 47, 140, 51, 33, 171, 105]),
+        (1043, [386, 358, 47, 140, 819, 289, 939, 105]),
+        (1377, [1071, 1164, 939, 1129, 316, 644, 288, 185]),
+    ],
+)
+def test_windows_begin_where_the_protocol_says(length: int, starts: list[int]) -> None:
+    assert window_starts(length).tolist() == starts
+
+
+def test_times_are_those_of_the_files() -> None:
+    assert [round(time) for time in true_times(CMU.fps)] == [33, 67, 133, 167, 233, 417]
+    assert true_times(H36M.fps)[-1] == 1000.0
+
+
+def test_the_error_is_the_literal_one() -> None:
+    rng = np.random.default_rng(1)
+    truth, predicted = rng.normal(size=(2, 75, 12)), rng.normal(size=(2, 25, 12))
+    truth[:, :, 9:] = truth[:, :1, 9:]  # a joint that does not move is not counted
+    found = window_errors(predicted, truth)
+    for window in range(2):
+        for frame in range(25):
+            total = 0.0
+            for joint in range(1, 3):
+                vectors = [predicted[window, frame], truth[window, 50 + frame]]
+                one, other = (
+                    Rotation.from_rotvec(v[3 + 3 * joint : 6 + 3 * joint]).inv().as_euler("xyz") for v in vectors
+                )
+                total += float(((one - other) ** 2).sum()) if joint < 2 else 0.0
+            assert found[window, frame] == pytest.approx(np.sqrt(total))
+    assert not euler_frames(truth)[..., :6].any()
+
+
+def test_a_perfect_prediction_has_no_error_and_zero_velocity_grows() -> None:
+    motion = 0.2 * np.sin(np.arange(400)[:, None] * np.linspace(0.01, 0.03, 117))
+    scaling = Scaling(motion.mean(0), motion.std(0), tuple(range(117)))
+    truth = iter([windows(motion)])
+    perfect = evaluate(lambda seed: next(truth)[:, 50:], {"x": [motion]}, scaling)["x"]
+    assert perfect.max() == pytest.approx(0, abs=1e-12)
+    still = evaluate(zero_velocity, {"x": [motion]}, scaling)["x"]
+    assert (np.diff(still[:10]) > 0).all()
+
+
+def test_files_are_read_and_missing_ones_named(tmp_path: Path) -> None:
+    corpus = read_expmap(write_files(tmp_path / "corpus"))
+    assert corpus.layout is CMU
+    assert (list(corpus.train), list(corpus.test)) == (["running", "walking"], ["running", "walking"])
+    assert len(corpus.missing) == 48 - 6
+    assert "train/walking/walking_3.txt" in corpus.missing
+    scaling = scaling_of(corpus.train)
+    assert scaling.kept == tuple(range(108))
+    frames = np.concatenate([frames for files in corpus.train.values() for frames in files.values()])
+    np.testing.assert_allclose(scaling.mean, frames.mean(axis=0))
+    np.testing.assert_array_equal(scaling.with_constants(np.zeros((2, 117)))[:, -9:], np.full((2, 9), scaling.mean[-1]))
+    np.testing.assert_allclose(scaling.mean[-9:], 0.25)
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [("1,2,3", "3 numbers instead of 117"), (",".join("x" * 117), "could not convert"), ("nan," * 116 + "1", "finite")],
+)
+def test_a_bad_line_is_named(tmp_path: Path, line: str, said: str) -> None:
+    path = write_files(tmp_path) / "train" / "walking" / "walking_2.txt"
+    lines = path.read_text().splitlines()
+    lines[6] = line
+    path.write_text("\n".join(lines))
+    with pytest.raises(FormatError, match=rf"walking_2.txt, line 7: .*{said}"):
+        read_expmap(tmp_path)
+
+
+def test_what_is_no_corpus_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="no exponential-map files"):
+        read_expmap(tmp_path)
+    assert not is_expmap(tmp_path)
+    with pytest.raises(FormatError, match="no frames"):
+        parse("\n", "a.txt", 117)
+    with pytest.raises(DataError, match="no training files"):
+        scaling_of({})
+    with pytest.raises(DataError, match="of 60 frames is too short"):
+        window_starts(60)
+
+
+def test_windows_keep_to_the_motions_and_the_recipe(tmp_path: Path) -> None:
+    material = expmap_material(read_expmap(write_files(tmp_path)))
+    assert (material.stride, material.held, material.contract.fps) == (2, 6, 60.0)
+    plain = Windows(material, Recipe(warp=0, reverse=0, mirror=0), 35, seed=0).draw(20).numpy()
+    cuts = [s[start : start + 69 : 2] for s in material.sequences for start in range(len(s) - 69)]
+    assert all(min(np.abs(window - cut).max() for cut in cuts) == 0 for window in plain)
+    one, other = (Windows(material, Recipe(), 35, seed=3).draw(20).numpy() for _ in range(2))
+    np.testing.assert_array_equal(one, other)
+    assert np.isfinite(one).all()
+    with pytest.raises(DataError, match="shorter than a window"):
+        Windows(material, Recipe(), 200, seed=0)
+
+
+def test_the_mirror_of_the_text_files_is_its_own_inverse(tmp_path: Path) -> None:
+    material = expmap_material(read_expmap(write_files(tmp_path)))
+    columns, signs = np.array(material.mirrored), np.array(material.signs)
+    frame = np.arange(117.0)
+    np.testing.assert_array_equal((frame[columns] * signs)[columns] * signs, frame)
+
+
+def test_motion_files_become_sequences_at_30_fps() -> None:
+    walk = read_motion(CLIPS / "39_14.amc")[:120]
+    trials = [Trial(f"{n:02}_01", f"{n:02}", walk) for n in range(12)]
+    material = mocap_material(trials, [], "x", "free")
+    assert (material.contract.fps, len(names_held_out(trials))) == (30.0, 1)
+    assert material.about["files"] == 11
+    assert sum(map(len, material.sequences)) == 11 * len(walk)
+    assert set(material.about["test"]) == set(names_held_out(trials))
+    columns, signs = _mirrored_joints(walk.skeleton, material.contract.channels)  # type: ignore[arg-type]
+    one, other = (
+        mocap_material([Trial(str(n), str(n), m) for n in range(12)], [], "x", "free").sequences[0]
+        for m in (walk, mirror(walk))
+    )
+    np.testing.assert_allclose(one[:, list(columns)] * np.array(signs), other, atol=1e-4)
+    assert [len(phase) for phase in phases(walk)] == [30, 30, 30, 30]
+
+
+def test_motion_files_that_cannot_be_used_are_named(tmp_path: Path) -> None:
+    for source in CLIPS.glob("39_14.*"):
+        (tmp_path / source.name).write_bytes(source.read_bytes())
+    (tmp_path / "01_01.amc").write_text("nonsense")
+    trials, skipped = read_trials(tmp_path)
+    assert [trial.name for trial in trials] == ["39_14"]
+    assert [item.name for item in skipped] == ["01_01"]
+    with pytest.raises(DataError, match="no motion files"):
+        read_trials(write_files(tmp_path / "text"))
+
+
+def test_zero_velocity_is_the_published_one(shared: Path) -> None:
+    """Reference figures of zero velocity on the protocol's eight windows."""
+    corpus = read_expmap(shared / "cmu-expmap.zip")
+    assert len(corpus.missing) == 10
+    scaling = scaling_of(corpus.train)
+    assert len(scaling.kept) == 70
+    found = evaluate(zero_velocity, {action: list(files.values()) for action, files in corpus.test.items()}, scaling)
+    expected = {
+        "basketball": [0.49, 0.82, 1.40, 1.64, 2.05, 2.83],
+        "jumping": [0.36, 0.62, 1.48, 1.68, 1.99, 2.03],
+        "running": [0.56, 0.99, 1.38, 1.46, 1.57, 1.54],
+        "soccer": [0.27, 0.48, 0.92, 1.10, 1.36, 1.84],
+        "walking": [0.41, 0.60, 0.83, 0.95, 1.09, 1.34],
+        "washwindow": [0.34, 0.57, 0.90, 1.09, 1.30, 1.47],
+    }
+    assert {a: [round(float(error[frame]), 2) for frame in REPORTED] for a, error in found.items()} == expected

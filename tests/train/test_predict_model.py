@@ -1,0 +1,164 @@
+"""The small predictor: what it is before and after training, and the commands around it."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from click.testing import CliRunner, Result
+from test_predict_data import write_files
+
+from motet.cli import main
+from motet.formats import read_motion, write_motion
+from motet.predict import PredictModel
+from motet_train.data.clips import CMU as CLIPS
+from motet_train.data.expmap_files import CMU_ACTIONS, read_expmap
+from motet_train.data.predict_data import expmap_material
+from motet_train.evaluate.predict.published import CMU_FIVE
+from motet_train.evaluate.predict.report import MEAN, ZERO, complete, curves
+from motet_train.models.predictor import Predictor, PredictorConfig
+from motet_train.predict import About, Recipe, train_predict
+from motet_train.runs import Run
+
+ABOUT = About("small", "motet train predict", "MIT")
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+def stirred(config: PredictorConfig) -> Predictor:
+    """A net whose weights are not those it starts with."""
+    torch.manual_seed(0)
+    net = Predictor(config)
+    with torch.no_grad():
+        for parameter in net.parameters():
+            parameter.add_(0.05 * torch.randn_like(parameter))
+    return net.eval()
+
+
+def test_the_shipped_size_is_small() -> None:
+    net = Predictor(PredictorConfig(117, tuple(range(70)), held=6))
+    assert sum(parameter.numel() for parameter in net.parameters()) == 318_405
+
+
+def test_before_training_it_predicts_zero_velocity() -> None:
+    frames = torch.randn(3, 10, 9)
+    net = Predictor(PredictorConfig(9, (0, 1, 2, 5, 6, 7, 8))).eval()
+    torch.testing.assert_close(net(frames), frames[:, -1:].expand(-1, 25, -1))
+
+
+def test_held_and_constant_channels_stay_and_the_place_does_not_matter() -> None:
+    net, frames = stirred(PredictorConfig(9, (0, 1, 2, 5, 6, 7), held=3)), torch.randn(4, 10, 9)
+    found = net(frames)
+    torch.testing.assert_close(found[..., [0, 1, 2, 3, 4, 8]], frames[:, -1:, [0, 1, 2, 3, 4, 8]].expand(-1, 25, -1))
+    assert (found[..., 5:8] - frames[:, -1:, 5:8]).abs().min() > 0
+    moved = frames + torch.tensor([7.0, -3, 2, 0, 0, 0, 0, 0, 0])
+    torch.testing.assert_close(net(moved)[..., 5:8], found[..., 5:8], atol=1e-4, rtol=1e-4)
+
+
+def test_the_mirror_image_of_a_seed_gives_the_mirror_image() -> None:
+    net = stirred(PredictorConfig(6, tuple(range(6)), mirrored=(3, 4, 5, 0, 1, 2), signs=(1.0, -1.0, -1.0) * 2))
+    frames = torch.randn(4, 10, 6)
+    torch.testing.assert_close(net(net.mirror(frames)), net.mirror(net(frames)))
+
+
+def test_training_learns_and_repeats_itself(tmp_path: Path) -> None:
+    material = expmap_material(read_expmap(write_files(tmp_path / "data")))
+    runs = []
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        runs.append(
+            train_predict(
+                material,
+                Recipe(steps=60, batch=16, learning_rate=1e-2, warm_up=5, average=0.9),
+                3,
+                ABOUT,
+                tmp_path / name,
+            )
+        )
+    for one, other in zip(runs[0].model.parameters(), runs[1].model.parameters(), strict=True):
+        torch.testing.assert_close(one, other, atol=0, rtol=0)
+    loaded = Run.load(tmp_path / "a")
+    models = {"a": PredictModel(loaded.manifest, loaded.torch_graphs())}
+    corpus = read_expmap(tmp_path / "data")
+    errors = curves(models, corpus)[8]
+    assert complete(corpus) == ["running", "walking"]  # none is, so all count
+    for action in ("walking", "running"):
+        assert errors["a"][action].mean() < 0.9 * errors[ZERO][action].mean()
+    lines = [json.loads(line) for line in (tmp_path / "a" / "log.jsonl").read_text().splitlines()]
+    assert [line["step"] for line in lines] == [60]
+
+
+def test_train_and_evaluate_from_the_command_line(tmp_path: Path) -> None:
+    data, out = write_files(tmp_path / "data"), tmp_path / "run"
+    trained = run("train", "predict", "--data", data, "--out", out, "--steps", 3, "--seed", 1)
+    assert trained.exit_code == 0, trained.output
+    assert "lacks 42 files: train/basketball/basketball_1.txt" in trained.stderr
+    shown = run("evaluate", out, "--data", data, "--plots", tmp_path / "plots")
+    assert shown.exit_code == 0, shown.output
+    assert "     33     67    133    167    233    417" in shown.stdout
+    assert "     80    160    320    400    560   1000" in shown.stdout
+    assert next(iter(CMU_FIVE)) in shown.stdout
+    assert (tmp_path / "plots" / "predict-error.png").stat().st_size > 1000
+    found = json.loads(run("evaluate", out, "--data", data, "--json", "--save").stdout)
+    assert set(found) == {"windows_8", "windows_256", "zero_velocity"}
+    assert list(found["windows_8"]["walking"]) == [f"frame_{n}" for n in (1, 3, 7, 9, 13, 24)]
+    assert Run.load(out).manifest["quality"] == found
+
+
+def test_motion_files_are_trained_on_and_measured_in_centimetres(tmp_path: Path) -> None:
+    data, out = tmp_path / "data", tmp_path / "run"
+    data.mkdir()
+    for subject in range(10):
+        write_motion(data / f"{subject:02}_01.npz", read_motion(CLIPS / "39_14.amc")[10 * subject : 10 * subject + 160])
+    trained = run("train", "predict", "--data", data, "--out", out, "--steps", 3, "--data-licence", "free")
+    assert trained.exit_code == 0, trained.output
+    manifest = Run.load(out).manifest
+    assert (manifest["licence"]["data"], len(manifest["training"]["data"]["test"])) == ("free", 1)
+    assert (manifest["training"]["recipe"]["warp"], manifest["training"]["recipe"]["mirror"]) == (0.0, 0.5)
+    found = json.loads(run("evaluate", out, "--data", data, "--json", "--plots", tmp_path / "plots").stdout)
+    still = found["zero_velocity"]["place_cm"]
+    assert 60 < still["frame_24"] < 130  # a walk at 1.4 m/s, after .83 s
+    assert still["frame_1"] < still["frame_24"]
+    assert found["zero_velocity"]["pose_cm"]["frame_24"] < still["frame_24"]
+    names = sorted(path.name for path in (tmp_path / "plots").iterdir())
+    assert names == sorted(["predict-distance.png", f"predict-{manifest['training']['data']['test'][0]}.png"])
+    shown = run("evaluate", out, "--data", data).stdout
+    assert "     67    133    267    333    467    833" in shown
+
+
+def test_the_mean_is_that_of_complete_actions(tmp_path: Path) -> None:
+    data = write_files(tmp_path, 160, CMU_ACTIONS[:2])
+    for action in CMU_ACTIONS[:2]:
+        for n in (3, 4, 5):
+            source = data / "train" / action / f"{action}_1.txt"
+            (source.parent / f"{action}_{n}.txt").write_bytes(source.read_bytes())
+    (data / "train" / CMU_ACTIONS[1] / f"{CMU_ACTIONS[1]}_4.txt").unlink()
+    corpus = read_expmap(data)
+    assert complete(corpus) == ["basketball"]
+    errors = curves({}, corpus)[8][ZERO]
+    np.testing.assert_array_equal(errors[MEAN], errors["basketball"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["train", "predict", "--data", "{data}", "--out", "{data}"], "it exists"),
+        (["train", "predict", "--data", "{data}/none", "--out", "{out}"], "no such corpus"),
+        (["train", "predict", "--data", "{empty}", "--out", "{out}"], "no motion files"),
+        (["evaluate", "{run}"], "need --data"),
+        (["evaluate", "{run}", "cmu-control", "--data", "{data}"], "apart"),
+        (["evaluate", "{run}", "--data", "{empty}"], "no motion files"),
+    ],
+)
+def test_bad_input_is_refused(tmp_path: Path, arguments: list[str], said: str) -> None:
+    places = {name: tmp_path / name for name in ("data", "empty", "run", "out")}
+    places["empty"].mkdir()
+    write_files(places["data"])
+    places["run"].mkdir()
+    train_predict(expmap_material(read_expmap(places["data"])), Recipe(steps=1), 0, ABOUT, places["run"])
+    result = run(*(argument.format(**places) for argument in arguments))
+    assert (result.exit_code, said in result.stderr) == (2, True), result.output
+    assert not places["out"].exists()

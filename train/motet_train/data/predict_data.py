@@ -1,0 +1,219 @@
+"""What a predictor is trained on: the exponential-map text files of the protocol, or ordinary motion files."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motet.contract import MotionContract
+from motet.errors import MotionError
+from motet.formats import read_motion
+from motet.joint_vectors import joints_of, to_joint_vectors
+from motet.kinematics import skeleton_of
+from motet.mirror import lateral_axis
+from motet.motion import Motion
+from motet.root_block import ROOT_BLOCK
+from motet.rotations import Array
+from motet.sides import partners_of
+from motet.skeleton import Skeleton
+from motet_train.data.archive import BROKEN, Archive
+from motet_train.data.clips import CMU_LICENCE
+from motet_train.data.corpus import MOCAP
+from motet_train.data.errors import DataError
+from motet_train.data.expmap_files import ROOT, ExpmapCorpus, Layout, scaling_of
+from motet_train.data.records import Skipped
+from motet_train.data.split import split
+from motet_train.data.store import Entry
+from motet_train.data.trim import trim
+from motet_train.mirror_frames import NEGATED
+
+STRIDE = 2
+"""Of the protocol: every second frame of a text file."""
+
+FPS = 30.0
+"""Of models of ordinary motion files."""
+
+STILL = 1e-3
+"""A channel of motion files with a smaller standard deviation, in radians or metres, is constant but for glitches."""
+
+
+@dataclass(frozen=True, eq=False)
+class Material:
+    """Sequences (T, C) float32 at ``stride`` times the contract's frame rate, and how often each is visited.
+
+    contract: its mean and std are those of training. kept: columns that vary, of which the first ``held`` are not
+    predicted. mirrored, signs: see PredictorConfig. poses: whether all channels are poses, which can be played
+    backwards and faster or slower; velocities cannot. about: what the manifest says of the data.
+    """
+
+    contract: MotionContract
+    sequences: Sequence[NDArray[np.float32]]
+    chances: Array
+    stride: int
+    kept: tuple[int, ...]
+    poses: bool
+    held: int = 0
+    mirrored: tuple[int, ...] = ()
+    signs: tuple[float, ...] = ()
+    licence: str = ""
+    about: dict[str, Any] = field(default_factory=dict)
+
+
+def expmap_material(corpus: ExpmapCorpus) -> Material:
+    """The training files of the protocol: each action as often as another, whatever its length."""
+    layout, scaling = corpus.layout, scaling_of(corpus.train)
+    count = layout.columns
+    channels = ("root.tx", "root.ty", "root.tz", *(f"joint{n}.e{a}" for n in range((count - 3) // 3) for a in "xyz"))
+    units = ("length",) * 3 + ("rad",) * (count - 3)
+    contract = MotionContract(channels, units, layout.fps / STRIDE, scaling.mean, scaling.std, None)
+    sequences, chances = _visited(corpus)
+    mirrored, signs = _mirrored_columns(layout)
+    held = sum(column < ROOT for column in scaling.kept)
+    about = {"name": layout.name, "files": len(sequences), "missing": list(corpus.missing)}
+    return Material(
+        contract,
+        sequences,
+        chances,
+        STRIDE,
+        scaling.kept,
+        poses=True,
+        held=held,
+        mirrored=mirrored,
+        signs=signs,
+        licence=CMU_LICENCE if layout.name.startswith("cmu") else "Human3.6M, research use only",
+        about=about,
+    )
+
+
+def _visited(corpus: ExpmapCorpus) -> tuple[list[NDArray[np.float32]], Array]:
+    """The training sequences, and how often each is visited."""
+    extra = corpus.layout.extra
+    # of the groups those that are measured, and what resembles them
+    groups = {group: files for group, files in corpus.train.items() if group in corpus.test or group in extra}
+    groups = groups or dict(corpus.train)
+    # a file's first frame can be a T-pose that was added
+    sequences = [frames[1:].astype(np.float32) for files in groups.values() for frames in files.values()]
+    chances = [
+        (0.5 if group in extra else 1.0) * len(frames) / sum(map(len, files.values()))
+        for group, files in groups.items()
+        for frames in files.values()
+    ]
+    return sequences, np.array(chances) / sum(chances)
+
+
+def _mirrored_columns(layout: Layout) -> tuple[tuple[int, ...], tuple[float, ...]]:
+    """Left is along x: its translation changes sign, and so do turns about the other two axes."""
+    if not layout.pairs:
+        return (), ()
+    columns = np.arange(layout.columns)
+    for left, right, width in layout.pairs:
+        columns[left : left + width] = np.arange(right, right + width)
+        columns[right : right + width] = np.arange(left, left + width)
+    signs = np.tile([1.0, -1.0, -1.0], layout.columns // 3)
+    signs[:3] = -1.0, 1.0, 1.0
+    return tuple(columns.tolist()), tuple(signs.tolist())
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """One motion file: its name, who moved, and its motion in the file's channels."""
+
+    name: str
+    subject: str
+    motion: Motion
+
+
+def read_trials(path: Path, progress: Callable[[str], object] = lambda name: None) -> tuple[list[Trial], list[Skipped]]:
+    """The motion files of a folder or zip, one of each name, idle ends cut off, and those that cannot be used."""
+    trials, skipped = {}, []
+    with Archive(path) as archive:
+        names = [name for name in archive.names if PurePosixPath(name).suffix.lower() in MOCAP]
+        for name in archive.names:
+            if name.lower().endswith(".asf"):
+                archive.place(name)  # the reader of an AMC file looks for its skeleton near it
+        for name in names:
+            clip = PurePosixPath(name).stem
+            progress(clip)
+            try:
+                with archive.opened(name) as place:
+                    trials[clip] = Trial(clip, clip.split("_")[0], trim(read_motion(place)))
+            except BROKEN as error:
+                skipped.append(Skipped(clip, archive.reason(error)))
+    if not trials:
+        raise DataError(f"no motion files in {path} ({' '.join(MOCAP)}), or none that can be used")
+    return list(trials.values()), skipped
+
+
+def test_names(trials: Sequence[Trial]) -> tuple[str, ...]:
+    """The trials that are held out: all those of some people, a tenth at most."""
+    entries = [Entry(trial.name, trial.subject, (), ()) for trial in trials]
+    return tuple(trials[index].name for index in split(entries, 0, "subject").test)
+
+
+def mocap_material(trials: Sequence[Trial], skipped: Sequence[Skipped], name: str, licence: str) -> Material:
+    """Motions of one figure as root block and exponential maps at :data:`FPS`, all phases, without the test trials."""
+    test = set(test_names(trials))
+    found, left_out = _figures([trial for trial in trials if trial.name not in test])
+    if not found:
+        raise DataError(f"no motion can be used: {'; '.join(item.reason for item in left_out[:3])}")
+    first = next(iter(found.values()))[0]
+    sequences = [motion.values.astype(np.float32) for motions in found.values() for motion in motions]
+    frames = np.concatenate(sequences)
+    mean, std = frames.mean(axis=0, dtype=np.float64), frames.std(axis=0, dtype=np.float64)
+    skeleton = skeleton_of(first).scaled(1.0)
+    contract = MotionContract(first.channels, first.units, FPS, mean, std, skeleton)
+    mirrored, signs = _mirrored_joints(skeleton, first.channels)
+    names = [item.name for item in (*skipped, *left_out)]
+    about = {"name": name, "files": len(found), "skipped": names, "test": sorted(test)}
+    lengths = np.array([len(sequence) for sequence in sequences], dtype=np.float64)
+    return Material(
+        contract,
+        sequences,
+        lengths / lengths.sum(),
+        1,
+        tuple(int(column) for column in np.flatnonzero(std >= STILL)),
+        poses=False,
+        mirrored=mirrored,
+        signs=signs,
+        licence=licence,
+        about=about,
+    )
+
+
+def _figures(trials: Sequence[Trial]) -> tuple[dict[str, list[Motion]], list[Skipped]]:
+    """All phases of each trial in the joints of the first one, and the trials that have others."""
+    found: dict[str, list[Motion]] = {}
+    left_out, joints = [], None
+    for trial in trials:
+        try:
+            found[trial.name] = [to_joint_vectors(motion, joints) for motion in phases(trial.motion)]
+            joints = joints_of(found[trial.name][0].channels)
+        except MotionError as error:
+            left_out.append(Skipped(trial.name, str(error)))
+    return found, left_out
+
+
+def phases(motion: Motion) -> list[Motion]:
+    """The motion at :data:`FPS`: once for each frame that a pick of every n-th can start at, else interpolated."""
+    ratio = motion.fps / FPS
+    offsets = round(ratio) if abs(ratio - round(ratio)) < 1e-9 else 1
+    smooth = motion.continuous()
+    return [smooth[offset:].resample(FPS) for offset in range(offsets)]
+
+
+def _mirrored_joints(skeleton: Skeleton, channels: Sequence[str]) -> tuple[tuple[int, ...], tuple[float, ...]]:
+    """As :func:`motet.mirror.mirror` does it, for exponential maps in the parent joint's axes."""
+    try:
+        if lateral_axis(skeleton) != 0:
+            return (), ()
+    except MotionError:
+        return (), ()
+    joints = joints_of(channels)
+    partners = np.array(partners_of(joints))
+    block = len(ROOT_BLOCK)
+    columns = np.concatenate([np.arange(block), *(block + 3 * partner + np.arange(3) for partner in partners)])
+    signs = [-1.0 if name in NEGATED else 1.0 for name in ROOT_BLOCK] + [1.0, -1.0, -1.0] * len(joints)
+    return tuple(columns.tolist()), tuple(signs)

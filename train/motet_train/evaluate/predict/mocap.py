@@ -1,0 +1,94 @@
+"""Predictions of motion files: how far each joint is from where it really was, in trials that were held out."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from motet.kinematics import positions, skeleton_of
+from motet.motion import Motion
+from motet.predict import PredictModel, ending
+from motet.rotations import Array
+from motet_train.data.errors import DataError
+from motet_train.data.predict_data import Trial
+from motet_train.evaluate.predict.protocol import REPORTED
+from motet_train.evaluate.predict.report import ZERO
+from motet_train.evaluate.table import Report
+
+Distances = dict[str, dict[str, Array]]
+"""Measure -> system -> mean distance (N,) in centimetres at each predicted frame."""
+
+PLACE, POSE = "place_cm", "pose_cm"
+"""Of joints in the world, and of joints relative to the root's place."""
+
+
+def held_out(model: PredictModel, trials: Sequence[Trial]) -> list[Trial]:
+    """The trials that the model did not see in training; DataError where none of them is here."""
+    test = set(model.manifest["training"]["data"].get("test", ()))
+    found = [trial for trial in trials if trial.name in test]
+    if not found:
+        raise DataError("none of the trials that the model was not trained on is here")
+    return found
+
+
+def distances(models: Mapping[str, PredictModel], trials: Sequence[Trial]) -> Distances:
+    """The mean over windows that begin every ``horizon`` frames, of all systems, zero velocity first.
+
+    Models must have the same frame rate, seed and horizon; DataError where the trials are too short.
+    """
+    first = next(iter(models.values()))
+    found: dict[str, list[tuple[Array, Array]]] = {ZERO: [], **{name: [] for name in models}}
+    for trial in trials:
+        motion = ending(trial.motion, first.fps)
+        for start in range(0, len(motion) - first.seed_frames - first.horizon + 1, first.horizon):
+            seed = motion[start : start + first.seed_frames]
+            truth = _places(motion[start + first.seed_frames :][: first.horizon])
+            found[ZERO].append(_distance(_places(seed)[-1:], truth))
+            for name, model in models.items():
+                found[name].append(_distance(_places(model.predict(seed, first.horizon)), truth))
+    if not found[ZERO]:
+        raise DataError(f"the trials are shorter than {first.seed_frames + first.horizon} frames at the model's rate")
+    means = {name: np.mean(windows, axis=0) for name, windows in found.items()}
+    return {measure: {name: mean[n] for name, mean in means.items()} for n, measure in enumerate((PLACE, POSE))}
+
+
+def _places(motion: Motion) -> Array:
+    """Positions (T, J, 3) in centimetres."""
+    return positions(motion) * skeleton_of(motion).unit_factor(0.01)
+
+
+def _distance(found: Array, truth: Array) -> tuple[Array, Array]:
+    """Mean distances (T,) of joints in the world and relative to the root."""
+    relative = (found - found[:, :1]) - (truth - truth[:, :1])
+    world: Array = np.linalg.norm(found - truth, axis=-1).mean(axis=-1)
+    return world, np.linalg.norm(relative, axis=-1).mean(axis=-1)
+
+
+def strips(models: Mapping[str, PredictModel], motion: Motion) -> dict[str, Motion]:
+    """One horizon from the middle of a motion: what was, and what each model says. Models are as above."""
+    first = next(iter(models.values()))
+    whole = ending(motion, first.fps)
+    middle = max(first.seed_frames, (len(whole) - first.horizon) // 2)
+    predicted = {name: model.predict(whole[:middle], first.horizon) for name, model in models.items()}
+    return {"truth": whole[middle:][: first.horizon], **predicted}
+
+
+def table(found: Distances, fps: float) -> str:
+    """The distances as text, one block for each measure."""
+    width = max(22, *(len(name) + 2 for name in found[PLACE]))
+    lines = [
+        f"{'output frame':<{width}}" + "".join(f"{frame:>7}" for frame in REPORTED),
+        f"{'milliseconds':<{width}}" + "".join(f"{(frame + 1) / fps * 1000:>7.0f}" for frame in REPORTED),
+    ]
+    for measure, title in ((PLACE, "joints in the world, cm"), (POSE, "joints relative to the root, cm")):
+        lines.append(title)
+        for name, values in found[measure].items():
+            lines.append(f"  {name:<{width - 2}}" + "".join(f"{values[frame]:>7.1f}" for frame in REPORTED))
+    return "\n".join(lines)
+
+
+def to_json(found: Distances, name: str) -> Report:
+    """The distances of one system: measure -> "frame_1" and so on."""
+    return {
+        measure: {f"frame_{frame}": round(float(systems[name][frame]), 4) for frame in REPORTED}
+        for measure, systems in found.items()
+    }
