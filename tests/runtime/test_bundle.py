@@ -29,10 +29,11 @@ def edit(folder: Path, change: Callable[[dict[str, Any]], None]) -> None:
 
 
 def test_the_shipped_bundles_are_whole() -> None:
+    assert list(list_bundles()) == ["cmu-control", "cmu-describe", "cmu-generate", "cmu-predict"]
     for name, path in list_bundles().items():
         bundle = Bundle.open(name)
         assert bundle.name == name == path.stem
-        assert bundle.verify() == ["encoder.onnx", "step.onnx"]
+        assert {"encoder.onnx", "step.onnx"} <= set(bundle.verify())
 
 
 def test_folder_and_zip_run_alike_and_pack_to_the_same_bytes(folder: Path, tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """What the commands share: where a run may go, and how it was called."""
 
+import shlex
 import sys
 from pathlib import Path
 
@@ -14,4 +15,4 @@ def refuse_existing(out: Path) -> None:
 
 def command_line() -> str:
     """The command as it was given."""
-    return " ".join(["motet", *sys.argv[1:]])
+    return shlex.join(["motet", *sys.argv[1:]])

@@ -1,0 +1,59 @@
+"""The bundles that put motions into words and words into motion, as a user has them."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from motet.cli import main
+from motet.formats import read_motion
+from motet.models import load
+from motet.root_block import to_root_block
+
+
+def test_five_ranked_sentences_for_each_motion_as_json(clips: Path) -> None:
+    files = [str(clips / name) for name in ("39_14.amc", "09_07.amc")]
+    result = CliRunner().invoke(main, ["describe", *files, "--beams", "5", "--json"])
+    assert result.exit_code == 0
+    rows = json.loads(result.stdout)
+    assert [row["input"] for row in rows] == files
+    for row, verb in zip(rows, ("walk", "run"), strict=True):
+        scores = [found["log_probability"] for found in row["hypotheses"]]
+        assert len(scores) == 5
+        assert scores == sorted(scores, reverse=True)
+        assert verb in row["hypotheses"][0]["text"]
+
+
+def test_a_description_scores_what_the_search_gave_it(clips: Path) -> None:
+    model, motion = load("cmu-describe"), read_motion(clips / "39_14.amc")
+    for found in model.describe(motion)[0]:
+        assert model.score(motion, found.text) == pytest.approx(found.log_probability, abs=1e-4)
+
+
+def test_a_walk_that_turns_left_travels_and_turns_and_is_written_alike_every_time(tmp_path: Path) -> None:
+    files = [tmp_path / "one.bvh", tmp_path / "two.bvh"]
+    for file in files:
+        sentence = "a person walks and turns left"
+        assert CliRunner().invoke(main, ["generate", sentence, "--seed", "1", "-o", str(file)]).exit_code == 0
+    assert files[0].read_bytes() == files[1].read_bytes()
+    block = to_root_block(read_motion(files[0]).with_unit(1.0))
+    column = {name: block.values[:, i] for i, name in enumerate(block.channels)}
+    assert 0.5 < np.median(column["root.forward"]) < 2.1
+    assert column["root.turn"].sum() / block.fps > 10
+
+
+def test_runs_are_faster_than_walks_and_both_end_by_themselves() -> None:
+    model = load("cmu-generate")
+    found = model.generate(["a person walks"] * 5 + ["a person runs"] * 5, hypotheses=1, seed=list(range(10)))
+    forward = model.contract.channels.index("root.forward")
+    speeds = [float(np.median(row[0].motion.values[:, forward])) for row in found]
+    assert max(speeds[:5]) < 2.1 < min(speeds[5:])
+    assert max(row[0].motion.duration for row in found) < 15
+
+
+def test_a_motion_scores_what_the_search_gave_it() -> None:
+    model = load("cmu-generate")
+    best = model.generate("a person runs", seed=3)[0][0]
+    assert model.score("a person runs", best.motion) == pytest.approx(best.log_likelihood, rel=1e-4)
