@@ -9,6 +9,7 @@ import numpy as np
 from motet.describe import DescribeModel
 from motet.errors import TextError
 from motet.generate import GenerateModel
+from motet.text import words
 from motet_train.evaluate.language.attributes import Score, sides_right, turns_right, verbs_right
 from motet_train.evaluate.language.bleu import RANKS, References, agreement, bleu, ranks
 from motet_train.evaluate.language.chain import Answers, answers, bounds_chained, chained, likelihood, told
@@ -38,7 +39,7 @@ GOALS: Goals = {
 SAMPLE, CHAIN_SAMPLE = 200, 40
 """Training motions, always the same, of which training BLEU is taken, and chained training BLEU."""
 
-TRAINING = ("seconds", "epochs", "best_epoch", "train_loss", "validation_loss", "steps_per_second")
+TRAINING = ("seconds", "epochs", "kept_epoch", "train_loss", "validation_loss", "steps_per_second")
 
 
 def describe_report(model: DescribeModel, corpus: Corpus, progress: Progress = lambda group: None) -> Report:
@@ -152,7 +153,7 @@ def _log_probability(model: DescribeModel, corpus: Corpus, records: tuple[int, .
                     total += model.score(motion, sentence)
                 except TextError:  # of unknown words only
                     continue
-                count += len(sentence.split()) + 1
+                count += len(words(sentence)) + 1
     return total / count if count else np.nan
 
 
