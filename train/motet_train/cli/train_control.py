@@ -31,7 +31,7 @@ RECIPES: dict[str, Callable[[], TDBNConfig]] = {
 )
 @click.option("--out", type=Path, default=Path("runs/tdbn"), show_default=True, help="Folder to write; must not exist.")
 @click.option("--recipe", type=click.Choice(list(RECIPES)), default="default", show_default=True)
-@click.option("--seed", default=0, show_default=True)
+@click.option("--seed", default=6, show_default=True, help="The default is that of the bundle cmu-control.")
 @click.option("--threads", default=1, show_default=True, help="More do not pay for a net of this size.")
 @click.option("--name", default="cmu-control", show_default=True, help="Name of the bundle to be.")
 @click.option("--licence", default="MIT", show_default=True, help="Licence of the weights.")
