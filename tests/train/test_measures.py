@@ -1,8 +1,10 @@
 import numpy as np
 import pytest
 
+from motet_train.data.body import body_parts
+from motet_train.data.clips import read_clips, sequences
 from motet_train.data.period import is_periodic, period
-from motet_train.evaluate.measures import Reference, arrival, upsample
+from motet_train.evaluate.measures import ARRIVED, Reference, arrival, upsample
 
 
 def wave(frames: int, cycle: float, phase: float = 0.0) -> np.ndarray:
@@ -60,3 +62,14 @@ def test_arrival_counts_only_what_stays() -> None:
     inside = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [1, 1, 0, 0], [1, 1, 1, 0]], dtype=bool)
     np.testing.assert_array_equal(arrival(inside, fps=40.0), [3 / 40, 3 / 40, 4 / 40, np.inf])
     np.testing.assert_array_equal(arrival(np.ones((4, 1), dtype=bool), fps=40.0), [1 / 40])
+
+
+def test_a_pose_has_arrived_when_it_is_as_near_as_the_recorded_cycles_are_to_each_other() -> None:
+    clips = read_clips()
+    motions = {label: [s for motion in found for s in sequences(motion, 40)] for label, found in clips.motions.items()}
+    parts = body_parts(clips.skeleton, clips.channels)
+    reference = Reference(motions, 40, np.flatnonzero(np.isin(parts.of_channel, parts.legs)))
+    walk, half = motions["walk"][0], reference.period("walk") / 2
+    fine, time = upsample(walk), np.arange(4 * (len(walk) - 1) + 1) / 4
+    apart = [reference.distance(walk[[i]], fine[np.abs(time - i) > half])[0] for i in range(len(walk))]
+    assert np.median(apart) == pytest.approx(ARRIVED, abs=0.01)
