@@ -9,7 +9,8 @@ from language_data import small_store
 from torch import Tensor, nn
 
 from motet_train.batches import Examples
-from motet_train.fit import CHECKPOINT, LOG, WEIGHTS, Fitted, Fitting, fit, rate, validate
+from motet_train.checkpoint import CHECKPOINT, LOG, WEIGHTS
+from motet_train.fit import Fitted, Fitting, fit, rate, validate
 from motet_train.language import material
 from motet_train.models.batch import Batch
 from motet_train.runs import RunError

@@ -14,8 +14,9 @@ from motet.cli import main
 from motet.contract import MotionContract
 from motet.formats import write_motion
 from motet_train import describe, generate
+from motet_train.checkpoint import CHECKPOINT, LOG
 from motet_train.data.store import Store
-from motet_train.fit import CHECKPOINT, LOG, Fitting
+from motet_train.fit import Fitting
 from motet_train.language import Recipe, material
 from motet_train.models.language_to_motion import LanguageToMotionConfig
 from motet_train.models.motion_to_language import MotionToLanguageConfig

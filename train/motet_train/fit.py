@@ -1,13 +1,11 @@
 """The training loop of both nets between motion and language (Plappert et al. 2017, section 5.2)."""
 
-import io
 import json
-import pickle
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import torch
@@ -15,10 +13,9 @@ from torch import Tensor, nn
 
 from motet.files import write_whole
 from motet_train.batches import Examples
+from motet_train.checkpoint import CHECKPOINT, LOG, WEIGHTS, read_state, seed_torch, to_bytes
 from motet_train.models.batch import Batch
 from motet_train.runs import RunError
-
-CHECKPOINT, LOG, WEIGHTS = "checkpoint.pt", "log.jsonl", "weights.pt"
 
 Progress = Callable[[int, int], object]
 """Called after each step with the epoch, from 1, and the number of epochs."""
@@ -79,7 +76,7 @@ def fit(
     optimiser = torch.optim.NAdam(net.parameters(), lr=fitting.learning_rate)
     fitted = _resume(folder / CHECKPOINT, net, optimiser, fitting.keep)
     for epoch in range(len(fitted.log) + 1, fitting.epochs + 1):
-        _seed(seed, epoch)
+        seed_torch(seed, epoch)
         for group in optimiser.param_groups:
             group["lr"] = rate(fitting, epoch)
         batches = data[0].epoch(np.random.default_rng((seed, epoch)), fitting.batch, fitting.offsets, fitting.windows)
@@ -91,7 +88,7 @@ def fit(
             progress(epoch, fitting.epochs)
         seconds = time.perf_counter() - started
         _keep(net, optimiser, fitted, folder, _line(epoch, losses, validate(net, data[1], fitting, device), seconds))
-    net.load_state_dict(_read(folder / WEIGHTS))
+    net.load_state_dict(read_state(folder / WEIGHTS))
     net.cpu().eval()
     return fitted
 
@@ -111,10 +108,6 @@ def validate(net: nn.Module, examples: Examples, fitting: Fitting, device: str =
         losses = net.losses(batch.to(device))  # type: ignore[operator]
         total, count = total + float(losses.double().sum()), count + len(losses)
     return total / count
-
-
-def _seed(seed: int, epoch: int) -> None:
-    torch.manual_seed(int(np.random.SeedSequence((seed, epoch)).generate_state(1, np.uint64)[0]))
 
 
 def _step(net: nn.Module, optimiser: torch.optim.Optimizer, batch: Batch, clip: float) -> tuple[float, int]:
@@ -147,32 +140,19 @@ def _keep(
     """Write the epoch down, its checkpoint last: until that is there, the epoch counts as not done."""
     fitted.log.append(line)
     if fitted.kept is line:
-        write_whole(folder / WEIGHTS, _bytes(net.state_dict()))
+        write_whole(folder / WEIGHTS, to_bytes(net.state_dict()))
     write_whole(folder / LOG, "".join(json.dumps(line) + "\n" for line in fitted.log))
     state = {"net": net.state_dict(), "optimiser": optimiser.state_dict(), "log": fitted.log}
-    write_whole(folder / CHECKPOINT, _bytes(state))
+    write_whole(folder / CHECKPOINT, to_bytes(state))
 
 
 def _resume(path: Path, net: nn.Module, optimiser: torch.optim.Optimizer, keep: Literal["best", "last"]) -> Fitted:
     if not path.exists():
         return Fitted(keep)
-    state = _read(path)
+    state = read_state(path)
     try:
         net.load_state_dict(state["net"])
         optimiser.load_state_dict(state["optimiser"])
         return Fitted(keep, state["log"])
     except (KeyError, TypeError, ValueError, RuntimeError) as error:
         raise RunError(f"the checkpoint {path} is not of this training: {error}") from error
-
-
-def _read(path: Path) -> Any:
-    try:
-        return torch.load(path, map_location="cpu", weights_only=True)
-    except (OSError, EOFError, RuntimeError, ValueError, pickle.UnpicklingError) as error:
-        raise RunError(f"{path} cannot be read: {error}") from error
-
-
-def _bytes(state: Any) -> bytes:
-    buffer = io.BytesIO()
-    torch.save(state, buffer)
-    return buffer.getvalue()

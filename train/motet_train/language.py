@@ -1,7 +1,6 @@
 """Training between motion and language: from a store and a recipe to a run, the same for both directions."""
 
 import json
-import platform
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from itertools import chain
@@ -14,13 +13,14 @@ from motet.contract import MotionContract
 from motet.files import write_whole
 from motet.text import Vocabulary
 from motet_train.batches import Examples, examples, usable
+from motet_train.checkpoint import refuse_other
 from motet_train.data.errors import DataError
 from motet_train.data.split import Split, split
 from motet_train.data.store import Store
 from motet_train.fit import Fitted, Fitting, Progress, fit
 from motet_train.mirror_frames import FrameMirror, frame_mirror
 from motet_train.mirror_text import mirror_text
-from motet_train.runs import MODELS, Run, RunError
+from motet_train.runs import MODELS, Run, surroundings
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ def train_language(
     net.mean.copy_(torch.tensor(found.contract.mean).float())  # type: ignore[operator]
     net.scale.copy_(torch.tensor(found.contract.std).float())  # type: ignore[operator]
     manifest = _manifest(found, recipe, about, config)
-    _refuse_other(folder / "run.json", manifest)
+    refuse_other(folder / "run.json", manifest, _essence)
     write_whole(folder / "run.json", json.dumps(manifest, indent=1) + "\n")
     data = found.examples(found.parts.train), found.examples(found.parts.validation)
     fitted = fit(net, data, recipe.fitting, about.seed, folder, device, progress)
@@ -165,23 +165,8 @@ def _results(fitted: Fitted, device: str) -> dict[str, Any]:
         "validation_loss": fitted.kept["validation_loss"],
         "seconds": round(seconds, 1),
         "steps_per_second": round(steps / seconds, 3),
-        "threads": torch.get_num_threads(),
-        "machine": f"{platform.system()} {platform.machine()}, {device.upper()}",
-        "torch": torch.__version__,
+        **surroundings(device),
     }
-
-
-def _refuse_other(path: Path, manifest: Mapping[str, Any]) -> None:
-    """RunError if the run that is to be continued was started with other data or settings."""
-    if not path.exists():
-        return
-    try:
-        before, now = _essence(json.loads(path.read_text())), _essence(manifest)
-    except (KeyError, TypeError, ValueError) as error:
-        raise RunError(f"{path} is no run that can be continued: {error}") from error
-    different = [key for key in now if now[key] != before[key]]
-    if different:
-        raise RunError(f"{path.parent} was started with other settings, and so cannot go on: {', '.join(different)}")
 
 
 def _essence(manifest: Mapping[str, Any]) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 import json
 import math
-import platform
 import time
 from collections.abc import Callable
 from copy import deepcopy
@@ -15,11 +14,12 @@ import torch
 from torch import Tensor, nn
 
 from motet.files import write_whole
+from motet_train.checkpoint import LOG
 from motet_train.data.errors import DataError
 from motet_train.data.predict_data import Material
-from motet_train.fit import LOG
 from motet_train.models.predictor import Predictor, PredictorConfig
-from motet_train.runs import Run, RunError
+from motet_train.runs import Run, RunError, surroundings
+from motet_train.windows import Windows
 
 EVERY = 200
 """Steps from one line of the log to the next."""
@@ -57,50 +57,6 @@ class About:
     weights_licence: str
 
 
-class Windows:
-    """Draws windows (B, T, C) of the sequences at the contract's frame rate."""
-
-    def __init__(self, material: Material, recipe: Recipe, frames: int, seed: int) -> None:
-        self.material, self.frames = material, frames
-        self.warp, self.reverse, self.mirror = recipe.warp, recipe.reverse, recipe.mirror
-        self.rng = np.random.default_rng(seed)
-        lengths = np.array([len(sequence) for sequence in material.sequences])
-        usable = lengths > material.stride * (frames - 1) + 1
-        if not usable.any():
-            raise DataError(f"all motions are shorter than a window of {frames} frames at the model's rate")
-        chances = np.where(usable, material.chances, 0.0)
-        self.chances = chances / chances.sum()
-        self.lengths, self.starts = lengths, np.cumsum(lengths) - lengths
-        self.all = torch.from_numpy(np.concatenate(material.sequences))
-        self.columns, self.signs = torch.tensor(material.mirrored), torch.tensor(material.signs)
-
-    def draw(self, batch: int) -> Tensor:
-        """A batch of windows."""
-        which = self.rng.choice(len(self.chances), batch, p=self.chances)
-        last = self.lengths[which] - 1.01
-        speed = self.material.stride * np.exp(self.rng.uniform(-self.warp, self.warp, batch))
-        speed = np.minimum(speed, last / (self.frames - 1))
-        start = self.rng.uniform(0, 1, batch) * (last - speed * (self.frames - 1))
-        if not self.warp:
-            speed, start = np.full(batch, float(self.material.stride)), np.floor(start)
-        windows = self._interpolated(which, start[:, None] + speed[:, None] * np.arange(self.frames))
-        backwards = self._some(batch, self.reverse)
-        windows = torch.where(backwards, windows.flip(1), windows)
-        if self.mirror:
-            windows = torch.where(self._some(batch, self.mirror), windows[..., self.columns] * self.signs, windows)
-        return windows
-
-    def _some(self, batch: int, share: float) -> Tensor:
-        return torch.from_numpy(self.rng.random(batch) < share)[:, None, None]
-
-    def _interpolated(self, which: Any, times: Any) -> Tensor:
-        before = np.floor(times + 1e-6).astype(np.int64)
-        part = torch.from_numpy(np.maximum(times - before, 0).astype(np.float32))[..., None]
-        index = torch.from_numpy(before + self.starts[which][:, None])
-        after = (index + 1).clamp_max(len(self.all) - 1)
-        return self.all[index] * (1 - part) + self.all[after] * part
-
-
 def train_predict(
     material: Material,
     recipe: Recipe,
@@ -113,7 +69,8 @@ def train_predict(
     torch.manual_seed(seed)
     recipe = _possible(recipe, material)
     net = _untrained(material)
-    windows = Windows(material, recipe, net.config.seed_frames + net.config.frames, seed)
+    chances = recipe.warp, recipe.reverse, recipe.mirror
+    windows = Windows(material, net.config.seed_frames + net.config.frames, seed, *chances)
     started = time.perf_counter()
     net, log = _fit(net, windows, recipe, folder, progress)
     training = {
@@ -124,9 +81,7 @@ def train_predict(
         "seconds": round(time.perf_counter() - started, 1),
         "loss": log[-1]["loss"],
         "parameters": sum(parameter.numel() for parameter in net.parameters()),
-        "threads": torch.get_num_threads(),
-        "machine": f"{platform.system()} {platform.machine()}, CPU",
-        "torch": torch.__version__,
+        **surroundings(),
     }
     run = Run(_manifest(material, net, about, training), net)
     run.save(folder)

@@ -3,8 +3,10 @@
 import io
 import json
 import pickle
+import platform
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +16,7 @@ from torch import nn
 from motet.errors import MotetError
 from motet.files import write_whole
 from motet.graph import Graph, GraphSpec
-from motet_train.models import angle_crbm, language_to_motion, motion_to_language, predictor, tdbn
+from motet_train.models import angle_crbm, language_to_motion, motion_to_language, predictor, systems, tdbn
 from motet_train.torch_graph import TorchGraph
 
 MODELS: Mapping[str, Callable[[Mapping[str, Any]], nn.Module]] = {
@@ -23,6 +25,7 @@ MODELS: Mapping[str, Callable[[Mapping[str, Any]], nn.Module]] = {
     "language-to-motion": language_to_motion.from_config,
     "angle-crbm": angle_crbm.from_config,
     "trajectory": predictor.from_config,
+    **{name: partial(systems.stepwise, name) for name in systems.SYSTEMS},
 }
 """Name of a model -> how it is built from the configuration in its manifest."""
 
@@ -70,3 +73,12 @@ class Run:
         except (KeyError, TypeError, ValueError, RuntimeError, OSError, pickle.UnpicklingError) as error:
             raise RunError(f"the training run {folder} cannot be read: {error}") from error
         return Run(manifest, model)
+
+
+def surroundings(device: str = "cpu") -> dict[str, Any]:
+    """Where a training runs, for its manifest."""
+    return {
+        "threads": torch.get_num_threads(),
+        "machine": f"{platform.system()} {platform.machine()}, {device.upper()}",
+        "torch": torch.__version__,
+    }

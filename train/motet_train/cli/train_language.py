@@ -1,6 +1,5 @@
 """``motet train describe`` and ``motet train generate``: the two ways between motion and language."""
 
-import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
@@ -12,13 +11,11 @@ import torch
 from tqdm import tqdm
 
 from motet.cli.convert import METRES
-from motet.errors import OutputError
 from motet_train import describe as describing
 from motet_train import generate as generating
-from motet_train.cli.places import command_line, refuse_existing
+from motet_train.cli.places import command_line, refuse, resumable
 from motet_train.cli.prepare import prepare
 from motet_train.data.store import INDEX, Store
-from motet_train.fit import CHECKPOINT
 from motet_train.language import About, Recipe, check_device, train_language
 
 OPTIONS: tuple[Callable[..., Any], ...] = (
@@ -79,18 +76,13 @@ def _train(
 ) -> None:
     check_device(device)
     torch.set_num_threads(threads)
-    _refuse(out, resume)
+    refuse(out, resume)
     recipe = _recipe(recipes, **settings)
     store = _store(data, out, resume, sentences, unit_in)
     stated = data_licence or f"not stated (trained on {data.name})"
     about = About(name or out.name, command_line(), licence, stated, data.name, seed, by)
-    out.mkdir(parents=True, exist_ok=True)
-    try:
-        with tqdm(unit=" steps", disable=None) as bar:
-            run = train_language(store, recipe, about, out, device, partial(_advance, bar))
-    except BaseException as error:
-        _leave(out, error)
-        raise
+    with resumable(out), tqdm(unit=" steps", disable=None) as bar:
+        run = train_language(store, recipe, about, out, device, partial(_advance, bar))
     training = run.manifest["training"]
     click.echo(
         f"{out}: {training['epochs']} epochs in {training['seconds']:g} s, {training['steps_per_second']:g} steps/s; "
@@ -109,22 +101,6 @@ def _recipe(
     recipe = recipes[preset]
     fitting = replace(recipe.fitting, epochs=epochs or recipe.fitting.epochs, batch=batch or recipe.fitting.batch)
     return replace(recipe, fitting=fitting, mirror=recipe.mirror if mirror is None else mirror)
-
-
-def _refuse(out: Path, resume: bool) -> None:
-    if not resume:
-        refuse_existing(out)
-    elif out.exists() and not (out / CHECKPOINT).is_file():
-        raise OutputError(f"cannot go on in {out}: it has no {CHECKPOINT}; choose another folder")
-
-
-def _leave(out: Path, error: BaseException) -> None:
-    """Training ended early: say how it goes on, and leave nothing behind where it cannot."""
-    if (out / CHECKPOINT).is_file():
-        if isinstance(error, KeyboardInterrupt):
-            click.echo(f"\nstopped: the same command with --resume goes on after {out}'s last whole epoch", err=True)
-    else:
-        shutil.rmtree(out)
 
 
 def _store(data: Path, out: Path, resume: bool, sentences: Path | None, unit_in: str | None) -> Store:

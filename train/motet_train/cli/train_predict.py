@@ -10,7 +10,7 @@ import torch
 from tqdm import tqdm
 
 from motet_train.cli.places import command_line, refuse_existing
-from motet_train.data.expmap_files import is_expmap, read_expmap
+from motet_train.data.expmap_files import ExpmapCorpus, is_expmap, read_expmap
 from motet_train.data.predict_data import Material, expmap_material, mocap_material, read_trials
 from motet_train.predict import About, Recipe, train_predict
 
@@ -57,13 +57,18 @@ def _advance(bar: "tqdm[Any]", loss: float) -> None:
 
 def _material(data: Path, licence: str) -> Material:
     if is_expmap(data):
-        corpus = read_expmap(data)
-        if corpus.missing:
-            click.echo(f"motet: {data} lacks {len(corpus.missing)} files: {', '.join(corpus.missing)}", err=True)
-        return expmap_material(corpus)
+        return expmap_material(read_expmap_files(data))
     with tqdm(unit=" files", disable=None, leave=False) as bar:
         trials, skipped = read_trials(data, lambda clip: bar.update())
     material = mocap_material(trials, skipped, data.name, licence)
     if material.about["skipped"]:
         click.echo(f"motet: cannot be used: {', '.join(material.about['skipped'])}", err=True)
     return material
+
+
+def read_expmap_files(data: Path) -> ExpmapCorpus:
+    """The corpus of text files in a folder or zip; those that are missing are named."""
+    corpus = read_expmap(data)
+    if corpus.missing:
+        click.echo(f"motet: {data} lacks {len(corpus.missing)} files: {', '.join(corpus.missing)}", err=True)
+    return corpus

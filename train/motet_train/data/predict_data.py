@@ -46,7 +46,8 @@ class Material:
 
     contract: its mean and std are those of training. kept: columns that vary, of which the first ``held`` are not
     predicted. mirrored, signs: see PredictorConfig. poses: whether all channels are poses, which can be played
-    backwards and faster or slower; velocities cannot. about: what the manifest says of the data.
+    backwards and faster or slower; velocities cannot. about: what the manifest says of the data. validation: sequences
+    that were kept back.
     """
 
     contract: MotionContract
@@ -60,19 +61,26 @@ class Material:
     signs: tuple[float, ...] = ()
     licence: str = ""
     about: dict[str, Any] = field(default_factory=dict)
+    validation: Sequence[NDArray[np.float32]] = ()
 
 
-def expmap_material(corpus: ExpmapCorpus) -> Material:
-    """The training files of the protocol: each action as often as another, whatever its length."""
+def expmap_material(corpus: ExpmapCorpus, kept_back: Sequence[str] = ()) -> Material:
+    """The training files of the protocol: each action as often as another, whatever its length.
+
+    kept_back: names of files, of :func:`validation_files`, that are for validation; they count in the statistics.
+    """
     layout, scaling = corpus.layout, scaling_of(corpus.train)
     count = layout.columns
     channels = ("root.tx", "root.ty", "root.tz", *(f"joint{n}.e{a}" for n in range((count - 3) // 3) for a in "xyz"))
     units = ("length",) * 3 + ("rad",) * (count - 3)
     contract = MotionContract(channels, units, layout.fps / STRIDE, scaling.mean, scaling.std, None)
-    sequences, chances = _visited(corpus)
+    sequences, chances = _visited(corpus, kept_back)
     mirrored, signs = _mirrored_columns(layout)
     held = sum(column < ROOT for column in scaling.kept)
     about = {"name": layout.name, "files": len(sequences), "missing": list(corpus.missing)}
+    if kept_back:
+        about["validation"] = list(kept_back)
+    validation = [_sequence(files[name]) for files in corpus.train.values() for name in files if name in kept_back]
     return Material(
         contract,
         sequences,
@@ -85,17 +93,37 @@ def expmap_material(corpus: ExpmapCorpus) -> Material:
         signs=signs,
         licence=CMU_LICENCE if layout.name.startswith("cmu") else "Human3.6M, research use only",
         about=about,
+        validation=validation,
     )
 
 
-def _visited(corpus: ExpmapCorpus) -> tuple[list[NDArray[np.float32]], Array]:
+def validation_files(corpus: ExpmapCorpus, window: int) -> tuple[str, ...]:
+    """Of each group that is measured, or of each where none is, the shortest file that is longer than a window.
+
+    Groups of one file keep none back. window: in frames of every second one.
+    """
+    groups = {group: files for group, files in corpus.train.items() if group in corpus.test} or dict(corpus.train)
+    found = []
+    for files in groups.values():
+        long = {name: len(frames) for name, frames in files.items() if len(frames) > STRIDE * (window + 1)}
+        if len(files) > 1 and long:
+            found.append(min(long, key=long.__getitem__))
+    return tuple(found)
+
+
+def _sequence(frames: Array) -> NDArray[np.float32]:
+    # a file's first frame can be a T-pose that was added
+    return frames[1:].astype(np.float32)
+
+
+def _visited(corpus: ExpmapCorpus, kept_back: Sequence[str]) -> tuple[list[NDArray[np.float32]], Array]:
     """The training sequences, and how often each is visited."""
     extra = corpus.layout.extra
     # of the groups those that are measured, and what resembles them
     groups = {group: files for group, files in corpus.train.items() if group in corpus.test or group in extra}
     groups = groups or dict(corpus.train)
-    # a file's first frame can be a T-pose that was added
-    sequences = [frames[1:].astype(np.float32) for files in groups.values() for frames in files.values()]
+    groups = {group: {n: files[n] for n in files if n not in kept_back} for group, files in groups.items()}
+    sequences = [_sequence(frames) for files in groups.values() for frames in files.values()]
     chances = [
         (0.5 if group in extra else 1.0) * len(frames) / sum(map(len, files.values()))
         for group, files in groups.items()

@@ -1,0 +1,44 @@
+"""The convolutional predictor as an ONNX bundle: the runtime's free run gives what torch gives."""
+
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from motet.models import load
+from motet.predict import PredictModel
+from motet_export.bundles import export_run
+from motet_train.models.stepwise import Stepwise
+from motet_train.models.systems import stepwise
+from motet_train.runs import Run
+
+CHANNELS = 48
+KEPT = range(3, 48)
+
+
+def test_the_bundle_predicts_what_torch_predicts(tmp_path: Path) -> None:
+    torch.manual_seed(0)
+    system = {"dimensions": 45, "filters": [3, 4, 5], "units": 8}
+    config = {"channels": CHANNELS, "kept": list(KEPT), "seed_frames": 50, "system": system}
+    net = stepwise("convseq2seq", config)
+    net.mean.copy_(torch.randn(45)), net.scale.copy_(torch.rand(45) + 0.5)
+    motion = {
+        "channels": [f"joint{n}.e{axis}" for n in range(16) for axis in "xyz"],
+        "units": ["rad"] * CHANNELS,
+        "fps": 60.0,
+        "mean": [0.1] * CHANNELS,
+        "std": [0.5] * CHANNELS,
+        "skeleton": None,
+    }
+    manifest = {"name": "x", "verb": "predict", "model": "convseq2seq", "motion": motion, "defaults": {"horizon": 25}}
+    run = Run({**manifest, "config": config, "licence": {}}, net)
+    export_run(run, tmp_path / "x.zip")
+    bundle = load(tmp_path / "x.zip")
+    assert isinstance(bundle, PredictModel)
+    assert isinstance(run.model, Stepwise)
+    seeds = np.random.default_rng(0).normal(size=(3, 50, CHANNELS)).astype(np.float32)
+    found = bundle.next_frames(seeds)
+    with torch.no_grad():
+        np.testing.assert_allclose(found, run.model(torch.from_numpy(seeds), 25), atol=1e-4)
+    np.testing.assert_array_equal(found[:, :, :3], np.repeat(seeds[:, -1:, :3], 25, axis=1))
+    np.testing.assert_array_equal(bundle.next_frames(seeds[:1])[0], found[0])

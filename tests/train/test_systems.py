@@ -1,0 +1,96 @@
+"""The published systems from the command line: train, stop and go on, evaluate, export."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from click.testing import CliRunner, Result
+from test_predict_data import write_files
+
+from motet.cli import main
+from motet_train.checkpoint import CHECKPOINT
+from motet_train.data.expmap_files import read_expmap
+from motet_train.data.predict_data import expmap_material, validation_files
+from motet_train.runs import Run
+from motet_train.systems import validation_error
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_files(tmp_path_factory.mktemp("data"), actions=("walking",))
+
+
+@pytest.fixture(scope="module")
+def trained(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("runs") / "small"
+    found = run("train", "convseq2seq", "--data", data, "--out", out, "--steps", 2, "--batch", 2, "--window", 16)
+    assert found.exit_code == 0, found.output
+    return out
+
+
+def test_a_run_says_what_it_is(trained: Path) -> None:
+    manifest = Run.load(trained).manifest
+    assert (manifest["model"], manifest["config"]["system"]["window"]) == ("convseq2seq", 16)
+    training = manifest["training"]
+    assert (training["seed"], training["steps"], training["recipe"]["adversary"]) == (0, 2, 0.01)
+    assert training["data"]["validation"] == ["train/walking/walking_1.txt"]
+    assert training["parameters"] > 3e6
+
+
+def test_it_goes_on_by_the_same_command_only(trained: Path, data: Path) -> None:
+    again = run(
+        "train", "convseq2seq", "--data", data, "--out", trained, "--steps", 2, "--batch", 2, "--window", 16, "--resume"
+    )
+    assert again.exit_code == 0, again.output
+    other = run("train", "convseq2seq", "--data", data, "--out", trained, "--steps", 2, "--batch", 3, "--resume")
+    assert (other.exit_code, "other settings" in other.stderr) == (2, True)
+    none = run("train", "convseq2seq", "--data", data, "--out", trained.parent, "--resume")
+    assert (none.exit_code, CHECKPOINT in none.stderr) == (2, True)
+
+
+def test_it_is_evaluated(trained: Path, data: Path) -> None:
+    shown = run("evaluate", trained, "--data", data, "--json")
+    assert shown.exit_code == 0, shown.output
+    assert "frame_24" in shown.stdout
+
+
+def test_what_is_kept_back_is_not_trained_on_and_is_measured(data: Path) -> None:
+    corpus = read_expmap(data)
+    names = validation_files(corpus, 75)
+    material = expmap_material(corpus, names)
+    assert (len(material.sequences), len(material.validation)) == (1, 1)
+    kept_back = corpus.train["walking"]["train/walking/walking_1.txt"][1:].astype(np.float32)
+    assert any(np.array_equal(kept_back, sequence) for sequence in material.validation)
+    assert not any(np.array_equal(kept_back, sequence) for sequence in material.sequences)
+
+    class Still(torch.nn.Module):
+        def forward(self, frames: torch.Tensor, count: int) -> torch.Tensor:
+            return frames[:, -1:].expand(-1, count, -1)
+
+    starts = np.linspace(0, 199 - 149, 32).astype(int)
+    windows = [s[start : start + 149 : 2] for s in material.validation for start in starts]
+    moved = [column for column in material.kept if column >= 6]
+    errors = [np.linalg.norm((w[50:] - w[49])[:, moved], axis=1).mean() for w in windows]
+    found = validation_error(Still(), material)  # type: ignore[arg-type]
+    np.testing.assert_allclose(found, np.mean(errors), rtol=1e-4)
+
+
+def test_bad_settings_are_named_and_nothing_stays(data: Path, tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    short = run("train", "convseq2seq", "--data", data, "--out", out, "--window", 5)
+    assert (short.exit_code, "padding 'same'" in short.stderr, out.exists()) == (2, True, False)
+    (tmp_path / "empty").mkdir()
+    empty = run("train", "convseq2seq", "--data", tmp_path / "empty", "--out", out)
+    assert (empty.exit_code, out.exists()) == (2, False)
+
+
+def test_log_has_a_line_for_each_validation(trained: Path) -> None:
+    lines = [json.loads(line) for line in (trained / "log.jsonl").read_text().splitlines()]
+    assert [line["step"] for line in lines] == [2]
+    assert set(lines[0]) == {"step", "loss", "validation_error", "seconds", "steps_per_second"}

@@ -1,0 +1,60 @@
+"""Windows of motions to train predictors on, drawn anew for each batch."""
+
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from motet_train.data.errors import DataError
+from motet_train.data.predict_data import Material
+
+
+class Windows:
+    """Draws windows (B, T, C) of the sequences at the contract's frame rate.
+
+    warp: a window is slower or faster by up to this much, as exp(+-warp). reverse: the share played backwards. mirror:
+    the share that is mirrored. DataError where no sequence is long enough.
+    """
+
+    def __init__(
+        self, material: Material, frames: int, seed: int, warp: float = 0.0, reverse: float = 0.0, mirror: float = 0.0
+    ) -> None:
+        self.material, self.frames = material, frames
+        self.warp, self.reverse, self.mirror = warp, reverse, mirror
+        self.rng = np.random.default_rng(seed)
+        lengths = np.array([len(sequence) for sequence in material.sequences])
+        usable = lengths > material.stride * (frames - 1) + 1
+        if not usable.any():
+            raise DataError(f"all motions are shorter than a window of {frames} frames at the model's rate")
+        chances = np.where(usable, material.chances, 0.0)
+        self.chances = chances / chances.sum()
+        self.lengths, self.starts = lengths, np.cumsum(lengths) - lengths
+        self.all = torch.from_numpy(np.concatenate(material.sequences))
+        self.columns, self.signs = torch.tensor(material.mirrored), torch.tensor(material.signs)
+
+    def draw(self, batch: int) -> Tensor:
+        """A batch of windows."""
+        which = self.rng.choice(len(self.chances), batch, p=self.chances)
+        last = self.lengths[which] - 1.01
+        speed = self.material.stride * np.exp(self.rng.uniform(-self.warp, self.warp, batch))
+        speed = np.minimum(speed, last / (self.frames - 1))
+        start = self.rng.uniform(0, 1, batch) * (last - speed * (self.frames - 1))
+        if not self.warp:
+            speed, start = np.full(batch, float(self.material.stride)), np.floor(start)
+        windows = self._interpolated(which, start[:, None] + speed[:, None] * np.arange(self.frames))
+        backwards = self._some(batch, self.reverse)
+        windows = torch.where(backwards, windows.flip(1), windows)
+        if self.mirror:
+            windows = torch.where(self._some(batch, self.mirror), windows[..., self.columns] * self.signs, windows)
+        return windows
+
+    def _some(self, batch: int, share: float) -> Tensor:
+        return torch.from_numpy(self.rng.random(batch) < share)[:, None, None]
+
+    def _interpolated(self, which: Any, times: Any) -> Tensor:
+        before = np.floor(times + 1e-6).astype(np.int64)
+        part = torch.from_numpy(np.maximum(times - before, 0).astype(np.float32))[..., None]
+        index = torch.from_numpy(before + self.starts[which][:, None])
+        after = (index + 1).clamp_max(len(self.all) - 1)
+        return self.all[index] * (1 - part) + self.all[after] * part
