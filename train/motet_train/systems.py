@@ -14,10 +14,11 @@ from torch import Tensor
 
 from motet.files import write_whole
 from motet_train.checkpoint import refuse_other
+from motet_train.data.errors import DataError
 from motet_train.data.predict_data import Material
 from motet_train.evaluate.predict.protocol import OUTPUT_FRAMES, SEED_FRAMES, WINDOW
 from motet_train.fit_windows import Fitting, Learner, best, fit_windows
-from motet_train.models import convseq2seq
+from motet_train.models import convseq2seq, lstm_3lr, lstm_ae, rrnn, srnn
 from motet_train.models.stepwise import Stepwise
 from motet_train.models.systems import stepwise
 from motet_train.predict import About
@@ -49,12 +50,32 @@ PAPER = Fitting(steps=20_000, batch=64, l2=0.001, adversary=0.01, every=500)
 SHORT = Fitting(steps=1500, falling=0.7, l2=0.0005, adversary=0.01)
 """Reaches on a CPU in minutes what the others do."""
 
+RESIDUAL = Fitting(
+    steps=10_000, optimiser="sgd", learning_rate=0.005, decay=(0.95, 10_000), clip=5.0, every=250, patience=10
+)
+"""Of Martinez et al. 2017; it ends when the validation error has stopped falling."""
+
+TAUGHT = Fitting(steps=2000, learning_rate=1e-3, falling=0.5, clip=25.0)
+"""Of nets that are taught the next frame: the clipping is that of Jain et al. 2016, who took SGD and more steps."""
+
+
+def _structural(material: Material) -> srnn.Config:
+    if material.layout is None:
+        raise DataError("a structural net needs text files whose columns are known")
+    return srnn.Config(len(material.kept), srnn.parts_of(material.layout, material.kept))
+
+
 RECIPES: Mapping[str, Mapping[str, Recipe]] = {
     "convseq2seq": {
         "default": _convseq2seq(SHORT),
         "paper": _convseq2seq(PAPER),
         "code": _convseq2seq(CODE, dropout=(0.2, 0.2, 0.5), own=0.95),
     },
+    "rrnn": {"default": Recipe("rrnn", lambda material: rrnn.Config(len(material.kept)), RESIDUAL)},
+    "erd": {"default": Recipe("erd", lambda material: lstm_3lr.ERDConfig(len(material.kept)), TAUGHT)},
+    "lstm-3lr": {"default": Recipe("lstm-3lr", lambda material: lstm_3lr.Config(len(material.kept)), TAUGHT)},
+    "srnn": {"default": Recipe("srnn", _structural, TAUGHT)},
+    "lstm-ae": {"default": Recipe("lstm-ae", lambda material: lstm_ae.Config(len(material.kept)), TAUGHT)},
 }
 """Model -> name of a preset -> recipe."""
 

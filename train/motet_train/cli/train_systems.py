@@ -106,4 +106,15 @@ def _material(corpus: ExpmapCorpus) -> Material:
     return expmap_material(corpus, validation_files(corpus, WINDOW))
 
 
-COMMANDS = (_command("convseq2seq", "the convolutional sequence-to-sequence model (Li et al. 2018)", SWITCHES),)
+TITLES = {
+    "rrnn": "the residual recurrent net (Martinez et al. 2017)",
+    "erd": "the encoder-recurrent-decoder (Fragkiadaki et al. 2015)",
+    "lstm-3lr": "three LSTMs between linear maps (Fragkiadaki et al. 2015)",
+    "srnn": "the structural RNN (Jain et al. 2016)",
+    "lstm-ae": "the LSTMs with a denoising autoencoder (Ghosh et al. 2017)",
+}
+
+COMMANDS = (
+    _command("convseq2seq", "the convolutional sequence-to-sequence model (Li et al. 2018)", SWITCHES),
+    *(_command(name, title) for name, title in TITLES.items()),
+)

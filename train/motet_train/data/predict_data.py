@@ -47,7 +47,7 @@ class Material:
     contract: its mean and std are those of training. kept: columns that vary, of which the first ``held`` are not
     predicted. mirrored, signs: see PredictorConfig. poses: whether all channels are poses, which can be played
     backwards and faster or slower; velocities cannot. about: what the manifest says of the data. validation: sequences
-    that were kept back.
+    that were kept back. layout: of text files.
     """
 
     contract: MotionContract
@@ -62,6 +62,7 @@ class Material:
     licence: str = ""
     about: dict[str, Any] = field(default_factory=dict)
     validation: Sequence[NDArray[np.float32]] = ()
+    layout: Layout | None = None
 
 
 def expmap_material(corpus: ExpmapCorpus, kept_back: Sequence[str] = ()) -> Material:
@@ -94,6 +95,7 @@ def expmap_material(corpus: ExpmapCorpus, kept_back: Sequence[str] = ()) -> Mate
         licence=CMU_LICENCE if layout.name.startswith("cmu") else "Human3.6M, research use only",
         about=about,
         validation=validation,
+        layout=layout,
     )
 
 

@@ -3,11 +3,16 @@
 from collections.abc import Mapping
 from typing import Any
 
-from motet_train.models import convseq2seq
+from motet_train.models import convseq2seq, lstm_3lr, lstm_ae, rrnn, srnn
 from motet_train.models.stepwise import Stepwise, System
 
 SYSTEMS: Mapping[str, tuple[type[Any], type[Any]]] = {
     "convseq2seq": (convseq2seq.ConvSeq2Seq, convseq2seq.Config),
+    "rrnn": (rrnn.RRNN, rrnn.Config),
+    "erd": (lstm_3lr.EncoderRecurrentDecoder, lstm_3lr.ERDConfig),
+    "lstm-3lr": (lstm_3lr.EncoderRecurrentDecoder, lstm_3lr.Config),
+    "srnn": (srnn.SRNN, srnn.Config),
+    "lstm-ae": (lstm_ae.LSTMAE, lstm_ae.Config),
 }
 """Name -> the system and its configuration, a dataclass."""
 

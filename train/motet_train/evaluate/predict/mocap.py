@@ -15,7 +15,7 @@ from motet_train.evaluate.predict.report import ZERO
 from motet_train.evaluate.table import Report
 
 Distances = dict[str, dict[str, Array]]
-"""Measure -> system -> mean distance (N,) in centimetres at each predicted frame."""
+"""System -> measure -> mean distance (N,) in centimetres at each predicted frame."""
 
 PLACE, POSE = "place_cm", "pose_cm"
 """Of joints in the world, and of joints relative to the root's place."""
@@ -48,7 +48,7 @@ def distances(models: Mapping[str, PredictModel], trials: Sequence[Trial]) -> Di
     if not found[ZERO]:
         raise DataError(f"the trials are shorter than {first.seed_frames + first.horizon} frames at the model's rate")
     means = {name: np.mean(windows, axis=0) for name, windows in found.items()}
-    return {measure: {name: mean[n] for name, mean in means.items()} for n, measure in enumerate((PLACE, POSE))}
+    return {name: {PLACE: mean[0], POSE: mean[1]} for name, mean in means.items()}
 
 
 def _places(motion: Motion) -> Array:
@@ -63,32 +63,42 @@ def _distance(found: Array, truth: Array) -> tuple[Array, Array]:
     return world, np.linalg.norm(relative, axis=-1).mean(axis=-1)
 
 
-def strips(models: Mapping[str, PredictModel], motion: Motion) -> dict[str, Motion]:
-    """One horizon from the middle of a motion: what was, and what each model says. Models are as above."""
+def strips(models: Mapping[str, PredictModel], motion: Motion, every: int) -> dict[str, Array]:
+    """One horizon from the middle of a motion: what was, and what each model says, one frame in ``every``.
+
+    Places (K, J, 3) as :func:`motet_train.evaluate.predict.plots.stick_figures` takes them: the root moves up and down
+    only. Models are as above.
+    """
     first = next(iter(models.values()))
     whole = ending(motion, first.fps)
     middle = max(first.seed_frames, (len(whole) - first.horizon) // 2)
-    predicted = {name: model.predict(whole[:middle], first.horizon) for name, model in models.items()}
-    return {"truth": whole[middle:][: first.horizon], **predicted}
+    found = {"truth": whole[middle:][: first.horizon]}
+    found |= {name: model.predict(whole[:middle], first.horizon) for name, model in models.items()}
+    return {name: _in_place(positions(predicted)[::every]) for name, predicted in found.items()}
+
+
+def _in_place(points: Array) -> Array:
+    result: Array = points - points[:, :1] * [1, 0, 1]
+    return result
 
 
 def table(found: Distances, fps: float) -> str:
     """The distances as text, one block for each measure."""
-    width = max(22, *(len(name) + 2 for name in found[PLACE]))
+    width = max(22, *(len(name) + 3 for name in found))
     lines = [
         f"{'output frame':<{width}}" + "".join(f"{frame:>7}" for frame in REPORTED),
         f"{'milliseconds':<{width}}" + "".join(f"{(frame + 1) / fps * 1000:>7.0f}" for frame in REPORTED),
     ]
     for measure, title in ((PLACE, "joints in the world, cm"), (POSE, "joints relative to the root, cm")):
         lines.append(title)
-        for name, values in found[measure].items():
-            lines.append(f"  {name:<{width - 2}}" + "".join(f"{values[frame]:>7.1f}" for frame in REPORTED))
+        for name, values in found.items():
+            lines.append(f"  {name:<{width - 2}}" + "".join(f"{values[measure][frame]:>7.1f}" for frame in REPORTED))
     return "\n".join(lines)
 
 
 def to_json(found: Distances, name: str) -> Report:
     """The distances of one system: measure -> "frame_1" and so on."""
     return {
-        measure: {f"frame_{frame}": round(float(systems[name][frame]), 4) for frame in REPORTED}
-        for measure, systems in found.items()
+        measure: {f"frame_{frame}": round(float(error[frame]), 4) for frame in REPORTED}
+        for measure, error in found[name].items()
     }

@@ -1,6 +1,6 @@
-"""The table of the protocol: each model and the zero-velocity baseline, for each action and on average."""
+"""The figures of the protocol: of each model and the zero-velocity baseline, for each action and on average."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -8,16 +8,8 @@ from motet.predict import PredictModel
 from motet.rotations import Array
 from motet_train.data.errors import DataError
 from motet_train.data.expmap_files import ExpmapCorpus, scaling_of
-from motet_train.evaluate.predict.protocol import (
-    LABELS,
-    OUTPUT_FRAMES,
-    REPORTED,
-    Predictor,
-    evaluate,
-    true_times,
-    zero_velocity,
-)
-from motet_train.evaluate.predict.published import FRAMES, GOAL, rows
+from motet_train.evaluate.predict.protocol import OUTPUT_FRAMES, REPORTED, Predictor, evaluate, zero_velocity
+from motet_train.evaluate.predict.rows import Row, mean, pooled
 
 COUNTS = (8, 256)
 """Windows of each action: as many as papers take, and enough for a figure without much noise."""
@@ -29,9 +21,12 @@ Curves = dict[int, dict[str, dict[str, Array]]]
 """Windows of each action -> system -> action, or MEAN -> error (25,)."""
 
 
-def curves(models: Mapping[str, PredictModel], corpus: ExpmapCorpus) -> Curves:
+def curves(
+    models: Mapping[str, PredictModel], corpus: ExpmapCorpus, progress: Callable[[str], object] = lambda name: None
+) -> Curves:
     """The errors of all systems. The mean is that of the actions that are :func:`complete`.
 
+    progress: is told each system that has been measured, once for each of :data:`COUNTS`.
     DataError where there is no test file, or a model is not one of this corpus.
     """
     if not corpus.test:
@@ -39,12 +34,14 @@ def curves(models: Mapping[str, PredictModel], corpus: ExpmapCorpus) -> Curves:
     scaling = scaling_of(corpus.train)
     test = {action: list(files.values()) for action, files in corpus.test.items()}
     systems: dict[str, Predictor] = {ZERO: zero_velocity}
-    systems |= {name: _predictor(name, model, corpus) for name, model in models.items()}
+    systems |= {name: predictor(name, model, corpus) for name, model in models.items()}
     found: Curves = {}
     for count in COUNTS:
-        found[count] = {name: evaluate(system, test, scaling, count) for name, system in systems.items()}
-        for errors in found[count].values():
+        found[count] = {}
+        for name, system in systems.items():
+            errors = found[count][name] = evaluate(system, test, scaling, count)
             errors[MEAN] = np.mean([errors[action] for action in complete(corpus)], axis=0)
+            progress(name)
     return found
 
 
@@ -54,7 +51,8 @@ def complete(corpus: ExpmapCorpus) -> list[str]:
     return [action for action in corpus.test if action not in gaps] or list(corpus.test)
 
 
-def _predictor(name: str, model: PredictModel, corpus: ExpmapCorpus) -> Predictor:
+def predictor(name: str, model: PredictModel, corpus: ExpmapCorpus) -> Predictor:
+    """What a model says of windows of a corpus; DataError where it is not one of that corpus."""
     if len(model.contract.channels) != corpus.layout.columns or model.contract.skeleton is not None:
         raise DataError(f"{name} is no model of these text files: it has {len(model.contract.channels)} channels")
 
@@ -64,35 +62,9 @@ def _predictor(name: str, model: PredictModel, corpus: ExpmapCorpus) -> Predicto
     return predict
 
 
-def table(found: Curves, corpus: ExpmapCorpus) -> str:
-    """The table as text: frames and true times above, published rows and the goal below the means."""
-    layout, width = corpus.layout, max(34, *(len(name) for name in found[COUNTS[0]]))
-    true = "".join(f"{time:>7.0f}" for time in true_times(layout.fps))
-    lines = [
-        f"{'output frame':<{width}}" + "".join(f"{frame:>7}" for frame in REPORTED),
-        f"{'milliseconds, true':<{width}}{true}",
-        f"{'milliseconds, as papers label them':<{width}}" + "".join(f"{label:>7}" for label in LABELS),
-    ]
-    for count, systems in found.items():
-        lines.append(f"\n{count} windows of each action")
-        for action in next(iter(systems.values())):
-            title = f"mean of {', '.join(complete(corpus))}" if action == MEAN else action
-            lines += [title, *(_line(name, errors[action], width) for name, errors in systems.items())]
-    lines.append("\npublished means, 8 windows")
-    lines += [_published(name, values, width) for name, values in rows(layout.name).items()]
-    if layout.name.startswith("cmu"):
-        lines.append(_published("goal", GOAL, width))
-    return "\n".join(lines)
-
-
-def _line(name: str, errors: Array, width: int) -> str:
-    return f"  {name:<{width - 2}}" + "".join(f"{errors[frame]:>7.2f}" for frame in REPORTED)
-
-
-def _published(name: str, values: tuple[float, ...], width: int) -> str:
-    known = dict(zip(FRAMES, values, strict=True))
-    cells = (f"{known[frame]:>7.2f}" if np.isfinite(known.get(frame, np.nan)) else " " * 7 for frame in REPORTED)
-    return f"  {name:<{width - 2}}" + "".join(cells)
+def by_row(found: Curves, rows: Sequence[Row], how: Callable[[Sequence[Array]], Array] = mean) -> Curves:
+    """The same with rows in place of runs, see :func:`motet_train.evaluate.predict.rows.pooled`."""
+    return {count: pooled(systems, rows, how) for count, systems in found.items()}
 
 
 def to_json(found: Curves, name: str) -> dict[str, dict[str, dict[str, float]]]:

@@ -1,0 +1,52 @@
+"""The recurrent systems' encoder and step as ONNX graphs: what torch computes, call by call and over a free run."""
+
+from collections.abc import Callable
+
+import numpy as np
+import onnx
+import pytest
+import torch
+
+from motet.decode.rollout import free_run
+from motet.graph import OnnxGraph
+from motet_export.exporter import export_graph
+from motet_export.parity import check_carried, check_one_step
+from motet_train.models import lstm_3lr, lstm_ae, rrnn
+from motet_train.models.lstm_3lr import EncoderRecurrentDecoder
+from motet_train.models.lstm_ae import LSTMAE
+from motet_train.models.rrnn import RRNN
+from motet_train.models.stepwise import Stepwise, System
+from motet_train.torch_graph import TorchGraph
+
+SEED, CHANNELS = 6, 7
+KEPT = (0, 1, 3, 4, 6)
+SYSTEMS: dict[str, Callable[[], System]] = {
+    "rrnn": lambda: RRNN(rrnn.Config(5, 9)),
+    "erd": lambda: EncoderRecurrentDecoder(lstm_3lr.ERDConfig(5, (7, 6), 2, 8, (7, 4))),
+    "lstm_3lr, filtered": lambda: LSTMAE(lstm_ae.Config(5, (7,), 2, 6, autoencoder=(9, 4, 9))),
+}
+
+
+@pytest.mark.parametrize("kind", SYSTEMS)
+def test_graphs_compute_what_torch_computes(kind: str) -> None:
+    torch.manual_seed(0)
+    net = Stepwise(SYSTEMS[kind](), CHANNELS, KEPT, SEED).eval()
+    net.mean += torch.randn(5)
+    net.scale += torch.rand(5)
+    graphs = net.graphs()
+    pairs = {}
+    for role, (module, spec) in graphs.items():
+        data = export_graph(module, spec, {"role": role})
+        assert role != "step" or not {"Scan", "Loop", "If"} & {
+            n.op_type for n in onnx.load_from_string(data).graph.node
+        }
+        pairs[role] = OnnxGraph(data, spec), TorchGraph(module, spec)
+        check_one_step(role, *pairs[role])
+    check_carried(*pairs["step"])
+    seed = np.random.default_rng(0).normal(size=(3, SEED, CHANNELS)).astype(np.float32)
+    found, expected = (free_run(*run, seed, 20, 10) for run in zip(pairs["encoder"], pairs["step"], strict=True))
+    np.testing.assert_allclose(found, expected, atol=1e-5)
+    again = free_run(pairs["encoder"][0], pairs["step"][0], seed, 10, 10)
+    with torch.no_grad():
+        np.testing.assert_allclose(again, net(torch.from_numpy(seed), 10).numpy(), atol=1e-5)
+    np.testing.assert_array_equal(found[:, :, [2, 5]], np.repeat(seed[:, -1:, [2, 5]], 20, axis=1))

@@ -1,0 +1,281 @@
+"""The table of systems that predict: rows of several seeds, published rows, ablations, costs and stick figures."""
+
+import json
+import zipfile
+from dataclasses import asdict, replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from test_predict_data import write_files
+
+from motet.errors import MotionError
+from motet.formats import read_motion
+from motet.heading import heading
+from motet.kinematics import local_rotations, positions
+from motet.predict import PredictModel
+from motet.rotations import axis_to_rotmat, rotmat_to_rotvec, rotvec_to_rotmat
+from motet_train.cli.evaluate_predict import predict_reports
+from motet_train.data.clips import CMU as CLIPS
+from motet_train.data.expmap_files import CMU, H36M, ExpmapCorpus, Layout, parse, read_expmap
+from motet_train.data.predict_data import expmap_material
+from motet_train.evaluate.predict import published
+from motet_train.evaluate.predict.ablations import ablated, ablations
+from motet_train.evaluate.predict.costs import costs
+from motet_train.evaluate.predict.plots import _looks
+from motet_train.evaluate.predict.protocol import windows
+from motet_train.evaluate.predict.published_h36m import CONV, ERD, RRNN
+from motet_train.evaluate.predict.report import COUNTS, MEAN, ZERO, Curves
+from motet_train.evaluate.predict.rows import Row, mean, pooled, rows_of, spread
+from motet_train.evaluate.predict.strips import EVERY, GIVEN, places, strips
+from motet_train.evaluate.predict.table import table
+from motet_train.models.convseq2seq import Config
+from motet_train.models.systems import stepwise
+from motet_train.runs import Run
+
+FIVE = ("basketball", "jumping", "running", "soccer", "walking")
+SKELETON = read_motion(CLIPS / "39_14.amc").skeleton
+assert SKELETON is not None
+
+
+def manifest(seed: int | None, model: str = "convseq2seq", recipe: dict[str, Any] | None = None, **system: Any) -> Any:
+    """A model of which nothing but its manifest is asked."""
+    training = {"recipe": {"steps": 5, **(recipe or {})}, "data": {}, "parameters": 12345, "machine": "M, CPU"}
+    seeded = {} if seed is None else {"seed": seed, "seconds": 10.0 * seed, "threads": 1}
+    settings = {"window": 20, "kernel": [2, 7], "padding": "valid", "long_term": "convolutional", **system}
+    config = {"channels": 117, "system": settings}
+    return SimpleNamespace(manifest={"model": model, "config": config, "training": {**training, **seeded}})
+
+
+def constant(**values: float) -> Curves:
+    """Systems of a constant error, in all actions."""
+    return {
+        count: {name: {part: np.full(25, value) for part in (*FIVE, MEAN)} for name, value in values.items()}
+        for count in COUNTS
+    }
+
+
+def line(text: str, start: str) -> str:
+    return next(line for line in text.splitlines() if line.strip().startswith(start))
+
+
+@pytest.mark.parametrize("layout", ["cmu-expmap", "h36m-expmap"])
+def test_the_published_actions_have_the_published_averages(layout: str) -> None:
+    actions, known = published.by_action(layout), published.averages(layout)
+    found = published.mean_over(actions, actions)
+    assert set(found) == {RRNN, CONV}
+    for name, values in found.items():
+        np.testing.assert_allclose(values, known[name], atol=0.0075)  # tables have two decimals
+
+
+def test_the_published_mean_of_the_complete_actions() -> None:
+    found = published.mean_over(published.CMU, FIVE)
+    assert [f"{value:.2f}" for value in found[CONV]] == ["0.33", "0.50", "0.83", "0.94", "1.39"]
+    assert [f"{value:.3f}" for value in found[RRNN]] == ["0.406", "0.632", "1.036", "1.172", "1.556"]
+    assert published.mean_over(published.CMU, ("walking", "unheard of")) == {}
+    assert set(published.by_action(H36M.name)) == set(H36M.test)
+    assert set(published.by_action(CMU.name)) == set(CMU.test)
+
+
+def test_runs_that_differ_in_the_seed_alone_are_one_row() -> None:
+    models = {
+        "runs/conv-4x4-0": manifest(0),
+        "runs/rrnn-0": manifest(0, "rrnn"),
+        "runs/conv-4x4-1": manifest(1),
+        "runs/none-0": manifest(0, long_term="none"),
+        "bundle.zip": manifest(0),  # the first run again
+        "runs/short-1": manifest(1, recipe={"steps": 4}),
+        "old": manifest(None),
+        "older": manifest(None),
+    }
+    assert [(row.title, row.runs) for row in rows_of(models)] == [
+        ("conv-4x4 (2 seeds)", ("runs/conv-4x4-0", "runs/conv-4x4-1")),
+        ("rrnn-0", ("runs/rrnn-0",)),
+        ("none-0", ("runs/none-0",)),
+        ("bundle.zip", ("bundle.zip",)),
+        ("short-1", ("runs/short-1",)),
+        ("old", ("old",)),
+        ("older", ("older",)),
+    ]
+
+
+def test_titles_stay_different() -> None:
+    same = {"a/x-0": manifest(0), "b/x-0": manifest(0, window=5)}
+    assert [row.title for row in rows_of(same)] == ["a/x-0", "b/x-0"]
+    stems = {f"x-{n}": manifest(n, window=5 if n > 1 else 20) for n in range(4)}
+    assert [row.title for row in rows_of(stems)] == ["x-0 (2 seeds)", "x-2 (2 seeds)"]
+    apart = {"one": manifest(0), "two": manifest(1)}
+    assert [row.title for row in rows_of(apart)] == ["one (2 seeds)"]
+
+
+def test_rows_are_means_and_spreads() -> None:
+    errors = {
+        name: {"walking": values} for name, values in zip("zabc", np.random.default_rng(0).random((4, 25)), strict=True)
+    }
+    rows = [Row("ac (2 seeds)", ("a", "c")), Row("b", ("b",))]
+    one, other = errors["a"]["walking"], errors["c"]["walking"]
+    found, apart = pooled(errors, rows, mean), pooled(errors, rows, spread)
+    assert list(found) == ["z", "ac (2 seeds)", "b"]
+    np.testing.assert_allclose(found["ac (2 seeds)"]["walking"], (one + other) / 2)
+    np.testing.assert_allclose(apart["ac (2 seeds)"]["walking"], np.abs(one - other))
+    np.testing.assert_array_equal(found["b"]["walking"], errors["b"]["walking"])
+    assert not apart["b"]["walking"].any()
+
+
+def shown(layout: Layout, actions: tuple[str, ...]) -> str:
+    found: Curves = {count: {ZERO: {part: np.ones(25) for part in (*actions, MEAN)}} for count in COUNTS}
+    return table(found, ExpmapCorpus(layout, {}, {action: {} for action in actions}, ()))
+
+
+def test_published_rows_stand_under_ours() -> None:
+    few, many = shown(CMU, FIVE).split("256 windows of each action")
+    blocks = few.split("mean of basketball, jumping, running, soccer, walking")
+    jumping = blocks[0].split("jumping\n")[1].split("running\n")[0].splitlines()
+    assert [one.split() for one in jumping[0:2]] == [
+        ["zero", "velocity", *["1.00"] * 6],
+        ["published:", "RRNN", "(Martinez", "2017)", "0.56", "0.88", "1.77", "2.02", "2.40"],
+    ]
+    assert jumping[2].endswith("   0.39   0.60   1.36   1.56          2.01")
+    assert line(blocks[1], f"published: {CONV}").endswith("   0.33   0.50   0.83   0.94          1.39")
+    measured, averages = many.split("average of all 8 actions")
+    assert "published" not in measured
+    assert line(averages, "published: LTD").endswith("   0.25   0.39   0.68   0.79          1.33")
+    assert line(averages, "goal  ").endswith("   0.26   0.40   0.68   0.78          1.25")
+    assert len({len(one) for one in few.splitlines() if "." in one}) == 1
+
+
+def test_published_rows_of_human36m() -> None:
+    text = shown(H36M, ("walking", "posing"))
+    assert line(text, f"published: {ERD}").endswith("   0.93   1.18   1.59   1.78" + " " * 14)
+    ours, *papers = text.split("mean of walking, posing\n")[1].splitlines()[:3]
+    assert (ours.split()[:2], papers[0].split()[1], papers[1].split()[1]) == (
+        ["zero", "velocity"],
+        "RRNN",
+        "ConvSeq2Seq",
+    )
+    assert [float(cell) for cell in papers[1].split()[-5:]] == pytest.approx(
+        [0.31, 0.57, 0.90, 1.05, 1.785], abs=0.0051
+    )
+    assert "goal" not in text
+
+
+def test_ablations_say_what_differs_from_the_first() -> None:
+    models = {
+        "small": manifest(0, "trajectory"),
+        "c-0": manifest(0, recipe={"adversary": 0.01}),
+        "c-1": manifest(1, recipe={"adversary": 0.01}),
+        "d": manifest(0, recipe={"adversary": 0.01}, long_term="none"),
+        "e": manifest(0, recipe={"adversary": 0.01}, long_term="recurrent"),
+        "f-0": manifest(0, recipe={"adversary": 0.01}, kernel=[4, 4], padding="same"),
+        "f-1": manifest(1, recipe={"adversary": 0.01}, kernel=[4, 4], padding="same"),
+        "g": manifest(0, recipe={"adversary": 0}, window=5),
+    }
+    rows = rows_of(models)
+    said = ablated(models, rows)
+    assert said == {
+        "c (2 seeds)": "c (2 seeds), as it is",
+        "d": "without long-term encoder",
+        "e": "LSTM encoder",
+        "f (2 seeds)": "kernel 4x4, padding same (2 seeds)",
+        "g": "window 5, without adversary",
+    }
+    found = constant(**dict(zip(said, (0.5, 0.625, 0.75, 0.875, 1.0), strict=True)))
+    found[256]["g"][MEAN] = np.arange(25.0)
+    text = ablations(found, said)
+    assert line(text, "without long").split()[-10:] == ["0.62"] * 10
+    assert line(text, "window 5").split()[-10:] == ["1.00"] * 5 + ["1.00", "3.00", "7.00", "9.00", "24.00"]
+    assert ablated(models, rows[:2]) == {}  # a single row of the model shows no difference
+
+
+def test_costs_are_those_of_the_manifests() -> None:
+    models = {"c-1": manifest(1), "c-2": manifest(2), "old": manifest(None)}
+    text = costs(models, rows_of(models))
+    assert line(text, "c (2 seeds)").split()[3:] == ["12,345", "15", "M,", "CPU,", "threads:", "1"]
+    assert line(text, "old").split() == ["old", "12,345", "M,", "CPU"]
+
+
+def test_twenty_systems_look_different() -> None:
+    looks = _looks([ZERO, *(str(n) for n in range(20))])
+    assert len({(look["color"], look.get("linestyle")) for look in looks.values()}) == 21
+
+
+def test_places_are_those_of_the_motion() -> None:
+    motion = read_motion(CLIPS / "39_14.amc")[:60]
+    vectors = rotmat_to_rotvec(local_rotations(motion).swapaxes(-1, -2))
+    frames = np.concatenate([np.full((60, 3), 7.0), vectors.reshape(60, -1)], axis=1)
+    points = positions(motion)
+    turned = axis_to_rotmat("y", -heading(motion))[:, None] @ (points - points[:, :1])[..., None]
+    np.testing.assert_allclose(places(frames, SKELETON), turned[..., 0], atol=1e-9)
+    with pytest.raises(MotionError, match="99 columns do not fit a skeleton of 38 joints"):
+        places(frames[:, :99], SKELETON)
+
+
+def test_text_files_hold_the_rotations_of_their_trials(shared: Path, cmu: Path) -> None:
+    for group, trial in (("walking", "35_01"), ("soccer", "11_01")):
+        with zipfile.ZipFile(shared / "cmu-expmap.zip") as archive:
+            text = archive.read(f"test/{group}/{group}_1.txt").decode()
+        frames = parse(text, group, 117)[1:]
+        motion = read_motion(cmu / "amc" / f"{trial}.amc")[: len(frames)]
+        vectors = frames[: len(motion), 3:].reshape(len(motion), 38, 3)
+        found, expected = rotvec_to_rotmat(vectors).swapaxes(-1, -2), local_rotations(motion)
+        np.testing.assert_allclose(found[:, 1:], expected[:, 1:], atol=0.02)  # another order or axis is off by .2
+
+
+def saved(folder: Path, data: Path, seed: int, **settings: Any) -> Path:
+    """The run of a small convolutional predictor that has not been trained."""
+    material = expmap_material(read_expmap(data))
+    torch.manual_seed(seed)
+    sizes = Config(len(material.kept), filters=(2, 2, 2), units=4)
+    config = {
+        "channels": 117,
+        "kept": list(material.kept),
+        "seed_frames": 50,
+        "system": asdict(replace(sizes, **settings)),
+    }
+    config = json.loads(json.dumps(config))
+    net = stepwise("convseq2seq", config)
+    training = {"seed": seed, "recipe": {}, "data": material.about, "parameters": 1, "seconds": 1.0}
+    parts = {"name": folder.name, "version": "1", "verb": "predict", "model": "convseq2seq"}
+    more = {"motion": material.contract.to_json(), "defaults": {"horizon": 25}, "config": config, "licence": {}}
+    folder.mkdir()
+    Run({**parts, **more, "training": training}, net.eval()).save(folder)
+    return folder
+
+
+def loaded(run: Path) -> PredictModel:
+    found = Run.load(run)
+    return PredictModel(found.manifest, found.torch_graphs())
+
+
+def test_all_runs_are_evaluated_at_once(tmp_path: Path) -> None:
+    data = write_files(tmp_path / "data", actions=("running",))
+    runs = [saved(tmp_path / f"conv-{n}", data, n) for n in range(2)]
+    runs.append(saved(tmp_path / "none-0", data, 0, long_term="none"))
+    found, text = predict_reports({str(run): loaded(run) for run in runs}, data, tmp_path / "plots")
+    assert {path.name for path in (tmp_path / "plots").iterdir()} == {"predict-error.png", "predict-running.png"}
+    assert "  without long-term encoder  " in text
+    assert line(text, "none-0")
+    assert json.loads(json.dumps(found)) == found
+    assert set(found) == {*map(str, runs), "grouped"}
+    assert set(found[str(runs[0])]) == {"windows_8", "windows_256", "zero_velocity"}
+    (title, grouped), *others = found["grouped"].items()
+    assert (title, others, grouped["runs"]) == ("conv (2 seeds)", [], [str(run) for run in runs[:2]])
+    one, other = (found[str(run)]["windows_8"]["running"]["frame_9"] for run in runs[:2])
+    assert one != other
+    assert grouped["windows_8"]["running"]["frame_9"] == pytest.approx((one + other) / 2, abs=2e-6)
+    assert grouped["spread"]["windows_8"]["running"]["frame_9"] == pytest.approx(abs(one - other), abs=2e-6)
+
+
+def test_strips_are_seed_frames_and_what_follows(tmp_path: Path) -> None:
+    data = write_files(tmp_path / "data")
+    corpus = read_expmap(data)
+    found = strips({"run": loaded(saved(tmp_path / "run", data, 0))}, corpus, "walking", SKELETON)
+    window = windows(corpus.test["walking"]["test/walking/walking_1.txt"])[0]
+    assert [points.shape for points in found.values()] == [(GIVEN + 13, 38, 3)] * 2
+    np.testing.assert_allclose(found["truth"][GIVEN - 1], places(window[50 - EVERY], SKELETON))
+    np.testing.assert_allclose(found["truth"][-1], places(window[-1], SKELETON))
+    np.testing.assert_array_equal(found["run"][:GIVEN], found["truth"][:GIVEN])
+    assert np.abs(found["run"][GIVEN:] - found["truth"][GIVEN:]).max(axis=(1, 2)).min() > 0

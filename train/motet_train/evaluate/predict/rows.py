@@ -1,0 +1,104 @@
+"""Rows of a table: runs that differ in nothing but their seed are one row."""
+
+import json
+import re
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from motet.predict import PredictModel
+from motet.rotations import Array
+
+SEED = re.compile(r"[-_. ]?(seed)?\d+$")
+"""How the name of a run ends that says its seed."""
+
+Errors = Mapping[str, Mapping[str, Array]]
+"""Run or row, or the baseline -> action or measure -> error at each predicted frame (N,)."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """A line of a table: its title, and the runs whose mean it is, by the names they were given by."""
+
+    title: str
+    runs: tuple[str, ...]
+
+    @property
+    def count(self) -> str:
+        """What is said of several runs behind a name."""
+        return _count(self.runs)
+
+
+def rows_of(models: Mapping[str, PredictModel]) -> list[Row]:
+    """The rows of some models by name, in their order.
+
+    Runs of equal model, config, recipe and data are one row; another one with the same seed is a row of its own.
+    """
+    groups: dict[tuple[str, int], list[str]] = {}
+    seen: Counter[tuple[str, Any]] = Counter()
+    for name, model in models.items():
+        training = model.manifest.get("training", {})
+        system = _system(model.manifest) if "seed" in training else name
+        twins = seen[system, training.get("seed")]
+        seen[system, training.get("seed")] += 1
+        groups.setdefault((system, twins), []).append(name)
+    together = [tuple(names) for names in groups.values()]
+    return [Row(title, runs) for title, runs in zip(_titles(together), together, strict=True)]
+
+
+def _system(manifest: Mapping[str, Any]) -> str:
+    """What all seeds of a system have in common."""
+    training = manifest["training"]
+    parts = manifest.get("model"), manifest.get("config"), training.get("recipe"), training.get("data")
+    return json.dumps(parts, sort_keys=True)
+
+
+def _titles(together: Sequence[tuple[str, ...]]) -> list[str]:
+    """Names without folders where they stay different, of several runs without their seed and with their number."""
+    names = [name for runs in together for name in runs]
+    short = {name: Path(name).name or name for name in names}
+    if len(set(short.values())) < len(names):
+        short = {name: name for name in names}
+    first = [short[runs[0]] for runs in together]
+    stems = [_stem([short[name] for name in runs]) for runs in together]
+    # names of different systems can have a stem in common
+    stems = [one if stems.count(stem) > 1 else stem for one, stem in zip(first, stems, strict=True)]
+    return [stem + _count(runs) for stem, runs in zip(stems, together, strict=True)]
+
+
+def _count(runs: Sequence[str]) -> str:
+    return "" if len(runs) == 1 else f" ({len(runs)} seeds)"
+
+
+def _stem(names: Sequence[str]) -> str:
+    """What the names of several runs have in common before their seeds; else the first name."""
+    stems = {SEED.sub("", name) for name in names}
+    return (stems.pop() or names[0]) if len(stems) == 1 < len(names) else names[0]
+
+
+def mean(errors: Sequence[Array]) -> Array:
+    """The mean (N,) of some errors (N,)."""
+    result: Array = np.mean(errors, axis=0)
+    return result
+
+
+def spread(errors: Sequence[Array]) -> Array:
+    """The largest minus the smallest (N,) of some errors (N,)."""
+    result: Array = np.ptp(errors, axis=0)
+    return result
+
+
+def pooled(
+    errors: Errors, rows: Sequence[Row], how: Callable[[Sequence[Array]], Array] = mean
+) -> dict[str, dict[str, Array]]:
+    """The errors with rows, by their titles, in place of runs; what is no run stays in front."""
+    runs = {name for row in rows for name in row.runs}
+    found = {name: dict(parts) for name, parts in errors.items() if name not in runs}
+    for row in rows:
+        parts = errors[row.runs[0]]
+        found[row.title] = {part: how([errors[name][part] for name in row.runs]) for part in parts}
+    return found
