@@ -149,6 +149,12 @@ def test_a_corpus_is_prepared_beside_the_run(tmp_path: Path) -> None:
     assert len(Store.open(tmp_path / "runs" / "mine-store").records) == 12
 
 
+def test_either_loss_can_be_trained(store: Path, tmp_path: Path) -> None:
+    runs = [trained("generate", store, tmp_path / loss, "--loss", loss) for loss in ("surrogate", "likelihood")]
+    assert [run.manifest["config"]["loss"] for run in runs] == ["surrogate", "likelihood"]
+    assert runs[0].manifest["training"]["train_loss"] != runs[1].manifest["training"]["train_loss"]
+
+
 PAPER: list[tuple[Recipe, Callable[[int, int], object], float]] = [
     (describe.PAPER, MotionToLanguageConfig, 8.0),
     (generate.PAPER, LanguageToMotionConfig, 25.0),

@@ -17,6 +17,7 @@ from motet_train.cli.places import command_line, refuse, resumable
 from motet_train.cli.prepare import prepare
 from motet_train.data.store import INDEX, Store
 from motet_train.language import About, Recipe, check_device, train_language
+from motet_train.models.language_to_motion import LOSSES
 
 OPTIONS: tuple[Callable[..., Any], ...] = (
     click.option("--data", type=Path, required=True, help="A prepared store, or a corpus: folder or zip."),
@@ -53,6 +54,7 @@ def describe(**options: Any) -> None:
 
 @click.command()
 @_with_options
+@click.option("--loss", type=click.Choice(list(LOSSES)), help="Eq. 12, or the true likelihood. [default: the preset's]")
 def generate(**options: Any) -> None:
     """Train language to motion: a net that makes a motion from a sentence."""
     _train(generating.RECIPES, **options)
@@ -96,9 +98,17 @@ def _advance(bar: "tqdm[Any]", epoch: int, epochs: int) -> None:
 
 
 def _recipe(
-    recipes: Mapping[str, Recipe], preset: str, epochs: int | None, batch: int | None, mirror: bool | None
+    recipes: Mapping[str, Recipe],
+    preset: str,
+    epochs: int | None,
+    batch: int | None,
+    mirror: bool | None,
+    loss: str | None = None,
 ) -> Recipe:
     recipe = recipes[preset]
+    if loss is not None:
+        config = recipe.config
+        recipe = replace(recipe, config=lambda channels, words: replace(config(channels, words), loss=loss))
     fitting = replace(recipe.fitting, epochs=epochs or recipe.fitting.epochs, batch=batch or recipe.fitting.batch)
     return replace(recipe, fitting=fitting, mirror=recipe.mirror if mirror is None else mirror)
 
