@@ -47,7 +47,7 @@ def _convseq2seq(fitting: Fitting, **sizes: Any) -> Recipe:
 
 CODE = Fitting(steps=20_000, learning_rate=5e-5, decay=(0.99, 10_000), l2=0.0005, adversary=0.01, every=500)
 PAPER = Fitting(steps=20_000, batch=64, l2=0.001, adversary=0.01, every=500)
-SHORT = Fitting(steps=4000, falling=0.7, l2=0.0005, adversary=0.01)
+SHORT = Fitting(steps=3000, falling=0.7, l2=0.0005, adversary=0.01)
 """The code's with the paper's learning rate, which falls: half an hour on a CPU."""
 
 RESIDUAL = Fitting(
@@ -55,7 +55,7 @@ RESIDUAL = Fitting(
 )
 """Of Martinez et al. 2017; it ends when the validation error has stopped falling."""
 
-TAUGHT = Fitting(steps=2000, learning_rate=1e-3, falling=0.5, clip=25.0)
+TAUGHT = Fitting(steps=1500, learning_rate=1e-3, falling=0.5, clip=25.0)
 """Of nets that are taught the next frame: the clipping is that of Jain et al. 2016, who took SGD and more steps."""
 
 
