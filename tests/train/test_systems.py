@@ -1,6 +1,7 @@
 """The published systems from the command line: train, stop and go on, evaluate, export."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,10 @@ from motet.cli import main
 from motet_train.checkpoint import CHECKPOINT
 from motet_train.data.expmap_files import read_expmap
 from motet_train.data.predict_data import expmap_material, validation_files
+from motet_train.models.convseq2seq import Config
+from motet_train.models.systems import SYSTEMS
 from motet_train.runs import Run
-from motet_train.systems import validation_error
+from motet_train.systems import RECIPES, validation_error
 
 
 def run(*arguments: object) -> Result:
@@ -88,6 +91,38 @@ def test_bad_settings_are_named_and_nothing_stays(data: Path, tmp_path: Path) ->
     (tmp_path / "empty").mkdir()
     empty = run("train", "convseq2seq", "--data", tmp_path / "empty", "--out", out)
     assert (empty.exit_code, out.exists()) == (2, False)
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters"),
+    [
+        ("convseq2seq", 3_348_806),
+        ("rrnn", 3_435_590),
+        ("erd", 14_851_670),
+        ("lstm-3lr", 22_117_570),
+        ("lstm-ae", 23_260_140),
+    ],
+)
+def test_the_recipes_have_the_published_sizes(name: str, parameters: int, data: Path) -> None:
+    material = replace(expmap_material(read_expmap(data)), kept=tuple(range(70)))
+    config = RECIPES[name]["default"].config(material)
+    with torch.device("meta"):
+        system = SYSTEMS[name][0](config)
+    assert sum(parameter.numel() for parameter in system.parameters()) == parameters
+
+
+def test_a_structural_net_needs_the_same_columns_left_and_right(data: Path, tmp_path: Path) -> None:
+    found = run("train", "srnn", "--data", data, "--out", tmp_path / "run")
+    assert (found.exit_code, "are not the same ones" in found.stderr) == (2, True)
+
+
+def test_the_presets_are_the_papers_and_its_codes(data: Path) -> None:
+    material = replace(expmap_material(read_expmap(data)), kept=tuple(range(70)))
+    paper, code = RECIPES["convseq2seq"]["paper"], RECIPES["convseq2seq"]["code"]
+    assert (paper.fitting.batch, paper.fitting.learning_rate, paper.fitting.l2) == (64, 2e-4, 0.001)
+    assert (code.fitting.batch, code.fitting.learning_rate, code.fitting.l2) == (16, 5e-5, 0.0005)
+    assert paper.config(material) == Config(70)
+    assert code.config(material) == Config(70, dropout=(0.2, 0.2, 0.5), own=0.95)
 
 
 def test_log_has_a_line_for_each_validation(trained: Path) -> None:

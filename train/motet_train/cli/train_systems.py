@@ -11,8 +11,7 @@ from tqdm import tqdm
 
 from motet_train.cli.places import command_line, refuse, resumable
 from motet_train.cli.train_predict import read_expmap_files
-from motet_train.data.expmap_files import ExpmapCorpus
-from motet_train.data.predict_data import Material, expmap_material, validation_files
+from motet_train.data.predict_data import expmap_material, validation_files
 from motet_train.evaluate.predict.protocol import WINDOW
 from motet_train.language import check_device
 from motet_train.predict import About
@@ -26,6 +25,7 @@ OPTIONS: tuple[Option, ...] = (
     click.option("--steps", type=click.IntRange(1), help="[default: the preset's]"),
     click.option("--batch", type=click.IntRange(1), help="Windows in a batch. [default: the preset's]"),
     click.option("--precision", type=click.Choice(["float32", "bfloat16"]), help="Of products in training."),
+    click.option("--all-files", is_flag=True, help="Keep no training file back, and validate on windows of them all."),
     click.option("--seed", type=click.IntRange(0), default=0, show_default=True),
     click.option("--device", type=click.Choice(["cpu", "cuda"]), default="cpu", show_default=True),
     click.option("--threads", type=click.IntRange(1), default=1, show_default=True),
@@ -64,6 +64,7 @@ def _train(
     recipe: Recipe,
     data: Path,
     out: Path,
+    all_files: bool,
     resume: bool,
     seed: int,
     device: str,
@@ -76,7 +77,8 @@ def _train(
     refuse(out, resume)
     torch.set_num_threads(threads)
     recipe = _changed(recipe, {key: value for key, value in settings.items() if value is not None})
-    material = _material(read_expmap_files(data))
+    corpus = read_expmap_files(data)
+    material = expmap_material(corpus, () if all_files else validation_files(corpus, WINDOW))
     about = About(name or out.name, command_line(), licence)
     with resumable(out), tqdm(total=recipe.fitting.steps, unit=" steps", disable=None) as bar:
         run = train_system(material, recipe, seed, about, out, device, lambda steps, loss: _advance(bar, steps, loss))
@@ -100,10 +102,6 @@ def _changed(recipe: Recipe, settings: Mapping[str, Any]) -> Recipe:
 def _advance(bar: "tqdm[Any]", steps: int, loss: float) -> None:
     bar.set_postfix(loss=f"{loss:.3f}", refresh=False)
     bar.update(steps - bar.n)
-
-
-def _material(corpus: ExpmapCorpus) -> Material:
-    return expmap_material(corpus, validation_files(corpus, WINDOW))
 
 
 TITLES = {
