@@ -29,8 +29,7 @@ class Fitting:
     for every so many steps. l2: the weight of the squared weights, not biases, in the loss. clip: the greatest norm of
     the gradient. adversary: the weight of the discriminator's opinion in the loss (Li et al. 2018, eq. 9). every: steps
     from one validation to the next; training ends when ``patience`` of them in a row brought nothing better. precision:
-    of the products of matrices in training; what is trained is float32. mirror: the share of windows with left
-    and right exchanged.
+    of the products of matrices in training; what is trained is float32.
     """
 
     steps: int = 2000
@@ -45,7 +44,6 @@ class Fitting:
     every: int = 100
     patience: int = 1000
     precision: Literal["float32", "bfloat16"] = "float32"
-    mirror: float = 0.0
 
 
 @dataclass

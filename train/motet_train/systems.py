@@ -95,8 +95,6 @@ def train_system(
     continued, see :func:`motet_train.fit_windows.fit_windows`; RunError where it was started with other settings.
     DataError where the data cannot be trained on.
     """
-    if recipe.fitting.mirror and not material.mirrored:
-        raise DataError("these files do not say what is left and right, so windows cannot be mirrored")
     torch.manual_seed(seed)
     config = recipe.config(material)
     sizes = {"channels": len(material.contract.channels), "kept": list(material.kept), "seed_frames": SEED_FRAMES}
@@ -106,7 +104,7 @@ def train_system(
     write_whole(folder / "run.json", json.dumps(manifest, indent=1) + "\n")
     judge = convseq2seq.Discriminator(config, WINDOW) if recipe.fitting.adversary else None
     learner = Learner(net.to(device), recipe.fitting, judge and judge.to(device))
-    draw = partial(_draw, net, Windows(material, WINDOW, seed, mirror=recipe.fitting.mirror), device)
+    draw = partial(_draw, net, Windows(material, WINDOW, seed), device)
     validate = partial(validation_error, net, material, device)
     fit_windows(learner, draw, validate, seed, folder, progress)
     training = {**manifest["training"], **_results(learner, device)}

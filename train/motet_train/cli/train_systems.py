@@ -25,7 +25,6 @@ OPTIONS: tuple[Option, ...] = (
     click.option("--steps", type=click.IntRange(1), help="[default: the preset's]"),
     click.option("--batch", type=click.IntRange(1), help="Windows in a batch. [default: the preset's]"),
     click.option("--precision", type=click.Choice(["float32", "bfloat16"]), help="Of products in training."),
-    click.option("--mirror", type=click.FloatRange(0, 1), help="Share of windows with left and right exchanged."),
     click.option("--all-files", is_flag=True, help="Keep no training file back, and validate on windows of them all."),
     click.option("--seed", type=click.IntRange(0), default=0, show_default=True),
     click.option("--device", type=click.Choice(["cpu", "cuda"]), default="cpu", show_default=True),
@@ -45,7 +44,7 @@ SWITCHES: tuple[Option, ...] = (
 )
 """Of the ablations; each one's default is the preset's."""
 
-FITTING = ("steps", "batch", "precision", "adversary", "mirror")
+FITTING = ("steps", "batch", "precision", "adversary")
 
 
 def _command(name: str, title: str, switches: tuple[Option, ...] = ()) -> click.Command:
