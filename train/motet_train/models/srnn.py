@@ -25,7 +25,7 @@ NODES = {"spine": 1, "arm": 2, "leg": 2}
 """Type -> its members; of limbs the left one, then the right one."""
 
 EDGES = {"spine": 1, "arm": 2, "leg": 2, "spine_arm": 3, "spine_leg": 3, "arm_arm": 2, "leg_leg": 2}
-"""Type -> its members, the nodes that it leads to; the first three lead from the frame before (paper, figure 5)."""
+"""Type -> its members, the nodes that it leads to; the first three lead from the frame before."""
 
 
 @dataclass(frozen=True)
@@ -208,7 +208,7 @@ def _widths(config: Config) -> dict[str, int]:
 
 
 def _concatenated(now: Tensors, before: Tensors) -> Tensors:
-    """The edges' features: those of both its nodes, summed over the edges of one type that lead to one node (3.2)."""
+    """The edges' features: those of both nodes, summed over edges of one type to one node (the authors' code)."""
     found = {name: torch.cat([before[name], now[name]], dim=-1) for name in NODES}
     for limb in LIMBS:
         pair = now[limb]
