@@ -47,13 +47,19 @@ def _controlled(variety: float, model: ControlModel) -> Decoded:
 def _describe(manifest: Mapping[str, Any], onnx: Graphs, torch: Graphs) -> Runs:
     models = [DescribeModel(manifest, graphs) for graphs in (onnx, torch)]
     return _pairs(
-        models, {"greedy": partial(_described, 1), "beam": partial(_described, 5), "scores": _sentence_scores}
+        models,
+        {
+            "greedy": partial(_described, 1, 0),
+            "beam": partial(_described, 5, 0),
+            "consensus": partial(_described, 5, 50),
+            "scores": _sentence_scores,
+        },
     )
 
 
-def _described(beams: int, model: DescribeModel) -> Decoded:
+def _described(beams: int, draws: int, model: DescribeModel) -> Decoded:
     """Sentences of eight motions: ids of their words and log-probabilities, and the motions' contexts."""
-    found = [row for motion in model.describe(_motions(model), beams) for row in motion]
+    found = [row for motion in model.describe(_motions(model), beams, draws) for row in motion]
     ids = np.zeros((len(found), MAX_WORDS), dtype=np.int64)
     for row, description in zip(ids, found, strict=True):
         if description.text:

@@ -50,6 +50,12 @@ def test_describe_prints_json_for_every_file(files: list[Path]) -> None:
         )
 
 
+def test_describe_draws_sentences_that_agree(files: list[Path]) -> None:
+    rows = json.loads(run("describe", *files, "--beams", 2, "--draws", 50, "--json").stdout)
+    expected = describe_model().describe([read_motion(path) for path in files], 2, draws=50)
+    assert [[h["text"] for h in row["hypotheses"]] for row in rows] == [[d.text for d in row] for row in expected]
+
+
 def test_describe_says_that_it_resampled(files: list[Path]) -> None:
     result = run("describe", *files)
     assert result.stderr == f"motet: {files[1]}: resampled from 40 to 10 fps\n"
@@ -114,6 +120,7 @@ def test_embed(tmp_path: Path, files: list[Path]) -> None:
         (["describe", "{bad}/long.npz"], "long.npz: the motion lasts 31.0 s"),
         (["describe", "{bad}/nan.csv"], "nan.csv"),
         (["describe", "{bad}/good.npz", "--beams", "0"], "beams must be between 1 and 100"),
+        (["describe", "{bad}/good.npz", "--draws", "-1"], "draws must be between 0 and 1000"),
         (["describe", "{bad}/good.npz", "--bundle", "nothing"], "unknown bundle 'nothing'"),
         (["describe", "{bad}/good.npz", "--bundle", "cmu-generate"], "is for 'generate', and one for 'describe'"),
         (["describe"], "Missing argument"),

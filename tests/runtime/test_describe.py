@@ -89,6 +89,41 @@ def test_frames_that_are_not_finite_never_become_a_motion() -> None:
         replace(moving(20), values=values)
 
 
+def drawing(temperature: float) -> DescribeModel:
+    """The model with 30 draws as its default; it is sharp, so that only hot draws differ."""
+    model = describe_model()
+    defaults = {**model.defaults, "draws": 30, "temperature": temperature}
+    return DescribeModel({**model.manifest, "defaults": defaults}, model.graphs)
+
+
+def test_a_motion_is_described_by_draws_as_it_is_alone_and_every_time() -> None:
+    model = drawing(6.0)
+    motions = [moving(3 + i % 7, seed=i) for i in range(21)]  # more than are drawn for at once
+    together = model.describe(motions, beams=4)
+    for motion, row in zip(motions, together, strict=True):
+        assert len({found.text for found in row}) == len(row) == 4
+        (alone,) = model.describe(motion, beams=4)
+        assert [found.text for found in alone] == [found.text for found in row]
+        for found in row:
+            if found.text:
+                assert model.score(motion, found.text) == pytest.approx(found.log_probability, abs=1e-4)
+    assert model.describe([]) == []
+
+
+def test_the_bundle_says_how_hypotheses_are_ranked(model: DescribeModel) -> None:
+    motion, searched = moving(20), model.describe(moving(20))
+    cold, hot = drawing(1.0), drawing(6.0)
+    assert searched == model.describe(motion, draws=0) == hot.describe(motion, draws=0)
+    assert cold.describe(motion) == model.describe(motion, draws=30)  # without a default the temperature is 1
+    assert hot.describe(motion) not in (searched, cold.describe(motion))
+
+
+@pytest.mark.parametrize("draws", [-1, 1001])
+def test_draws_out_of_range(model: DescribeModel, draws: int) -> None:
+    with pytest.raises(DecodingError, match=f"draws must be between 0 and 1000, not {draws}"):
+        model.describe(moving(20), draws=draws)
+
+
 @pytest.mark.parametrize("beams", [0, -1, 101])
 def test_beams_out_of_range(model: DescribeModel, beams: int) -> None:
     with pytest.raises(DecodingError, match=f"beams must be between 1 and 100, not {beams}"):
@@ -140,7 +175,8 @@ def test_batches_and_padding() -> None:
 def test_the_benchmark_measures_sentences_of_one_length() -> None:
     model = describe_model()
     found = figures(model, 0.001)
-    assert set(found) == {"describe.descriptions", "describe.one", "describe.encoder", "describe.step"}
+    parts = ("descriptions", "one", "consensus", "encoder", "step")
+    assert set(found) == {f"describe.{part}" for part in parts}
     assert all(value > 0 for value, _ in found.values())
     step = model.graphs["step"]
     assert isinstance(step, FakeGraph)

@@ -15,15 +15,25 @@ from motet.models import load_as
 @click.argument("motions", nargs=-1, required=True, type=Path)
 @click.option("--bundle", default="cmu-describe", show_default=True, help="Name or path of a bundle.")
 @click.option("--beams", type=int, help="Hypotheses that are kept, and printed. [default: the bundle's]")
+@click.option(
+    "--draws", type=int, help="Sentences that are drawn to agree on one; 0: beam search. [default: the bundle's]"
+)
 @unit_option
 @click.option("--json", "as_json", is_flag=True, help="Print a list with input and hypotheses of each motion.")
-def describe(motions: tuple[Path, ...], bundle: str, beams: int | None, unit_in: str | None, as_json: bool) -> None:
+def describe(
+    motions: tuple[Path, ...],
+    bundle: str,
+    beams: int | None,
+    draws: int | None,
+    unit_in: str | None,
+    as_json: bool,
+) -> None:
     """Describe the motion files MOTIONS: sentences with their log-probabilities, the best first.
 
     Reads .amc (with its .asf) .bvh .npz .csv. All files are described in one batch.
     """
     model = load_as(DescribeModel, bundle)
-    found = model.describe(read_for(model, motions, unit_in), beams)
+    found = model.describe(read_for(model, motions, unit_in), beams, draws)
     if as_json:
         rows = zip(motions, found, strict=True)
         click.echo(json.dumps([{"input": str(path), "hypotheses": list(map(asdict, row))} for path, row in rows]))

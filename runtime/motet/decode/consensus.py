@@ -1,0 +1,55 @@
+"""The sentence that agrees best with all others: minimum Bayes risk decoding (Kumar and Byrne 2004).
+
+From many draws, as Eikema and Aziz (2020) do: "Is MAP decoding all you need?"
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motet.decode.ancestral import Drawn
+from motet.decode.beam import Hypothesis
+
+ORDERS = (1, 2)
+"""Words, and pairs of words that follow each other."""
+
+
+def by_consensus(drawn: Sequence[Drawn]) -> list[Hypothesis]:
+    """The drawn sequences by falling :func:`agreement` with all draws; of equal ones the most probable first."""
+    scores = agreement([one.ids for one in drawn], np.array([one.times for one in drawn]))
+    falling = -scores.round(9)  # what only rounding tells apart is equal
+    order = sorted(range(len(drawn)), key=lambda i: (falling[i], -drawn[i].log_probability))
+    return [Hypothesis(drawn[i].ids, drawn[i].log_probability) for i in order]
+
+
+def agreement(sequences: Sequence[tuple[int, ...]], times: NDArray[np.int64]) -> NDArray[np.float64]:
+    """What each of S sequences has in common with the others and itself, each as often as it came: means (S,), 0 to 1.
+
+    In common: the mean of two F1, of the words and of the pairs that both have.
+    """
+    found = np.zeros(len(sequences))
+    for order in ORDERS:
+        marks = _marks(sequences, order)
+        sizes = marks.sum(axis=1)
+        shared = 2 * (marks @ marks.T) / np.maximum(sizes[:, None] + sizes, 1)
+        found += shared @ (times / times.sum()) / len(ORDERS)
+    return found
+
+
+def _marks(sequences: Sequence[tuple[int, ...]], order: int) -> NDArray[np.float64]:
+    """(S, G) of 0 and 1: whether a sequence has an n-gram for the first, second, ... time.
+
+    The product of two rows is the number of n-grams that both have.
+    """
+    columns: dict[tuple[tuple[int, ...], int], int] = {}
+    places = []
+    for row, ids in enumerate(sequences):
+        seen: Counter[tuple[int, ...]] = Counter()
+        for gram in zip(*(ids[shift:] for shift in range(order)), strict=False):
+            seen[gram] += 1
+            places.append((row, columns.setdefault((gram, seen[gram]), len(columns))))
+    marks = np.zeros((len(sequences), len(columns)))
+    marks[tuple(np.array(places, dtype=np.intp).reshape(-1, 2).T)] = 1
+    return marks
