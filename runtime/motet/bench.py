@@ -98,7 +98,7 @@ def _rate(model: ControlModel, batch: int, variety: float, seconds: float) -> fl
 def describe_figures(model: DescribeModel, seconds: float) -> Figures:
     """Descriptions of :data:`WORDS` words a second, many at once and one alone; encoder and step of one alone.
 
-    By beam search; and one by consensus of :data:`DRAWS` draws, of the lengths that they happen to have.
+    By beam search; and one by consensus of :data:`DRAWS` draws.
     """
     end = model.vocabulary.ids[EOS]
     never = {"log_probabilities": lambda found: np.where(np.arange(found.shape[1]) == end, np.float32(-1e9), found)}
@@ -109,7 +109,7 @@ def describe_figures(model: DescribeModel, seconds: float) -> Figures:
     return {
         "describe.descriptions": (_batch_rate(steady.describe, [motion], 128, seconds), "motions/s"),
         "describe.one": (_milliseconds(lambda: steady.describe(motion), seconds), "ms"),
-        "describe.consensus": (_milliseconds(lambda: model.describe(motion, draws=DRAWS), seconds), "ms"),
+        "describe.consensus": (_milliseconds(lambda: steady.describe(motion, draws=DRAWS), seconds), "ms"),
         "describe.encoder": (_milliseconds(lambda: model.embed(motion), seconds), "ms"),
         "describe.step": (_milliseconds(_step_call(model.graphs["step"]), seconds), "ms"),
     }
