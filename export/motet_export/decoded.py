@@ -85,8 +85,8 @@ def _generated(candidates: int, model: GenerateModel) -> Decoded:
     found = [generated for row in rows for generated in row]
     std = model.contract.std
     return {
-        "frames": np.concatenate([(g.motion.values - model.contract.mean) / std for g in found]),
-        "lengths": np.array([len(g.motion.values) for g in found]),
+        "frames": np.concatenate([(g.drawn.values - model.contract.mean) / std for g in found]),
+        "lengths": np.array([len(g.drawn.values) for g in found]),
         "log_likelihoods": np.array([g.log_likelihood for g in found]),
         "contexts": model.embed(_sentences(model)),
     }

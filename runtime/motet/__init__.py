@@ -30,7 +30,7 @@ from motet.models import load
 from motet.motion import Motion
 from motet.predict import PredictModel, PredictSession
 from motet.root_block import from_root_block, to_root_block
-from motet.root_path import lay_root_path
+from motet.root_path import lay_root_path, plant_feet
 from motet.skeleton import Joint, Skeleton
 from motet.smooth import smooth_resample
 from motet.text import Vocabulary
@@ -67,6 +67,7 @@ __all__ = [
     "list_bundles",
     "load",
     "mirror",
+    "plant_feet",
     "positions",
     "read",
     "smooth_resample",

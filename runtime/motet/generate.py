@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,8 @@ from motet.decode.mixture import Sample, mixture_search
 from motet.errors import DecodingError
 from motet.language import LanguageModel
 from motet.motion import Motion
+from motet.root_block import ROOT_BLOCK
+from motet.root_path import has_feet, plant_feet
 
 BATCH = 64
 """Sentences that are decoded at once; more bring no speed and take memory."""
@@ -19,12 +22,20 @@ BATCH = 64
 class Generated:
     """A motion in the contract's channels, its log-likelihood given the sentence, and the words that were unknown.
 
-    log_likelihood: of the normalised frames and of where the motion ends, as :meth:`GenerateModel.score` gives it.
+    drawn: the motion as it was drawn, whose feet slide.
+    log_likelihood: of the normalised frames as drawn and of where they end, as :meth:`GenerateModel.score` gives it.
+    feet: whether the motion has feet that can be planted, and a root block.
     """
 
-    motion: Motion
+    drawn: Motion
     log_likelihood: float
     unknown: tuple[str, ...] = ()
+    feet: bool = False
+
+    @cached_property
+    def motion(self) -> Motion:
+        """The motion, going where its feet take it (:func:`motet.root_path.plant_feet`)."""
+        return plant_feet(self.drawn) if self.feet else self.drawn
 
 
 class GenerateModel(LanguageModel):
@@ -48,7 +59,7 @@ class GenerateModel(LanguageModel):
 
         How they are found is said in :func:`motet.decode.mixture.mixture_search`.
         candidates: frames that each hypothesis draws in a step; 1 gives independent samples.
-        temperature: of the draws; lower is closer to the centres of the mixture.
+        temperature: of the draws about the centres of the mixture's components; lower trembles less.
         seed: sentence i has seed + i (or seed[i]), and the motions it would have alone with that seed.
         max_seconds: a motion that has not ended by then ends there.
         What is None comes from the bundle. TextError for a sentence that is empty, too long or wholly unknown;
@@ -81,8 +92,13 @@ class GenerateModel(LanguageModel):
         return float(self.graphs["score"](feeds)["log_likelihood"].sum(dtype=np.float64))
 
     def _generated(self, sample: Sample, text: str) -> Generated:
-        frames = sample.frames * self.contract.std + self.contract.mean
-        return Generated(self.contract.motion(frames), sample.log_likelihood, tuple(self.unknown(text)))
+        drawn = self.contract.motion(sample.frames * self.contract.std + self.contract.mean)
+        return Generated(drawn, sample.log_likelihood, tuple(self.unknown(text)), self._feet())
+
+    def _feet(self) -> bool:
+        skeleton = self.contract.skeleton
+        known = skeleton is not None and skeleton.metres_per_unit is not None and has_feet(skeleton)
+        return known and set(ROOT_BLOCK) <= set(self.contract.channels)
 
 
 def _seeds(seed: int | Sequence[int], count: int) -> list[int]:

@@ -23,6 +23,7 @@ import numpy as np
 from motet.errors import MotionError
 from motet.kinematics import positions, skeleton_of, with_channels
 from motet.motion import Motion
+from motet.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS, from_root_block, to_root_block
 from motet.rotations import Array
 from motet.sides import partners_of
 from motet.skeleton import Skeleton
@@ -37,6 +38,8 @@ GENERATED = 0.05  # s: the same for motions that a model generated, whose feet t
 CARRY = 0.05  # s: over which votes are brought together
 TAKE_OFF = 0.05  # s: over which the velocity upwards is measured
 ROUNDS = 10
+TRUST = 0.1  # weight of the velocity that a motion has already; that of a point on the ground is 1
+LOW = 10  # per cent of the frames whose lowest point of the feet is under what counts as the ground
 
 
 def lay_root_path(
@@ -56,26 +59,56 @@ def lay_root_path(
     places = positions(motion)
     points = (places[:, joints] - places[:, :1]) * metres
     height = _height(points[..., 1], motion.fps)
-    velocity = (
-        _velocity(_smooth(points[..., [0, 2]], tremble, motion.fps), points[..., 1] + height[:, None], motion.fps)
-        if len(motion) > 1
-        else np.zeros((0, 2))
-    )
+    plane = _smooth(points[..., [0, 2]], tremble, motion.fps)
+    velocity = _velocity(plane, points[..., 1] + height[:, None], motion.fps) if len(motion) > 1 else np.zeros((0, 2))
+    return _along(motion, velocity, height, metres)
+
+
+def plant_feet(motion: Motion) -> Motion:
+    """A motion with the root block whose figure goes where its feet take it, wherever they are on the ground.
+
+    root.forward and root.left change, nothing else. What they were is one more vote for the velocity, of weight TRUST:
+    it decides in flight, and where hands or a seat carry the figure. The ground is where the feet are at their lowest.
+    MotionError for a motion without the root block, or without a skeleton with feet and a unit of length.
+    """
+    skeleton, placed = skeleton_of(motion), from_root_block(motion)
+    joints, metres = _feet(skeleton), skeleton.unit_factor(1.0)
+    if len(motion) < 2:
+        return motion
+    places = positions(placed) * metres
+    root, feet = places[:, 0], places[:, joints]
+    above = feet[..., 1] - np.percentile(feet[..., 1].min(axis=1), LOW)
+    was = np.diff(root[:, [0, 2]], axis=0) * motion.fps
+    velocity = _velocity((feet - root[:, None])[..., [0, 2]], above, motion.fps, was, TRUST)
+    block = to_root_block(_along(placed, velocity, root[:, 1], metres)).select(ROOT_BLOCK[:2])
+    return with_channels(motion, ROOT_BLOCK[:2], block.values, ROOT_BLOCK_UNITS[:2])
+
+
+def has_feet(skeleton: Skeleton) -> bool:
+    """Whether there are joints in pairs, left and right, to find the feet among."""
+    return bool(_paired(skeleton))
+
+
+def _along(motion: Motion, velocity: Array, height: Array, metres: float) -> Motion:
+    """The motion with its root led by velocities (T - 1, 2) in m/s, from x = z = 0, at heights (T,) in m."""
     path = np.zeros((len(motion), 3))
     path[1:, [0, 2]] = np.cumsum(velocity, axis=0) / motion.fps
     path[:, 1] = height
-    names = tuple(f"{skeleton.names[0]}.{kind}" for kind in ("tx", "ty", "tz"))
+    names = tuple(f"{skeleton_of(motion).names[0]}.{kind}" for kind in ("tx", "ty", "tz"))
     return with_channels(motion, names, path / metres, ("length",) * 3)
 
 
 def _feet(skeleton: Skeleton) -> list[int]:
     """All joints of the two paired branches that lie no higher than a tenth of the figure above its lowest tip."""
-    partners, height = partners_of(skeleton.names), skeleton.rest_positions[:, 1]
-    paired = [i for i, partner in enumerate(partners) if partner != i]
+    paired, height = _paired(skeleton), skeleton.rest_positions[:, 1]
     if not paired:
         raise MotionError("no joints in pairs, left and right, to find the feet among: name the joints of the feet")
     limit = height[paired].min() + 0.1 * skeleton.height
     return [i for i in paired if height[i] <= limit]
+
+
+def _paired(skeleton: Skeleton) -> list[int]:
+    return [i for i, partner in enumerate(partners_of(skeleton.names)) if partner != i]
 
 
 def _height(points: Array, fps: float) -> Array:
@@ -99,17 +132,20 @@ def _with_flight(standing: Array, fps: float) -> Array:
     return np.array(heights)
 
 
-def _velocity(points: Array, above: Array, fps: float) -> Array:
-    """Velocity (T - 1, 2) in m/s of the root, from points of the feet (T, K, 2) and their heights (T, K)."""
+def _velocity(points: Array, above: Array, fps: float, guess: Array | float = 0.0, trust: float = 1e-12) -> Array:
+    """Velocity (T - 1, 2) in m/s of the root, from points of the feet (T, K, 2) and their heights (T, K).
+
+    guess: (T - 1, 2) in m/s, a vote of weight ``trust`` that always counts.
+    """
     between = (above[1:] + above[:-1]) / 2
     near = np.exp(-0.5 * (between / REACH) ** 2)
     votes = -np.diff(points, axis=0) * fps
-    velocity = _agreed(votes, near, fps)
+    velocity = _agreed(votes, near, fps, guess, trust)
     for _ in range(ROUNDS):
         off = votes - velocity[:, None]
         faster = (off * velocity[:, None]).sum(axis=-1) > 0
         slip = np.where(faster, FASTER * SLIP, SLIP)
-        velocity = _agreed(votes, near / (1 + (off**2).sum(axis=-1) / slip**2) ** 2, fps)
+        velocity = _agreed(votes, near / (1 + (off**2).sum(axis=-1) / slip**2) ** 2, fps, guess, trust)
     return velocity
 
 
@@ -124,11 +160,12 @@ def _smooth(points: Array, tremble: float, fps: float) -> Array:
     return smoothed
 
 
-def _agreed(votes: Array, weights: Array, fps: float) -> Array:
-    """The mean (T, 2) of votes (T, K, 2) by their weights (T, K) and by how near they are in time."""
+def _agreed(votes: Array, weights: Array, fps: float, guess: Array | float, trust: float) -> Array:
+    """The mean (T, 2) of votes (T, K, 2) by their weights (T, K) and by how near they are in time, and of the guess."""
     reach = round(1.0 * fps)
     nearness = np.exp(-np.abs(np.arange(-reach, reach + 1)) / (CARRY * fps))
     columns = [weights.sum(axis=1), *np.moveaxis((weights[..., None] * votes).sum(axis=1), 1, 0)]
     total, x, z = (np.convolve(column, nearness)[reach : reach + len(votes)] for column in columns)
-    # without any vote within a second: no velocity
-    return np.stack([x, z], axis=1) / (total + 1e-12)[:, None]
+    # without any vote within a second: the guess
+    mean: Array = (np.stack([x, z], axis=1) + trust * guess) / (total + trust)[:, None]
+    return mean

@@ -116,8 +116,8 @@ def test_a_generated_motion_scores_what_its_beam_says(bundles: dict[str, Path]) 
     model = load(bundles["generate"])
     assert isinstance(model, GenerateModel)
     for found in model.generate("a person walks", hypotheses=4, candidates=2, seed=3)[0]:
-        if len(found.motion.values) > 1:
-            score = model.score("a person walks", found.motion)
+        if len(found.drawn.values) > 1:
+            score = model.score("a person walks", found.drawn)
             assert score == pytest.approx(found.log_likelihood, rel=1e-3, abs=1e-2)
 
 

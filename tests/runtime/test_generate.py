@@ -1,4 +1,5 @@
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -7,10 +8,13 @@ from figures import walker
 
 from motet.bench import figures
 from motet.cli.generate import playable
+from motet.contract import MotionContract
+from motet.decode.mixture import Sample
 from motet.errors import DecodingError, MotionError, TextError, TextWarning
 from motet.generate import Generated, GenerateModel
 from motet.kinematics import positions
 from motet.root_block import to_root_block
+from motet.root_path import plant_feet
 
 TEXTS = ["a person walks", "walks", "a person walks left 80"]
 
@@ -131,6 +135,23 @@ def test_a_file_gets_the_roots_path_and_a_smooth_frame_rate() -> None:
     assert travelled == pytest.approx(np.linalg.norm(np.diff(source[:, [0, 2]], axis=0), axis=1).sum(), rel=1e-6)
     np.testing.assert_allclose(places[:, 1], source[:, 1], atol=1e-9)
     assert len(playable(to_root_block(motion), 5.0)) == 15
+
+
+def test_a_motion_has_planted_feet_and_is_there_as_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A model whose contract is the walker's, root block and all."""
+    plain = to_root_block(walker(frames=30, fps=10.0))
+    model = generate_model()
+    mean, std = plain.values.mean(axis=0), np.ones(len(plain.channels))
+    model.contract = MotionContract(plain.channels, plain.units, 10.0, mean, std, plain.skeleton)
+    drawn = Sample((plain.values - mean).astype(np.float32), -1.0)
+    monkeypatch.setattr("motet.generate.mixture_search", lambda *given: [[drawn]])
+    ((found,),) = model.generate("walks")
+    np.testing.assert_allclose(found.drawn.values, plain.values, atol=1e-4)
+    np.testing.assert_array_equal(found.motion.values, plant_feet(found.drawn).values)
+    assert np.abs(found.motion.values - found.drawn.values).max() > 0.1
+    model.contract = replace(model.contract, skeleton=None)
+    ((found,),) = model.generate("walks")
+    assert found.motion is found.drawn
 
 
 def test_the_benchmark_measures_motions_of_one_length(model: GenerateModel) -> None:

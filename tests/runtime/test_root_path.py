@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from figures import walker
@@ -7,7 +9,8 @@ from motet.formats import read_motion
 from motet.formats.amc import read
 from motet.kinematics import local_translations, positions
 from motet.motion import Motion
-from motet.root_path import lay_root_path
+from motet.root_block import ROOT_BLOCK, from_root_block, to_root_block
+from motet.root_path import has_feet, lay_root_path, plant_feet
 from motet.skeleton import Joint, Skeleton
 
 FEET = ("lfoot", "ltoes", "ltoes_end"), ("rfoot", "rtoes", "rtoes_end")
@@ -179,3 +182,69 @@ def test_paths_of_cmus_walks_and_runs(cmu, trials, mean, largest):
     errors = [error_of(read(cmu / "amc" / f"{trial}.amc"))[0] for trial in trials]
     assert np.mean(errors) < mean
     assert max(errors) < largest
+
+
+def block_of(clips, name):
+    """A recorded motion as models know it, 10 frames a second with a root block; and its root's way in metres."""
+    motion = to_root_block(read_motion(clips / f"{name}.amc").resample(10))
+    return motion, way_of(motion)
+
+
+def way_of(motion):
+    return path_of(from_root_block(motion)) * motion.skeleton.metres_per_unit
+
+
+def with_velocity(motion, change):
+    values = motion.values.copy()
+    columns = [motion.channels.index(name) for name in ROOT_BLOCK[:2]]
+    values[:, columns] = change(values[:, columns])
+    return replace(motion, values=values)
+
+
+def off(one, other):
+    """How far apart two ways end, in parts of the length of the second."""
+    length = np.linalg.norm(np.diff(other[:, [0, 2]], axis=0), axis=1).sum()
+    return np.linalg.norm((one[-1] - other[-1])[[0, 2]]) / length
+
+
+@pytest.mark.parametrize(("name", "limit"), [("39_14", 0.05), ("09_07", 0.08)])
+def test_feet_that_stand_already_are_left_where_they_are(clips, name, limit):
+    motion, way = block_of(clips, name)
+    planted = plant_feet(motion)
+    assert planted.channels == motion.channels
+    rest = [i for i, channel in enumerate(motion.channels) if channel not in ROOT_BLOCK[:2]]
+    np.testing.assert_array_equal(planted.values[:, rest], motion.values[:, rest])
+    assert off(way_of(planted), way) < limit
+
+
+def test_feet_that_slide_are_planted(clips):
+    """A walk whose root goes at a third less than its feet say, and trembles."""
+    motion, way = block_of(clips, "39_14")
+    rng = np.random.default_rng(0)
+    sliding = with_velocity(motion, lambda v: 0.67 * v + rng.normal(0, 0.3, v.shape))
+    assert off(way_of(sliding), way) > 0.3
+    assert off(way_of(plant_feet(sliding)), way) < 0.1
+
+
+def test_in_flight_a_figure_goes_on_as_it_did(clips):
+    """All frames of the second half are lifted by a metre: nothing is on the ground there."""
+    motion, _ = block_of(clips, "39_14")
+    values, half = motion.values.copy(), len(motion) // 2
+    values[half:, motion.channels.index("root.height")] += 1.0
+    values[half:, motion.channels.index("root.forward")] = 3.0
+    planted = plant_feet(replace(motion, values=values)).values
+    columns = [motion.channels.index(name) for name in ROOT_BLOCK[:2]]
+    # feet on the ground are heard for a second
+    np.testing.assert_allclose(planted[half + 12 :, columns], values[half + 12 :, columns], atol=1e-9)
+
+
+def test_what_cannot_be_planted(clips):
+    motion, _ = block_of(clips, "39_14")
+    np.testing.assert_array_equal(plant_feet(motion[:1]).values, motion[:1].values)
+    with pytest.raises(MotionError, match=r"root\.forward"):
+        plant_feet(walker())
+    lonely = Skeleton((Joint("a", -1, (0, 0, 0)),), 1.0)
+    assert (has_feet(lonely), has_feet(motion.skeleton)) == (False, True)
+    alone = Motion(np.zeros((3, 6)), ROOT_BLOCK, motion.units[:6], 10, lonely)
+    with pytest.raises(MotionError, match="name the joints of the feet"):
+        plant_feet(alone)

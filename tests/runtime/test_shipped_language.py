@@ -40,6 +40,10 @@ def test_a_walk_that_turns_left_travels_and_turns_and_is_written_alike_every_tim
         sentence = "a person walks and turns left"
         assert CliRunner().invoke(main, ["generate", sentence, "--seed", "1", "-o", str(file)]).exit_code == 0
     assert files[0].read_bytes() == files[1].read_bytes()
+    sliding = tmp_path / "sliding.bvh"
+    options = ["--seed", "1", "--no-plant", "-o", str(sliding)]
+    assert CliRunner().invoke(main, ["generate", sentence, *options]).exit_code == 0
+    assert sliding.read_bytes() != files[0].read_bytes()
     block = to_root_block(read_motion(files[0]).with_unit(1.0))
     column = {name: block.values[:, i] for i, name in enumerate(block.channels)}
     assert 0.5 < np.median(column["root.forward"]) < 2.1
@@ -58,4 +62,4 @@ def test_runs_are_faster_than_walks_and_both_end_by_themselves() -> None:
 def test_a_motion_scores_what_the_search_gave_it() -> None:
     model = load("cmu-generate")
     best = model.generate("a person runs", seed=3)[0][0]
-    assert model.score("a person runs", best.motion) == pytest.approx(best.log_likelihood, rel=1e-4)
+    assert model.score("a person runs", best.drawn) == pytest.approx(best.log_likelihood, rel=1e-4)

@@ -22,10 +22,11 @@ from motet.smooth import smooth_resample
 @click.option("--bundle", default="cmu-generate", show_default=True, help="Name or path of a bundle.")
 @click.option("--hypotheses", type=int, help="Motions that are kept while decoding. [default: the bundle's]")
 @click.option("--candidates", type=int, help="Frames drawn for each; 1: independent samples. [default: the bundle's]")
-@click.option("--temperature", type=float, help="Of the draws; lower is more decided. [default: the bundle's]")
+@click.option("--temperature", type=float, help="Of the draws; lower trembles less. [default: the bundle's]")
 @click.option("--max-seconds", type=float, help="Where a motion ends at the latest. [default: the bundle's]")
 @click.option("--seed", default=0, show_default=True, help="Seed of the first text; the next ones count on.")
 @click.option("--fps", default=30.0, show_default=True, help="Frame rate to write.")
+@click.option("--no-plant", is_flag=True, help="Let feet slide: move the figure as drawn, not as its feet take it.")
 @click.option("--all", "every", is_flag=True, help="Write all hypotheses, not only the best.")
 @click.option("--json", "as_json", is_flag=True, help="Print a list with input and hypotheses of each text.")
 def generate(
@@ -38,6 +39,7 @@ def generate(
     max_seconds: float | None,
     seed: int,
     fps: float,
+    no_plant: bool,
     every: bool,
     as_json: bool,
 ) -> None:
@@ -51,7 +53,7 @@ def generate(
     with text_notes():
         found = model.generate(texts, hypotheses, seed=seed, **settings)
     kept = [row if every else row[:1] for row in found]
-    motions = [playable(result.motion, fps) for row in kept for result in row]
+    motions = [playable(result.drawn if no_plant else result.motion, fps) for row in kept for result in row]
     paths = _numbered(out, len(motions))
     for path, motion in zip(paths, motions, strict=True):
         write_motion(path, motion)

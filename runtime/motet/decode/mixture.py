@@ -44,9 +44,10 @@ def mixture_search(
     of a channel), so a hypothesis that has ended keeps its score and competes by its log-likelihood per frame, which
     is the order of the result, too. With one candidate all go on: independent samples.
 
-    Temperature T divides the log-weights and multiplies the variances by T; likelihoods are those of the model itself
-    (T = 1). The flag is drawn as it is: 1 in the first step, so that no motion is empty, and 0 after ``max_frames``.
-    A hypothesis that draws its end several times ends once.
+    Temperature T multiplies the variances; likelihoods are those of the model itself (T = 1). Components are drawn as
+    the model weighs them: they say what is done, while what is drawn about their centres, anew in every frame, makes a
+    figure tremble. The flag is drawn as it is: 1 in the first step, so that no motion is empty, and 0 after
+    ``max_frames``. A hypothesis that draws its end several times ends once.
 
     Row i draws from its own generator, of ``seeds[i]``, and does not depend on the rows around it.
     """
@@ -147,7 +148,7 @@ class _Beam:
 def draw(outputs: Arrays, normal: Floats, uniform: Floats, temperature: float, forced: bool | None) -> _Drawn:
     """Turn noise, normal (n, C, D) and uniform (n, C, 2), into frames and flags of a step's distributions."""
     log_weights, means, stds, active = (outputs[name] for name in ("log_weights", "means", "stds", "active"))
-    weights = np.exp((log_weights - log_weights.max(axis=1, keepdims=True)) / temperature, dtype=np.float64)
+    weights = np.exp(log_weights - log_weights.max(axis=1, keepdims=True), dtype=np.float64)
     bounds = np.cumsum(weights, axis=1)
     threshold = uniform[:, :, :1] * bounds[:, None, -1:]
     component = np.minimum((threshold >= bounds[:, None]).sum(axis=2), weights.shape[1] - 1)

@@ -29,10 +29,14 @@ class Answers:
 
 
 def answers(model: GenerateModel, corpus: Corpus, records: Sequence[int]) -> Answers:
-    """Five hypotheses for every sentence of the records; one of which the model knows no word is left out."""
+    """Ranked motions for every sentence of the records; one of which the model knows no word is left out.
+
+    As many hypotheses as the model keeps by default, as users get them; from one that keeps less than five the last
+    stands for those that lack.
+    """
     asked = prompts(model, corpus, records)
     with unknown_words_allowed():
-        rows = model.generate([sentence for _, sentence in asked], RANKS)
+        rows = model.generate([sentence for _, sentence in asked])
     return Answers(tuple(r for r, _ in asked), tuple(s for _, s in asked), tuple(rows))
 
 
@@ -62,7 +66,7 @@ def bounds_chained(describe: DescribeModel, found: Answers, corpus: Corpus) -> d
 
 
 def told(describe: DescribeModel, motions: Sequence[Motion]) -> list[str]:
-    """The most probable description of each motion; nothing for one that is too short to be described."""
+    """The best description of each motion; nothing for one that is too short to be described."""
     usable = [i for i, motion in enumerate(motions) if round(motion.duration * describe.fps) >= 2]
     rows = describe.describe([motions[i] for i in usable]) if usable else []
     texts = {i: row[0].text for i, row in zip(usable, rows, strict=True)}
