@@ -52,7 +52,7 @@ def test_a_walk_that_turns_left_travels_and_turns_and_is_written_alike_every_tim
 
 def test_runs_are_faster_than_walks_and_both_end_by_themselves() -> None:
     model = load("cmu-generate")
-    found = model.generate(["a person walks"] * 5 + ["a person runs"] * 5, hypotheses=1, seed=list(range(10)))
+    found = model.generate(["a person walks"] * 5 + ["a person runs"] * 5, hypotheses=5, seed=list(range(10)))
     forward = model.contract.channels.index("root.forward")
     speeds = [float(np.median(row[0].motion.values[:, forward])) for row in found]
     assert max(speeds[:5]) < 2.1 < min(speeds[5:])
