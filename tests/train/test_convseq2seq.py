@@ -137,7 +137,7 @@ def test_the_adversary_is_taught_first_and_then_heard() -> None:
     loss = trained.step(windows)
     after = doubt()
     assert after < before
-    opinion = float(-trained.judge(false).sigmoid().log().mean())
+    opinion = float(-trained.judge(false).sigmoid().log().mean().detach())
     np.testing.assert_allclose(loss, squared + 0.01 * opinion, rtol=1e-5)
 
 
