@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -70,9 +71,10 @@ def train_predict(
     recipe = _possible(recipe, material)
     net = _untrained(material)
     chances = recipe.warp, recipe.reverse, recipe.mirror
-    windows = Windows(material, net.config.seed_frames + net.config.frames, seed, *chances)
+    windows = Windows(material, net.config.seed_frames + net.config.frames, *chances)
     started = time.perf_counter()
-    net, log = _fit(net, windows, recipe, folder, progress)
+    draw = partial(windows.draw, recipe.batch, np.random.default_rng(seed))
+    net, log = _fit(net, draw, recipe, folder, progress)
     training = {
         "command": about.command,
         "seed": seed,
@@ -109,7 +111,7 @@ def _untrained(material: Material) -> Predictor:
 
 
 def _fit(
-    net: Predictor, windows: Windows, recipe: Recipe, folder: Path, progress: Callable[[float], object]
+    net: Predictor, draw: Callable[[], Tensor], recipe: Recipe, folder: Path, progress: Callable[[float], object]
 ) -> tuple[Predictor, list[dict[str, float]]]:
     """The running mean of the net's weights over training, and the log."""
     mean = deepcopy(net).eval()
@@ -122,7 +124,7 @@ def _fit(
     for step in range(recipe.steps):
         for group in optimiser.param_groups:
             group["lr"] = _rate(recipe, step)
-        drawn = windows.draw(recipe.batch)
+        drawn = draw()
         loss = _loss(net, drawn, times)
         if not torch.isfinite(loss):
             raise RunError("the loss is no longer finite: start again with another seed")

@@ -104,7 +104,7 @@ def train_system(
     write_whole(folder / "run.json", json.dumps(manifest, indent=1) + "\n")
     judge = convseq2seq.Discriminator(config, WINDOW) if recipe.fitting.adversary else None
     learner = Learner(net.to(device), recipe.fitting, judge and judge.to(device))
-    draw = partial(_draw, net, Windows(material, WINDOW, seed), device)
+    draw = partial(_draw, net, Windows(material, WINDOW), device)
     validate = partial(validation_error, net, material, device)
     fit_windows(learner, draw, validate, seed, folder, progress)
     training = {**manifest["training"], **_results(learner, device)}
@@ -121,8 +121,7 @@ def _untrained(manifest: Mapping[str, Any], material: Material) -> Stepwise:
 
 
 def _draw(net: Stepwise, windows: Windows, device: str, rng: np.random.Generator, batch: int) -> Tensor:
-    windows.rng = rng
-    return net.normalised(windows.draw(batch).to(device))
+    return net.normalised(windows.draw(batch, rng).to(device))
 
 
 @torch.no_grad()

@@ -18,11 +18,10 @@ class Windows:
     """
 
     def __init__(
-        self, material: Material, frames: int, seed: int, warp: float = 0.0, reverse: float = 0.0, mirror: float = 0.0
+        self, material: Material, frames: int, warp: float = 0.0, reverse: float = 0.0, mirror: float = 0.0
     ) -> None:
         self.material, self.frames = material, frames
         self.warp, self.reverse, self.mirror = warp, reverse, mirror
-        self.rng = np.random.default_rng(seed)
         lengths = np.array([len(sequence) for sequence in material.sequences])
         usable = lengths > material.stride * (frames - 1) + 1
         if not usable.any():
@@ -33,24 +32,21 @@ class Windows:
         self.all = torch.from_numpy(np.concatenate(material.sequences))
         self.columns, self.signs = torch.tensor(material.mirrored), torch.tensor(material.signs)
 
-    def draw(self, batch: int) -> Tensor:
+    def draw(self, batch: int, rng: np.random.Generator) -> Tensor:
         """A batch of windows."""
-        which = self.rng.choice(len(self.chances), batch, p=self.chances)
+        which = rng.choice(len(self.chances), batch, p=self.chances)
         last = self.lengths[which] - 1.01
-        speed = self.material.stride * np.exp(self.rng.uniform(-self.warp, self.warp, batch))
+        speed = self.material.stride * np.exp(rng.uniform(-self.warp, self.warp, batch))
         speed = np.minimum(speed, last / (self.frames - 1))
-        start = self.rng.uniform(0, 1, batch) * (last - speed * (self.frames - 1))
+        start = rng.uniform(0, 1, batch) * (last - speed * (self.frames - 1))
         if not self.warp:
             speed, start = np.full(batch, float(self.material.stride)), np.floor(start)
         windows = self._interpolated(which, start[:, None] + speed[:, None] * np.arange(self.frames))
-        backwards = self._some(batch, self.reverse)
+        backwards = _some(rng, batch, self.reverse)
         windows = torch.where(backwards, windows.flip(1), windows)
         if self.mirror:
-            windows = torch.where(self._some(batch, self.mirror), windows[..., self.columns] * self.signs, windows)
+            windows = torch.where(_some(rng, batch, self.mirror), windows[..., self.columns] * self.signs, windows)
         return windows
-
-    def _some(self, batch: int, share: float) -> Tensor:
-        return torch.from_numpy(self.rng.random(batch) < share)[:, None, None]
 
     def _interpolated(self, which: Any, times: Any) -> Tensor:
         before = np.floor(times + 1e-6).astype(np.int64)
@@ -58,3 +54,7 @@ class Windows:
         index = torch.from_numpy(before + self.starts[which][:, None])
         after = (index + 1).clamp_max(len(self.all) - 1)
         return self.all[index] * (1 - part) + self.all[after] * part
+
+
+def _some(rng: np.random.Generator, batch: int, share: float) -> Tensor:
+    return torch.from_numpy(rng.random(batch) < share)[:, None, None]
