@@ -10,6 +10,7 @@ from motet.bundle import Bundle, write_bundle
 from motet.files import check_place
 from motet.graph import Graph, OnnxGraph
 from motet_export.decoded import whole_runs
+from motet_export.examples import examples
 from motet_export.exporter import ExportError, export_graph
 from motet_export.parity import check_carried, check_one_step, check_runs
 from motet_export.quantise import difference, quantised
@@ -50,11 +51,12 @@ def parity_of(run: Run, bundle: Bundle) -> dict[str, Any]:
 
 def parity(manifest: Mapping[str, Any], onnx: Mapping[str, Graph], torch: Mapping[str, Graph]) -> dict[str, Any]:
     """Climb the parity ladder; the report that goes into the manifest. ExportError at the first rung that fails."""
-    words = len(manifest.get("vocabulary", "-"))
+    draws = examples(manifest, torch)
     report: dict[str, Any] = {
-        f"{role}.one_step": check_one_step(role, onnx[role], graph, words) for role, graph in torch.items()
+        f"{role}.one_step": check_one_step(role, onnx[role], graph, draws[role]) for role, graph in torch.items()
     }
-    report["step.carried"] = check_carried(onnx["step"], torch["step"], words)
+    horizon = manifest["defaults"]["horizon"] if manifest["verb"] == "predict" else None
+    report["step.carried"] = check_carried(onnx["step"], torch["step"], draws["step"], horizon)
     report["runs"] = check_runs(whole_runs(manifest, onnx, torch))
     report["versions"] = {name: version(name) for name in ("torch", "onnx", "onnxruntime")}
     report["machine"] = f"{platform.system()} {platform.machine()}"

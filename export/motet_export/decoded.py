@@ -15,6 +15,7 @@ from motet.motion import Motion
 from motet.predict import PredictModel
 from motet.rotations import Array
 from motet.text import MAX_WORDS, SPECIALS
+from motet_export.examples import walks
 
 Decoded = dict[str, NDArray[Any]]
 Runs = dict[str, Callable[[], tuple[Decoded, Decoded]]]
@@ -103,12 +104,11 @@ def _predict(manifest: Mapping[str, Any], onnx: Graphs, torch: Graphs) -> Runs:
 
 
 def _predicted(horizons: int, model: PredictModel) -> Decoded:
-    """What follows eight random walks about the mean of the training data, normalised."""
-    rng, contract = np.random.default_rng(3), model.contract
-    std = np.maximum(contract.std, 1e-4)
-    steps = 0.1 * rng.normal(size=(8, model.seed_frames, len(std)))
-    found = model.next_frames(contract.mean + std * steps.cumsum(axis=1), horizons * model.horizon)
-    return {"frames": (found - contract.mean) / std}
+    """What follows eight random walks, normalised."""
+    contract = model.contract
+    seeds = walks(contract, np.random.default_rng(3), 8, model.seed_frames)
+    found = model.next_frames(seeds, horizons * model.horizon)
+    return {"frames": (found - contract.mean) / np.maximum(contract.std, 1e-4)}
 
 
 def _pairs(models: Sequence[Any], runs: Mapping[str, Callable[[Any], Decoded]]) -> Runs:

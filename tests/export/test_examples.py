@@ -1,0 +1,79 @@
+"""What the ladder feeds to graphs: a predictor's frames resemble its data, and its states are its encoder's."""
+
+import numpy as np
+import pytest
+
+from motet.contract import MotionContract
+from motet.graph import Arrays, Graph, GraphSpec, TensorSpec
+from motet_export.examples import example, examples, walks
+from motet_export.exporter import ExportError
+from motet_export.parity import check_carried
+
+MOTION = {
+    "channels": ["a", "b"],
+    "units": ["rad", "length"],
+    "fps": 60.0,
+    "mean": [0.5, -40.0],
+    "std": [0.1, 6.0],
+    "skeleton": None,
+}
+STEP = GraphSpec(
+    (TensorSpec("context", ("batch", 1)), TensorSpec("state", ("batch", 2))),
+    (TensorSpec("frame", ("batch", 2)), TensorSpec("next_state", ("batch", 2))),
+    {"state": "next_state"},
+)
+
+
+class Means:
+    """An encoder whose state is the mean frame."""
+
+    spec = GraphSpec((TensorSpec("frames", ("batch", 8, 2)),), STEP.inputs)
+
+    def __call__(self, feeds: Arrays) -> dict[str, np.ndarray]:
+        mean = feeds["frames"].mean(axis=1)
+        return {"context": mean[:, :1], "state": mean}
+
+
+class Chaos:
+    """A step that doubles the difference of two states each time, and errs by a little."""
+
+    spec = STEP
+
+    def __init__(self, slip: float) -> None:
+        self.slip = np.float32(slip)
+
+    def __call__(self, feeds: Arrays) -> dict[str, np.ndarray]:
+        state = 2 * feeds["state"] % 1 + self.slip
+        return {"frame": state, "next_state": state}
+
+
+def test_a_predictors_step_is_asked_about_what_its_encoder_makes_of_frames_like_the_datas() -> None:
+    graphs: dict[str, Graph] = {"encoder": Means(), "step": Chaos(0)}
+    draws = examples({"verb": "predict", "motion": MOTION}, graphs)
+    frames = draws["encoder"](np.random.default_rng(0), 500)["frames"]
+    np.testing.assert_array_equal(
+        draws["step"](np.random.default_rng(0), 500)["state"], graphs["encoder"]({"frames": frames})["state"]
+    )
+    np.testing.assert_allclose(frames.mean(axis=(0, 1)), MOTION["mean"], rtol=0.02)
+    assert (np.abs(frames - np.array(MOTION["mean"])) < 2 * np.array(MOTION["std"])).all()
+
+
+def test_other_graphs_get_what_their_contract_allows() -> None:
+    found = examples({"verb": "control"}, {"step": Chaos(0)})["step"](np.random.default_rng(0), 3)
+    expected = example(STEP, np.random.default_rng(0), 3)
+    assert found.keys() == expected.keys()
+    for name, values in expected.items():
+        np.testing.assert_array_equal(found[name], values)
+
+
+def test_walks_go_on_from_frame_to_frame() -> None:
+    contract = MotionContract.from_json(MOTION)
+    pace = np.diff(walks(contract, np.random.default_rng(0), 200, 20), axis=1).std(axis=(0, 1))
+    np.testing.assert_allclose(pace, 0.1 * contract.std, rtol=0.05)
+
+
+def test_a_state_is_carried_to_the_horizon_that_a_predictor_has() -> None:
+    pair = Chaos(1e-7), Chaos(0)
+    assert check_carried(*pair, horizon=5)["error"] == pytest.approx(31e-7, rel=0.2)
+    with pytest.raises(ExportError, match="carried"):
+        check_carried(*pair)
