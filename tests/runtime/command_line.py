@@ -1,0 +1,21 @@
+"""The command line as tests use it: a run, and what is asked of every refusal."""
+
+from pathlib import Path
+
+from click.testing import CliRunner, Result
+
+from motet.cli import main
+
+
+def run(*arguments: object) -> Result:
+    """What ``motet ARGUMENTS`` says and returns."""
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+def check_refused(result: Result, said: str, out: Path) -> None:
+    """One message with the words ``said``, and nothing written in the folder ``out``."""
+    assert result.exit_code == 2
+    assert said in result.stderr
+    assert "Traceback" not in result.stderr
+    assert result.stdout == ""
+    assert list(out.iterdir()) == []
