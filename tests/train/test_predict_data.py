@@ -24,8 +24,10 @@ from motet_train.data.predict_data import (
 from motet_train.data.predict_data import test_names as names_held_out
 from motet_train.evaluate.predict.protocol import (
     REPORTED,
+    errors,
     euler_frames,
-    evaluate,
+    predictions,
+    rotation_errors,
     rotmat_to_protocol_euler,
     true_times,
     window_errors,
@@ -106,13 +108,30 @@ def test_the_error_is_the_literal_one() -> None:
     assert not euler_frames(truth)[..., :6].any()
 
 
+def test_the_rotation_error_is_scipys_angle_and_does_not_leap_at_gimbal_lock() -> None:
+    rng = np.random.default_rng(1)
+    truth, predicted = rng.normal(size=(2, 75, 15)), rng.normal(size=(2, 25, 15))
+    truth[:, :, 12:] = truth[:, :1, 12:]  # a joint that does not move is not counted
+    found = rotation_errors(predicted, truth)
+    for window, frame in np.ndindex(2, 25):
+        vectors = [predicted[window, frame], truth[window, 50 + frame]]
+        one, other = (Rotation.from_rotvec(v.reshape(-1, 3)[2:4]) for v in vectors)
+        assert found[window, frame] == pytest.approx(np.degrees((one.inv() * other).magnitude()).mean())
+    before, after = np.zeros((2, 1, 75, 9))
+    for frames, angle in ((before, np.pi / 2 - 0.02), (after, np.pi / 2 + 0.02)):
+        turns = Rotation.from_euler("xyz", [[0.01 * n, angle, 0.5] for n in range(75)]).inv()
+        frames[0, :, 6:] = turns.as_rotvec()
+    np.testing.assert_allclose(rotation_errors(after[:, 50:], before), np.degrees(0.04), rtol=1e-6)
+    assert window_errors(after[:, 50:], before).min() > 3
+
+
 def test_a_perfect_prediction_has_no_error_and_zero_velocity_grows() -> None:
     motion = 0.2 * np.sin(np.arange(400)[:, None] * np.linspace(0.01, 0.03, 117))
     scaling = Scaling(motion.mean(0), motion.std(0), tuple(range(117)))
     truth = iter([windows(motion)])
-    perfect = evaluate(lambda seed: next(truth)[:, 50:], {"x": [motion]}, scaling)["x"]
+    perfect = errors(predictions(lambda seed: next(truth)[:, 50:], {"x": [motion]}, scaling))["x"]
     assert perfect.max() == pytest.approx(0, abs=1e-12)
-    still = evaluate(zero_velocity, {"x": [motion]}, scaling)["x"]
+    still = errors(predictions(zero_velocity, {"x": [motion]}, scaling))["x"]
     assert (np.diff(still[:10]) > 0).all()
 
 
@@ -210,7 +229,8 @@ def test_zero_velocity_is_the_published_one(shared: Path) -> None:
     assert len(corpus.missing) == 10
     scaling = scaling_of(corpus.train)
     assert len(scaling.kept) == 70
-    found = evaluate(zero_velocity, {action: list(files.values()) for action, files in corpus.test.items()}, scaling)
+    test = {action: list(files.values()) for action, files in corpus.test.items()}
+    found = errors(predictions(zero_velocity, test, scaling))
     expected = {
         "basketball": [0.49, 0.82, 1.40, 1.64, 2.05, 2.83],
         "jumping": [0.36, 0.62, 1.48, 1.68, 1.99, 2.03],

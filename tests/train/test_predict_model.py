@@ -16,7 +16,7 @@ from motet_train.data.clips import CMU as CLIPS
 from motet_train.data.expmap_files import CMU_ACTIONS, read_expmap
 from motet_train.data.predict_data import expmap_material
 from motet_train.evaluate.predict.published_h36m import CONV
-from motet_train.evaluate.predict.report import MEAN, ZERO, complete, curves
+from motet_train.evaluate.predict.report import FEW, MEAN, ZERO, complete, curves
 from motet_train.models.predictor import Predictor, PredictorConfig
 from motet_train.predict import About, Recipe, train_predict
 from motet_train.runs import Run
@@ -83,7 +83,7 @@ def test_training_learns_and_repeats_itself(tmp_path: Path) -> None:
     loaded = Run.load(tmp_path / "a")
     models = {"a": PredictModel(loaded.manifest, loaded.torch_graphs())}
     corpus = read_expmap(tmp_path / "data")
-    errors = curves(models, corpus)[8]
+    errors = curves(models, corpus)[FEW]
     assert complete(corpus) == ["running", "walking"]  # none is, so all count
     for action in ("walking", "running"):
         assert errors["a"][action].mean() < 0.9 * errors[ZERO][action].mean()
@@ -103,7 +103,7 @@ def test_train_and_evaluate_from_the_command_line(tmp_path: Path) -> None:
     assert f"published: {CONV}" in shown.stdout
     assert (tmp_path / "plots" / "predict-error.png").stat().st_size > 1000
     found = json.loads(run("evaluate", out, "--data", data, "--json", "--save").stdout)
-    assert set(found) == {"windows_8", "windows_256", "zero_velocity"}
+    assert set(found) == {"windows_8", "windows_256", "rotation", "zero_velocity"}
     assert list(found["windows_8"]["walking"]) == [f"frame_{n}" for n in (1, 3, 7, 9, 13, 24)]
     assert Run.load(out).manifest["quality"] == found
 
@@ -138,7 +138,7 @@ def test_the_mean_is_that_of_complete_actions(tmp_path: Path) -> None:
     (data / "train" / CMU_ACTIONS[1] / f"{CMU_ACTIONS[1]}_4.txt").unlink()
     corpus = read_expmap(data)
     assert complete(corpus) == ["basketball"]
-    errors = curves({}, corpus)[8][ZERO]
+    errors = curves({}, corpus)[FEW][ZERO]
     np.testing.assert_array_equal(errors[MEAN], errors["basketball"])
 
 

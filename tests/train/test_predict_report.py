@@ -28,7 +28,7 @@ from motet_train.evaluate.predict.costs import costs
 from motet_train.evaluate.predict.plots import _looks
 from motet_train.evaluate.predict.protocol import windows
 from motet_train.evaluate.predict.published_h36m import CONV, ERD, RRNN
-from motet_train.evaluate.predict.report import COUNTS, MEAN, ZERO, Curves
+from motet_train.evaluate.predict.report import COUNTS, MANY, MEAN, ZERO, Curves
 from motet_train.evaluate.predict.rows import Row, mean, pooled, rows_of, spread
 from motet_train.evaluate.predict.strips import EVERY, GIVEN, places, strips
 from motet_train.evaluate.predict.table import table
@@ -53,8 +53,8 @@ def manifest(seed: int | None, model: str = "convseq2seq", recipe: dict[str, Any
 def constant(**values: float) -> Curves:
     """Systems of a constant error, in all actions."""
     return {
-        count: {name: {part: np.full(25, value) for part in (*FIVE, MEAN)} for name, value in values.items()}
-        for count in COUNTS
+        kind: {name: {part: np.full(25, value) for part in (*FIVE, MEAN)} for name, value in values.items()}
+        for kind in COUNTS
     }
 
 
@@ -126,7 +126,7 @@ def test_rows_are_means_and_spreads() -> None:
 
 
 def shown(layout: Layout, actions: tuple[str, ...]) -> str:
-    found: Curves = {count: {ZERO: {part: np.ones(25) for part in (*actions, MEAN)}} for count in COUNTS}
+    found: Curves = {kind: {ZERO: {part: np.ones(25) for part in (*actions, MEAN)}} for kind in COUNTS}
     return table(found, ExpmapCorpus(layout, {}, {action: {} for action in actions}, ()))
 
 
@@ -183,7 +183,7 @@ def test_ablations_say_what_differs_from_the_first() -> None:
         "g": "window 5, without adversary",
     }
     found = constant(**dict(zip(said, (0.5, 0.625, 0.75, 0.875, 1.0), strict=True)))
-    found[256]["g"][MEAN] = np.arange(25.0)
+    found[MANY]["g"][MEAN] = np.arange(25.0)
     text = ablations(found, said)
     assert line(text, "without long").split()[-10:] == ["0.62"] * 10
     assert line(text, "window 5").split()[-10:] == ["1.00"] * 5 + ["1.00", "3.00", "7.00", "9.00", "24.00"]
@@ -260,7 +260,7 @@ def test_all_runs_are_evaluated_at_once(tmp_path: Path) -> None:
     assert line(text, "none-0")
     assert json.loads(json.dumps(found)) == found
     assert set(found) == {*map(str, runs), "grouped"}
-    assert set(found[str(runs[0])]) == {"windows_8", "windows_256", "zero_velocity"}
+    assert set(found[str(runs[0])]) == {"windows_8", "windows_256", "rotation", "zero_velocity"}
     (title, grouped), *others = found["grouped"].items()
     assert (title, others, grouped["runs"]) == ("conv (2 seeds)", [], [str(run) for run in runs[:2]])
     one, other = (found[str(run)]["windows_8"]["running"]["frame_9"] for run in runs[:2])

@@ -64,7 +64,7 @@ def _protocol(models: Models, data: Path, plots: Path | None) -> Result:
 def _draw_protocol(models: Models, corpus: ExpmapCorpus, shown: report.Curves, plots: Path) -> None:
     from motet_train.evaluate.predict.plots import error_over_time, stick_figures
 
-    many = shown[report.COUNTS[-1]]
+    many = shown[report.MANY]
     panels = {action: {name: many[name][action] for name in many} for action in many[report.ZERO]}
     error_over_time(panels, corpus.layout.fps / STRIDE, "Euler error", plots / "predict-error.png")
     if corpus.layout is CMU:  # of Human3.6M's figure there are no bones

@@ -56,11 +56,12 @@ def ablations(found: Curves, said: Mapping[str, str]) -> str:
     """The means of such rows as text, at the frames that papers report, on few windows and on many."""
     width = max(36, *(len(words) + 3 for words in said.values()))
     frames = "".join(f"{frame:>6}" for frame in FRAMES)
+    counts = "  ".join(f"{f'{count} windows':>30}" for count in COUNTS.values())
     lines = [
-        f"{'ablations, mean of the actions':<{width}}" + "  ".join(f"{f'{count} windows':>30}" for count in COUNTS),
+        f"{'ablations, mean of the actions':<{width}}{counts}",
         f"{'output frame':<{width}}" + "  ".join([frames] * len(COUNTS)),
     ]
     for title, words in said.items():
-        parts = ("".join(f"{found[count][title][MEAN][frame]:>6.2f}" for frame in FRAMES) for count in COUNTS)
+        parts = ("".join(f"{found[kind][title][MEAN][frame]:>6.2f}" for frame in FRAMES) for kind in COUNTS)
         lines.append(f"  {words:<{width - 2}}" + "  ".join(parts))
     return "\n".join(lines)

@@ -79,15 +79,39 @@ def window_errors(predicted: Array, truth: Array) -> Array:
     return error
 
 
-def evaluate(
+def rotation_errors(predicted: Array, truth: Array) -> Array:
+    """Degrees (W, 25) between predicted rotations and true ones: the mean over the joints that move in a window.
+
+    Not of the protocol: Euler errors leap where a joint passes gimbal lock, these do not. Arguments as in
+    :func:`window_errors`.
+    """
+    vectors, said = (frames[..., ROOT:].reshape(*frames.shape[:-1], -1, 3) for frames in (truth, predicted))
+    moving = (vectors.std(axis=1, keepdims=True) > CONSTANT).any(axis=-1)
+    apart = rotvec_to_rotmat(said) - rotvec_to_rotmat(vectors[:, SEED_FRAMES:])
+    half_sin = np.linalg.norm(apart, axis=(-2, -1)) / np.sqrt(8)
+    angles = 2 * np.degrees(np.arcsin(np.minimum(half_sin, 1.0)))
+    error: Array = (angles * moving).sum(axis=-1) / np.maximum(moving.sum(axis=-1), 1)
+    return error
+
+
+Predictions = Mapping[str, tuple[Array, Array]]
+"""Action -> predicted frames (W, 25, C) and whole true windows (W, 75, C), of all its motions."""
+
+
+def predictions(
     predictor: Predictor, test: Mapping[str, Sequence[Array]], scaling: Scaling, count: int = 8
-) -> dict[str, Array]:
-    """Error (25,) of each action: mean over ``count`` windows of each of its motions (T, C)."""
-    table = {}
+) -> Predictions:
+    """What is predicted of ``count`` windows of each motion (T, C) of each action."""
+    found = {}
     for action, motions in test.items():
         truth = scaling.with_constants(np.concatenate([windows(motion, count) for motion in motions]))
-        table[action] = window_errors(predictor(truth[:, :SEED_FRAMES]), truth).mean(axis=0)
-    return table
+        found[action] = predictor(truth[:, :SEED_FRAMES]), truth
+    return found
+
+
+def errors(found: Predictions, measure: Callable[[Array, Array], Array] = window_errors) -> dict[str, Array]:
+    """Error (25,) of each action: mean over windows."""
+    return {action: measure(predicted, truth).mean(axis=0) for action, (predicted, truth) in found.items()}
 
 
 def zero_velocity(seed: Array) -> Array:

@@ -8,17 +8,29 @@ from motet.predict import PredictModel
 from motet.rotations import Array
 from motet_train.data.errors import DataError
 from motet_train.data.expmap_files import ExpmapCorpus, scaling_of
-from motet_train.evaluate.predict.protocol import OUTPUT_FRAMES, REPORTED, Predictor, evaluate, zero_velocity
+from motet_train.evaluate.predict.protocol import (
+    OUTPUT_FRAMES,
+    REPORTED,
+    Predictor,
+    errors,
+    predictions,
+    rotation_errors,
+    zero_velocity,
+)
 from motet_train.evaluate.predict.rows import Row, mean, pooled
 
-COUNTS = (8, 256)
+COUNTS = {"windows_8": 8, "windows_256": 256}
 """Windows of each action: as many as papers take, and enough for a figure without much noise."""
+
+FEW, MANY = COUNTS
+ROTATION = "rotation"
+"""Of the many windows, not the Euler error but :func:`rotation_errors`."""
 
 ZERO = "zero velocity"
 MEAN = "mean"
 
-Curves = dict[int, dict[str, dict[str, Array]]]
-"""Windows of each action -> system -> action, or MEAN -> error (25,)."""
+Curves = dict[str, dict[str, dict[str, Array]]]
+"""FEW, MANY or ROTATION -> system -> action, or MEAN -> error (25,)."""
 
 
 def curves(
@@ -35,13 +47,15 @@ def curves(
     test = {action: list(files.values()) for action, files in corpus.test.items()}
     systems: dict[str, Predictor] = {ZERO: zero_velocity}
     systems |= {name: predictor(name, model, corpus) for name, model in models.items()}
-    found: Curves = {}
-    for count in COUNTS:
-        found[count] = {}
-        for name, system in systems.items():
-            errors = found[count][name] = evaluate(system, test, scaling, count)
-            errors[MEAN] = np.mean([errors[action] for action in complete(corpus)], axis=0)
+    found: Curves = {FEW: {}, MANY: {}, ROTATION: {}}
+    for name, system in systems.items():
+        for kind, count in COUNTS.items():
+            predicted = predictions(system, test, scaling, count)
+            found[kind][name] = errors(predicted)
             progress(name)
+        found[ROTATION][name] = errors(predicted, rotation_errors)
+        for measured in found.values():
+            measured[name][MEAN] = np.mean([measured[name][action] for action in complete(corpus)], axis=0)
     return found
 
 
@@ -64,15 +78,15 @@ def predictor(name: str, model: PredictModel, corpus: ExpmapCorpus) -> Predictor
 
 def by_row(found: Curves, rows: Sequence[Row], how: Callable[[Sequence[Array]], Array] = mean) -> Curves:
     """The same with rows in place of runs, see :func:`motet_train.evaluate.predict.rows.pooled`."""
-    return {count: pooled(systems, rows, how) for count, systems in found.items()}
+    return {kind: pooled(systems, rows, how) for kind, systems in found.items()}
 
 
 def to_json(found: Curves, name: str) -> dict[str, dict[str, dict[str, float]]]:
-    """The errors of one system: "windows_8" -> action, or "mean" -> "frame_1" and so on."""
+    """The errors of one system: "windows_8" and so on -> action, or "mean" -> "frame_1" and so on."""
     return {
-        f"windows_{count}": {
+        kind: {
             action: {f"frame_{frame}": round(float(error[frame]), 6) for frame in REPORTED}
             for action, error in systems[name].items()
         }
-        for count, systems in found.items()
+        for kind, systems in found.items()
     }

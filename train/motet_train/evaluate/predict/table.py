@@ -9,10 +9,16 @@ from motet_train.data.expmap_files import ExpmapCorpus
 from motet_train.evaluate.predict.protocol import LABELS, REPORTED, true_times
 from motet_train.evaluate.predict.published import FRAMES, GOAL, averages, by_action, mean_over
 from motet_train.evaluate.predict.published_h36m import Rows
-from motet_train.evaluate.predict.report import COUNTS, MEAN, Curves, complete
+from motet_train.evaluate.predict.report import FEW, MANY, MEAN, ROTATION, Curves, complete
 
 PUBLISHED = "published: "
 """What lines begin with that were not measured here."""
+
+TITLES = {
+    FEW: "8 windows of each action",
+    MANY: "256 windows of each action",
+    ROTATION: "256 windows, mean angle between predicted and true rotations of the joints that move, degrees",
+}
 
 
 def table(found: Curves, corpus: ExpmapCorpus) -> str:
@@ -21,7 +27,7 @@ def table(found: Curves, corpus: ExpmapCorpus) -> str:
     Published figures are of eight windows and stand there only.
     """
     layout, complete_ones = corpus.layout, complete(corpus)
-    width = _width([*found[COUNTS[0]], *(PUBLISHED + name for name in _names(layout.name))])
+    width = _width([*found[FEW], *(PUBLISHED + name for name in _names(layout.name))])
     true = "".join(f"{time:>7.0f}" for time in true_times(layout.fps))
     lines = [
         f"{'output frame':<{width}}" + "".join(f"{frame:>7}" for frame in REPORTED),
@@ -30,12 +36,12 @@ def table(found: Curves, corpus: ExpmapCorpus) -> str:
     ]
     known = by_action(layout.name)
     beside = {**known, MEAN: mean_over(known, complete_ones)}
-    for count, systems in found.items():
-        lines.append(f"\n{count} windows of each action")
+    for kind, systems in found.items():
+        lines.append(f"\n{TITLES[kind]}")
         for action in next(iter(systems.values())):
             lines.append(f"mean of {', '.join(complete_ones)}" if action == MEAN else action)
             lines += [_line(name, errors[action], width) for name, errors in systems.items()]
-            lines += _published(beside.get(action, {}), width) if count == COUNTS[0] else []
+            lines += _published(beside.get(action, {}), width) if kind == FEW else []
     lines += [f"\naverage of all {len(layout.test)} actions, 8 windows", *_published(averages(layout.name), width)]
     if layout.name.startswith("cmu"):
         lines += ["goal of the mean, 8 windows", _line("goal", _at_frames(GOAL), width)]
