@@ -88,6 +88,17 @@ def test_a_free_run_feeds_back_its_frames_mixed_with_true_ones() -> None:
     torch.testing.assert_close(net.loss(windows, 50), (torch.stack(expected, dim=1) - truth).square().mean())
 
 
+def test_the_loss_can_be_the_mean_distance_of_frames() -> None:
+    net, windows = small(loss="distance"), torch.randn(2, 55, 45)
+    apart = (net.imagine(windows, 50) - windows[:, 50:]).detach().numpy()
+    distances = [[np.sqrt((frame**2).sum() / 45) for frame in row] for row in apart]
+    assert net.loss(windows, 50).item() == pytest.approx(np.mean(distances), rel=1e-5)
+    exact = torch.zeros(1, 5, 45, requires_grad=True)
+    net.error(exact, torch.zeros(1, 5, 45)).backward()  # type: ignore[no-untyped-call]
+    assert exact.grad is not None
+    assert torch.isfinite(exact.grad).all()
+
+
 @pytest.mark.parametrize(
     "changes",
     [

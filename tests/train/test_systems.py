@@ -1,6 +1,7 @@
 """The published systems from the command line: train, stop and go on, evaluate, export."""
 
 import json
+import shlex
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,6 +25,10 @@ def run(*arguments: object) -> Result:
     return CliRunner().invoke(main, [str(argument) for argument in arguments])
 
 
+SETTINGS = shlex.split("--steps 2 --batch 2 --window 16 --loss square --learning-rate 3e-4 --l2 0.002 --adversary 0.01")
+"""Of a run that is small and has nothing by default."""
+
+
 @pytest.fixture(scope="module")
 def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_files(tmp_path_factory.mktemp("data"), actions=("walking",))
@@ -32,24 +37,25 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def trained(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("runs") / "small"
-    found = run("train", "convseq2seq", "--data", data, "--out", out, "--steps", 2, "--batch", 2, "--window", 16)
+    found = run("train", "convseq2seq", "--data", data, "--out", out, *SETTINGS)
     assert found.exit_code == 0, found.output
     return out
 
 
 def test_a_run_says_what_it_is(trained: Path) -> None:
     manifest = Run.load(trained).manifest
-    assert (manifest["model"], manifest["config"]["system"]["window"]) == ("convseq2seq", 16)
+    system = manifest["config"]["system"]
+    assert (manifest["model"], system["window"], system["loss"]) == ("convseq2seq", 16, "square")
     training = manifest["training"]
-    assert (training["seed"], training["steps"], training["recipe"]["adversary"]) == (0, 2, 0.01)
+    recipe = training["recipe"]
+    assert (training["seed"], training["steps"]) == (0, 2)
+    assert (recipe["batch"], recipe["learning_rate"], recipe["l2"], recipe["adversary"]) == (2, 3e-4, 0.002, 0.01)
     assert training["data"]["validation"] == ["train/walking/walking_1.txt"]
     assert training["parameters"] > 3e6
 
 
 def test_it_goes_on_by_the_same_command_only(trained: Path, data: Path) -> None:
-    again = run(
-        "train", "convseq2seq", "--data", data, "--out", trained, "--steps", 2, "--batch", 2, "--window", 16, "--resume"
-    )
+    again = run("train", "convseq2seq", "--data", data, "--out", trained, *SETTINGS, "--resume")
     assert again.exit_code == 0, again.output
     other = run("train", "convseq2seq", "--data", data, "--out", trained, "--steps", 2, "--batch", 3, "--resume")
     assert (other.exit_code, "other settings" in other.stderr) == (2, True)
@@ -86,7 +92,7 @@ def test_what_is_kept_back_is_not_trained_on_and_is_measured(data: Path) -> None
 
 def test_bad_settings_are_named_and_nothing_stays(data: Path, tmp_path: Path) -> None:
     out = tmp_path / "run"
-    short = run("train", "convseq2seq", "--data", data, "--out", out, "--window", 5)
+    short = run("train", "convseq2seq", "--data", data, "--out", out, "--padding", "valid", "--window", 5)
     assert (short.exit_code, "padding 'same'" in short.stderr, out.exists()) == (2, True, False)
     (tmp_path / "empty").mkdir()
     empty = run("train", "convseq2seq", "--data", tmp_path / "empty", "--out", out)
@@ -94,18 +100,18 @@ def test_bad_settings_are_named_and_nothing_stays(data: Path, tmp_path: Path) ->
 
 
 @pytest.mark.parametrize(
-    ("name", "parameters"),
+    ("name", "preset", "parameters"),
     [
-        ("convseq2seq", 3_348_806),
-        ("rrnn", 3_435_590),
-        ("erd", 14_851_670),
-        ("lstm-3lr", 22_117_570),
-        ("lstm-ae", 23_260_140),
+        ("convseq2seq", "paper", 3_348_806),
+        ("rrnn", "default", 3_435_590),
+        ("erd", "default", 14_851_670),
+        ("lstm-3lr", "default", 22_117_570),
+        ("lstm-ae", "default", 23_260_140),
     ],
 )
-def test_the_recipes_have_the_published_sizes(name: str, parameters: int, data: Path) -> None:
+def test_the_recipes_have_the_published_sizes(name: str, preset: str, parameters: int, data: Path) -> None:
     material = replace(expmap_material(read_expmap(data)), kept=tuple(range(70)))
-    config = RECIPES[name]["default"].config(material)
+    config = RECIPES[name][preset].config(material)
     with torch.device("meta"):
         system = SYSTEMS[name][0](config)
     assert sum(parameter.numel() for parameter in system.parameters()) == parameters

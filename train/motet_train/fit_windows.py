@@ -14,7 +14,7 @@ from torch.nn.functional import softplus
 
 from motet.files import write_whole
 from motet_train.checkpoint import CHECKPOINT, LOG, WEIGHTS, read_state, seed_torch, to_bytes
-from motet_train.models.stepwise import Stepwise, squared_error
+from motet_train.models.stepwise import Stepwise
 from motet_train.runs import RunError
 
 Draw = Callable[[np.random.Generator, int], Tensor]
@@ -86,7 +86,7 @@ class Learner:
         doubt = softplus(judge(false.detach()).float()) + softplus(-judge(windows).float())
         _descend(self.judging, judge, doubt.mean(), None)
         opinion = softplus(-judge(false).float()).mean()
-        return squared_error(predicted, truth) + self.fitting.adversary * opinion
+        return self.net.system.error(predicted, truth) + self.fitting.adversary * opinion
 
 
 def fit_windows(

@@ -47,15 +47,17 @@ def _convseq2seq(fitting: Fitting, **sizes: Any) -> Recipe:
 
 CODE = Fitting(steps=20_000, learning_rate=5e-5, decay=(0.99, 10_000), l2=0.0005, adversary=0.01, every=500)
 PAPER = Fitting(steps=20_000, batch=64, l2=0.001, adversary=0.01, every=500)
-SHORT = Fitting(steps=2000, falling=0.7, l2=0.0005, adversary=0.01)
-"""The code's with the paper's learning rate, which falls: twenty minutes on a CPU."""
+SHORT = Fitting(steps=2000, learning_rate=1e-3, falling=0.7, l2=1.4e-5)
+"""What learns best in a quarter of an hour on a CPU, by the error on files that were kept back: a higher learning rate,
+which falls, the paper's weight of the squared weights, .001, relative to an error that eq. 7 sums over 70 channels, and
+no adversary, which doubles the time and brings nothing."""
 
 RESIDUAL = Fitting(
     steps=10_000, optimiser="sgd", learning_rate=0.005, decay=(0.95, 10_000), clip=5.0, every=250, patience=10
 )
 """Of Martinez et al. 2017; it ends when the validation error has stopped falling."""
 
-TAUGHT = Fitting(steps=1000, learning_rate=1e-3, falling=0.5, clip=25.0)
+TAUGHT = Fitting(steps=2000, learning_rate=1e-3, falling=0.5, clip=25.0)
 """Of nets that are taught the next frame: the clipping is that of Jain et al. 2016, who took SGD and more steps."""
 
 
@@ -67,15 +69,17 @@ def _structural(material: Material) -> srnn.Config:
 
 RECIPES: Mapping[str, Mapping[str, Recipe]] = {
     "convseq2seq": {
-        "default": _convseq2seq(SHORT),
+        "default": _convseq2seq(SHORT, padding="same", loss="distance"),
         "paper": _convseq2seq(PAPER),
         "code": _convseq2seq(CODE, dropout=(0.2, 0.2, 0.5), own=0.95),
     },
     "rrnn": {"default": Recipe("rrnn", lambda material: rrnn.Config(len(material.kept)), RESIDUAL)},
     "erd": {"default": Recipe("erd", lambda material: lstm_3lr.ERDConfig(len(material.kept)), TAUGHT)},
     "lstm-3lr": {"default": Recipe("lstm-3lr", lambda material: lstm_3lr.Config(len(material.kept)), TAUGHT)},
-    "srnn": {"default": Recipe("srnn", _structural, replace(TAUGHT, steps=400, every=50))},
-    "lstm-ae": {"default": Recipe("lstm-ae", lambda material: lstm_ae.Config(len(material.kept)), TAUGHT)},
+    "srnn": {"default": Recipe("srnn", _structural, replace(TAUGHT, steps=1200))},
+    "lstm-ae": {
+        "default": Recipe("lstm-ae", lambda material: lstm_ae.Config(len(material.kept)), replace(TAUGHT, steps=1000))
+    },
 }
 """Model -> name of a preset -> recipe."""
 

@@ -24,6 +24,7 @@ OPTIONS: tuple[Option, ...] = (
     click.option("--out", type=Path, required=True, help="Folder to write; must not exist."),
     click.option("--steps", type=click.IntRange(1), help="[default: the preset's]"),
     click.option("--batch", type=click.IntRange(1), help="Windows in a batch. [default: the preset's]"),
+    click.option("--learning-rate", type=click.FloatRange(0, min_open=True), help="[default: the preset's]"),
     click.option("--precision", type=click.Choice(["float32", "bfloat16"]), help="Of products in training."),
     click.option("--all-files", is_flag=True, help="Keep no training file back, and validate on windows of them all."),
     click.option("--seed", type=click.IntRange(0), default=0, show_default=True),
@@ -40,11 +41,15 @@ SWITCHES: tuple[Option, ...] = (
     click.option("--padding", type=click.Choice(["valid", "same"]), help="Other kernels or windows need 'same'."),
     click.option("--window", type=click.IntRange(1), help="Frames that the short-term encoder sees, C."),
     click.option("--own", type=click.FloatRange(0, 1), help="Share of predicted frames in what training feeds back."),
+    click.option(
+        "--loss", type=click.Choice(["square", "distance"]), help="Of distances from true frames, or squares."
+    ),
+    click.option("--l2", type=click.FloatRange(0), help="Weight of the squared weights in the loss."),
     click.option("--adversary", type=click.FloatRange(0), help="Weight of the discriminator in the loss; 0 is none."),
 )
 """Of the ablations; each one's default is the preset's."""
 
-FITTING = ("steps", "batch", "precision", "adversary")
+FITTING = ("steps", "batch", "learning_rate", "precision", "l2", "adversary")
 
 
 def _command(name: str, title: str, switches: tuple[Option, ...] = ()) -> click.Command:

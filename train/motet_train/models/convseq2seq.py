@@ -3,6 +3,7 @@
 Letters in shapes: B rows, T frames, D channels, C frames of the short-term encoder's window, U units.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -11,12 +12,13 @@ from torch import Tensor, nn
 from torch.nn.functional import leaky_relu, pad
 
 from motet_train.data.errors import DataError
-from motet_train.models.stepwise import State, System, free_run
+from motet_train.models.stepwise import State, System, free_run, squared_error
 
 SLOPE = 0.2
 """Of the leaky rectifiers."""
 
 Padding = Literal["valid", "same"]
+Loss = Literal["square", "distance"]
 
 
 @dataclass(frozen=True)
@@ -27,7 +29,8 @@ class Config:
     keeps the borders ("same", Human3.6M); a window of 5 frames and other kernels need it. long_term: which encoder
     sees the whole seed: the convolutional one, an LSTM, or none. dropout: of convolutions' outputs, in their order;
     decoder_dropout: of the decoder's hidden units. own: the share of predicted frames in what training feeds back, eta
-    in eq. 10.
+    in eq. 10. loss: of predicted frames: the mean of the squared distances, eq. 7, or of the distances, which is what
+    is measured in the end and gives early frames, whose errors are small, more weight.
     """
 
     dimensions: int
@@ -41,6 +44,7 @@ class Config:
     dropout: tuple[float, ...] = (0.0, 0.0, 0.5)
     decoder_dropout: float = 0.5
     own: float = 1.0
+    loss: Loss = "square"
 
 
 class Convolution(nn.Module):
@@ -142,6 +146,13 @@ class ConvSeq2Seq(System):
         """As everywhere, but that a share of what is fed back may be true frames (eq. 10)."""
         seed, truth = windows[:, :seed_frames], windows[:, seed_frames:]
         return free_run(self, seed, truth.shape[1], truth if self.config.own < 1 else None, self.config.own)
+
+    def error(self, predicted: Tensor, truth: Tensor) -> Tensor:
+        """Eq. 7, per channel; or the mean distance of frames, over the root of the number of channels."""
+        if self.config.loss == "square":
+            return squared_error(predicted, truth)
+        mean: Tensor = torch.linalg.vector_norm(predicted - truth, dim=-1).mean() / math.sqrt(truth.shape[-1])
+        return mean
 
 
 def _long_term(config: Config) -> nn.Module | None:

@@ -47,9 +47,13 @@ class System(nn.Module, ABC):
         """The frames (B, N, D) that training predicts for whole windows (B, L + N, D): here those of a free run."""
         return free_run(self, windows[:, :seed_frames], windows.shape[1] - seed_frames)
 
+    def error(self, predicted: Tensor, truth: Tensor) -> Tensor:
+        """How far predicted frames (B, N, D) are from true ones, in training: here :func:`squared_error`."""
+        return squared_error(predicted, truth)
+
     def loss(self, windows: Tensor, seed_frames: int) -> Tensor:
-        """What training makes small, of whole windows (B, L + N, D): here the squared error of :meth:`imagine`."""
-        return squared_error(self.imagine(windows, seed_frames), windows[:, seed_frames:])
+        """What training makes small, of whole windows (B, L + N, D): here the :meth:`error` of :meth:`imagine`."""
+        return self.error(self.imagine(windows, seed_frames), windows[:, seed_frames:])
 
 
 def squared_error(predicted: Tensor, truth: Tensor) -> Tensor:
