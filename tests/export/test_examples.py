@@ -1,5 +1,7 @@
 """What the ladder feeds to graphs: a predictor's frames resemble its data, and its states are its encoder's."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -34,21 +36,21 @@ class Means:
         return {"context": mean[:, :1], "state": mean}
 
 
-class Chaos:
-    """A step that doubles the difference of two states each time, and errs by a little."""
+class Turn:
+    """A step that multiplies the state on a circle of length 1, and errs by a little."""
 
     spec = STEP
 
-    def __init__(self, slip: float) -> None:
-        self.slip = np.float32(slip)
+    def __init__(self, slip: float = 0.0, times: int = 1) -> None:
+        self.slip, self.times = np.float32(slip), times
 
     def __call__(self, feeds: Arrays) -> dict[str, np.ndarray]:
-        state = 2 * feeds["state"] % 1 + self.slip
+        state = self.times * feeds["state"] % 1 + self.slip
         return {"frame": state, "next_state": state}
 
 
 def test_a_predictors_step_is_asked_about_what_its_encoder_makes_of_frames_like_the_datas() -> None:
-    graphs: dict[str, Graph] = {"encoder": Means(), "step": Chaos(0)}
+    graphs: dict[str, Graph] = {"encoder": Means(), "step": Turn()}
     draws = examples({"verb": "predict", "motion": MOTION}, graphs)
     frames = draws["encoder"](np.random.default_rng(0), 500)["frames"]
     np.testing.assert_array_equal(
@@ -59,7 +61,7 @@ def test_a_predictors_step_is_asked_about_what_its_encoder_makes_of_frames_like_
 
 
 def test_other_graphs_get_what_their_contract_allows() -> None:
-    found = examples({"verb": "control"}, {"step": Chaos(0)})["step"](np.random.default_rng(0), 3)
+    found = examples({"verb": "control"}, {"step": Turn()})["step"](np.random.default_rng(0), 3)
     expected = example(STEP, np.random.default_rng(0), 3)
     assert found.keys() == expected.keys()
     for name, values in expected.items():
@@ -73,7 +75,18 @@ def test_walks_go_on_from_frame_to_frame() -> None:
 
 
 def test_a_state_is_carried_to_the_horizon_that_a_predictor_has() -> None:
-    pair = Chaos(1e-7), Chaos(0)
-    assert check_carried(*pair, horizon=5)["error"] == pytest.approx(31e-7, rel=0.2)
+    pair = Turn(1e-6), Turn()
+    assert check_carried(*pair, horizon=5)["error"] == pytest.approx(5e-6, rel=0.1)
     with pytest.raises(ExportError, match="carried"):
         check_carried(*pair)
+
+
+def test_a_step_that_amplifies_rounding_is_held_to_what_torch_makes_of_it() -> None:
+    def check(slip: float) -> dict[str, Any]:
+        return check_carried(Turn(slip, times=2), Turn(times=2), horizon=12)
+
+    report = check(1e-7)
+    assert report["bound"] == pytest.approx(10 * report["rounding"])
+    assert 1e-4 < report["error"] < report["bound"]
+    with pytest.raises(ExportError, match="carried"):
+        check(1e-5)
