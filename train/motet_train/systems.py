@@ -57,7 +57,7 @@ RESIDUAL = Fitting(
 )
 """Of Martinez et al. 2017; it ends when the validation error has stopped falling."""
 
-TAUGHT = Fitting(steps=2000, learning_rate=1e-3, falling=0.5, clip=25.0)
+TAUGHT = Fitting(steps=1000, learning_rate=1e-3, falling=0.5, clip=25.0)
 """Of nets that are taught the next frame: the clipping is that of Jain et al. 2016, who took SGD and more steps."""
 
 
@@ -77,9 +77,7 @@ RECIPES: Mapping[str, Mapping[str, Recipe]] = {
     "erd": {"default": Recipe("erd", lambda material: lstm_3lr.ERDConfig(len(material.kept)), TAUGHT)},
     "lstm-3lr": {"default": Recipe("lstm-3lr", lambda material: lstm_3lr.Config(len(material.kept)), TAUGHT)},
     "srnn": {"default": Recipe("srnn", _structural, replace(TAUGHT, steps=1200))},
-    "lstm-ae": {
-        "default": Recipe("lstm-ae", lambda material: lstm_ae.Config(len(material.kept)), replace(TAUGHT, steps=1000))
-    },
+    "lstm-ae": {"default": Recipe("lstm-ae", lambda material: lstm_ae.Config(len(material.kept)), TAUGHT)},
 }
 """Model -> name of a preset -> recipe."""
 
