@@ -49,13 +49,16 @@ def curves(
     systems |= {name: predictor(name, model, corpus) for name, model in models.items()}
     found: Curves = {FEW: {}, MANY: {}, ROTATION: {}}
     for name, system in systems.items():
+        predicted = {}
         for kind, count in COUNTS.items():
-            predicted = predictions(system, test, scaling, count)
-            found[kind][name] = errors(predicted)
+            predicted[kind] = predictions(system, test, scaling, count)
+            found[kind][name] = errors(predicted[kind])
             progress(name)
-        found[ROTATION][name] = errors(predicted, rotation_errors)
-        for measured in found.values():
-            measured[name][MEAN] = np.mean([measured[name][action] for action in complete(corpus)], axis=0)
+        found[ROTATION][name] = errors(predicted[MANY], rotation_errors)
+    whole = complete(corpus)
+    for by_system in found.values():
+        for measured in by_system.values():
+            measured[MEAN] = np.mean([measured[action] for action in whole], axis=0)
     return found
 
 
