@@ -6,9 +6,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from motet.bundle import Bundle, write_bundle
+from motet.bundle.bundle import Bundle, write_bundle
+from motet.bundle.graph import Graph, OnnxGraph
 from motet.files import check_place
-from motet.graph import Graph, OnnxGraph
 from motet_export.decoded import whole_runs
 from motet_export.examples import examples
 from motet_export.exporter import ExportError, export_graph

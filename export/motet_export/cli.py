@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from motet.bundle import Bundle
+from motet.bundle.bundle import Bundle
 from motet_export.bundles import export_run, parity_of
 from motet_train.runs import Run
 

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.control import ControlModel
-from motet.describe import DescribeModel
-from motet.generate import GenerateModel
-from motet.graph import Graph
-from motet.motion import Motion
-from motet.predict import PredictModel
-from motet.rotations import Array
-from motet.text import MAX_WORDS, SPECIALS
+from motet.bundle.graph import Graph
+from motet.models.control import ControlModel
+from motet.models.describe import DescribeModel
+from motet.models.generate import GenerateModel
+from motet.models.predict import PredictModel
+from motet.models.text import MAX_WORDS, SPECIALS
+from motet.motion.motion import Motion
+from motet.motion.rotations import Array
 from motet_export.examples import walks
 
 Decoded = dict[str, NDArray[Any]]

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.contract import MotionContract
-from motet.graph import Arrays, Graph, GraphSpec
-from motet.rotations import Array
+from motet.bundle.graph import Arrays, Graph, GraphSpec
+from motet.motion.rotations import Array
+from motet.representation.contract import MotionContract
 
 LONGEST = 12
 """Of an axis other than the batch."""

@@ -10,8 +10,8 @@ import onnx
 import torch
 from torch import nn
 
+from motet.bundle.graph import GraphSpec
 from motet.errors import MotetError
-from motet.graph import GraphSpec
 
 OPSET = 18
 MAX_IR_VERSION = 10

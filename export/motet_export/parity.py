@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from motet.bundle.graph import Graph
 from motet.decode.rollout import advance
-from motet.graph import Graph
 from motet_export.examples import Examples, example
 from motet_export.exporter import ExportError
 

@@ -10,7 +10,7 @@ import numpy as np
 import onnx
 from onnxruntime.quantization import QuantType, quantize_dynamic
 
-from motet.graph import Graph
+from motet.bundle.graph import Graph
 from motet_export.decoded import whole_runs
 from motet_export.exporter import finished
 

@@ -5,9 +5,7 @@
 
 from importlib.metadata import version
 
-from motet.bundle import Bundle, list_bundles
-from motet.control import ControlModel, ControlSession, Snapshot
-from motet.describe import DescribeModel, Description
+from motet.bundle.bundle import Bundle, list_bundles
 from motet.errors import (
     BundleError,
     ControlError,
@@ -22,18 +20,20 @@ from motet.errors import (
 )
 from motet.formats import read_motion as read
 from motet.formats import write_motion as write
-from motet.generate import Generated, GenerateModel
-from motet.heading import without_heading
-from motet.kinematics import positions
-from motet.mirror import mirror
-from motet.models import load
-from motet.motion import Motion
-from motet.predict import PredictModel, PredictSession
-from motet.root_block import from_root_block, to_root_block
-from motet.root_path import lay_root_path, plant_feet
-from motet.skeleton import Joint, Skeleton
-from motet.smooth import smooth_resample
-from motet.text import Vocabulary
+from motet.models.control import ControlModel, ControlSession, Snapshot
+from motet.models.describe import DescribeModel, Description
+from motet.models.generate import Generated, GenerateModel
+from motet.models.load import load
+from motet.models.predict import PredictModel, PredictSession
+from motet.models.text import Vocabulary
+from motet.motion.heading import without_heading
+from motet.motion.kinematics import positions
+from motet.motion.mirror import mirror
+from motet.motion.motion import Motion
+from motet.motion.root_path import lay_root_path, plant_feet
+from motet.motion.skeleton import Joint, Skeleton
+from motet.motion.smooth import smooth_resample
+from motet.representation.root_block import from_root_block, to_root_block
 
 __version__ = version("motet")
 

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from motet.bundled import Bundled
-from motet.control import ControlModel
-from motet.describe import DescribeModel
-from motet.generate import GenerateModel
-from motet.graph import Arrays, Graph
-from motet.predict import PredictModel
-from motet.text import EOS, SPECIALS
+from motet.bundle.graph import Arrays, Graph
+from motet.models.base import Bundled
+from motet.models.control import ControlModel
+from motet.models.describe import DescribeModel
+from motet.models.generate import GenerateModel
+from motet.models.predict import PredictModel
+from motet.models.text import EOS, SPECIALS
 
 BATCHES = (64, 256, 512, 1024, 2048, 4096)
 """Numbers of characters among which the best is looked for."""

@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from motet.models import load
-from motet.predict import PredictModel
+from motet.models.load import load
+from motet.models.predict import PredictModel
 from motet_export.bundles import export_run
-from motet_train.models.stepwise import Stepwise
-from motet_train.models.systems import stepwise
+from motet_train.models.predict.stepwise import Stepwise
+from motet_train.models.predict.systems import stepwise
 from motet_train.runs import Run
 
 CHANNELS = 48

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from motet.contract import MotionContract
-from motet.graph import Arrays, Graph, GraphSpec, TensorSpec
+from motet.bundle.graph import Arrays, Graph, GraphSpec, TensorSpec
+from motet.representation.contract import MotionContract
 from motet_export.examples import example, examples, walks
 from motet_export.exporter import ExportError
 from motet_export.parity import check_carried

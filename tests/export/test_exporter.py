@@ -6,7 +6,7 @@ import pytest
 import torch
 from torch import Tensor, nn
 
-from motet.graph import GraphSpec, OnnxGraph, TensorSpec
+from motet.bundle.graph import GraphSpec, OnnxGraph, TensorSpec
 from motet_export.exporter import MAX_IR_VERSION, OPSET, ExportError, export_graph
 from motet_export.parity import check_carried, check_one_step, error
 from motet_train.torch_graph import TorchGraph

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 import torch
 
-from motet.bundle import Bundle
-from motet.describe import DescribeModel
-from motet.generate import GenerateModel
-from motet.models import load
-from motet.text import SPECIALS
+from motet.bundle.bundle import Bundle
+from motet.models.describe import DescribeModel
+from motet.models.generate import GenerateModel
+from motet.models.load import load
+from motet.models.text import SPECIALS
 from motet_export.bundles import export_run, parity_of
 from motet_export.examples import example
 from motet_export.exporter import ExportError
-from motet_train.models import language_to_motion, motion_to_language
-from motet_train.models.language_to_motion import LanguageToMotion, LanguageToMotionConfig
-from motet_train.models.motion_to_language import MotionToLanguage, MotionToLanguageConfig
+from motet_train.models.language import language_to_motion, motion_to_language
+from motet_train.models.language.language_to_motion import LanguageToMotion, LanguageToMotionConfig
+from motet_train.models.language.motion_to_language import MotionToLanguage, MotionToLanguageConfig
 from motet_train.runs import Run
 
 D = 3

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import torch
 
-from motet.models import load
-from motet.predict import PredictModel
+from motet.models.load import load
+from motet.models.predict import PredictModel
 from motet_export.bundles import export_run
-from motet_train.models.predictor import Predictor, PredictorConfig
+from motet_train.models.predict.predictor import Predictor, PredictorConfig
 from motet_train.runs import Run
 
 CHANNELS = 9

@@ -5,11 +5,11 @@ import onnx
 import pytest
 import torch
 
+from motet.bundle.graph import OnnxGraph
 from motet.decode.rollout import free_run
-from motet.graph import OnnxGraph
 from motet_export.exporter import export_graph
-from motet_train.models.srnn import EDGES, NODES, SRNN, Config
-from motet_train.models.stepwise import Stepwise
+from motet_train.models.predict.srnn import EDGES, NODES, SRNN, Config
+from motet_train.models.predict.stepwise import Stepwise
 from motet_train.torch_graph import TorchGraph
 
 SEED, CHANNELS = 7, 11

@@ -7,15 +7,15 @@ import onnx
 import pytest
 import torch
 
+from motet.bundle.graph import OnnxGraph
 from motet.decode.rollout import free_run
-from motet.graph import OnnxGraph
 from motet_export.exporter import export_graph
 from motet_export.parity import check_carried, check_one_step
-from motet_train.models import lstm_3lr, lstm_ae, rrnn
-from motet_train.models.lstm_3lr import EncoderRecurrentDecoder
-from motet_train.models.lstm_ae import LSTMAE
-from motet_train.models.rrnn import RRNN
-from motet_train.models.stepwise import Stepwise, System
+from motet_train.models.predict import lstm_3lr, lstm_ae, rrnn
+from motet_train.models.predict.lstm_3lr import EncoderRecurrentDecoder
+from motet_train.models.predict.lstm_ae import LSTMAE
+from motet_train.models.predict.rrnn import RRNN
+from motet_train.models.predict.stepwise import Stepwise, System
 from motet_train.torch_graph import TorchGraph
 
 SEED, CHANNELS = 6, 7

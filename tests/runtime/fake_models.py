@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.contract import MotionContract
-from motet.describe import DescribeModel
-from motet.generate import GenerateModel
-from motet.graph import Arrays, GraphSpec, TensorSpec
-from motet.motion import Motion
-from motet.skeleton import Joint, Skeleton
-from motet.text import SPECIALS, Vocabulary
+from motet.bundle.graph import Arrays, GraphSpec, TensorSpec
+from motet.models.describe import DescribeModel
+from motet.models.generate import GenerateModel
+from motet.models.text import SPECIALS, Vocabulary
+from motet.motion.motion import Motion
+from motet.motion.skeleton import Joint, Skeleton
+from motet.representation.contract import MotionContract
 
 Array = NDArray[Any]
 FPS = 10.0

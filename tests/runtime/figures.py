@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from motet.motion import Motion
-from motet.skeleton import Joint, Skeleton
+from motet.motion.motion import Motion
+from motet.motion.skeleton import Joint, Skeleton
 
 JOINTS = (
     Joint("hips", -1, (0.0, 0.0, 0.0), "xyz"),

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from motet.bundle import FORMAT, Bundle, list_bundles, write_bundle, zip_bytes
+from motet.bundle.bundle import FORMAT, Bundle, list_bundles, write_bundle, zip_bytes
 from motet.errors import BundleError, OutputError
-from motet.models import load
+from motet.models.load import load
 
 SHIPPED = list_bundles()["cmu-control"]
 

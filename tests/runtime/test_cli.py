@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from command_line import check_refused, run
 
-from motet.bundle import list_bundles
+from motet.bundle.bundle import list_bundles
 from motet.formats import read_motion
-from motet.kinematics import positions
+from motet.motion.kinematics import positions
 
 WALK = "39_14.amc"
 

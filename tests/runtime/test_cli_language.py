@@ -8,18 +8,18 @@ import pytest
 from command_line import check_refused, run
 from fake_models import describe_model, generate_model, moving
 
-from motet.describe import DescribeModel
 from motet.formats import read_motion, write_motion
-from motet.generate import GenerateModel
-from motet.models import load, load_as
-from motet.motion import Motion
+from motet.models.describe import DescribeModel
+from motet.models.generate import GenerateModel
+from motet.models.load import load, load_as
+from motet.motion.motion import Motion
 
 
 @pytest.fixture(autouse=True)
 def bundles(monkeypatch: pytest.MonkeyPatch) -> None:
     """Small models in the place of the shipped ones."""
     models = {"cmu-describe": describe_model(), "cmu-generate": generate_model()}
-    monkeypatch.setattr("motet.models.load", lambda name, threads=1: models.get(name) or load(name, threads))
+    monkeypatch.setattr("motet.models.load.load", lambda name, threads=1: models.get(name) or load(name, threads))
 
 
 @pytest.fixture

@@ -8,13 +8,13 @@ import numpy as np
 import onnxruntime
 import pytest
 
-from motet.bundle import list_bundles
-from motet.control import ControlModel
+from motet.bundle.bundle import list_bundles
 from motet.errors import ControlError, MotionError
 from motet.formats import read_motion
-from motet.models import load
-from motet.motion import Motion
-from motet.script import control_track, parse_script
+from motet.models.control import ControlModel
+from motet.models.load import load
+from motet.models.script import control_track, parse_script
+from motet.motion.motion import Motion
 
 SCRIPT = "walk .5s, walk>run .5s, run .5s, bend .5s"
 

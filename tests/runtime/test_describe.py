@@ -5,9 +5,9 @@ import pytest
 from fake_models import CHANNELS, CONTRACT, FakeGraph, describe_model, moving
 
 from motet.bench import WORDS, describe_figures, figures
-from motet.describe import DescribeModel, Description
 from motet.errors import BundleError, DecodingError, MotionError, TextError, TextWarning
-from motet.language import batches, padded
+from motet.models.describe import DescribeModel, Description
+from motet.models.language import batches, padded
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +41,7 @@ def test_more_motions_than_fit_one_batch_come_back_in_order(
 ) -> None:
     motions = [moving(3 + i % 7, seed=i) for i in range(11)]
     whole, vectors = model.describe(motions), model.embed(motions)
-    monkeypatch.setattr("motet.describe.BATCH", 4)
+    monkeypatch.setattr("motet.models.describe.BATCH", 4)
     assert [[d.text for d in row] for row in model.describe(motions)] == [[d.text for d in row] for row in whole]
     np.testing.assert_allclose(model.embed(motions), vectors, atol=1e-5)
 

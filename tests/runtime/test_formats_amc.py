@@ -8,10 +8,10 @@ from figures import walker
 from motet.errors import FormatError, MotionError, OutputError
 from motet.formats import amc, bvh, read_motion, write_motion
 from motet.formats.asf import CMU_METRES, read_skeleton
-from motet.kinematics import local_rotations, positions, with_channels
-from motet.motion import Motion
-from motet.rotations import axis_to_rotmat
-from motet.skeleton import Joint, Skeleton
+from motet.motion.kinematics import local_rotations, positions, with_channels
+from motet.motion.motion import Motion
+from motet.motion.rotations import axis_to_rotmat
+from motet.motion.skeleton import Joint, Skeleton
 
 ASF = """
 :version 1.10

@@ -4,10 +4,10 @@ from figures import walker
 
 from motet.errors import FormatError, MotionError
 from motet.formats import bvh, read_motion, write_motion
-from motet.kinematics import positions, with_channels
-from motet.motion import Motion
-from motet.rotations import axis_to_rotmat
-from motet.skeleton import Joint, Skeleton
+from motet.motion.kinematics import positions, with_channels
+from motet.motion.motion import Motion
+from motet.motion.rotations import axis_to_rotmat
+from motet.motion.skeleton import Joint, Skeleton
 
 SIX = "CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation"
 

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 from figures import walker
 
+from motet.draw.figure import figure_of
+from motet.draw.raster import Stage, palette
 from motet.errors import MotionError
 from motet.formats import gif, write_motion
-from motet.formats.figure import figure_of
-from motet.formats.raster import Stage, palette
 
 
 def frames_of(content):

@@ -8,10 +8,10 @@ from figures import walker
 
 from motet.errors import MotionError
 from motet.formats import glb, write_motion
-from motet.kinematics import positions
-from motet.motion import Motion
-from motet.rotations import quat_to_rotmat
-from motet.skeleton import Joint, Skeleton
+from motet.motion.kinematics import positions
+from motet.motion.motion import Motion
+from motet.motion.rotations import quat_to_rotmat
+from motet.motion.skeleton import Joint, Skeleton
 
 TYPES = {5126: "<f4", 5123: "<u2", 5125: "<u4"}
 WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}

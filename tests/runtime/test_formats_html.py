@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from figures import walker
 
+from motet.draw.body import Body
+from motet.draw.figure import figure_of
 from motet.errors import MotionError, OutputError
 from motet.formats import html, write_motion
-from motet.formats.body import Body
-from motet.formats.figure import figure_of
-from motet.kinematics import positions
-from motet.motion import Motion
-from motet.skeleton import Joint, Skeleton
+from motet.motion.kinematics import positions
+from motet.motion.motion import Motion
+from motet.motion.skeleton import Joint, Skeleton
 
 
 def data_of(path):

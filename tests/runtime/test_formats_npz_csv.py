@@ -7,7 +7,7 @@ from figures import walker
 
 from motet.errors import FormatError, OutputError
 from motet.formats import csv, npz, read_motion, write_motion
-from motet.motion import Motion
+from motet.motion.motion import Motion
 
 AWKWARD = Motion(
     [[1 / 3, -0.0, 1e-300], [1e300, 0.1, 2.0]], ("a,b.rx", 'say "hi".tx', "c [1].vx"), ("rad", "m", "m/s"), 29.97

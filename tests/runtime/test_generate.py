@@ -8,13 +8,13 @@ from figures import walker
 
 from motet.bench import figures
 from motet.cli.generate import playable
-from motet.contract import MotionContract
 from motet.decode.mixture import Sample
 from motet.errors import DecodingError, MotionError, TextError, TextWarning
-from motet.generate import Generated, GenerateModel
-from motet.kinematics import positions
-from motet.root_block import to_root_block
-from motet.root_path import plant_feet
+from motet.models.generate import Generated, GenerateModel
+from motet.motion.kinematics import positions
+from motet.motion.root_path import plant_feet
+from motet.representation.contract import MotionContract
+from motet.representation.root_block import to_root_block
 
 TEXTS = ["a person walks", "walks", "a person walks left 80"]
 
@@ -61,7 +61,7 @@ def test_more_sentences_than_fit_one_batch_come_back_in_order(
 ) -> None:
     texts = [TEXTS[i % 3] for i in range(7)]
     whole, vectors = model.generate(texts, seed=range(7)), model.embed(texts)
-    monkeypatch.setattr("motet.generate.BATCH", 2)
+    monkeypatch.setattr("motet.models.generate.BATCH", 2)
     for one, other in zip(model.generate(texts, seed=range(7)), whole, strict=True):
         assert_same(one, other)
     np.testing.assert_allclose(model.embed(texts), vectors, atol=1e-6)
@@ -144,7 +144,7 @@ def test_a_motion_has_planted_feet_and_is_there_as_drawn(monkeypatch: pytest.Mon
     mean, std = plain.values.mean(axis=0), np.ones(len(plain.channels))
     model.contract = MotionContract(plain.channels, plain.units, 10.0, mean, std, plain.skeleton)
     drawn = Sample((plain.values - mean).astype(np.float32), -1.0)
-    monkeypatch.setattr("motet.generate.mixture_search", lambda *given: [[drawn]])
+    monkeypatch.setattr("motet.models.generate.mixture_search", lambda *given: [[drawn]])
     ((found,),) = model.generate("walks")
     np.testing.assert_allclose(found.drawn.values, plain.values, atol=1e-4)
     np.testing.assert_array_equal(found.motion.values, plant_feet(found.drawn).values)

@@ -6,8 +6,8 @@ from figures import walker
 
 from motet.errors import MotionError
 from motet.formats import read_motion
-from motet.kinematics import euler_of, global_transforms, local_rotations, positions, with_channels
-from motet.motion import Motion
+from motet.motion.kinematics import euler_of, global_transforms, local_rotations, positions, with_channels
+from motet.motion.motion import Motion
 
 
 def turn(axis, degrees):

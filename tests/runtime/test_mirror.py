@@ -4,11 +4,11 @@ from figures import walker
 
 from motet.errors import MotionError
 from motet.formats import read_motion, write_motion
-from motet.kinematics import positions, with_channels
-from motet.mirror import lateral_axis, mirror
-from motet.motion import Motion
-from motet.sides import partners_of
-from motet.skeleton import Joint, Skeleton
+from motet.motion.kinematics import positions, with_channels
+from motet.motion.mirror import lateral_axis, mirror
+from motet.motion.motion import Motion
+from motet.motion.sides import partners_of
+from motet.motion.skeleton import Joint, Skeleton
 
 
 def line_of(*names):

@@ -3,10 +3,10 @@ import pytest
 from figures import walker
 
 from motet.errors import MotionError
-from motet.kinematics import positions
-from motet.motion import Motion
-from motet.rotations import euler_to_rotmat
-from motet.skeleton import Joint, Skeleton
+from motet.motion.kinematics import positions
+from motet.motion.motion import Motion
+from motet.motion.rotations import euler_to_rotmat
+from motet.motion.skeleton import Joint, Skeleton
 
 
 def plain(values, unit="deg", fps=10.0):

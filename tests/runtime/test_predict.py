@@ -9,15 +9,15 @@ import pytest
 from fake_models import FakeGraph, spec
 from figures import walker
 
-from motet.contract import MotionContract
 from motet.decode.rollout import free_run
 from motet.errors import BundleError, DecodingError, MotionError
 from motet.formats import read_motion, write_motion
-from motet.joint_vectors import carry_on, continuous_vectors, joints_of, to_joint_vectors
-from motet.kinematics import local_rotations, positions
-from motet.motion import Motion
-from motet.predict import PredictModel, ending
-from motet.rotations import axis_to_rotmat
+from motet.models.predict import PredictModel, ending
+from motet.motion.kinematics import local_rotations, positions
+from motet.motion.motion import Motion
+from motet.motion.rotations import axis_to_rotmat
+from motet.representation.contract import MotionContract
+from motet.representation.joint_vectors import carry_on, continuous_vectors, joints_of, to_joint_vectors
 
 SEED, HORIZON = 4, 3
 FPS = 30.0

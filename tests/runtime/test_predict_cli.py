@@ -9,9 +9,9 @@ from command_line import check_refused, run
 from figures import walker
 
 from motet.formats import read_motion, write_motion
-from motet.kinematics import positions
-from motet.models import load
-from motet.predict import ending
+from motet.models.load import load
+from motet.models.predict import ending
+from motet.motion.kinematics import positions
 
 WALK = "39_14.amc"
 

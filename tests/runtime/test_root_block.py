@@ -5,14 +5,14 @@ import numpy as np
 import pytest
 from figures import walker
 
-from motet.contract import MotionContract
 from motet.errors import MotionError
 from motet.formats import read_motion
-from motet.heading import heading
-from motet.kinematics import positions
-from motet.motion import Motion
-from motet.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS, from_root_block, to_root_block
-from motet.smooth import smooth_resample
+from motet.motion.heading import heading
+from motet.motion.kinematics import positions
+from motet.motion.motion import Motion
+from motet.motion.smooth import smooth_resample
+from motet.representation.contract import MotionContract
+from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS, from_root_block, to_root_block
 
 
 def block(motion: Motion) -> dict[str, np.ndarray]:

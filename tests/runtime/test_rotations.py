@@ -3,7 +3,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from motet.rotations import (
+from motet.motion.rotations import (
     axis_to_rotmat,
     continuous_euler,
     euler_to_rotmat,

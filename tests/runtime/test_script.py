@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from motet.errors import ScriptError
-from motet.script import Segment, control_track, parse_script, starts_of
+from motet.models.script import Segment, control_track, parse_script, starts_of
 
 LABELS = ("walk", "run", "bend_over")
 

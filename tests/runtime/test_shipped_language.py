@@ -9,8 +9,8 @@ from click.testing import CliRunner
 
 from motet.cli import main
 from motet.formats import read_motion
-from motet.models import load
-from motet.root_block import to_root_block
+from motet.models.load import load
+from motet.representation.root_block import to_root_block
 
 
 @pytest.mark.parametrize("draws", [0, 100])

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from motet.errors import TextError
-from motet.text import EOS, MAX_WORDS, PAD, SOS, SPECIALS, SPELLING, UNK, Vocabulary, normalise, words
+from motet.models.text import EOS, MAX_WORDS, PAD, SOS, SPECIALS, SPELLING, UNK, Vocabulary, normalise, words
 
 SENTENCES = [
     "A person walks forward.",

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from motet.motion import Motion
-from motet.skeleton import Joint, Skeleton
+from motet.motion.motion import Motion
+from motet.motion.skeleton import Joint, Skeleton
 from motet_train.data.records import Record
 from motet_train.data.representation import Representation
 from motet_train.data.store import Store, prepare

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 from language_data import SKELETON
 
-from motet.describe import Description
 from motet.errors import TextError
-from motet.generate import Generated
-from motet.motion import Motion
-from motet.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS
+from motet.models.describe import Description
+from motet.models.generate import Generated
+from motet.motion.motion import Motion
+from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS
 from motet_train.data.store import Entry, Store
 from motet_train.evaluate.language.corpus import plain
 

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 import torch
 
-from motet.control import ControlModel
+from motet.models.control import ControlModel
 from motet_export.bundles import export_run
-from motet_train.contrastive import DivergedError, Learning
-from motet_train.control import About, train_control
 from motet_train.data.clips import read_clips
-from motet_train.evaluate.gaits import limit_cycle, switch
-from motet_train.evaluate.report import experiments, lab_of
-from motet_train.models.angle_crbm import AngleCRBM, AngleCRBMConfig, from_config, to_config
-from motet_train.models.crbm import CRBM
+from motet_train.evaluate.control.gaits import limit_cycle, switch
+from motet_train.evaluate.control.report import experiments, lab_of
+from motet_train.models.control.angle_crbm import AngleCRBM, AngleCRBMConfig, from_config, to_config
+from motet_train.models.control.contrastive import DivergedError, Learning
+from motet_train.models.control.crbm import CRBM
+from motet_train.recipes.control import About, train_control
 from motet_train.runs import Run
 
 ABOUT = About("small", "a test", "MIT")

@@ -1,6 +1,6 @@
 from torch import nn
 
-from motet_train.audition import audition
+from motet_train.recipes.audition import audition
 
 
 def candidates(net: nn.Linear, values: list[float], seen: list[float]):

@@ -6,12 +6,12 @@ import pytest
 
 from motet.errors import FormatError
 from motet.formats import read_motion, write_motion
-from motet_train.contrastive import Learning
-from motet_train.control import About, train_control
 from motet_train.data.body import body_parts
 from motet_train.data.clips import CMU, read_clips, sequences
 from motet_train.data.errors import DataError
-from motet_train.models.tdbn import TDBNConfig
+from motet_train.models.control.contrastive import Learning
+from motet_train.models.control.tdbn import TDBNConfig
+from motet_train.recipes.control import About, train_control
 
 
 def test_the_default_clips_are_the_thesis_trials() -> None:

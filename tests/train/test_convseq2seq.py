@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from motet_train.data.errors import DataError
 from motet_train.fit_windows import Fitting, Learner
-from motet_train.models.convseq2seq import SLOPE, Config, Convolution, ConvSeq2Seq, Discriminator
-from motet_train.models.stepwise import Stepwise, free_run
+from motet_train.models.predict.convseq2seq import SLOPE, Config, Convolution, ConvSeq2Seq, Discriminator
+from motet_train.models.predict.stepwise import Stepwise, free_run
 from motet_train.runs import RunError
 
 Array = NDArray[Any]

@@ -24,8 +24,8 @@ from language_models import (
 )
 
 from motet.cli import main
-from motet.motion import Motion
-from motet.text import Vocabulary
+from motet.models.text import Vocabulary
+from motet.motion.motion import Motion
 from motet_train.data.store import FRAMES as FRAMES_FILE
 from motet_train.data.store import INDEX, Store
 from motet_train.evaluate.language.chain import answers, bounds_chained, chained, told
@@ -33,7 +33,7 @@ from motet_train.evaluate.language.corpus import Corpus, corpus_of
 from motet_train.evaluate.language.motions import energy, feet_of, last_energy, measures, skate, speed
 from motet_train.evaluate.language.prompts import kinds, prompted, recognised, thresholds, travel
 from motet_train.evaluate.language.report import GOALS, describe_report, generate_report
-from motet_train.evaluate.table import json_ready, reached, table
+from motet_train.evaluate.tables import json_ready, reached, table
 from motet_train.runs import MODELS, Run
 
 STORE = small_store()

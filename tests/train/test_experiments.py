@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from motet.contract import MotionContract
-from motet.control import ControlModel
-from motet.graph import Arrays, GraphSpec, TensorSpec
-from motet.models import load
-from motet_train.control import About, train_control
+from motet.bundle.graph import Arrays, GraphSpec, TensorSpec
+from motet.models.control import ControlModel
+from motet.models.load import load
+from motet.representation.contract import MotionContract
 from motet_train.data.clips import Clips, read_clips
-from motet_train.evaluate.gaits import gait_transitions, limit_cycle
-from motet_train.evaluate.lab import Lab
-from motet_train.evaluate.report import GOALS, control_report, lab_of
-from motet_train.evaluate.table import reached
-from motet_train.models.tdbn import TDBNConfig
+from motet_train.evaluate.control.gaits import gait_transitions, limit_cycle
+from motet_train.evaluate.control.lab import Lab
+from motet_train.evaluate.control.report import GOALS, control_report, lab_of
+from motet_train.evaluate.tables import reached
+from motet_train.models.control.tdbn import TDBNConfig
+from motet_train.recipes.control import About, train_control
 
 
 @pytest.fixture(scope="module")

@@ -8,11 +8,11 @@ import torch
 from language_data import small_store
 from torch import Tensor, nn
 
-from motet_train.batches import Examples
 from motet_train.checkpoint import CHECKPOINT, LOG, WEIGHTS
+from motet_train.data.batches import Examples
 from motet_train.fit import Fitted, Fitting, fit, rate, validate
-from motet_train.language import material
-from motet_train.models.batch import Batch
+from motet_train.models.language.batch import Batch
+from motet_train.recipes.language import material
 from motet_train.runs import RunError
 
 FITTING = Fitting(clip=1.0, epochs=4, batch=8, learning_rate=0.05)

@@ -12,7 +12,7 @@ from torch import Tensor, nn
 
 from motet_train.checkpoint import CHECKPOINT, LOG, WEIGHTS
 from motet_train.fit_windows import Fitting, Learner, fit_windows, rate
-from motet_train.models.stepwise import State, Stepwise, System, squared_error
+from motet_train.models.predict.stepwise import State, Stepwise, System, squared_error
 from motet_train.runs import RunError
 
 FITTING = Fitting(steps=12, batch=8, learning_rate=0.02, every=3)

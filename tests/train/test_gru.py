@@ -6,10 +6,10 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from motet_train.models.dropout import WordEmbedding, mask
-from motet_train.models.gru import GRU
-from motet_train.models.layer_norm_gru import LayerNormGRU
-from motet_train.models.sequence import Decoder, Encoder
+from motet_train.models.language.dropout import WordEmbedding, mask
+from motet_train.models.language.gru import GRU
+from motet_train.models.language.layer_norm_gru import LayerNormGRU
+from motet_train.models.language.sequence import Decoder, Encoder
 
 Array = NDArray[np.float64]
 LAYERS = pytest.mark.parametrize("layer", [GRU, LayerNormGRU])

@@ -4,7 +4,7 @@ import pytest
 from motet_train.data.body import body_parts
 from motet_train.data.clips import read_clips, sequences
 from motet_train.data.period import is_periodic, period
-from motet_train.evaluate.measures import ARRIVED, Reference, arrival, upsample
+from motet_train.evaluate.control.measures import ARRIVED, Reference, arrival, upsample
 
 
 def wave(frames: int, cycle: float, phase: float = 0.0) -> np.ndarray:

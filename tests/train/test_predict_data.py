@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from motet.errors import FormatError
 from motet.formats import read_motion
-from motet.mirror import mirror
-from motet.rotations import rotmat_to_euler, rotmat_to_rotvec, rotvec_to_rotmat
+from motet.motion.mirror import mirror
+from motet.motion.rotations import rotmat_to_euler, rotmat_to_rotvec, rotvec_to_rotmat
 from motet_train.data.clips import CMU as CLIPS
 from motet_train.data.errors import DataError
 from motet_train.data.expmap_files import CMU, H36M, Scaling, is_expmap, parse, read_expmap, scaling_of
@@ -22,6 +22,7 @@ from motet_train.data.predict_data import (
     read_trials,
 )
 from motet_train.data.predict_data import test_names as names_held_out
+from motet_train.data.windows import Windows
 from motet_train.evaluate.predict.protocol import (
     REPORTED,
     errors,
@@ -35,7 +36,6 @@ from motet_train.evaluate.predict.protocol import (
     windows,
     zero_velocity,
 )
-from motet_train.windows import Windows
 
 
 def write_files(folder: Path, frames: int = 200, actions: tuple[str, ...] = ("walking", "running")) -> Path:

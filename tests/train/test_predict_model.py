@@ -11,14 +11,14 @@ from test_predict_data import write_files
 
 from motet.cli import main
 from motet.formats import read_motion, write_motion
-from motet.predict import PredictModel
+from motet.models.predict import PredictModel
 from motet_train.data.clips import CMU as CLIPS
 from motet_train.data.expmap_files import CMU_ACTIONS, read_expmap
 from motet_train.data.predict_data import expmap_material
 from motet_train.evaluate.predict.published_h36m import CONV
 from motet_train.evaluate.predict.report import FEW, MEAN, ZERO, complete, curves
-from motet_train.models.predictor import Predictor, PredictorConfig
-from motet_train.predict import About, Recipe, train_predict
+from motet_train.models.predict.predictor import Predictor, PredictorConfig
+from motet_train.recipes.predict import About, Recipe, train_predict
 from motet_train.runs import Run
 
 ABOUT = About("small", "motet train predict", "MIT")

@@ -14,10 +14,10 @@ from test_predict_data import write_files
 
 from motet.errors import MotionError
 from motet.formats import read_motion
-from motet.heading import heading
-from motet.kinematics import local_rotations, positions
-from motet.predict import PredictModel
-from motet.rotations import axis_to_rotmat, rotmat_to_rotvec, rotvec_to_rotmat
+from motet.models.predict import PredictModel
+from motet.motion.heading import heading
+from motet.motion.kinematics import local_rotations, positions
+from motet.motion.rotations import axis_to_rotmat, rotmat_to_rotvec, rotvec_to_rotmat
 from motet_train.cli.evaluate_predict import predict_reports
 from motet_train.data.clips import CMU as CLIPS
 from motet_train.data.expmap_files import CMU, H36M, ExpmapCorpus, Layout, parse, read_expmap
@@ -32,8 +32,8 @@ from motet_train.evaluate.predict.report import COUNTS, MANY, MEAN, ZERO, Curves
 from motet_train.evaluate.predict.rows import Row, mean, pooled, rows_of, spread
 from motet_train.evaluate.predict.strips import EVERY, GIVEN, places, strips
 from motet_train.evaluate.predict.table import table
-from motet_train.models.convseq2seq import Config
-from motet_train.models.systems import stepwise
+from motet_train.models.predict.convseq2seq import Config
+from motet_train.models.predict.systems import stepwise
 from motet_train.runs import Run
 
 FIVE = ("basketball", "jumping", "running", "soccer", "walking")

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import torch
 
-from motet_train.contrastive import Ascent, Epoch, Learning, balanced, epochs
-from motet_train.models.rbm import RBM, block_mask, reconstruct, train_rbm
+from motet_train.models.control.contrastive import Ascent, Epoch, Learning, balanced, epochs
+from motet_train.models.control.rbm import RBM, block_mask, reconstruct, train_rbm
 
 
 def small_rbm() -> RBM:

@@ -10,13 +10,13 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from motet_train.models import lstm_3lr, lstm_ae, rrnn
-from motet_train.models.lstm_3lr import EncoderRecurrentDecoder
-from motet_train.models.lstm_ae import LSTMAE
-from motet_train.models.noise import noise_at
-from motet_train.models.reused import Reused, one_gradient
-from motet_train.models.rrnn import RRNN
-from motet_train.models.stepwise import System, free_run
+from motet_train.models.predict import lstm_3lr, lstm_ae, rrnn
+from motet_train.models.predict.lstm_3lr import EncoderRecurrentDecoder
+from motet_train.models.predict.lstm_ae import LSTMAE
+from motet_train.models.predict.noise import noise_at
+from motet_train.models.predict.reused import Reused, one_gradient
+from motet_train.models.predict.rrnn import RRNN
+from motet_train.models.predict.stepwise import System, free_run
 
 Array = NDArray[np.float64]
 D, SEED = 5, 6

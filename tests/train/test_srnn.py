@@ -10,8 +10,8 @@ from torch import Tensor, nn
 
 from motet_train.data.errors import DataError
 from motet_train.data.expmap_files import CMU, H36M
-from motet_train.models.noise import noise_at, noisy
-from motet_train.models.srnn import SRNN, Config, parts_of
+from motet_train.models.predict.noise import noise_at, noisy
+from motet_train.models.predict.srnn import SRNN, Config, parts_of
 
 Array = NDArray[np.float64]
 TINY = Config(9, ((8, 0, 4), (1, 2), (5, 6), (3,), (7,)), linear=6, units=5, narrow=4)

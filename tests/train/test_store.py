@@ -11,9 +11,9 @@ from kit_zip import JOINTS, write_kit_zip
 from motet.cli import main
 from motet.errors import OutputError
 from motet.formats import read_motion
-from motet.kinematics import positions
-from motet.motion import Motion
-from motet.root_block import ROOT_BLOCK
+from motet.motion.kinematics import positions
+from motet.motion.motion import Motion
+from motet.representation.root_block import ROOT_BLOCK
 from motet_train.data.clips import CMU
 from motet_train.data.corpus import read_corpus
 from motet_train.data.errors import DataError

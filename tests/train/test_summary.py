@@ -3,9 +3,9 @@ from dataclasses import replace
 import numpy as np
 import torch
 
-from motet_train.models.batch import Batch
-from motet_train.models.language_to_motion import LanguageToMotion, LanguageToMotionConfig
-from motet_train.models.summary import LARGEST, SummaryHead, summary
+from motet_train.models.language.batch import Batch
+from motet_train.models.language.language_to_motion import LanguageToMotion, LanguageToMotionConfig
+from motet_train.models.language.summary import LARGEST, SummaryHead, summary
 
 SMALL = LanguageToMotionConfig(channels=3, words=9, encoder_units=(4,), decoder_units=(5,), embedding=4, components=2)
 

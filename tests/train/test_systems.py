@@ -15,10 +15,10 @@ from motet.cli import main
 from motet_train.checkpoint import CHECKPOINT
 from motet_train.data.expmap_files import read_expmap
 from motet_train.data.predict_data import expmap_material, validation_files
-from motet_train.models.convseq2seq import Config
-from motet_train.models.systems import SYSTEMS
+from motet_train.models.predict.convseq2seq import Config
+from motet_train.models.predict.systems import SYSTEMS
+from motet_train.recipes.systems import RECIPES, validation_error
 from motet_train.runs import Run
-from motet_train.systems import RECIPES, validation_error
 
 
 def run(*arguments: object) -> Result:

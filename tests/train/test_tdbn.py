@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 import torch
 
-from motet.control import ControlModel
-from motet_train.contrastive import Learning
-from motet_train.control import About, train_control
+from motet.models.control import ControlModel
 from motet_train.data.body import body_parts
 from motet_train.data.clips import read_clips
-from motet_train.models.tdbn import TDBN, TDBNConfig, from_config, to_config
+from motet_train.models.control.contrastive import Learning
+from motet_train.models.control.tdbn import TDBN, TDBNConfig, from_config, to_config
+from motet_train.recipes.control import About, train_control
 from motet_train.runs import Run, RunError
 
 ABOUT = About("small", "a test", "MIT")

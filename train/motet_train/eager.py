@@ -5,7 +5,7 @@ from typing import Any
 
 import torch
 
-from motet.models import VERBS, Model
+from motet.models.load import VERBS, Model
 from motet_train.runs import MODELS, Run
 
 

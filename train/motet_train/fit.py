@@ -12,9 +12,9 @@ import torch
 from torch import Tensor, nn
 
 from motet.files import write_whole
-from motet_train.batches import Examples
 from motet_train.checkpoint import CHECKPOINT, LOG, WEIGHTS, read_state, seed_torch, to_bytes
-from motet_train.models.batch import Batch
+from motet_train.data.batches import Examples
+from motet_train.models.language.batch import Batch
 from motet_train.runs import RunError
 
 Progress = Callable[[int, int], object]
@@ -26,9 +26,9 @@ class Fitting:
     """How a net is trained: Adam with Nesterov momentum, the gradient's norm clipped (table 1).
 
     clip: the greatest norm of the gradient. offsets, windows: how many down-sampling offsets of each motion are visited
-    in an epoch, and frames of each, see :meth:`motet_train.batches.Examples.epoch`. decay: the share of the epochs, at
-    the end, over which the learning rate falls linearly to zero. keep: the weights of the "best" validation loss, or
-    the "last".
+    in an epoch, and frames of each, see :meth:`motet_train.data.batches.Examples.epoch`. decay: the share of the
+    epochs, at the end, over which the learning rate falls linearly to zero. keep: the weights of the "best" validation
+    loss, or the "last".
     """
 
     clip: float

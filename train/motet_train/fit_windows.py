@@ -14,7 +14,7 @@ from torch.nn.functional import softplus
 
 from motet.files import write_whole
 from motet_train.checkpoint import CHECKPOINT, LOG, WEIGHTS, read_state, seed_torch, to_bytes
-from motet_train.models.stepwise import Stepwise
+from motet_train.models.predict.stepwise import Stepwise
 from motet_train.runs import RunError
 
 Draw = Callable[[np.random.Generator, int], Tensor]

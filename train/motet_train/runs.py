@@ -13,10 +13,12 @@ from typing import Any
 import torch
 from torch import nn
 
+from motet.bundle.graph import Graph, GraphSpec
 from motet.errors import MotetError
 from motet.files import write_whole
-from motet.graph import Graph, GraphSpec
-from motet_train.models import angle_crbm, language_to_motion, motion_to_language, predictor, systems, tdbn
+from motet_train.models.control import angle_crbm, tdbn
+from motet_train.models.language import language_to_motion, motion_to_language
+from motet_train.models.predict import predictor, systems
 from motet_train.torch_graph import TorchGraph
 
 MODELS: Mapping[str, Callable[[Mapping[str, Any]], nn.Module]] = {

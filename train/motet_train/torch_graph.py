@@ -6,7 +6,7 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
-from motet.graph import Arrays, GraphSpec
+from motet.bundle.graph import Arrays, GraphSpec
 
 
 class TorchGraph:

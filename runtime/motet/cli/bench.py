@@ -7,7 +7,7 @@ import json
 import click
 
 from motet.bench import Row, figures, rows
-from motet.models import load
+from motet.models.load import load
 
 
 @click.command()

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from motet.bundle import Bundle, list_bundles
+from motet.bundle.bundle import Bundle, list_bundles
 
 _NAME = click.argument("name")
 

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import click
 
-from motet.control import ControlModel
 from motet.formats import check_writable, read_motion, write_motion
 from motet.formats.html import write as write_html
-from motet.models import load_as
-from motet.root_path import GENERATED, lay_root_path
-from motet.script import parse_script, starts_of
+from motet.models.control import ControlModel
+from motet.models.load import load_as
+from motet.models.script import parse_script, starts_of
+from motet.motion.root_path import GENERATED, lay_root_path
 
 
 @click.command()

@@ -6,8 +6,8 @@ from pathlib import Path
 import click
 
 from motet.formats import check_writable, read_motion, write_motion
-from motet.mirror import mirror as mirrored
-from motet.motion import Motion
+from motet.motion.mirror import mirror as mirrored
+from motet.motion.motion import Motion
 
 _PARTIAL = click.option("--partial", is_flag=True, help="Take the whole frames of a file that breaks off.")
 

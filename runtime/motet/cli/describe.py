@@ -7,8 +7,8 @@ from pathlib import Path
 import click
 
 from motet.cli.notes import read_for, unit_option
-from motet.describe import DescribeModel
-from motet.models import load_as
+from motet.models.describe import DescribeModel
+from motet.models.load import load_as
 
 
 @click.command()

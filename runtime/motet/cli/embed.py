@@ -7,10 +7,10 @@ import click
 import numpy as np
 
 from motet.cli.notes import read_for, text_notes, unit_option
-from motet.describe import DescribeModel
 from motet.files import check_place, write_whole
-from motet.generate import GenerateModel
-from motet.models import load_as
+from motet.models.describe import DescribeModel
+from motet.models.generate import GenerateModel
+from motet.models.load import load_as
 
 
 @click.command()

@@ -9,11 +9,11 @@ import click
 
 from motet.cli.notes import text_notes
 from motet.formats import check_writable, write_motion
-from motet.generate import Generated, GenerateModel
-from motet.models import load_as
-from motet.motion import Motion
-from motet.root_block import ROOT_BLOCK, from_root_block
-from motet.smooth import smooth_resample
+from motet.models.generate import Generated, GenerateModel
+from motet.models.load import load_as
+from motet.motion.motion import Motion
+from motet.motion.smooth import smooth_resample
+from motet.representation.root_block import ROOT_BLOCK, from_root_block
 
 
 @click.command()

@@ -10,8 +10,8 @@ import click
 from motet.cli.convert import METRES
 from motet.errors import FormatError, MotionError, TextWarning
 from motet.formats import read_motion
-from motet.language import LanguageModel
-from motet.motion import Motion
+from motet.models.language import LanguageModel
+from motet.motion.motion import Motion
 
 unit_option = click.option(
     "--unit-in", type=click.Choice(list(METRES)), help="Length unit of motions whose file does not say."

@@ -8,9 +8,9 @@ from motet.cli.convert import METRES
 from motet.cli.notes import note, unit_option
 from motet.errors import FormatError, MotionError
 from motet.formats import check_writable, read_motion, write_motion
-from motet.models import load_as
-from motet.motion import Motion
-from motet.predict import PredictModel
+from motet.models.load import load_as
+from motet.models.predict import PredictModel
+from motet.motion.motion import Motion
 
 
 @click.command()

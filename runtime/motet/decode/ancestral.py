@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from motet.bundle.graph import Graph
 from motet.decode.beam import Floats, Ids, Scores
 from motet.decode.rollout import advance, two_rows, zero_state
-from motet.graph import Graph
 
 SEED = 0
 """Every row draws by the noise of this seed: a row gets the same sequences each time, and in any batch."""

@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from motet.bundle.graph import Arrays, Graph
 from motet.decode.rollout import advance, two_rows, zero_state
-from motet.graph import Arrays, Graph
 
 Floats = NDArray[np.float32]
 Scores = NDArray[np.float64]

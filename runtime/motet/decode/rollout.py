@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.graph import Arrays, Graph
+from motet.bundle.graph import Arrays, Graph
 
 State = dict[str, NDArray[Any]]
 

@@ -10,7 +10,7 @@ from types import ModuleType
 
 from motet.errors import FormatError
 from motet.files import check_place
-from motet.motion import Motion
+from motet.motion.motion import Motion
 
 MODULES = {
     ".amc": "amc",

@@ -11,12 +11,12 @@ import numpy as np
 from motet.errors import FormatError
 from motet.files import check_place, write_whole
 from motet.formats.asf import CMU_METRES, ROOT, Asf, read_skeleton, write_skeleton
-from motet.formats.text import numbers, plain_names, read_text
+from motet.formats.lines import numbers, plain_names, read_text
 from motet.formats.writable import ANGLES, TRANSLATIONS, with_names, with_still_offsets
-from motet.kinematics import skeleton_of
-from motet.motion import Motion
-from motet.rotations import Array
-from motet.skeleton import Joint
+from motet.motion.kinematics import skeleton_of
+from motet.motion.motion import Motion
+from motet.motion.rotations import Array
+from motet.motion.skeleton import Joint
 
 CMU_FPS = 120.0
 FPS_COMMENT = "# fps "

@@ -14,9 +14,9 @@ import numpy as np
 
 from motet.errors import FormatError
 from motet.files import write_whole
-from motet.formats.text import complete_order, numbers, read_text, unique_name
-from motet.rotations import euler_to_rotmat, rotmat_to_euler
-from motet.skeleton import END_SUFFIX, Joint, Skeleton
+from motet.formats.lines import complete_order, numbers, read_text, unique_name
+from motet.motion.rotations import euler_to_rotmat, rotmat_to_euler
+from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
 
 CMU_LENGTH = 0.45
 CMU_METRES = 0.0254 / CMU_LENGTH

@@ -16,12 +16,12 @@ import numpy as np
 
 from motet.errors import FormatError
 from motet.files import check_place, write_whole
-from motet.formats.text import complete_order, numbers, plain_names, read_text, unique_name
+from motet.formats.lines import complete_order, numbers, plain_names, read_text, unique_name
 from motet.formats.writable import with_names, with_still_offsets
-from motet.kinematics import local_rotations, local_translations, skeleton_of
-from motet.motion import TURN, Motion
-from motet.rotations import Array, continuous_euler, rotmat_to_euler
-from motet.skeleton import END_SUFFIX, Joint, Skeleton
+from motet.motion.kinematics import local_rotations, local_translations, skeleton_of
+from motet.motion.motion import TURN, Motion
+from motet.motion.rotations import Array, continuous_euler, rotmat_to_euler
+from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
 
 ORDER = "zyx"
 POSITION, ROTATION = "Xposition Yposition Zposition", "Zrotation Yrotation Xrotation"

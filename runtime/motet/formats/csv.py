@@ -13,8 +13,8 @@ import numpy as np
 
 from motet.errors import FormatError, MotionError
 from motet.files import write_whole
-from motet.formats.text import numbers, read_text
-from motet.motion import Motion
+from motet.formats.lines import numbers, read_text
+from motet.motion.motion import Motion
 
 TIME = "time"
 COMMENT = "# motet motion, fps "

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from motet.draw.figure import Figure, figure_of
+from motet.draw.raster import GROUND, Indices, Stage, palette
 from motet.files import write_whole
-from motet.formats.figure import Figure, figure_of
-from motet.formats.raster import GROUND, Indices, Stage, palette
-from motet.motion import Motion
-from motet.rotations import Array
+from motet.motion.motion import Motion
+from motet.motion.rotations import Array
 
 SIZE = 320
 YAW = np.radians(40.0)

@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from motet.draw.body import COLOURS, Body, Bone
 from motet.errors import MotionError
 from motet.files import write_whole
-from motet.formats.body import COLOURS, Body, Bone
-from motet.kinematics import local_rotations, local_translations, skeleton_of
-from motet.motion import Motion
-from motet.rotations import Array, rotmat_to_quat
-from motet.skeleton import Skeleton
+from motet.motion.kinematics import local_rotations, local_translations, skeleton_of
+from motet.motion.motion import Motion
+from motet.motion.rotations import Array, rotmat_to_quat
+from motet.motion.skeleton import Skeleton
 
 FLOAT, UINT8, UINT16, UINT32 = 5126, 5121, 5123, 5125
 """glTF's numbers for the types of components."""

@@ -17,11 +17,11 @@ from typing import Any
 
 import numpy as np
 
+from motet.draw.body import Bone
+from motet.draw.figure import figure_of
 from motet.errors import MotionError
 from motet.files import write_whole
-from motet.formats.body import Bone
-from motet.formats.figure import figure_of
-from motet.motion import Motion
+from motet.motion.motion import Motion
 
 Captions = Sequence[tuple[float, str]]
 """What is shown when: (start in seconds, text), each until the next one starts."""
@@ -50,7 +50,7 @@ def page(figures: list[dict[str, Any]], title: str) -> str:
     """The HTML of the figures, each from :func:`figure_data`."""
     data = json.dumps({"figures": figures}, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     parts = {"TITLE": escape(title), "DATA": data}
-    template = (files("motet.formats") / "player.html").read_text(encoding="utf-8")
+    template = (files("motet.draw") / "player.html").read_text(encoding="utf-8")
     return re.sub(r"\{\{(TITLE|DATA)\}\}", lambda place: parts[place[1]], template)
 
 

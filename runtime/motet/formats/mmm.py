@@ -12,9 +12,9 @@ from xml.etree import ElementTree
 import numpy as np
 
 from motet.errors import FormatError
-from motet.formats.text import numbers
-from motet.motion import Motion
-from motet.rotations import Array
+from motet.formats.lines import numbers
+from motet.motion.motion import Motion
+from motet.motion.rotations import Array
 
 ROOT = ("root.tx", "root.ty", "root.tz", "root.rx", "root.ry", "root.rz")
 ROOT_UNITS = ("m",) * 3 + ("rad",) * 3

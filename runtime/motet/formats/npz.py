@@ -1,7 +1,7 @@
 """NPZ: all of a motion, without loss, as numpy arrays. Nothing in it is pickled.
 
 Arrays: ``values`` (T, D) float64, ``channels`` (D,) and ``units`` (D,) text, ``fps`` float64, and ``skeleton``, the
-text of the JSON object of :meth:`motet.skeleton.Skeleton.to_json`, empty for a motion without skeleton.
+text of the JSON object of :meth:`motet.motion.skeleton.Skeleton.to_json`, empty for a motion without skeleton.
 """
 
 import io
@@ -14,8 +14,8 @@ import numpy as np
 
 from motet.errors import FormatError, MotionError
 from motet.files import write_whole
-from motet.motion import Motion
-from motet.skeleton import Skeleton
+from motet.motion.motion import Motion
+from motet.motion.skeleton import Skeleton
 
 KEYS = ("values", "channels", "units", "fps", "skeleton")
 

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from motet.errors import FormatError
-from motet.kinematics import local_translations, skeleton_of
-from motet.motion import TURN, Motion
-from motet.skeleton import Skeleton
+from motet.motion.kinematics import local_translations, skeleton_of
+from motet.motion.motion import TURN, Motion
+from motet.motion.skeleton import Skeleton
 
 ANGLES, TRANSLATIONS = ("rx", "ry", "rz"), ("tx", "ty", "tz")
 

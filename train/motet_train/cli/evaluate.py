@@ -7,17 +7,17 @@ import click
 import torch
 from tqdm import tqdm
 
-from motet.control import ControlModel
-from motet.describe import DescribeModel
-from motet.generate import GenerateModel
-from motet.models import VERBS, Model, load
-from motet.predict import PredictModel
+from motet.models.control import ControlModel
+from motet.models.describe import DescribeModel
+from motet.models.generate import GenerateModel
+from motet.models.load import VERBS, Model, load
+from motet.models.predict import PredictModel
 from motet_train.cli.evaluate_language import by_subject, language_reports
 from motet_train.cli.evaluate_predict import predict_reports
 from motet_train.data.clips import read_clips
+from motet_train.evaluate.control.report import GOALS, control_report, lab_of
 from motet_train.evaluate.language.report import GOALS as LANGUAGE_GOALS
-from motet_train.evaluate.report import GOALS, control_report, lab_of
-from motet_train.evaluate.table import Report, json_ready, table
+from motet_train.evaluate.tables import Report, json_ready, table
 from motet_train.runs import Run
 
 
@@ -76,7 +76,7 @@ def _control(models: dict[str, ControlModel], data: Path | None, plots: Path | N
         reports[name] = control_report(lab, lambda key, bar=bar: bar.update())  # type: ignore[misc]
         bar.close()
         if plots is not None:
-            from motet_train.evaluate.plots import draw_all
+            from motet_train.evaluate.control.plots import draw_all
 
             draw_all(lab, plots)
     return reports

@@ -7,12 +7,12 @@ from typing import Any
 import click
 from tqdm import tqdm
 
-from motet.describe import DescribeModel
-from motet.generate import GenerateModel
+from motet.models.describe import DescribeModel
+from motet.models.generate import GenerateModel
 from motet_train.data.store import Store
 from motet_train.evaluate.language.corpus import Corpus, corpus_of
 from motet_train.evaluate.language.report import describe_report, generate_report
-from motet_train.evaluate.table import Report
+from motet_train.evaluate.tables import Report
 
 Models = Mapping[str, DescribeModel | GenerateModel]
 

@@ -9,8 +9,8 @@ import click
 from tqdm import tqdm
 
 from motet.formats import read_motion
-from motet.kinematics import skeleton_of
-from motet.predict import PredictModel
+from motet.models.predict import PredictModel
+from motet.motion.kinematics import skeleton_of
 from motet_train.data.clips import CMU as CLIPS
 from motet_train.data.expmap_files import CMU, ExpmapCorpus, is_expmap, read_expmap
 from motet_train.data.predict_data import STRIDE, Trial, read_trials

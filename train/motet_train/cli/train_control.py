@@ -10,10 +10,10 @@ import torch
 from tqdm import tqdm
 
 from motet_train.cli.places import command_line, refuse_existing
-from motet_train.control import About, Config, train_control
 from motet_train.data.clips import Clips, read_clips
-from motet_train.models.angle_crbm import AngleCRBMConfig
-from motet_train.models.tdbn import TDBNConfig
+from motet_train.models.control.angle_crbm import AngleCRBMConfig
+from motet_train.models.control.tdbn import TDBNConfig
+from motet_train.recipes.control import About, Config, train_control
 from motet_train.runs import Run
 
 RECIPES: dict[str, Callable[[], TDBNConfig]] = {

@@ -11,13 +11,13 @@ import torch
 from tqdm import tqdm
 
 from motet.cli.convert import METRES
-from motet_train import describe as describing
-from motet_train import generate as generating
 from motet_train.cli.places import command_line, refuse, resumable
 from motet_train.cli.prepare import prepare
 from motet_train.data.store import INDEX, Store
-from motet_train.language import About, Recipe, check_device, train_language
-from motet_train.models.language_to_motion import LOSSES
+from motet_train.models.language.language_to_motion import LOSSES
+from motet_train.recipes import describe as describing
+from motet_train.recipes import generate as generating
+from motet_train.recipes.language import About, Recipe, check_device, train_language
 
 OPTIONS: tuple[Callable[..., Any], ...] = (
     click.option("--data", type=Path, required=True, help="A prepared store, or a corpus: folder or zip."),

@@ -12,7 +12,7 @@ from tqdm import tqdm
 from motet_train.cli.places import command_line, refuse_existing
 from motet_train.data.expmap_files import ExpmapCorpus, is_expmap, read_expmap
 from motet_train.data.predict_data import Material, expmap_material, mocap_material, read_trials
-from motet_train.predict import About, Recipe, train_predict
+from motet_train.recipes.predict import About, Recipe, train_predict
 
 
 @click.command()

@@ -13,9 +13,9 @@ from motet_train.cli.places import command_line, refuse, resumable
 from motet_train.cli.train_predict import read_expmap_files
 from motet_train.data.predict_data import expmap_material, validation_files
 from motet_train.evaluate.predict.protocol import WINDOW
-from motet_train.language import check_device
-from motet_train.predict import About
-from motet_train.systems import RECIPES, Recipe, train_system
+from motet_train.recipes.language import check_device
+from motet_train.recipes.predict import About
+from motet_train.recipes.systems import RECIPES, Recipe, train_system
 
 Option = Callable[[Callable[..., None]], Callable[..., None]]
 

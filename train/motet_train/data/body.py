@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.sides import LEFT, MIDDLE, sides_of
-from motet.skeleton import Skeleton
+from motet.motion.sides import LEFT, MIDDLE, sides_of
+from motet.motion.skeleton import Skeleton
 
 TRUNK = "trunk"
 

@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from motet.formats import READABLE, read_motion
-from motet.heading import without_heading
-from motet.kinematics import skeleton_of
-from motet.motion import Motion
-from motet.rotations import Array
-from motet.skeleton import Skeleton
+from motet.motion.heading import without_heading
+from motet.motion.kinematics import skeleton_of
+from motet.motion.motion import Motion
+from motet.motion.rotations import Array
+from motet.motion.skeleton import Skeleton
 from motet_train.data.errors import DataError
 
 CONSTANT = 1e-3

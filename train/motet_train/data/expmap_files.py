@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from motet.errors import FormatError
-from motet.rotations import Array
+from motet.motion.rotations import Array
 from motet_train.data.archive import Archive
 from motet_train.data.errors import DataError
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from motet.rotations import Array
+from motet.motion.rotations import Array
 
 
 def period(frames: Array) -> float:

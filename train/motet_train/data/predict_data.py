@@ -8,27 +8,27 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.contract import MotionContract
 from motet.errors import MotionError
 from motet.formats import read_motion
-from motet.joint_vectors import joints_of, to_joint_vectors
-from motet.kinematics import skeleton_of
-from motet.mirror import lateral_axis
-from motet.motion import Motion
-from motet.root_block import ROOT_BLOCK
-from motet.rotations import Array
-from motet.sides import partners_of
-from motet.skeleton import Skeleton
+from motet.motion.kinematics import skeleton_of
+from motet.motion.mirror import lateral_axis
+from motet.motion.motion import Motion
+from motet.motion.rotations import Array
+from motet.motion.sides import partners_of
+from motet.motion.skeleton import Skeleton
+from motet.representation.contract import MotionContract
+from motet.representation.joint_vectors import joints_of, to_joint_vectors
+from motet.representation.root_block import ROOT_BLOCK
 from motet_train.data.archive import BROKEN, Archive
 from motet_train.data.clips import CMU_LICENCE
 from motet_train.data.corpus import MOCAP
 from motet_train.data.errors import DataError
 from motet_train.data.expmap_files import ROOT, ExpmapCorpus, Layout, scaling_of
+from motet_train.data.mirror_frames import NEGATED
 from motet_train.data.records import Skipped
 from motet_train.data.split import split
 from motet_train.data.store import Entry
 from motet_train.data.trim import trim
-from motet_train.mirror_frames import NEGATED
 
 STRIDE = 2
 """Of the protocol: every second frame of a text file."""
@@ -235,7 +235,7 @@ def phases(motion: Motion) -> list[Motion]:
 
 
 def _mirrored_joints(skeleton: Skeleton, channels: Sequence[str]) -> tuple[tuple[int, ...], tuple[float, ...]]:
-    """As :func:`motet.mirror.mirror` does it, for exponential maps in the parent joint's axes."""
+    """As :func:`motet.motion.mirror.mirror` does it, for exponential maps in the parent joint's axes."""
     try:
         if lateral_axis(skeleton) != 0:
             return (), ()

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from motet.motion import Motion
+from motet.motion.motion import Motion
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 from motet.errors import MotionError
-from motet.motion import TURN, Motion
-from motet.root_block import to_root_block
+from motet.motion.motion import TURN, Motion
+from motet.representation.root_block import to_root_block
 from motet_train.data.trim import trim
 
 SHORTEST = 0.5

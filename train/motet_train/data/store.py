@@ -15,10 +15,10 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.contract import MotionContract
 from motet.errors import MotetError, MotionError, OutputError
-from motet.motion import Motion
-from motet.skeleton import Skeleton
+from motet.motion.motion import Motion
+from motet.motion.skeleton import Skeleton
+from motet.representation.contract import MotionContract
 from motet_train.data.errors import DataError
 from motet_train.data.records import Record, Skipped
 from motet_train.data.representation import Representation

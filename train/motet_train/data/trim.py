@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from motet.kinematics import positions, skeleton_of
-from motet.motion import Motion
-from motet.root_path import HEIGHT
-from motet.rotations import Array
+from motet.motion.kinematics import positions, skeleton_of
+from motet.motion.motion import Motion
+from motet.motion.root_path import HEIGHT
+from motet.motion.rotations import Array
 
 LEAP, EDGE = 10.0, 0.5
 """m/s, seconds: joints that move faster on average within so long of an end do not move, the recording leaps there."""

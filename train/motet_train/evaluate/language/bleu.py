@@ -6,7 +6,7 @@ from itertools import zip_longest
 import numpy as np
 from sacrebleu.metrics.bleu import BLEU
 
-from motet.text import EOS, SOS
+from motet.models.text import EOS, SOS
 from motet_train.evaluate.language.corpus import plain
 
 RANKS = 5

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from motet.describe import DescribeModel
 from motet.errors import TextError
-from motet.generate import Generated, GenerateModel
-from motet.motion import Motion
+from motet.models.describe import DescribeModel
+from motet.models.generate import Generated, GenerateModel
+from motet.motion.motion import Motion
 from motet_train.evaluate.language.bleu import RANKS, bleu, ranks
 from motet_train.evaluate.language.corpus import Corpus, unknown_words_allowed
 from motet_train.evaluate.language.floors import retrieved

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from motet.contract import MotionContract
 from motet.errors import TextWarning
-from motet.motion import Motion
-from motet.rotations import Array
-from motet.text import words
-from motet_train.batches import usable
+from motet.models.text import words
+from motet.motion.motion import Motion
+from motet.motion.rotations import Array
+from motet.representation.contract import MotionContract
+from motet_train.data.batches import usable
 from motet_train.data.errors import DataError
 from motet_train.data.split import Split
 from motet_train.data.store import Store

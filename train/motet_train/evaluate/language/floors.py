@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 from sklearn.feature_extraction.text import TfidfVectorizer
 
-from motet.motion import Motion
-from motet.rotations import Array
+from motet.motion.motion import Motion
+from motet.motion.rotations import Array
 from motet_train.evaluate.language.bleu import References, bleu
 from motet_train.evaluate.language.corpus import Corpus
 

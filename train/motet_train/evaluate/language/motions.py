@@ -4,12 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from motet.contract import MotionContract
-from motet.kinematics import positions, skeleton_of
-from motet.motion import Motion
-from motet.root_block import ROOT_BLOCK, from_root_block
-from motet.rotations import Array
-from motet.skeleton import Skeleton
+from motet.motion.kinematics import positions, skeleton_of
+from motet.motion.motion import Motion
+from motet.motion.rotations import Array
+from motet.motion.skeleton import Skeleton
+from motet.representation.contract import MotionContract
+from motet.representation.root_block import ROOT_BLOCK, from_root_block
 
 LOW = 0.05
 """m: a joint of a foot no higher than this above the ground is on it."""

@@ -12,13 +12,13 @@ from matplotlib.figure import Figure as Picture
 from numpy.typing import NDArray
 from sklearn.manifold import TSNE
 
-from motet.describe import DescribeModel
+from motet.draw.body import COLOURS
+from motet.draw.figure import Figure, figure_of
 from motet.errors import OutputError
-from motet.formats.body import COLOURS
-from motet.formats.figure import Figure, figure_of
-from motet.generate import GenerateModel
-from motet.motion import Motion
-from motet.root_block import from_root_block
+from motet.models.describe import DescribeModel
+from motet.models.generate import GenerateModel
+from motet.motion.motion import Motion
+from motet.representation.root_block import from_root_block
 from motet_train.data.errors import DataError
 from motet_train.evaluate.language.attributes import ACTIONS, DIRECTIONS, Table, common, said
 from motet_train.evaluate.language.chain import prompts

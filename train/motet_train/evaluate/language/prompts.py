@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from motet.errors import TextError
-from motet.generate import GenerateModel
-from motet.motion import Motion
-from motet.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS
+from motet.models.generate import GenerateModel
+from motet.motion.motion import Motion
+from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS
 from motet_train.evaluate.language.attributes import common_side, common_verbs, turns
 from motet_train.evaluate.language.corpus import Corpus
 

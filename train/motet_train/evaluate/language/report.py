@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from motet.describe import DescribeModel
 from motet.errors import TextError
-from motet.generate import GenerateModel
-from motet.text import words
+from motet.models.describe import DescribeModel
+from motet.models.generate import GenerateModel
+from motet.models.text import words
 from motet_train.evaluate.language.attributes import Score, sides_right, turns_right, verbs_right
 from motet_train.evaluate.language.bleu import RANKS, References, agreement, bleu, ranks
 from motet_train.evaluate.language.chain import Answers, answers, bounds_chained, chained, likelihood, told
@@ -17,7 +17,7 @@ from motet_train.evaluate.language.corpus import Corpus, unknown_words_allowed
 from motet_train.evaluate.language.floors import frequent_bleu, nearest_bleu
 from motet_train.evaluate.language.motions import measures, quiet_energy
 from motet_train.evaluate.language.prompts import kinds, prompted, recognised, thresholds
-from motet_train.evaluate.table import Goals, Report
+from motet_train.evaluate.tables import Goals, Report
 
 Progress = Callable[[str], object]
 

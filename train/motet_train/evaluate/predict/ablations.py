@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from motet.predict import PredictModel
+from motet.models.predict import PredictModel
 from motet_train.evaluate.predict.published import FRAMES
 from motet_train.evaluate.predict.report import COUNTS, MEAN, Curves
 from motet_train.evaluate.predict.rows import Row

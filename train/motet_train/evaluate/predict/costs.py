@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from motet.predict import PredictModel
+from motet.models.predict import PredictModel
 from motet_train.evaluate.predict.rows import Row
 
 

@@ -4,15 +4,15 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from motet.kinematics import positions, skeleton_of
-from motet.motion import Motion
-from motet.predict import PredictModel, ending
-from motet.rotations import Array
+from motet.models.predict import PredictModel, ending
+from motet.motion.kinematics import positions, skeleton_of
+from motet.motion.motion import Motion
+from motet.motion.rotations import Array
 from motet_train.data.errors import DataError
 from motet_train.data.predict_data import Trial
 from motet_train.evaluate.predict.protocol import REPORTED
 from motet_train.evaluate.predict.report import ZERO
-from motet_train.evaluate.table import Report
+from motet_train.evaluate.tables import Report
 
 Distances = dict[str, dict[str, Array]]
 """System -> measure -> mean distance (N,) in centimetres at each predicted frame."""

@@ -11,8 +11,8 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from motet.errors import OutputError
-from motet.rotations import Array
-from motet.skeleton import Skeleton
+from motet.motion.rotations import Array
+from motet.motion.skeleton import Skeleton
 
 mpl.use("Agg")
 

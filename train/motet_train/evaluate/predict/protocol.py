@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.rotations import Array, rotvec_to_rotmat
+from motet.motion.rotations import Array, rotvec_to_rotmat
 from motet_train.data.errors import DataError
 from motet_train.data.expmap_files import CONSTANT, ROOT, Scaling
 from motet_train.data.predict_data import STRIDE
@@ -35,8 +35,9 @@ def true_times(fps: float) -> tuple[float, ...]:
 def rotmat_to_protocol_euler(matrix: Array) -> Array:
     """Matrices (..., 3, 3) to the protocol's Euler angles (..., 3): Slabaugh's formula on the transposed matrix.
 
-    They are the angles of order "xyz" of :func:`motet.rotations.rotmat_to_euler` with the sign changed. At gimbal lock,
-    where the last one is 0 and the first should be what the matrix says, it is 0 or pi as in the papers' code.
+    They are the angles of order "xyz" of :func:`motet.motion.rotations.rotmat_to_euler` with the sign changed. At
+    gimbal lock, where the last one is 0 and the first should be what the matrix says, it is 0 or pi as in the papers'
+    code.
     """
     sin = np.clip(matrix[..., 0, 2], -1.0, 1.0)
     locked = np.abs(sin) >= 1.0

@@ -4,8 +4,8 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from motet.predict import PredictModel
-from motet.rotations import Array
+from motet.models.predict import PredictModel
+from motet.motion.rotations import Array
 from motet_train.data.errors import DataError
 from motet_train.data.expmap_files import ExpmapCorpus, scaling_of
 from motet_train.evaluate.predict.protocol import (

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from motet.predict import PredictModel
-from motet.rotations import Array
+from motet.models.predict import PredictModel
+from motet.motion.rotations import Array
 
 SEED = re.compile(r"[-_. ]?(seed)?\d+$")
 """How the name of a run ends that says its seed."""

@@ -1,8 +1,8 @@
 """Poses of CMU's text files as places of joints, and what models predict of a test window (Li et al. 2018, figure 5).
 
 The 38 exponential maps of a line are those of the joints of an ASF skeleton, depth first, its left leg first, tips of
-bones among them: the order of :attr:`motet.skeleton.Skeleton.joints`. Vectors of joints are rows there and are turned
-by the matrix from the right, so a rotation here is the transposed one. (The .amc of a test file, 35_01 of
+bones among them: the order of :attr:`motet.motion.skeleton.Skeleton.joints`. Vectors of joints are rows there and are
+turned by the matrix from the right, so a rotation here is the transposed one. (The .amc of a test file, 35_01 of
 walking/walking_1.txt, gives the same rotations.) Who moved is not in a file; bones are those of the skeleton given.
 """
 
@@ -11,9 +11,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from motet.errors import MotionError
-from motet.predict import PredictModel
-from motet.rotations import Array, axis_to_rotmat, rotvec_to_rotmat
-from motet.skeleton import Skeleton
+from motet.models.predict import PredictModel
+from motet.motion.rotations import Array, axis_to_rotmat, rotvec_to_rotmat
+from motet.motion.skeleton import Skeleton
 from motet_train.data.expmap_files import ExpmapCorpus
 from motet_train.evaluate.predict.protocol import OUTPUT_FRAMES, SEED_FRAMES, windows
 from motet_train.evaluate.predict.report import predictor

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from motet.rotations import Array
+from motet.motion.rotations import Array
 from motet_train.data.expmap_files import ExpmapCorpus
 from motet_train.evaluate.predict.protocol import LABELS, REPORTED, true_times
 from motet_train.evaluate.predict.published import FRAMES, GOAL, averages, by_action, mean_over

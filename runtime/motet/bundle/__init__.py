@@ -1,0 +1,1 @@
+"""What is on disk: graphs and the manifest that says everything needed to run them."""

@@ -1,0 +1,1 @@
+"""What people look at: a body on a skeleton, and pages and pictures of it."""

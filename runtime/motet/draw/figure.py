@@ -1,0 +1,60 @@
+"""The figure that pictures of a motion show: the points of its body in every frame, standing on the ground."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from motet.draw.body import Body, Bone
+from motet.errors import MotionError
+from motet.motion.kinematics import positions, skeleton_of
+from motet.motion.motion import Motion
+from motet.motion.rotations import Array
+from motet.motion.sides import LEFT, RIGHT
+
+NEAR_GROUND = 0.1
+"""Within this height of y = 0 the lowest point of a motion is taken to stand on y = 0."""
+
+LARGEST = 1e6
+"""Positions further than this from the origin are refused: such a motion is broken and cannot be drawn."""
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A motion as points and bones.
+
+    points: (T, P, 3) in body heights, y up, the ground at y = 0: the J joints, then jaw and crown if there is a head.
+    bones: which points they join.
+    heading: where the figure faces in its first frame: radians about y, 0 is +z, a quarter turn is +x.
+    fps: frames per second.
+    """
+
+    points: Array
+    bones: tuple[Bone, ...]
+    heading: float
+    fps: float
+
+
+def figure_of(motion: Motion) -> Figure:
+    """The figure of a motion; MotionError if it has no skeleton, no frames or positions far beyond any stage."""
+    skeleton = skeleton_of(motion)
+    if not len(motion):
+        raise MotionError("this motion has no frames: there is nothing to show")
+    body = Body(skeleton)
+    points = positions(motion) / body.height
+    if not np.abs(points).max() < LARGEST:
+        raise MotionError(f"joints are further than {LARGEST:g} body heights from the origin: this cannot be shown")
+    points[:, :, 1] -= _ground(points, moves=f"{skeleton.names[0]}.ty" in motion.channels)
+    return Figure(body.points(points), body.bones, _heading(points[0], body.sides), motion.fps)
+
+
+def _ground(points: Array, moves: bool) -> float:
+    lowest = float(points[..., 1].min())
+    return 0.0 if moves and abs(lowest) < NEAR_GROUND else lowest
+
+
+def _heading(points: Array, sides: tuple[str, ...]) -> float:
+    if LEFT not in sides:
+        return 0.0
+    left, right = (np.mean([points[i] for i, of in enumerate(sides) if of == side], axis=0) for side in (LEFT, RIGHT))
+    to_left = left - right
+    return float(np.arctan2(-to_left[2], to_left[0]))

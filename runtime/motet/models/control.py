@@ -1,0 +1,229 @@
+"""Control: a figure, or thousands, that move as they are told, tick by tick."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from motet.bundle.graph import Graph
+from motet.decode.noise import RowNoise
+from motet.decode.rollout import State, advance
+from motet.errors import BundleError, ControlError, MotionError
+from motet.models.base import Bundled
+from motet.models.script import control_track, parse_script
+from motet.motion.heading import without_heading
+from motet.motion.motion import Motion
+
+Floats = NDArray[np.float32]
+
+
+class ControlModel(Bundled):
+    """A model of labelled motions that runs live; shared between any number of sessions and threads.
+
+    manifest: of a control bundle, or of a training run with the same keys.
+    graphs: "encoder" (frames -> codes) and "step" (history, control, noise, variety, temperature -> codes, frame,
+        next history), and for models with free hidden units also codes -> step.
+    """
+
+    def __init__(self, manifest: Mapping[str, Any], graphs: Mapping[str, Graph]) -> None:
+        super().__init__(manifest, graphs)
+        self.encoder, self.stepper = graphs["encoder"], graphs["step"]
+        try:
+            control = manifest["control"]
+            self.labels: tuple[str, ...] = tuple(control["labels"])
+            self.starts = {label: np.array(frames, dtype=np.float64) for label, frames in control["starts"].items()}
+            self.defaults: dict[str, float] = dict(manifest["defaults"])
+        except (KeyError, TypeError, ValueError) as error:
+            raise BundleError(f"the manifest describes no control model: {error}") from error
+        history = self.stepper.spec.input("history")
+        self.taps, self.codes = history.size(1), history.size(2)
+        self.has_free_units = self.stepper.spec.takes("codes")
+
+    def encode(self, frames: ArrayLike) -> Floats:
+        """Frames (B, D) in the contract's units to codes (B, H) float32."""
+        codes: Floats = self.encoder({"frames": np.asarray(frames, dtype=np.float32)})["codes"]
+        return codes
+
+    def start(
+        self,
+        start: Motion | str | None = None,
+        *,
+        characters: int = 1,
+        seed: int | Sequence[int] = 0,
+        variety: float = 0.0,
+        temperature: float | None = None,
+        iterations: int | None = None,
+    ) -> "ControlSession":
+        """A session of ``characters`` figures that start alike.
+
+        start: a label of the model, or a motion whose last frames are carried on; default is the first label. A
+            label is also the first control; after a motion, set one before the first step.
+        seed: of the noise. Character i has seed + i (or seed[i]) and moves as it would alone with that seed.
+        variety: 0 runs on probabilities, always alike; 1 draws binary codes; between, a blend.
+        temperature: of the sigmoid, the bundle's by default; lower is more decided.
+        iterations: Gibbs iterations for each frame, as many as the bundle says by default; more than 1 only in models
+            with free hidden units.
+        Raises ControlError for values out of range, MotionError for a motion that does not fit.
+        """
+        seeds = _seeds(seed, characters)
+        if isinstance(start, Motion):
+            history, label = self._history_of(start), None
+        else:
+            label = self.labels[0] if start is None else start
+            history = self._history_at(label)
+        temperature = self.defaults["temperature"] if temperature is None else temperature
+        iterations = int(self.defaults.get("iterations", 1)) if iterations is None else iterations
+        settings = self._settings(variety, temperature, iterations)
+        session = ControlSession(self, np.repeat(history[None], characters, axis=0), seeds, settings)
+        if label is not None:
+            session.control(**{label: 1.0})
+        return session
+
+    def _history_at(self, label: str) -> Floats:
+        if label not in self.starts:
+            raise ControlError(f"cannot start from {label!r}; known are {', '.join(self.starts)}")
+        return self.encode(self.starts[label])
+
+    def _history_of(self, motion: Motion) -> Floats:
+        frames = self.contract.frames(without_heading(motion))
+        if len(frames) < self.taps:
+            raise MotionError(f"a start needs {self.taps} frames at {self.fps:g} fps, this motion has {len(frames)}")
+        return self.encode(frames[-self.taps :])
+
+    def _settings(self, variety: float, temperature: float, iterations: int) -> "_Settings":
+        if not 0 <= variety <= 1:
+            raise ControlError(f"variety must be between 0 and 1, not {variety}")
+        if not 0.01 <= temperature <= 100:
+            raise ControlError(f"temperature must be between 0.01 and 100, not {temperature}")
+        if iterations < 1 or (iterations > 1 and not self.has_free_units):
+            raise ControlError("iterations must be 1 in a model without free hidden units, and at least 1 in others")
+        return _Settings(np.float32(variety), np.float32(temperature), iterations)
+
+
+@dataclass(frozen=True)
+class _Settings:
+    variety: np.float32
+    temperature: np.float32
+    iterations: int
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """All that changes in a session, for n characters: history (n, K, H), control (n, labels), the tick."""
+
+    history: Floats
+    control: Floats
+    tick: int
+
+
+class ControlSession:
+    """Characters that move in one batch, each with its own control; holds their whole state."""
+
+    def __init__(self, model: ControlModel, history: Floats, seeds: Sequence[int], settings: _Settings) -> None:
+        self.model, self.settings, self.characters = model, settings, len(history)
+        self._state: State = {"history": history}
+        self._tick = 0
+        column = np.ones((self.characters, 1), dtype=np.float32)
+        self._inputs: dict[str, Floats] = {
+            "control": np.zeros((self.characters, len(model.labels)), dtype=np.float32),
+            "variety": column * settings.variety,
+            "temperature": column * settings.temperature,
+        }
+        width = model.stepper.spec.input("noise").size(1)
+        self._noise = RowNoise(seeds, width) if settings.variety > 0 else None
+        if self._noise is None:  # noise has no effect: any array will do
+            self._inputs["noise"] = np.zeros((self.characters, width), dtype=np.float32)
+
+    def control(self, **values: ArrayLike) -> None:
+        """Set the control from now on: labels to numbers, or arrays (characters,), between 0 and 1.
+
+        Labels that are not named become 0. ControlError for an unknown label or a value out of range; the control
+        is then as it was.
+        """
+        self.set_control(self._control_of(values))
+
+    def set_control(self, control: ArrayLike) -> None:
+        """Set the control (labels,) or (characters, labels) from now on, in the order of ``model.labels``."""
+        wanted = np.asarray(control, dtype=np.float32)
+        if wanted.ndim == 0 or wanted.shape[-1] != len(self.model.labels):
+            raise ControlError(f"a control needs one value for each of {', '.join(self.model.labels)}")
+        if not ((wanted >= 0) & (wanted <= 1)).all():
+            raise ControlError("control values must be between 0 and 1")
+        shape = (self.characters, len(self.model.labels))
+        try:
+            self._inputs["control"] = np.ascontiguousarray(np.broadcast_to(wanted, shape))
+        except ValueError as error:
+            raise ControlError(
+                f"a control of shape {wanted.shape} does not fit {self.characters} characters"
+            ) from error
+
+    def _control_of(self, values: Mapping[str, ArrayLike]) -> Floats:
+        unknown = sorted(values.keys() - set(self.model.labels))
+        if unknown:
+            raise ControlError(f"unknown control {', '.join(unknown)}; known are {', '.join(self.model.labels)}")
+        control = np.zeros((self.characters, len(self.model.labels)), dtype=np.float32)
+        for label, value in values.items():
+            try:
+                control[:, self.model.labels.index(label)] = value
+            except (TypeError, ValueError) as error:
+                raise ControlError(
+                    f"control {label!r} needs a number or one for each of {self.characters} characters"
+                ) from error
+        return control
+
+    def step(self) -> Floats:
+        """One tick: the next frame (characters, D) float32, in the units of ``model.contract``."""
+        if self.model.has_free_units:  # a Gibbs chain starts at the codes of the last frame
+            self._state["codes"] = self._state["history"][:, -1]
+            for _ in range(self.settings.iterations - 1):
+                self._state["codes"] = self._iterate()[0]["next_codes"]
+        outputs, self._state = self._iterate()
+        frame: Floats = outputs["frame"]
+        return frame
+
+    def _iterate(self) -> tuple[dict[str, NDArray[Any]], State]:
+        if self._noise is not None:
+            self._inputs["noise"] = self._noise.at(self._tick)
+        self._tick += 1
+        return advance(self.model.stepper, self._state, self._inputs)
+
+    def run(self, script: str) -> list[Motion]:
+        """Run a control script (:mod:`motet.models.script`) for all characters; one motion for each."""
+        segments = parse_script(script, self.model.labels)
+        frames = self.frames(control_track(segments, self.model.labels, self.model.fps))
+        return [self.model.contract.motion(character) for character in frames]
+
+    def frames(self, track: ArrayLike) -> Floats:
+        """Run a control track (T, labels) or (T, characters, labels): frames (characters, T, D) float32."""
+        result = []
+        for control in np.asarray(track, dtype=np.float32):
+            self.set_control(control)
+            result.append(self.step())
+        if not result:
+            return np.empty((self.characters, 0, len(self.model.contract.channels)), dtype=np.float32)
+        return np.stack(result, axis=1)
+
+    def snapshot(self) -> Snapshot:
+        """The whole state; restoring it continues with the same frames."""
+        return Snapshot(self._state["history"].copy(), self._inputs["control"].copy(), self._tick)
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go back to a snapshot, of this session or of one with as many characters of the same model."""
+        if snapshot.history.shape != self._state["history"].shape:
+            raise ControlError(
+                f"a snapshot of history {snapshot.history.shape} does not fit {self._state['history'].shape}"
+            )
+        self.set_control(snapshot.control)
+        self._tick = snapshot.tick
+        self._state = {"history": np.array(snapshot.history, dtype=np.float32)}
+
+
+def _seeds(seed: int | Sequence[int], characters: int) -> list[int]:
+    if characters < 1:
+        raise ControlError(f"a session needs at least one character, not {characters}")
+    seeds = [seed + i for i in range(characters)] if isinstance(seed, int) else [int(s) for s in seed]
+    if len(seeds) != characters or min(seeds) < 0:
+        raise ControlError(f"{characters} characters need a seed of 0 or more, or as many seeds, not {seed}")
+    return seeds

@@ -1,0 +1,108 @@
+"""Generate: ranked motions for a sentence. Section 4.3 of Plappert et al. 2017."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motet.decode.mixture import Sample, mixture_search
+from motet.errors import DecodingError
+from motet.models.language import LanguageModel
+from motet.motion.motion import Motion
+from motet.motion.root_path import has_feet, plant_feet
+from motet.representation.root_block import ROOT_BLOCK
+
+BATCH = 64
+"""Sentences that are decoded at once; more bring no speed and take memory."""
+
+
+@dataclass(frozen=True, eq=False)
+class Generated:
+    """A motion in the contract's channels, its log-likelihood given the sentence, and the words that were unknown.
+
+    drawn: the motion as it was drawn, whose feet slide.
+    log_likelihood: of the normalised frames as drawn and of where they end, as :meth:`GenerateModel.score` gives it.
+    feet: whether the motion has feet that can be planted, and a root block.
+    """
+
+    drawn: Motion
+    log_likelihood: float
+    unknown: tuple[str, ...] = ()
+    feet: bool = False
+
+    @cached_property
+    def motion(self) -> Motion:
+        """The motion, going where its feet take it (:func:`motet.motion.root_path.plant_feet`)."""
+        return plant_feet(self.drawn) if self.feet else self.drawn
+
+
+class GenerateModel(LanguageModel):
+    """A model that puts words into motion.
+
+    graphs: "encoder" (words, lengths -> context), "step" (frame, context, state -> log_weights, means, stds, active,
+        next_state) and "score" (context, frames -> log_likelihood), with frames normalised and the active flag last.
+    """
+
+    def generate(
+        self,
+        sentences: str | Sequence[str],
+        hypotheses: int | None = None,
+        *,
+        candidates: int | None = None,
+        temperature: float | None = None,
+        seed: int | Sequence[int] = 0,
+        max_seconds: float | None = None,
+    ) -> list[list[Generated]]:
+        """For each sentence ``hypotheses`` motions, the likeliest per frame first.
+
+        How they are found is said in :func:`motet.decode.mixture.mixture_search`.
+        candidates: frames that each hypothesis draws in a step; 1 gives independent samples.
+        temperature: of the draws about the centres of the mixture's components; lower trembles less.
+        seed: sentence i has seed + i (or seed[i]), and the motions it would have alone with that seed.
+        max_seconds: a motion that has not ended by then ends there.
+        What is None comes from the bundle. TextError for a sentence that is empty, too long or wholly unknown;
+        DecodingError for a setting out of range. Unknown words are named by a TextWarning and in the result.
+        """
+        texts = [sentences] if isinstance(sentences, str) else list(sentences)
+        ids, seeds = [self.ids(text) for text in texts], _seeds(seed, len(texts))
+        settings = (
+            int(self.setting("hypotheses", hypotheses, 1, 100)),
+            int(self.setting("candidates", candidates, 1, 100)),
+            self.setting("temperature", temperature, 0.01, 100),
+            max(1, round(self.setting("max_seconds", max_seconds, 1 / self.fps, 600) * self.fps)),
+        )
+        contexts, found = self.contexts(ids), []
+        for place in range(0, len(texts), BATCH):
+            batch = slice(place, place + BATCH)
+            found += mixture_search(self.graphs["step"], contexts[batch], seeds[batch], *settings)
+        return [[self._generated(s, text) for s in row] for text, row in zip(texts, found, strict=True)]
+
+    def embed(self, sentences: str | Sequence[str]) -> NDArray[np.float32]:
+        """Context vectors (N, C) float32 of sentences; TextError and TextWarning as :meth:`ids`."""
+        return self.contexts([self.ids(text) for text in ([sentences] if isinstance(sentences, str) else sentences)])
+
+    def score(self, sentence: str, motion: Motion) -> float:
+        """Log-likelihood of a motion, and of its end, given a sentence; a TextWarning names words that count as UNK."""
+        normal = (self.frames(motion) - self.contract.mean) / self.contract.std
+        frames = np.zeros((1, len(normal) + 1, normal.shape[1] + 1), dtype=np.float32)
+        frames[0, :-1, :-1], frames[0, :-1, -1] = normal, 1
+        feeds = {"context": self.embed(sentence), "frames": frames}
+        return float(self.graphs["score"](feeds)["log_likelihood"].sum(dtype=np.float64))
+
+    def _generated(self, sample: Sample, text: str) -> Generated:
+        drawn = self.contract.motion(sample.frames * self.contract.std + self.contract.mean)
+        return Generated(drawn, sample.log_likelihood, tuple(self.unknown(text)), self._feet())
+
+    def _feet(self) -> bool:
+        skeleton = self.contract.skeleton
+        known = skeleton is not None and skeleton.metres_per_unit is not None and has_feet(skeleton)
+        return known and set(ROOT_BLOCK) <= set(self.contract.channels)
+
+
+def _seeds(seed: int | Sequence[int], count: int) -> list[int]:
+    seeds = [seed + i for i in range(count)] if isinstance(seed, int) else [int(value) for value in seed]
+    if len(seeds) != count or any(value < 0 for value in seeds):
+        raise DecodingError(f"{count} sentences need a seed of 0 or more, or as many seeds, not {seed}")
+    return seeds

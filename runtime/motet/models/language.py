@@ -1,0 +1,99 @@
+"""What describe and generate share: the vocabulary, what a model refuses, and batches of sequences."""
+
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motet.bundle.graph import Graph
+from motet.decode.rollout import two_rows
+from motet.errors import BundleError, DecodingError, MotionError, TextWarning
+from motet.models.base import Bundled
+from motet.models.text import Vocabulary
+from motet.motion.motion import Motion
+from motet.motion.rotations import Array
+
+MAX_SECONDS = 30.0
+"""The longest motion that a model takes, as in the paper's training data."""
+
+
+BATCH = 64
+"""Sequences that are encoded at once."""
+
+
+class LanguageModel(Bundled):
+    """A model between motion and language: a motion contract, a vocabulary, graphs, and defaults of decoding."""
+
+    ROLES: ClassVar[tuple[str, ...]] = ("encoder", "step", "score")
+
+    def __init__(self, manifest: Mapping[str, Any], graphs: Mapping[str, Graph]) -> None:
+        super().__init__(manifest, graphs)
+        try:
+            self.vocabulary = Vocabulary.from_json(manifest["vocabulary"])
+            self.defaults: dict[str, Any] = dict(manifest["defaults"])
+        except (KeyError, TypeError, ValueError) as error:
+            raise BundleError(f"the manifest describes no model of motion and language: {error}") from error
+
+    def unknown(self, sentence: str) -> list[str]:
+        """The words of a sentence that the model does not know; TextError as in :meth:`ids`."""
+        return self.vocabulary.encode(sentence)[1]
+
+    def ids(self, sentence: str) -> NDArray[np.int64]:
+        """Ids (words,) int64 of a sentence, UNK for unknown words, which a TextWarning names.
+
+        TextError for a sentence that is empty, too long, or of unknown words only.
+        """
+        ids, unknown = self.vocabulary.encode(sentence)
+        if unknown:
+            warnings.warn(f"the model does not know {', '.join(unknown)} (in {sentence!r})", TextWarning, stacklevel=3)
+        return ids
+
+    def frames(self, motion: Motion) -> Array:
+        """The frames (T, D) float64 of a motion in the contract's channels and units, resampled to its frame rate.
+
+        MotionError names the channels that the motion lacks, and refuses less than two frames and more than 30 s.
+        """
+        if motion.duration > MAX_SECONDS:
+            limit = f"the model takes at most {MAX_SECONDS:g} s: cut it"
+            raise MotionError(f"the motion lasts {motion.duration:.1f} s, and {limit}")
+        frames = self.contract.frames(motion)
+        if len(frames) < 2:
+            raise MotionError(f"the model needs two frames at {self.fps:g} fps, and the motion has {len(frames)}")
+        return frames
+
+    def contexts(self, sequences: Sequence[NDArray[Any]]) -> NDArray[np.float32]:
+        """Context vectors (N, C) float32 of the sequences (T_i, ...) that the encoder takes."""
+        encoder = self.graphs["encoder"]
+        given, context = encoder.spec.inputs[0], encoder.spec.outputs[0]
+        found = np.empty((len(sequences), context.size(1)), dtype=np.float32)
+        for batch in batches([len(sequence) for sequence in sequences], BATCH):
+            rows = two_rows(np.array(batch))
+            values, lengths = padded([sequences[row] for row in rows], given.dtype)
+            found[rows] = encoder({given.name: values, "lengths": lengths})[context.name]
+        return found
+
+    def setting(self, name: str, value: float | None, low: float, high: float) -> float:
+        """A setting of decoding, or the bundle's default for None; DecodingError out of ``low`` to ``high``."""
+        value = self.defaults.get(name) if value is None else value
+        if value is None:
+            raise DecodingError(f"the bundle has no default for {name}: give one")
+        if not low <= value <= high:
+            raise DecodingError(f"{name} must be between {low:g} and {high:g}, not {value}")
+        return value
+
+
+def batches(lengths: Sequence[int], size: int) -> Iterator[list[int]]:
+    """Indices in batches of at most ``size``, sequences of like length together."""
+    order = sorted(range(len(lengths)), key=lambda i: lengths[i])
+    return (order[start : start + size] for start in range(0, len(order), size))
+
+
+def padded(sequences: Sequence[NDArray[Any]], dtype: str) -> tuple[NDArray[Any], NDArray[np.int64]]:
+    """Sequences (T_i, ...) as one array (B, T, ...), zeros on the right, and their lengths (B,) int64."""
+    lengths = np.array([len(sequence) for sequence in sequences], dtype=np.int64)
+    result = np.zeros((len(sequences), int(lengths.max()), *sequences[0].shape[1:]), dtype=dtype)
+    for row, sequence in zip(result, sequences, strict=True):
+        row[: len(sequence)] = sequence
+    return result, lengths

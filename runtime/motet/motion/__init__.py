@@ -1,0 +1,1 @@
+"""Geometry: motions, skeletons, rotations, and what is done to them without a model."""

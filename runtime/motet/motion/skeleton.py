@@ -1,0 +1,150 @@
+"""The skeleton: a tree of joints with offsets, and how each joint turns its angles into a rotation."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from motet.errors import MotionError
+from motet.motion.rotations import Array, euler_to_rotmat
+
+END_SUFFIX = "_end"
+
+
+@dataclass(frozen=True)
+class Joint:
+    """One joint, with the bone that leads to it.
+
+    offset: (x, y, z) from the parent joint at rest, in the skeleton's length unit; y points up.
+    order: the Euler order of its rotation, see :mod:`motet.motion.rotations`; a channel that a motion lacks counts as
+    0.
+    axis: Euler angles of order "zyx" in degrees, given as (x, y, z): the frame its rotation is expressed in (the
+        ``axis`` of an ASF file). The local rotation is C M C^T with C from ``axis`` and M from the channels.
+    """
+
+    name: str
+    parent: int
+    offset: tuple[float, float, float]
+    order: str = "zyx"
+    axis: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @cached_property
+    def frame(self) -> Array:
+        """C, the rotation matrix (3, 3) of ``axis``."""
+        return euler_to_rotmat(np.radians(self.axis[::-1]), "zyx")
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """Joints in an order where each parent comes before its children; the first is the root.
+
+    A joint with a name that ends in ``_end`` marks the tip of its parent's last bone and has no channels.
+    metres_per_unit: how long one unit of the offsets is, or None where a file does not say.
+    """
+
+    joints: tuple[Joint, ...]
+    metres_per_unit: float | None = None
+
+    def __post_init__(self) -> None:
+        if not self.joints:
+            raise MotionError("a skeleton needs at least one joint")
+        names = [joint.name for joint in self.joints]
+        double = sorted({name for name in names if names.count(name) > 1})
+        if double:
+            raise MotionError(f"joint names must differ, twice in this skeleton: {', '.join(double)}")
+        for index, joint in enumerate(self.joints):
+            if not (joint.parent == -1 if index == 0 else 0 <= joint.parent < index):
+                raise MotionError(f"joint {joint.name!r} must come after its parent, and only the first has none")
+            if sorted(joint.order) != ["x", "y", "z"]:
+                raise MotionError(f"joint {joint.name!r}: {joint.order!r} is no Euler order of three different axes")
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The joints' names, in order."""
+        return tuple(joint.name for joint in self.joints)
+
+    @cached_property
+    def offsets(self) -> Array:
+        """The joints' offsets (J, 3)."""
+        return np.array([joint.offset for joint in self.joints], dtype=np.float64)
+
+    @cached_property
+    def children(self) -> tuple[tuple[int, ...], ...]:
+        """For each joint the indices of its children."""
+        return tuple(
+            tuple(i for i, joint in enumerate(self.joints) if joint.parent == parent)
+            for parent in range(len(self.joints))
+        )
+
+    @cached_property
+    def rest_positions(self) -> Array:
+        """Positions of the joints (J, 3) with every angle 0 and the root at the origin."""
+        positions = np.zeros((len(self.joints), 3))
+        for i, joint in enumerate(self.joints[1:], start=1):
+            positions[i] = positions[joint.parent] + joint.offset
+        return positions
+
+    @cached_property
+    def height(self) -> float:
+        """The largest extent of the rest pose along x, y or z, in the skeleton's length unit."""
+        return float(np.ptp(self.rest_positions, axis=0).max())
+
+    def index(self, name: str) -> int:
+        """Index of the joint called ``name``; MotionError if there is none."""
+        if name not in self.names:
+            raise MotionError(f"the skeleton has no joint {name!r}; it has {', '.join(self.names)}")
+        return self.names.index(name)
+
+    def subtree(self, name: str) -> tuple[int, ...]:
+        """Indices of a joint and of all that hang on it."""
+        found = [self.index(name)]
+        for i in found:
+            found.extend(self.children[i])
+        return tuple(sorted(found))
+
+    def scaled(self, metres_per_unit: float) -> "Skeleton":
+        """The same skeleton in another length unit; MotionError if its own unit is not known."""
+        factor = self.unit_factor(metres_per_unit)
+        joints = tuple(
+            Joint(j.name, j.parent, (j.offset[0] * factor, j.offset[1] * factor, j.offset[2] * factor), j.order, j.axis)
+            for j in self.joints
+        )
+        return Skeleton(joints, metres_per_unit)
+
+    def unit_factor(self, metres_per_unit: float) -> float:
+        """What a length in this skeleton's unit is multiplied by to be in the other unit."""
+        if self.metres_per_unit is None:
+            raise MotionError(
+                "the file does not say how long a unit of its skeleton is: give metres_per_unit (motet's --unit-in)"
+            )
+        return self.metres_per_unit / metres_per_unit
+
+    def to_json(self) -> dict[str, Any]:
+        """A JSON object that :meth:`from_json` reads back without loss."""
+        return {
+            "metres_per_unit": self.metres_per_unit,
+            "joints": [
+                {"name": j.name, "parent": j.parent, "offset": list(j.offset), "order": j.order, "axis": list(j.axis)}
+                for j in self.joints
+            ],
+        }
+
+    @staticmethod
+    def from_json(data: dict[str, Any]) -> "Skeleton":
+        """The inverse of :meth:`to_json`; MotionError where the object is no skeleton."""
+        try:
+            joints = tuple(
+                Joint(str(j["name"]), int(j["parent"]), _triple(j["offset"]), str(j["order"]), _triple(j["axis"]))
+                for j in data["joints"]
+            )
+            metres = data["metres_per_unit"]
+            return Skeleton(joints, None if metres is None else float(metres))
+        except (KeyError, TypeError, ValueError) as error:
+            raise MotionError(f"no skeleton: {error}") from error
+
+
+def _triple(values: Iterable[float]) -> tuple[float, float, float]:
+    x, y, z = (float(value) for value in values)
+    return x, y, z

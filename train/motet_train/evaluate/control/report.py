@@ -1,0 +1,131 @@
+"""All figures of a control model in one nested object with stable keys, and the goals of the one we ship."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from motet.models.control import ControlModel
+from motet_train.data.body import BodyParts, body_parts
+from motet_train.data.clips import Clips, sequences
+from motet_train.data.errors import DataError
+from motet_train.data.period import is_periodic
+from motet_train.evaluate.control.bend import bends, interruptions
+from motet_train.evaluate.control.gaits import (
+    constant_hysteresis,
+    convergence,
+    gait_transitions,
+    limit_cycle,
+    ramp_hysteresis,
+    synchronisation,
+)
+from motet_train.evaluate.control.lab import Lab, Leg
+from motet_train.evaluate.control.measures import Reference
+from motet_train.evaluate.control.variety import sampled_runs
+from motet_train.evaluate.tables import Goals, Report, reached
+
+GOALS: Goals = {
+    "train.seconds": (None, 30),
+    "train.reconstruction": (None, 0.25),
+    "cycle.period_error": (None, 0.02),
+    "cycle.drift": (None, 0.005),
+    "cycle.energy": (0.7, 1.1),
+    "cycle.converged": (99, None),
+    "cycle.median_s": (None, 1.2),
+    "cycle_run.energy": (0.7, 1.1),
+    "sync.share": (1, None),
+    "sync.max_s": (None, 1),
+    "gait.share": (1, None),
+    "gait.median_s": (None, 0.45),
+    "gait.under_half": (0.8, None),
+    "gait.jump_ratio": (None, 1),
+    "hysteresis.ramp_width": (0.4, None),
+    "hysteresis.constant_width": (0.25, None),
+    "bend.share": (0.95, None),
+    "bend.share_from_run": (0.95, None),
+    "bend.interrupt_s": (None, 0.8),
+}
+"""Figure -> (least, most) that the default recipe is to reach."""
+
+
+def lab_of(model: ControlModel, clips: Clips) -> Lab:
+    """A model beside the clips it was trained on; DataError where clips and model do not go together.
+
+    The first two periodic labels are taken for walk and run (those of these names first), the first other for bend.
+    Clips of labels that the model does not know are left out.
+    """
+    clips, contract = clips.only(model.labels), model.contract
+    motions = {
+        label: [s for motion in found for s in sequences(motion.select(contract.channels, contract.units), model.fps)]
+        for label, found in clips.motions.items()
+    }
+    parts = body_parts(clips.skeleton, contract.channels)
+    reference = Reference(motions, model.fps, np.flatnonzero(np.isin(parts.of_channel, parts.legs)))
+    by_name = sorted(motions, key=lambda label: ("walk", "run").index(label) if label in ("walk", "run") else 2)
+    gaits = [label for label in by_name if is_periodic(motions[label])]
+    if not gaits:
+        raise DataError("the experiments need clips of a periodic motion, such as walking")
+    run, bend = (next(iter(found), None) for found in (gaits[1:], [label for label in motions if label not in gaits]))
+    return Lab(model, reference, gaits[0], run, bend, _legs(model, parts))
+
+
+def experiments(lab: Lab) -> dict[str, list[Callable[[], Mapping[str, float]]]]:
+    """For each key of the report the experiments whose figures stand under it."""
+    found: dict[str, list[Callable[[], Mapping[str, float]]]] = {
+        "cycle": [lambda: limit_cycle(lab), lambda: convergence(lab)],
+        "sync": [lambda: synchronisation(lab)],
+    }
+    if lab.run is None:
+        return found
+    found |= {
+        "cycle_run": [lambda: limit_cycle(lab, "run")],
+        "gait": [lambda: gait_transitions(lab)],
+        "hysteresis": [lambda: ramp_hysteresis(lab), lambda: constant_hysteresis(lab)],
+        "variety": [lambda: sampled_runs(lab)],
+    }
+    if lab.bend is not None:
+        found["bend"] = [lambda: bends(lab), lambda: interruptions(lab)]
+    return found
+
+
+REHEARSED = ("gait", "bend", "sync", "cycle_run", "cycle", "hysteresis")
+"""Groups of experiments with goals, quick ones first."""
+
+
+def missed_goals(lab: Lab, enough: int) -> list[str]:
+    """Goals that a model misses in the :data:`REHEARSED` experiments; stops at ``enough`` of them."""
+    missed: list[str] = []
+    groups = experiments(lab)
+    for group, run in ((name, run) for name in REHEARSED for run in groups.get(name, [])):
+        named = {f"{group}.{key}": value for key, value in run().items()}
+        missed += [name for name in named if name in GOALS and not reached(GOALS, name, named[name])]
+        if len(missed) >= enough:
+            break
+    return missed
+
+
+def control_report(lab: Lab, progress: Callable[[str], None]) -> Report:
+    """Run all experiments; ``progress`` is called with the name of each group before it starts.
+
+    "train" repeats what training measured. A figure that does not exist (a period of no loop) is NaN, a time that
+    never came infinite.
+    """
+    training: Mapping[str, Any] = lab.model.manifest.get("training", {})
+    report: Report = {"train": {key: float(training[key]) for key in ("seconds", "reconstruction") if key in training}}
+    for name, group in experiments(lab).items():
+        progress(name)
+        report[name] = {key: value for run in group for key, value in run().items()}
+    return report
+
+
+def _legs(model: ControlModel, parts: BodyParts) -> tuple[Leg, Leg] | None:
+    if not parts.legs:
+        return None
+    # codes are the channels themselves, or as many of each part
+    of_code = parts.of_channel
+    if model.codes != len(of_code):
+        of_code = np.repeat(np.arange(len(parts.names)), model.codes // len(parts.names))
+    left, right = (
+        Leg(np.flatnonzero(parts.of_channel == part), np.flatnonzero(of_code == part)) for part in parts.legs
+    )
+    return left, right

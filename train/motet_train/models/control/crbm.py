@@ -1,0 +1,167 @@
+"""Conditional restricted Boltzmann machine: the past as directed input, control and free units above (thesis 3.2, 4.1).
+
+Letters in shapes: B rows, N all rows, H visible units, K taps, C control units, F free hidden units.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import torch
+from torch import Tensor, nn
+
+from motet_train.models.control.contrastive import (
+    Ascent,
+    DivergedError,
+    Learning,
+    Progress,
+    balanced,
+    epochs,
+    parameter,
+)
+
+LARGEST = 1e3
+"""A weight beyond this is a sign that learning blew up; where it works, weights stay near 1."""
+
+
+class CRBM(nn.Module):
+    """Visible units driven by the past and by a second hidden layer (figure 3.5).
+
+    The second hidden layer is C control units, which are given, and F free units, which are inferred. Visible units
+    are binary, or with ``taylor`` real with unit variance, and then the past drives the free units too (Taylor 2007).
+    """
+
+    free_past_weight: nn.Parameter | None
+
+    def __init__(self, visible: int, taps: int, control: int, free: int, taylor: bool = False) -> None:
+        super().__init__()
+        self.control_units, self.free_units, self.gaussian = control, free, taylor
+        self.past_weight = parameter(taps * visible, visible)
+        self.hidden_weight = parameter(control + free, visible)
+        self.visible_bias = parameter(visible)
+        self.hidden_bias = parameter(control + free)
+        self.register_parameter("free_past_weight", parameter(taps * visible, free) if taylor else None)
+
+    def drive(self, past: Tensor, control: Tensor) -> Tensor:
+        """What the past (B, K H) and the control units (B, C) put on the visible units (B, H)."""
+        given = torch.addmm(self.visible_bias, past, self.past_weight)
+        return torch.addmm(given, control, self.hidden_weight[: self.control_units])
+
+    def visible(self, drive: Tensor, free: Tensor, temperature: Tensor | float) -> Tensor:
+        """Means of the visible units (B, H) given what drives them (B, H) and the free units (B, F)."""
+        total = torch.addmm(drive, free, self.hidden_weight[self.control_units :]) if self.free_units else drive
+        return total if self.gaussian else torch.sigmoid(total / temperature)
+
+    def control(self, visible: Tensor, temperature: Tensor | float) -> Tensor:
+        """Probabilities of the control units (B, C) given the visible units (B, H)."""
+        units = self.control_units
+        total = torch.addmm(self.hidden_bias[:units], visible, self.hidden_weight[:units].T)
+        return torch.sigmoid(total / temperature)
+
+    def free(self, visible: Tensor, past: Tensor, temperature: Tensor | float) -> Tensor:
+        """Probabilities of the free units (B, F) given the visible units (B, H) and the past (B, K H)."""
+        units = self.control_units
+        total = torch.addmm(self.hidden_bias[units:], visible, self.hidden_weight[units:].T)
+        if self.free_past_weight is not None:
+            total = torch.addmm(total, past, self.free_past_weight)
+        return torch.sigmoid(total / temperature)
+
+
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """What a CRBM learns from: past (N, K H), visible (N, H), control (N, C), and probabilities (N,) to draw each."""
+
+    past: Tensor
+    visible: Tensor
+    control: Tensor
+    probabilities: Tensor
+
+
+def windows(codes: Sequence[Sequence[Tensor]], expansion: Tensor, taps: int, onsets: Sequence[float]) -> Windows:
+    """Cut the sequences (T, H) of each label into windows of K past frames and the one after them.
+
+    expansion: (L, C), the control units of each label. onsets: for each label how many times as often the first
+    window of a sequence is drawn as its last, geometric between: a motion that ends has to be entered at its start.
+    """
+    cut = [torch.cat([sequence.unfold(0, taps + 1, 1) for sequence in found]).transpose(1, 2) for found in codes]
+    weights = [
+        torch.cat([onset ** torch.linspace(1, 0, len(sequence) - taps) for sequence in found])
+        for onset, found in zip(onsets, codes, strict=True)
+    ]
+    every = torch.cat(cut)
+    control = torch.cat([units.expand(len(part), -1) for units, part in zip(expansion, cut, strict=True)])
+    return Windows(every[:, :taps].flatten(1), every[:, taps], control, balanced(weights))
+
+
+@dataclass(frozen=True)
+class Past:
+    """How a CRBM learns from its past (Taylor 2007)."""
+
+    noise: float = 0.0
+    """Standard deviation of Gaussian noise on the past, so that the net learns the way back to its data."""
+    rate: float = 1.0
+    """Learning rate of the weights from the past to the visible units over that of the others."""
+
+
+@torch.no_grad()
+def train_crbm(
+    crbm: CRBM,
+    data: Windows,
+    learning: Learning,
+    generator: torch.Generator,
+    progress: Progress,
+    *,
+    clamped: bool,
+    recall: Past,
+) -> None:
+    """Train by contrastive divergence with the past held fixed (thesis 3.2, 5.2).
+
+    clamped: control units keep their values in the reconstruction; else they are inferred from it (thesis 5.3).
+    Raises DivergedError where the weights leave all bounds.
+    """
+    past_weight, hidden_weight, bias, hidden_bias = (
+        Ascent(p, learning.decay) for p in (crbm.past_weight, crbm.hidden_weight, crbm.visible_bias, crbm.hidden_bias)
+    )
+    free_past = None if crbm.free_past_weight is None else Ascent(crbm.free_past_weight, learning.decay)
+    for number, epoch in enumerate(epochs(learning, data.probabilities, generator), start=1):
+        for rows in epoch.batches:
+            past, visible, control = data.past[rows], data.visible[rows], data.control[rows]
+            if recall.noise:
+                past = past + recall.noise * torch.randn(past.shape, generator=generator)
+            free = _sampled_free(crbm, visible, past, epoch.temperature, generator)
+            end, end_free = settle(crbm, past, control, free, learning.steps, epoch.temperature, generator)
+            end_control = control if clamped else crbm.control(end, epoch.temperature)
+            hidden, end_hidden = torch.cat([control, free], 1), torch.cat([end_control, end_free], 1)
+            past_weight.outer(past, visible - end, replace(epoch, rate=epoch.rate * recall.rate))
+            if free_past is not None:
+                free_past.outer(past, free - end_free, epoch)
+            hidden_weight.contrast((hidden, visible), (end_hidden, end), epoch)
+            hidden_bias.mean(hidden - end_hidden, epoch)
+            bias.mean(visible - end, epoch)
+        if not crbm.past_weight.abs().max() <= LARGEST:
+            raise DivergedError(f"learning blew up: the CRBM has weights beyond {LARGEST:g} after epoch {number}")
+        progress("CRBM", number, learning.epochs)
+
+
+def settle(
+    crbm: CRBM,
+    past: Tensor,
+    control: Tensor,
+    free: Tensor,
+    steps: int,
+    temperature: float,
+    generator: torch.Generator,
+) -> tuple[Tensor, Tensor]:
+    """k Gibbs steps from free units (B, F): means of the visible (B, H) and of the free units (B, F)."""
+    drive = crbm.drive(past, control)
+    for _ in range(steps - 1 if crbm.free_units else 0):
+        free = _sampled_free(crbm, crbm.visible(drive, free, temperature), past, temperature, generator)
+    end = crbm.visible(drive, free, temperature)
+    return end, crbm.free(end, past, temperature)
+
+
+def _sampled_free(crbm: CRBM, visible: Tensor, past: Tensor, temperature: float, generator: torch.Generator) -> Tensor:
+    free = crbm.free(visible, past, temperature)
+    if not crbm.free_units:
+        return free
+    # not torch.bernoulli: learning that blows up is noticed at the end of its epoch
+    return (torch.rand(free.shape, generator=generator) < free).to(free.dtype)

@@ -1,0 +1,155 @@
+"""Temporal deep belief net (thesis, chapter 4): a body-part RBM under a conditional RBM over its codes.
+
+Where the thesis' text and its author's code differ, the default follows what works (docs/control.md shows both):
+control units stay clamped in the reconstruction, binary layers are annealed, and the root's rotation is among the
+channels; :meth:`TDBNConfig.thesis` is the text.
+
+Letters in shapes: B rows, T frames, D channels, H codes, K taps, L labels, C control units, F free hidden units.
+"""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from motet_train.models.control.contrastive import Learning, Progress, balanced
+from motet_train.models.control.control_net import ControlNet, binary
+from motet_train.models.control.crbm import CRBM, Past, train_crbm, windows
+from motet_train.models.control.rbm import RBM, block_mask, train_rbm
+
+Sequences = Sequence[Sequence[Tensor]]
+"""For each label its sequences of frames (T, D)."""
+
+
+@dataclass(frozen=True)
+class TDBNConfig:
+    """Sizes of the net and how it is trained; the defaults are the recipe of the shipped bundle."""
+
+    fps: float = 40.0
+    root_rotation: bool = True
+    """Whether the root's rotation is among the channels: 59 of CMU's skeleton, else the thesis' 56."""
+    hidden_per_part: int = 30
+    taps: int = 3
+    control_units: int = 24
+    """For each label."""
+    free_units: int = 0
+    clamped: bool = True
+    """Whether control units keep their values in the reconstruction."""
+    sigma: float = 0.38
+    """Standard deviation of a Gaussian visible unit, in units of its channel's own: smaller codes say more."""
+    past_noise: float = 0.3
+    onset: float = 100.0
+    """How many times as often the first window of a motion that ends is drawn as its last."""
+    temperature: float = 0.38
+    """Of the codes and of generation; learning anneals from 1 to it."""
+    initial: float = 0.01
+    """Standard deviation of the initial weights."""
+    restarts: int = 2
+    """RBMs that learn side by side: which features they find decides how the net moves."""
+    tries: int = 3
+    """CRBMs learned on each of them at the most, while none satisfies."""
+    rbm: Learning = field(default_factory=lambda: Learning(2000, rate=1e-2, final_rate=0.03, temperature=(1.0, 0.38)))
+    crbm: Learning = field(default_factory=lambda: Learning(80, rate=6e-3, final_rate=0.3, temperature=(1.0, 0.38)))
+
+    @staticmethod
+    def thesis() -> "TDBNConfig":
+        """The thesis' text: 56 angles, control units unclamped in the reconstruction, no annealing (5.2 to 5.4)."""
+        flat = (1.0, 1.0)
+        return TDBNConfig(
+            root_rotation=False,
+            control_units=7,
+            clamped=False,
+            sigma=1.0,
+            past_noise=0.0,
+            onset=1.0,
+            temperature=1.0,
+            restarts=1,
+            tries=1,
+            rbm=Learning(epochs=1000, temperature=flat),
+            crbm=Learning(epochs=100, temperature=flat),
+        )
+
+    def unclamped(self) -> "TDBNConfig":
+        """The same recipe with control units inferred in the reconstruction, as the thesis' text has it (5.3)."""
+        return replace(self, clamped=False, restarts=1, tries=1)
+
+
+class TDBN(ControlNet):
+    """The net with its normalisation: degrees in, codes as state, degrees out.
+
+    parts: the body part of each channel (D). labels: how many (L).
+    """
+
+    def __init__(self, config: TDBNConfig, parts: Sequence[int], labels: int) -> None:
+        mask = block_mask(parts, config.hidden_per_part)
+        control = labels * config.control_units
+        super().__init__(CRBM(mask.shape[1], config.taps, control, config.free_units), labels, len(parts), config.taps)
+        self.config = config
+        self.rbm = RBM(mask)
+
+    def encode(self, frames: Tensor) -> Tensor:
+        """Frames (B, D) to codes (B, H)."""
+        return self.rbm.encode((frames - self.mean) / self.scale, self.config.temperature)
+
+    def decode(self, codes: Tensor) -> Tensor:
+        """Codes (B, H) to frames (B, D)."""
+        return self.rbm.decode(codes) * self.scale + self.mean
+
+    def vary(self, mean: Tensor, noise: Tensor, variety: Tensor) -> Tensor:
+        """Between the probabilities (variety 0) and binary samples of them (variety 1)."""
+        return binary(mean, noise, variety)
+
+
+def from_config(config: Mapping[str, Any]) -> TDBN:
+    """An untrained net of the sizes that :func:`to_config` wrote."""
+    values = dict(config)
+    parts, labels = values.pop("parts"), values.pop("labels")
+    for layer in ("rbm", "crbm"):
+        values[layer] = Learning.from_json(values[layer])
+    return TDBN(TDBNConfig(**values), parts, labels)
+
+
+def to_config(net: TDBN) -> dict[str, Any]:
+    """Everything that :func:`from_config` needs, ready for JSON."""
+    parts = net.rbm.mask[:, :: net.config.hidden_per_part].argmax(dim=1).tolist()
+    config: dict[str, Any] = json.loads(json.dumps(asdict(net.config)))
+    return {**config, "parts": parts, "labels": len(net.expansion)}
+
+
+def train_tdbn(
+    net: TDBN, sequences: Sequences, onsets: Sequence[float], generator: torch.Generator, progress: Progress
+) -> Iterator[None]:
+    """Train RBM and CRBM, one after the other, on the sequences (T, D) of each label (thesis 3.3).
+
+    Yields whenever ``net`` is trained, again and again with other random numbers: ``tries`` times on each of the
+    ``restarts`` of the RBM. net.mean and net.scale must be set. onsets: see
+    :func:`motet_train.models.control.crbm.windows`.
+    """
+    config = net.config
+    rbms = RBM(net.rbm.mask, config.restarts)
+    frames = (torch.cat([frames for found in sequences for frames in found]) - net.mean) / net.scale
+    uniform = balanced([torch.ones(sum(map(len, found))) for found in sequences])
+    rbms.weight.normal_(0.0, config.initial, generator=generator).mul_(rbms.mask)
+    train_rbm(rbms, frames, uniform, config.rbm, generator, progress)
+    for number in list(range(config.restarts)) * config.tries:
+        net.rbm.take(rbms, number)
+        _train_upper(net, sequences, onsets, generator, progress)
+        yield
+
+
+@torch.no_grad()
+def _train_upper(
+    net: TDBN, sequences: Sequences, onsets: Sequence[float], generator: torch.Generator, progress: Progress
+) -> None:
+    """Train the CRBM anew on the codes that the RBM gives."""
+    config, crbm = net.config, net.crbm
+    for parameter in crbm.parameters():
+        parameter.zero_()
+    for weight in (crbm.past_weight, crbm.hidden_weight):
+        weight.normal_(0.0, config.initial, generator=generator)
+    codes = [[net.encode(frames) for frames in found] for found in sequences]
+    data = windows(codes, net.expansion, config.taps, onsets)
+    train_crbm(crbm, data, config.crbm, generator, progress, clamped=config.clamped, recall=Past(config.past_noise))

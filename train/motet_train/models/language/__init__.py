@@ -1,0 +1,1 @@
+"""Nets between motion and language."""

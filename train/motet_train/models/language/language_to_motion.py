@@ -1,0 +1,199 @@
+"""A motion for a sentence: layer-norm GRUs and a mixture of Gaussians for each frame (Plappert et al. 2017, 4.3).
+
+Letters in shapes: B rows, T frames, D channels, W words, C units of the context, K components. A frame of D + 1 numbers
+is normalised and has the active flag at its end: 1 on every frame of a motion and 0 on the one that ends it.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from motet.bundle.graph import GraphSpec, TensorSpec
+from motet_train.models.language.batch import Batch, before
+from motet_train.models.language.dropout import WordEmbedding
+from motet_train.models.language.layer_norm_gru import LayerNormGRU
+from motet_train.models.language.mixture import Mixture, MixtureHead
+from motet_train.models.language.sequence import Decoder, Encoder
+from motet_train.models.language.summary import SummaryHead
+
+LOSSES = {"surrogate": Mixture.surrogate_loss, "likelihood": lambda *given: -Mixture.log_likelihood(*given)}
+"""Eq. 12, on which the paper's net was trained, and eq. 11, the true likelihood."""
+
+
+@dataclass(frozen=True)
+class LanguageToMotionConfig:
+    """Sizes; the defaults are the paper's (table 1). channels: D, without the flag. words: V, with special words."""
+
+    channels: int
+    words: int
+    encoder_units: tuple[int, ...] = (64, 64)
+    decoder_units: tuple[int, ...] = (400, 400, 400)
+    embedding: int = 64
+    components: int = 20
+    dropout: float = 0.1
+    gates: str = "sigmoid"
+    loss: str = "surrogate"
+    variance_floor: float = 1e-4
+    """In normalised units."""
+    feed_noise: float = 0.0
+    """Standard deviation of what training adds to the frames that are fed back, in normalised units: a free run feeds
+    back frames that are a little off, and must find its way back."""
+    frame_dropout: float = 0.0
+    """Mean share of the frames that are fed back as zeros in training, from none to twice as many in a sequence: what
+    the frame before does not tell, the context must."""
+    summary: float = 0.0
+    """Weight of the training-only loss of :mod:`motet_train.models.language.summary`; 0 leaves its head out."""
+
+    @staticmethod
+    def paper() -> "LanguageToMotionConfig":
+        """The net of the paper: 44 joints, 1,344 words, 5,446,517 parameters."""
+        return LanguageToMotionConfig(channels=44, words=1344)
+
+
+class LanguageToMotion(nn.Module):
+    """The net with its normalisation. mean, scale: (D,) of the channels, set before training."""
+
+    mean: Tensor
+    scale: Tensor
+
+    def __init__(self, config: LanguageToMotionConfig) -> None:
+        super().__init__()
+        self.config = config
+        context, shared = 2 * config.encoder_units[-1], (config.gates, config.dropout)
+        self.register_buffer("mean", torch.zeros(config.channels))
+        self.register_buffer("scale", torch.ones(config.channels))
+        self.embedding = WordEmbedding(config.words, config.embedding, config.dropout)
+        self.encoder = Encoder(LayerNormGRU, config.embedding, config.encoder_units, *shared)
+        self.decoder = Decoder(LayerNormGRU, config.channels + 1, context, config.decoder_units, True, *shared)
+        self.head = MixtureHead(
+            sum(config.decoder_units), config.channels, config.components, config.variance_floor, config.dropout
+        )
+        self.summary = SummaryHead(context, config.channels) if config.summary else None
+
+    def encode(self, words: Tensor, lengths: Tensor) -> Tensor:
+        """Words (B, W) without SOS and EOS, of lengths (B,), to contexts (B, C)."""
+        context: Tensor = self.encoder(self.embedding(words), lengths)
+        return context
+
+    def outputs(self, frames: Tensor, context: Tensor) -> Tensor:
+        """Outputs of the decoder (B, T, S) from which each of the frames (B, T, D + 1) is predicted."""
+        given = torch.cat([torch.ones_like(frames[:, :1]), frames[:, :-1]], dim=1)
+        found: Tensor = self.decoder(given, context)
+        return found
+
+    def losses(self, batch: Batch) -> Tensor:
+        """The loss of every frame of the batch and of the one after it where a motion ends (N,)."""
+        losses = LOSSES[self.config.loss](*self._predictions(batch))
+        if self.summary is None or not self.training:
+            return losses
+        context = self.encode(batch.words, (batch.words != 0).sum(dim=1))
+        return losses + self.config.summary * self.summary.loss(context, self.normal(batch), batch.lengths)
+
+    def loss(self, batch: Batch) -> Tensor:
+        """The mean over frames of :meth:`losses` (eq. 12, or eq. 11)."""
+        return self.losses(batch).mean()
+
+    def likelihoods(self, batch: Batch) -> Tensor:
+        """The log-likelihood (eq. 8) of the same frames as in :meth:`losses`, whichever loss is trained (N,)."""
+        return Mixture.log_likelihood(*self._predictions(batch))
+
+    def _predictions(self, batch: Batch) -> tuple[Mixture, Tensor, Tensor]:
+        """Mixtures, frames (N, D) and flags (N,) of all active steps, in one row."""
+        normal = functional.pad(self.normal(batch), (0, 0, 0, 1))
+        flags = before(batch.lengths, normal.shape[1]).to(normal.dtype)
+        active = before(batch.lengths + (1 if batch.ended is None else batch.ended), normal.shape[1])
+        context = self.encode(batch.words, (batch.words != 0).sum(dim=1))
+        fed = self._blurred(normal) if self.training else normal
+        outputs = self.outputs(torch.cat([fed, flags[..., None]], dim=-1), context)
+        # padded steps are left out before the output layer, which is the largest product of all
+        return self.head(outputs[active]), normal[active], flags[active]
+
+    def normal(self, batch: Batch) -> Tensor:
+        """The normalised frames (B, T, D) of a batch."""
+        return (batch.frames - self.mean) / self.scale
+
+    def _blurred(self, normal: Tensor) -> Tensor:
+        """Frames (B, T, D) as training feeds them back: with noise, and some of them left out."""
+        config = self.config
+        if config.feed_noise:
+            normal = normal + config.feed_noise * torch.randn_like(normal)
+        if config.frame_dropout:
+            share = 2 * config.frame_dropout * torch.rand_like(normal[:, :1, :1])
+            normal = normal * (torch.rand_like(normal[..., :1]) >= share)
+        return normal
+
+    def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
+        """The encoder, the step and the score, each with its contract."""
+        channels, components = self.config.channels, self.config.components
+        context = TensorSpec("context", ("batch", 2 * self.config.encoder_units[-1]))
+        words, lengths = TensorSpec("words", ("batch", "words"), "int64"), TensorSpec("lengths", ("batch",), "int64")
+        state, following = (TensorSpec(n, ("batch", sum(self.config.decoder_units))) for n in ("state", "next_state"))
+        mixture = (
+            TensorSpec("log_weights", ("batch", components)),
+            *(TensorSpec(name, ("batch", components, channels)) for name in ("means", "stds")),
+            TensorSpec("active", ("batch",)),
+        )
+        frame = TensorSpec("frame", ("batch", channels + 1))
+        step = GraphSpec((frame, context, state), (*mixture, following), {"state": "next_state"})
+        frames = TensorSpec("frames", ("batch", "time", channels + 1))
+        score = GraphSpec((context, frames), (TensorSpec("log_likelihood", ("batch", "time")),))
+        encoder = GraphSpec((words, lengths), (context,))
+        return {"encoder": (Encode(self), encoder), "step": (Step(self), step), "score": (Score(self), score)}
+
+
+class Encode(nn.Module):
+    """The encoder graph: words (B, W), lengths (B,) -> context (B, C)."""
+
+    def __init__(self, net: LanguageToMotion) -> None:
+        super().__init__()
+        self.net = net
+
+    def forward(self, words: Tensor, lengths: Tensor) -> Tensor:
+        """Encode."""
+        return self.net.encode(words, lengths)
+
+
+class Step(nn.Module):
+    """The step graph: frame (B, D + 1), context (B, C), state (B, S) -> the next frame's mixture and the next state.
+
+    log_weights (B, K), means and standard deviations (B, K, D) in normalised units, probability of the flag (B,).
+    """
+
+    def __init__(self, net: LanguageToMotion) -> None:
+        super().__init__()
+        self.net = net
+
+    def forward(self, frame: Tensor, context: Tensor, state: Tensor) -> tuple[Tensor, ...]:
+        """One frame."""
+        following = self.net.decoder.step(frame, context, state)
+        mixture = self.net.head(following)
+        stds = mixture.variances.sqrt()
+        return mixture.log_weights, mixture.means, stds, mixture.active.sigmoid(), following
+
+
+class Score(nn.Module):
+    """The score graph: context (B, C), frames (B, T, D + 1) -> log-likelihoods given all frames before (B, T)."""
+
+    def __init__(self, net: LanguageToMotion) -> None:
+        super().__init__()
+        self.net = net
+
+    def forward(self, context: Tensor, frames: Tensor) -> Tensor:
+        """Score known motions."""
+        mixture: Mixture = self.net.head(self.net.outputs(frames, context))
+        return mixture.log_likelihood(frames[..., :-1], frames[..., -1])
+
+
+def from_config(config: Mapping[str, Any]) -> LanguageToMotion:
+    """An untrained net of the sizes that :func:`to_config` wrote."""
+    tuples = {key: tuple(config[key]) for key in ("encoder_units", "decoder_units")}
+    return LanguageToMotion(LanguageToMotionConfig(**{**config, **tuples}))
+
+
+def to_config(net: LanguageToMotion) -> dict[str, Any]:
+    """Everything that :func:`from_config` needs, ready for JSON."""
+    return {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(net.config).items()}

@@ -1,0 +1,169 @@
+"""A sentence for a motion: bidirectional GRU encoder, GRU decoder over words (Plappert et al. 2017, section 4.2).
+
+Letters in shapes: B rows, T frames, D channels, W words, V words of the vocabulary, C units of the context.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from motet.bundle.graph import GraphSpec, TensorSpec
+from motet_train.models.language.batch import Batch, before
+from motet_train.models.language.dropout import WordEmbedding
+from motet_train.models.language.gru import GRU
+from motet_train.models.language.sequence import Decoder, Encoder
+from motet_train.models.language.summary import SummaryHead
+
+PAD, SOS, EOS = 0, 1, 2
+"""Ids of the special words."""
+
+
+@dataclass(frozen=True)
+class MotionToLanguageConfig:
+    """Sizes; the defaults are the paper's (table 1). channels: D, without the flag. words: V, with special words."""
+
+    channels: int
+    words: int
+    encoder_units: tuple[int, ...] = (64, 64)
+    decoder_units: tuple[int, ...] = (128, 128)
+    embedding: int = 64
+    dropout: float = 0.4
+    gates: str = "sigmoid"
+    frame_noise: float = 0.0
+    """Standard deviation of what training adds to the frames, in normalised units."""
+    summary: float = 0.0
+    """Weight of the training-only loss of :mod:`motet_train.models.language.summary`; 0 leaves its head out."""
+
+    @staticmethod
+    def paper() -> "MotionToLanguageConfig":
+        """The net of the paper: 44 joints, 1,344 words, 843,456 parameters."""
+        return MotionToLanguageConfig(channels=44, words=1344)
+
+
+class MotionToLanguage(nn.Module):
+    """The net with its normalisation. mean, scale: (D,) of the channels, set before training."""
+
+    mean: Tensor
+    scale: Tensor
+
+    def __init__(self, config: MotionToLanguageConfig) -> None:
+        super().__init__()
+        self.config = config
+        context, shared = 2 * config.encoder_units[-1], (config.gates, config.dropout)
+        self.register_buffer("mean", torch.zeros(config.channels))
+        self.register_buffer("scale", torch.ones(config.channels))
+        self.encoder = Encoder(GRU, config.channels + 1, config.encoder_units, *shared)
+        self.embedding = WordEmbedding(config.words, config.embedding, config.dropout)
+        self.decoder = Decoder(GRU, config.embedding, context, config.decoder_units, False, *shared)
+        self.output = nn.Linear(sum(config.decoder_units), config.words)
+        nn.init.xavier_uniform_(self.output.weight)
+        nn.init.zeros_(self.output.bias)
+        self.summary = SummaryHead(context, config.channels) if config.summary else None
+
+    def encode(self, frames: Tensor, lengths: Tensor) -> Tensor:
+        """Frames (B, T, D) in the contract's units, of lengths (B,), to contexts (B, C)."""
+        normal = (frames - self.mean) / self.scale
+        if self.training and self.config.frame_noise:
+            normal = normal + self.config.frame_noise * torch.randn_like(normal)
+        context: Tensor = self.encoder(torch.cat([normal, torch.ones_like(normal[..., :1])], dim=-1), lengths)
+        return context
+
+    def outputs(self, words: Tensor, context: Tensor) -> Tensor:
+        """Outputs of the decoder (B, W, S) after each of the words (B, W) and all before it."""
+        found: Tensor = self.decoder(self.embedding(words), context)
+        return found
+
+    def log_probabilities(self, outputs: Tensor) -> Tensor:
+        """Outputs of the decoder (..., S) to log-probabilities of the next word (..., V), eq. 5 and 6."""
+        dropped = functional.dropout(outputs, self.config.dropout, self.training)
+        return functional.log_softmax(self.output(dropped), dim=-1)
+
+    def losses(self, batch: Batch) -> Tensor:
+        """Cross-entropy of every word and every EOS of the batch (N,): the terms of eq. 7."""
+        lengths = (batch.words != PAD).sum(dim=1)
+        words = functional.pad(batch.words, (1, 0), value=SOS)
+        targets = functional.pad(batch.words, (0, 1), value=PAD).scatter(1, lengths[:, None], EOS)
+        active = before(lengths + 1, words.shape[1])
+        context = self.encode(batch.frames, batch.lengths)
+        outputs = self.outputs(words, context)
+        # padded steps are left out before the output layer, which is the largest product of all
+        losses = functional.nll_loss(self.log_probabilities(outputs[active]), targets[active], reduction="none")
+        if self.summary is None or not self.training:
+            return losses
+        normal = (batch.frames - self.mean) / self.scale
+        return losses + self.config.summary * self.summary.loss(context, normal, batch.lengths)
+
+    def loss(self, batch: Batch) -> Tensor:
+        """The mean over words of :meth:`losses` (eq. 7)."""
+        return self.losses(batch).mean()
+
+    def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
+        """The encoder, the step and the score, each with its contract."""
+        context = TensorSpec("context", ("batch", 2 * self.config.encoder_units[-1]))
+        frames = TensorSpec("frames", ("batch", "time", self.config.channels))
+        lengths, word = TensorSpec("lengths", ("batch",), "int64"), TensorSpec("word", ("batch",), "int64")
+        state, following = (TensorSpec(n, ("batch", sum(self.config.decoder_units))) for n in ("state", "next_state"))
+        scores = TensorSpec("log_probabilities", ("batch", self.config.words))
+        step = GraphSpec((word, context, state), (scores, following), {"state": "next_state"})
+        words = TensorSpec("words", ("batch", "words"), "int64")
+        score = GraphSpec((context, words), (TensorSpec("log_probabilities", ("batch", "words")),))
+        encoder = GraphSpec((frames, lengths), (context,))
+        return {"encoder": (Encode(self), encoder), "step": (Step(self), step), "score": (Score(self), score)}
+
+
+class Encode(nn.Module):
+    """The encoder graph: frames (B, T, D), lengths (B,) -> context (B, C)."""
+
+    def __init__(self, net: MotionToLanguage) -> None:
+        super().__init__()
+        self.net = net
+
+    def forward(self, frames: Tensor, lengths: Tensor) -> Tensor:
+        """Encode."""
+        return self.net.encode(frames, lengths)
+
+
+class Step(nn.Module):
+    """The step graph: word (B,), context (B, C), state (B, S) -> log-probabilities (B, V), next state (B, S)."""
+
+    def __init__(self, net: MotionToLanguage) -> None:
+        super().__init__()
+        self.net = net
+
+    def forward(self, word: Tensor, context: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
+        """One word."""
+        token = self.net.embedding(word[:, None])[:, 0]
+        following = self.net.decoder.step(token, context, state)
+        return self.net.log_probabilities(following), following
+
+
+class Score(nn.Module):
+    """The score graph: context (B, C), words (B, W) = SOS w1.. EOS PAD.. -> log p of each given those before (B, W).
+
+    0 for the first word, which is given, and for PAD.
+    """
+
+    def __init__(self, net: MotionToLanguage) -> None:
+        super().__init__()
+        self.net = net
+
+    def forward(self, context: Tensor, words: Tensor) -> Tensor:
+        """Score known sentences."""
+        log_probabilities = self.net.log_probabilities(self.net.outputs(words, context))[:, :-1]
+        found = log_probabilities.gather(2, words[:, 1:, None])[..., 0]
+        return functional.pad(torch.where(words[:, 1:] == PAD, 0.0, found), (1, 0))
+
+
+def from_config(config: Mapping[str, Any]) -> MotionToLanguage:
+    """An untrained net of the sizes that :func:`to_config` wrote."""
+    tuples = {key: tuple(config[key]) for key in ("encoder_units", "decoder_units")}
+    return MotionToLanguage(MotionToLanguageConfig(**{**config, **tuples}))
+
+
+def to_config(net: MotionToLanguage) -> dict[str, Any]:
+    """Everything that :func:`from_config` needs, ready for JSON."""
+    return {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(net.config).items()}

@@ -1,0 +1,172 @@
+"""Systems that predict frame by frame: one face for all of them, and their encoder and step graphs.
+
+Letters in shapes: B rows, L seed frames, N predicted frames, C channels of the contract, D of them that vary.
+"""
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+
+import torch
+from torch import Tensor, nn
+
+from motet.bundle.graph import GraphSpec, TensorSpec
+
+State = dict[str, Tensor]
+"""What a system knows, by name; each (B, ...)."""
+
+Shapes = Mapping[str, tuple[int, ...]]
+"""Name in a state -> shape of one row."""
+
+
+class System(nn.Module, ABC):
+    """What a published system computes, on normalised frames of D channels.
+
+    carried: what changes with every frame. constant: what the seed alone decides.
+    """
+
+    carried: Shapes
+    constant: Shapes
+
+    @abstractmethod
+    def begin(self, seed: Tensor) -> State:
+        """The state after the seed frames (B, L, D), the last of which has been pushed."""
+
+    @abstractmethod
+    def predict(self, state: State) -> tuple[Tensor, State]:
+        """The next frame (B, D), and what is carried on, before that frame is pushed."""
+
+    @abstractmethod
+    def push(self, state: State, frame: Tensor) -> State:
+        """What is carried on after a frame (B, D), a predicted or a true one."""
+
+    def progress(self, share: float) -> None:
+        """Told before each step of training which share of it is done; for what changes on the way."""
+
+    def imagine(self, windows: Tensor, seed_frames: int) -> Tensor:
+        """The frames (B, N, D) that training predicts for whole windows (B, L + N, D): here those of a free run."""
+        return free_run(self, windows[:, :seed_frames], windows.shape[1] - seed_frames)
+
+    def error(self, predicted: Tensor, truth: Tensor) -> Tensor:
+        """How far predicted frames (B, N, D) are from true ones, in training: here :func:`squared_error`."""
+        return squared_error(predicted, truth)
+
+    def loss(self, windows: Tensor, seed_frames: int) -> Tensor:
+        """What training makes small, of whole windows (B, L + N, D): here the :meth:`error` of :meth:`imagine`."""
+        return self.error(self.imagine(windows, seed_frames), windows[:, seed_frames:])
+
+
+def squared_error(predicted: Tensor, truth: Tensor) -> Tensor:
+    """The mean over rows, frames and channels."""
+    return (predicted - truth).square().mean()
+
+
+def free_run(system: System, seed: Tensor, count: int, truth: Tensor | None = None, own: float = 1.0) -> Tensor:
+    """The ``count`` frames (B, N, D) that follow the seed frames (B, L, D).
+
+    truth: the true frames (B, N, D), mixed into those that are fed back, of which ``own`` is the share that was
+        predicted (Li et al. 2018, eq. 10).
+    """
+    state = system.begin(seed)
+    frames = []
+    for n in range(count):
+        frame, carried = system.predict(state)
+        frames.append(frame)
+        pushed = frame if truth is None else own * frame + (1 - own) * truth[:, n]
+        state = {**state, **system.push({**state, **carried}, pushed)}
+    return torch.stack(frames, dim=1)
+
+
+class Stepwise(nn.Module):
+    """A system with its units: frames of all channels, in those of the contract.
+
+    kept: the channels that vary; others stay as they are in the last seed frame. mean, scale: (D,) of the kept ones,
+    set before training.
+    """
+
+    mean: Tensor
+    scale: Tensor
+    kept: Tensor
+    placing: Tensor
+
+    def __init__(self, system: System, channels: int, kept: Sequence[int], seed_frames: int) -> None:
+        super().__init__()
+        self.system, self.channels, self.seed_frames = system, channels, seed_frames
+        self.register_buffer("mean", torch.zeros(len(kept)))
+        self.register_buffer("scale", torch.ones(len(kept)))
+        self.register_buffer("kept", torch.tensor(kept), persistent=False)
+        self.register_buffer("placing", torch.eye(channels)[list(kept)], persistent=False)
+
+    def normalised(self, frames: Tensor) -> Tensor:
+        """Frames (..., C) in the contract's units to (..., D)."""
+        return (frames[..., self.kept] - self.mean) / self.scale
+
+    def whole(self, normalised: Tensor, still: Tensor) -> Tensor:
+        """Normalised frames (..., D) and channels that do not vary (..., C), the others 0 there, to frames (..., C)."""
+        return still + (normalised * self.scale + self.mean) @ self.placing
+
+    def still(self, frames: Tensor) -> Tensor:
+        """The channels of the last of the frames (B, L, C) that do not vary, and 0 for the others: (B, C)."""
+        return frames[:, -1] * (1 - self.placing.sum(0))
+
+    def forward(self, frames: Tensor, count: int) -> Tensor:
+        """Seed frames (B, L, C) to the next ``count`` ones (B, N, C), both in the contract's units."""
+        found = free_run(self.system, self.normalised(frames), count)
+        return self.whole(found, self.still(frames)[:, None])
+
+    def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
+        """The encoder and the step, each with its contract.
+
+        What is carried on is one tensor, ``state``; what the seed alone decides another, ``context``, which begins with
+        the channels that do not vary.
+        """
+        carried, constant = (sum(map(math.prod, s.values())) for s in (self.system.carried, self.system.constant))
+        frames = TensorSpec("frames", ("batch", self.seed_frames, self.channels))
+        frame = TensorSpec("frame", ("batch", self.channels))
+        context = TensorSpec("context", ("batch", self.channels + constant))
+        state, following = (TensorSpec(name, ("batch", carried)) for name in ("state", "next_state"))
+        step = GraphSpec((context, state), (frame, following), {state.name: following.name})
+        encoder = GraphSpec((frames,), (context, state))
+        return {"encoder": (EncoderGraph(self), encoder), "step": (StepGraph(self), step)}
+
+
+class EncoderGraph(nn.Module):
+    """The encoder graph: from seed frames to all that the step takes."""
+
+    def __init__(self, net: Stepwise) -> None:
+        super().__init__()
+        self.net = net
+
+    def forward(self, frames: Tensor) -> tuple[Tensor, Tensor]:
+        """Frames (B, L, C) to context and state."""
+        system = self.net.system
+        state = system.begin(self.net.normalised(frames))
+        context = torch.cat([self.net.still(frames), *_rows(state, system.constant)], dim=1)
+        return context, torch.cat(_rows(state, system.carried), dim=1)
+
+
+class StepGraph(nn.Module):
+    """The step graph: one frame, and what is carried on after it."""
+
+    def __init__(self, net: Stepwise) -> None:
+        super().__init__()
+        self.net = net
+
+    def forward(self, context: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
+        """Context and state to the next frame (B, C) and the next state."""
+        system, channels = self.net.system, self.net.channels
+        known = {**_parts(state, system.carried), **_parts(context[:, channels:], system.constant)}
+        frame, carried = system.predict(known)
+        after = system.push({**known, **carried}, frame)
+        return self.net.whole(frame, context[:, :channels]), torch.cat(_rows(after, system.carried), dim=1)
+
+
+def _rows(state: State, shapes: Shapes) -> list[Tensor]:
+    """What has these names, in their order, each (B, ...) as (B, ?)."""
+    return [state[name].flatten(1) for name in shapes]
+
+
+def _parts(rows: Tensor, shapes: Shapes) -> State:
+    """The inverse of :func:`_rows`, of what was joined."""
+    parts = torch.split_with_sizes(rows, [math.prod(shape) for shape in shapes.values()], dim=1)
+    return {name: part.view(-1, *shapes[name]) for name, part in zip(shapes, parts, strict=True)}

@@ -1,0 +1,29 @@
+"""The published systems that predict, by the name of their model."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from motet_train.models.predict import convseq2seq, lstm_3lr, lstm_ae, rrnn, srnn
+from motet_train.models.predict.stepwise import Stepwise, System
+
+SYSTEMS: Mapping[str, tuple[type[Any], type[Any]]] = {
+    "convseq2seq": (convseq2seq.ConvSeq2Seq, convseq2seq.Config),
+    "rrnn": (rrnn.RRNN, rrnn.Config),
+    "erd": (lstm_3lr.EncoderRecurrentDecoder, lstm_3lr.ERDConfig),
+    "lstm-3lr": (lstm_3lr.EncoderRecurrentDecoder, lstm_3lr.Config),
+    "srnn": (srnn.SRNN, srnn.Config),
+    "lstm-ae": (lstm_ae.LSTMAE, lstm_ae.Config),
+}
+"""Name -> the system and its configuration, a dataclass."""
+
+
+def stepwise(name: str, config: Mapping[str, Any]) -> Stepwise:
+    """The net of a configuration as it stands in a manifest."""
+    kind, sizes = SYSTEMS[name]
+    system: System = kind(sizes(**{key: _plain(value) for key, value in config["system"].items()}))
+    return Stepwise(system, config["channels"], config["kept"], config["seed_frames"])
+
+
+def _plain(value: Any) -> Any:
+    """Lists, which JSON makes of tuples, as tuples again."""
+    return tuple(_plain(item) for item in value) if isinstance(value, list) else value
