@@ -10,7 +10,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from motet.motion.rotations import Array
 from motet_train.data.clips import CONSTANT
@@ -21,6 +20,9 @@ ARRIVED = 0.25
 its cycles (median .25; 09_07 .30), and a fifth of the distance between the loops of walking and running."""
 
 UPSAMPLE = 4
+
+PART = 4096
+"""Frames that are compared with all points at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +62,7 @@ class Reference:
         flat = z.reshape(-1, z.shape[-1])
         finite = np.isfinite(flat).all(axis=1)
         nearest = np.full(len(flat), np.inf)
-        nearest[finite] = KDTree(self.z(points)).query(flat[finite])[0] / np.sqrt(flat.shape[1])
+        nearest[finite] = _nearest(flat[finite], self.z(points)) / np.sqrt(flat.shape[1])
         return nearest.reshape(z.shape[:-1])
 
     def jumps(self, frames: Array) -> Array:
@@ -81,6 +83,14 @@ class Reference:
         """Leg energy of frames (T, D) over that of a training motion: mean squared change of the leg angles."""
         data = np.mean([_energy(self.leg_angles(clip)) for clip in self.motions[label]])
         return _energy(self.leg_angles(frames)) / float(data)
+
+
+def _nearest(frames: Array, points: Array) -> Array:
+    """Distance (M,) from each of frames (M, D) to the nearest of points (N, D)."""
+    squares = (points**2).sum(axis=1)
+    parts = [frames[start : start + PART] for start in range(0, len(frames), PART)]
+    least = [(squares - 2 * part @ points.T).min(axis=1) + (part**2).sum(axis=1) for part in parts]
+    return np.sqrt(np.maximum(np.concatenate([*least, np.empty(0)]), 0.0))
 
 
 def _energy(angles: Array) -> float:
