@@ -14,15 +14,13 @@ from numpy.typing import NDArray
 from motet.motion.rotations import Array
 from motet_train.data.clips import CONSTANT
 from motet_train.data.period import period
+from motet_train.evaluate.nearest import nearest
 
 ARRIVED = 0.25
 """z: a pose nearer to a loop than this is on it. As near as the frames of one recorded cycle of 39_14 are to another of
 its cycles (median .25; 09_07 .30), and a fifth of the distance between the loops of walking and running."""
 
 UPSAMPLE = 4
-
-PART = 4096
-"""Frames that are compared with all points at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,9 +59,9 @@ class Reference:
         z = self.z(frames)
         flat = z.reshape(-1, z.shape[-1])
         finite = np.isfinite(flat).all(axis=1)
-        nearest = np.full(len(flat), np.inf)
-        nearest[finite] = _nearest(flat[finite], self.z(points)) / np.sqrt(flat.shape[1])
-        return nearest.reshape(z.shape[:-1])
+        distance = np.full(len(flat), np.inf)
+        distance[finite] = nearest(flat[finite], self.z(points))[1] / np.sqrt(flat.shape[1])
+        return distance.reshape(z.shape[:-1])
 
     def jumps(self, frames: Array) -> Array:
         """RMS z change (T-1, ...) from each of frames (T, ..., D) to the next."""
@@ -83,14 +81,6 @@ class Reference:
         """Leg energy of frames (T, D) over that of a training motion: mean squared change of the leg angles."""
         data = np.mean([_energy(self.leg_angles(clip)) for clip in self.motions[label]])
         return _energy(self.leg_angles(frames)) / float(data)
-
-
-def _nearest(frames: Array, points: Array) -> Array:
-    """Distance (M,) from each of frames (M, D) to the nearest of points (N, D)."""
-    squares = (points**2).sum(axis=1)
-    parts = [frames[start : start + PART] for start in range(0, len(frames), PART)]
-    least = [(squares - 2 * part @ points.T).min(axis=1) + (part**2).sum(axis=1) for part in parts]
-    return np.sqrt(np.maximum(np.concatenate([*least, np.empty(0)]), 0.0))
 
 
 def _energy(angles: Array) -> float:
