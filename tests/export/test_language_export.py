@@ -106,7 +106,7 @@ def test_normalisation_is_inside_the_encoder_of_motions(bundles: dict[str, Path]
 def test_a_description_scores_what_its_beam_says(bundles: dict[str, Path]) -> None:
     model = load(bundles["describe"])
     assert isinstance(model, DescribeModel)
-    motion = model.contract.motion(np.random.default_rng(0).normal(size=(20, D)))
+    motion = model.contract.features(np.random.default_rng(0).normal(size=(20, D)))
     for found in model.describe(motion, beams=5)[0]:
         if found.text:
             assert model.score(motion, found.text) == pytest.approx(found.log_probability, abs=1e-4)
@@ -116,8 +116,8 @@ def test_a_generated_motion_scores_what_its_beam_says(bundles: dict[str, Path]) 
     model = load(bundles["generate"])
     assert isinstance(model, GenerateModel)
     for found in model.generate("a person walks", hypotheses=4, candidates=2, seed=3)[0]:
-        if len(found.drawn.values) > 1:
-            score = model.score("a person walks", found.drawn)
+        if len(found.frames) > 1:
+            score = model.score("a person walks", model.contract.features(found.frames))
             assert score == pytest.approx(found.log_likelihood, rel=1e-3, abs=1e-2)
 
 

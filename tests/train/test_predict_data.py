@@ -15,10 +15,8 @@ from motet_train.data.errors import DataError
 from motet_train.data.expmap_files import CMU, H36M, Scaling, is_expmap, parse, read_expmap, scaling_of
 from motet_train.data.predict_data import (
     Trial,
-    _mirrored_joints,
     expmap_material,
     mocap_material,
-    phases,
     read_trials,
 )
 from motet_train.data.predict_data import test_names as names_held_out
@@ -203,13 +201,15 @@ def test_motion_files_become_sequences_at_30_fps() -> None:
     assert material.about["files"] == 11
     assert sum(map(len, material.sequences)) == 11 * len(walk)
     assert set(material.about["test"]) == set(names_held_out(trials))
-    columns, signs = _mirrored_joints(walk.skeleton, material.contract.channels)  # type: ignore[arg-type]
+    mirror_of = material.contract.mirror
+    np.testing.assert_array_equal(mirror_of.columns, material.mirrored)
+    np.testing.assert_array_equal(mirror_of.signs, material.signs)
     one, other = (
         mocap_material([Trial(str(n), str(n), m) for n in range(12)], [], "x", "free").sequences[0]
         for m in (walk, mirror(walk))
     )
-    np.testing.assert_allclose(one[:, list(columns)] * np.array(signs), other, atol=1e-4)
-    assert [len(phase) for phase in phases(walk)] == [30, 30, 30, 30]
+    np.testing.assert_allclose(mirror_of(one), other, atol=1e-4)
+    assert [len(sequence) for sequence in material.sequences[:4]] == [30, 30, 30, 30]
 
 
 def test_motion_files_that_cannot_be_used_are_named(tmp_path: Path) -> None:

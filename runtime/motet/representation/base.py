@@ -1,6 +1,6 @@
 """What every representation offers, and what they share: mirroring by columns, down-sampling in all phases."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -57,7 +57,7 @@ class FrameMirror:
         return mirrored
 
 
-def phases(motion: Motion, fps: float) -> list[Motion]:
+def phases(motion: Motion, fps: float) -> Iterator[Motion]:
     """The motion at another frame rate, leaps taken out, in all phases (Plappert et al. 2017, section 5.1).
 
     Where every n-th frame is picked, that can begin at each of n frames: 120 Hz to 10 fps gives 12 motions. Else it
@@ -66,7 +66,7 @@ def phases(motion: Motion, fps: float) -> list[Motion]:
     ratio = motion.fps / fps
     count = round(ratio) if abs(ratio - round(ratio)) < 1e-9 else 1
     smooth = motion.continuous()
-    return [smooth[offset:].resample(fps) for offset in range(max(1, count))]
+    return (smooth[offset:].resample(fps) for offset in range(max(1, count)))
 
 
 def lateral_x(features: Motion) -> Skeleton:

@@ -1,6 +1,6 @@
 """The motion contract of a bundle: what the frames are that a model takes and gives."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -13,7 +13,7 @@ from motet.motion.motion import UNITS, Motion
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
 from motet.representation import named
-from motet.representation.base import FrameMirror
+from motet.representation.base import FrameMirror, phases
 from motet.representation.figure import in_joints_of
 
 LIMIT = 50.0
@@ -21,8 +21,8 @@ LIMIT = 50.0
 is further than 36 from the mean in any channel, and two of them, by glitches of the recording, further than 50."""
 
 FLOORS = {
-    "deg": 0.5,
-    "rad": np.radians(0.5),
+    "deg": 0.25,
+    "rad": np.radians(0.25),
     "deg/s": 1.0,
     "rad/s": np.radians(1.0),
     "m": 1e-3,
@@ -31,8 +31,8 @@ FLOORS = {
     "1": 1e-4,
 }
 """Standard deviations, by unit, from which on a channel lives. CMU's fingers, which only single T-poses bend otherwise,
-have up to .12 degrees; the stillest channel that means something, the twist of a thorax, has 1.4. "length" and "1" are
-in units of files, of which nothing is known: what is less than 1e-4 is constant but for rounding."""
+have up to .12 degrees; the stillest channel that means something, the bend of the upper back in a single walk, has .41.
+"length" and "1" are in units of files, of which nothing is known: under 1e-4 there is rounding alone."""
 
 FASTEST = 1000.0
 """Frames per second of the fastest contract."""
@@ -78,8 +78,7 @@ class MotionContract:
         Angles are made continuous, in the order and axes of the contract's joints, and the motion brought to the
         contract's frame rate, beginning with its first frame. MotionError names what the motion lacks.
         """
-        smooth = in_joints_of(motion, self.skeleton).continuous().resample(self.fps)
-        return named(self.representation).features(smooth, self._like).values
+        return next(sequences(self.representation, motion, self.fps, self._like)).values
 
     def motion(self, frames: ArrayLike, after: Motion | None = None, plant: bool = True) -> Motion:
         """Frames (T, D) as a motion that can be played and written, at the contract's frame rate.
@@ -129,6 +128,17 @@ class MotionContract:
         _refuse(not 0 < fps <= FASTEST, "fps", f"a number over 0 and up to {FASTEST:g} is needed, not {fps:g}")
         _refuse(bool((std < 0).any()), "std", "a standard deviation is not negative")
         return MotionContract(name, channels, units, fps, mean, std, _skeleton(data))
+
+
+def sequences(representation: str, motion: Motion, fps: float, like: Motion | None = None) -> Iterator[Motion]:
+    """The features of a motion at a frame rate, in all phases (:func:`motet.representation.base.phases`).
+
+    like: features whose channels, units and joints are wanted; else all that the motion has. MotionError names what the
+    motion lacks.
+    """
+    if like is not None:
+        motion = in_joints_of(motion, like.skeleton)
+    return (named(representation).features(phase, like) for phase in phases(motion, fps))
 
 
 def _inferred_name(channels: Sequence[str]) -> str:

@@ -201,7 +201,7 @@ def _thighs(lab: Lab) -> list[int]:
 
 def _sticks(lab: Lab, axes: Axes, frames: Array) -> None:
     """Stick figures in profile, each a little to the right of the one before."""
-    motion = lab.model.contract.motion(frames)
+    motion = lab.model.contract.features(frames)
     skeleton = skeleton_of(motion)
     points = positions(motion) / skeleton.height
     for number, pose in enumerate(points):

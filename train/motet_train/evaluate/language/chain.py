@@ -25,7 +25,7 @@ class Answers:
     @property
     def best(self) -> list[Motion]:
         """The likeliest motion for each sentence."""
-        return [row[0].motion for row in self.rows]
+        return [row[0].features for row in self.rows]
 
 
 def answers(model: GenerateModel, corpus: Corpus, records: Sequence[int]) -> Answers:
@@ -50,7 +50,7 @@ def chained(describe: DescribeModel, found: Answers, corpus: Corpus) -> dict[str
 
     One entry for each sentence that a motion was made for; references are all that was said about its record.
     """
-    texts = [told(describe, [row[min(rank, len(row) - 1)].motion for row in found.rows]) for rank in range(RANKS)]
+    texts = [told(describe, [row[min(rank, len(row) - 1)].features for row in found.rows]) for rank in range(RANKS)]
     return ranks(list(zip(*texts, strict=True)), corpus.references(found.records))
 
 

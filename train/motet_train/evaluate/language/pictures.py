@@ -123,7 +123,7 @@ def generated(model: GenerateModel) -> Picture:
     texts = [sentence for sentence, _ in ASKED.values()]
     rows = model.generate(texts)
     titles = [f"{text}   {row[0].log_likelihood:.1f}" for text, row in zip(texts, rows, strict=True)]
-    return _strips([row[0].motion for row in rows], titles, "Generated motions and their log-likelihood")
+    return _strips([row[0].features for row in rows], titles, "Generated motions and their log-likelihood")
 
 
 def _kind(table: Table, sentences: Sequence[str]) -> str:

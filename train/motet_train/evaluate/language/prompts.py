@@ -121,5 +121,5 @@ def prompted(model: GenerateModel, limits: Thresholds, seeds: int = SEEDS) -> di
             rows = model.generate([sentence] * seeds, seed=range(seeds))
         except TextError:
             rows = []
-        shares[key] = sum(is_so(travel(row[0].motion), limits) for row in rows) / seeds
+        shares[key] = sum(is_so(travel(row[0].features), limits) for row in rows) / seeds
     return shares
