@@ -2,6 +2,7 @@ import json
 import pickle
 import threading
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +11,11 @@ import pytest
 
 from motet.bundle.bundle import list_bundles
 from motet.errors import ControlError, MotionError
-from motet.formats import read_motion
+from motet.formats import read_motion, write_motion
 from motet.models.control import ControlModel
 from motet.models.load import load
 from motet.models.script import control_track, parse_script
+from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
 
 SCRIPT = "walk .5s, walk>run .5s, run .5s, bend .5s"
@@ -122,6 +124,29 @@ def test_a_motion_is_carried_on(model: ControlModel, clips: Path) -> None:
     difference = (first.values - last.values)[0, moving] / model.contract.std[moving]
     # the root's heading is taken out, all other angles go on where they were
     assert np.sqrt(np.mean(difference[3:] ** 2)) < 0.6
+
+
+def test_a_late_turn_does_not_turn_the_start(model: ControlModel, clips: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ten seconds straight on and a quarter turn in the last one: what is carried on faces where the last frames do."""
+    walk = read_motion(clips / "39_14.amc")
+    values = np.tile(walk.values, (4, 1))[:1320]
+    # round the vertical, the root's order being zyx, and its other angles small
+    values[:, walk.channels.index("root.ry")] += np.concatenate([np.zeros(1200), np.linspace(0, 90, 120)])
+    seen: list[np.ndarray] = []
+    encode = model.encode
+    monkeypatch.setattr(model, "encode", lambda frames: seen.append(np.asarray(frames)) or encode(frames))
+    model.start(replace(walk, values=values))
+    turned = seen[0][:, model.contract.channels.index("root.ry")]
+    assert turned.shape == (model.taps,)
+    assert np.abs(turned).max() < 3 * 3.3  # three deviations of training
+
+
+def test_a_run_is_written_as_it_is(model: ControlModel, tmp_path: Path) -> None:
+    motion = model.start("walk").run("walk 2s")[0]
+    write_motion(tmp_path / "x.bvh", motion)
+    root = positions(read_motion(tmp_path / "x.bvh"))[:, 0]
+    assert np.linalg.norm((root[-1] - root[0])[[0, 2]]) > 1.5
+    np.testing.assert_allclose(root, positions(motion)[:, 0], atol=1e-6)
 
 
 def test_a_model_from_a_bundle_pickles(model: ControlModel) -> None:

@@ -138,6 +138,14 @@ def test_short_motions(frames):
     assert not path[:1, [0, 2]].any()
 
 
+def test_feet_need_not_be_smoothed(clips):
+    motion = read_motion(clips / "39_14.amc")
+    assert error_of(motion, tremble=0)[0] < 0.1
+    for tremble in (-1.0, np.nan):
+        with pytest.raises(MotionError, match="0 or more seconds"):
+            lay_root_path(motion, tremble=tremble)
+
+
 def test_feet_must_be_there():
     lonely = Motion(np.zeros((2, 1)), ("a.rx",), ("deg",), 30, Skeleton((Joint("a", -1, (0, 0, 0)),)))
     with pytest.raises(MotionError, match="name the joints of the feet"):
