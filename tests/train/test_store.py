@@ -7,14 +7,15 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from kit_zip import JOINTS, write_kit_zip
+from language_data import walker
 
 from motet.cli import main
 from motet.errors import OutputError
 from motet.formats import read_motion
-from motet.motion.kinematics import positions
+from motet.motion.kinematics import euler_of, local_rotations, positions, with_channels
 from motet.motion.motion import Motion
 from motet.representation.contract import FLOORS
-from motet.representation.root_block import ROOT_BLOCK
+from motet.representation.root_block import ROOT_BLOCK, from_root_block
 from motet_train.data.clips import CMU
 from motet_train.data.corpus import read_corpus
 from motet_train.data.errors import DataError
@@ -130,6 +131,56 @@ def test_what_does_not_fit_is_skipped_with_its_reason(tmp_path: Path) -> None:
     for name, (_, reason) in others.items():
         assert reason in reasons[name]
     assert [item.name for item in seen] == ["09_07", "gone", *others]  # type: ignore[attr-defined]
+
+
+def test_everybody_keeps_their_own_bones(tmp_path: Path) -> None:
+    people = [cmu(), cmu("02_06"), cmu("09_07", "again")]
+    found = prepare(people, tmp_path / "store", PLAIN)
+    assert ([entry.skeleton for entry in found.records], len(found.skeletons)) == ([0, 1, 0], 2)
+    for number, record in enumerate(people):
+        own = record.motion.skeleton
+        features = found.motion(number)
+        assert own is not None
+        assert features.skeleton == own.scaled(1.0)
+        # metres of this person's root go with this person's legs
+        expected = record.motion.continuous().resample(10)
+        apart = positions(from_root_block(features))
+        places = positions(expected) * own.metres_per_unit
+        np.testing.assert_allclose(
+            np.linalg.norm(np.diff(apart, axis=1), axis=-1), np.linalg.norm(np.diff(places, axis=1), axis=-1), atol=1e-5
+        )
+
+
+def test_lengths_of_all_joints_are_scaled_with_the_skeleton(tmp_path: Path) -> None:
+    """A figure in centimetres whose spine has a translation of its own, as in files of many studios."""
+    motion = walker(0, 60)
+    spine = replace(
+        motion.scaled(0.01),
+        values=np.column_stack([motion.scaled(0.01).values, np.full(60, 30.0)]),
+        channels=(*motion.channels, "spine.ty"),
+        units=(*motion.units, "length"),
+    )
+    found = prepare([Record("x", "x", spine, ("A person walks.",))], tmp_path / "store", PLAIN)
+    features = found.motion(0)
+    assert features.units[features.channels.index("spine.ty")] == "m"
+    np.testing.assert_allclose(features.values[:, features.channels.index("spine.ty")], 0.3, rtol=1e-6)
+    tall = np.ptp(positions(from_root_block(features))[0, :, 1])
+    assert tall == pytest.approx(np.ptp(positions(motion)[0, :, 1]), abs=0.01)
+
+
+def test_joints_about_other_axes_are_brought_to_the_first_ones(tmp_path: Path) -> None:
+    record = cmu()
+    skeleton = record.motion.skeleton
+    assert skeleton is not None
+    place = skeleton.index("lfemur")
+    turned = replace(skeleton.joints[place], order="xyz", axis=(0.0, 30.0, 0.0))
+    rotations = local_rotations(record.motion, [place])[:, 0]
+    names = tuple(f"lfemur.r{axis}" for axis in "xyz")
+    joints = (*skeleton.joints[:place], turned, *skeleton.joints[place + 1 :])
+    motion = with_channels(record.motion, names, np.degrees(euler_of(rotations, turned)), ("deg",) * 3)
+    other = replace(record, name="x", motion=replace(motion, skeleton=replace(skeleton, joints=joints)))
+    found = prepare([record, other], tmp_path / "store", PLAIN)
+    np.testing.assert_allclose(found.sequence(1), found.sequence(0), atol=1e-4)
 
 
 def test_a_store_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
