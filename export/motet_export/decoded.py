@@ -84,10 +84,9 @@ def _generated(candidates: int, model: GenerateModel) -> Decoded:
     """Three motions of each of eight sentences: normalised frames, lengths and log-likelihoods, and the contexts."""
     rows = model.generate(_sentences(model), hypotheses=3, candidates=candidates, seed=7, max_seconds=4)
     found = [generated for row in rows for generated in row]
-    std = model.contract.std
     return {
-        "frames": np.concatenate([(g.drawn.values - model.contract.mean) / std for g in found]),
-        "lengths": np.array([len(g.drawn.values) for g in found]),
+        "frames": np.concatenate([model.contract.normalised(g.frames) for g in found]),
+        "lengths": np.array([len(g.frames) for g in found]),
         "log_likelihoods": np.array([g.log_likelihood for g in found]),
         "contexts": model.embed(_sentences(model)),
     }
@@ -108,7 +107,7 @@ def _predicted(horizons: int, model: PredictModel) -> Decoded:
     contract = model.contract
     seeds = walks(contract, np.random.default_rng(3), 8, model.seed_frames)
     found = model.next_frames(seeds, horizons * model.horizon)
-    return {"frames": (found - contract.mean) / np.maximum(contract.std, 1e-4)}
+    return {"frames": contract.normalised(found)}
 
 
 def _pairs(models: Sequence[Any], runs: Mapping[str, Callable[[Any], Decoded]]) -> Runs:
@@ -128,7 +127,7 @@ def _motions(model: DescribeModel | GenerateModel) -> list[Motion]:
         found: Array = 0.3 * rng.normal(size=(frames, len(contract.mean))).cumsum(axis=0)
         return np.tanh(found) * 2 * contract.std + contract.mean
 
-    return [contract.motion(walk(frames)) for frames in range(5, 85, 10)]
+    return [contract.features(walk(frames)) for frames in range(5, 85, 10)]
 
 
 def _sentences(model: DescribeModel | GenerateModel) -> list[str]:

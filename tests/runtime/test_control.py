@@ -2,6 +2,7 @@ import json
 import pickle
 import threading
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +11,11 @@ import pytest
 
 from motet.bundle.bundle import list_bundles
 from motet.errors import ControlError, MotionError
-from motet.formats import read_motion
+from motet.formats import read_motion, write_motion
 from motet.models.control import ControlModel
 from motet.models.load import load
 from motet.models.script import control_track, parse_script
+from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
 
 SCRIPT = "walk .5s, walk>run .5s, run .5s, bend .5s"
@@ -48,7 +50,7 @@ def test_the_documented_loop_gives_the_same_frames(model: ControlModel) -> None:
         }
         frame, history = step.run(["frame", "next_history"], feeds)
         frames.append(frame[0])
-    np.testing.assert_array_equal(model.start().run(SCRIPT)[0].values, np.stack(frames))
+    np.testing.assert_array_equal(model.start().run(SCRIPT, in_place=True)[0].values, np.stack(frames))
 
 
 @pytest.mark.parametrize("variety", [0.0, 0.5, 1.0])
@@ -116,12 +118,35 @@ def test_a_motion_is_carried_on(model: ControlModel, clips: Path) -> None:
     walk = read_motion(clips / "39_14.amc")
     session = model.start(walk)
     session.control(walk=1.0)
-    first = model.contract.motion(session.step())
+    first = model.contract.features(session.step())
     last = walk.resample(model.fps).select(first.channels)[-1:]
     moving = model.contract.std > 1
     difference = (first.values - last.values)[0, moving] / model.contract.std[moving]
     # the root's heading is taken out, all other angles go on where they were
     assert np.sqrt(np.mean(difference[3:] ** 2)) < 0.6
+
+
+def test_a_late_turn_does_not_turn_the_start(model: ControlModel, clips: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ten seconds straight on and a quarter turn in the last one: what is carried on faces where the last frames do."""
+    walk = read_motion(clips / "39_14.amc")
+    values = np.tile(walk.values, (4, 1))[:1320]
+    # round the vertical, the root's order being zyx, and its other angles small
+    values[:, walk.channels.index("root.ry")] += np.concatenate([np.zeros(1200), np.linspace(0, 90, 120)])
+    seen: list[np.ndarray] = []
+    encode = model.encode
+    monkeypatch.setattr(model, "encode", lambda frames: seen.append(np.asarray(frames)) or encode(frames))
+    model.start(replace(walk, values=values))
+    turned = seen[0][:, model.contract.channels.index("root.ry")]
+    assert turned.shape == (model.taps,)
+    assert np.abs(turned).max() < 3 * 3.3  # three deviations of training
+
+
+def test_a_run_is_written_as_it_is(model: ControlModel, tmp_path: Path) -> None:
+    motion = model.start("walk").run("walk 2s")[0]
+    write_motion(tmp_path / "x.bvh", motion)
+    root = positions(read_motion(tmp_path / "x.bvh"))[:, 0]
+    assert np.linalg.norm((root[-1] - root[0])[[0, 2]]) > 1.5
+    np.testing.assert_allclose(root, positions(motion)[:, 0], atol=1e-6)
 
 
 def test_a_model_from_a_bundle_pickles(model: ControlModel) -> None:
@@ -182,7 +207,8 @@ def test_frames_come_in_the_contract(model: ControlModel) -> None:
     assert frame.shape == (3, 59)
     motions = session.run("walk 1s")
     assert [type(motion) for motion in motions] == [Motion] * 3
-    assert (motions[0].fps, len(motions[0]), set(motions[0].units)) == (40.0, 40, {"deg"})
+    assert (motions[0].fps, len(motions[0]), set(motions[0].units)) == (40.0, 40, {"deg", "length"})
+    assert set(session.run("walk 1s", in_place=True)[0].units) == {"deg"}
     assert session.frames(np.zeros((0, 3))).shape == (3, 0, 59)
 
 

@@ -1,3 +1,6 @@
+import copy
+import pickle
+
 import numpy as np
 import pytest
 from figures import walker
@@ -21,6 +24,36 @@ def test_a_motion_is_its_own_and_cannot_change():
     assert motion.values.sum() == 0
     with pytest.raises(ValueError, match="read-only"):
         motion.values[0, 0] = 1
+
+
+def test_copies_cannot_change_either():
+    motion = walker()
+    for again in (copy.copy(motion), copy.deepcopy(motion), pickle.loads(pickle.dumps(motion))):
+        with pytest.raises(ValueError, match="read-only"):
+            again.values[0, 0] = 1
+        np.testing.assert_array_equal(again.values, motion.values)
+        assert (again.channels, again.units, again.fps, again.skeleton) == (
+            motion.channels,
+            motion.units,
+            motion.fps,
+            motion.skeleton,
+        )
+
+
+def test_a_repr_fits_on_a_line():
+    assert repr(walker(399, fps=120)) == "Motion(399 frames, 24 channels, 120 fps, 3.3 s)"
+    assert repr(walker().skeleton) == "Skeleton(14 joints, root 'hips', unit 1 m)"
+    assert repr(walker(metres_per_unit=None).skeleton) == "Skeleton(14 joints, root 'hips', unit unknown)"
+
+
+def test_one_frame_and_frame_by_frame():
+    motion = plain(np.arange(5))
+    for index in (3, np.int64(3), -2):
+        assert (motion[index].values.tolist(), motion[index].fps) == ([[3.0]], 10.0)
+    assert [frame.values[0, 0] for frame in motion] == [0, 1, 2, 3, 4]
+    for index in (5, -6):
+        with pytest.raises(IndexError):
+            motion[index]
 
 
 @pytest.mark.parametrize(
@@ -77,8 +110,8 @@ def test_resample_picks_frames_or_interpolates():
     motion = plain(np.arange(20.0))
     assert motion.resample(5.0).values.ravel().tolist() == list(range(0, 20, 2))
     doubled = motion.resample(20.0)
-    assert len(doubled) == 40
-    np.testing.assert_allclose(doubled.values[:39, 0], np.arange(39) / 2)
+    assert len(doubled) == 39
+    np.testing.assert_allclose(doubled.values[:, 0], np.arange(39) / 2)
     assert abs(plain(np.arange(120.0), fps=120).resample(29.97).duration - 1) < 0.02
     assert len(plain([]).resample(7.0)) == 0
 
@@ -86,6 +119,27 @@ def test_resample_picks_frames_or_interpolates():
 def test_resample_turns_on_where_angles_leap():
     motion = plain([170.0, 179.0, -172.0, -163.0])
     np.testing.assert_allclose(motion.resample(20.0).values[:6, 0], [170, 174.5, 179, 183.5, 188, 192.5])
+
+
+@pytest.mark.parametrize("ratio", [0.25, 1 / 3, 0.8, 1.0, 1.5, 2.0, 7.0, 12.0])
+@pytest.mark.parametrize("frames", [0, 1, 2, 3, 13, 40])
+def test_one_rule_for_the_frames_between(ratio, frames):
+    """Nothing is made up past the last frame, and what changes evenly still does."""
+    motion = plain(2 * np.arange(frames), unit="m", fps=12.0)
+    expected = np.arange(0, 2 * frames - 2 + 1e-6, 2 * ratio)
+    np.testing.assert_allclose(motion.resample(12.0 / ratio).values[:, 0], expected, atol=1e-9)
+    ending = motion.resample(12.0 / ratio, to_end=True).values[:, 0]
+    np.testing.assert_allclose(ending, expected + (2 * frames - 2 - expected[-1:]), atol=1e-9)
+
+
+def test_resample_goes_around_where_exponential_maps_are_cut():
+    """A hand that turns slowly past half a turn: 3.12, 3.13 and then -3.13."""
+    angle = np.linspace(2.9, 3.4, 20)
+    wrapped = np.where(angle > np.pi, angle - 2 * np.pi, angle)
+    values = np.column_stack([wrapped, np.zeros(20), np.zeros(20)])
+    motion = Motion(values, ("hand.ex", "hand.ey", "hand.ez"), ("rad",) * 3, 50.0)
+    found = motion.resample(30.0).values[:, 0]
+    np.testing.assert_allclose(found, np.interp(np.arange(len(found)) / 30, np.arange(20) / 50, angle - 2 * np.pi))
 
 
 def test_continuous_takes_out_gimbal_flips_of_the_joints_own_order():
@@ -110,7 +164,7 @@ def test_skeletons_are_trees_with_a_text_form():
     for joints in ((), (Joint("a", 0, (0, 0, 0)),), (Joint("a", -1, (0, 0, 0)), Joint("a", 0, (0, 0, 0)))):
         with pytest.raises(MotionError):
             Skeleton(joints)
-    with pytest.raises(MotionError, match="no Euler order"):
+    with pytest.raises(MotionError, match="not an Euler order"):
         Skeleton((Joint("a", -1, (0, 0, 0), "xyx"),))
-    with pytest.raises(MotionError, match="no skeleton"):
+    with pytest.raises(MotionError, match="not a skeleton"):
         Skeleton.from_json({"joints": [{"name": "a"}], "metres_per_unit": None})

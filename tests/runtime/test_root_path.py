@@ -7,11 +7,12 @@ from figures import walker
 from motet.errors import MotionError
 from motet.formats import read_motion
 from motet.formats.amc import read
+from motet.motion.feet import has_feet
 from motet.motion.kinematics import local_translations, positions
 from motet.motion.motion import Motion
-from motet.motion.root_path import has_feet, lay_root_path, plant_feet
+from motet.motion.root_path import lay_root_path
 from motet.motion.skeleton import Joint, Skeleton
-from motet.representation.root_block import ROOT_BLOCK, from_root_block, to_root_block
+from motet.representation.root_block import ROOT_BLOCK, from_root_block, plant_feet, to_root_block
 
 FEET = ("lfoot", "ltoes", "ltoes_end"), ("rfoot", "rtoes", "rtoes_end")
 
@@ -135,6 +136,14 @@ def test_short_motions(frames):
     path = path_of(lay_root_path(motion))
     assert path.shape == (frames, 3)
     assert not path[:1, [0, 2]].any()
+
+
+def test_feet_need_not_be_smoothed(clips):
+    motion = read_motion(clips / "39_14.amc")
+    assert error_of(motion, tremble=0)[0] < 0.1
+    for tremble in (-1.0, np.nan):
+        with pytest.raises(MotionError, match="0 or more seconds"):
+            lay_root_path(motion, tremble=tremble)
 
 
 def test_feet_must_be_there():

@@ -7,8 +7,8 @@ import numpy as np
 
 from motet.motion.motion import Motion
 from motet.motion.skeleton import Joint, Skeleton
+from motet_train.data.preparation import Preparation
 from motet_train.data.records import Record
-from motet_train.data.representation import Representation
 from motet_train.data.store import Store, prepare
 
 SKELETON = Skeleton(
@@ -50,4 +50,4 @@ def records(count: int) -> Iterator[Record]:
 
 def small_store(folder: Path, count: int = 20) -> Store:
     """The corpus prepared at 10 fps with three offsets and the root block, in ``folder``/store."""
-    return prepare(records(count), folder / "store", Representation(root_block=True, trim=False))
+    return prepare(records(count), folder / "store", Preparation("root_angles", trim=False))

@@ -1,6 +1,7 @@
 """A corpus of five kinds of motions whose measures are known, and models whose answers to it are known."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,6 @@ from language_data import SKELETON
 
 from motet.errors import TextError
 from motet.models.describe import Description
-from motet.models.generate import Generated
 from motet.motion.motion import Motion
 from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS
 from motet_train.data.store import Entry, Store
@@ -47,9 +47,9 @@ def small_store(each: int = 6) -> Store:
         kind = list(KINDS)[i % len(KINDS)]
         motions.append(moving(*KINDS[kind], swing=10.0 + 0.1 * i).values)
         sentences = (f"A person {kind}.", f"Somebody quickly {kind} here", f"the {kind} of {'x' * (i + 1)} are seen")
-        entries.append(Entry(f"{i:02}", f"{i // 10}", sentences, ((i * FRAMES, (i + 1) * FRAMES),)))
+        entries.append(Entry(f"{i:02}", f"{i // 10}", sentences, ((i * FRAMES, (i + 1) * FRAMES),), 0))
     frames = np.concatenate(motions).astype(np.float32)
-    return Store(frames, CHANNELS, UNITS, FPS, SKELETON, tuple(entries), ())
+    return Store(frames, "root_angles", CHANNELS, UNITS, FPS, (SKELETON,), tuple(entries), ())
 
 
 def manifest(store: Store, verb: str, by: str = "trial") -> dict[str, Any]:
@@ -76,6 +76,14 @@ class FakeDescribe:
         return -2.0 * (len(sentence.split()) + 1)
 
 
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What is measured of a generated motion."""
+
+    features: Motion
+    log_likelihood: float
+
+
 class FakeGenerate:
     """Gives the very motion that a sentence was said about first; knows all sentences with a known kind in them."""
 
@@ -94,10 +102,8 @@ class FakeGenerate:
             raise TextError(f"no word of {sentence} is known")
         return []
 
-    def generate(
-        self, sentences: Sequence[str], hypotheses: int = 2, seed: Iterable[int] = ()
-    ) -> list[list[Generated]]:
-        return [[Generated(self.motions[plain(text)], -1.0)] * hypotheses for text in sentences]
+    def generate(self, sentences: Sequence[str], hypotheses: int = 2, seed: Iterable[int] = ()) -> list[list[Answer]]:
+        return [[Answer(self.motions[plain(text)], -1.0)] * hypotheses for text in sentences]
 
     def score(self, sentence: str, motion: Motion) -> float:
         return -3.0 * (len(motion) + 1)

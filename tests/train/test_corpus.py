@@ -14,8 +14,8 @@ from motet_train.data.archive import Archive
 from motet_train.data.clips import CMU
 from motet_train.data.corpus import read_corpus, read_table, recordings
 from motet_train.data.errors import DataError
+from motet_train.data.preparation import ANGLES, FULL
 from motet_train.data.records import Record, Skipped
-from motet_train.data.representation import ANGLES, FULL
 
 
 def of(corpus: object) -> tuple[dict[str, Record], dict[str, str]]:
@@ -61,7 +61,7 @@ def test_a_folder_and_a_zip_give_the_same_records(own: Path, pack: object) -> No
     corpus = read_corpus(pack(own))  # type: ignore[operator]
     records, skipped = of(corpus)
     assert (len(corpus), list(records), skipped) == (3, ["02_06", "09_07", "stroll"], {})
-    assert corpus.representation == FULL
+    assert corpus.preparation == FULL
     assert records["09_07"].sentences == ("A person runs.", "Somebody runs fast.")
     assert [record.subject for record in records.values()] == ["02", "09", "stroll"]
     for clip in ("02_06", "09_07"):
@@ -185,7 +185,7 @@ def test_kit_is_read_from_a_zip_or_a_folder(tmp_path: Path, inside: str) -> None
     for place in (path, tmp_path / "kit"):
         corpus = read_corpus(place)
         records, skipped = of(corpus)
-        assert (len(corpus), corpus.representation, skipped) == (5, ANGLES, {})
+        assert (len(corpus), corpus.preparation, skipped) == (5, ANGLES, {})
         assert list(records) == [f"{number:05}" for number in range(1, 6)]
         for name, record in records.items():
             np.testing.assert_array_equal(record.motion.values, read(folder / f"{name}_mmm.xml").values)

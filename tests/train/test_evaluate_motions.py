@@ -168,7 +168,9 @@ def test_the_report_of_a_perfect_generate_model(corpus: SplitStore) -> None:
 
 def test_without_a_root_block_nothing_is_said_of_the_path() -> None:
     """The paper's representation: joint angles alone."""
-    angles = replace(STORE, frames=STORE.frames[:, 6:], channels=CHANNELS[6:], units=UNITS[6:], skeleton=None)
+    angles = replace(STORE, frames=STORE.frames[:, 6:], channels=CHANNELS[6:], units=UNITS[6:], skeletons=())
+    entries = tuple(replace(entry, skeleton=None) for entry in STORE.records)
+    angles = replace(angles, representation="angles", records=entries)
     model: Any = FakeGenerate(angles)
     report = generate_report(model, split_as(model.manifest, angles))
     assert set(report["motion"]) == {"seconds", "energy", "end_energy", "frozen"}
@@ -275,10 +277,10 @@ def _save(run: Run, folder: Path) -> None:
 
 def _write(store: Store, folder: Path) -> None:
     np.save(folder / FRAMES_FILE, store.frames)
-    assert store.skeleton is not None
     index = {
         **{"channels": store.channels, "units": store.units, "fps": store.fps, "skipped": []},
-        "skeleton": store.skeleton.to_json(),
+        "skeletons": [skeleton.to_json() for skeleton in store.skeletons],
+        "representation": store.representation,
         "records": [vars(entry) for entry in store.records],
     }
     (folder / INDEX).write_text(json.dumps(index))

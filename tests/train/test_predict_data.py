@@ -1,5 +1,6 @@
 """Text files of exponential maps, the protocol that is measured on them, and windows of training data."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,16 +10,15 @@ from scipy.spatial.transform import Rotation
 from motet.errors import FormatError
 from motet.formats import read_motion
 from motet.motion.mirror import mirror
-from motet.motion.rotations import rotmat_to_euler, rotmat_to_rotvec, rotvec_to_rotmat
+from motet.motion.motion import Motion
+from motet.motion.rotations import continuous_rotvec, rotmat_to_euler, rotmat_to_rotvec, rotvec_to_rotmat
 from motet_train.data.clips import CMU as CLIPS
 from motet_train.data.errors import DataError
 from motet_train.data.expmap_files import CMU, H36M, Scaling, is_expmap, parse, read_expmap, scaling_of
 from motet_train.data.predict_data import (
     Trial,
-    _mirrored_joints,
     expmap_material,
     mocap_material,
-    phases,
     read_trials,
 )
 from motet_train.data.predict_data import test_names as names_held_out
@@ -203,13 +203,40 @@ def test_motion_files_become_sequences_at_30_fps() -> None:
     assert material.about["files"] == 11
     assert sum(map(len, material.sequences)) == 11 * len(walk)
     assert set(material.about["test"]) == set(names_held_out(trials))
-    columns, signs = _mirrored_joints(walk.skeleton, material.contract.channels)  # type: ignore[arg-type]
+    mirror_of = material.contract.mirror
+    np.testing.assert_array_equal(mirror_of.columns, material.mirrored)
+    np.testing.assert_array_equal(mirror_of.signs, material.signs)
     one, other = (
         mocap_material([Trial(str(n), str(n), m) for n in range(12)], [], "x", "free").sequences[0]
         for m in (walk, mirror(walk))
     )
-    np.testing.assert_allclose(one[:, list(columns)] * np.array(signs), other, atol=1e-4)
-    assert [len(phase) for phase in phases(walk)] == [30, 30, 30, 30]
+    np.testing.assert_allclose(mirror_of(one), other, atol=1e-4)
+    assert [len(sequence) for sequence in material.sequences[:4]] == [30, 30, 30, 30]
+
+
+def spun(frames: int = 240) -> Motion:
+    """A walk whose left hand turns slowly past half a turn."""
+    walk = read_motion(CLIPS / "39_14.amc")[:frames]
+    values = np.array(walk.values)
+    values[:, walk.channels.index("lhand.rx")] = 0
+    values[:, walk.channels.index("lhand.rz")] = np.linspace(100, 300, frames)
+    return replace(walk, values=values)
+
+
+def test_what_is_trained_does_not_leap_and_is_what_inference_sees() -> None:
+    motion = spun()
+    material = mocap_material([Trial(f"{n:02}_01", f"{n:02}", motion) for n in range(12)], [], "x", "free")
+    hand = material.contract.channels.index("lhand.ez")
+    sequence = material.sequences[0]
+    assert np.abs(np.diff(sequence[:, hand - 2 : hand + 1], axis=0)).max() < 0.3
+    np.testing.assert_array_equal(sequence, material.contract.frames(motion).astype(np.float32))
+    windows = Windows(material, 20, mirror=0.0, seed=10).draw(50, np.random.default_rng(0)).numpy()
+    for window in windows:
+        phase = next(s for s in material.sequences if (s[:, :6] == window[:1, :6]).all(axis=1).any())
+        first = int(np.flatnonzero((phase[:, :6] == window[0, :6]).all(axis=1))[0])
+        asked = rotmat_to_rotvec(rotvec_to_rotmat(phase[first : first + 10, hand - 2 : hand + 1].astype(np.float64)))
+        expected = continuous_rotvec(asked[:, None])[:, 0]
+        np.testing.assert_allclose(window[:10, hand - 2 : hand + 1], expected, atol=1e-3)
 
 
 def test_motion_files_that_cannot_be_used_are_named(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from motet.cli.convert import METRES
-from motet.errors import FormatError, MotionError, TextWarning
+from motet.errors import FormatError, MotionError, TextWarning, UnitError
 from motet.formats import read_motion
 from motet.models.language import LanguageModel
 from motet.motion.motion import Motion
@@ -21,6 +21,12 @@ unit_option = click.option(
 def note(text: str) -> None:
     """One line on stderr."""
     click.echo(f"motet: {text}", err=True)
+
+
+def refused(path: Path, error: MotionError) -> FormatError:
+    """The error that names the file a motion is from."""
+    unit = "the file does not say how long a unit of its skeleton is: give --unit-in"
+    return FormatError(path, unit if isinstance(error, UnitError) else str(error))
 
 
 @contextmanager
@@ -44,9 +50,9 @@ def read_for(model: LanguageModel, paths: Sequence[Path], unit_in: str | None) -
         if unit_in and motion.skeleton and motion.skeleton.metres_per_unit is None:
             motion = motion.with_unit(METRES[unit_in])
         try:
-            motions.append(model.contract.motion(model.frames(motion)))
+            motions.append(model.contract.features(model.frames(motion)))
         except MotionError as error:
-            raise FormatError(path, str(error)) from error
+            raise refused(path, error) from error
         if abs(motion.fps - model.fps) > 1e-6:
             note(f"{path}: resampled from {motion.fps:g} to {model.fps:g} fps")
     return motions

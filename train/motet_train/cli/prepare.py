@@ -31,7 +31,7 @@ def prepare(data: Path, out: Path, sentences: Path | None, unit_in: str | None) 
             if isinstance(item, Skipped):
                 bar.write(f"skipped {item.name}: {item.reason}")
 
-        store = prepare_store(corpus, out, corpus.representation, progress)
+        store = prepare_store(corpus, out, corpus.preparation, progress)
     seconds = sum(stop - start for entry in store.records for start, stop in entry.spans[:1]) / store.fps
     texts = sum(len(entry.sentences) for entry in store.records)
     click.echo(

@@ -8,9 +8,11 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from motet.errors import MotionError
 from motet.models.text import MAX_WORDS, PAD, SPECIALS, Vocabulary, words
+from motet.representation.base import FrameMirror
+from motet.representation.contract import MotionContract
 from motet_train.data.errors import DataError
-from motet_train.data.mirror_frames import FrameMirror
 from motet_train.data.mirror_text import mirror_text
 from motet_train.data.store import Store
 from motet_train.models.language.batch import Batch
@@ -109,6 +111,14 @@ def examples(store: Store, records: Sequence[int], vocabulary: Vocabulary, mirro
     if not kept:
         raise DataError(f"none of {len(records)} motions has a sentence of 1 to {MAX_WORDS} words that can be used")
     return Examples(store, tuple(kept), tuple(sentences), tuple(mirrored), mirror)
+
+
+def frame_mirror(contract: MotionContract) -> FrameMirror:
+    """How frames of a contract are mirrored; DataError where they cannot be."""
+    try:
+        return contract.mirror
+    except MotionError as error:
+        raise DataError(f"the motions cannot be mirrored ({error}): train without mirroring") from error
 
 
 def usable(sentence: str) -> bool:

@@ -4,15 +4,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from motet.errors import MotionError
 from motet.formats import READABLE, read_motion
 from motet.motion.heading import without_heading
 from motet.motion.kinematics import skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
+from motet.representation.base import phases
+from motet.representation.contract import FLOORS
+from motet.representation.figure import in_joints_of
 from motet_train.data.errors import DataError
 
-CONSTANT = 1e-3
+CONSTANT = FLOORS["deg"]
 """Degrees: a channel with a smaller standard deviation is as good as constant."""
 
 CMU = Path(__file__).parent / "cmu"
@@ -75,10 +79,7 @@ def sequences(motion: Motion, fps: float) -> list[Array]:
 
     A 120 Hz clip gives three sequences at 40 fps (thesis 5.1 takes every third frame; the others are data too).
     """
-    ratio = motion.fps / fps
-    if abs(ratio - round(ratio)) > 1e-9 or ratio < 1:
-        return [motion.resample(fps).values]
-    return [motion.values[phase :: round(ratio)] for phase in range(round(ratio))]
+    return [phase.values for phase in phases(motion, fps)]
 
 
 def _find(folder: Path) -> dict[str, list[Path]]:
@@ -115,7 +116,10 @@ def _fit(path: Path, motion: Motion, first_path: Path, first: Motion) -> Motion:
     different = sorted(set(motion.channels) ^ set(first.channels))
     if different:
         raise DataError(f"{path} does not go with {first_path}: only one of them has {', '.join(different)}")
-    return motion.select(first.channels)
+    try:
+        return in_joints_of(motion, first.skeleton).select(first.channels)
+    except MotionError as error:
+        raise DataError(f"{path} does not go with {first_path}: {error}") from error
 
 
 def _metric(skeleton: Skeleton) -> Skeleton:

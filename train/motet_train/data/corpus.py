@@ -8,8 +8,8 @@ from motet.formats import read_motion
 from motet_train.data import kit
 from motet_train.data.archive import BROKEN, Archive
 from motet_train.data.errors import DataError
+from motet_train.data.preparation import ANGLES, FULL, Preparation
 from motet_train.data.records import Record, Skipped
-from motet_train.data.representation import ANGLES, FULL, Representation
 
 MOCAP = (".amc", ".bvh", ".npz")
 
@@ -26,13 +26,13 @@ class Described:
 class Corpus:
     """A corpus on disk; iterating reads it anew, one motion at a time.
 
-    names: the motion files. representation: how its motions become frames by default. A motion that cannot be read,
+    names: the motion files. preparation: how its motions become sequences. A motion that cannot be read,
     has no sentence or comes twice is given as Skipped, and so is a clip of the table without a motion.
     """
 
     path: Path
     names: tuple[str, ...]
-    representation: Representation
+    preparation: Preparation
     table: Path | None = None
     metres_per_unit: float | None = None
 

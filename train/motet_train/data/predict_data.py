@@ -11,20 +11,14 @@ from numpy.typing import NDArray
 from motet.errors import MotionError
 from motet.formats import read_motion
 from motet.motion.kinematics import skeleton_of
-from motet.motion.mirror import lateral_axis
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
-from motet.motion.sides import partners_of
-from motet.motion.skeleton import Skeleton
-from motet.representation.contract import MotionContract
-from motet.representation.joint_vectors import joints_of, to_joint_vectors
-from motet.representation.root_block import ROOT_BLOCK
+from motet.representation.contract import MotionContract, living, sequences
 from motet_train.data.archive import BROKEN, Archive
 from motet_train.data.clips import CMU_LICENCE
 from motet_train.data.corpus import MOCAP
 from motet_train.data.errors import DataError
 from motet_train.data.expmap_files import ROOT, ExpmapCorpus, Layout, scaling_of
-from motet_train.data.mirror_frames import NEGATED
 from motet_train.data.records import Skipped
 from motet_train.data.split import split
 from motet_train.data.store import Entry
@@ -35,9 +29,6 @@ STRIDE = 2
 
 FPS = 30.0
 """Of models of ordinary motion files."""
-
-STILL = 1e-3
-"""A channel of motion files with a smaller standard deviation, in radians or metres, is constant but for glitches."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +65,8 @@ def expmap_material(corpus: ExpmapCorpus, kept_back: Sequence[str] = ()) -> Mate
     count = layout.columns
     channels = ("root.tx", "root.ty", "root.tz", *(f"joint{n}.e{a}" for n in range((count - 3) // 3) for a in "xyz"))
     units = ("length",) * 3 + ("rad",) * (count - 3)
-    contract = MotionContract(channels, units, layout.fps / STRIDE, scaling.mean, scaling.std, None)
+    std = np.where(np.isin(np.arange(count), scaling.kept), scaling.std, 0.0)
+    contract = MotionContract("angles", channels, units, layout.fps / STRIDE, scaling.mean, std, None)
     sequences, chances = _visited(corpus, kept_back)
     mirrored, signs = _mirrored_columns(layout)
     held = sum(column < ROOT for column in scaling.kept)
@@ -192,10 +184,10 @@ def mocap_material(trials: Sequence[Trial], skipped: Sequence[Skipped], name: st
     first = next(iter(found.values()))[0]
     sequences = [motion.values.astype(np.float32) for motions in found.values() for motion in motions]
     frames = np.concatenate(sequences)
-    mean, std = frames.mean(axis=0, dtype=np.float64), frames.std(axis=0, dtype=np.float64)
+    mean, std = frames.mean(axis=0, dtype=np.float64), living(frames.std(axis=0, dtype=np.float64), first.units)
     skeleton = skeleton_of(first).scaled(1.0)
-    contract = MotionContract(first.channels, first.units, FPS, mean, std, skeleton)
-    mirrored, signs = _mirrored_joints(skeleton, first.channels)
+    contract = MotionContract("root_vectors", first.channels, first.units, FPS, mean, std, skeleton)
+    mirrored, signs = _mirrored(contract)
     names = [item.name for item in (*skipped, *left_out)]
     about = {"name": name, "files": len(found), "skipped": names, "test": sorted(test)}
     lengths = np.array([len(sequence) for sequence in sequences], dtype=np.float64)
@@ -204,7 +196,7 @@ def mocap_material(trials: Sequence[Trial], skipped: Sequence[Skipped], name: st
         sequences,
         lengths / lengths.sum(),
         1,
-        tuple(int(column) for column in np.flatnonzero(std >= STILL)),
+        tuple(int(column) for column in np.flatnonzero(std)),
         poses=False,
         mirrored=mirrored,
         signs=signs,
@@ -214,36 +206,21 @@ def mocap_material(trials: Sequence[Trial], skipped: Sequence[Skipped], name: st
 
 
 def _figures(trials: Sequence[Trial]) -> tuple[dict[str, list[Motion]], list[Skipped]]:
-    """All phases of each trial in the joints of the first one, and the trials that have others."""
+    """The features of each trial in all phases, in the joints of the first one, and the trials that have others."""
     found: dict[str, list[Motion]] = {}
-    left_out, joints = [], None
+    left_out, first = [], None
     for trial in trials:
         try:
-            found[trial.name] = [to_joint_vectors(motion, joints) for motion in phases(trial.motion)]
-            joints = joints_of(found[trial.name][0].channels)
+            found[trial.name] = list(sequences("root_vectors", trial.motion, FPS, first))
+            first = found[trial.name][0]
         except MotionError as error:
             left_out.append(Skipped(trial.name, str(error)))
     return found, left_out
 
 
-def phases(motion: Motion) -> list[Motion]:
-    """The motion at :data:`FPS`: once for each frame that a pick of every n-th can start at, else interpolated."""
-    ratio = motion.fps / FPS
-    offsets = round(ratio) if abs(ratio - round(ratio)) < 1e-9 else 1
-    smooth = motion.continuous()
-    return [smooth[offset:].resample(FPS) for offset in range(offsets)]
-
-
-def _mirrored_joints(skeleton: Skeleton, channels: Sequence[str]) -> tuple[tuple[int, ...], tuple[float, ...]]:
-    """As :func:`motet.motion.mirror.mirror` does it, for exponential maps in the parent joint's axes."""
+def _mirrored(contract: MotionContract) -> tuple[tuple[int, ...], tuple[float, ...]]:
+    """Columns and signs of mirrored frames; nothing where they cannot be mirrored."""
     try:
-        if lateral_axis(skeleton) != 0:
-            return (), ()
+        return tuple(contract.mirror.columns.tolist()), tuple(contract.mirror.signs.tolist())
     except MotionError:
         return (), ()
-    joints = joints_of(channels)
-    partners = np.array(partners_of(joints))
-    block = len(ROOT_BLOCK)
-    columns = np.concatenate([np.arange(block), *(block + 3 * partner + np.arange(3) for partner in partners)])
-    signs = [-1.0 if name in NEGATED else 1.0 for name in ROOT_BLOCK] + [1.0, -1.0, -1.0] * len(joints)
-    return tuple(columns.tolist()), tuple(signs)

@@ -6,6 +6,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from motet.representation.root_vectors import KINDS, joints_of
 from motet_train.data.errors import DataError
 from motet_train.data.predict_data import Material
 
@@ -14,13 +15,22 @@ class Windows:
     """Draws windows (B, T, C) of the sequences at the contract's frame rate.
 
     warp: a window is slower or faster by up to this much, as exp(+-warp). reverse: the share played backwards. mirror:
-    the share that is mirrored. DataError where no sequence is long enough.
+    the share that is mirrored. seed: how many frames of a window are given, where exponential maps are to be as a
+    predictor is asked about them (:func:`anchored`). DataError where no sequence is long enough.
     """
 
     def __init__(
-        self, material: Material, frames: int, warp: float = 0.0, reverse: float = 0.0, mirror: float = 0.0
+        self,
+        material: Material,
+        frames: int,
+        warp: float = 0.0,
+        reverse: float = 0.0,
+        mirror: float = 0.0,
+        seed: int | None = None,
     ) -> None:
-        self.material, self.frames = material, frames
+        self.material, self.frames, self.seed = material, frames, seed
+        joints = joints_of(material.contract.channels)
+        self.maps = [material.contract.channels.index(f"{joint}.{kind}") for joint in joints for kind in KINDS]
         self.warp, self.reverse, self.mirror = warp, reverse, mirror
         lengths = np.array([len(sequence) for sequence in material.sequences])
         usable = lengths > material.stride * (frames - 1) + 1
@@ -46,6 +56,8 @@ class Windows:
         windows = torch.where(backwards, windows.flip(1), windows)
         if self.mirror:
             windows = torch.where(_some(rng, batch, self.mirror), windows[..., self.columns] * self.signs, windows)
+        if self.seed is not None and self.maps:
+            windows[..., self.maps] = anchored(windows[..., self.maps].unflatten(-1, (-1, 3)), self.seed - 1).flatten(2)
         return windows
 
     def _interpolated(self, which: Any, times: Any) -> Tensor:
@@ -54,6 +66,22 @@ class Windows:
         index = torch.from_numpy(before + self.starts[which][:, None])
         after = (index + 1).clamp_max(len(self.all) - 1)
         return self.all[index] * (1 - part) + self.all[after] * part
+
+
+def anchored(vectors: Tensor, frame: int) -> Tensor:
+    """Continuous exponential maps (B, T, J, 3) that are at most half a turn at one frame, as where a seed ends.
+
+    A joint that has turned further over a whole motion is given in other numbers than in a motion that ends there.
+    """
+    then = vectors[:, frame : frame + 1]
+    turns = torch.round(then.norm(dim=-1, keepdim=True) / (2 * torch.pi))
+    if not turns.any():
+        return vectors
+    angle = vectors.norm(dim=-1, keepdim=True)
+    axis = torch.where(angle > 1e-3, vectors / angle.clamp_min(1e-9), torch.nn.functional.normalize(then, dim=-1))
+    # an axis that points the other way is that of a negative angle
+    axis = axis * torch.where((axis * then).sum(-1, keepdim=True) < 0, -1.0, 1.0)
+    return vectors - 2 * torch.pi * turns * axis
 
 
 def _some(rng: np.random.Generator, batch: int, share: float) -> Tensor:

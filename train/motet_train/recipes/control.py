@@ -12,9 +12,9 @@ from torch import Tensor
 
 from motet.models.control import ControlModel
 from motet.motion.rotations import Array
-from motet.representation.contract import MotionContract
+from motet.representation.contract import MotionContract, living
 from motet_train.data.body import body_parts
-from motet_train.data.clips import CONSTANT, Clips, sequences
+from motet_train.data.clips import Clips, sequences
 from motet_train.data.errors import DataError
 from motet_train.data.period import is_periodic
 from motet_train.evaluate.control.experiments import missed_goals, study_of
@@ -45,14 +45,15 @@ def train_control(clips: Clips, config: Config, seed: int, about: About, progres
     _check_lengths(found, config.taps)
     started = time.perf_counter()
     net = _untrained(clips, config)
-    mean, std = _statistics(found)
+    units = ("deg",) * len(clips.channels)
+    mean, std = _statistics(found, units)
     net.mean, net.scale = (
         torch.tensor(mean).float(),
-        torch.tensor(np.where(std < CONSTANT, 1.0, std * config.sigma)).float(),
+        torch.tensor(std * config.sigma).float(),
     )
     onsets = [1.0 if is_periodic(frames) else config.onset for frames in found.values()]
     generator = torch.Generator().manual_seed(seed)
-    contract = MotionContract(clips.channels, ("deg",) * len(clips.channels), config.fps, mean, std, clips.skeleton)
+    contract = MotionContract("angles", clips.channels, units, config.fps, mean, std, clips.skeleton)
     manifest = _manifest(about, clips, contract, net, found)
     candidates = _candidates(net, _tensors(found), onsets, generator, progress)
     tried = _choose(Run(manifest, net), clips, candidates)
@@ -122,7 +123,7 @@ def reconstruction(net: Net, found: Mapping[str, Sequence[Array]], std: Array) -
     """RMS error in z units of frames encoded and decoded, over the channels that are not constant."""
     frames = torch.cat([s for group in _tensors(found) for s in group])
     with torch.no_grad():
-        error = (net.decode(net.encode(frames)) - frames).numpy()[:, std >= CONSTANT] / std[std >= CONSTANT]
+        error = (net.decode(net.encode(frames)) - frames).numpy()[:, std > 0] / std[std > 0]
     return float(np.sqrt(np.mean(error**2)))
 
 
@@ -145,9 +146,9 @@ def _manifest(
     }
 
 
-def _statistics(found: Mapping[str, Sequence[Array]]) -> tuple[Array, Array]:
+def _statistics(found: Mapping[str, Sequence[Array]], units: Sequence[str]) -> tuple[Array, Array]:
     every = np.concatenate([s for group in found.values() for s in group])
-    return every.mean(axis=0), every.std(axis=0)
+    return every.mean(axis=0), living(every.std(axis=0), units)
 
 
 def _tensors(found: Mapping[str, Sequence[Array]]) -> list[list[Tensor]]:

@@ -11,11 +11,11 @@ import torch
 
 from motet.files import write_whole
 from motet.models.text import Vocabulary
+from motet.representation.base import FrameMirror
 from motet.representation.contract import MotionContract
 from motet_train.checkpoint import refuse_other
-from motet_train.data.batches import Examples, examples, usable
+from motet_train.data.batches import Examples, examples, frame_mirror, usable
 from motet_train.data.errors import DataError
-from motet_train.data.mirror_frames import FrameMirror, frame_mirror
 from motet_train.data.mirror_text import mirror_text
 from motet_train.data.split import Split, split
 from motet_train.data.store import Store

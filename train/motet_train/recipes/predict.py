@@ -71,7 +71,8 @@ def train_predict(
     recipe = _possible(recipe, material)
     net = _untrained(material)
     chances = recipe.warp, recipe.reverse, recipe.mirror
-    windows = Windows(material, net.config.seed_frames + net.config.frames, *chances)
+    seed_frames = net.config.seed_frames if material.layout is None else None  # text files are taken as they are
+    windows = Windows(material, net.config.seed_frames + net.config.frames, *chances, seed_frames)
     started = time.perf_counter()
     draw = partial(windows.draw, recipe.batch, np.random.default_rng(seed))
     net, log = _fit(net, draw, recipe, folder, progress)

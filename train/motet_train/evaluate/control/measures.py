@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from motet.motion.resample import lines
 from motet.motion.rotations import Array
 from motet_train.data.clips import CONSTANT
 from motet_train.data.period import period
@@ -89,9 +90,7 @@ def _energy(angles: Array) -> float:
 
 def upsample(frames: Array, factor: int = UPSAMPLE) -> Array:
     """Frames (T, D) with factor - 1 linear ones between each two."""
-    at = np.arange((len(frames) - 1) * factor + 1) / factor
-    old = np.arange(len(frames))
-    return np.stack([np.interp(at, old, column) for column in frames.T], axis=1)
+    return lines(frames, np.arange((len(frames) - 1) * factor + 1) / factor)
 
 
 def arrival(inside: NDArray[np.bool_], fps: float) -> Array:

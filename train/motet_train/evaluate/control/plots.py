@@ -179,6 +179,6 @@ def _thighs(study: ControlStudy) -> list[int]:
 
 def _sticks(study: ControlStudy, axes: Axes, frames: Array) -> None:
     """Stick figures in profile."""
-    motion = study.model.contract.motion(frames)
+    motion = study.model.contract.features(frames)
     skeleton = skeleton_of(motion)
     stick_figures(axes, in_profile(positions(motion), skeleton), bones_of(skeleton), ["black"] * len(frames))

@@ -25,7 +25,7 @@ class Answers:
     @property
     def best(self) -> list[Motion]:
         """The likeliest motion for each sentence."""
-        return [row[0].motion for row in self.rows]
+        return [row[0].features for row in self.rows]
 
 
 def answers(model: GenerateModel, corpus: SplitStore, records: Sequence[int]) -> Answers:
@@ -51,7 +51,7 @@ def chained(describe: DescribeModel, found: Answers, corpus: SplitStore) -> dict
     One entry for each sentence that a motion was made for; references are all that was said about its record.
     """
     texts = [
-        best_descriptions(describe, [row[min(rank, len(row) - 1)].motion for row in found.rows])
+        best_descriptions(describe, [row[min(rank, len(row) - 1)].features for row in found.rows])
         for rank in range(RANKS)
     ]
     return ranks(list(zip(*texts, strict=True)), corpus.references(found.records))

@@ -4,21 +4,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from motet.motion.feet import feet_of, ground_of
 from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
-from motet.motion.skeleton import Skeleton
 from motet.representation.contract import MotionContract
 from motet.representation.root_block import ROOT_BLOCK, from_root_block
 
 LOW = 0.05
 """m: a joint of a foot no higher than this above the ground is on it."""
-
-GROUND = 10
-"""Per cent of the frames in which the lowest joint of the feet is below what is taken for the ground."""
-
-FEET = 0.1
-"""Of the figure's height: joints that lie no higher than this above its lowest one at rest are the feet."""
 
 QUIET = 5
 """Per cent of the training motions whose last second has less energy than what counts as frozen."""
@@ -30,7 +24,7 @@ def measures(motions: Sequence[Motion], contract: MotionContract, quiet: float) 
     frozen: the share whose last second has less energy than ``quiet``. Energies are those of :func:`energy`.
     What the channels do not tell, or without a skeleton, is left out.
     """
-    z = [contract.frames(motion) / contract.std for motion in motions]
+    z = [contract.normalised(contract.frames(motion)) for motion in motions]
     ends = [last_energy(frames, contract.fps) for frames in z]
     found = {
         "seconds": np.mean([motion.duration for motion in motions]),
@@ -63,7 +57,7 @@ def last_energy(z: Array, fps: float) -> float:
 
 def quiet_energy(motions: Sequence[Motion], contract: MotionContract) -> float:
     """The energy of the last second below which QUIET per cent of the motions are."""
-    ends = [last_energy(contract.frames(motion) / contract.std, contract.fps) for motion in motions]
+    ends = [last_energy(contract.normalised(contract.frames(motion)), contract.fps) for motion in motions]
     return float(np.percentile(ends, QUIET))
 
 
@@ -76,20 +70,14 @@ def speed(motion: Motion) -> float:
 def skate(motion: Motion) -> float:
     """How fast feet on the ground slide, m/s: the mean over all steps from one frame to the next.
 
-    A joint of a foot counts that is on the ground (LOW, GROUND) before and after the step; of several the slowest does,
+    A joint of a foot counts that is on the ground (LOW) before and after the step; of several the slowest does,
     since the others roll. NaN where none ever is.
     """
     skeleton = skeleton_of(motion)
     feet = positions(from_root_block(motion))[:, feet_of(skeleton)] * skeleton.unit_factor(1.0)
-    low = feet[..., 1] <= np.percentile(feet[..., 1].min(axis=1), GROUND) + LOW
+    low = feet[..., 1] <= ground_of(feet[..., 1]) + LOW
     slides = np.linalg.norm(np.diff(feet[..., [0, 2]], axis=0), axis=-1) * motion.fps
     slides[~(low[1:] & low[:-1])] = np.inf
     slowest = slides.min(axis=1)
     standing = np.isfinite(slowest)
     return float(slowest[standing].mean()) if standing.any() else np.nan
-
-
-def feet_of(skeleton: Skeleton) -> list[int]:
-    """The joints of the feet: those that lie low at rest."""
-    height = skeleton.rest_positions[:, 1]
-    return [int(i) for i in np.flatnonzero(height <= height.min() + FEET * skeleton.height)]

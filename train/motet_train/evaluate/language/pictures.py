@@ -116,7 +116,7 @@ def generated(model: GenerateModel, texts: Sequence[str]) -> Figure:
     """Figure 8: the likeliest motion for each of a few sentences."""
     rows = model.generate(texts)
     titles = [f"{text}   {row[0].log_likelihood:.1f}" for text, row in zip(texts, rows, strict=True)]
-    return _strips([row[0].motion for row in rows], titles, "Generated motions and their log-likelihood")
+    return _strips([row[0].features for row in rows], titles, "Generated motions and their log-likelihood")
 
 
 def _kind(patterns: Patterns, sentences: Sequence[str]) -> str:

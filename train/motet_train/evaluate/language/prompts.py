@@ -136,5 +136,5 @@ def prompted(model: GenerateModel, limits: Thresholds, seeds: int = SEEDS) -> di
         known = knows(model, asked.sentence)
         with unknown_words_allowed():
             rows = model.generate([asked.sentence] * seeds, seed=range(seeds)) if known else []
-        shares[key] = sum(asked.is_so(travel(row[0].motion), limits) for row in rows) / seeds
+        shares[key] = sum(asked.is_so(travel(row[0].features), limits) for row in rows) / seeds
     return shares

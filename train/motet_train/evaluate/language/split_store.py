@@ -34,9 +34,7 @@ class SplitStore:
 
     def motion(self, record: int) -> Motion:
         """One record at its first down-sampling offset."""
-        store = self.store
-        values = store.sequence(record).astype(np.float64)
-        return Motion(values, store.channels, store.units, store.fps, store.skeleton)
+        return self.store.motion(record)
 
     def motions(self, records: Iterable[int]) -> list[Motion]:
         """Several records as :meth:`motion` gives them."""
@@ -70,8 +68,8 @@ class SplitStore:
         return asked - train
 
     def z(self, motion: Motion) -> Array:
-        """The frames (T, D) of a motion in standard deviations of the training motions, without a mean."""
-        return self.contract.frames(motion) / self.contract.std
+        """The frames (T, D) of a motion in standard deviations from the mean of the training motions."""
+        return self.contract.normalised(self.contract.frames(motion))
 
 
 def split_as(manifest: Mapping[str, Any], store: Store) -> SplitStore:

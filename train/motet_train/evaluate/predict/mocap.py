@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from motet.models.predict import PredictModel, ending
+from motet.models.predict import PredictModel
 from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
@@ -39,7 +39,7 @@ def distances(models: Mapping[str, PredictModel], trials: Sequence[Trial]) -> Di
     first = next(iter(models.values()))
     found: dict[str, list[tuple[Array, Array]]] = {ZERO: [], **{name: [] for name in models}}
     for trial in trials:
-        motion = ending(trial.motion, first.fps)
+        motion = trial.motion.resample(first.fps, to_end=True)
         for start in range(0, len(motion) - first.seed_frames - first.horizon + 1, first.horizon):
             seed = motion[start : start + first.seed_frames]
             truth = _places(motion[start + first.seed_frames :][: first.horizon])
@@ -71,7 +71,7 @@ def strips(models: Mapping[str, PredictModel], motion: Motion, every: int) -> di
     only. Models are as above.
     """
     first = next(iter(models.values()))
-    whole = ending(motion, first.fps)
+    whole = motion.resample(first.fps, to_end=True)
     middle = max(first.seed_frames, (len(whole) - first.horizon) // 2)
     found = {"truth": whole[middle:][: first.horizon]}
     found |= {name: model.predict(whole[:middle], first.horizon) for name, model in models.items()}

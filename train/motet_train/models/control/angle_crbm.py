@@ -16,9 +16,11 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from motet.representation.contract import LIMIT
 from motet_train.models.control.contrastive import Learning, Progress
 from motet_train.models.control.control_net import ControlNet
 from motet_train.models.control.crbm import CRBM, Past, train_crbm, windows
+from motet_train.models.normalised import normalised
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,7 @@ class AngleCRBM(ControlNet):
 
     def encode(self, frames: Tensor) -> Tensor:
         """Frames (B, D) to z-scored angles (B, D)."""
-        return (frames - self.mean) / self.scale
+        return normalised(frames, self.mean, self.scale, LIMIT / self.config.sigma)
 
     def decode(self, codes: Tensor) -> Tensor:
         """Z-scored angles (B, D) to frames (B, D)."""

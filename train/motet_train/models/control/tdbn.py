@@ -15,10 +15,12 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from motet.representation.contract import LIMIT
 from motet_train.models.control.contrastive import Learning, Progress, balanced
 from motet_train.models.control.control_net import ControlNet, binary
 from motet_train.models.control.crbm import CRBM, Past, train_crbm, windows
 from motet_train.models.control.rbm import RBM, block_mask, train_rbm
+from motet_train.models.normalised import normalised
 
 Sequences = Sequence[Sequence[Tensor]]
 """For each label its sequences of frames (T, D)."""
@@ -92,7 +94,11 @@ class TDBN(ControlNet):
 
     def encode(self, frames: Tensor) -> Tensor:
         """Frames (B, D) to codes (B, H)."""
-        return self.rbm.encode((frames - self.mean) / self.scale, self.config.temperature)
+        return self.rbm.encode(self.normalised(frames), self.config.temperature)
+
+    def normalised(self, frames: Tensor) -> Tensor:
+        """Frames (B, D) as the RBM sees them: over sigma standard deviations."""
+        return normalised(frames, self.mean, self.scale, LIMIT / self.config.sigma)
 
     def decode(self, codes: Tensor) -> Tensor:
         """Codes (B, H) to frames (B, D)."""
@@ -130,7 +136,7 @@ def train_tdbn(
     """
     config = net.config
     rbms = RBM(net.rbm.mask, config.restarts)
-    frames = (torch.cat([frames for found in sequences for frames in found]) - net.mean) / net.scale
+    frames = net.normalised(torch.cat([frames for found in sequences for frames in found]))
     uniform = balanced([torch.ones(sum(map(len, found))) for found in sequences])
     rbms.weight.normal_(0.0, config.initial, generator=generator).mul_(rbms.mask)
     train_rbm(rbms, frames, uniform, config.rbm, generator, progress)

@@ -13,12 +13,14 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from motet.bundle.graph import GraphSpec, TensorSpec
+from motet.representation.contract import LIMIT
 from motet_train.models.language.batch import Batch, before
 from motet_train.models.language.dropout import WordEmbedding
 from motet_train.models.language.layer_norm_gru import LayerNormGRU
 from motet_train.models.language.mixture import Mixture, MixtureHead
 from motet_train.models.language.sequence import Decoder, Encoder
 from motet_train.models.language.summary import SummaryHead
+from motet_train.models.normalised import normalised
 
 LOSSES = {"surrogate": Mixture.surrogate_loss, "likelihood": lambda *given: -Mixture.log_likelihood(*given)}
 """Eq. 12, on which the paper's net was trained, and eq. 11, the true likelihood."""
@@ -81,7 +83,7 @@ class LanguageToMotion(nn.Module):
 
     def outputs(self, frames: Tensor, context: Tensor) -> Tensor:
         """Outputs of the decoder (B, T, S) from which each of the frames (B, T, D + 1) is predicted."""
-        given = torch.cat([torch.ones_like(frames[:, :1]), frames[:, :-1]], dim=1)
+        given = torch.cat([torch.ones_like(frames[:, :1]), frames[:, :-1]], dim=1).clamp(-LIMIT, LIMIT)
         found: Tensor = self.decoder(given, context)
         return found
 
@@ -114,7 +116,7 @@ class LanguageToMotion(nn.Module):
 
     def normal(self, batch: Batch) -> Tensor:
         """The normalised frames (B, T, D) of a batch."""
-        return (batch.frames - self.mean) / self.scale
+        return normalised(batch.frames, self.mean, self.scale)
 
     def _blurred(self, normal: Tensor) -> Tensor:
         """Frames (B, T, D) as training feeds them back: with noise, and some of them left out."""
@@ -169,7 +171,7 @@ class Step(nn.Module):
 
     def forward(self, frame: Tensor, context: Tensor, state: Tensor) -> tuple[Tensor, ...]:
         """One frame."""
-        following = self.net.decoder.step(frame, context, state)
+        following = self.net.decoder.step(frame.clamp(-LIMIT, LIMIT), context, state)
         mixture = self.net.head(following)
         stds = mixture.variances.sqrt()
         return mixture.log_weights, mixture.means, stds, mixture.active.sigmoid(), following

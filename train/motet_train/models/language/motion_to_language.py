@@ -17,6 +17,7 @@ from motet_train.models.language.dropout import WordEmbedding
 from motet_train.models.language.gru import GRU
 from motet_train.models.language.sequence import Decoder, Encoder
 from motet_train.models.language.summary import SummaryHead
+from motet_train.models.normalised import normalised
 
 PAD, SOS, EOS = 0, 1, 2
 """Ids of the special words."""
@@ -66,7 +67,7 @@ class MotionToLanguage(nn.Module):
 
     def encode(self, frames: Tensor, lengths: Tensor) -> Tensor:
         """Frames (B, T, D) in the contract's units, of lengths (B,), to contexts (B, C)."""
-        normal = (frames - self.mean) / self.scale
+        normal = normalised(frames, self.mean, self.scale)
         if self.training and self.config.frame_noise:
             normal = normal + self.config.frame_noise * torch.randn_like(normal)
         context: Tensor = self.encoder(torch.cat([normal, torch.ones_like(normal[..., :1])], dim=-1), lengths)
@@ -94,7 +95,7 @@ class MotionToLanguage(nn.Module):
         losses = functional.nll_loss(self.log_probabilities(outputs[active]), targets[active], reduction="none")
         if self.summary is None or not self.training:
             return losses
-        normal = (batch.frames - self.mean) / self.scale
+        normal = normalised(batch.frames, self.mean, self.scale)
         return losses + self.config.summary * self.summary.loss(context, normal, batch.lengths)
 
     def loss(self, batch: Batch) -> Tensor:

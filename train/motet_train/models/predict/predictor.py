@@ -18,6 +18,7 @@ from torch import Tensor, nn
 from torch.nn.functional import gelu
 
 from motet.bundle.graph import GraphSpec, TensorSpec
+from motet_train.models.normalised import normalised
 
 GAIN = 3.0
 """Differences of normalised frames are multiplied by it, so that they vary about as much as poses do."""
@@ -146,8 +147,8 @@ class Predictor(nn.Module):
     def plain(self, frames: Tensor) -> Tensor:
         """Frames (B, L, C) to the next (B, N, C), without the mirror image: what is trained."""
         seen = frames[:, -self.config.seed_frames :, self.kept]
-        normalised = (seen - self.relative * seen[:, -1:] - self.mean) / self.scale
-        steps = self.trajectory(normalised) * self.scale[self.config.held :]
+        z = normalised(seen - self.relative * seen[:, -1:], self.mean, self.scale)
+        steps = self.trajectory(z) * self.scale[self.config.held :]
         predicted: Tensor = frames[:, -1:] + steps @ self.placing
         return predicted
 

@@ -11,6 +11,7 @@ import torch
 from torch import Tensor, nn
 
 from motet.bundle.graph import GraphSpec, TensorSpec
+from motet_train.models.normalised import normalised
 
 State = dict[str, Tensor]
 """What a system knows, by name; each (B, ...)."""
@@ -99,7 +100,7 @@ class Stepwise(nn.Module):
 
     def normalised(self, frames: Tensor) -> Tensor:
         """Frames (..., C) in the contract's units to (..., D)."""
-        return (frames[..., self.kept] - self.mean) / self.scale
+        return normalised(frames[..., self.kept], self.mean, self.scale)
 
     def whole(self, normalised: Tensor, still: Tensor) -> Tensor:
         """Normalised frames (..., D) and channels that do not vary (..., C), the others 0 there, to frames (..., C)."""
