@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from control_runs import control_run
 from numpy.typing import NDArray
 
 from motet.bundle.graph import Arrays, GraphSpec, TensorSpec
@@ -17,7 +18,6 @@ from motet_train.evaluate.control.lab import Lab
 from motet_train.evaluate.control.report import GOALS, control_report, lab_of
 from motet_train.evaluate.tables import reached
 from motet_train.models.control.tdbn import TDBNConfig
-from motet_train.recipes.control import About, train_control
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +44,7 @@ def test_unclamped_control_units_make_the_state_leap(clips: Clips, clamped: bool
     """The thesis' text unclamps them in the reconstruction; the switch is then a jump in one frame."""
     config = TDBNConfig().unclamped()
     config = replace(config, clamped=clamped, rbm=replace(config.rbm, epochs=300))
-    run = train_control(clips, config, 0, About("leaps", "a test", "MIT"), lambda *_: None)
+    run = control_run(clips, config)
     lab = lab_of(ControlModel(run.manifest, run.torch_graphs()), clips)
     assert least < gait_transitions(lab, count=8)["jump_ratio"] < most
 
