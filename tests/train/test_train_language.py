@@ -192,4 +192,4 @@ PAPER: list[tuple[Recipe, Callable[[int, int], object], float]] = [
 def test_the_paper_preset_is_table_1(recipe: Recipe, config: Callable[[int, int], object], clip: float) -> None:
     assert recipe.sized(channels=44, words=1344) == config(44, 1344)
     assert recipe.training == Training(epochs=100, batch=128, learning_rate=1e-3, optimiser="nadam", clip=clip)
-    assert recipe.data == LanguageVisits(offsets=None, windows=None, mirror=False)
+    assert recipe.visits == LanguageVisits(offsets=None, windows=None, mirror=False)

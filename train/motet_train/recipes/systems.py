@@ -77,8 +77,8 @@ def train_system(material: Material, job: Job) -> Run:
 
     The weights kept are those with the smallest :func:`validation_error`.
     """
-    visits = possible(job.recipe.data, material)
-    job = replace(job, recipe=replace(job.recipe, data=visits))
+    visits = possible(job.recipe.visits, material)
+    job = replace(job, recipe=replace(job.recipe, visits=visits))
     torch.manual_seed(job.about.seed)
     config = sized(job.recipe, material)
     sizes = {"channels": len(material.contract.channels), "kept": list(material.kept), "seed_frames": SEED_FRAMES}
