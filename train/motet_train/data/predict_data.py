@@ -49,7 +49,7 @@ class Material:
     held: int = 0
     mirrored: tuple[int, ...] = ()
     signs: tuple[float, ...] = ()
-    licence: str = ""
+    licence: str | None = None
     about: dict[str, Any] = field(default_factory=dict)
     validation: Sequence[NDArray[np.float32]] = ()
     layout: Layout | None = None
@@ -169,7 +169,7 @@ def test_names(trials: Sequence[Record]) -> tuple[str, ...]:
     return tuple(trials[index].name for index in split(entries, 0, "subject").test)
 
 
-def mocap_material(trials: Sequence[Record], skipped: Sequence[Skipped], name: str, licence: str) -> Material:
+def mocap_material(trials: Sequence[Record], skipped: Sequence[Skipped], name: str, licence: str | None) -> Material:
     """Motions of one figure as root block and exponential maps at :data:`FPS`, all phases, without the test trials."""
     test = set(test_names(trials))
     found, left_out = _figures([trial for trial in trials if trial.name not in test])
