@@ -272,7 +272,7 @@ def test_evaluate_says_what_it_lacks(runs: Path) -> None:
 def _save(run: Run, folder: Path) -> None:
     folder.mkdir()
     run.save(folder)
-    (folder / "log.jsonl").write_text('{"epoch": 1, "train_loss": 2.0, "validation_loss": 3.0}\n')
+    (folder / "log.jsonl").write_text('{"epoch": 1, "loss": 2.0, "validation": 3.0}\n')
 
 
 def _write(store: Store, folder: Path) -> None:

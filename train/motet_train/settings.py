@@ -1,12 +1,14 @@
 """The settings of a run as a TOML file: a command's options by their names, and tables for what the recipe says.
 
-seed = 1
-[training]              # how it is trained: the fields of Training
-learning_rate = 1e-3
-[model]                 # sizes: the fields of the model's configuration
-dropout = 0.3
-[visits]                # how the data is visited
-mirror = false
+Such as::
+
+    seed = 1
+    [training]        # how it is trained: the fields of Training
+    learning_rate = 1e-3
+    [model]           # sizes: the fields of the model's configuration
+    dropout = 0.3
+    [visits]          # how the data is visited
+    mirror = false
 """
 
 import json

@@ -70,7 +70,7 @@ def losses(run: Path) -> Figure:
     except (OSError, ValueError) as error:
         raise DataError(f"{run} has no log of its training that can be read: {error}") from error
     picture, (axes,) = panels(1, 1, (7, 4), f"Loss of {run.name}")
-    for key, name in (("train_loss", "training"), ("validation_loss", "validation")):
+    for key, name in (("loss", "training"), ("validation", "validation")):
         axes.plot([line["epoch"] for line in lines], [line[key] for line in lines], label=name)
     axes.set(xlabel="epoch", ylabel="loss of a step")
     axes.legend()

@@ -39,7 +39,7 @@ GOALS: Goals = {
 SAMPLE, CHAIN_SAMPLE = 200, 40
 """Training motions, always the same, of which training BLEU is taken, and chained training BLEU."""
 
-TRAINING = ("seconds", "epochs", "kept_epoch", "train_loss", "validation_loss", "steps_per_second")
+TRAINING = ("seconds", "epochs", "kept_epoch", "loss", "validation", "steps_per_second")
 
 
 def describe_report(model: DescribeModel, corpus: SplitStore, progress: Progress = lambda group: None) -> Report:
