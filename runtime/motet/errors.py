@@ -2,6 +2,14 @@
 
 from pathlib import Path
 
+SHOWN = 60
+"""Characters of a faulty word that an error repeats."""
+
+
+def quoted(text: str) -> str:
+    """What was given or a file says, for an error: not more of it than fits on a line."""
+    return repr(text if len(text) <= SHOWN else text[:SHOWN] + "...")
+
 
 class MotetError(Exception):
     """Base of every error that motet raises on purpose."""

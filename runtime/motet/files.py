@@ -42,8 +42,8 @@ def write_whole(file: File, content: str | bytes) -> None:
 
     OutputError if the file cannot be written. A file object just gets the content.
     """
-    data = content.encode() if isinstance(content, str) else content
     try:
+        data = content.encode() if isinstance(content, str) else content
         if isinstance(file, str | Path):
             _replace(check_place(file).resolve(), data)
         else:

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import check_refused, run
-from figures import walker
+from figures import WRITTEN, walker
 
 from motet.formats import read_motion, write_motion
 from motet.models.load import load
@@ -29,9 +29,9 @@ def test_a_walk_goes_on(clips: Path) -> None:
     assert off[-1] < 0.25 < still[-1]
 
 
-@pytest.mark.parametrize("extension", ["amc", "bvh", "npz", "csv", "html", "gif", "glb"])
+@pytest.mark.parametrize("extension", WRITTEN)
 def test_predict_writes_every_format(tmp_path: Path, clips: Path, extension: str) -> None:
-    out = tmp_path / f"out.{extension}"
+    out = tmp_path / f"out{extension}"
     result = run("predict", clips / WALK, "-o", out, "--frames", 5)
     assert (result.exit_code, result.stdout) == (0, f"{out}: 5 frames at 30 fps, 0.166667 s\n")
     assert "resampled from 120 to 30 fps" in result.stderr

@@ -1,5 +1,7 @@
 """The skeleton: a tree of joints with offsets, and how each joint turns its angles into a rotation."""
 
+import math
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -51,9 +53,13 @@ class Skeleton:
         if not self.joints:
             raise MotionError("a skeleton needs at least one joint")
         names = [joint.name for joint in self.joints]
-        double = sorted({name for name in names if names.count(name) > 1})
+        double = sorted(name for name, count in Counter(names).items() if count > 1)
         if double:
             raise MotionError(f"joint names must differ, twice in this skeleton: {', '.join(double)}")
+        if not np.isfinite([[*joint.offset, *joint.axis] for joint in self.joints]).all():
+            raise MotionError("offsets and axes of joints must be finite")
+        if self.metres_per_unit is not None and not (0 < self.metres_per_unit < math.inf):
+            raise MotionError(f"a length unit must be a positive number of metres, not {self.metres_per_unit}")
         for index, joint in enumerate(self.joints):
             if not (joint.parent == -1 if index == 0 else 0 <= joint.parent < index):
                 raise MotionError(f"joint {joint.name!r} must come after its parent, and only the first has none")
@@ -73,10 +79,10 @@ class Skeleton:
     @cached_property
     def children(self) -> tuple[tuple[int, ...], ...]:
         """For each joint the indices of its children."""
-        return tuple(
-            tuple(i for i, joint in enumerate(self.joints) if joint.parent == parent)
-            for parent in range(len(self.joints))
-        )
+        found: list[list[int]] = [[] for _ in self.joints]
+        for i, joint in enumerate(self.joints[1:], start=1):
+            found[joint.parent].append(i)
+        return tuple(map(tuple, found))
 
     @cached_property
     def rest_positions(self) -> Array:
