@@ -6,7 +6,7 @@ joint, and the root's pose. MMM has z up, millimetres, and figures that face y; 
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 from xml.etree import ElementTree
 
 import numpy as np
@@ -61,11 +61,12 @@ def motion_name(file: File) -> str:
 def _elements(file: File, event: Literal["start", "end"] = "end") -> Iterator[ElementTree.Element]:
     """The elements up to the end of the first motion, as they come; nothing behind it is looked at."""
     path, content = place_of(file), read_bytes(file)
-    parser = ElementTree.XMLPullParser([event])
+    parser: ElementTree.XMLPullParser[Any] = ElementTree.XMLPullParser([event])
     try:
         for start in range(0, len(content), CHUNK):
             parser.feed(content[start : start + CHUNK])
-            for _, element in parser.read_events():
+            for found in parser.read_events():
+                element = found[1]
                 assert isinstance(element, ElementTree.Element)
                 yield element
                 if element.tag == "Motion":
