@@ -65,9 +65,8 @@ def _elements(file: File, event: Literal["start", "end"] = "end") -> Iterator[El
     try:
         for start in range(0, len(content), CHUNK):
             parser.feed(content[start : start + CHUNK])
-            for found in parser.read_events():
-                element = found[1]
-                assert isinstance(element, ElementTree.Element)
+            events: Iterator[Any] = parser.read_events()
+            for _, element in events:
                 yield element
                 if element.tag == "Motion":
                     return
