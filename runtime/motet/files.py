@@ -2,6 +2,8 @@
 
 import shutil
 import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
@@ -62,6 +64,26 @@ def _replace(path: Path, data: bytes) -> None:
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
+
+
+@contextmanager
+def new_folder(path: str | Path) -> Iterator[Path]:
+    """A new folder to write into, which becomes ``path`` in the end; after an exception nothing is left of it.
+
+    Missing parents are made. OutputError if there is something at ``path``, or it cannot be written.
+    """
+    path = Path(path)
+    temporary = temporary_beside(path)
+    try:
+        if path.exists() or path.is_symlink():
+            raise OutputError(f"cannot write {path}: it exists; remove it first or choose another folder")
+        temporary.mkdir(parents=True)
+        yield temporary
+        temporary.rename(path)
+    except OSError as error:
+        raise _refusal(path, error) from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
 
 
 def temporary_beside(path: Path) -> Path:
