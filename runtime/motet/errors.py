@@ -19,6 +19,10 @@ class MotionError(MotetError, ValueError):
     """A motion or a skeleton that cannot be used for what was asked."""
 
 
+class UnitError(MotionError):
+    """A length is needed in metres, and it is not known how long a unit of the skeleton is."""
+
+
 class FormatError(MotionError):
     """A file that is not what its format promises: names the file, the line (from 1) and the reason."""
 

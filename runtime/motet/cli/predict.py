@@ -5,8 +5,8 @@ from pathlib import Path
 import click
 
 from motet.cli.convert import METRES
-from motet.cli.notes import note, unit_option
-from motet.errors import FormatError, MotionError
+from motet.cli.notes import note, refused, unit_option
+from motet.errors import MotionError
 from motet.formats import check_writable, read_motion, write_motion
 from motet.models.load import load_as
 from motet.models.predict import PredictModel
@@ -31,7 +31,7 @@ def predict(source: Path, out: Path, bundle: str, frames: int | None, append: bo
     try:
         found = model.predict(motion, frames, append)
     except MotionError as error:
-        raise FormatError(source, str(error)) from error
+        raise refused(source, error) from error
     if abs(motion.fps - model.fps) > 1e-6:
         note(f"{source}: resampled from {motion.fps:g} to {model.fps:g} fps")
     write_motion(out, found)

@@ -20,7 +20,7 @@ from motet.formats.lines import Names, complete_order, frame_rate, number, numbe
 from motet.formats.writable import with_names, with_still_offsets
 from motet.motion.kinematics import local_rotations, local_translations, skeleton_of
 from motet.motion.motion import TURN, Motion
-from motet.motion.rotations import Array, continuous_euler, rotmat_to_euler
+from motet.motion.rotations import Array, rotmats_to_euler
 from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
 
 ORDER = "zyx"
@@ -270,7 +270,7 @@ def _rows(motion: Motion, joints: list[int], translated: set[str]) -> Array:
 def _zyx_degrees(motion: Motion) -> Array:
     """Angles (T, J, 3) about z, y, x in degrees, as they are where they are of this kind already."""
     skeleton = skeleton_of(motion)
-    converted = continuous_euler(rotmat_to_euler(local_rotations(motion), ORDER))
+    converted = rotmats_to_euler(local_rotations(motion), ORDER)
     angles: Array = np.round(np.degrees(converted), 9).astype(np.float64)
     kept = [i for i, joint in enumerate(skeleton.joints) if joint.order == ORDER and not any(joint.axis)]
     angles[:, kept] = 0.0

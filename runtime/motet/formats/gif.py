@@ -9,10 +9,11 @@ import io
 import numpy as np
 from PIL import Image
 
-from motet.draw.figure import Figure, figure_of
+from motet.draw.figure import figure_of
 from motet.draw.stage import Stage
 from motet.files import File, write_whole
 from motet.motion.motion import Motion
+from motet.motion.resample import resampled
 from motet.motion.rotations import Array
 
 SIZE = 320
@@ -29,7 +30,7 @@ def write(file: File, motion: Motion, size: int = SIZE) -> None:
     """Write a square GIF of ``size`` pixels; MotionError for a motion without skeleton or frames."""
     figure = figure_of(motion)
     delay = delay_of(figure.fps)
-    points = _resampled(figure, 100 / delay)
+    points = resampled(figure.points, figure.fps * delay / 100)
     stage, targets = Stage(size, figure.heading + YAW), _targets(points[:, 0, ::2], 100 / delay)
     pictures = (stage.picture(pose, figure.bones, target) for pose, target in zip(points, targets, strict=True))
     first = next(pictures).quantize(COLOURS)
@@ -45,17 +46,6 @@ def delay_of(fps: float) -> int:
     if whole >= 4 and abs(whole * fps - 100) < 1e-6:
         return whole
     return 5
-
-
-def _resampled(figure: Figure, fps: float) -> Array:
-    """The figure's points at another rate, as long as the motion: between frames on a straight line."""
-    frames = len(figure.points)
-    count = max(1, round(frames / figure.fps * fps))
-    place = np.minimum(np.arange(count) * figure.fps / fps, frames - 1)
-    first = np.floor(place + 1e-9).astype(int)
-    second, part = np.minimum(first + 1, frames - 1), (place - first)[:, None, None]
-    points: Array = figure.points[first] * (1 - part) + figure.points[second] * part
-    return points
 
 
 def _targets(path: Array, fps: float) -> Array:
