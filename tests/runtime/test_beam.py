@@ -36,7 +36,7 @@ def naive(step: FakeGraph, context: NDArray[np.float32], beams: int, longest: in
                 ended = following == END
                 pool.append((ids if ended else (*ids, following), total, out["next_state"], ended))
         hypotheses = sorted(pool, key=lambda h: -h[1])[:beams]
-    return [Hypothesis(ids, score) for ids, score, _, _ in hypotheses]
+    return [Hypothesis(ids, score, score) for ids, score, _, _ in hypotheses]
 
 
 def test_a_wide_beam_finds_what_exhaustive_search_finds() -> None:
@@ -46,8 +46,8 @@ def test_a_wide_beam_finds_what_exhaustive_search_finds() -> None:
     found = beam_search(step, context, len(every), START, END, 3)
     for row, ranked in zip(context, found, strict=True):
         best = sorted(((log_probability(step, row, ids), ids) for ids in every), reverse=True)
-        assert [ids for ids, _ in ranked] == [ids for _, ids in best]
-        np.testing.assert_allclose([score for _, score in ranked], [score for score, _ in best], atol=1e-5)
+        assert [ids for ids, *_ in ranked] == [ids for _, ids in best]
+        np.testing.assert_allclose([score for *_, score in ranked], [score for score, _ in best], atol=1e-5)
 
 
 @pytest.mark.parametrize("beams", [1, 2, 5])
@@ -58,7 +58,7 @@ def test_as_the_naive_search_of_each_row(beams: int, sharpness: float) -> None:
     for row, found in zip(context, together, strict=True):
         wanted = naive(step, row, beams, 6)
         assert [h.ids for h in found] == [h.ids for h in wanted]
-        np.testing.assert_allclose([s for _, s in found], [s for _, s in wanted], atol=1e-5)
+        np.testing.assert_allclose([h.score for h in found], [h.score for h in wanted], atol=1e-5)
         assert beam_search(step, row[None], beams, START, END, 6) == [found]
 
 
@@ -66,7 +66,7 @@ def test_scores_are_those_of_whole_sequences_also_at_the_longest() -> None:
     step, context = word_step(6, WORDS, 3, 0.01), contexts(3)  # ends are rare
     for row, found in zip(context, beam_search(step, context, 4, START, END, 3), strict=True):
         assert {len(h.ids) for h in found} <= {0, 1, 2, 3}
-        for ids, score in found:
+        for ids, score, _ in found:
             assert score == pytest.approx(log_probability(step, row, ids), abs=1e-5)
 
 

@@ -15,10 +15,14 @@ Ids = NDArray[np.int64]
 
 
 class Hypothesis(NamedTuple):
-    """A finished sequence: its ids without start and end, and the sum of its steps' log-probabilities, end included."""
+    """A finished sequence: its ids without start and end, and the sum of its steps' log-probabilities, end included.
+
+    score: what sequences are ranked by, the higher the better.
+    """
 
     ids: tuple[int, ...]
     log_probability: float
+    score: float
 
 
 def beam_search(
@@ -84,5 +88,5 @@ def _hypotheses(ids: Ids, scores: Scores, end: int) -> list[Hypothesis]:
     found = []
     for sequence, score in zip(ids.tolist(), scores.tolist(), strict=True):
         if np.isfinite(score):
-            found.append(Hypothesis(tuple(sequence[: sequence.index(end)]), score))
+            found.append(Hypothesis(tuple(sequence[: sequence.index(end)]), score, score))
     return found

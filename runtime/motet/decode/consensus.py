@@ -21,7 +21,7 @@ def by_consensus(drawn: Sequence[Drawn]) -> list[Hypothesis]:
     scores = agreement([one.ids for one in drawn], np.array([one.times for one in drawn]))
     falling = -scores.round(9)  # what only rounding tells apart is equal
     order = sorted(range(len(drawn)), key=lambda i: (falling[i], -drawn[i].log_probability))
-    return [Hypothesis(drawn[i].ids, drawn[i].log_probability) for i in order]
+    return [Hypothesis(drawn[i].ids, drawn[i].log_probability, float(scores[i])) for i in order]
 
 
 def agreement(sequences: Sequence[tuple[int, ...]], times: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 from tqdm import tqdm
 
-from motet.cli.convert import METRES
+from motet.motion.units import METRES
 from motet_train.data.corpus import read_corpus
 from motet_train.data.records import Skipped
 from motet_train.data.store import Item

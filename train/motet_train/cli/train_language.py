@@ -10,7 +10,7 @@ import click
 import torch
 from tqdm import tqdm
 
-from motet.cli.convert import METRES
+from motet.motion.units import METRES
 from motet_train.cli.places import command_line, refuse, resumable
 from motet_train.cli.prepare import prepare
 from motet_train.data.store import INDEX, Store

@@ -5,14 +5,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from motet.formats import read_motion
+from motet.formats import MOCAP, read_motion
 from motet_train.data import kit
 from motet_train.data.archive import BROKEN, Archive
 from motet_train.data.errors import DataError
 from motet_train.data.records import Record, Skipped
 from motet_train.data.representation import ANGLES, FULL, Representation
-
-MOCAP = (".amc", ".bvh", ".npz")
 
 
 @dataclass(frozen=True)
@@ -56,9 +54,7 @@ class Corpus:
     def _record(self, archive: Archive, file: str, clip: str, sentences: tuple[str, ...]) -> Record | Skipped:
         try:
             with archive.opened(file) as place:
-                motion = read_motion(place)
-            if self.metres_per_unit is not None:
-                motion = motion.with_unit(self.metres_per_unit)
+                motion = read_motion(place, unit=self.metres_per_unit)
             return Record(clip, clip.rpartition("/")[2].split("_")[0], motion, sentences)
         except BROKEN as error:
             return Skipped(clip, archive.reason(error))

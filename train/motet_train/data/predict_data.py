@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.errors import MotionError
-from motet.formats import read_motion
+from motet.formats import MOCAP, read_motion
 from motet.motion.kinematics import skeleton_of
 from motet.motion.mirror import lateral_axis
 from motet.motion.motion import Motion
@@ -21,7 +21,6 @@ from motet.representation.joint_vectors import joints_of, to_joint_vectors
 from motet.representation.root_block import ROOT_BLOCK
 from motet_train.data.archive import BROKEN, Archive
 from motet_train.data.clips import CMU_LICENCE
-from motet_train.data.corpus import MOCAP
 from motet_train.data.errors import DataError
 from motet_train.data.expmap_files import ROOT, ExpmapCorpus, Layout, scaling_of
 from motet_train.data.mirror_frames import NEGATED
