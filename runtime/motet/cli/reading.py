@@ -91,7 +91,7 @@ def _named(path: Path | str, error: MotetError) -> str:
 @contextmanager
 def bar(label: str) -> Iterator[Progress]:
     """A progress bar on stderr, if that is a terminal, as the callback of long work."""
-    if not sys.stderr.isatty():
+    if not (sys.stderr.isatty() and log.isEnabledFor(logging.WARNING)):
         yield silent
         return
     with click.progressbar(length=1, label=label, file=sys.stderr) as shown:
