@@ -9,6 +9,7 @@ import numpy as np
 import onnxruntime
 from numpy.typing import NDArray
 
+from motet.bundle.graph_safety import check_graph
 from motet.errors import BundleError
 
 Arrays = Mapping[str, NDArray[Any]]
@@ -103,11 +104,13 @@ class OnnxGraph:
 
     def __init__(self, model: bytes, spec: GraphSpec, threads: int = 1) -> None:
         self.spec = spec
+        check_graph(model)
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = threads
         options.inter_op_num_threads = 1
         options.enable_cpu_mem_arena = False  # memory goes back after a large batch, at the same speed
         options.log_severity_level = 3
+        options.add_session_config_entry("session.load_model_format", "ONNX")  # the one that was checked
         try:
             with _creation:
                 self._session = onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
