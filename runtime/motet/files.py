@@ -1,9 +1,12 @@
 """Writing files whole or not at all."""
 
+import shutil
 import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
-from motet.errors import OutputError
+from motet.errors import MotetError, OutputError
 
 
 def check_place(path: str | Path) -> Path:
@@ -26,3 +29,25 @@ def write_whole(path: str | Path, content: str | bytes) -> None:
     except OSError as error:
         temporary.unlink(missing_ok=True)
         raise OutputError(f"cannot write {path}: {error.strerror}") from error
+
+
+@contextmanager
+def new_folder(path: str | Path) -> Iterator[Path]:
+    """A new folder to write into, which becomes ``path`` in the end; after an exception nothing is left of it.
+
+    Missing parents are made. OutputError if there is something at ``path``, or it cannot be written.
+    """
+    path = Path(path)
+    if path.exists() or path.is_symlink():
+        raise OutputError(f"cannot write {path}: it exists; remove it first or choose another folder")
+    temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
+    try:
+        temporary.mkdir(parents=True)
+        yield temporary
+        temporary.rename(path)
+    except MotetError:
+        raise
+    except OSError as error:
+        raise OutputError(f"cannot write {path}: {error}") from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
