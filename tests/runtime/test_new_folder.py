@@ -17,12 +17,17 @@ def test_what_was_written_is_there_in_the_end_alone(tmp_path: Path) -> None:
     assert (place / "x").read_text() == "1"
 
 
+def interrupted(place: Path, error: type[BaseException]) -> None:
+    with new_folder(place) as folder:
+        (folder / "x").write_text("1")
+        raise error
+
+
 @pytest.mark.parametrize("error", [KeyboardInterrupt, BundleError, MemoryError])
 def test_after_an_exception_nothing_is_left(tmp_path: Path, error: type[BaseException]) -> None:
     for _ in range(2):  # and the next attempt is not in the way of the first
-        with pytest.raises(error), new_folder(tmp_path / "b") as folder:
-            (folder / "x").write_text("1")
-            raise error
+        with pytest.raises(error):
+            interrupted(tmp_path / "b", error)
         assert list(tmp_path.iterdir()) == []
 
 
