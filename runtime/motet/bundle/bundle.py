@@ -20,7 +20,7 @@ from motet.bundle.manifest import FORMAT, MANIFEST, FileEntry, Manifest
 from motet.bundle.members import Archive, Folder, Members
 from motet.bundle.session import SessionOptions
 from motet.errors import BundleError
-from motet.files import write_whole
+from motet.files import new_folder, write_whole
 
 DEFAULT_BUNDLES = Path(__file__).parents[1] / "bundles"
 
@@ -143,13 +143,9 @@ def write_bundle(path: str | Path, manifest: Mapping[str, Any], files: Mapping[s
     if path.suffix == ".zip":
         write_whole(path, zip_bytes(files, text))
         return
-    if path.exists():
-        raise BundleError(f"cannot write the bundle {path}: it exists; remove it first or choose another name")
-    temporary = path.with_name(f".{path.name}.partial")
-    temporary.mkdir(parents=True)
-    for name, data in {**files, MANIFEST: text}.items():
-        write_whole(temporary / name, data)
-    temporary.rename(path)
+    with new_folder(path) as folder:
+        for name, data in {**files, MANIFEST: text}.items():
+            write_whole(folder / name, data)
 
 
 def zip_bytes(files: Mapping[str, bytes], manifest: bytes) -> bytes:

@@ -110,14 +110,17 @@ class Manifest:
         version = data.get("format") if isinstance(data, dict) else None
         if version == 1 and not isinstance(version, bool):
             raise BundleError(
-                "it has format 1, of an older motet: export its training run again with this one, or use the older motet"
+                "it has format 1, of an older motet: export its training run again with this one, or use the older one"
             )
         if version != FORMAT:
             raise BundleError(f"it has the format {version!r}; this motet reads format {FORMAT}")
         found = Manifest.from_json(data)
         if found.golden is None or not found.graphs:
             raise BundleError("manifest: it needs graphs and golden vectors")
-        named = {**{f"graphs.{role}.file": g.file for role, g in found.graphs.items()}, "golden.file": found.golden.file}
+        named = {
+            **{f"graphs.{role}.file": g.file for role, g in found.graphs.items()},
+            "golden.file": found.golden.file,
+        }
         for key, file in named.items():
             if file not in found.files:
                 raise BundleError(f"manifest, {key}: {file!r} is not among its files")

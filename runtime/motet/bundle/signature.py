@@ -1,6 +1,6 @@
 """What a model asks of a graph: tensors with shapes such as "batch time D", as docs/bundle.md writes them."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from motet.bundle.graph import GraphSpec, TensorSpec
 from motet.errors import BundleError
@@ -10,13 +10,18 @@ Sizes = dict[str, int]
 
 
 def bind(
-    role: str, spec: GraphSpec, inputs: Mapping[str, str], outputs: Mapping[str, str], sizes: Sizes, given: str = ""
+    role: str,
+    spec: GraphSpec,
+    inputs: Mapping[str, str],
+    outputs: Mapping[str, str],
+    sizes: Sizes,
+    given: Collection[TensorSpec] = (),
 ) -> None:
     """Check a graph's tensors, and note the sizes of axes that were not known before.
 
     inputs, outputs: shapes by name. A small word is a dynamic axis; a capital letter is a size, the same wherever it
-        stands; "*" in front is int64. The graph may have more outputs, and more inputs where they are fed back and
-        their start is known, or where ``given`` says who gives them.
+        stands; "*" in front is int64. The graph may have more outputs, and more inputs where something gives them.
+    given: tensors that another graph gives. All other inputs must be fed back, and how they start be known.
     BundleError names the role, the tensor and what is expected.
     """
     for wanted, find in ((inputs, spec.input), (outputs, spec.output)):
@@ -26,10 +31,11 @@ def bind(
             except BundleError as error:
                 raise BundleError(f"manifest, graphs.{role}: {error}") from error
     for tensor in spec.inputs:
-        if tensor.name in spec.feedback and not given:
-            spec.start_shape(tensor.name)
-        elif tensor.name not in inputs and not given:
+        if tensor in given or tensor.name in inputs:
+            continue
+        if tensor.name not in spec.feedback:
             raise BundleError(f"manifest, graphs.{role}: nothing gives the input {tensor.name!r}")
+        spec.start_shape(tensor.name)
 
 
 def _bind(tensor: TensorSpec, shape: str, sizes: Sizes) -> None:

@@ -6,7 +6,9 @@ from pathlib import Path
 
 import click
 
+from motet.bundle.session import SessionOptions
 from motet.cli.notes import read_for, unit_option
+from motet.cli.options import session_options
 from motet.models.describe import DescribeModel
 from motet.models.load import load_as
 
@@ -19,6 +21,7 @@ from motet.models.load import load_as
     "--draws", type=int, help="Sentences that are drawn to agree on one; 0: beam search. [default: the bundle's]"
 )
 @unit_option
+@session_options
 @click.option("--json", "as_json", is_flag=True, help="Print a list with input and hypotheses of each motion.")
 def describe(
     motions: tuple[Path, ...],
@@ -27,12 +30,13 @@ def describe(
     draws: int | None,
     unit_in: str | None,
     as_json: bool,
+    session: SessionOptions,
 ) -> None:
     """Describe the motion files MOTIONS: sentences with their log-probabilities, the best first.
 
     Reads .amc (with its .asf) .bvh .npz .csv. All files are described in one batch.
     """
-    model = load_as(DescribeModel, bundle)
+    model = load_as(DescribeModel, bundle, session)
     found = model.describe(read_for(model, motions, unit_in), beams, draws)
     if as_json:
         rows = zip(motions, found, strict=True)

@@ -7,7 +7,9 @@ from typing import Any
 
 import click
 
+from motet.bundle.session import SessionOptions
 from motet.cli.notes import text_notes
+from motet.cli.options import session_options
 from motet.formats import check_writable, write_motion
 from motet.models.generate import Generated, GenerateModel
 from motet.models.load import load_as
@@ -28,6 +30,7 @@ from motet.representation.root_block import ROOT_BLOCK, from_root_block
 @click.option("--fps", default=30.0, show_default=True, help="Frame rate to write.")
 @click.option("--no-plant", is_flag=True, help="Let feet slide: move the figure as drawn, not as its feet take it.")
 @click.option("--all", "every", is_flag=True, help="Write all hypotheses, not only the best.")
+@session_options
 @click.option("--json", "as_json", is_flag=True, help="Print a list with input and hypotheses of each text.")
 def generate(
     texts: tuple[str, ...],
@@ -42,13 +45,14 @@ def generate(
     no_plant: bool,
     every: bool,
     as_json: bool,
+    session: SessionOptions,
 ) -> None:
     """Generate a motion for each TEXT, such as "a person walks and turns left", and write it to OUT.
 
     With several texts, or --all, the files are numbered: out-1.bvh, out-2.bvh, ...
     """
     check_writable(out)
-    model = load_as(GenerateModel, bundle)
+    model = load_as(GenerateModel, bundle, session)
     settings: dict[str, Any] = {"candidates": candidates, "temperature": temperature, "max_seconds": max_seconds}
     with text_notes():
         found = model.generate(texts, hypotheses, seed=seed, **settings)

@@ -4,8 +4,10 @@ from pathlib import Path
 
 import click
 
+from motet.bundle.session import SessionOptions
 from motet.cli.convert import METRES
 from motet.cli.notes import note, unit_option
+from motet.cli.options import session_options
 from motet.errors import FormatError, MotionError
 from motet.formats import check_writable, read_motion, write_motion
 from motet.models.load import load_as
@@ -20,13 +22,22 @@ from motet.motion.motion import Motion
 @click.option("--frames", type=click.IntRange(1), help="How many to predict. [default: the bundle's horizon]")
 @click.option("--append", is_flag=True, help="Write the motion too, and what follows behind it.")
 @unit_option
-def predict(source: Path, out: Path, bundle: str, frames: int | None, append: bool, unit_in: str | None) -> None:
+@session_options
+def predict(
+    source: Path,
+    out: Path,
+    bundle: str,
+    frames: int | None,
+    append: bool,
+    unit_in: str | None,
+    session: SessionOptions,
+) -> None:
     """Carry the motion file MOTION on from its last frames, and write what follows.
 
     The file must have the joints of the bundle's figure; the frames come at the bundle's frame rate.
     """
     check_writable(out)
-    model = load_as(PredictModel, bundle)
+    model = load_as(PredictModel, bundle, session)
     motion = _read(source, unit_in)
     try:
         found = model.predict(motion, frames, append)
