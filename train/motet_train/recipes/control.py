@@ -16,7 +16,7 @@ from motet_train.data.clips import CONSTANT, Clips, sequences
 from motet_train.data.errors import DataError
 from motet_train.data.period import is_periodic
 from motet_train.divergence import DivergenceLearner
-from motet_train.evaluate.control.report import lab_of, missed_goals
+from motet_train.evaluate.control.experiments import missed_goals, study_of
 from motet_train.models.control import angle_crbm, tdbn
 from motet_train.models.control.angle_crbm import AngleCRBM, AngleCRBMConfig
 from motet_train.models.control.tdbn import TDBN, TDBNConfig
@@ -87,7 +87,7 @@ def _missed(
 
     def missed(enough: int) -> list[str]:
         run = Run(manifest, deepcopy(net).cpu())
-        return missed_goals(lab_of(ControlModel(run.manifest, run.torch_graphs()), clips), enough)
+        return missed_goals(study_of(ControlModel(run.manifest, run.torch_graphs()), clips), enough)
 
     return missed
 
