@@ -30,10 +30,9 @@ from motet.motion.heading import without_heading
 from motet.motion.kinematics import positions
 from motet.motion.mirror import mirror
 from motet.motion.motion import Motion
-from motet.motion.root_path import lay_root_path, plant_feet
+from motet.motion.root_path import lay_root_path
 from motet.motion.skeleton import Joint, Skeleton
-from motet.motion.smooth import smooth_resample
-from motet.representation.root_block import from_root_block, to_root_block
+from motet.representation.root_block import from_root_block, plant_feet, to_root_block
 
 __version__ = version("motet")
 
@@ -70,7 +69,6 @@ __all__ = [
     "plant_feet",
     "positions",
     "read",
-    "smooth_resample",
     "to_root_block",
     "without_heading",
     "write",

@@ -105,7 +105,7 @@ def describe_figures(model: DescribeModel, seconds: float) -> Figures:
     defaults = {"beams": BEAMS, "max_words": WORDS}
     steady = DescribeModel({**model.manifest, "defaults": defaults}, _steady(model.graphs, never))
     size = (round(SECONDS * model.fps), len(model.contract.channels))
-    motion = model.contract.motion(np.random.default_rng(0).normal(model.contract.mean, model.contract.std, size))
+    motion = model.contract.features(np.random.default_rng(0).normal(model.contract.mean, model.contract.std, size))
     return {
         "describe.descriptions": (_batch_rate(steady.describe, [motion], 128, seconds), "motions/s"),
         "describe.one": (_milliseconds(lambda: steady.describe(motion), seconds), "ms"),

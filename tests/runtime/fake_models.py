@@ -19,7 +19,7 @@ FPS = 10.0
 CHANNELS = ("hips.ty", "knee.rx", "knee.ry")
 SKELETON = Skeleton((Joint("hips", -1, (0.0, 0.0, 0.0)), Joint("knee", 0, (0.0, -1.0, 0.0))), 1.0)
 CONTRACT = MotionContract(
-    CHANNELS, ("m", "deg", "deg"), FPS, np.array([1.0, 20.0, 5.0]), np.array([0.5, 10.0, 1.0]), SKELETON
+    "angles", CHANNELS, ("m", "deg", "deg"), FPS, np.array([1.0, 20.0, 5.0]), np.array([0.5, 10.0, 1.0]), SKELETON
 )
 VOCABULARY = Vocabulary([*SPECIALS, "walks", "person", "a", "left", "8", "0"])
 STATE = 6

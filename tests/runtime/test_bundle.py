@@ -73,8 +73,11 @@ def test_verify_names_a_file_that_does_not_belong(folder: Path) -> None:
     [
         (lambda m: m.update(format=FORMAT + 1), f"this motet reads format {FORMAT}"),
         (lambda m: m.pop("motion"), "lacks motion"),
-        (lambda m: m["motion"].pop("fps"), "no motion contract"),
-        (lambda m: m["motion"]["skeleton"]["joints"][3].update(parent=9), "no motion contract"),
+        (lambda m: m["motion"].pop("fps"), "motion.fps: numbers are needed"),
+        (
+            lambda m: m["motion"]["skeleton"]["joints"][3].update(parent=9),
+            "motion.skeleton: .*after its parent",
+        ),
         (lambda m: m.update(verb="swim"), "for 'swim'"),
         (lambda m: m.pop("control"), "no control model"),
         (lambda m: m["graphs"].pop("step"), "no graph for the role 'step'"),

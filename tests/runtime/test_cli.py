@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import check_refused, run
+from figures import WRITTEN
 
 from motet.bundle.bundle import list_bundles
 from motet.formats import read_motion
@@ -32,9 +33,9 @@ def test_a_script_becomes_a_motion_that_travels(tmp_path: Path) -> None:
     assert again.read_bytes() == out.read_bytes()
 
 
-@pytest.mark.parametrize("extension", ["amc", "bvh", "npz", "csv", "html", "gif", "glb"])
+@pytest.mark.parametrize("extension", WRITTEN)
 def test_control_writes_every_format(tmp_path: Path, extension: str) -> None:
-    out = tmp_path / f"out.{extension}"
+    out = tmp_path / f"out{extension}"
     assert run("control", "walk .5s", "-o", out, "--in-place").exit_code == 0
     assert out.stat().st_size > 1000
 

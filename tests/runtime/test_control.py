@@ -48,7 +48,7 @@ def test_the_documented_loop_gives_the_same_frames(model: ControlModel) -> None:
         }
         frame, history = step.run(["frame", "next_history"], feeds)
         frames.append(frame[0])
-    np.testing.assert_array_equal(model.start().run(SCRIPT)[0].values, np.stack(frames))
+    np.testing.assert_array_equal(model.start().run(SCRIPT, in_place=True)[0].values, np.stack(frames))
 
 
 @pytest.mark.parametrize("variety", [0.0, 0.5, 1.0])
@@ -116,7 +116,7 @@ def test_a_motion_is_carried_on(model: ControlModel, clips: Path) -> None:
     walk = read_motion(clips / "39_14.amc")
     session = model.start(walk)
     session.control(walk=1.0)
-    first = model.contract.motion(session.step())
+    first = model.contract.features(session.step())
     last = walk.resample(model.fps).select(first.channels)[-1:]
     moving = model.contract.std > 1
     difference = (first.values - last.values)[0, moving] / model.contract.std[moving]
@@ -182,7 +182,8 @@ def test_frames_come_in_the_contract(model: ControlModel) -> None:
     assert frame.shape == (3, 59)
     motions = session.run("walk 1s")
     assert [type(motion) for motion in motions] == [Motion] * 3
-    assert (motions[0].fps, len(motions[0]), set(motions[0].units)) == (40.0, 40, {"deg"})
+    assert (motions[0].fps, len(motions[0]), set(motions[0].units)) == (40.0, 40, {"deg", "length"})
+    assert set(session.run("walk 1s", in_place=True)[0].units) == {"deg"}
     assert session.frames(np.zeros((0, 3))).shape == (3, 0, 59)
 
 

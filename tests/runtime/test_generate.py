@@ -1,5 +1,6 @@
 import pickle
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -7,14 +8,20 @@ from fake_models import CONTRACT, generate_model, moving
 from figures import walker
 
 from motet.bench import figures
-from motet.cli.generate import playable
 from motet.decode.mixture import Sample
 from motet.errors import DecodingError, MotionError, TextError, TextWarning
+from motet.formats import read_motion, write_motion
 from motet.models.generate import Generated, GenerateModel
 from motet.motion.kinematics import positions
-from motet.motion.root_path import plant_feet
+from motet.motion.motion import Motion
 from motet.representation.contract import MotionContract
-from motet.representation.root_block import to_root_block
+from motet.representation.root_block import from_root_block, plant_feet, to_root_block
+
+
+def contract_of(features: Motion) -> MotionContract:
+    mean, std = features.values.mean(axis=0), np.ones(len(features.channels))
+    return MotionContract("root_angles", features.channels, features.units, 10.0, mean, std, features.skeleton)
+
 
 TEXTS = ["a person walks", "walks", "a person walks left 80"]
 
@@ -32,10 +39,10 @@ def assert_same(one: list[Generated], other: list[Generated]) -> None:
 
 def test_motions_are_ranked_and_scored(model: GenerateModel) -> None:
     for row in model.generate(TEXTS, 4, candidates=3):
-        rates = [g.log_likelihood / len(g.motion) for g in row]
+        rates = [g.log_likelihood / len(g.frames) for g in row]
         assert rates == sorted(rates, reverse=True)
         for generated in row:
-            motion = generated.motion
+            motion = generated.features
             assert (motion.channels, motion.fps, motion.skeleton is None) == (CONTRACT.channels, 10.0, False)
             assert 1 <= len(motion) <= 30
 
@@ -43,8 +50,8 @@ def test_motions_are_ranked_and_scored(model: GenerateModel) -> None:
 def test_the_log_likelihood_is_the_score_of_the_motion(model: GenerateModel) -> None:
     for text, row in zip(TEXTS, model.generate(TEXTS, 3, candidates=2, max_seconds=1), strict=True):
         for generated in row:
-            if len(generated.motion) > 1:
-                assert model.score(text, generated.motion) == pytest.approx(generated.log_likelihood, abs=1e-3)
+            if len(generated.frames) > 1:
+                assert model.score(text, generated.features) == pytest.approx(generated.log_likelihood, abs=1e-3)
 
 
 def test_a_sentence_gets_what_it_gets_alone_with_its_seed(model: GenerateModel) -> None:
@@ -72,9 +79,9 @@ def test_settings_are_the_bundles_unless_given(model: GenerateModel) -> None:
         model.generate("walks")[0],
         model.generate("walks", 3, candidates=4, temperature=1.0, max_seconds=3)[0],
     )
-    assert max(len(g.motion) for g in model.generate("walks", 20, max_seconds=0.5)[0]) == 5
+    assert max(len(g.frames) for g in model.generate("walks", 20, max_seconds=0.5)[0]) == 5
     cold, hot = (
-        np.std([g.motion.values[0, 0] for g in model.generate("walks", 50, candidates=1, temperature=t)[0]])
+        np.std([g.frames[0, 0] for g in model.generate("walks", 50, candidates=1, temperature=t)[0]])
         for t in (0.05, 1.0)
     )
     assert cold < 0.7 * hot
@@ -128,30 +135,46 @@ def test_only_a_model_from_a_bundle_pickles(model: GenerateModel) -> None:
 
 def test_a_file_gets_the_roots_path_and_a_smooth_frame_rate() -> None:
     motion = walker(frames=30, fps=10.0)
-    found = playable(to_root_block(motion), 30.0)
+    generated = Generated(contract_of(to_root_block(motion)), to_root_block(motion).values, 0.0)
+    found = generated.playable(plant=False)
     assert (found.fps, len(found)) == (30.0, 88)
     places, source = positions(found)[::3, 0], positions(motion)[:, 0]
     travelled = np.linalg.norm(np.diff(places[:, [0, 2]], axis=0), axis=1).sum()
     assert travelled == pytest.approx(np.linalg.norm(np.diff(source[:, [0, 2]], axis=0), axis=1).sum(), rel=1e-6)
     np.testing.assert_allclose(places[:, 1], source[:, 1], atol=1e-9)
-    assert len(playable(to_root_block(motion), 5.0)) == 15
+    assert len(generated.playable(5.0, plant=False)) == 15
 
 
 def test_a_motion_has_planted_feet_and_is_there_as_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """A model whose contract is the walker's, root block and all."""
     plain = to_root_block(walker(frames=30, fps=10.0))
     model = generate_model()
-    mean, std = plain.values.mean(axis=0), np.ones(len(plain.channels))
-    model.contract = MotionContract(plain.channels, plain.units, 10.0, mean, std, plain.skeleton)
-    drawn = Sample((plain.values - mean).astype(np.float32), -1.0)
+    model.contract = contract_of(plain)
+    drawn = Sample((plain.values - model.contract.mean).astype(np.float32), -1.0)
     monkeypatch.setattr("motet.models.generate.mixture_search", lambda *given: [[drawn]])
     ((found,),) = model.generate("walks")
-    np.testing.assert_allclose(found.drawn.values, plain.values, atol=1e-4)
-    np.testing.assert_array_equal(found.motion.values, plant_feet(found.drawn).values)
-    assert np.abs(found.motion.values - found.drawn.values).max() > 0.1
+    np.testing.assert_allclose(found.frames, plain.values, atol=1e-4)
+    planted = plant_feet(model.contract.features(found.frames))
+    np.testing.assert_array_equal(found.features.values, planted.values)
+    assert np.abs(found.features.values - found.frames).max() > 0.1
+    np.testing.assert_array_equal(found.motion.values, from_root_block(planted).resample(30).values)
+    assert np.abs(positions(found.motion) - positions(found.playable(plant=False))).max() > 0.05
     model.contract = replace(model.contract, skeleton=None)
     ((found,),) = model.generate("walks")
-    assert found.motion is found.drawn
+    np.testing.assert_array_equal(found.features.values, found.frames)
+
+
+def test_a_result_is_written_as_it_is(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    plain = to_root_block(walker(frames=30, fps=10.0))
+    model = generate_model()
+    model.contract = contract_of(plain)
+    drawn = Sample((plain.values - model.contract.mean).astype(np.float32), -1.0)
+    monkeypatch.setattr("motet.models.generate.mixture_search", lambda *given: [[drawn]])
+    ((found,),) = model.generate("walks")
+    write_motion(tmp_path / "x.bvh", found.motion)
+    again = read_motion(tmp_path / "x.bvh")
+    assert (again.fps, len(again)) == (30.0, 88)
+    np.testing.assert_allclose(positions(again), positions(found.motion), atol=1e-6)
 
 
 def test_the_benchmark_measures_motions_of_one_length(model: GenerateModel) -> None:

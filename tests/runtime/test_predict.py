@@ -12,12 +12,12 @@ from figures import walker
 from motet.decode.rollout import free_run
 from motet.errors import BundleError, DecodingError, MotionError
 from motet.formats import read_motion, write_motion
-from motet.models.predict import PredictModel, ending
+from motet.models.predict import PredictModel
 from motet.motion.kinematics import local_rotations, positions
 from motet.motion.motion import Motion
 from motet.motion.rotations import axis_to_rotmat
 from motet.representation.contract import MotionContract
-from motet.representation.joint_vectors import carry_on, continuous_vectors, joints_of, to_joint_vectors
+from motet.representation.root_vectors import carry_on, joints_of, to_joint_vectors
 
 SEED, HORIZON = 4, 3
 FPS = 30.0
@@ -42,7 +42,8 @@ def graphs(channels: int, change: float = 1.0) -> dict[str, Any]:
 def model_of(motion: Motion, change: float = 1.0) -> PredictModel:
     """A model whose contract is the channels of a motion."""
     zeros = np.zeros(len(motion.channels))
-    contract = MotionContract(motion.channels, motion.units, motion.fps, zeros, zeros + 1, motion.skeleton)
+    name = "root_vectors" if joints_of(motion.channels) else "angles"
+    contract = MotionContract(name, motion.channels, motion.units, motion.fps, zeros, zeros + 1, motion.skeleton)
     manifest = {"name": "fake", "verb": "predict", "motion": contract.to_json(), "defaults": {"horizon": HORIZON}}
     return PredictModel(manifest, graphs(len(motion.channels), change))
 
@@ -104,7 +105,7 @@ def test_exponential_maps_do_not_leap() -> None:
     column = turning.channels.index("left_arm.ry")
     values[:, column - 1 : column + 2] = np.column_stack([np.zeros(60), 20.0 * np.arange(60), np.zeros(60)])
     figure = to_joint_vectors(replace(turning, values=values))
-    smooth = continuous_vectors(figure)
+    smooth = figure.continuous()
     place = figure.channels.index("left_arm.ex")
     assert np.abs(np.diff(figure.values[:, place : place + 3], axis=0)).max() > 3
     assert np.abs(np.diff(smooth.values[:, place : place + 3], axis=0)).max() < 0.5
@@ -113,17 +114,17 @@ def test_exponential_maps_do_not_leap() -> None:
 
 def test_another_frame_rate_ends_with_the_same_frame() -> None:
     motion = walker(41, fps=120.0)
-    found = ending(motion, FPS)
+    found = motion.resample(FPS, to_end=True)
     np.testing.assert_array_equal(found.values, motion.values[::4])
-    np.testing.assert_array_equal(ending(motion[:40], FPS).values, motion.values[3:40:4])
-    slow = ending(walker(9, fps=24.0), FPS)
+    np.testing.assert_array_equal(motion[:40].resample(FPS, to_end=True).values, motion.values[3:40:4])
+    slow = walker(9, fps=24.0).resample(FPS, to_end=True)
     assert len(slow) == 11
     np.testing.assert_allclose(slow.values[-1], walker(9, fps=24.0).values[-1], atol=1e-9)
 
 
 def test_a_stream_gives_what_the_whole_motion_gives() -> None:
     whole = walker(80, fps=120.0)
-    model = model_of(ending(to_joint_vectors(whole), FPS), change=0.5)
+    model = model_of(to_joint_vectors(whole).resample(FPS, to_end=True), change=0.5)
     session = model.stream(whole[:30])
     session.push(whole.values[30])
     session.push(whole.values[31:70])
@@ -138,7 +139,7 @@ def test_a_stream_gives_what_the_whole_motion_gives() -> None:
 def test_a_stream_without_a_start_takes_the_contracts_channels() -> None:
     model = model_of(to_joint_vectors(circle()))
     session = model.stream()
-    with pytest.raises(MotionError, match="has none"):
+    with pytest.raises(MotionError, match="has 0"):
         session.predict()
     session.push(to_joint_vectors(circle()).values)
     assert len(session.predict()) == HORIZON
@@ -157,7 +158,7 @@ def test_what_does_not_fit_is_refused() -> None:
     model = model_of(to_joint_vectors(whole))
     with pytest.raises(MotionError, match=r"needs 4 frames at 30 fps, and the motion has 3 \(9 at 90 fps\)"):
         model.predict(circle(9, fps=90.0))
-    with pytest.raises(MotionError, match="the motion has none"):
+    with pytest.raises(MotionError, match="the motion has 0"):
         model.predict(whole[:0])
     skeleton = whole.skeleton
     assert skeleton is not None

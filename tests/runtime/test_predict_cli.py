@@ -6,11 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import check_refused, run
-from figures import walker
+from figures import WRITTEN, walker
 
 from motet.formats import read_motion, write_motion
 from motet.models.load import load
-from motet.models.predict import ending
 from motet.motion.kinematics import positions
 
 WALK = "39_14.amc"
@@ -18,7 +17,7 @@ WALK = "39_14.amc"
 
 def test_a_walk_goes_on(clips: Path) -> None:
     """Trial 39_14 is none of those that the bundle was trained on."""
-    walk = ending(read_motion(clips / WALK), 30.0)
+    walk = read_motion(clips / WALK).resample(30.0, to_end=True)
     model = load("cmu-predict")
     truth = positions(walk)[60:85]
     assert walk.skeleton is not None
@@ -29,9 +28,9 @@ def test_a_walk_goes_on(clips: Path) -> None:
     assert off[-1] < 0.25 < still[-1]
 
 
-@pytest.mark.parametrize("extension", ["amc", "bvh", "npz", "csv", "html", "gif", "glb"])
+@pytest.mark.parametrize("extension", WRITTEN)
 def test_predict_writes_every_format(tmp_path: Path, clips: Path, extension: str) -> None:
-    out = tmp_path / f"out.{extension}"
+    out = tmp_path / f"out{extension}"
     result = run("predict", clips / WALK, "-o", out, "--frames", 5)
     assert (result.exit_code, result.stdout) == (0, f"{out}: 5 frames at 30 fps, 0.166667 s\n")
     assert "resampled from 120 to 30 fps" in result.stderr
@@ -54,7 +53,7 @@ def test_a_bvh_is_carried_on_as_the_amc_it_was_made_from(tmp_path: Path, clips: 
 def test_append_writes_the_motion_before_what_follows(tmp_path: Path, clips: Path) -> None:
     out = tmp_path / "out.npz"
     assert run("predict", clips / WALK, "-o", out, "--frames", 40, "--append").exit_code == 0
-    motion, walk = read_motion(out), ending(read_motion(clips / WALK), 30.0)
+    motion, walk = read_motion(out), read_motion(clips / WALK).resample(30.0, to_end=True)
     assert len(motion) == len(walk) + 40
     np.testing.assert_allclose(positions(motion)[: len(walk)], positions(walk), atol=1e-5)
     steps = np.linalg.norm(np.diff(positions(motion)[:, 0], axis=0), axis=1)

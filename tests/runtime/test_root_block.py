@@ -10,7 +10,7 @@ from motet.formats import read_motion
 from motet.motion.heading import heading
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
-from motet.motion.smooth import smooth_resample
+from motet.motion.resample import lines
 from motet.representation.contract import MotionContract
 from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS, from_root_block, to_root_block
 
@@ -93,7 +93,10 @@ def test_what_the_block_needs_is_named() -> None:
 
 def contract_of(motion: Motion) -> MotionContract:
     width = len(motion.channels)
-    return MotionContract(motion.channels, motion.units, motion.fps, np.zeros(width), np.ones(width), motion.skeleton)
+    name = "root_angles" if set(ROOT_BLOCK) <= set(motion.channels) else "angles"
+    return MotionContract(
+        name, motion.channels, motion.units, motion.fps, np.zeros(width), np.ones(width), motion.skeleton
+    )
 
 
 def test_a_contract_takes_motions_with_and_without_the_block() -> None:
@@ -112,32 +115,29 @@ def test_a_contract_needs_no_skeleton() -> None:
     contract = contract_of(replace(walker(3), skeleton=None))
     again = MotionContract.from_json(contract.to_json())
     assert again.skeleton is None
-    assert again.motion(np.zeros((2, len(again.channels)))).skeleton is None
+    assert again.features(np.zeros((2, len(again.channels)))).skeleton is None
 
 
 def test_smoothing_passes_through_every_frame() -> None:
     motion = walker(20, fps=10).continuous()
-    smooth = smooth_resample(motion, 30)
+    smooth = motion.resample(30)
     assert (smooth.fps, len(smooth)) == (30, 19 * 3 + 1)
     np.testing.assert_allclose(smooth.values[::3], motion.values, atol=1e-9)
     line = np.linspace(1, 5, 20)[:, None] * np.ones(len(motion.channels))
-    np.testing.assert_allclose(
-        smooth_resample(replace(motion, values=line), 25).values[:, 0], 1 + 4 / 19 * 0.4 * np.arange(48)
-    )
+    np.testing.assert_allclose(replace(motion, values=line).resample(25).values[:, 0], 1 + 4 / 19 * 0.4 * np.arange(48))
 
 
 def test_smoothing_is_nearer_to_the_motion_than_lines() -> None:
     motion = walker(122, fps=60).continuous()
     slow = motion[::6]
-    smooth, lines = smooth_resample(slow, 60).values, slow.resample(60).values
+    smooth = slow.resample(60).values
+    straight = lines(slow.values, np.arange(len(smooth)) / 6)
     truth = motion.values[: len(smooth)]
-    assert np.abs(smooth - truth).max() < 0.4 * np.abs(lines[: len(smooth)] - truth).max()
+    assert np.abs(smooth - truth).max() < 0.4 * np.abs(straight - truth).max()
 
 
 def test_smoothing_takes_no_turn_for_a_leap() -> None:
     motion = walker(12, fps=10).select(("hips.ry",))
     leaping = replace(motion, values=(motion.values + 180) % 360 - 180)
-    np.testing.assert_allclose(smooth_resample(leaping, 30).values, smooth_resample(motion, 30).values, atol=1e-9)
-    assert len(smooth_resample(motion[:1], 30)) == 1
-    with pytest.raises(MotionError, match="less"):
-        smooth_resample(motion, 5)
+    np.testing.assert_allclose(leaping.resample(30).values, motion.resample(30).values, atol=1e-9)
+    assert len(motion[:1].resample(30)) == 1

@@ -52,7 +52,7 @@ def test_runs_are_faster_than_walks_and_both_end_by_themselves() -> None:
     model = load("cmu-generate")
     found = model.generate(["a person walks"] * 5 + ["a person runs"] * 5, hypotheses=5, seed=list(range(10)))
     forward = model.contract.channels.index("root.forward")
-    speeds = [float(np.median(row[0].motion.values[:, forward])) for row in found]
+    speeds = [float(np.median(row[0].features.values[:, forward])) for row in found]
     assert max(speeds[:5]) < 2.1 < min(speeds[5:])
     assert max(row[0].motion.duration for row in found) < 15
 
@@ -60,4 +60,6 @@ def test_runs_are_faster_than_walks_and_both_end_by_themselves() -> None:
 def test_a_motion_scores_what_the_search_gave_it() -> None:
     model = load("cmu-generate")
     best = model.generate("a person runs", seed=3)[0][0]
-    assert model.score("a person runs", best.drawn) == pytest.approx(best.log_likelihood, rel=1e-4)
+    assert model.score("a person runs", best.contract.features(best.frames)) == pytest.approx(
+        best.log_likelihood, rel=1e-4
+    )

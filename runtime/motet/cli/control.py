@@ -11,7 +11,6 @@ from motet.formats.html import write as write_html
 from motet.models.control import ControlModel
 from motet.models.load import load_as
 from motet.models.script import parse_script, starts_of
-from motet.motion.root_path import GENERATED, lay_root_path
 
 
 @click.command()
@@ -48,8 +47,7 @@ def control(
         else start or max(segments[0].start, key=segments[0].start.__getitem__)
     )
     figure = model.start(first, seed=seed, variety=variety, temperature=temperature)
-    motion = figure.run(script)[0]
-    motion = motion if in_place else lay_root_path(motion, tremble=GENERATED)
+    motion = figure.run(script, in_place)[0]
     if out.suffix.lower() == ".html":
         write_html(out, motion, captions=starts_of(segments), title=script)
     else:

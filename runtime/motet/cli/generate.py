@@ -14,8 +14,6 @@ from motet.formats import check_writable, write_motion
 from motet.models.generate import Generated, GenerateModel
 from motet.models.load import load_as
 from motet.motion.motion import Motion
-from motet.motion.smooth import smooth_resample
-from motet.representation.root_block import ROOT_BLOCK, from_root_block
 
 
 @click.command()
@@ -57,7 +55,7 @@ def generate(
     with text_notes():
         found = model.generate(texts, hypotheses, seed=seed, **settings)
     kept = [row if every else row[:1] for row in found]
-    motions = [playable(result.drawn if no_plant else result.motion, fps) for row in kept for result in row]
+    motions = [result.playable(fps, plant=not no_plant) for row in kept for result in row]
     paths = _numbered(out, len(motions))
     for path, motion in zip(paths, motions, strict=True):
         write_motion(path, motion)
@@ -67,13 +65,6 @@ def generate(
         for text, row in zip(texts, kept, strict=True)
     ]
     click.echo(json.dumps(rows) if as_json else "\n".join(_lines(rows)))
-
-
-def playable(motion: Motion, fps: float) -> Motion:
-    """A model's motion for a file: with the root's path instead of its velocities, at another frame rate."""
-    if set(ROOT_BLOCK) <= set(motion.channels):
-        motion = from_root_block(motion)
-    return smooth_resample(motion, fps) if fps >= motion.fps else motion.resample(fps)
 
 
 def _numbered(out: Path, count: int) -> list[Path]:

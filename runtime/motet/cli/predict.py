@@ -6,9 +6,9 @@ import click
 
 from motet.bundle.session import SessionOptions
 from motet.cli.convert import METRES
-from motet.cli.notes import note, unit_option
+from motet.cli.notes import note, refused, unit_option
 from motet.cli.options import session_options
-from motet.errors import FormatError, MotionError
+from motet.errors import MotionError
 from motet.formats import check_writable, read_motion, write_motion
 from motet.models.load import load_as
 from motet.models.predict import PredictModel
@@ -42,7 +42,7 @@ def predict(
     try:
         found = model.predict(motion, frames, append)
     except MotionError as error:
-        raise FormatError(source, str(error)) from error
+        raise refused(source, error) from error
     if abs(motion.fps - model.fps) > 1e-6:
         note(f"{source}: resampled from {motion.fps:g} to {model.fps:g} fps")
     write_motion(out, found)

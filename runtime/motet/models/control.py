@@ -103,10 +103,11 @@ class ControlModel(BundleModel):
         return self.encode(self.starts[label])
 
     def _history_of(self, motion: Motion) -> Floats:
-        frames = self.contract.frames(without_heading(motion))
-        if len(frames) < self.taps:
-            raise MotionError(f"a start needs {self.taps} frames at {self.fps:g} fps, this motion has {len(frames)}")
-        return self.encode(frames[-self.taps :])
+        last = motion.continuous().resample(self.fps, to_end=True)[-self.taps :]
+        if len(last) < self.taps:
+            raise MotionError(f"a start needs {self.taps} frames at {self.fps:g} fps, this motion has {len(last)}")
+        # levelled by themselves: where the figure faced long before says nothing about where it faces now
+        return self.encode(self.contract.frames(without_heading(last)))
 
     def _settings(self, variety: float, temperature: float, iterations: int) -> "_Settings":
         if not 0 <= variety <= 1:
@@ -200,11 +201,14 @@ class ControlSession:
         self._tick += 1
         return self._inputs
 
-    def run(self, script: str) -> list[Motion]:
-        """Run a control script (:mod:`motet.models.script`) for all characters; one motion for each."""
+    def run(self, script: str, in_place: bool = False) -> list[Motion]:
+        """Run a control script (:mod:`motet.models.script`) for all characters; one motion for each.
+
+        The root's path is laid by what the feet do on the ground; ``in_place`` leaves it out.
+        """
         segments = parse_script(script, self.model.labels)
         frames = self.frames(control_track(segments, self.model.labels, self.model.fps))
-        return [self.model.contract.motion(character) for character in frames]
+        return [self.model.contract.motion(character, plant=not in_place) for character in frames]
 
     def frames(self, track: ArrayLike) -> Floats:
         """Run a control track (T, labels) or (T, characters, labels): frames (characters, T, D) float32."""

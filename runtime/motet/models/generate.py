@@ -15,29 +15,40 @@ from motet.decode.noise import Recorded
 from motet.errors import DecodingError
 from motet.models.language import LanguageModel
 from motet.motion.motion import Motion
-from motet.motion.root_path import has_feet, plant_feet
-from motet.representation.root_block import ROOT_BLOCK
+from motet.motion.rotations import Array
+from motet.representation.contract import MotionContract
+
+PLAYED = 30.0
+"""Frames per second of what is generated, whatever the model's own rate is."""
 
 
 @dataclass(frozen=True, eq=False)
 class Generated:
-    """A motion in the contract's channels, its log-likelihood given the sentence, and the words that were unknown.
+    """A generated motion, its log-likelihood given the sentence, and the words that were unknown.
 
-    drawn: the motion as it was drawn, whose feet slide.
+    contract: what the frames mean. frames: (T, D) as they were drawn, in its channels; their feet slide.
     log_likelihood: of the normalised frames as drawn and of where they end, as :meth:`GenerateModel.score` gives it;
         None where the model's loop has no likelihoods.
-    feet: whether the motion has feet that can be planted, and a root block.
     """
 
-    drawn: Motion
+    contract: MotionContract
+    frames: Array
     log_likelihood: float | None
     unknown: tuple[str, ...] = ()
-    feet: bool = False
+
+    @cached_property
+    def features(self) -> Motion:
+        """The motion in the contract's channels and at its frame rate, its feet planted: to be measured."""
+        return self.contract.features(self.frames, plant=True)
 
     @cached_property
     def motion(self) -> Motion:
-        """The motion, going where its feet take it (:func:`motet.motion.root_path.plant_feet`)."""
-        return plant_feet(self.drawn) if self.feet else self.drawn
+        """The motion at 30 frames a second, going where its feet take it: to be played and written."""
+        return self.playable()
+
+    def playable(self, fps: float = PLAYED, plant: bool = True) -> Motion:
+        """The motion at another frame rate, or without its feet planted: moving as it was drawn, with sliding feet."""
+        return self.contract.motion(self.frames, plant=plant).resample(fps)
 
 
 class GenerateModel(LanguageModel):
@@ -112,7 +123,7 @@ class GenerateModel(LanguageModel):
 
     def score(self, sentence: str, motion: Motion) -> float:
         """Log-likelihood of a motion, and of its end, given a sentence; a TextWarning names words that count as UNK."""
-        normal = (self.frames(motion) - self.contract.mean) / self.contract.std
+        normal = self.contract.normalised(self.frames(motion))
         frames = np.zeros((1, len(normal) + 1, normal.shape[1] + 1), dtype=np.float32)
         frames[0, :-1, :-1], frames[0, :-1, -1] = normal, 1
         feeds = {"context": self.embed(sentence), "frames": frames}
@@ -129,13 +140,8 @@ class GenerateModel(LanguageModel):
         return {"ids": ids, "frames": row[0].frames}
 
     def _generated(self, sample: Sample, text: str) -> Generated:
-        drawn = self.contract.motion(sample.frames * self.contract.std + self.contract.mean)
-        return Generated(drawn, sample.log_likelihood, tuple(self.unknown(text)), self._feet())
-
-    def _feet(self) -> bool:
-        skeleton = self.contract.skeleton
-        known = skeleton is not None and skeleton.metres_per_unit is not None and has_feet(skeleton)
-        return known and set(ROOT_BLOCK) <= set(self.contract.channels)
+        frames = self.contract.denormalised(sample.frames)
+        return Generated(self.contract, frames, sample.log_likelihood, tuple(self.unknown(text)))
 
 
 def _seeds(seed: int | Sequence[int], count: int) -> list[int]:

@@ -15,9 +15,6 @@ from motet.decode.rollout import two_rows
 from motet.errors import DecodingError, MotionError
 from motet.models.base import BundleModel
 from motet.motion.motion import Motion
-from motet.motion.rotations import Array
-from motet.representation.contract import MotionContract
-from motet.representation.joint_vectors import carry_on, continuous_vectors, joints_of, to_joint_vectors
 
 Floats = NDArray[np.float32]
 
@@ -46,36 +43,23 @@ class PredictModel(BundleModel):
         """The ``frames`` (as many as the horizon by default) that follow a motion, at the model's frame rate.
 
         A mocap motion of the model's figure is carried on in its own channels, units and skeleton, from where its root
-        is; a motion in the channels of :attr:`contract` in those. Only the last :attr:`seed_frames` at the model's
+        is; features, in the channels of :attr:`contract`, as features. Only the last :attr:`seed_frames` at the model's
         frame rate are looked at; one at another rate is resampled, so that its last frame is kept.
         append: give the motion, resampled, and what follows it.
         MotionError for a motion that is too short, or lacks joints or channels of the model, which are named.
         """
-        whole = ending(motion, self.fps)
+        whole = motion if motion.fps == self.fps else motion.continuous().resample(self.fps, to_end=True)
         seed = whole[max(0, len(whole) - self.seed_frames - 1) :]
-        figure = self.figure(seed)
-        if len(figure) < self.seed_frames:
+        given = self.contract.frames(seed)
+        if len(given) < self.seed_frames:
             limit = f"the model needs {self.seed_frames} frames at {self.fps:g} fps"
-            raise MotionError(f"{limit}, and the motion has {len(figure)} ({len(motion)} at {motion.fps:g} fps)")
-        found = self.next_frames(figure.values[None, -self.seed_frames :], frames)[0]
-        following = self.contract.motion(found)
-        if _converted(self.contract, motion):
-            following = carry_on(seed, following)
-        else:
-            whole = whole.select(self.contract.channels, self.contract.units)
+            raise MotionError(f"{limit}, and the motion has {len(given)} ({len(motion)} at {motion.fps:g} fps)")
+        found = self.next_frames(given[None, -self.seed_frames :], frames)[0]
+        following = self.contract.motion(found, after=seed, plant=False)
         if append:
-            whole = whole.continuous() if motion.fps != self.fps else whole
+            whole = whole.select(following.channels, following.units)
             following = replace(following, values=np.concatenate([whole.values, following.values]))
         return following
-
-    def figure(self, motion: Motion) -> Motion:
-        """A motion at the model's frame rate in the channels and units of :attr:`contract`; MotionError as above."""
-        if not len(motion):
-            raise MotionError(f"the model needs {self.seed_frames} frames, and the motion has none")
-        if not _converted(self.contract, motion):
-            return motion.select(self.contract.channels, self.contract.units)
-        found = to_joint_vectors(motion, joints_of(self.contract.channels))
-        return continuous_vectors(found.select(self.contract.channels, self.contract.units))
 
     def next_frames(self, seeds: ArrayLike, frames: int | None = None) -> Floats:
         """Seed frames (B, L, C) in the contract's channels, to the next frames (B, frames, C) float32.
@@ -107,7 +91,7 @@ class PredictModel(BundleModel):
             default there is none, and frames come in the channels and at the frame rate of :attr:`contract`.
         """
         if start is None:
-            start = self.contract.motion(np.empty((0, len(self.contract.channels))))
+            start = self.contract.features(np.empty((0, len(self.contract.channels))))
         return PredictSession(self, start)
 
 
@@ -130,22 +114,3 @@ class PredictSession:
     def predict(self, frames: int | None = None) -> Motion:
         """As :meth:`PredictModel.predict`, after all that was pushed so far."""
         return self.model.predict(self._motion, frames)
-
-
-def ending(motion: Motion, fps: float) -> Motion:
-    """The motion at another frame rate, such that its last frame stays; what is left over falls away at the start."""
-    if motion.fps == fps:
-        return motion
-    count = math.floor((len(motion) - 1) * fps / motion.fps + 1e-9) + 1
-    backwards: Array = motion.values[::-1]
-    resampled = replace(motion, values=backwards).resample(fps)[: max(count, 0)]
-    return replace(resampled, values=resampled.values[::-1])
-
-
-def _converted(contract: MotionContract, motion: Motion) -> bool:
-    """Whether the motion comes as a mocap figure that has to be put into the contract's channels."""
-    return (
-        bool(joints_of(contract.channels))
-        and motion.skeleton is not None
-        and not (set(contract.channels) <= set(motion.channels))
-    )

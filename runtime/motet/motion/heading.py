@@ -9,7 +9,7 @@ from motet.motion.rotations import Array, axis_to_rotmat
 
 def heading(motion: Motion) -> Array:
     """Angle (T,) in radians about the vertical y axis that the root faces, unwrapped over time; 0 is along z."""
-    forward = local_rotations(motion)[:, 0, :, 2]
+    forward = local_rotations(motion, [0])[:, 0, :, 2]
     return np.unwrap(np.arctan2(forward[:, 0], forward[:, 2]))
 
 
@@ -25,7 +25,7 @@ def without_heading(motion: Motion) -> Motion:
         return motion
     time, angle = np.arange(len(motion)), heading(motion)
     line: Array = np.polyval(np.polyfit(time, angle, min(1, len(motion) - 1)), time).astype(np.float64)
-    levelled = axis_to_rotmat("y", -line) @ local_rotations(motion)[:, 0]
+    levelled = axis_to_rotmat("y", -line) @ local_rotations(motion, [0])[:, 0]
     units = tuple(motion.units[motion.channels.index(name)] for name in names)
     turns = np.array([TURN[unit] for unit in units])
     angles = euler_of(levelled, joint) * turns / (2 * np.pi)

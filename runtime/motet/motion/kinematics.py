@@ -1,12 +1,13 @@
 """Forward kinematics: from the channels of a motion to rotations and positions of its joints."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from motet.errors import MotionError
 from motet.motion.motion import TURN, Motion
-from motet.motion.rotations import Array, euler_to_rotmat, rotmat_to_euler
+from motet.motion.rotations import Array, euler_to_rotmat, rotmats_to_euler
 from motet.motion.skeleton import Joint, Skeleton
 
 AXES = ("x", "y", "z")
@@ -19,14 +20,21 @@ def skeleton_of(motion: Motion) -> Skeleton:
     return motion.skeleton
 
 
-def local_rotations(motion: Motion) -> Array:
-    """Rotations (T, J, 3, 3) of every joint relative to its parent."""
+def local_rotations(motion: Motion, joints: Sequence[int] | None = None) -> Array:
+    """Rotations (T, J, 3, 3) relative to the parent of every joint, or of the joints with the given indices."""
     skeleton = skeleton_of(motion)
-    angles = _angles(motion, skeleton)
-    rotations = np.empty((len(motion), len(skeleton.joints), 3, 3))
-    for i, joint in enumerate(skeleton.joints):
-        columns = [AXES.index(axis) for axis in joint.order]
-        rotations[:, i] = joint.frame @ euler_to_rotmat(angles[:, i, columns], joint.order) @ joint.frame.T
+    wanted = range(len(skeleton.joints)) if joints is None else joints
+    angles = _angles(motion, [skeleton.names[joint] for joint in wanted])
+    rotations = np.empty((len(motion), len(wanted), 3, 3))
+    orders = [skeleton.joints[joint].order for joint in wanted]
+    for order in dict.fromkeys(orders):
+        places = [place for place, other in enumerate(orders) if other == order]
+        columns = [AXES.index(axis) for axis in order]
+        rotations[:, places] = euler_to_rotmat(angles[:, places][..., columns], order)
+    for place, joint in enumerate(wanted):
+        if any(skeleton.joints[joint].axis):
+            frame = skeleton.joints[joint].frame
+            rotations[:, place] = frame @ rotations[:, place] @ frame.T
     return rotations
 
 
@@ -36,9 +44,9 @@ def local_translations(motion: Motion) -> Array:
     translations = np.repeat(skeleton.offsets[None], len(motion), axis=0)
     for column, name in enumerate(motion.channels):
         joint, _, kind = name.rpartition(".")
-        if kind in ("tx", "ty", "tz") and joint in skeleton.names:
+        if kind in ("tx", "ty", "tz") and joint in skeleton.places:
             factor = 1.0 if motion.units[column] == "length" else 1 / skeleton.unit_factor(1.0)
-            translations[:, skeleton.index(joint), AXES.index(kind[1])] = motion.values[:, column] * factor
+            translations[:, skeleton.places[joint], AXES.index(kind[1])] = motion.values[:, column] * factor
     return translations
 
 
@@ -46,10 +54,11 @@ def global_transforms(motion: Motion) -> tuple[Array, Array]:
     """Rotations (T, J, 3, 3) and positions (T, J, 3) of every joint in the world, lengths in the skeleton's unit."""
     skeleton = skeleton_of(motion)
     rotations, positions = local_rotations(motion), local_translations(motion)
-    for i, joint in enumerate(skeleton.joints[1:], start=1):
-        parent = rotations[:, joint.parent]
-        positions[:, i] = positions[:, joint.parent] + (parent @ positions[:, i, :, None])[..., 0]
-        rotations[:, i] = parent @ rotations[:, i]
+    for level in skeleton.levels:
+        parents = skeleton.parents[level]
+        turned = rotations[:, parents]
+        positions[:, level] = positions[:, parents] + (turned @ positions[:, level, :, None])[..., 0]
+        rotations[:, level] = turned @ rotations[:, level]
     return rotations, positions
 
 
@@ -59,14 +68,17 @@ def positions(motion: Motion) -> Array:
 
 
 def euler_of(rotations: Array, joint: Joint) -> Array:
-    """Local rotations (T, 3, 3) of one joint to its channels rx, ry, rz (T, 3) in radians: undoes C M C^T."""
-    angles = rotmat_to_euler(joint.frame.T @ rotations @ joint.frame, joint.order)
+    """Local rotations (T, 3, 3) of one joint to its channels rx, ry, rz (T, 3) in radians: undoes C M C^T.
+
+    The angles do not leap from frame to frame; the first frame's middle angle is within a quarter turn.
+    """
+    angles = rotmats_to_euler(joint.frame.T @ rotations @ joint.frame, joint.order)
     ordered: Array = angles[:, [joint.order.index(axis) for axis in AXES]]
     return ordered
 
 
 def with_channels(motion: Motion, names: tuple[str, ...], values: Array, units: tuple[str, ...]) -> Motion:
-    """The motion with channels (T, len(names)) replaced, or put in front where it has none of that name."""
+    """The motion with channels (T, len(names)) replaced, or prepended where it has none of that name."""
     new = tuple(name for name in names if name not in motion.channels)
     added = [names.index(name) for name in new]
     everything = np.concatenate([values[:, added], motion.values], axis=1)
@@ -77,13 +89,12 @@ def with_channels(motion: Motion, names: tuple[str, ...], values: Array, units: 
     return replace(motion, values=everything, channels=channels, units=tuple(all_units))
 
 
-def _angles(motion: Motion, skeleton: Skeleton) -> Array:
-    """Euler angles (T, J, 3) about x, y, z in radians; 0 where there is no channel."""
-    angles = np.zeros((len(motion), len(skeleton.joints), 3))
-    for joint, columns in motion.rotation_columns().items():
-        if joint in skeleton.names:
-            for column in columns:
-                axis = AXES.index(motion.channels[column][-1])
-                radians = motion.values[:, column] * (2 * np.pi / TURN[motion.units[column]])
-                angles[:, skeleton.index(joint), axis] = radians
+def _angles(motion: Motion, joints: Sequence[str]) -> Array:
+    """Euler angles (T, J, 3) about x, y, z in radians of the joints named; 0 where there is no channel."""
+    angles = np.zeros((len(motion), len(joints), 3))
+    found = motion.rotation_columns()
+    for place, joint in enumerate(joints):
+        for column in found.get(joint, ()):
+            radians = motion.values[:, column] * (2 * np.pi / TURN[motion.units[column]])
+            angles[:, place, AXES.index(motion.channels[column][-1])] = radians
     return angles

@@ -14,7 +14,7 @@ import numpy as np
 from motet.errors import MotionError
 from motet.motion.kinematics import AXES, euler_of, local_rotations, local_translations, skeleton_of, with_channels
 from motet.motion.motion import TURN, Motion
-from motet.motion.rotations import Array, continuous_euler
+from motet.motion.rotations import Array
 from motet.motion.sides import partners_of
 from motet.motion.skeleton import Joint, Skeleton
 
@@ -101,10 +101,8 @@ def _sign(kind: str, axis: int) -> float:
 
 def _mirrored_rotation(motion: Motion, joint: Joint, partner: int, axis: int) -> Channels:
     signs = _signs(axis)
-    rotations = signs[:, None] * local_rotations(motion)[:, partner] * signs
-    order = [AXES.index(letter) for letter in joint.order]
+    rotations = signs[:, None] * local_rotations(motion, [partner])[:, 0] * signs
     angles = euler_of(rotations, joint)
-    angles[:, order] = continuous_euler(angles[:, order])
     own = _kinds(motion, joint, "r")
     units = [own.get(f"r{letter}", next(iter(own.values()), "deg")) for letter in AXES]
     factors = [TURN[unit] / (2 * np.pi) for unit in units]

@@ -1,12 +1,16 @@
 """The motion: frames of named channels with units and a frame rate. Immutable, finite, never guessed."""
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any, SupportsIndex
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from motet.errors import MotionError
-from motet.motion.rotations import Array, continuous_euler
+from motet.motion.resample import resampled
+from motet.motion.rotations import Array, continuous_euler, continuous_rotvec, without_turns
 from motet.motion.skeleton import Skeleton
 
 UNITS = ("deg", "rad", "length", "m", "deg/s", "rad/s", "m/s", "1")
@@ -15,8 +19,11 @@ UNITS = ("deg", "rad", "length", "m", "deg/s", "rad/s", "m/s", "1")
 TURN = {"deg": 360.0, "rad": 2 * np.pi}
 """A whole turn in each unit of angle."""
 
+MAX_VALUES = 2**28
+"""Numbers that a motion is resampled to at most: 2 GiB, of a hundred channels six hours at 120 frames a second."""
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Motion:
     """A motion of T frames and D channels.
 
@@ -50,8 +57,9 @@ class Motion:
         self._refuse_not_finite()
 
     def _refuse_not_finite(self) -> None:
-        bad = np.argwhere(~np.isfinite(self.values))
-        if len(bad):
+        finite = np.isfinite(self.values)
+        if not finite.all():
+            bad = np.argwhere(~finite)
             frame, channel = bad[0]
             place = f"frame {frame}, channel {self.channels[channel]!r} is {self.values[frame, channel]}"
             raise MotionError(f"{place}: {len(bad)} values are not finite")
@@ -64,26 +72,48 @@ class Motion:
         """Seconds: the number of frames over fps."""
         return len(self) / self.fps
 
-    def __getitem__(self, frames: slice) -> "Motion":
-        """The motion of a slice of its frames, with the frame rate divided by the slice's step."""
-        step = frames.step or 1
+    def __repr__(self) -> str:
+        return f"Motion({len(self)} frames, {len(self.channels)} channels, {self.fps:g} fps, {self.duration:.1f} s)"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # arrays come back writeable from pickle and deepcopy: made anew, the motion is read-only again
+        return Motion, (self.values, self.channels, self.units, self.fps, self.skeleton)
+
+    def __getitem__(self, frames: slice | SupportsIndex) -> "Motion":
+        """The motion of a slice of its frames, with the frame rate divided by the slice's step; or of one frame.
+
+        IndexError for one frame that there is not.
+        """
+        if not isinstance(frames, slice):
+            index = range(len(self))[frames]
+            return replace(self, values=self.values[index : index + 1])
+        step = 1 if frames.step is None else frames.step
         if step < 1:
             raise MotionError(f"frames are taken forward: a step of {step} is not possible")
         return replace(self, values=self.values[frames], fps=self.fps / step)
+
+    def __iter__(self) -> Iterator["Motion"]:
+        return (self[index] for index in range(len(self)))
 
     def cut(self, start: float = 0.0, stop: float | None = None) -> "Motion":
         """The part from ``start`` to ``stop``, in seconds; MotionError outside of the motion."""
         stop = self.duration if stop is None else stop
         if not 0 <= start < stop <= self.duration + 0.5 / self.fps:
             raise MotionError(f"cannot cut {start:g} to {stop:g} s out of a motion of {self.duration:g} s")
-        return self[round(start * self.fps) : round(stop * self.fps)]
+        part = self[round(start * self.fps) : round(stop * self.fps)]
+        if not len(part):
+            raise MotionError(f"there is no frame from {start:g} to {stop:g} s at {self.fps:g} fps")
+        return part
 
     def select(self, channels: tuple[str, ...], units: tuple[str, ...] | None = None) -> "Motion":
-        """The named channels in the order given, converted to ``units``; MotionError names those that lack."""
-        missing = [name for name in channels if name not in self.channels]
+        """The named channels in the order given, converted to ``units``; MotionError names what is missing."""
+        if channels == self.channels and units in (None, self.units):
+            return self
+        places = {name: column for column, name in enumerate(self.channels)}
+        missing = [name for name in channels if name not in places]
         if missing:
             raise MotionError(f"the motion lacks {len(missing)} of {len(channels)} channels: {', '.join(missing)}")
-        columns = [self.channels.index(name) for name in channels]
+        columns = [places[name] for name in channels]
         units = units or tuple(self.units[column] for column in columns)
         factors = [self._factor(column, unit) for column, unit in zip(columns, units, strict=True)]
         return replace(self, values=self.values[:, columns] * factors, channels=channels, units=units)
@@ -92,8 +122,9 @@ class Motion:
         old = self.units[column]
         if old == unit:
             return 1.0
-        if old in TURN and unit in TURN:
-            return TURN[unit] / TURN[old]
+        angles = old.removesuffix("/s"), unit.removesuffix("/s")
+        if set(angles) <= TURN.keys() and old.endswith("/s") == unit.endswith("/s"):
+            return TURN[angles[1]] / TURN[angles[0]]
         if {old, unit} == {"length", "m"} and self.skeleton is not None:
             metres = self.skeleton.unit_factor(1.0)
             return metres if unit == "m" else 1 / metres
@@ -113,51 +144,73 @@ class Motion:
             raise MotionError("a motion without a skeleton has no length unit")
         return replace(self, skeleton=replace(self.skeleton, metres_per_unit=metres_per_unit))
 
-    def resample(self, fps: float) -> "Motion":
-        """The motion at another frame rate, starting at the same frame and as long.
+    def resample(self, fps: float, to_end: bool = False) -> "Motion":
+        """The motion at another frame rate, by the rule of :mod:`motet.motion.resample`.
 
-        Where the old rate is a multiple of the new one, frames are picked; else channels are interpolated linearly,
-        Euler angles after their leaps are taken out (:meth:`continuous`).
+        It starts at the same frame, or ends at the same one (``to_end``). Where frames are not picked, leaps of angles
+        are taken out first (:meth:`continuous`).
         """
         if not (np.isfinite(fps) and fps > 0):
             raise MotionError(f"the frame rate must be a positive number, not {fps}")
+        if fps == self.fps:
+            return self
         ratio = self.fps / fps
-        if abs(ratio - round(ratio)) < 1e-9 and ratio > 0.5:
-            return replace(self[:: round(ratio)], fps=fps)
-        smooth = self.continuous().values
-        old = np.arange(len(self)) / self.fps
-        new = np.arange(max(1, round(len(self) / ratio)) if len(self) else 0) / fps
-        columns = [np.interp(new, old, column) for column in smooth.T] if len(self) else []
-        return replace(self, values=np.reshape(columns, (len(self.channels), len(new))).T, fps=fps)
+        if self.values.size / ratio > MAX_VALUES:
+            raise MotionError(f"{self.duration:g} s at {fps:g} fps are too many frames")
+        picked = abs(ratio - round(ratio)) < 1e-9 and ratio > 0.5
+        values = (self if picked else self.continuous()).values
+        return replace(self, values=resampled(values, ratio, to_end), fps=fps)
 
     def continuous(self) -> "Motion":
-        """The same poses with Euler angles that do not leap between frames (whole turns and gimbal flips)."""
+        """The same poses with angles that do not leap between frames.
+
+        Euler angles by whole turns and gimbal flips, from the first frame on; exponential maps ("JOINT.ex", "JOINT.ey",
+        "JOINT.ez") by whole turns, back from the last one.
+        """
         values = np.array(self.values)
-        for joint, columns in self.rotation_columns().items():
-            turns = [TURN[self.units[column]] for column in columns]
-            order = self._order(joint)
-            if len(columns) == 3 and order is not None:
-                ordered = [columns["xyz".index(axis)] for axis in order]
-                radians = values[:, ordered] * 2 * np.pi / turns
-                values[:, ordered] = continuous_euler(radians) * turns / (2 * np.pi)
-            else:
-                for column, turn in zip(columns, turns, strict=True):
-                    values[:, column] = np.unwrap(values[:, column], period=turn)
+        triples, singles = self._euler()
+        turns = np.array([TURN.get(unit, np.inf) for unit in self.units])
+        if len(triples):
+            values[:, triples] = continuous_euler(values[:, triples], turns[triples])
+        if len(singles):
+            values[:, singles] = without_turns(values[:, singles], turns[singles])
+        maps = [columns for columns in rotation_columns(self.channels, self.units, "e").values() if len(columns) == 3]
+        if maps:
+            radians = 2 * np.pi / turns[maps]
+            values[:, maps] = continuous_rotvec(values[:, maps] * radians) / radians
         return replace(self, values=values)
 
-    def rotation_columns(self) -> dict[str, list[int]]:
+    def _euler(self) -> tuple[list[list[int]], list[int]]:
+        """Columns of joints with all three Euler angles, in the order of each; and columns of all other angles."""
+        triples, singles = [], []
+        for joint, columns in self.rotation_columns().items():
+            order = self._order(joint)
+            if len(columns) == 3 and order is not None:
+                triples.append([columns["xyz".index(axis)] for axis in order])
+            else:
+                singles.extend(columns)
+        return triples, singles
+
+    def rotation_columns(self) -> Mapping[str, list[int]]:
         """For each joint with Euler channels their columns, in the order x, y, z."""
-        found: dict[str, list[int]] = {}
-        for column in sorted(range(len(self.channels)), key=lambda column: self.channels[column][-2:]):
-            joint, _, kind = self.channels[column].rpartition(".")
-            if kind in ("rx", "ry", "rz") and self.units[column] in TURN:
-                found.setdefault(joint, []).append(column)
-        return found
+        return rotation_columns(self.channels, self.units)
 
     def _order(self, joint: str) -> str | None:
-        if self.skeleton is None or joint not in self.skeleton.names:
+        if self.skeleton is None or joint not in self.skeleton.places:
             return None
-        return self.skeleton.joints[self.skeleton.index(joint)].order
+        return self.skeleton.joints[self.skeleton.places[joint]].order
+
+
+@lru_cache(maxsize=64)
+def rotation_columns(channels: tuple[str, ...], units: tuple[str, ...], letter: str = "r") -> Mapping[str, list[int]]:
+    """For each joint with channels "JOINT.rx", ... (or with another letter) in a unit of angle their columns."""
+    found: dict[str, list[int]] = {}
+    kinds = {f"{letter}{axis}" for axis in "xyz"}
+    for column in sorted(range(len(channels)), key=lambda column: channels[column][-2:]):
+        joint, _, kind = channels[column].rpartition(".")
+        if kind in kinds and units[column] in TURN:
+            found.setdefault(joint, []).append(column)
+    return found
 
 
 def _frozen(values: ArrayLike) -> Array:

@@ -21,12 +21,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from motet.errors import MotionError
+from motet.motion.feet import feet_of
 from motet.motion.kinematics import positions, skeleton_of, with_channels
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
-from motet.motion.sides import partners_of
-from motet.motion.skeleton import Skeleton
-from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS, from_root_block, to_root_block
 
 GRAVITY = 9.81  # m/s^2
 HEIGHT = 1.7  # m: taken for a figure whose skeleton does not know its unit of length
@@ -38,8 +36,6 @@ GENERATED = 0.05  # s: the same for motions that a model generated, whose feet t
 CARRY = 0.05  # s: over which votes are brought together
 TAKE_OFF = 0.05  # s: over which the velocity upwards is measured
 ROUNDS = 10
-TRUST = 0.1  # weight of the velocity that a motion has already; that of a point on the ground is 1
-LOW = 10  # per cent of the frames whose lowest point of the feet is under what counts as the ground
 
 
 def lay_root_path(
@@ -51,64 +47,31 @@ def lay_root_path(
     millimetres, but in flight. A translation that the motion has already is replaced.
     feet: the names of the joints of each foot, toes included; if not given, the lowest joints that are paired left
         and right. MotionError for a motion without skeleton or one without such joints.
-    tremble: seconds over which the feet are smoothed; recorded motions need little, generated ones GENERATED.
+    tremble: seconds over which the feet are smoothed; recorded motions need little, generated ones GENERATED, and 0
+        smooths nothing.
     """
+    if not 0 <= tremble < np.inf:
+        raise MotionError(f"feet are smoothed over 0 or more seconds, not {tremble}")
     skeleton = skeleton_of(motion)
-    joints = _feet(skeleton) if feet is None else [skeleton.index(name) for name in (*feet[0], *feet[1])]
+    joints = feet_of(skeleton) if feet is None else [skeleton.index(name) for name in (*feet[0], *feet[1])]
     metres = skeleton.metres_per_unit or HEIGHT / skeleton.height
     places = positions(motion)
     points = (places[:, joints] - places[:, :1]) * metres
     height = _height(points[..., 1], motion.fps)
     plane = _smooth(points[..., [0, 2]], tremble, motion.fps)
-    velocity = _velocity(plane, points[..., 1] + height[:, None], motion.fps) if len(motion) > 1 else np.zeros((0, 2))
-    return _along(motion, velocity, height, metres)
+    velocity = (
+        velocity_by_feet(plane, points[..., 1] + height[:, None], motion.fps) if len(motion) > 1 else np.zeros((0, 2))
+    )
+    return led_along(motion, velocity, height, metres)
 
 
-def plant_feet(motion: Motion) -> Motion:
-    """A motion with the root block whose figure goes where its feet take it, wherever they are on the ground.
-
-    root.forward and root.left change, nothing else. What they were is one more vote for the velocity, of weight TRUST:
-    it decides in flight, and where hands or a seat carry the figure. The ground is where the feet are at their lowest.
-    MotionError for a motion without the root block, or without a skeleton with feet and a unit of length.
-    """
-    skeleton, placed = skeleton_of(motion), from_root_block(motion)
-    joints, metres = _feet(skeleton), skeleton.unit_factor(1.0)
-    if len(motion) < 2:
-        return motion
-    places = positions(placed) * metres
-    root, feet = places[:, 0], places[:, joints]
-    above = feet[..., 1] - np.percentile(feet[..., 1].min(axis=1), LOW)
-    was = np.diff(root[:, [0, 2]], axis=0) * motion.fps
-    velocity = _velocity((feet - root[:, None])[..., [0, 2]], above, motion.fps, was, TRUST)
-    block = to_root_block(_along(placed, velocity, root[:, 1], metres)).select(ROOT_BLOCK[:2])
-    return with_channels(motion, ROOT_BLOCK[:2], block.values, ROOT_BLOCK_UNITS[:2])
-
-
-def has_feet(skeleton: Skeleton) -> bool:
-    """Whether there are joints in pairs, left and right, to find the feet among."""
-    return bool(_paired(skeleton))
-
-
-def _along(motion: Motion, velocity: Array, height: Array, metres: float) -> Motion:
+def led_along(motion: Motion, velocity: Array, height: Array, metres: float) -> Motion:
     """The motion with its root led by velocities (T - 1, 2) in m/s, from x = z = 0, at heights (T,) in m."""
     path = np.zeros((len(motion), 3))
     path[1:, [0, 2]] = np.cumsum(velocity, axis=0) / motion.fps
     path[:, 1] = height
     names = tuple(f"{skeleton_of(motion).names[0]}.{kind}" for kind in ("tx", "ty", "tz"))
     return with_channels(motion, names, path / metres, ("length",) * 3)
-
-
-def _feet(skeleton: Skeleton) -> list[int]:
-    """All joints of the two paired branches that lie no higher than a tenth of the figure above its lowest tip."""
-    paired, height = _paired(skeleton), skeleton.rest_positions[:, 1]
-    if not paired:
-        raise MotionError("no joints in pairs, left and right, to find the feet among: name the joints of the feet")
-    limit = height[paired].min() + 0.1 * skeleton.height
-    return [i for i in paired if height[i] <= limit]
-
-
-def _paired(skeleton: Skeleton) -> list[int]:
-    return [i for i, partner in enumerate(partners_of(skeleton.names)) if partner != i]
 
 
 def _height(points: Array, fps: float) -> Array:
@@ -132,7 +95,9 @@ def _with_flight(standing: Array, fps: float) -> Array:
     return np.array(heights)
 
 
-def _velocity(points: Array, above: Array, fps: float, guess: Array | float = 0.0, trust: float = 1e-12) -> Array:
+def velocity_by_feet(
+    points: Array, above: Array, fps: float, guess: Array | float = 0.0, trust: float = 1e-12
+) -> Array:
     """Velocity (T - 1, 2) in m/s of the root, from points of the feet (T, K, 2) and their heights (T, K).
 
     guess: (T - 1, 2) in m/s, a vote of weight ``trust`` that always counts.
@@ -151,9 +116,9 @@ def _velocity(points: Array, above: Array, fps: float, guess: Array | float = 0.
 
 def _smooth(points: Array, tremble: float, fps: float) -> Array:
     """Points (T, ..., ...) through a Gaussian window in time, continued at both ends as they come in."""
-    if len(points) < 2:
-        return points
     reach = round(3 * tremble * fps)
+    if len(points) < 2 or not reach:
+        return points
     window = np.exp(-0.5 * (np.arange(-reach, reach + 1) / (tremble * fps)) ** 2)
     padded = np.pad(points, ((reach, reach), (0, 0), (0, 0)), mode="reflect", reflect_type="odd")
     smoothed: Array = sum(weight * padded[i : i + len(points)] for i, weight in enumerate(window / window.sum()))

@@ -13,6 +13,9 @@ Array = NDArray[np.float64]
 
 _AXES = {"x": 0, "y": 1, "z": 2}
 
+LOCKED = 1e-9
+"""A cosine of the middle Euler angle under which the other two turn about the same axis: a gimbal lock."""
+
 
 def axis_to_rotmat(axis: str, angle: Array) -> Array:
     """Rotation matrices (..., 3, 3) about one coordinate axis ("x", "y" or "z") by ``angle`` (...)."""
@@ -39,9 +42,9 @@ def rotmat_to_euler(matrix: Array, order: str) -> Array:
     ``order`` must name three different axes. At a gimbal lock the last angle is 0.
     """
     i, j, k = (_AXES[axis] for axis in order)
-    sign = 1.0 if (j - i) % 3 == 1 else -1.0
+    sign = _handedness(order)
     cos_middle = np.hypot(matrix[..., i, i], matrix[..., i, j])
-    locked = cos_middle < 1e-9
+    locked = cos_middle < LOCKED
     first = np.where(
         locked,
         np.arctan2(sign * matrix[..., k, j], matrix[..., j, j]),
@@ -52,21 +55,82 @@ def rotmat_to_euler(matrix: Array, order: str) -> Array:
     return np.stack([first, middle, last], axis=-1)
 
 
-def continuous_euler(angles: Array) -> Array:
+def _handedness(order: str) -> float:
+    """1 for "xyz" and what is rotated out of it, -1 for "zyx" and those."""
+    return 1.0 if (_AXES[order[1]] - _AXES[order[0]]) % 3 == 1 else -1.0
+
+
+def continuous_euler(angles: Array, turn: Array | float = 2 * np.pi) -> Array:
     """The same rotations with Euler angles (T, ..., 3) that do not leap from frame to frame.
 
     Of the two solutions (a, b, c) and (a + pi, pi - b, c + pi), each up to whole turns, every frame takes the one
     nearest to the frame before it; the first frame stays.
+    turn: a whole turn in the angles' unit, or in that of each.
     """
-    result = np.array(angles, dtype=np.float64)
-    turn = 2 * np.pi
-    for t in range(1, len(result)):
-        before, now = result[t - 1], result[t]
-        flipped = now * [1, -1, 1] + np.pi
-        now, flipped = (x - turn * np.round((x - before) / turn) for x in (now, flipped))
-        nearer = np.abs(flipped - before).sum(-1) < np.abs(now - before).sum(-1) - 1e-9
-        result[t] = np.where(nearer[..., None], flipped, now)
+    turn = turn + np.zeros(angles.shape[1:])
+    angles = np.array(angles, dtype=np.float64)
+    flipped = angles * [1, -1, 1] + turn / 2
+    # the solutions lie as far from each other seen from either: where one is nearer than the other does not depend on
+    # which of them the frame before took
+    stay, change = (_distance(then - angles[:-1], turn) for then in (angles[1:], flipped[1:]))
+    changed = np.cumsum(change < stay - 1e-9, axis=0) % 2 == 1
+    angles[1:] = np.where(changed[..., None], flipped[1:], angles[1:])
+    return without_turns(angles, turn)
+
+
+def rotmats_to_euler(matrices: Array, order: str) -> Array:
+    """Matrices (T, ..., 3, 3) to Euler angles (T, ..., 3) that do not leap from frame to frame.
+
+    At a gimbal lock, where only the sum or difference of the first and the last angle counts, the last one is that of
+    the last frame without one.
+    """
+    angles = rotmat_to_euler(matrices, order)
+    locked = np.abs(np.cos(angles[..., 1])) < LOCKED
+    if locked.any():
+        frames = np.arange(len(angles)).reshape(-1, *[1] * (angles.ndim - 2))
+        free = np.maximum.accumulate(np.where(locked, 0, frames), axis=0)
+        last = np.take_along_axis(angles[..., 2], free, axis=0)
+        angles[..., 0] -= np.where(locked, _handedness(order) * np.sign(angles[..., 1]) * (last - angles[..., 2]), 0)
+        angles[..., 2] = np.where(locked, last, angles[..., 2])
+    return continuous_euler(angles)
+
+
+def without_turns(angles: Array, turn: Array | float = 2 * np.pi) -> Array:
+    """Angles (T, ...) that differ by no more than half a turn from frame to frame; the first frame stays."""
+    turns = np.round(np.diff(angles, axis=0) / turn).cumsum(axis=0)
+    return np.concatenate([angles[:1], angles[1:] - turns * turn])
+
+
+def _distance(steps: Array, turn: Array) -> Array:
+    """Radians (T, ...) over all three of angles (T, ..., 3), whole turns left out."""
+    turns = steps / turn
+    distance: Array = 2 * np.pi * np.abs(turns - np.round(turns)).sum(axis=-1)
+    return distance
+
+
+def continuous_rotvec(vectors: Array) -> Array:
+    """The same rotations as rotation vectors (T, J, 3) that do not leap from frame to frame; the last frame stays.
+
+    A turn by a about an axis is one by a - 2 pi too: every frame takes the one nearest to the frame after it.
+    """
+    result = np.array(vectors, dtype=np.float64)
+    frames, joints, _ = np.nonzero(_whole_turns(result[:-1], result[1:]))
+    if len(joints):  # what does not leap anywhere is the nearest as it is
+        joints = np.unique(joints)
+        part = result[:, joints]
+        for t in range(int(frames.max()), -1, -1):
+            part[t] += _whole_turns(part[t], part[t + 1])
+        result[:, joints] = part
     return result
+
+
+def _whole_turns(now: Array, after: Array) -> Array:
+    """What to add to rotation vectors (..., 3), whole turns, so that they are nearest to ``after`` (..., 3)."""
+    angle, other = (np.linalg.norm(vector, axis=-1, keepdims=True) for vector in (now, after))
+    # without an angle of its own, a rotation has the axis of the frame after it
+    axis = np.where(angle > 1e-3, now / np.maximum(angle, 1e-9), after / np.maximum(other, 1e-9))
+    turns: Array = axis * (np.round(((after * axis).sum(-1, keepdims=True) - angle) / (2 * np.pi)) * 2 * np.pi)
+    return turns
 
 
 def rotvec_to_rotmat(vector: Array) -> Array:

@@ -1,13 +1,16 @@
 """The skeleton: a tree of joints with offsets, and how each joint turns its angles into a rotation."""
 
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from operator import index
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from motet.errors import MotionError
+from motet.errors import MotionError, UnitError
 from motet.motion.rotations import Array, euler_to_rotmat
 
 END_SUFFIX = "_end"
@@ -36,7 +39,7 @@ class Joint:
         return euler_to_rotmat(np.radians(self.axis[::-1]), "zyx")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Skeleton:
     """Joints in an order where each parent comes before its children; the first is the root.
 
@@ -50,20 +53,33 @@ class Skeleton:
     def __post_init__(self) -> None:
         if not self.joints:
             raise MotionError("a skeleton needs at least one joint")
+        if self.metres_per_unit is not None and not 0 < self.metres_per_unit < np.inf:
+            raise MotionError(f"a unit of length has a positive number of metres, not {self.metres_per_unit}")
         names = [joint.name for joint in self.joints]
-        double = sorted({name for name in names if names.count(name) > 1})
+        double = sorted(name for name, count in Counter(names).items() if count > 1)
         if double:
             raise MotionError(f"joint names must differ, twice in this skeleton: {', '.join(double)}")
-        for index, joint in enumerate(self.joints):
-            if not (joint.parent == -1 if index == 0 else 0 <= joint.parent < index):
+        if not np.isfinite([[*joint.offset, *joint.axis] for joint in self.joints]).all():
+            raise MotionError("offsets and axes of joints must be finite")
+        for i, joint in enumerate(self.joints):
+            if not (joint.parent == -1 if i == 0 else 0 <= joint.parent < i):
                 raise MotionError(f"joint {joint.name!r} must come after its parent, and only the first has none")
             if sorted(joint.order) != ["x", "y", "z"]:
-                raise MotionError(f"joint {joint.name!r}: {joint.order!r} is no Euler order of three different axes")
+                raise MotionError(f"joint {joint.name!r}: {joint.order!r} is not an Euler order of three axes")
+
+    def __repr__(self) -> str:
+        unit = "unit unknown" if self.metres_per_unit is None else f"unit {self.metres_per_unit:g} m"
+        return f"Skeleton({len(self.joints)} joints, root {self.joints[0].name!r}, {unit})"
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         """The joints' names, in order."""
         return tuple(joint.name for joint in self.joints)
+
+    @cached_property
+    def places(self) -> dict[str, int]:
+        """The joints' indices by name."""
+        return {name: i for i, name in enumerate(self.names)}
 
     @cached_property
     def offsets(self) -> Array:
@@ -73,10 +89,23 @@ class Skeleton:
     @cached_property
     def children(self) -> tuple[tuple[int, ...], ...]:
         """For each joint the indices of its children."""
-        return tuple(
-            tuple(i for i, joint in enumerate(self.joints) if joint.parent == parent)
-            for parent in range(len(self.joints))
-        )
+        found: list[list[int]] = [[] for _ in self.joints]
+        for i, joint in enumerate(self.joints[1:], start=1):
+            found[joint.parent].append(i)
+        return tuple(map(tuple, found))
+
+    @cached_property
+    def levels(self) -> tuple[NDArray[np.intp], ...]:
+        """Indices of the joints by their number of ancestors, without the root."""
+        depth = np.zeros(len(self.joints), dtype=np.intp)
+        for i, joint in enumerate(self.joints[1:], start=1):
+            depth[i] = depth[joint.parent] + 1
+        return tuple(np.flatnonzero(depth == level) for level in range(1, depth.max() + 1))
+
+    @cached_property
+    def parents(self) -> NDArray[np.intp]:
+        """For each joint the index of its parent, -1 for the root."""
+        return np.array([joint.parent for joint in self.joints], dtype=np.intp)
 
     @cached_property
     def rest_positions(self) -> Array:
@@ -93,9 +122,9 @@ class Skeleton:
 
     def index(self, name: str) -> int:
         """Index of the joint called ``name``; MotionError if there is none."""
-        if name not in self.names:
+        if name not in self.places:
             raise MotionError(f"the skeleton has no joint {name!r}; it has {', '.join(self.names)}")
-        return self.names.index(name)
+        return self.places[name]
 
     def subtree(self, name: str) -> tuple[int, ...]:
         """Indices of a joint and of all that hang on it."""
@@ -116,8 +145,8 @@ class Skeleton:
     def unit_factor(self, metres_per_unit: float) -> float:
         """What a length in this skeleton's unit is multiplied by to be in the other unit."""
         if self.metres_per_unit is None:
-            raise MotionError(
-                "the file does not say how long a unit of its skeleton is: give metres_per_unit (motet's --unit-in)"
+            raise UnitError(
+                "it is not known how long a unit of this skeleton is: give metres_per_unit, as motion.with_unit(0.01)"
             )
         return self.metres_per_unit / metres_per_unit
 
@@ -136,15 +165,23 @@ class Skeleton:
         """The inverse of :meth:`to_json`; MotionError where the object is no skeleton."""
         try:
             joints = tuple(
-                Joint(str(j["name"]), int(j["parent"]), _triple(j["offset"]), str(j["order"]), _triple(j["axis"]))
+                Joint(
+                    str(j["name"]),
+                    index(j["parent"]),
+                    _triple(j["offset"]),
+                    str(j["order"]),
+                    _triple(j["axis"]),
+                )
                 for j in data["joints"]
             )
             metres = data["metres_per_unit"]
             return Skeleton(joints, None if metres is None else float(metres))
         except (KeyError, TypeError, ValueError) as error:
-            raise MotionError(f"no skeleton: {error}") from error
+            raise MotionError(f"not a skeleton: {error}") from error
 
 
 def _triple(values: Iterable[float]) -> tuple[float, float, float]:
     x, y, z = (float(value) for value in values)
+    if not np.isfinite([x, y, z]).all():
+        raise ValueError(f"{x:g}, {y:g}, {z:g} are not three finite numbers")
     return x, y, z

@@ -1,23 +1,53 @@
-"""The motion contract of a bundle: which channels, in which units, at which frame rate a model takes and gives."""
+"""The motion contract of a bundle: what the frames are that a model takes and gives."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from motet.errors import BundleError, MotionError
-from motet.motion.motion import Motion
+from motet.motion.motion import UNITS, Motion
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
-from motet.representation.root_block import ROOT_BLOCK, to_root_block
+from motet.representation import named
+from motet.representation.base import FrameMirror
+from motet.representation.figure import in_joints_of
+
+LIMIT = 50.0
+"""Standard deviations: z is clipped to this, in the nets' graphs too. Of 256 of CMU's trials one frame in a thousand
+is further than 36 from the mean in any channel, and two of them, by glitches of the recording, further than 50."""
+
+FLOORS = {
+    "deg": 0.5,
+    "rad": np.radians(0.5),
+    "deg/s": 1.0,
+    "rad/s": np.radians(1.0),
+    "m": 1e-3,
+    "m/s": 0.01,
+    "length": 1e-4,
+    "1": 1e-4,
+}
+"""Standard deviations, by unit, from which on a channel lives. CMU's fingers, which only single T-poses bend otherwise,
+have up to .12 degrees; the stillest channel that means something, the twist of a thorax, has 1.4. "length" and "1" are
+in units of files, of which nothing is known: what is less than 1e-4 is constant but for rounding."""
+
+FASTEST = 1000.0
+"""Frames per second of the fastest contract."""
 
 
 @dataclass(frozen=True, eq=False)
 class MotionContract:
-    """Channels (D names), units (D), fps, mean and std of the training data (D,) and the skeleton, if any."""
+    """What the frames (T, D) of a model mean.
 
+    representation: a name of :data:`motet.representation.REPRESENTATIONS`. channels, units: D each. fps: frames per
+    second. mean, std: (D,) of the training data; a channel of std 0 is dead: always at its mean. skeleton: the figure
+    that the frames move, or None.
+    """
+
+    representation: str
     channels: tuple[str, ...]
     units: tuple[str, ...]
     fps: float
@@ -25,24 +55,56 @@ class MotionContract:
     std: Array
     skeleton: Skeleton | None
 
-    def motion(self, frames: ArrayLike) -> Motion:
-        """Frames (T, D) of a model as a motion."""
-        return Motion(np.asarray(frames, dtype=np.float64), self.channels, self.units, self.fps, self.skeleton)
+    @cached_property
+    def mirror(self) -> FrameMirror:
+        """How frames are mirrored; MotionError where they cannot be."""
+        return named(self.representation).mirror(self._like)
+
+    @cached_property
+    def _like(self) -> Motion:
+        return self.features(np.empty((0, len(self.channels))))
+
+    def features(self, frames: ArrayLike, plant: bool = False) -> Motion:
+        """Frames (T, D) as a motion in the contract's own channels, frame for frame.
+
+        plant: let the feet say where the figure goes, in representations of generated motions.
+        """
+        found = Motion(np.asarray(frames, dtype=np.float64), self.channels, self.units, self.fps, self.skeleton)
+        return named(self.representation).planted(found) if plant else found
 
     def frames(self, motion: Motion) -> Array:
-        """The frames (T, D) float64 of a motion with the contract's channels, units and frame rate.
+        """The frames (T, D) float64 of a motion, of any length, or of features.
 
-        Where the contract has the root block (:mod:`motet.representation.root_block`) and the motion has the root's
-        path and rotation, the block is computed at the contract's frame rate, from continuous angles. MotionError names
-        the channels that the motion lacks.
+        Angles are made continuous, in the order and axes of the contract's joints, and the motion brought to the
+        contract's frame rate, beginning with its first frame. MotionError names what the motion lacks.
         """
-        if set(ROOT_BLOCK) & set(self.channels) - set(motion.channels):
-            motion = to_root_block(motion.continuous().resample(self.fps))
-        return motion.select(self.channels, self.units).resample(self.fps).values
+        smooth = in_joints_of(motion, self.skeleton).continuous().resample(self.fps)
+        return named(self.representation).features(smooth, self._like).values
+
+    def motion(self, frames: ArrayLike, after: Motion | None = None, plant: bool = True) -> Motion:
+        """Frames (T, D) as a motion that can be played and written, at the contract's frame rate.
+
+        after: a motion that is carried on, at the same frame rate, in its channels where the representation can; else
+            the figure starts at the origin and faces z.
+        plant: as :meth:`features`.
+        """
+        return named(self.representation).motion(self.features(frames, plant), after)
+
+    def normalised(self, frames: ArrayLike) -> Array:
+        """Frames (..., D) in standard deviations from the mean: 0 in dead channels, and within LIMIT."""
+        scale = np.where(self.std > 0, self.std, np.inf)
+        z: Array = np.clip((np.asarray(frames, dtype=np.float64) - self.mean) / scale, -LIMIT, LIMIT)
+        return z
+
+    def denormalised(self, z: ArrayLike) -> Array:
+        """The inverse: frames (..., D), dead channels at their mean."""
+        frames: Array = np.asarray(z, dtype=np.float64) * self.std + self.mean
+        return frames
 
     def to_json(self) -> dict[str, Any]:
         """A JSON object; :meth:`from_json` is the inverse."""
         return {
+            "representation": self.representation,
             "channels": list(self.channels),
             "units": list(self.units),
             "fps": self.fps,
@@ -52,12 +114,64 @@ class MotionContract:
         }
 
     @staticmethod
-    def from_json(data: Mapping[str, Any]) -> "MotionContract":
-        """Read what :meth:`to_json` wrote; BundleError where it is no contract."""
-        try:
-            mean, std = (np.array(data[key], dtype=np.float64) for key in ("mean", "std"))
-            channels, units = tuple(data["channels"]), tuple(data["units"])
-            skeleton = None if data["skeleton"] is None else Skeleton.from_json(data["skeleton"])
-            return MotionContract(channels, units, float(data["fps"]), mean, std, skeleton)
-        except (KeyError, TypeError, ValueError, MotionError) as error:
-            raise BundleError(f"no motion contract: {error}") from error
+    def from_json(data: Any) -> "MotionContract":
+        """Read what :meth:`to_json` wrote; BundleError names the key of a manifest that is not what it must be."""
+        if not isinstance(data, Mapping):
+            raise BundleError("motion: a JSON object is needed")
+        channels, units = _texts(data, "channels"), _texts(data, "units", len(data["channels"]))
+        fps = float(_numbers([data.get("fps")], "fps", 1)[0])
+        mean, std = (_numbers(data.get(key), key, len(channels)) for key in ("mean", "std"))
+        name = str(data.get("representation", _inferred_name(channels)))
+        lacking = [channel for channel in named(name).required if channel not in channels]
+        _refuse(bool(lacking), "channels", f"{name} needs {', '.join(lacking)}")
+        _refuse(len(set(channels)) < len(channels), "channels", "names must differ")
+        _refuse(bool(set(units) - set(UNITS)), "units", f"each must be one of {', '.join(UNITS)}")
+        _refuse(not 0 < fps <= FASTEST, "fps", f"a number over 0 and up to {FASTEST:g} is needed, not {fps:g}")
+        _refuse(bool((std < 0).any()), "std", "a standard deviation is not negative")
+        return MotionContract(name, channels, units, fps, mean, std, _skeleton(data))
+
+
+def _inferred_name(channels: Sequence[str]) -> str:
+    """To be deleted with format 1, whose manifests do not name the representation."""
+    if "root.forward" not in channels:
+        return "angles"
+    return "root_vectors" if any(name.endswith(".ex") for name in channels) else "root_angles"
+
+
+def living(std: ArrayLike, units: Sequence[str]) -> Array:
+    """Standard deviations (D,) of training data, 0 where they are under the floor of their unit."""
+    floors = np.array([FLOORS[unit] for unit in units])
+    found: Array = np.where(np.asarray(std, dtype=np.float64) < floors, 0.0, std)
+    return found
+
+
+def _refuse(wrong: bool, key: str, reason: str) -> None:
+    if wrong:
+        raise BundleError(f"motion.{key}: {reason}")
+
+
+def _texts(data: Mapping[str, Any], key: str, count: int | None = None) -> tuple[str, ...]:
+    values = data.get(key)
+    if not isinstance(values, list | tuple) or not all(isinstance(value, str) for value in values) or not values:
+        raise BundleError(f"motion.{key}: a list of names is needed")
+    _refuse(count not in (None, len(values)), key, f"{count} are needed, one for each channel, not {len(values)}")
+    return tuple(values)
+
+
+def _numbers(values: Any, key: str, count: int) -> Array:
+    numbers = isinstance(values, list | tuple) and all(type(value) in (int, float) for value in values)
+    _refuse(not numbers, key, "numbers are needed")
+    _refuse(len(values) != count, key, f"{count} are needed, one for each channel, not {len(values)}")
+    try:
+        found = np.array(values, dtype=np.float64)
+    except OverflowError as error:
+        raise BundleError(f"motion.{key}: {error}") from error
+    _refuse(not np.isfinite(found).all(), key, "finite numbers are needed")
+    return found
+
+
+def _skeleton(data: Mapping[str, Any]) -> Skeleton | None:
+    try:
+        return None if data.get("skeleton") is None else Skeleton.from_json(data["skeleton"])
+    except MotionError as error:
+        raise BundleError(f"motion.skeleton: {error}") from error

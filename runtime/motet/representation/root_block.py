@@ -6,18 +6,34 @@ facing frame of the previous frame, so that adding them up gives the path exactl
 at.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from motet.errors import MotionError
-from motet.motion.kinematics import AXES, euler_of, local_rotations, local_translations, skeleton_of, with_channels
+from motet.motion.feet import feet_of, ground_of, has_feet
+from motet.motion.heading import heading
+from motet.motion.kinematics import (
+    AXES,
+    euler_of,
+    local_rotations,
+    local_translations,
+    positions,
+    skeleton_of,
+    with_channels,
+)
 from motet.motion.motion import Motion
-from motet.motion.rotations import Array, continuous_euler, euler_to_rotmat, rotmat_to_euler
+from motet.motion.root_path import led_along, velocity_by_feet
+from motet.motion.rotations import Array, euler_to_rotmat, rotmats_to_euler
 
 ROOT_BLOCK = ("root.forward", "root.left", "root.turn", "root.height", "root.pitch", "root.roll")
 ROOT_BLOCK_UNITS = ("m/s", "m/s", "deg/s", "m", "deg", "deg")
 """Forward, to the left, turning to the left (counterclockwise seen from above), above y = 0, and what remains."""
 
 ORDER = "yxz"
+
+TRUST = 0.1
+"""Weight of the velocity that a motion has already, where its feet are planted; a point on the ground has 1."""
 
 
 def to_root_block(motion: Motion) -> Motion:
@@ -27,13 +43,12 @@ def to_root_block(motion: Motion) -> Motion:
     are continuous in time. Other channels are untouched. MotionError where the root's translation or rotation is
     missing, or a skeleton that knows its unit of length.
     """
-    skeleton = skeleton_of(motion)
     names = _root_channels(motion)
     missing = [name for name in names if name not in motion.channels]
     if missing:
         raise MotionError(f"the root's path and rotation are needed, and this motion lacks {', '.join(missing)}")
-    angles = continuous_euler(rotmat_to_euler(local_rotations(motion)[:, 0], ORDER))
-    places = local_translations(motion)[:, 0] * skeleton.unit_factor(1.0)
+    angles = rotmats_to_euler(local_rotations(motion, [0])[:, 0], ORDER)
+    places = motion.select(names[:3], ("m",) * 3).values
     velocities = _velocities(places, angles[:, 0], motion.fps)
     block = np.column_stack([velocities, places[:, 1], np.degrees(angles[:, 1:])])
     rest = motion.select(tuple(name for name in motion.channels if name not in names))
@@ -50,34 +65,76 @@ def _velocities(places: Array, heading: Array, fps: float) -> Array:
     return np.concatenate([found[:1], found])
 
 
-def from_root_block(motion: Motion) -> Motion:
+def from_root_block(motion: Motion, after: Motion | None = None) -> Motion:
     """The inverse: the root's translation ("length") and rotation ("deg") in front, instead of the root block.
 
-    The figure starts at x = z = 0 and faces z; the velocities of frame 0 are not used. MotionError where a channel of
-    the block is missing, or a skeleton that knows its unit of length.
+    The figure starts at x = z = 0 and faces z, and the velocities of frame 0 are not used; or it goes on where another
+    motion ends (``after``), facing as it does there. MotionError where a channel of the block is missing, or a skeleton
+    that knows its unit of length.
     """
     skeleton = skeleton_of(motion)
-    block = motion.select(ROOT_BLOCK, ROOT_BLOCK_UNITS).values
-    steps = np.concatenate([np.zeros((1, 3)), block[1:, :3] / motion.fps])[: len(block)]
-    heading = np.cumsum(np.radians(steps[:, 2]))
-    sin, cos = np.sin(heading - np.radians(steps[:, 2])), np.cos(heading - np.radians(steps[:, 2]))
-    forward, left = steps[:, 0], steps[:, 1]
-    x, z = np.cumsum(forward * sin + left * cos), np.cumsum(forward * cos - left * sin)
-    places = np.column_stack([x, block[:, 3], z]) / skeleton.unit_factor(1.0)
-    rotations = euler_to_rotmat(np.column_stack([heading, np.radians(block[:, 4:])]), ORDER)
-    angles = np.degrees(_continuous(euler_of(rotations, skeleton.joints[0]), skeleton.joints[0].order))
+    rotations, places = root_in_world(motion, after)
+    angles = np.degrees(euler_of(rotations, skeleton.joints[0]))
     rest = motion.select(tuple(name for name in motion.channels if name not in ROOT_BLOCK))
-    units = ("length",) * 3 + ("deg",) * 3
-    return with_channels(rest, _root_channels(motion), np.column_stack([places, angles]), units)
+    values = np.column_stack([places / skeleton.unit_factor(1.0), angles])
+    return with_channels(rest, _root_channels(motion), values, ("length",) * 3 + ("deg",) * 3)
+
+
+def root_in_world(motion: Motion, after: Motion | None = None) -> tuple[Array, Array]:
+    """Rotations (T, 3, 3) and places (T, 3) in metres of the root whose block a motion has, from the origin or on."""
+    block = motion.select(ROOT_BLOCK, ROOT_BLOCK_UNITS).values
+    steps = block[:, :3] / motion.fps
+    if after is None:
+        steps[:1] = 0
+        start, facing = np.zeros(3), 0.0
+    else:
+        start, facing = _last_place(after), heading(after[-1])[0]
+    turns = np.radians(steps[:, 2])
+    now = facing + np.cumsum(turns)
+    sin, cos = np.sin(now - turns), np.cos(now - turns)
+    x = start[0] + np.cumsum(steps[:, 0] * sin + steps[:, 1] * cos)
+    z = start[2] + np.cumsum(steps[:, 0] * cos - steps[:, 1] * sin)
+    rotations = euler_to_rotmat(np.column_stack([now, np.radians(block[:, 4:])]), ORDER)
+    return rotations, np.column_stack([x, block[:, 3], z])
+
+
+def _last_place(motion: Motion) -> Array:
+    """The root's place (3,) in a motion's last frame, in metres."""
+    place: Array = local_translations(motion[-1])[0, 0] * skeleton_of(motion).unit_factor(1.0)
+    return place
+
+
+def mirrored_signs(channels: Sequence[str]) -> Array:
+    """The signs (D,) by which channels of the root block change in a mirror image; 1 for all others."""
+    return np.array([-1.0 if name in ("root.left", "root.turn", "root.roll") else 1.0 for name in channels])
+
+
+def plant_feet(motion: Motion) -> Motion:
+    """A motion with the root block whose figure goes where its feet take it, wherever they are on the ground.
+
+    root.forward and root.left change, nothing else. What they were is one more vote for the velocity, of weight TRUST:
+    it decides in flight, and where hands or a seat carry the figure. The ground is where the feet are at their lowest.
+    MotionError for a motion without the root block, or without a skeleton with feet and a unit of length.
+    """
+    skeleton, placed = skeleton_of(motion), from_root_block(motion)
+    joints, metres = feet_of(skeleton), skeleton.unit_factor(1.0)
+    if len(motion) < 2:
+        return motion
+    places = positions(placed) * metres
+    root, feet = places[:, 0], places[:, joints]
+    above = feet[..., 1] - ground_of(feet[..., 1])
+    was = np.diff(root[:, [0, 2]], axis=0) * motion.fps
+    velocity = velocity_by_feet((feet - root[:, None])[..., [0, 2]], above, motion.fps, was, TRUST)
+    block = to_root_block(led_along(placed, velocity, root[:, 1], metres)).select(ROOT_BLOCK[:2])
+    return with_channels(motion, ROOT_BLOCK[:2], block.values, ROOT_BLOCK_UNITS[:2])
+
+
+def can_be_planted(motion: Motion) -> bool:
+    """Whether a figure in features with the root block has feet, and a skeleton that knows its unit of length."""
+    skeleton = motion.skeleton
+    return skeleton is not None and skeleton.metres_per_unit is not None and has_feet(skeleton)
 
 
 def _root_channels(motion: Motion) -> tuple[str, ...]:
     root = skeleton_of(motion).names[0]
     return tuple(f"{root}.{kind}{axis}" for kind in "tr" for axis in AXES)
-
-
-def _continuous(angles: Array, order: str) -> Array:
-    columns = [AXES.index(axis) for axis in order]
-    result = np.empty_like(angles)
-    result[:, columns] = continuous_euler(angles[:, columns])
-    return result

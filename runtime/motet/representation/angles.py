@@ -1,0 +1,49 @@
+"""``angles``: Euler angles of joints, and whatever other channels a model has, as they are in motions.
+
+They do not say where a figure goes: its path is laid by what its feet do.
+"""
+
+import numpy as np
+
+from motet.errors import MotionError
+from motet.motion.feet import has_feet
+from motet.motion.mirror import mirror
+from motet.motion.motion import Motion
+from motet.motion.root_path import GENERATED, lay_root_path
+from motet.representation.base import FrameMirror, in_units
+
+
+class Angles:
+    """See :class:`motet.representation.base.Representation`."""
+
+    name = "angles"
+    required: tuple[str, ...] = ()
+
+    def features(self, motion: Motion, like: Motion | None = None) -> Motion:
+        """The channels of ``like``, or all but the root's."""
+        if like is not None:
+            return motion.select(like.channels, like.units)
+        root = "root" if motion.skeleton is None else motion.skeleton.names[0]
+        kept = tuple(name for name in motion.channels if name.rpartition(".")[0] != root)
+        return in_units(motion.select(kept), str)
+
+    def planted(self, features: Motion) -> Motion:
+        """With the root's translation, found from the feet's contact with the ground."""
+        if features.skeleton is None or not has_feet(features.skeleton):
+            return features
+        return lay_root_path(features, tremble=GENERATED)
+
+    def motion(self, features: Motion, after: Motion | None = None) -> Motion:
+        """The features themselves: what they do not tell is not taken from another motion either."""
+        return features
+
+    def mirror(self, features: Motion) -> FrameMirror:
+        """By :mod:`motet.motion.mirror`."""
+        # each column of a probe frame holds its own number: where mirroring puts it, and with which sign, can be read
+        count = len(features.channels)
+        probe = Motion(np.arange(1.0, count + 1)[None], features.channels, features.units, 1.0, features.skeleton)
+        mirrored = mirror(probe)
+        found = np.abs(mirrored.values[0])
+        if mirrored.channels != probe.channels or not np.array_equal(np.sort(found), probe.values[0]):
+            raise MotionError("joints of the two sides turn about other axes: frames are not mirrored by their columns")
+        return FrameMirror(found.astype(np.intp) - 1, np.sign(mirrored.values[0]).astype(np.float32))

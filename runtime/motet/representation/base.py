@@ -1,0 +1,84 @@
+"""What every representation offers, and what they share: mirroring by columns, down-sampling in all phases."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motet.errors import MotionError
+from motet.motion.kinematics import skeleton_of
+from motet.motion.mirror import lateral_axis
+from motet.motion.motion import Motion
+from motet.motion.skeleton import Skeleton
+
+
+class Representation(Protocol):
+    """What the channels of a model mean. *Features* are a motion in these channels, frame for frame a model's frames.
+
+    name: as manifests have it. required: channels that features always have.
+    """
+
+    name: str
+    required: tuple[str, ...]
+
+    def features(self, motion: Motion, like: Motion | None = None) -> Motion:
+        """The features of a continuous motion at the model's frame rate; features are given back as they are.
+
+        like: features whose channels, units and joints are wanted; else all that the motion has. MotionError names
+        what the motion lacks.
+        """
+        ...
+
+    def planted(self, features: Motion) -> Motion:
+        """Features of a generated motion whose feet stand where they are on the ground, where that can be said."""
+        ...
+
+    def motion(self, features: Motion, after: Motion | None = None) -> Motion:
+        """A motion that can be played, from features: from the origin, or such that it carries another motion on."""
+        ...
+
+    def mirror(self, features: Motion) -> "FrameMirror":
+        """How frames of such features are mirrored; MotionError where they cannot be."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class FrameMirror:
+    """Column d of a mirrored frame is column ``columns[d]`` of the frame times ``signs[d]``; both (D,)."""
+
+    columns: NDArray[np.intp]
+    signs: NDArray[np.float32]
+
+    def __call__(self, frames: NDArray[Any]) -> NDArray[Any]:
+        """Mirror frames (..., D)."""
+        mirrored: NDArray[Any] = frames[..., self.columns] * self.signs
+        return mirrored
+
+
+def phases(motion: Motion, fps: float) -> list[Motion]:
+    """The motion at another frame rate, leaps taken out, in all phases (Plappert et al. 2017, section 5.1).
+
+    Where every n-th frame is picked, that can begin at each of n frames: 120 Hz to 10 fps gives 12 motions. Else it
+    gives one. The first one begins with the motion.
+    """
+    ratio = motion.fps / fps
+    count = round(ratio) if abs(ratio - round(ratio)) < 1e-9 else 1
+    smooth = motion.continuous()
+    return [smooth[offset:].resample(fps) for offset in range(max(1, count))]
+
+
+def lateral_x(features: Motion) -> Skeleton:
+    """The skeleton, whose left and right lie along x, as the root block needs; else MotionError."""
+    skeleton = skeleton_of(features)
+    if lateral_axis(skeleton) != 0:
+        raise MotionError("left and right of its rest pose do not lie along x, as the root block needs")
+    return skeleton
+
+
+def in_units(motion: Motion, change: Callable[[str], str]) -> Motion:
+    """The motion with the units of its channels changed one by one, lengths to metres where their unit is known."""
+    known = motion.skeleton is not None and motion.skeleton.metres_per_unit is not None
+    units = ("m" if known and unit == "length" else change(unit) for unit in motion.units)
+    return motion.select(motion.channels, tuple(units))

@@ -1,0 +1,135 @@
+"""``root_vectors``: the root block in radians, and each joint's rotation as an exponential map.
+
+Whatever Euler order, axes or missing channels a file's joints have, the rotation relative to the parent joint is the
+same, so an AMC file and the BVH file that was made from it give equal frames. Channels are the six of
+:mod:`motet.representation.root_block`, then JOINT.ex, JOINT.ey, JOINT.ez for every other joint.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from motet.errors import MotionError
+from motet.motion.kinematics import AXES, euler_of, local_rotations, skeleton_of
+from motet.motion.motion import TURN, Motion
+from motet.motion.rotations import Array, rotmat_to_rotvec, rotvec_to_rotmat
+from motet.motion.sides import partners_of
+from motet.motion.skeleton import END_SUFFIX
+from motet.representation.base import FrameMirror, lateral_x
+from motet.representation.root_block import (
+    ROOT_BLOCK,
+    ROOT_BLOCK_UNITS,
+    mirrored_signs,
+    root_in_world,
+    to_root_block,
+)
+
+KINDS = ("ex", "ey", "ez")
+
+ROOT_UNITS = tuple(unit.replace("deg", "rad") for unit in ROOT_BLOCK_UNITS)
+
+
+class RootVectors:
+    """See :class:`motet.representation.base.Representation`."""
+
+    name = "root_vectors"
+    required: tuple[str, ...] = ROOT_BLOCK
+
+    def features(self, motion: Motion, like: Motion | None = None) -> Motion:
+        """Exponential maps that do not leap, of the joints of ``like`` or of all but the root."""
+        if like is None:
+            return to_joint_vectors(motion).continuous()
+        if not set(like.channels) <= set(motion.channels):
+            motion = to_joint_vectors(motion, joints_of(like.channels))
+        return motion.select(like.channels, like.units).continuous()
+
+    def planted(self, features: Motion) -> Motion:
+        """The features themselves: a prediction's path goes on from a recorded one, and is better than one laid."""
+        return features
+
+    def motion(self, features: Motion, after: Motion | None = None) -> Motion:
+        """In the channels of ``after``, which may be features too; from the origin in Euler angles of the skeleton."""
+        if after is not None and set(features.channels) <= set(after.channels):
+            return features
+        return carry_on(after, features)
+
+    def mirror(self, features: Motion) -> FrameMirror:
+        """As :func:`motet.motion.mirror.mirror` does it, for exponential maps in the parent joint's axes."""
+        lateral_x(features)
+        joints = joints_of(features.channels)
+        places = {name: column for column, name in enumerate(features.channels)}
+        columns, signs = np.arange(len(places)), mirrored_signs(features.channels).astype(np.float32)
+        for joint, partner in zip(joints, partners_of(joints), strict=True):
+            for kind, sign in zip(KINDS, (1, -1, -1), strict=True):
+                columns[places[f"{joint}.{kind}"]] = places[f"{joints[partner]}.{kind}"]
+                signs[places[f"{joint}.{kind}"]] = sign
+        return FrameMirror(columns, signs)
+
+
+def joints_of(channels: Sequence[str]) -> tuple[str, ...]:
+    """The joints whose exponential maps are among the channels."""
+    return tuple(name.rpartition(".")[0] for name in channels if name.endswith(".ex"))
+
+
+def to_joint_vectors(motion: Motion, joints: Sequence[str] | None = None) -> Motion:
+    """The motion with the root block and with exponential maps of ``joints`` (all but the root) as its channels.
+
+    Each exponential map is at most half a turn, so it can leap between frames: :meth:`Motion.continuous` mends that.
+    MotionError where a joint, the root's translation or rotation is missing, or a skeleton that knows its unit of
+    length.
+    """
+    skeleton = skeleton_of(motion)
+    if joints is None:
+        joints = tuple(name for name in skeleton.names[1:] if not name.endswith(END_SUFFIX))
+    lacking = [name for name in joints if name not in skeleton.places]
+    if lacking:
+        raise MotionError(f"the model's figure has joints that this motion lacks: {', '.join(lacking)}")
+    block = to_root_block(motion).select(ROOT_BLOCK, ROOT_UNITS)
+    vectors = rotmat_to_rotvec(local_rotations(motion, [skeleton.places[name] for name in joints]))
+    channels = (*ROOT_BLOCK, *(f"{name}.{kind}" for name in joints for kind in KINDS))
+    units = (*ROOT_UNITS, *["rad"] * (3 * len(joints)))
+    values = np.concatenate([block.values, vectors.reshape(len(motion), 3 * len(joints))], axis=1)
+    return replace(motion, values=values, channels=channels, units=units)
+
+
+def carry_on(after: Motion | None, features: Motion) -> Motion:
+    """Features that follow a motion, as that motion's own channels, units and skeleton; None: from the origin.
+
+    They start where the motion ends and face as it does there; both have the same frame rate. Channels of which the
+    features know nothing stay as they are in the motion's last frame.
+    """
+    last = _at_rest(features) if after is None else after[-1]
+    skeleton = skeleton_of(last)
+    root, places = root_in_world(features, after)
+    rotations = {skeleton.names[0]: root, **_rotations(features)}
+    values = np.repeat(last.values, len(features) + 1, axis=0)
+    for name, columns in last.rotation_columns().items():
+        if name in rotations:
+            angles = euler_of(rotations[name], skeleton.joints[skeleton.index(name)])
+            for column in columns:
+                axis = AXES.index(last.channels[column][-1])
+                values[1:, column] = angles[:, axis] * TURN[last.units[column]] / (2 * np.pi)
+    for column, name in enumerate(last.channels):
+        if name.startswith(f"{skeleton.names[0]}.t"):
+            metres = skeleton.unit_factor(1.0) if last.units[column] == "length" else 1.0
+            values[1:, column] = places[:, AXES.index(name[-1])] / metres
+    # the frame before the first one says which of two equal angles is the nearer one
+    return replace(last, values=values).continuous()[1:]
+
+
+def _at_rest(features: Motion) -> Motion:
+    """One frame of the features' figure at rest at the origin, in Euler angles of all its joints."""
+    skeleton = skeleton_of(features)
+    joints = (skeleton.names[0], *joints_of(features.channels))
+    channels = [f"{skeleton.names[0]}.t{axis}" for axis in AXES] + [f"{name}.r{a}" for name in joints for a in AXES]
+    units = ("length",) * 3 + ("deg",) * (3 * len(joints))
+    return Motion(np.zeros((1, len(channels))), tuple(channels), units, features.fps, skeleton)
+
+
+def _rotations(features: Motion) -> dict[str, Array]:
+    """Local rotations (T, 3, 3) by joint."""
+    joints = joints_of(features.channels)
+    vectors = features.select(tuple(f"{name}.{kind}" for name in joints for kind in KINDS)).values
+    matrices = rotvec_to_rotmat(vectors.reshape(len(features), len(joints), 3))
+    return {name: matrices[:, n] for n, name in enumerate(joints)}
