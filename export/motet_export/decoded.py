@@ -17,7 +17,7 @@ from motet.models.predict import PredictModel
 from motet.models.text import MAX_WORDS, SPECIALS
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
-from motet_export.examples import normalised, walks
+from motet_export.examples import walks
 
 Decoded = dict[str, NDArray[Any]]
 Runs = dict[str, Callable[[], tuple[Decoded, Decoded]]]
@@ -86,8 +86,8 @@ def _generated(candidates: int | None, model: GenerateModel) -> Decoded:
     rows = model.generate(_sentences(model), hypotheses, candidates=candidates, seed=7, max_seconds=4)
     found = [generated for row in rows for generated in row]
     return {
-        "frames": np.concatenate([normalised(model.contract, g.drawn.values) for g in found]),
-        "lengths": np.array([len(g.drawn.values) for g in found]),
+        "frames": np.concatenate([model.contract.normalised(g.frames) for g in found]),
+        "lengths": np.array([len(g.frames) for g in found]),
         "log_likelihoods": np.array([g.log_likelihood or 0.0 for g in found]),
         "contexts": model.embed(_sentences(model)),
     }
@@ -107,7 +107,7 @@ def _predicted(horizons: int, model: PredictModel) -> Decoded:
     contract = model.contract
     seeds = walks(contract, np.random.default_rng(3), 8, model.seed_frames)
     found = model.next_frames(seeds, horizons * model.horizon)
-    return {"frames": normalised(contract, found)}
+    return {"frames": contract.normalised(found)}
 
 
 def _pair(models: Sequence[Any], run: Callable[[Any], Decoded]) -> tuple[Decoded, Decoded]:
@@ -123,7 +123,7 @@ def _motions(model: DescribeModel | GenerateModel) -> list[Motion]:
         found: Array = 0.3 * rng.normal(size=(frames, len(contract.mean))).cumsum(axis=0)
         return np.tanh(found) * 2 * contract.std + contract.mean
 
-    return [contract.motion(walk(frames)) for frames in range(5, 85, 10)]
+    return [contract.features(walk(frames)) for frames in range(5, 85, 10)]
 
 
 def _sentences(model: DescribeModel | GenerateModel) -> list[str]:

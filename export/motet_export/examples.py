@@ -5,7 +5,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from motet.bundle.graph import Arrays, Graph, GraphSpec
 from motet.bundle.manifest import Manifest
@@ -47,7 +47,7 @@ def examples(manifest: Manifest, torch: Mapping[str, Graph]) -> dict[str, Exampl
         if value.shape[-1] == frames.shape[-1]:
             return frames
         flags = np.ones((*value.shape[:-1], 1), dtype=np.float32)  # of frames as generators take them
-        return np.concatenate([normalised(contract, frames), flags], axis=-1)
+        return np.concatenate([contract.normalised(frames).astype(np.float32), flags], axis=-1)
 
     draws: dict[str, Examples] = {role: partial(draw, graph.spec) for role, graph in torch.items()}
     if manifest.verb == "predict":
@@ -79,10 +79,4 @@ def walks(contract: MotionContract, rng: np.random.Generator, rows: int, frames:
     """Random walks (rows, frames, C) float32 from near the mean of the training data, in the contract's units."""
     steps = PACE * rng.normal(size=(rows, frames, len(contract.mean)))
     found: Array = contract.mean + contract.std * steps.cumsum(axis=1)
-    return found.astype(np.float32)
-
-
-def normalised(contract: MotionContract, frames: ArrayLike) -> NDArray[np.float32]:
-    """Frames (..., C) less the mean of the training data, in its standard deviations; float32."""
-    found: Array = (np.asarray(frames) - contract.mean) / np.maximum(contract.std, 1e-4)
     return found.astype(np.float32)

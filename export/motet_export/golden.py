@@ -60,11 +60,13 @@ def _describe(model: DescribeModel, rng: np.random.Generator) -> Run:
 def _generate(model: GenerateModel, rng: np.random.Generator) -> Run:
     """Two seconds for a sentence of five words, with few hypotheses where the loop has such."""
     text = " ".join(rng.choice(model.vocabulary.words[len(SPECIALS) :], 5))
-    fewer = {name: 2 for name in ("hypotheses", "candidates") if name in model.defaults}
-    settings = {**fewer, "max_seconds": 2.0, "text": text}
+    settings: dict[str, Any] = {
+        name: 2 for name in ("hypotheses", "candidates", "max_seconds") if name in model.defaults
+    }
     noise = Recording(rng)
-    model.decode(model.contexts([model.ids(text)]), [noise], {**model.defaults, **fewer, "max_seconds": 2.0})
-    return {kind: np.array(drawn, dtype=np.float32) for kind, drawn in noise.drawn.items()}, settings
+    model.decode(model.contexts([model.ids(text)]), [noise], {**model.defaults, **settings})
+    given = {kind: np.array(drawn, dtype=np.float32) for kind, drawn in noise.drawn.items()}
+    return given, {**settings, "text": text}
 
 
 def _predict(model: PredictModel, rng: np.random.Generator) -> Run:

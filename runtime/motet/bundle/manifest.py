@@ -11,14 +11,14 @@ from motet.bundle.fields import Fields, parse
 from motet.bundle.graph import GraphSpec
 from motet.bundle.members import MAX_SIZE, NAME
 from motet.errors import BundleError
-from motet.representation.contract import MotionContract
+from motet.representation.contract import FASTEST, MotionContract
 
 FORMAT = 2
 """Version of the bundle format that this motet writes and reads."""
 
 MANIFEST = "manifest.json"
 
-MAX_CHANNELS, MAX_FPS = 10_000, 1000.0
+MAX_CHANNELS = 10_000
 
 
 @dataclass(frozen=True)
@@ -87,16 +87,22 @@ class Manifest:
         """Read the manifest of a bundle or of a training run; BundleError names the key that is wrong."""
         top = Fields(data)
         motion = _motion(top.fields("motion"))
-        free = {key: top.mapping(key) for key in ("config", "licence", "training", "quality", "parity")}
         return Manifest(
-            **{key: top.text(key) for key in ("name", "verb", "model", "loop")},
+            name=top.text("name"),
+            verb=top.text("verb"),
+            model=top.text("model"),
+            loop=top.text("loop"),
             version=top.text("version") if "version" in top else "",
             motion=motion,
             defaults=top.fields("defaults").data,
             text=top.mapping("text") if "text" in top else None,
             vocabulary=top.texts("vocabulary") if "vocabulary" in top else (),
             control=_control(top.fields("control"), len(motion.channels)) if "control" in top else None,
-            **free,
+            config=top.mapping("config"),
+            licence=top.mapping("licence"),
+            training=top.mapping("training"),
+            quality=top.mapping("quality"),
+            parity=top.mapping("parity"),
             graphs={role: _graph(entry) for role, entry in top.entries("graphs")} if "graphs" in top else {},
             files={name: _file(name, entry) for name, entry in top.entries("files")} if "files" in top else {},
             golden=_golden(top.fields("golden")) if "golden" in top else None,
@@ -131,18 +137,16 @@ def _motion(data: Fields) -> MotionContract:
     channels = data.texts("channels")
     if not 1 <= len(channels) <= MAX_CHANNELS:
         raise data.fault(f"1 to {MAX_CHANNELS} names", len(channels), "channels")
-    units = data.items("units")
-    if len(units) != len(channels) or not all(isinstance(unit, str) for unit in units):
-        raise data.fault(f"{len(channels)} units", units, "units")
-    data.number("fps", 1, MAX_FPS)
+    data.text("representation")
+    data.number("fps", 1, FASTEST)
     data.numbers("mean", len(channels))
     data.numbers("std", len(channels), low=0.0)
     if "skeleton" in data:
         _check_skeleton(data.fields("skeleton"), channels)
     try:
-        return MotionContract.from_json({"skeleton": None, **data.data})
+        return MotionContract.from_json(data.data)
     except BundleError as error:
-        raise BundleError(f"manifest, {data.path}: {error}") from error
+        raise BundleError(f"manifest, {error}") from error
 
 
 def _check_skeleton(data: Fields, channels: tuple[str, ...]) -> None:

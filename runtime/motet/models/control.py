@@ -227,9 +227,7 @@ class ControlSession:
     def restore(self, snapshot: Snapshot) -> None:
         """Go back to a snapshot, of this session or of one with as many characters of the same model."""
         if snapshot.history.shape != self._history.shape:
-            raise ControlError(
-                f"a snapshot of history {snapshot.history.shape} does not fit {self._state['history'].shape}"
-            )
+            raise ControlError(f"a snapshot of history {snapshot.history.shape} does not fit {self._history.shape}")
         self.set_control(snapshot.control)
         self._tick = snapshot.tick
         self._history = np.array(snapshot.history, dtype=np.float32)

@@ -55,8 +55,8 @@ class GenerateModel(LanguageModel):
     """A model that puts words into motion.
 
     graphs: "encoder" (words, lengths -> context), "step" (for the loop "mixture" frame, context, states ->
-        log_weights, means, stds, active, next states) and perhaps "score" (context, frames -> log_likelihood), with frames
-        normalised and the active flag last.
+        log_weights, means, stds, active, next states) and perhaps "score" (context, frames -> log_likelihood), with
+        frames normalised and the active flag last.
     Its loops (:mod:`motet.decode.loops`) take the step, contexts (B, C), a generator of noise for each row, the longest
     number of frames and their settings by name, and give samples for each row, the best first.
     """
@@ -111,7 +111,7 @@ class GenerateModel(LanguageModel):
     def decode(
         self, contexts: NDArray[np.float32], noise: Sequence[Noise], settings: Mapping[str, Any]
     ) -> list[list[Sample]]:
-        """Samples for each context (B, C) by the model's loop, from the noise of each and all of the loop's settings."""
+        """Samples for each context (B, C) by the model's loop, from the noise of each and all the loop's settings."""
         rest = {name: value for name, value in settings.items() if name != "max_seconds"}
         frames = max(1, round(settings["max_seconds"] * self.fps))
         found: list[list[Sample]] = self.loop.run(self.graphs["step"], contexts, noise, frames, **rest)

@@ -6,6 +6,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
+from motet.representation.joint_vectors import joints_of, to_joint_vectors
 from numpy.typing import NDArray
 
 from motet.errors import MotionError
@@ -16,7 +17,6 @@ from motet.motion.rotations import Array
 from motet.motion.sides import partners_of
 from motet.motion.skeleton import Skeleton
 from motet.representation.contract import MotionContract
-from motet.representation.joint_vectors import joints_of, to_joint_vectors
 from motet.representation.root_block import ROOT_BLOCK
 from motet_train.data.archive import BROKEN, Archive
 from motet_train.data.clips import CMU_LICENCE, read_with_unit
@@ -73,7 +73,7 @@ def expmap_material(corpus: ExpmapCorpus, kept_back: Sequence[str] = ()) -> Mate
     count = layout.columns
     channels = ("root.tx", "root.ty", "root.tz", *(f"joint{n}.e{a}" for n in range((count - 3) // 3) for a in "xyz"))
     units = ("length",) * 3 + ("rad",) * (count - 3)
-    contract = MotionContract(channels, units, layout.fps / STRIDE, scaling.mean, scaling.std, None)
+    contract = MotionContract("angles", channels, units, layout.fps / STRIDE, scaling.mean, scaling.std, None)
     sequences, chances = _visited(corpus, kept_back)
     mirrored, signs = _mirrored_columns(layout)
     held = sum(column < ROOT for column in scaling.kept)
@@ -199,7 +199,7 @@ def mocap_material(trials: Sequence[Trial], skipped: Sequence[Skipped], name: st
     frames = np.concatenate(sequences)
     mean, std = frames.mean(axis=0, dtype=np.float64), frames.std(axis=0, dtype=np.float64)
     skeleton = skeleton_of(first).scaled(1.0)
-    contract = MotionContract(first.channels, first.units, FPS, mean, std, skeleton)
+    contract = MotionContract("root_vectors", first.channels, first.units, FPS, mean, std, skeleton)
     mirrored, signs = _mirrored_joints(skeleton, first.channels)
     names = [item.name for item in (*skipped, *left_out)]
     about = {"name": name, "files": len(found), "skipped": names, "test": sorted(test)}

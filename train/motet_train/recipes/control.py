@@ -8,6 +8,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from motet.bundle.manifest import Manifest
 from motet.models.control import ControlModel
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
@@ -46,7 +47,9 @@ def train_control(clips: Clips, job: Job) -> Run:
         torch.tensor(np.where(std < CONSTANT, 1.0, std * config.sigma)).float(),
     )
     onsets = [1.0 if is_periodic(frames) else config.onset for frames in found.values()]
-    contract = MotionContract(clips.channels, ("deg",) * len(clips.channels), config.fps, mean, std, clips.skeleton)
+    contract = MotionContract(
+        "angles", clips.channels, ("deg",) * len(clips.channels), config.fps, mean, std, clips.skeleton
+    )
     manifest = _manifest(job, clips, contract, net, found)
     net.to(job.device)
     generator = torch.Generator(job.device).manual_seed(job.about.seed)
@@ -87,7 +90,7 @@ def _missed(
 
     def missed(enough: int) -> list[str]:
         run = Run(manifest, deepcopy(net).cpu())
-        return missed_goals(study_of(ControlModel(run.manifest, run.torch_graphs()), clips), enough)
+        return missed_goals(study_of(ControlModel(Manifest.from_json(run.manifest), run.torch_graphs()), clips), enough)
 
     return missed
 

@@ -24,7 +24,7 @@ PLACE, POSE = "place_cm", "pose_cm"
 
 def held_out(model: PredictModel, trials: Sequence[Trial]) -> list[Trial]:
     """The trials that the model did not see in training; DataError where none of them is here."""
-    test = set(model.manifest["training"]["data"].get("test", ()))
+    test = set(model.manifest.training.get("data", {}).get("test", ()))
     found = [trial for trial in trials if trial.name in test]
     if not found:
         raise DataError("none of the trials that the model was not trained on is here")
