@@ -12,8 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from motet.bundle.golden import difference
 from motet.bundle.graph import Graph
 from motet.decode.rollout import advance
+from motet.errors import BundleError
 from motet_export.examples import Examples, example
 from motet_export.exporter import ExportError
 
@@ -37,16 +39,10 @@ def error(found: Arrays, expected: Arrays) -> float:
 
     ExportError where shapes or dtypes differ, or a value is not finite.
     """
-    largest = 0.0
-    for name, array in expected.items():
-        if name not in found or found[name].shape != array.shape or found[name].dtype != array.dtype:
-            raise ExportError(f"output {name!r} has another shape or dtype than in torch")
-        if not np.isfinite(found[name]).all():
-            raise ExportError(f"output {name!r} has values that are not finite")
-        expected_values = array.astype(np.float64)
-        scale = np.maximum(max(1.0, np.sqrt(np.mean(expected_values**2))), np.abs(expected_values))
-        largest = max(largest, float((np.abs(found[name] - expected_values) / scale).max(initial=0)))
-    return largest
+    try:
+        return difference(found, expected)
+    except BundleError as fault:
+        raise ExportError(str(fault)) from fault
 
 
 def check_one_step(name: str, onnx: Graph, torch: Graph, draw: Examples | None = None) -> dict[str, Any]:

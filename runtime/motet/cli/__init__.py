@@ -24,13 +24,17 @@ COMMANDS = {
     "bench": ("motet.cli.bench:bench", "", "How fast the models run on this machine."),
     "prepare": ("motet_train.cli.prepare:prepare", "train", "Motion files and sentences to a store for training."),
     "train": ("motet_train.cli.train:train", "train", "Train a model."),
-    "evaluate": ("motet_train.cli.evaluate:evaluate", "train", "Measure a trained run or a bundle."),
+    "evaluate": ("motet_train.cli.evaluate:evaluate", "evaluate", "Measure a trained run or a bundle."),
     "export": ("motet_export.cli:export", "export", "A trained run to a bundle."),
     "parity": ("motet_export.cli:parity", "export", "Compare a bundle with the trained run it came from."),
 }
 """Command -> where it is, the extra that it needs, and what it does."""
 
-NEEDS = {"train": ("torch", "tqdm", "scipy", "sklearn", "sacrebleu"), "export": ("torch", "onnx", "onnxscript")}
+NEEDS = {
+    "train": ("torch", "tqdm"),
+    "evaluate": ("torch", "tqdm", "matplotlib", "sklearn", "sacrebleu"),
+    "export": ("torch", "tqdm", "onnx", "onnxscript"),
+}
 """Extra -> the packages by which it is recognised."""
 
 

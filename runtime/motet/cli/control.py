@@ -4,6 +4,8 @@ from pathlib import Path
 
 import click
 
+from motet.bundle.session import SessionOptions
+from motet.cli.options import session_options
 from motet.cli.reading import Read, naming, out_option, read_options
 from motet.formats import check_writable, write_motion
 from motet.formats.html import write as write_html
@@ -27,6 +29,7 @@ from motet.models.script import parse_script, starts_of
     help="Sampling temperature; lower is more deterministic. [default: the bundle's]",
 )
 @click.option("--in-place", is_flag=True, help="Keep the root where it is, instead of laying its path.")
+@session_options
 @read_options
 def control(
     script: str,
@@ -37,6 +40,7 @@ def control(
     variety: float,
     temperature: float | None,
     in_place: bool,
+    session: SessionOptions,
     read: Read,
 ) -> None:
     """Run SCRIPT, such as "walk 3s, walk>run 2s, run 3s", and write the motion.
@@ -44,7 +48,7 @@ def control(
     Segments have commas between them: a label and seconds; a ramp "walk>run 5s"; a mix "walk*.3+run*.7 2s".
     """
     check_writable(out)
-    model = load_as(ControlModel, bundle)
+    model = load_as(ControlModel, bundle, session)
     segments = parse_script(script, model.labels)
     with naming(start):
         first = read(Path(start)) if start and Path(start).suffix else start

@@ -7,6 +7,8 @@ from typing import Any
 
 import click
 
+from motet.bundle.session import SessionOptions
+from motet.cli.options import session_options
 from motet.cli.reading import READS, Read, Tries, bar, read_options, say_resampled
 from motet.models.describe import DescribeModel, Description
 from motet.models.load import load_as
@@ -27,13 +29,20 @@ from motet.models.load import load_as
     type=click.IntRange(0, 1000),
     help="Samples for consensus (MBR) decoding; 0: beam search. [default: the bundle's]",
 )
+@session_options
 @read_options
 @click.option("--json", "as_json", is_flag=True, help="Print a list with input, seconds and hypotheses of each window.")
 def describe(
-    motions: tuple[Path, ...], bundle: str, beams: int | None, draws: int | None, read: Read, as_json: bool
+    motions: tuple[Path, ...],
+    bundle: str,
+    beams: int | None,
+    draws: int | None,
+    session: SessionOptions,
+    read: Read,
+    as_json: bool,
 ) -> None:
     """Describe motion files."""
-    model = load_as(DescribeModel, bundle)
+    model = load_as(DescribeModel, bundle, session)
     tries, rows, parts, rates = Tries(), [], [], []
     for path in motions:
         with tries.of(path):

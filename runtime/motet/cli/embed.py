@@ -7,7 +7,9 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
+from motet.bundle.session import SessionOptions
 from motet.cli.notes import text_notes
+from motet.cli.options import session_options
 from motet.cli.reading import Read, Tries, read_options, say_resampled
 from motet.files import check_place, write_whole
 from motet.models.describe import DescribeModel
@@ -20,8 +22,16 @@ from motet.models.load import load_as
 @click.option("--text", "texts", multiple=True, help="A sentence, instead of motions; may be given several times.")
 @click.option("-o", "--out", required=True, type=Path, help="The .npy to write: (N, C) float32.")
 @click.option("--bundle", help="Name or path of a bundle. [default: cmu-describe, with --text cmu-generate]")
+@session_options
 @read_options
-def embed(motions: tuple[Path, ...], texts: tuple[str, ...], out: Path, bundle: str | None, read: Read) -> None:
+def embed(
+    motions: tuple[Path, ...],
+    texts: tuple[str, ...],
+    out: Path,
+    bundle: str | None,
+    session: SessionOptions,
+    read: Read,
+) -> None:
     """Write context vectors of motion files, or of sentences, one row for each: for search and clusters.
 
     Motions have those of a bundle that describes, sentences those of one that generates; the two are not comparable.
@@ -34,10 +44,10 @@ def embed(motions: tuple[Path, ...], texts: tuple[str, ...], out: Path, bundle: 
     check_place(out)
     tries = Tries()
     if motions:
-        vectors = _of_motions(load_as(DescribeModel, bundle or "cmu-describe"), motions, read, tries)
+        vectors = _of_motions(load_as(DescribeModel, bundle or "cmu-describe", session), motions, read, tries)
     else:
         with text_notes():
-            vectors = load_as(GenerateModel, bundle or "cmu-generate").embed(texts)
+            vectors = load_as(GenerateModel, bundle or "cmu-generate", session).embed(texts)
     if len(vectors):
         buffer = io.BytesIO()
         np.save(buffer, vectors, allow_pickle=False)

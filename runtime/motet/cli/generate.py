@@ -7,7 +7,9 @@ from typing import Any
 
 import click
 
+from motet.bundle.session import SessionOptions
 from motet.cli.notes import text_notes
+from motet.cli.options import session_options
 from motet.cli.reading import FPS, bar, out_option, places
 from motet.formats import check_writable, write_motion
 from motet.models.generate import PLAYED, Generated, GenerateModel
@@ -34,6 +36,7 @@ from motet.models.load import load_as
 @click.option("--fps", type=FPS, default=PLAYED, show_default=True, help="Frame rate to write.")
 @click.option("--no-plant", is_flag=True, help="Skip foot planting: the figure moves as drawn.")
 @click.option("--all", "every", is_flag=True, help="Write all hypotheses, not only the best.")
+@session_options
 @click.option("--json", "as_json", is_flag=True, help="Print a list with input and hypotheses of each text.")
 def generate(
     texts: tuple[str, ...],
@@ -43,6 +46,7 @@ def generate(
     no_plant: bool,
     every: bool,
     as_json: bool,
+    session: SessionOptions,
     **settings: Any,
 ) -> None:
     """Generate a motion for each TEXT, such as "a person walks and turns left", and write it to OUT.
@@ -50,7 +54,7 @@ def generate(
     With several texts, or --all, the files are numbered: out-1.bvh, out-2.bvh, ...
     """
     check_writable(out)
-    model = load_as(GenerateModel, bundle)
+    model = load_as(GenerateModel, bundle, session)
     with text_notes(), bar("generating") as progress:
         found = model.generate(texts, progress=progress, **settings)
     kept = [row if every else row[:1] for row in found]

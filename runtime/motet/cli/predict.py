@@ -4,6 +4,8 @@ from pathlib import Path
 
 import click
 
+from motet.bundle.session import SessionOptions
+from motet.cli.options import session_options
 from motet.cli.reading import Read, Tries, out_option, places, read_options, say_resampled
 from motet.formats import write_motion
 from motet.models.load import load_as
@@ -16,15 +18,24 @@ from motet.models.predict import PredictModel
 @click.option("--bundle", default="cmu-predict", show_default=True, help="Name or path of a bundle.")
 @click.option("--frames", type=click.IntRange(1, 100_000), help="How many to predict. [default: the bundle's horizon]")
 @click.option("--append", is_flag=True, help="Write the motion too, and what follows behind it.")
+@session_options
 @read_options
-def predict(sources: tuple[Path, ...], out: Path, bundle: str, frames: int | None, append: bool, read: Read) -> None:
+def predict(
+    sources: tuple[Path, ...],
+    out: Path,
+    bundle: str,
+    frames: int | None,
+    append: bool,
+    session: SessionOptions,
+    read: Read,
+) -> None:
     """Carry motion files on from their last frames, and write what follows.
 
     A file must have the joints of the bundle's figure; the frames come at the bundle's frame rate. With several files
     OUT holds {name} for their names, or the results are numbered: out-1.bvh, out-2.bvh, ...
     """
     outs = places(out, [source.stem for source in sources])
-    model, tries, rates = load_as(PredictModel, bundle), Tries(), []
+    model, tries, rates = load_as(PredictModel, bundle, session), Tries(), []
     for source, place in zip(sources, outs, strict=True):
         with tries.of(source):
             motion = read(source)

@@ -1,14 +1,17 @@
 """Generate: ranked motions for a sentence. Section 4.3 of Plappert et al. 2017."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import overload
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.decode.mixture import Sample, mixture_search
+from motet.bundle.graph import Arrays, Graph
+from motet.bundle.manifest import Manifest
+from motet.decode.mixture import Noise, Sample
+from motet.decode.noise import Recorded
 from motet.errors import DecodingError
 from motet.files import File
 from motet.formats import write_motion
@@ -19,9 +22,6 @@ from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
 
-BATCH = 64
-"""Sentences that are decoded at once; more bring no speed and take memory."""
-
 PLAYED = 30.0
 """Frames per second of what is generated, whatever the model's own rate is."""
 
@@ -31,12 +31,13 @@ class Generated:
     """A generated motion, its log-likelihood given the sentence, and the words that were unknown.
 
     contract: what the frames mean. frames: (T, D) as they were drawn, in its channels; their feet slide.
-    log_likelihood: of the normalised frames as drawn and of where they end, as :meth:`GenerateModel.score` gives it.
+    log_likelihood: of the normalised frames as drawn and of where they end, as :meth:`GenerateModel.score` gives it;
+        None where the model's loop has no likelihoods.
     """
 
     contract: MotionContract
     frames: Array
-    log_likelihood: float
+    log_likelihood: float | None
     unknown: tuple[str, ...] = ()
 
     @cached_property
@@ -65,9 +66,23 @@ class Generated:
 class GenerateModel(LanguageModel):
     """A model that puts words into motion.
 
-    graphs: "encoder" (words, lengths -> context), "step" (frame, context, state -> log_weights, means, stds, active,
-        next_state) and "score" (context, frames -> log_likelihood), with frames normalised and the active flag last.
+    graphs: "encoder" (words, lengths -> context), "step" (for the loop "mixture" frame, context, states ->
+        log_weights, means, stds, active, next states) and perhaps "score" (context, frames -> log_likelihood), with
+        frames normalised and the active flag last.
+    Its loops (:mod:`motet.decode.loops`) take the step, contexts (B, C), a generator of noise for each row, the longest
+    number of frames and their settings by name, and give samples for each row, the best first.
     """
+
+    VERB = "generate"
+
+    def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph]) -> None:
+        super().__init__(manifest, graphs)
+        self.sizes["F"] = self.sizes["D"] + 1  # with the active flag
+        context = {"context": "batch C"}
+        self.bind("encoder", {"words": "*batch words", "lengths": "*batch"}, context)
+        self.bind("step", self.loop.inputs, self.loop.outputs)
+        if "score" in graphs:
+            self.bind("score", {**context, "frames": "batch time F"}, {"log_likelihood": "batch time"})
 
     @overload
     def generate(  # type: ignore[overload-overlap]  # a string is a sequence of strings, too
@@ -117,19 +132,30 @@ class GenerateModel(LanguageModel):
         """
         texts = [sentences] if isinstance(sentences, str) else list(sentences)
         ids, seeds = [self.ids(text) for text in texts], seeds_of(seed, len(texts), DecodingError)
-        settings = (
-            int(self.setting("hypotheses", hypotheses, 1, 100)),
-            int(self.setting("candidates", candidates, 1, 100)),
-            self.setting("temperature", temperature, 0.01, 100),
-            max(1, round(self.setting("max_seconds", max_seconds, 1 / self.fps, 600) * self.fps)),
-        )
+        chosen = {
+            "hypotheses": hypotheses,
+            "candidates": candidates,
+            "temperature": temperature,
+            "max_seconds": max_seconds,
+        }
+        settings = self.loop.settled(self.defaults, chosen)
+        noise = [np.random.Generator(np.random.PCG64(one)) for one in seeds]
         contexts, found = self.contexts(ids), []
-        for place in range(0, len(texts), BATCH):
-            batch = slice(place, place + BATCH)
-            found += mixture_search(self.graphs["step"], contexts[batch], seeds[batch], *settings)
+        for place in range(0, len(texts), self.loop.batch):
+            batch = slice(place, place + self.loop.batch)
+            found += self.decode(contexts[batch], noise[batch], settings)
             progress(len(found), len(texts))
         rows = [[self._generated(s, text) for s in row] for text, row in zip(texts, found, strict=True)]
         return rows[0] if isinstance(sentences, str) else rows
+
+    def decode(
+        self, contexts: NDArray[np.float32], noise: Sequence[Noise], settings: Mapping[str, Any]
+    ) -> list[list[Sample]]:
+        """Samples for each context (B, C) by the model's loop, from the noise of each and all the loop's settings."""
+        rest = {name: value for name, value in settings.items() if name != "max_seconds"}
+        frames = max(1, round(settings["max_seconds"] * self.fps))
+        found: list[list[Sample]] = self.loop.run(self.graphs["step"], contexts, noise, frames, **rest)
+        return found
 
     def embed(self, sentences: str | Sequence[str]) -> NDArray[np.float32]:
         """The context vector (C,) float32 of a sentence, or vectors (N, C) of several; errors as :meth:`ids`."""
@@ -144,7 +170,17 @@ class GenerateModel(LanguageModel):
         frames = np.zeros((1, len(normal) + 1, normal.shape[1] + 1), dtype=np.float32)
         frames[0, :-1, :-1], frames[0, :-1, -1] = normal, 1
         feeds = {"context": self.embed([sentence]), "frames": frames}
-        return float(self.graphs["score"](feeds)["log_likelihood"].sum(dtype=np.float64))
+        return float(self.score_graph()(feeds)["log_likelihood"].sum(dtype=np.float64))
+
+    def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
+        """A sentence ("text" of the settings) and its noise to ids (words,) int64 and the frames of the best motion.
+
+        The noise of each kind is (steps, ...), the frames (T, D) are normalised.
+        """
+        ids, _ = self.vocabulary.encode(str(settings["text"]))
+        chosen = self.loop.settled(self.defaults, {k: v for k, v in settings.items() if k != "text"})
+        (row,) = self.decode(self.contexts([ids]), [Recorded(given)], chosen)
+        return {"ids": ids, "frames": row[0].frames}
 
     def _generated(self, sample: Sample, text: str) -> Generated:
         frames = self.contract.denormalised(sample.frames)

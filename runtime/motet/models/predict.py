@@ -8,34 +8,38 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from motet.bundle.graph import Graph
-from motet.decode.rollout import free_run, two_rows
-from motet.errors import BundleError, DecodingError, MotionError
-from motet.models.base import Bundled
+from motet.bundle.graph import Arrays, Graph
+from motet.bundle.manifest import Manifest
+from motet.bundle.signature import bind
+from motet.decode.rollout import two_rows
+from motet.errors import DecodingError, MotionError
+from motet.models.base import BundleModel
 from motet.models.progress import Progress, silent
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 
 Floats = NDArray[np.float32]
 
-BATCH = 64
-"""Motions that are carried on at once."""
+MAX_FRAMES = 100_000
+"""Of one prediction, which is in memory as a whole."""
 
 
-class PredictModel(Bundled):
+class PredictModel(BundleModel):
     """A model that carries motions on; shared between any number of sessions and threads.
 
     graphs: "encoder" (frames (B, L, C) -> what the step takes first) and "step" (-> frame (B, C), and what it takes
         next). After ``horizon`` frames, its default, a prediction goes on from its own last frames.
     """
 
-    def __init__(self, manifest: Mapping[str, Any], graphs: Mapping[str, Graph]) -> None:
+    VERB = "predict"
+
+    def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph]) -> None:
         super().__init__(manifest, graphs)
-        try:
-            self.horizon = int(manifest["defaults"]["horizon"])
-        except (KeyError, TypeError, ValueError) as error:
-            raise BundleError(f"the manifest describes no model that predicts: {error}") from error
-        self.seed_frames = graphs["encoder"].spec.input("frames").size(1)
+        self.horizon = int(self.defaults["horizon"])
+        encoder, step = graphs["encoder"].spec, graphs["step"].spec
+        self.bind("encoder", {"frames": "batch L D"}, {})
+        bind("step", step, self.loop.inputs, self.loop.outputs, self.sizes, given=encoder.outputs)
+        self.seed_frames = self.sizes["L"]
 
     @overload
     def predict(
@@ -66,8 +70,8 @@ class PredictModel(Bundled):
         given = [motions] if isinstance(motions, Motion) else list(motions)
         seeds = [self._seed(motion) for motion in given]
         found: list[Motion] = []
-        for place in range(0, len(given), BATCH):
-            part = seeds[place : place + BATCH]
+        for place in range(0, len(given), self.loop.batch):
+            part = seeds[place : place + self.loop.batch]
             following = self.next_frames([last for _, _, last in part], frames)
             found += [self._carried_on(*one[:2], new, append) for one, new in zip(part, following, strict=True)]
             progress(len(found), len(given))
@@ -94,12 +98,12 @@ class PredictModel(Bundled):
         """Seed frames (B, L, C) in the contract's channels, to the next frames (B, frames, C) float32.
 
         Each row gives what it gives alone, to the bit with one thread.
-        DecodingError for less than one frame, MotionError for seeds of another shape.
+        DecodingError for a number of frames out of range, MotionError for seeds of another shape.
         """
         given = np.asarray(seeds, dtype=np.float32)
         count = self.horizon if frames is None else frames
-        if count < 1:
-            raise DecodingError(f"at least one frame can be predicted, not {count}")
+        if not 1 <= count <= MAX_FRAMES:
+            raise DecodingError(f"1 to {MAX_FRAMES} frames can be predicted, not {count}")
         shape = (self.seed_frames, len(self.contract.channels))
         if given.ndim != 3 or given.shape[1:] != shape:
             raise MotionError(
@@ -108,7 +112,12 @@ class PredictModel(Bundled):
         if not np.isfinite(given).all():
             raise MotionError("seeds must be finite numbers")
         rows = two_rows(np.arange(len(given)))
-        return free_run(self.graphs["encoder"], self.graphs["step"], given[rows], count, self.horizon)[: len(given)]
+        found: Floats = self.loop.run(self.graphs["encoder"], self.graphs["step"], given[rows], count, self.horizon)
+        return found[: len(given)]
+
+    def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
+        """Seed frames (L, C) and the number of "frames" of the settings to the next frames (frames, C)."""
+        return {"frames": self.next_frames(given["frames"][None], int(settings["frames"]))[0]}
 
     def stream(self, start: Motion | None = None) -> "PredictSession":
         """A session that frames are pushed into as they come.

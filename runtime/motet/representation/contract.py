@@ -121,7 +121,7 @@ class MotionContract:
         channels, units = _texts(data, "channels"), _texts(data, "units", len(data["channels"]))
         fps = float(_numbers([data.get("fps")], "fps", 1)[0])
         mean, std = (_numbers(data.get(key), key, len(channels)) for key in ("mean", "std"))
-        name = str(data.get("representation", _inferred_name(channels)))
+        name = str(data.get("representation"))
         lacking = [channel for channel in named(name).required if channel not in channels]
         _refuse(bool(lacking), "channels", f"{name} needs {', '.join(lacking)}")
         _refuse(len(set(channels)) < len(channels), "channels", "names must differ")
@@ -129,13 +129,6 @@ class MotionContract:
         _refuse(not 0 < fps <= FASTEST, "fps", f"a number over 0 and up to {FASTEST:g} is needed, not {fps:g}")
         _refuse(bool((std < 0).any()), "std", "a standard deviation is not negative")
         return MotionContract(name, channels, units, fps, mean, std, _skeleton(data))
-
-
-def _inferred_name(channels: Sequence[str]) -> str:
-    """To be deleted with format 1, whose manifests do not name the representation."""
-    if "root.forward" not in channels:
-        return "angles"
-    return "root_vectors" if any(name.endswith(".ex") for name in channels) else "root_angles"
 
 
 def living(std: ArrayLike, units: Sequence[str]) -> Array:

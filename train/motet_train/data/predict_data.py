@@ -6,10 +6,11 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
+from motet.representation.joint_vectors import joints_of, to_joint_vectors
 from numpy.typing import NDArray
 
 from motet.errors import MotionError
-from motet.formats import MOCAP, read_motion
+from motet.formats import MOCAP
 from motet.motion.kinematics import skeleton_of
 from motet.motion.mirror import lateral_axis
 from motet.motion.motion import Motion
@@ -17,10 +18,9 @@ from motet.motion.rotations import Array
 from motet.motion.sides import partners_of
 from motet.motion.skeleton import Skeleton
 from motet.representation.contract import MotionContract
-from motet.representation.joint_vectors import joints_of, to_joint_vectors
 from motet.representation.root_block import ROOT_BLOCK
 from motet_train.data.archive import BROKEN, Archive
-from motet_train.data.clips import CMU_LICENCE
+from motet_train.data.clips import CMU_LICENCE, read_with_unit
 from motet_train.data.errors import DataError
 from motet_train.data.expmap_files import ROOT, ExpmapCorpus, Layout, scaling_of
 from motet_train.data.mirror_frames import NEGATED
@@ -58,7 +58,7 @@ class Material:
     held: int = 0
     mirrored: tuple[int, ...] = ()
     signs: tuple[float, ...] = ()
-    licence: str = ""
+    licence: str | None = None
     about: dict[str, Any] = field(default_factory=dict)
     validation: Sequence[NDArray[np.float32]] = ()
     layout: Layout | None = None
@@ -73,7 +73,7 @@ def expmap_material(corpus: ExpmapCorpus, kept_back: Sequence[str] = ()) -> Mate
     count = layout.columns
     channels = ("root.tx", "root.ty", "root.tz", *(f"joint{n}.e{a}" for n in range((count - 3) // 3) for a in "xyz"))
     units = ("length",) * 3 + ("rad",) * (count - 3)
-    contract = MotionContract(channels, units, layout.fps / STRIDE, scaling.mean, scaling.std, None)
+    contract = MotionContract("angles", channels, units, layout.fps / STRIDE, scaling.mean, scaling.std, None)
     sequences, chances = _visited(corpus, kept_back)
     mirrored, signs = _mirrored_columns(layout)
     held = sum(column < ROOT for column in scaling.kept)
@@ -155,8 +155,13 @@ class Trial:
     motion: Motion
 
 
-def read_trials(path: Path, progress: Callable[[str], object] = lambda name: None) -> tuple[list[Trial], list[Skipped]]:
-    """The motion files of a folder or zip, one of each name, idle ends cut off, and those that cannot be used."""
+def read_trials(
+    path: Path, progress: Callable[[str], object] = lambda name: None, metres_per_unit: float | None = None
+) -> tuple[list[Trial], list[Skipped]]:
+    """The motion files of a folder or zip, one of each name, idle ends cut off, and those that cannot be used.
+
+    metres_per_unit: the length unit of files that do not say it.
+    """
     trials, skipped = {}, []
     with Archive(path) as archive:
         names = [name for name in archive.names if PurePosixPath(name).suffix.lower() in MOCAP]
@@ -168,7 +173,8 @@ def read_trials(path: Path, progress: Callable[[str], object] = lambda name: Non
             progress(clip)
             try:
                 with archive.opened(name) as place:
-                    trials[clip] = Trial(clip, clip.split("_")[0], trim(read_motion(place)))
+                    motion = read_with_unit(place, metres_per_unit)
+                trials[clip] = Trial(clip, clip.split("_")[0], trim(motion))
             except BROKEN as error:
                 skipped.append(Skipped(clip, archive.reason(error)))
     if not trials:
@@ -182,7 +188,7 @@ def test_names(trials: Sequence[Trial]) -> tuple[str, ...]:
     return tuple(trials[index].name for index in split(entries, 0, "subject").test)
 
 
-def mocap_material(trials: Sequence[Trial], skipped: Sequence[Skipped], name: str, licence: str) -> Material:
+def mocap_material(trials: Sequence[Trial], skipped: Sequence[Skipped], name: str, licence: str | None) -> Material:
     """Motions of one figure as root block and exponential maps at :data:`FPS`, all phases, without the test trials."""
     test = set(test_names(trials))
     found, left_out = _figures([trial for trial in trials if trial.name not in test])
@@ -193,7 +199,7 @@ def mocap_material(trials: Sequence[Trial], skipped: Sequence[Skipped], name: st
     frames = np.concatenate(sequences)
     mean, std = frames.mean(axis=0, dtype=np.float64), frames.std(axis=0, dtype=np.float64)
     skeleton = skeleton_of(first).scaled(1.0)
-    contract = MotionContract(first.channels, first.units, FPS, mean, std, skeleton)
+    contract = MotionContract("root_vectors", first.channels, first.units, FPS, mean, std, skeleton)
     mirrored, signs = _mirrored_joints(skeleton, first.channels)
     names = [item.name for item in (*skipped, *left_out)]
     about = {"name": name, "files": len(found), "skipped": names, "test": sorted(test)}
