@@ -91,7 +91,10 @@ def check_carried(
 def _nudged(state: Arrays, rng: np.random.Generator) -> dict[str, NDArray[Any]]:
     """A state whose numbers have moved to one of their two neighbours in float32."""
     ends = np.array([-np.inf, np.inf], dtype=np.float32)
-    return {name: np.nextafter(values, rng.choice(ends, values.shape)) for name, values in state.items()}
+    return {
+        name: np.nextafter(values, rng.choice(ends, values.shape)) if values.dtype == np.float32 else values
+        for name, values in state.items()
+    }
 
 
 def check_runs(runs: Mapping[str, Callable[[], tuple[Arrays, Arrays]]]) -> dict[str, Any]:

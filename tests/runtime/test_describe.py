@@ -1,11 +1,14 @@
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from fake_models import CHANNELS, CONTRACT, FakeGraph, describe_model, moving
+from fake_models import CHANNELS, CONTRACT, VOCABULARY, FakeGraph, describe_model, moving
 
 from motet.bench import WORDS, describe_figures, figures
 from motet.errors import BundleError, DecodingError, MotionError, TextError, TextWarning
+from motet.formats import write_motion
 from motet.models.describe import DescribeModel, Description
 from motet.models.language import batches, padded
 
@@ -42,7 +45,7 @@ def test_more_motions_than_fit_one_batch_come_back_in_order(
 ) -> None:
     motions = [moving(3 + i % 7, seed=i) for i in range(11)]
     whole, vectors = model.describe(motions), model.embed(motions)
-    monkeypatch.setattr("motet.models.describe.BATCH", 4)
+    monkeypatch.setattr(model, "loop", replace(model.loop, batch=4))
     assert [[d.text for d in row] for row in model.describe(motions)] == [[d.text for d in row] for row in whole]
     np.testing.assert_allclose(model.embed(motions), vectors, atol=1e-5)
 
@@ -120,7 +123,7 @@ def drawing(temperature: float) -> DescribeModel:
     """The model with 30 draws as its default; it is sharp, so that only hot draws differ."""
     model = describe_model()
     defaults = {**model.defaults, "draws": 30, "temperature": temperature}
-    return DescribeModel({**model.manifest, "defaults": defaults}, model.graphs)
+    return DescribeModel(replace(model.manifest, loop="consensus", defaults=defaults), model.graphs)
 
 
 def test_a_motion_is_described_by_draws_as_it_is_alone_and_every_time() -> None:
@@ -148,7 +151,7 @@ def test_the_bundle_says_how_hypotheses_are_ranked(model: DescribeModel) -> None
 
 @pytest.mark.parametrize("draws", [-1, 1001])
 def test_draws_out_of_range(model: DescribeModel, draws: int) -> None:
-    with pytest.raises(DecodingError, match=f"draws must be between 0 and 1000, not {draws}"):
+    with pytest.raises(DecodingError, match=f"draws must be between 1 and 1000, not {draws}"):
         model.describe(moving(20), draws=draws)
 
 
@@ -176,13 +179,34 @@ def test_the_model_holds_no_state(model: DescribeModel) -> None:
     assert vars(model) == before
 
 
-@pytest.mark.parametrize("key", ["vocabulary", "defaults"])
-def test_a_manifest_that_lacks_something(model: DescribeModel, key: str) -> None:
-    manifest = {name: value for name, value in model.manifest.items() if name != key}
-    with pytest.raises(BundleError, match=key):
-        DescribeModel(manifest, model.graphs)
-    with pytest.raises(BundleError, match="starts with PAD"):
-        DescribeModel({**model.manifest, "vocabulary": ["a"]}, model.graphs)
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"vocabulary": ("a",)}, "manifest, vocabulary: a vocabulary starts with PAD"),
+        ({"vocabulary": (*VOCABULARY.words, "more")}, r"graphs.step: 'log_probabilities' is float32 \['batch', 10\]"),
+        ({"text": None}, "manifest, text: is missing"),
+        ({"text": {"rules": 2}}, "manifest, text.rules: must be a whole number between 1 and 1, not 2"),
+        ({"defaults": {"beams": 5}}, "manifest, defaults.max_words: is missing"),
+        (
+            {"defaults": {"beams": 5, "max_words": "x"}},
+            "defaults.max_words: max_words must be between 1 and 1000, not x",
+        ),
+        ({"defaults": {"beams": 2.5, "max_words": 5}}, "beams must be a whole number, not 2.5"),
+        ({"loop": "mixture"}, "manifest, loop: 'mixture' does not describe; expected one of beam, consensus"),
+        ({"verb": "generate"}, "manifest, verb: 'generate', expected 'describe'"),
+    ],
+)
+def test_a_manifest_that_does_not_fit(model: DescribeModel, change: dict[str, Any], reason: str) -> None:
+    with pytest.raises(BundleError, match=reason):
+        DescribeModel(replace(model.manifest, **change), model.graphs)
+
+
+def test_without_a_score_graph_only_scoring_is_refused(model: DescribeModel) -> None:
+    graphs = {role: graph for role, graph in model.graphs.items() if role != "score"}
+    other = DescribeModel(model.manifest, graphs)
+    assert other.describe(moving(20)) == model.describe(moving(20))
+    with pytest.raises(BundleError, match="no graph 'score'"):
+        other.score(moving(20), "walks")
 
 
 def test_one_step_call_serves_the_batch(model: DescribeModel) -> None:
@@ -200,10 +224,11 @@ def test_batches_and_padding() -> None:
     assert (values[1, 1] == 0).all()
 
 
-def test_the_benchmark_measures_sentences_of_one_length() -> None:
+def test_the_benchmark_measures_sentences_of_one_length(tmp_path: Path) -> None:
     model = describe_model()
-    found = figures(model, 0.001)
-    parts = ("descriptions", "one", "consensus", "encoder", "step")
+    write_motion(tmp_path / "a.npz", moving(20))
+    found = figures(model, 0.001, tmp_path / "a.npz")
+    parts = ("descriptions", "one", "consensus", "encoder", "step", "file")
     assert set(found) == {f"describe.{part}" for part in parts}
     assert all(value > 0 for value, _ in found.values())
     step = model.graphs["step"]

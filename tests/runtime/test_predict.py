@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fake_models import FakeGraph, spec
+from fake_models import FakeGraph, manifest, spec
 from figures import walker
 
-from motet.decode.rollout import free_run
+from motet.decode.free_run import free_run
 from motet.errors import BundleError, DecodingError, MotionError
 from motet.formats import read_motion, write_motion
 from motet.models.predict import PredictModel
@@ -44,8 +44,8 @@ def model_of(motion: Motion, change: float = 1.0) -> PredictModel:
     zeros = np.zeros(len(motion.channels))
     name = "root_vectors" if joints_of(motion.channels) else "angles"
     contract = MotionContract(name, motion.channels, motion.units, motion.fps, zeros, zeros + 1, motion.skeleton)
-    manifest = {"name": "fake", "verb": "predict", "motion": contract.to_json(), "defaults": {"horizon": HORIZON}}
-    return PredictModel(manifest, graphs(len(motion.channels), change))
+    found = manifest("predict", "free_run", contract, {"horizon": HORIZON})
+    return PredictModel(found, graphs(len(motion.channels), change))
 
 
 def circle(frames: int = 12, fps: float = FPS) -> Motion:
@@ -177,8 +177,8 @@ def test_what_does_not_fit_is_refused() -> None:
         model.next_frames(np.full((1, model.seed_frames, len(model.contract.channels)), np.nan))
     with pytest.raises(MotionError, match="do not fit"):
         model.next_frames(np.zeros((1, SEED, 5)))
-    with pytest.raises(BundleError, match="no model that predicts"):
-        PredictModel({**model.manifest, "defaults": {}}, model.graphs)
+    with pytest.raises(BundleError, match=r"manifest, defaults.horizon: is missing"):
+        PredictModel(replace(model.manifest, defaults={}), model.graphs)
 
 
 def test_the_root_faces_where_it_faced() -> None:

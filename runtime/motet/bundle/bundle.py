@@ -137,7 +137,7 @@ def write_bundle(path: str | Path, manifest: Mapping[str, Any], files: Mapping[s
     BundleError for a manifest that could not be read again.
     """
     path = Path(path)
-    entries = {name: vars(entry(data)) for name, data in files.items()}
+    entries = {name: vars(entry(data)) for name, data in sorted(files.items())}
     text = (json.dumps({"format": FORMAT, **manifest, "files": entries}, indent=1) + "\n").encode()
     Manifest.of_bundle(text)
     if path.suffix == ".zip":

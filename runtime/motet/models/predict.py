@@ -12,7 +12,7 @@ from motet.bundle.graph import Arrays, Graph
 from motet.bundle.manifest import Manifest
 from motet.bundle.signature import bind
 from motet.decode.rollout import two_rows
-from motet.errors import DecodingError, MotionError
+from motet.errors import BundleError, DecodingError, MotionError
 from motet.models.base import BundleModel
 from motet.models.progress import Progress, silent
 from motet.motion.motion import Motion
@@ -20,8 +20,8 @@ from motet.motion.rotations import Array
 
 Floats = NDArray[np.float32]
 
-MAX_FRAMES = 100_000
-"""Of one prediction, which is in memory as a whole."""
+MAX_FRAMES, MAX_GOLDEN = 100_000, 1000
+"""Of one prediction, which is in memory as a whole; and of one among the golden vectors."""
 
 
 class PredictModel(BundleModel):
@@ -117,7 +117,10 @@ class PredictModel(BundleModel):
 
     def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
         """Seed frames (L, C) and the number of "frames" of the settings to the next frames (frames, C)."""
-        return {"frames": self.next_frames(given["frames"][None], int(settings["frames"]))[0]}
+        count = int(settings["frames"])
+        if count > MAX_GOLDEN:
+            raise BundleError(f"golden vectors hold at most {MAX_GOLDEN} frames, not {count}")
+        return {"frames": self.next_frames(given["frames"][None], count)[0]}
 
     def stream(self, start: Motion | None = None) -> "PredictSession":
         """A session that frames are pushed into as they come.
