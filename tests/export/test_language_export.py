@@ -123,7 +123,7 @@ def test_a_description_scores_what_its_beam_says(bundles: dict[str, Path]) -> No
     model = load(bundles["describe"])
     assert isinstance(model, DescribeModel)
     motion = model.contract.features(np.random.default_rng(0).normal(size=(20, D)))
-    for found in model.describe(motion, beams=5)[0]:
+    for found in model.describe(motion, beams=5):
         if found.text:
             assert model.score(motion, found.text) == pytest.approx(found.log_probability, abs=1e-4)
 
@@ -131,7 +131,7 @@ def test_a_description_scores_what_its_beam_says(bundles: dict[str, Path]) -> No
 def test_a_generated_motion_scores_what_its_beam_says(bundles: dict[str, Path]) -> None:
     model = load(bundles["generate"])
     assert isinstance(model, GenerateModel)
-    for found in model.generate("a person walks", hypotheses=4, candidates=2, seed=3)[0]:
+    for found in model.generate("a person walks", hypotheses=4, candidates=2, seed=3):
         if len(found.frames) > 1:
             score = model.score("a person walks", model.contract.features(found.frames))
             assert score == pytest.approx(found.log_likelihood, rel=1e-3, abs=1e-2)

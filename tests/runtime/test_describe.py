@@ -20,10 +20,11 @@ def model() -> DescribeModel:
 
 def test_hypotheses_are_ranked_and_scored(model: DescribeModel) -> None:
     motion = moving(20)
-    (row,) = model.describe(motion)
+    row = model.describe(motion)
     assert [type(d) for d in row] == [Description] * 5
     scores = [d.log_probability for d in row]
     assert scores == sorted(scores, reverse=True)
+    assert scores == [d.score for d in row]
     for description in row:
         if description.text:
             assert model.score(motion, description.text) == pytest.approx(description.log_probability, abs=1e-4)
@@ -33,7 +34,7 @@ def test_a_motion_gets_what_it_gets_alone(model: DescribeModel) -> None:
     motions = [moving(length, seed=length) for length in (5, 30, 2, 17, 30)]
     together = model.describe(motions, beams=3)
     for motion, row in zip(motions, together, strict=True):
-        (alone,) = model.describe(motion, beams=3)
+        alone = model.describe(motion, beams=3)
         assert [d.text for d in alone] == [d.text for d in row]
         np.testing.assert_allclose([d.log_probability for d in alone], [d.log_probability for d in row], rtol=1e-5)
     assert model.describe([]) == []
@@ -55,6 +56,8 @@ def test_context_vectors(model: DescribeModel) -> None:
     found = model.embed(motions)
     assert (found.dtype, found.shape) == (np.float32, (2, 3))
     np.testing.assert_allclose(found, wanted, atol=1e-5)
+    assert model.embed(motions[0]).shape == (3,)
+    np.testing.assert_array_equal(model.embed(motions[0]), found[0])
 
 
 def test_channels_in_another_order_and_unit_and_rate_are_the_same_motion(model: DescribeModel) -> None:
@@ -66,7 +69,7 @@ def test_channels_in_another_order_and_unit_and_rate_are_the_same_motion(model: 
     np.testing.assert_array_equal(model.frames(ordered), frames)
     fast = ordered.resample(40)
     np.testing.assert_allclose(model.frames(fast), frames, atol=1e-9)
-    assert model.describe(fast)[0][0].text == model.describe(motion)[0][0].text
+    assert model.describe(fast)[0].text == model.describe(motion)[0].text
 
 
 def test_a_motion_that_does_not_fit(model: DescribeModel) -> None:
@@ -83,6 +86,30 @@ def test_a_motion_that_does_not_fit(model: DescribeModel) -> None:
         with pytest.raises(MotionError, match=reason):
             model.describe([motion, bad])
     assert model.describe(moving(300))
+
+
+def test_a_long_motion_goes_in_windows(model: DescribeModel) -> None:
+    long = moving(901)  # 90.1 s
+    windows = model.windows(long)
+    assert [start for start, _ in windows] == [0.0, 22.5, 45.0, 67.6]
+    np.testing.assert_array_equal(np.concatenate([part.values for _, part in windows]), long.values)
+    assert max(part.duration for _, part in windows) <= 30
+    assert len(model.describe([part for _, part in windows])) == 4
+    ((start, whole),) = model.windows(moving(300))
+    assert (start, len(whole)) == (0.0, 300)
+    assert len(model.windows(moving(0))) == 1
+
+
+def test_what_the_model_sees_is_prepared_once(model: DescribeModel) -> None:
+    motion = moving(47, fps=25.0)
+    np.testing.assert_array_equal(model.frames(model.prepared(motion)), model.frames(motion))
+
+
+def test_progress_is_told(model: DescribeModel, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("motet.models.describe.BATCH", 2)
+    told: list[tuple[int, int]] = []
+    model.describe([moving(9)] * 5, progress=lambda done, total: told.append((done, total)))
+    assert told == [(2, 5), (4, 5), (5, 5)]
 
 
 def test_frames_that_are_not_finite_never_become_a_motion() -> None:
@@ -105,7 +132,8 @@ def test_a_motion_is_described_by_draws_as_it_is_alone_and_every_time() -> None:
     together = model.describe(motions, beams=4)
     for motion, row in zip(motions, together, strict=True):
         assert len({found.text for found in row}) == len(row) == 4
-        (alone,) = model.describe(motion, beams=4)
+        assert 1 >= row[0].score >= row[1].score >= row[3].score >= 0
+        alone = model.describe(motion, beams=4)
         assert [found.text for found in alone] == [found.text for found in row]
         for found in row:
             if found.text:

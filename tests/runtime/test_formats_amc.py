@@ -187,14 +187,14 @@ def test_a_file_that_breaks_off_gives_its_whole_frames_when_asked_to(pair, broke
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("hip leg", "hip arm", "'arm', which :bonedata lacks"),
+        ("hip leg", "hip arm", "'arm', which :bonedata does not have"),
         ("root hip", "root hip leg", "hangs on two bones"),
         ("10 20 30 ZXY", "10 20 30", "three angles and their order"),
         ("direction 0 -1 0", "direction 0 -1", "three numbers"),
         ("dof rz rx", "dof rz tx", "at most once"),
         ("name leg", "name hip", "name of its own"),
-        ("    direction 1 0 0\n", "", "lacks its direction"),
-        ("    length 4\n    axis 10 20 30 ZXY\n", "", "lacks its length and axis"),
+        ("    direction 1 0 0\n", "", "has no direction"),
+        ("    length 4\n    axis 10 20 30 ZXY\n", "", "has no length or axis"),
         ("direction 1 0 0\n    length 2", "direction 1e308 0 0\n    length 1e9", "'inf' is not a finite number"),
         ("    root hip\n", "", "does not lead to bone 'hip'"),
         ("    hip leg\n", "", "does not lead to bone 'leg'"),

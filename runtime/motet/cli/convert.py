@@ -1,6 +1,7 @@
 """``motet convert`` and ``motet view``: motion files from one format to another, or to a page that plays."""
 
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -29,7 +30,7 @@ from motet.motion.units import METRES
 @click.option("--unit", type=click.Choice(list(METRES)), help="Length unit to write.")
 @read_options
 def convert(
-    files: tuple[Path, ...],
+    files: Sequence[Path],
     out: Path | None,
     fps: float | None,
     start: float,
@@ -42,9 +43,9 @@ def convert(
     if out is None:
         if len(files) != 2:
             raise click.UsageError("give IN and OUT, or several files and -o OUT")
-        files, out = files[:1], files[1]
-    tries = Tries()
-    for source, place in zip(files, places(out, [file.stem for file in files]), strict=True):
+        *files, out = files
+    outs, tries = places(out, [file.stem for file in files]), Tries()
+    for source, place in zip(files, outs, strict=True):
         with tries.of(source):
             motion = _cut(read(source), start, stop)
             motion = motion.scaled(METRES[unit]) if unit else motion

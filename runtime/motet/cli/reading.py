@@ -10,8 +10,9 @@ from typing import Any
 
 import click
 
-from motet.errors import MotetError, MotionError
+from motet.errors import MotetError, MotionError, UnitError
 from motet.formats import FORMATS, READABLE, WRITABLE, check_writable, read_motion
+from motet.models.progress import Progress, silent
 from motet.motion.motion import Motion
 from motet.motion.units import METRES
 
@@ -65,7 +66,7 @@ class Tries:
             yield
         except MotetError as error:
             self.failed += 1
-            click.echo(f"motet: {error if str(path) in str(error) else f'{path}: {error}'}", err=True)
+            click.echo(f"motet: {_named(path, error)}", err=True)
 
     def finish(self) -> None:
         """Exit code 1 if anything failed."""
@@ -74,12 +75,32 @@ class Tries:
 
 
 @contextmanager
-def naming(path: Path | str) -> Iterator[None]:
-    """Errors about a motion name the file that it came from."""
+def naming(path: Path | str | None) -> Iterator[None]:
+    """Errors about a motion name the file that it came from, if there is one."""
     try:
         yield
     except MotionError as error:
-        raise error if str(path) in str(error) else MotionError(f"{path}: {error}") from error
+        raise error if path is None else MotionError(_named(path, error)) from error
+
+
+def _named(path: Path | str, error: MotetError) -> str:
+    hint = " (--unit-in)" if isinstance(error, UnitError) else ""
+    return f"{error}{hint}" if str(path) in str(error) else f"{path}: {error}{hint}"
+
+
+@contextmanager
+def bar(label: str) -> Iterator[Progress]:
+    """A progress bar on stderr, if that is a terminal, as the callback of long work."""
+    if not (sys.stderr.isatty() and log.isEnabledFor(logging.WARNING)):
+        yield silent
+        return
+    with click.progressbar(length=1, label=label, file=sys.stderr) as shown:
+
+        def progress(done: int, total: int) -> None:
+            shown.length = total
+            shown.update(done - shown.pos)
+
+        yield progress
 
 
 def places(out: Path, names: Sequence[str]) -> list[Path]:

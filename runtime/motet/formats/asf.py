@@ -49,7 +49,7 @@ class _Bone:
 def read_skeleton(path: str | Path) -> Asf:
     """Read an ASF file, without limits and masses.
 
-    FormatError with file and line where it is not one, where a bone lacks its direction, length or axis, and where the
+    FormatError with file and line where it is not one, where a bone has no direction, length or axis, and where the
     hierarchy leaves one out.
     """
     path = Path(path)
@@ -133,7 +133,7 @@ def _bone(path: Path, begin: int, lines: Lines, factor: float) -> _Bone:
     bone, direction, length = _Bone(), (0.0, 0.0, 0.0), 0.0
     said = {words[0].lower() for _, words in lines}
     if missing := [word for word in ("direction", "length", "axis") if word not in said]:
-        raise FormatError(path, f"this bone lacks its {' and '.join(missing)}", begin)
+        raise FormatError(path, f"this bone has no {' or '.join(missing)}", begin)
     for line, words in lines:
         match words[0].lower():
             case "name":
@@ -187,7 +187,7 @@ def _hang_children(path: Path, lines: Lines, bones: dict[str, _Bone]) -> None:
             continue
         for name in words:
             if name not in bones:
-                raise FormatError(path, f"the hierarchy has a bone {quoted(name)}, which :bonedata lacks", line)
+                raise FormatError(path, f"the hierarchy has a bone {quoted(name)}, which :bonedata does not have", line)
         for child in words[1:]:
             if child in hung:
                 raise FormatError(path, f"bone {quoted(child)} hangs on two bones", line)

@@ -60,6 +60,9 @@ class BundleModel:
             raise TypeError("only a model loaded from a bundle can be pickled")
         return _reload, (type(self), *self._source)
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({len(self.contract.channels)} channels at {self.fps:g} fps)"
+
     @property
     def fps(self) -> float:
         """Frames per second that the model takes and gives."""

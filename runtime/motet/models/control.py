@@ -14,10 +14,14 @@ from motet.decode.session import tick
 from motet.errors import BundleError, ControlError, MotionError
 from motet.models.base import BundleModel
 from motet.models.script import control_track, parse_script
+from motet.models.seeds import Seed, seeds_of
 from motet.motion.heading import without_heading
 from motet.motion.motion import Motion
 
 Floats = NDArray[np.float32]
+
+MAX_CHARACTERS = 100_000
+"""Of one session, whose state is in memory."""
 
 
 class ControlModel(BundleModel):
@@ -58,7 +62,7 @@ class ControlModel(BundleModel):
         start: Motion | str | None = None,
         *,
         characters: int = 1,
-        seed: int | Sequence[int] = 0,
+        seed: Seed = 0,
         variety: float = 0.0,
         temperature: float | None = None,
         iterations: int | None = None,
@@ -74,7 +78,9 @@ class ControlModel(BundleModel):
             with free hidden units.
         Raises ControlError for values out of range, MotionError for a motion that does not fit.
         """
-        seeds = _seeds(seed, characters)
+        if not 1 <= characters <= MAX_CHARACTERS:
+            raise ControlError(f"a session has 1 to {MAX_CHARACTERS} characters, not {characters}")
+        seeds = seeds_of(seed, characters, ControlError)
         if isinstance(start, Motion):
             history, label = self._history_of(start), None
         else:
@@ -88,6 +94,25 @@ class ControlModel(BundleModel):
             session.control(**{label: 1.0})
         return session
 
+    def run(
+        self,
+        script: str,
+        start: Motion | str | None = None,
+        *,
+        seed: Seed = 0,
+        variety: float = 0.0,
+        temperature: float | None = None,
+        in_place: bool = False,
+    ) -> Motion:
+        """The motion of one figure that runs a control script, from the script's first label unless ``start`` says.
+
+        The parameters are those of :meth:`start` and :meth:`ControlSession.run`.
+        """
+        first = parse_script(script, self.labels)[0].start
+        begin = max(first, key=first.__getitem__) if start is None else start
+        session = self.start(begin, seed=seed, variety=variety, temperature=temperature)
+        return session.run(script, in_place)[0]
+
     def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
         """From the start of the first label, at variety 1: a track (T, labels) and noise (T, N) to frames (T, D).
 
@@ -99,7 +124,7 @@ class ControlModel(BundleModel):
 
     def _history_at(self, label: str) -> Floats:
         if label not in self.starts:
-            raise ControlError(f"cannot start from {label!r}; known are {', '.join(self.starts)}")
+            raise ControlError(f"cannot start from {label!r}; expected one of {', '.join(self.starts)}")
         return self.encode(self.starts[label])
 
     def _history_of(self, motion: Motion) -> Floats:
@@ -126,13 +151,16 @@ class _Settings:
     iterations: int
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Snapshot:
     """All that changes in a session, for n characters: history (n, K, H), control (n, labels), the tick."""
 
     history: Floats
     control: Floats
     tick: int
+
+    def __repr__(self) -> str:
+        return f"Snapshot({len(self.history)} characters, tick {self.tick})"
 
 
 class ControlSession:
@@ -153,6 +181,9 @@ class ControlSession:
         if self.noise is None:  # noise has no effect: any array will do
             self._inputs["noise"] = np.zeros((self.characters, width), dtype=np.float32)
 
+    def __repr__(self) -> str:
+        return f"ControlSession({self.characters} characters, tick {self._tick}, {self.model!r})"
+
     def control(self, **values: ArrayLike) -> None:
         """Set the control from now on: labels to numbers, or arrays (characters,), between 0 and 1.
 
@@ -170,7 +201,7 @@ class ControlSession:
             raise ControlError("control values must be between 0 and 1")
         shape = (self.characters, len(self.model.labels))
         try:
-            self._inputs["control"] = np.ascontiguousarray(np.broadcast_to(wanted, shape))
+            self._inputs["control"] = np.array(np.broadcast_to(wanted, shape))  # a copy: the caller's may change
         except ValueError as error:
             raise ControlError(
                 f"a control of shape {wanted.shape} does not fit {self.characters} characters"
@@ -179,7 +210,7 @@ class ControlSession:
     def _control_of(self, values: Mapping[str, ArrayLike]) -> Floats:
         unknown = sorted(values.keys() - set(self.model.labels))
         if unknown:
-            raise ControlError(f"unknown control {', '.join(unknown)}; known are {', '.join(self.model.labels)}")
+            raise ControlError(f"unknown control {', '.join(unknown)}; expected one of {', '.join(self.model.labels)}")
         control = np.zeros((self.characters, len(self.model.labels)), dtype=np.float32)
         for label, value in values.items():
             try:
@@ -231,12 +262,3 @@ class ControlSession:
         self.set_control(snapshot.control)
         self._tick = snapshot.tick
         self._history = np.array(snapshot.history, dtype=np.float32)
-
-
-def _seeds(seed: int | Sequence[int], characters: int) -> list[int]:
-    if characters < 1:
-        raise ControlError(f"a session needs at least one character, not {characters}")
-    seeds = [seed + i for i in range(characters)] if isinstance(seed, int) else [int(s) for s in seed]
-    if len(seeds) != characters or min(seeds) < 0:
-        raise ControlError(f"{characters} characters need a seed of 0 or more, or as many seeds, not {seed}")
-    return seeds

@@ -1,8 +1,10 @@
 """Describe: ranked sentences for a motion. Section 4.2 of Plappert et al. 2017."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from itertools import pairwise
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +14,8 @@ from motet.bundle.manifest import Manifest
 from motet.decode.beam import Floats, Hypothesis, Limits
 from motet.decode.loop import Loop
 from motet.decode.loops import LOOPS
-from motet.models.language import LanguageModel
+from motet.models.language import MAX_SECONDS, LanguageModel
+from motet.models.progress import Progress, silent
 from motet.models.text import EOS, PAD, SOS, UNK
 from motet.motion.motion import Motion
 
@@ -49,25 +52,47 @@ class DescribeModel(LanguageModel):
         if "score" in graphs:
             self.bind("score", {**context, "words": "*batch words"}, {"log_probabilities": "batch words"})
 
+    @overload
     def describe(
-        self, motions: Motion | Sequence[Motion], beams: int | None = None, draws: int | None = None
-    ) -> list[list[Description]]:
-        """For each motion up to ``beams`` descriptions, the best first.
+        self, motions: Motion, beams: int | None = None, draws: int | None = None, *, progress: Progress = ...
+    ) -> list[Description]: ...
+    @overload
+    def describe(
+        self, motions: Sequence[Motion], beams: int | None = None, draws: int | None = None, *, progress: Progress = ...
+    ) -> list[list[Description]]: ...
+    def describe(
+        self,
+        motions: Motion | Sequence[Motion],
+        beams: int | None = None,
+        draws: int | None = None,
+        *,
+        progress: Progress = silent,
+    ) -> list[Description] | list[list[Description]]:
+        """Up to ``beams`` descriptions of a motion, the best first; of several motions a list for each.
 
         draws: 0 for beam search, whose best is the most probable sentence. More: so many sentences are drawn, and the
             best is the one that has most in common with all of them (:mod:`motet.decode.consensus`), which need not be
             probable itself. By default the bundle's loop.
+        progress: called with the number of motions done and of all.
 
         A motion at another frame rate is resampled. Each motion gets what it would get alone, and the same every time.
-        MotionError as :meth:`frames`; DecodingError where ``beams`` (the bundle's by default) is not between 1 and 100,
-        or ``draws`` not between 0 and 1,000.
+        MotionError as :meth:`frames`: longer motions go in :meth:`windows`. DecodingError where ``beams`` (the bundle's
+        by default) is not between 1 and 100, or ``draws`` not between 0 and 1,000.
         """
         loop = self.loop if draws is None else LOOPS["consensus" if draws else "beam"]
         settings = loop.settled(loop.defaults(self.manifest.defaults), {"beams": beams, "draws": draws or None})
-        contexts, found = self.embed(motions), []
+        contexts, found = self.embed([motions] if isinstance(motions, Motion) else motions), []
         for place in range(0, len(contexts), loop.batch):
             found += self._decoded(loop, contexts[place : place + loop.batch], settings)
-        return [[Description(self.vocabulary.decode(ids), *scores) for ids, *scores in row] for row in found]
+            progress(len(found), len(contexts))
+        rows = [[Description(self.vocabulary.decode(ids), *scores) for ids, *scores in row] for row in found]
+        return rows[0] if isinstance(motions, Motion) else rows
+
+    def windows(self, motion: Motion) -> list[tuple[float, Motion]]:
+        """A motion of any length in as few equal parts as the model takes, each with the second at which it starts."""
+        count = max(1, math.ceil(motion.duration / MAX_SECONDS - 1e-9))
+        edges = np.linspace(0, len(motion), count + 1).round().astype(int).tolist()
+        return [(start / motion.fps, motion[start:stop]) for start, stop in pairwise(edges)]
 
     def _decoded(self, loop: Loop, contexts: Floats, settings: Mapping[str, Any]) -> list[list[Hypothesis]]:
         rest = {name: value for name, value in settings.items() if name != "max_words"}
@@ -75,16 +100,17 @@ class DescribeModel(LanguageModel):
         return found
 
     def embed(self, motions: Motion | Sequence[Motion]) -> NDArray[np.float32]:
-        """Context vectors (N, C) float32 of motions; MotionError as :meth:`frames`."""
-        return self.contexts(
-            [self.frames(motion) for motion in ([motions] if isinstance(motions, Motion) else motions)]
-        )
+        """The context vector (C,) float32 of a motion, or vectors (N, C) of several; MotionError as :meth:`frames`."""
+        if isinstance(motions, Motion):
+            context: NDArray[np.float32] = self.contexts([self.frames(motions)])[0]
+            return context
+        return self.contexts([self.frames(motion) for motion in motions])
 
     def score(self, motion: Motion, sentence: str) -> float:
         """Log-probability of a sentence given a motion; unknown words count as UNK, and a TextWarning names them."""
         ids = self.vocabulary.ids
         words = np.concatenate([[ids[SOS]], self.ids(sentence), [ids[EOS]]])[None]
-        feeds = {"context": self.embed(motion), "words": words}
+        feeds = {"context": self.embed([motion]), "words": words}
         return float(self.score_graph()(feeds)["log_probabilities"].sum(dtype=np.float64))
 
     def limits(self, settings: Mapping[str, Any]) -> Limits:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,11 @@ from motet.bundle.manifest import Manifest
 from motet.decode.mixture import Noise, Sample
 from motet.decode.noise import Recorded
 from motet.errors import DecodingError
+from motet.files import File
+from motet.formats import write_motion
 from motet.models.language import LanguageModel
+from motet.models.progress import Progress, silent
+from motet.models.seeds import Seed, seeds_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
@@ -22,7 +26,7 @@ PLAYED = 30.0
 """Frames per second of what is generated, whatever the model's own rate is."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Generated:
     """A generated motion, its log-likelihood given the sentence, and the words that were unknown.
 
@@ -50,6 +54,14 @@ class Generated:
         """The motion at another frame rate, or without its feet planted: moving as it was drawn, with sliding feet."""
         return self.contract.motion(self.frames, plant=plant).resample(fps)
 
+    def write(self, path: File, fps: float = PLAYED, plant: bool = True) -> None:
+        """Write :meth:`playable` as :func:`motet.write` does."""
+        write_motion(path, self.playable(fps, plant))
+
+    def __repr__(self) -> str:
+        seconds = len(self.frames) / self.contract.fps
+        return f"Generated({len(self.frames)} frames, {seconds:.1f} s, log-likelihood {self.log_likelihood:.1f})"
+
 
 class GenerateModel(LanguageModel):
     """A model that puts words into motion.
@@ -72,6 +84,30 @@ class GenerateModel(LanguageModel):
         if "score" in graphs:
             self.bind("score", {**context, "frames": "batch time F"}, {"log_likelihood": "batch time"})
 
+    @overload
+    def generate(  # type: ignore[overload-overlap]  # a string is a sequence of strings, too
+        self,
+        sentences: str,
+        hypotheses: int | None = None,
+        *,
+        candidates: int | None = None,
+        temperature: float | None = None,
+        seed: Seed = 0,
+        max_seconds: float | None = None,
+        progress: Progress = silent,
+    ) -> list[Generated]: ...
+    @overload
+    def generate(
+        self,
+        sentences: Sequence[str],
+        hypotheses: int | None = None,
+        *,
+        candidates: int | None = None,
+        temperature: float | None = None,
+        seed: Seed = 0,
+        max_seconds: float | None = None,
+        progress: Progress = silent,
+    ) -> list[list[Generated]]: ...
     def generate(
         self,
         sentences: str | Sequence[str],
@@ -79,21 +115,23 @@ class GenerateModel(LanguageModel):
         *,
         candidates: int | None = None,
         temperature: float | None = None,
-        seed: int | Sequence[int] = 0,
+        seed: Seed = 0,
         max_seconds: float | None = None,
-    ) -> list[list[Generated]]:
-        """For each sentence ``hypotheses`` motions, the likeliest per frame first.
+        progress: Progress = silent,
+    ) -> list[Generated] | list[list[Generated]]:
+        """``hypotheses`` motions for a sentence, the likeliest per frame first; for several sentences a list for each.
 
         How they are found is said in :func:`motet.decode.mixture.mixture_search`.
         candidates: frames that each hypothesis draws in a step; 1 gives independent samples.
         temperature: of the draws about the centres of the mixture's components; lower trembles less.
         seed: sentence i has seed + i (or seed[i]), and the motions it would have alone with that seed.
         max_seconds: a motion that has not ended by then ends there.
+        progress: called with the number of sentences done and of all.
         What is None comes from the bundle. TextError for a sentence that is empty, too long or wholly unknown;
         DecodingError for a setting out of range. Unknown words are named by a TextWarning and in the result.
         """
         texts = [sentences] if isinstance(sentences, str) else list(sentences)
-        ids, seeds = [self.ids(text) for text in texts], _seeds(seed, len(texts))
+        ids, seeds = [self.ids(text) for text in texts], seeds_of(seed, len(texts), DecodingError)
         chosen = {
             "hypotheses": hypotheses,
             "candidates": candidates,
@@ -106,7 +144,9 @@ class GenerateModel(LanguageModel):
         for place in range(0, len(texts), self.loop.batch):
             batch = slice(place, place + self.loop.batch)
             found += self.decode(contexts[batch], noise[batch], settings)
-        return [[self._generated(s, text) for s in row] for text, row in zip(texts, found, strict=True)]
+            progress(len(found), len(texts))
+        rows = [[self._generated(s, text) for s in row] for text, row in zip(texts, found, strict=True)]
+        return rows[0] if isinstance(sentences, str) else rows
 
     def decode(
         self, contexts: NDArray[np.float32], noise: Sequence[Noise], settings: Mapping[str, Any]
@@ -118,15 +158,18 @@ class GenerateModel(LanguageModel):
         return found
 
     def embed(self, sentences: str | Sequence[str]) -> NDArray[np.float32]:
-        """Context vectors (N, C) float32 of sentences; TextError and TextWarning as :meth:`ids`."""
-        return self.contexts([self.ids(text) for text in ([sentences] if isinstance(sentences, str) else sentences)])
+        """The context vector (C,) float32 of a sentence, or vectors (N, C) of several; errors as :meth:`ids`."""
+        if isinstance(sentences, str):
+            context: NDArray[np.float32] = self.contexts([self.ids(sentences)])[0]
+            return context
+        return self.contexts([self.ids(text) for text in sentences])
 
     def score(self, sentence: str, motion: Motion) -> float:
         """Log-likelihood of a motion, and of its end, given a sentence; a TextWarning names words that count as UNK."""
         normal = self.contract.normalised(self.frames(motion))
         frames = np.zeros((1, len(normal) + 1, normal.shape[1] + 1), dtype=np.float32)
         frames[0, :-1, :-1], frames[0, :-1, -1] = normal, 1
-        feeds = {"context": self.embed(sentence), "frames": frames}
+        feeds = {"context": self.embed([sentence]), "frames": frames}
         return float(self.score_graph()(feeds)["log_likelihood"].sum(dtype=np.float64))
 
     def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
@@ -142,10 +185,3 @@ class GenerateModel(LanguageModel):
     def _generated(self, sample: Sample, text: str) -> Generated:
         frames = self.contract.denormalised(sample.frames)
         return Generated(self.contract, frames, sample.log_likelihood, tuple(self.unknown(text)))
-
-
-def _seeds(seed: int | Sequence[int], count: int) -> list[int]:
-    seeds = [seed + i for i in range(count)] if isinstance(seed, int) else [int(value) for value in seed]
-    if len(seeds) != count or any(value < 0 for value in seeds):
-        raise DecodingError(f"{count} sentences need a seed of 0 or more, or as many seeds, not {seed}")
-    return seeds

@@ -57,12 +57,16 @@ class LanguageModel(BundleModel):
         MotionError names the channels that the motion lacks, and refuses less than two frames and more than 30 s.
         """
         if motion.duration > MAX_SECONDS:
-            limit = f"the model takes at most {MAX_SECONDS:g} s: cut it"
+            limit = f"the model takes at most {MAX_SECONDS:g} s: cut it, or describe its windows"
             raise MotionError(f"the motion lasts {motion.duration:.1f} s, and {limit}")
         frames = self.contract.frames(motion)
         if len(frames) < 2:
             raise MotionError(f"the model needs two frames at {self.fps:g} fps, and the motion has {len(frames)}")
         return frames
+
+    def prepared(self, motion: Motion) -> Motion:
+        """What the model sees of a motion, to be prepared once and asked about often; MotionError as :meth:`frames`."""
+        return self.contract.features(self.frames(motion))
 
     def contexts(self, sequences: Sequence[NDArray[Any]]) -> NDArray[np.float32]:
         """Context vectors (N, C) float32 of the sequences (T_i, ...) that the encoder takes."""

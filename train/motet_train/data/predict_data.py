@@ -10,6 +10,7 @@ from motet.representation.joint_vectors import joints_of, to_joint_vectors
 from numpy.typing import NDArray
 
 from motet.errors import MotionError
+from motet.formats import MOCAP
 from motet.motion.kinematics import skeleton_of
 from motet.motion.mirror import lateral_axis
 from motet.motion.motion import Motion
@@ -20,7 +21,6 @@ from motet.representation.contract import MotionContract
 from motet.representation.root_block import ROOT_BLOCK
 from motet_train.data.archive import BROKEN, Archive
 from motet_train.data.clips import CMU_LICENCE, read_with_unit
-from motet_train.data.corpus import MOCAP
 from motet_train.data.errors import DataError
 from motet_train.data.expmap_files import ROOT, ExpmapCorpus, Layout, scaling_of
 from motet_train.data.mirror_frames import NEGATED

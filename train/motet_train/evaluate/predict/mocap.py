@@ -45,7 +45,7 @@ def distances(models: Mapping[str, PredictModel], trials: Sequence[Trial]) -> Di
             truth = _places(motion[start + first.seed_frames :][: first.horizon])
             found[ZERO].append(_distance(_places(seed)[-1:], truth))
             for name, model in models.items():
-                found[name].append(_distance(_places(model.predict(seed, first.horizon)), truth))
+                found[name].append(_distance(_places(model.predict(seed, frames=first.horizon)), truth))
     if not found[ZERO]:
         raise DataError(f"the trials are shorter than {first.seed_frames + first.horizon} frames at the model's rate")
     means = {name: np.mean(windows, axis=0) for name, windows in found.items()}
@@ -74,7 +74,7 @@ def strips(models: Mapping[str, PredictModel], motion: Motion, every: int) -> di
     whole = ending(motion, first.fps)
     middle = max(first.seed_frames, (len(whole) - first.horizon) // 2)
     found = {"truth": whole[middle:][: first.horizon]}
-    found |= {name: model.predict(whole[:middle], first.horizon) for name, model in models.items()}
+    found |= {name: model.predict(whole[:middle], frames=first.horizon) for name, model in models.items()}
     return {name: _in_place(positions(predicted)[::every]) for name, predicted in found.items()}
 
 
