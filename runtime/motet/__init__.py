@@ -9,6 +9,7 @@ from importlib.metadata import version
 
 from motet import motion
 from motet.bundle.bundle import Bundle, list_bundles
+from motet.bundle.session import SessionOptions
 from motet.errors import (
     BundleError,
     ControlError,
@@ -27,7 +28,7 @@ from motet.formats import write_motion as write
 from motet.models.control import ControlModel, ControlSession, Snapshot
 from motet.models.describe import DescribeModel, Description
 from motet.models.generate import Generated, GenerateModel
-from motet.models.load import load
+from motet.models.load import load, load_as
 from motet.models.predict import PredictModel, PredictSession
 from motet.motion.motion import Motion
 
@@ -52,12 +53,14 @@ __all__ = [
     "PredictModel",
     "PredictSession",
     "ScriptError",
+    "SessionOptions",
     "Snapshot",
     "TextError",
     "TextWarning",
     "UnitError",
     "list_bundles",
     "load",
+    "load_as",
     "motion",
     "read",
     "write",

@@ -120,4 +120,4 @@ def test_the_public_names_are_there_and_geometry_is_in_its_module() -> None:
     assert all(hasattr(motet, name) for name in motet.__all__)
     assert {"read", "write", "load", "Motion"} <= set(motet.__all__)
     assert motet.motion.lateral_axis is not None
-    assert repr(motet.load("cmu-describe")).startswith("DescribeModel(62 channels at 10 fps")
+    assert repr(motet.load("cmu-describe")) == "DescribeModel('cmu-describe', 62 channels, 10 fps)"

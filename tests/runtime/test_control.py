@@ -180,7 +180,7 @@ def test_one_figure_runs_a_script_in_one_call(model: ControlModel) -> None:
     motion = model.run("run .2s, walk .1s", seed=np.int64(3), variety=0.5)
     session = model.start("run", seed=3, variety=0.5)
     np.testing.assert_array_equal(motion.values, session.run("run .2s, walk .1s")[0].values)
-    assert repr(session) == "ControlSession(1 characters, tick 12, ControlModel(59 channels at 40 fps))"
+    assert repr(session) == "ControlSession(1 characters, tick 12, ControlModel('cmu-control', 59 channels, 40 fps))"
     assert repr(session.snapshot()) == "Snapshot(1 characters, tick 12)"
 
 

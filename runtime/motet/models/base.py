@@ -61,7 +61,8 @@ class BundleModel:
         return _reload, (type(self), *self._source)
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}({len(self.contract.channels)} channels at {self.fps:g} fps)"
+        size = f"{len(self.contract.channels)} channels, {self.fps:g} fps"
+        return f"{type(self).__name__}({self.manifest.name!r}, {size})"
 
     @property
     def fps(self) -> float:
