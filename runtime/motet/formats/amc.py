@@ -1,7 +1,7 @@
 """AMC motion with its ASF skeleton (Acclaim), the format of the CMU motion capture database."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from itertools import compress, cycle, islice
 from pathlib import Path
@@ -98,7 +98,7 @@ def _frame_lines(text: str, header: int) -> Iterator[tuple[int, list[str]]]:
             yield line, words
 
 
-def _layout(path: Path, lines: Iterator[tuple[int, list[str]]], dofs: dict[str, tuple[str, ...]]) -> Layout:
+def _layout(path: Path, lines: Iterator[tuple[int, list[str]]], dofs: Mapping[str, tuple[str, ...]]) -> Layout:
     """The first frame's bones, each with its number of values; those of the skeleton if there is no frame."""
     line, words = next(lines, (0, [""]))
     if not words[0]:
@@ -222,7 +222,7 @@ def _dofs(motion: Motion, joint: Joint) -> tuple[str, ...]:
     return (*(dof for dof in dofs if dof in TRANSLATIONS), *turns)
 
 
-def _text(motion: Motion, dofs: dict[str, tuple[str, ...]]) -> str:
+def _text(motion: Motion, dofs: Mapping[str, tuple[str, ...]]) -> str:
     bones = list(dict.fromkeys(channel.rpartition(".")[0] for channel in motion.channels))
     unit = "rad" if "rad" in motion.units and "deg" not in motion.units else "deg"
     channels = tuple(f"{bone}.{dof}" for bone in bones for dof in dofs[bone])

@@ -6,8 +6,9 @@ root's ``order`` name a bone's channels, the one applied first comes first: ``rx
 is ``axis ... XYZ``. The root's ``orientation`` is read as its axis, its ``position`` as its offset.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -29,10 +30,13 @@ Lines = list[tuple[int, list[str]]]
 
 @dataclass(frozen=True)
 class Asf:
-    """A skeleton; for every joint with channels their names ("rx", "tx", ...); the unit of angles, deg or rad."""
+    """A skeleton; for every joint with channels their names ("rx", "tx", ...); the unit of angles, deg or rad.
+
+    Files of the same skeleton share one: nothing of it is to be changed.
+    """
 
     skeleton: Skeleton
-    dofs: dict[str, tuple[str, ...]]
+    dofs: Mapping[str, tuple[str, ...]]
     angle: str
 
 
@@ -52,8 +56,13 @@ def read_skeleton(path: str | Path) -> Asf:
     FormatError with file and line where it is not one, where a bone has no direction, length or axis, and where the
     hierarchy leaves one out.
     """
-    path = Path(path)
-    sections = _sections(path)
+    return _skeleton(Path(path), read_text(path))
+
+
+@lru_cache(maxsize=16)
+def _skeleton(path: Path, text: str) -> Asf:
+    """A folder's motions are mostly of a few people: each skeleton is parsed once."""
+    sections = _sections(path, text)
     units = {words[0].lower(): words[1] for _, words in sections.get("units", []) if len(words) > 1}
     angle = units.get("angle", "deg").lower()[:3]
     if angle not in ("deg", "rad"):
@@ -78,12 +87,12 @@ def read_skeleton(path: str | Path) -> Asf:
     return Asf(skeleton, {bone.name: bone.dofs for bone in bones.values() if bone.dofs}, angle)
 
 
-def _sections(path: Path) -> dict[str, Lines]:
+def _sections(path: Path, text: str) -> dict[str, Lines]:
     """The lines of each ``:section``, as line number and words, without comments."""
     sections: dict[str, Lines] = {}
     current: Lines = []
-    for line, text in enumerate(read_text(path).split("\n"), start=1):
-        words = text.split("#")[0].split()
+    for line, content in enumerate(text.split("\n"), start=1):
+        words = content.split("#")[0].split()
         if words and words[0].startswith(":"):
             current = sections.setdefault(words[0][1:].lower(), [])
         elif words:

@@ -38,7 +38,7 @@ def read_text(file: File) -> str:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
         text = content.decode("latin-1")
-    return text.replace("\r\n", "\n").replace("\r", "\n")
+    return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
 
 
 def numbers(words: Iterable[str], path: Path, line: int | None) -> list[float]:
