@@ -6,8 +6,8 @@ from pathlib import Path
 
 import click
 
-from motet.cli.reading import FPS, READS, WRITES, Read, Tries, places, read_options
-from motet.formats import write_motion
+from motet.cli.reading import FPS, Read, Tries, places, read_options
+from motet.formats import READS, WRITES, write_motion
 from motet.motion.mirror import mirror as mirrored
 from motet.motion.motion import Motion
 from motet.motion.units import METRES

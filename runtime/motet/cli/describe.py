@@ -9,7 +9,8 @@ import click
 
 from motet.bundle.session import SessionOptions
 from motet.cli.options import session_options
-from motet.cli.reading import READS, Read, Tries, bar, read_options, say_resampled
+from motet.cli.reading import Read, Tries, bar, read_options, say_resampled
+from motet.formats import READS
 from motet.models.describe import DescribeModel, Description
 from motet.models.load import load_as
 

@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from motet.errors import MotetError, MotionError, UnitError
-from motet.formats import FORMATS, READABLE, WRITABLE, check_writable, read_motion
+from motet.formats import FORMATS, WRITABLE, check_writable, read_motion
 from motet.models.progress import Progress, silent
 from motet.motion.motion import Motion
 from motet.motion.units import METRES
@@ -23,10 +23,8 @@ Read = Callable[[Path], Motion]
 FPS = click.FloatRange(0, 10_000, min_open=True)
 """Frame rates that a motion is resampled to."""
 
-READS, WRITES = " ".join(READABLE), " ".join(WRITABLE)
-
 out_option = click.option(
-    "-o", "--out", required=True, type=Path, help=f"File to write; its extension says the format: {WRITES}."
+    "-o", "--out", required=True, type=Path, help=f"File to write; its extension says the format: {' '.join(WRITABLE)}."
 )
 
 
