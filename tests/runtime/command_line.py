@@ -16,9 +16,12 @@ def run(*arguments: object) -> Result:
     return CliRunner(**SEPARATE).invoke(main, [str(argument) for argument in arguments])
 
 
-def check_refused(result: Result, said: str, out: Path) -> None:
-    """One message with the words ``said``, and nothing written in the folder ``out``."""
-    assert result.exit_code == 2
+def check_refused(result: Result, said: str, out: Path, code: int = 2) -> None:
+    """One message with the words ``said``, and nothing written in the folder ``out``.
+
+    code: 2 where the command cannot be run as it was given, 1 where an input file fails.
+    """
+    assert result.exit_code == code
     assert said in result.stderr
     assert "Traceback" not in result.stderr
     assert result.stdout == ""

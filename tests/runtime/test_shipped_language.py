@@ -29,7 +29,7 @@ def test_five_ranked_sentences_for_each_motion_as_json(clips: Path, draws: int) 
 @pytest.mark.parametrize("draws", [0, 100])
 def test_a_description_scores_what_the_search_gave_it(clips: Path, draws: int) -> None:
     model, motion = load("cmu-describe"), read_motion(clips / "39_14.amc")
-    for found in model.describe(motion, draws=draws)[0]:
+    for found in model.describe(motion, draws=draws):
         assert model.score(motion, found.text) == pytest.approx(found.log_probability, abs=1e-4)
 
 
@@ -59,7 +59,7 @@ def test_runs_are_faster_than_walks_and_both_end_by_themselves() -> None:
 
 def test_a_motion_scores_what_the_search_gave_it() -> None:
     model = load("cmu-generate")
-    best = model.generate("a person runs", seed=3)[0][0]
+    best = model.generate("a person runs", seed=3)[0]
     assert model.score("a person runs", best.contract.features(best.frames)) == pytest.approx(
         best.log_likelihood, rel=1e-4
     )

@@ -70,7 +70,7 @@ class FakeDescribe:
 
     def describe(self, motions: Sequence[Motion], beams: int = 5) -> list[list[Description]]:
         rows = [self.said.get(motion.values.astype(np.float32).tobytes(), ("somebody dances",)) for motion in motions]
-        return [[Description(plain(text), -float(i)) for i, text in enumerate(row[:beams])] for row in rows]
+        return [[Description(plain(text), -float(i), -float(i)) for i, text in enumerate(row[:beams])] for row in rows]
 
     def score(self, motion: Motion, sentence: str) -> float:
         return -2.0 * (len(sentence.split()) + 1)

@@ -11,10 +11,11 @@ import click
 import torch
 from tqdm import tqdm
 
+from motet.bundle.manifest import Manifest
 from motet.models.control import ControlModel
 from motet.models.describe import DescribeModel
 from motet.models.generate import GenerateModel
-from motet.models.load import VERBS, Model, load
+from motet.models.load import Model, build, load
 from motet.models.predict import PredictModel
 from motet_train.cli.evaluate_language import by_subject, language_reports
 from motet_train.cli.evaluate_predict import predict_reports
@@ -56,7 +57,7 @@ def evaluate(models: tuple[str, ...], data: Path | None, as_json: bool, plots: P
 
 
 def _model(run: Run) -> Model:
-    return VERBS[run.manifest["verb"]](run.manifest, run.torch_graphs())
+    return build(Manifest.from_json(run.manifest), run.torch_graphs())
 
 
 def _measured(models: Mapping[str, Model], data: Path | None, plots: Path | None) -> tuple[dict[str, Any], str]:
@@ -97,7 +98,7 @@ def _control(models: Mapping[str, ControlModel], data: Path | None, plots: Path 
 def _clips(name: str, model: ControlModel, data: Path | None) -> Clips:
     """The clips in ``data``, else those that training was given, else CMU's; DataError where they are gone."""
     if data is None:
-        words = shlex.split(model.manifest.get("training", {}).get("command", ""))
+        words = shlex.split(str(model.manifest.training.get("command", "")))
         given = [word.removeprefix("--data=") for word in words if word.startswith("--data=")]
         given += [after for word, after in pairwise(words) if word == "--data"]
         data = Path(given[-1]) if given else None

@@ -36,8 +36,8 @@ def language_reports(models: Models, data: Path | None, plots: Path | None) -> d
 
 def by_subject(models: Models, name: str) -> str | None:
     """The model that shows how well this one would do with people never seen: the same verb, split by subject."""
-    by = {other: model.manifest["training"]["split"]["by"] for other, model in models.items()}
-    alike = (other for other, model in models.items() if model.manifest["verb"] == models[name].manifest["verb"])
+    by = {other: model.manifest.training["split"]["by"] for other, model in models.items()}
+    alike = (other for other, model in models.items() if model.manifest.verb == models[name].manifest.verb)
     return next((other for other in alike if by[other] == "subject" and by[name] != "subject"), None)
 
 

@@ -13,8 +13,8 @@ from typing import Any
 import click
 import torch
 
-from motet.cli.convert import METRES
 from motet.errors import OutputError
+from motet.motion.units import METRES
 from motet_train import distributed
 from motet_train.data.errors import DataError
 from motet_train.manifest import About

@@ -4,14 +4,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from motet.formats import read_motion
+from motet.formats import MOCAP, read_motion
 from motet_train.data import kit
 from motet_train.data.archive import BROKEN, Archive
 from motet_train.data.errors import DataError
 from motet_train.data.preparation import ANGLES, FULL, Preparation
 from motet_train.data.records import Record, Skipped
-
-MOCAP = (".amc", ".bvh", ".npz")
 
 
 @dataclass(frozen=True)

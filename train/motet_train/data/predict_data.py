@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.errors import MotionError
+from motet.formats import MOCAP
 from motet.motion.kinematics import skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract, living, sequences
 from motet_train.data.archive import Archive
 from motet_train.data.clips import CMU_LICENCE
-from motet_train.data.corpus import MOCAP, recordings
+from motet_train.data.corpus import recordings
 from motet_train.data.errors import DataError
 from motet_train.data.expmap_files import ROOT, ExpmapCorpus, Layout, scaling_of
 from motet_train.data.records import Record, Skipped

@@ -8,6 +8,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from motet.bundle.manifest import Manifest
 from motet.models.control import ControlModel
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract, living
@@ -88,7 +89,8 @@ def _missed(
 
     def missed(enough: int) -> list[str]:
         run = Run(manifest, deepcopy(net).cpu())
-        return missed_goals(study_of(ControlModel(run.manifest, run.torch_graphs()), clips), enough)
+        model = ControlModel(Manifest.from_json(run.manifest), run.torch_graphs())
+        return missed_goals(study_of(model, clips), enough)
 
     return missed
 

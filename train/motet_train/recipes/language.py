@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from motet.models.text import Vocabulary
+from motet.models.text import RULES, Vocabulary
 from motet.representation.base import FrameMirror
 from motet.representation.contract import MotionContract
 from motet_train.data.batches import Examples, examples, frame_mirror, usable
@@ -86,7 +86,9 @@ def train_language(store: Store, job: Job, data: str = "", by: str = "trial") ->
     net.scale.copy_(torch.tensor(found.contract.std).float())
     training = {"data": _data(store, data), "split": _split(found, by)}
     words = found.vocabulary.to_json()
-    manifest = job.manifest(found.contract, config, recipe.defaults, None, training, vocabulary=words)
+    manifest = job.manifest(
+        found.contract, config, recipe.defaults, None, training, text=RULES.to_json(), vocabulary=words
+    )
     return job.run(net, _learner(net.to(job.device), found, job), manifest)
 
 

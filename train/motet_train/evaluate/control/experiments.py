@@ -113,7 +113,7 @@ def control_report(study: ControlStudy, progress: Callable[[str], None]) -> Repo
     "train" repeats what training measured. A figure that does not exist (a period of no loop) is NaN, a time that
     never came infinite.
     """
-    training: Mapping[str, Any] = study.model.manifest.get("training", {})
+    training: Mapping[str, Any] = study.model.manifest.training
     report: Report = {"train": {key: float(training[key]) for key in ("seconds", "reconstruction") if key in training}}
     for name, group in experiments(study).items():
         progress(name)

@@ -1,11 +1,11 @@
 """All figures of a describe or generate model in one nested object with stable keys, and the goals of those we ship."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import asdict
-from typing import Any
 
 import numpy as np
 
+from motet.bundle.manifest import Manifest
 from motet.errors import TextError
 from motet.models.describe import DescribeModel
 from motet.models.generate import GenerateModel
@@ -112,8 +112,8 @@ def hypotheses(model: DescribeModel, corpus: SplitStore, records: tuple[int, ...
     return [[found.text for found in row] for row in model.describe(corpus.motions(records), RANKS)]
 
 
-def _origin(manifest: Mapping[str, Any], corpus: SplitStore) -> Report:
-    training, parts, store = manifest["training"], corpus.parts, corpus.store
+def _origin(manifest: Manifest, corpus: SplitStore) -> Report:
+    training, parts, store = manifest.training, corpus.parts, corpus.store
     people = [{store.records[i].subject for i in part} for part in (parts.train, parts.test)]
     return {
         "train": {key: float(training[key]) for key in TRAINING if key in training},

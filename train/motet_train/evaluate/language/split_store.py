@@ -1,14 +1,14 @@
 """A prepared corpus, divided as it was when a model was trained on it."""
 
 import warnings
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
+from motet.bundle.manifest import Manifest
 from motet.errors import TextWarning
 from motet.models.text import words
 from motet.motion.motion import Motion
@@ -72,18 +72,18 @@ class SplitStore:
         return self.contract.normalised(self.contract.frames(motion))
 
 
-def split_as(manifest: Mapping[str, Any], store: Store) -> SplitStore:
+def split_as(manifest: Manifest, store: Store) -> SplitStore:
     """The store divided as the manifest of a run or bundle says; DataError where it is not what it was trained on."""
     try:
-        told = manifest["training"]["split"]
+        told = manifest.training["split"]
         validation, test, count = set(told["validation"]), set(told["test"]), int(told["train"])
     except (KeyError, TypeError, ValueError) as error:
-        raise DataError(f"{manifest.get('name')} does not say which motions it was trained on") from error
+        raise DataError(f"{manifest.name} does not say which motions it was trained on") from error
     names = [entry.name for entry in store.records]
     train = tuple(i for i, name in enumerate(names) if name not in validation | test)
     if (validation | test) - set(names) or len(train) != count or len(names) != count + len(validation) + len(test):
         raise DataError(
-            f"{manifest.get('name')} was not trained on this data: its {count} training, {len(validation)} validation "
+            f"{manifest.name} was not trained on this data: its {count} training, {len(validation)} validation "
             f"and {len(test)} test motions are not the {len(names)} that are here"
         )
     parts = ([i for i, name in enumerate(names) if name in part] for part in (validation, test))

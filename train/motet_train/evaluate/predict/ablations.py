@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from motet.bundle.manifest import Manifest
 from motet.models.predict import PredictModel
 from motet_train.evaluate.predict.curves import COUNTS, MEAN, Curves
 from motet_train.evaluate.predict.protocol_table import error_row, frame_heads
@@ -24,7 +25,7 @@ WORDS = {
 
 def ablated(models: Mapping[str, PredictModel], groups: Sequence[SeedGroup]) -> dict[str, str]:
     """Title of each of the model's groups -> how its settings differ from the first; {} where there is one only."""
-    ours = [group for group in groups if models[group.runs[0]].manifest.get("model") == MODEL]
+    ours = [group for group in groups if models[group.runs[0]].manifest.model == MODEL]
     if len(ours) < 2:
         return {}
     first, *others = ours
@@ -36,9 +37,9 @@ def ablated(models: Mapping[str, PredictModel], groups: Sequence[SeedGroup]) -> 
     return said
 
 
-def _settings(manifest: Mapping[str, Any]) -> dict[str, Any]:
+def _settings(manifest: Manifest) -> dict[str, Any]:
     """Config and recipe of a run as one."""
-    config, recipe = manifest["config"], manifest.get("training", {}).get("recipe", {})
+    config, recipe = manifest.config, manifest.training.get("recipe", {})
     return {**config, **config.get("system", {}), **recipe}
 
 

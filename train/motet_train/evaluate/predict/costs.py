@@ -14,7 +14,7 @@ def cost_table(models: Mapping[str, PredictModel], groups: Sequence[SeedGroup]) 
     """As text, a line for each group: parameters, the mean seconds of its runs' training, and where that was."""
     rows = [("", "parameters", "training, s", "on")]
     for group in groups:
-        trainings = [models[name].manifest.get("training", {}) for name in group.runs]
+        trainings = [models[name].manifest.training for name in group.runs]
         seconds = [training["seconds"] for training in trainings if "seconds" in training]
         parameters = f"{trainings[0]['parameters']:,}" if "parameters" in trainings[0] else ""
         places = "; ".join(sorted({_place(training) for training in trainings}))

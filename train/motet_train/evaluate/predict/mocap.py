@@ -24,7 +24,7 @@ PLACE, POSE = "place_cm", "pose_cm"
 
 def held_out(model: PredictModel, trials: Sequence[Record]) -> list[Record]:
     """The trials that the model did not see in training; DataError where none of them is here."""
-    test = set(model.manifest["training"]["data"].get("test", ()))
+    test = set(model.manifest.training.get("data", {}).get("test", ()))
     found = [trial for trial in trials if trial.name in test]
     if not found:
         raise DataError("none of the trials that the model was not trained on is here")
@@ -45,7 +45,7 @@ def distances(models: Mapping[str, PredictModel], trials: Sequence[Record]) -> D
             truth = _places(motion[start + first.seed_frames :][: first.horizon])
             found[ZERO].append(_distance(_places(seed)[-1:], truth))
             for name, model in models.items():
-                found[name].append(_distance(_places(model.predict(seed, first.horizon)), truth))
+                found[name].append(_distance(_places(model.predict(seed, frames=first.horizon)), truth))
     if not found[ZERO]:
         raise DataError(f"the trials are shorter than {first.seed_frames + first.horizon} frames at the model's rate")
     means = {name: np.mean(windows, axis=0) for name, windows in found.items()}
@@ -74,7 +74,7 @@ def strips(models: Mapping[str, PredictModel], motion: Motion, every: int) -> di
     whole = motion.resample(first.fps, to_end=True)
     middle = max(first.seed_frames, (len(whole) - first.horizon) // 2)
     found = {"truth": whole[middle:][: first.horizon]}
-    found |= {name: model.predict(whole[:middle], first.horizon) for name, model in models.items()}
+    found |= {name: model.predict(whole[:middle], frames=first.horizon) for name, model in models.items()}
     return {name: _in_place(positions(predicted)[::every]) for name, predicted in found.items()}
 
 

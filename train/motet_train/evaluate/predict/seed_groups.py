@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from motet.bundle.manifest import Manifest
 from motet.models.predict import PredictModel
 from motet.motion.rotations import Array
 from motet_train.evaluate.tables import short_names
@@ -41,7 +42,7 @@ def seed_groups(models: Mapping[str, PredictModel]) -> list[SeedGroup]:
     groups: dict[tuple[str, int], list[str]] = {}
     seen: Counter[tuple[str, Any]] = Counter()
     for name, model in models.items():
-        training = model.manifest.get("training", {})
+        training = model.manifest.training
         system = _system(model.manifest) if "seed" in training else name
         twins = seen[system, training.get("seed")]
         seen[system, training.get("seed")] += 1
@@ -50,10 +51,10 @@ def seed_groups(models: Mapping[str, PredictModel]) -> list[SeedGroup]:
     return [SeedGroup(title, runs) for title, runs in zip(_titles(together), together, strict=True)]
 
 
-def _system(manifest: Mapping[str, Any]) -> str:
+def _system(manifest: Manifest) -> str:
     """What all seeds of a system have in common."""
-    training = manifest["training"]
-    parts = manifest.get("model"), manifest.get("config"), training.get("recipe"), training.get("data")
+    training = manifest.training
+    parts = manifest.model, manifest.config, training.get("recipe"), training.get("data")
     return json.dumps(parts, sort_keys=True)
 
 
