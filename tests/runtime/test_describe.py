@@ -106,7 +106,7 @@ def test_what_the_model_sees_is_prepared_once(model: DescribeModel) -> None:
 
 
 def test_progress_is_told(model: DescribeModel, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("motet.models.describe.BATCH", 2)
+    monkeypatch.setattr(model, "loop", replace(model.loop, batch=2))
     told: list[tuple[int, int]] = []
     model.describe([moving(9)] * 5, progress=lambda done, total: told.append((done, total)))
     assert told == [(2, 5), (4, 5), (5, 5)]
