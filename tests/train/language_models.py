@@ -12,7 +12,7 @@ from motet.models.generate import Generated
 from motet.motion.motion import Motion
 from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS
 from motet_train.data.store import Entry, Store
-from motet_train.evaluate.language.corpus import plain
+from motet_train.evaluate.language.split_store import plain
 
 FPS, FRAMES = 10.0, 21
 HEIGHT = 0.85  # of the hips above the feet of SKELETON

@@ -21,13 +21,17 @@ COMMANDS = {
     "bench": ("motet.cli.bench:bench", None),
     "prepare": ("motet_train.cli.prepare:prepare", "train"),
     "train": ("motet_train.cli.train:train", "train"),
-    "evaluate": ("motet_train.cli.evaluate:evaluate", "train"),
+    "evaluate": ("motet_train.cli.evaluate:evaluate", "evaluate"),
     "export": ("motet_export.cli:export", "export"),
     "parity": ("motet_export.cli:parity", "export"),
 }
 """Command -> where it is, and the extra that it needs."""
 
-NEEDS = {"train": ("torch", "tqdm", "scipy", "sklearn", "sacrebleu"), "export": ("torch", "onnx", "onnxscript")}
+NEEDS = {
+    "train": ("torch", "tqdm"),
+    "evaluate": ("torch", "tqdm", "matplotlib", "sklearn", "sacrebleu"),
+    "export": ("torch", "tqdm", "onnx", "onnxscript"),
+}
 """Extra -> the packages by which it is recognised."""
 
 

@@ -17,7 +17,7 @@ from motet_train.data.body import body_parts
 from motet_train.data.clips import CONSTANT, Clips, sequences
 from motet_train.data.errors import DataError
 from motet_train.data.period import is_periodic
-from motet_train.evaluate.control.report import lab_of, missed_goals
+from motet_train.evaluate.control.experiments import missed_goals, study_of
 from motet_train.models.control import angle_crbm, tdbn
 from motet_train.models.control.angle_crbm import AngleCRBM, AngleCRBMConfig
 from motet_train.models.control.contrastive import Progress
@@ -104,7 +104,7 @@ def _choose(run: Run, clips: Clips, candidates: Iterator[None]) -> dict[str, Any
         return {}
 
     def missed(enough: int) -> list[str]:
-        return missed_goals(lab_of(ControlModel(run.manifest, run.torch_graphs()), clips), enough)
+        return missed_goals(study_of(ControlModel(run.manifest, run.torch_graphs()), clips), enough)
 
     tried, goals = audition(run.model, candidates, missed)
     return {"candidates": tried, "missed": goals}

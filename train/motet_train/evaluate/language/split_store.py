@@ -21,7 +21,7 @@ from motet_train.data.store import Store
 
 
 @dataclass(frozen=True, eq=False)
-class Corpus:
+class SplitStore:
     """A store and the parts that a model was trained, validated and is tested on."""
 
     store: Store
@@ -59,6 +59,11 @@ class Corpus:
             found = np.sort(np.random.default_rng(0).choice(found, most, replace=False))
         return tuple(found.tolist())
 
+    def unseen(self, records: Iterable[int]) -> list[tuple[str, ...]]:
+        """The sentences of several records, without those that were also said about a training motion."""
+        known = {sentence for said in self.references(self.parts.train) for sentence in said}
+        return [tuple(sentence for sentence in said if sentence not in known) for said in self.references(records)]
+
     def unknown_words(self, records: Iterable[int]) -> set[str]:
         """The words said about some records that were not said about training motions: models read UNK."""
         train, asked = (_vocabulary(self.references(part)) for part in (self.parts.train, records))
@@ -69,7 +74,7 @@ class Corpus:
         return self.contract.frames(motion) / self.contract.std
 
 
-def corpus_of(manifest: Mapping[str, Any], store: Store) -> Corpus:
+def split_as(manifest: Mapping[str, Any], store: Store) -> SplitStore:
     """The store divided as the manifest of a run or bundle says; DataError where it is not what it was trained on."""
     try:
         told = manifest["training"]["split"]
@@ -84,7 +89,7 @@ def corpus_of(manifest: Mapping[str, Any], store: Store) -> Corpus:
             f"and {len(test)} test motions are not the {len(names)} that are here"
         )
     parts = ([i for i, name in enumerate(names) if name in part] for part in (validation, test))
-    return Corpus(store, Split(train, *(tuple(part) for part in parts)))
+    return SplitStore(store, Split(train, *(tuple(part) for part in parts)))
 
 
 def _vocabulary(rows: Iterable[Iterable[str]]) -> set[str]:
