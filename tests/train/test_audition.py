@@ -1,6 +1,5 @@
-from torch import nn
-
 from motet_train.recipes.audition import audition
+from torch import nn
 
 
 def candidates(net: nn.Linear, values: list[float], seen: list[float]):

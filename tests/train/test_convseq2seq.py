@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+from motet_train.fit_windows import Fitting, Learner
 from numpy.typing import NDArray
 
 from motet_train.data.errors import DataError
-from motet_train.fit_windows import Fitting, Learner
 from motet_train.models.predict.convseq2seq import SLOPE, Config, Convolution, ConvSeq2Seq, Discriminator
 from motet_train.models.predict.stepwise import Stepwise, free_run
 from motet_train.runs import RunError

@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 import torch
 from language_data import small_store
+from motet_train.checkpoint import CHECKPOINT, LOG, WEIGHTS
+from motet_train.fit import Fitted, Fitting, fit, rate, validate
 from torch import Tensor, nn
 
-from motet_train.checkpoint import CHECKPOINT, LOG, WEIGHTS
 from motet_train.data.batches import Examples
-from motet_train.fit import Fitted, Fitting, fit, rate, validate
 from motet_train.models.language.batch import Batch
 from motet_train.recipes.language import material
 from motet_train.runs import RunError

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from torch import Tensor, nn
-
 from motet_train.checkpoint import CHECKPOINT, LOG, WEIGHTS
 from motet_train.fit_windows import Fitting, Learner, fit_windows, rate
+from torch import Tensor, nn
+
 from motet_train.models.predict.stepwise import State, Stepwise, System, squared_error
 from motet_train.runs import RunError
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import torch
 from click.testing import CliRunner, Result
+from motet_train.checkpoint import CHECKPOINT
 from test_predict_data import write_files
 
 from motet.cli import main
-from motet_train.checkpoint import CHECKPOINT
 from motet_train.data.expmap_files import read_expmap
 from motet_train.data.predict_data import expmap_material, validation_files
 from motet_train.models.predict.convseq2seq import Config

@@ -9,13 +9,13 @@ import pytest
 import torch
 from click.testing import CliRunner, Result
 from language_data import records, small_store
+from motet_train.checkpoint import CHECKPOINT, LOG
+from motet_train.fit import Fitting
 
 from motet.cli import main
 from motet.formats import write_motion
 from motet.representation.contract import MotionContract
-from motet_train.checkpoint import CHECKPOINT, LOG
 from motet_train.data.store import Store
-from motet_train.fit import Fitting
 from motet_train.models.language.language_to_motion import LanguageToMotionConfig
 from motet_train.models.language.motion_to_language import MotionToLanguageConfig
 from motet_train.recipes import describe, generate
