@@ -103,7 +103,9 @@ def test_bench_prints_rows() -> None:
 
 def test_bench_describes_a_file_and_says_where_it_ran(clips: Path) -> None:
     for motion in ([], ["--motion", clips / WALK]):
-        lines = run("bench", "--bundle", "cmu-describe", "--seconds", 0.001, "--threads", 2, *motion).stdout.splitlines()
+        lines = run(
+            "bench", "--bundle", "cmu-describe", "--seconds", 0.001, "--threads", 2, *motion
+        ).stdout.splitlines()
         assert lines[0] == "on CPUExecutionProvider, threads: 2"
         assert any(line.startswith("describe.file") for line in lines)
 

@@ -12,6 +12,8 @@ import torch
 from tqdm import tqdm
 
 from motet.bundle.manifest import Manifest
+from motet.bundle.session import SessionOptions
+from motet.cli.options import session_options
 from motet.models.control import ControlModel
 from motet.models.describe import DescribeModel
 from motet.models.generate import GenerateModel
@@ -37,8 +39,11 @@ from motet_train.runs import Run
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one nested object with stable keys.")
 @click.option("--plots", type=Path, help="Folder for the figures of the papers.")
+@session_options
 @click.option("--save", is_flag=True, help="Keep the figures in each run; export puts them into the bundle.")
-def evaluate(models: tuple[str, ...], data: Path | None, as_json: bool, plots: Path | None, save: bool) -> None:
+def evaluate(
+    models: tuple[str, ...], data: Path | None, as_json: bool, plots: Path | None, save: bool, session: SessionOptions
+) -> None:
     """Run the papers' experiments on MODELS: run folders, or names and paths of bundles.
 
     Control: the thesis' experiments. Describe and generate: BLEU, floors, attributes, measures; with both, of the
@@ -49,7 +54,7 @@ def evaluate(models: tuple[str, ...], data: Path | None, as_json: bool, plots: P
     runs = {name: Run.load(Path(name)) for name in models if (Path(name) / "run.json").is_file()}
     if save and (bundles := [name for name in models if name not in runs]):
         raise click.UsageError(f"--save keeps figures in training runs; {', '.join(bundles)} is a bundle")
-    loaded = {name: _model(runs[name]) if name in runs else load(name) for name in models}
+    loaded = {name: _model(runs[name]) if name in runs else load(name, session) for name in models}
     ready, text = _measured(loaded, data, plots)
     for name in runs if save else ():
         Run({**runs[name].manifest, "quality": ready[name]}, runs[name].model).save(Path(name))
