@@ -1,4 +1,4 @@
-"""From a training run to a bundle: graphs exported, parity checked, figures and licences in the manifest."""
+"""From a training run to a bundle: graphs exported, parity checked, golden vectors, figures and licences."""
 
 import platform
 from collections.abc import Mapping
@@ -8,10 +8,12 @@ from typing import Any
 
 from motet.bundle.bundle import Bundle, write_bundle
 from motet.bundle.graph import Graph, OnnxGraph
+from motet.bundle.manifest import Manifest
 from motet.files import check_place
 from motet_export.decoded import whole_runs
 from motet_export.examples import examples
 from motet_export.exporter import ExportError, export_graph
+from motet_export.golden import FILE, golden_vectors
 from motet_export.parity import check_carried, check_one_step, check_runs
 from motet_export.quantise import difference, quantised
 from motet_train.runs import Run
@@ -24,38 +26,41 @@ def export_run(run: Run, out: str | Path, int8: bool = False) -> dict[str, Any]:
     int8: quantise the graphs after that; the report then has "int8", the difference that it makes.
     """
     check_place(out)
-    modules = run.graphs()
-    label = {"motet": version("motet"), "bundle": run.manifest["name"], "model": run.manifest["model"]}
+    manifest, modules, torch = Manifest.from_json(run.manifest), run.graphs(), run.torch_graphs()
+    label = {"motet": version("motet"), "bundle": manifest.name, "model": manifest.model}
     files = {
         f"{role}.onnx": export_graph(module, spec, {**label, "role": role}) for role, (module, spec) in modules.items()
     }
-    onnx_graphs: dict[str, Graph] = {
-        role: OnnxGraph(files[f"{role}.onnx"], spec) for role, (_, spec) in modules.items()
-    }
-    report = parity(run.manifest, onnx_graphs, run.torch_graphs())
+    onnx = _sessions(files, torch)
+    report = parity(manifest, onnx, torch)
     if int8:
-        files = {name: quantised(data) for name, data in files.items()}
-        small: dict[str, Graph] = {role: OnnxGraph(files[f"{role}.onnx"], spec) for role, (_, spec) in modules.items()}
-        report["int8"] = difference(run.manifest, small, onnx_graphs)
+        files, exact = {name: quantised(data) for name, data in files.items()}, onnx
+        onnx = _sessions(files, torch)
+        report["int8"] = difference(manifest, onnx, exact)
+    files[FILE], golden = golden_vectors(manifest, onnx, examples(manifest, torch), int8)
     graphs = {role: {"file": f"{role}.onnx", **spec.to_json()} for role, (_, spec) in modules.items()}
-    write_bundle(out, {**run.manifest, "graphs": graphs, "parity": report}, files)
+    write_bundle(out, {**run.manifest, "graphs": graphs, "golden": golden, "parity": report}, files)
     return report
+
+
+def _sessions(files: Mapping[str, bytes], torch: Mapping[str, Graph]) -> dict[str, Graph]:
+    return {role: OnnxGraph(files[f"{role}.onnx"], graph.spec) for role, graph in torch.items()}
 
 
 def parity_of(run: Run, bundle: Bundle) -> dict[str, Any]:
     """The parity report of a bundle that is there against a run; ExportError at the first rung that fails."""
-    if "int8" in bundle.manifest.get("parity", {}):
+    if "int8" in bundle.manifest.parity:
         raise ExportError(f"bundle {bundle.path} has weights of 8 bits, which torch has not; export without --int8")
     return parity(bundle.manifest, {role: bundle.graph(role) for role in run.graphs()}, run.torch_graphs())
 
 
-def parity(manifest: Mapping[str, Any], onnx: Mapping[str, Graph], torch: Mapping[str, Graph]) -> dict[str, Any]:
+def parity(manifest: Manifest, onnx: Mapping[str, Graph], torch: Mapping[str, Graph]) -> dict[str, Any]:
     """Climb the parity ladder; the report that goes into the manifest. ExportError at the first rung that fails."""
     draws = examples(manifest, torch)
     report: dict[str, Any] = {
         f"{role}.one_step": check_one_step(role, onnx[role], graph, draws[role]) for role, graph in torch.items()
     }
-    horizon = manifest["defaults"]["horizon"] if manifest["verb"] == "predict" else None
+    horizon = manifest.defaults["horizon"] if manifest.verb == "predict" else None
     report["step.carried"] = check_carried(onnx["step"], torch["step"], draws["step"], horizon)
     report["runs"] = check_runs(whole_runs(manifest, onnx, torch))
     report["versions"] = {name: version(name) for name in ("torch", "onnx", "onnxruntime")}

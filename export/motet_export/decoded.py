@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.bundle.graph import Graph
+from motet.bundle.manifest import Manifest
 from motet.models.control import ControlModel
 from motet.models.describe import DescribeModel
 from motet.models.generate import GenerateModel
+from motet.models.load import build
 from motet.models.predict import PredictModel
 from motet.models.text import MAX_WORDS, SPECIALS
 from motet.motion.motion import Motion
@@ -21,17 +23,20 @@ Decoded = dict[str, NDArray[Any]]
 Runs = dict[str, Callable[[], tuple[Decoded, Decoded]]]
 """By name of a run: what ONNX Runtime decoded, and what torch decoded."""
 
+Named = dict[str, Callable[[Any], Decoded]]
+"""By name of a run: what a model decodes."""
+
 Graphs = Mapping[str, Graph]
 
 
-def whole_runs(manifest: Mapping[str, Any], onnx: Graphs, torch: Graphs) -> Runs:
+def whole_runs(manifest: Manifest, onnx: Graphs, torch: Graphs) -> Runs:
     """The runs by which a bundle of the manifest's verb is judged, each by its name."""
-    return _RUNS[manifest["verb"]](manifest, onnx, torch)
+    models = [build(manifest, graphs) for graphs in (onnx, torch)]
+    return {name: partial(_pair, models, run) for name, run in _RUNS[manifest.verb](models[0]).items()}
 
 
-def _control(manifest: Mapping[str, Any], onnx: Graphs, torch: Graphs) -> Runs:
-    models = [ControlModel(manifest, graphs) for graphs in (onnx, torch)]
-    return _pairs(models, {"mean_field": partial(_controlled, 0.0), "sampled": partial(_controlled, 1.0)})
+def _control(_: ControlModel) -> Named:
+    return {"mean_field": partial(_controlled, 0.0), "sampled": partial(_controlled, 1.0)}
 
 
 def _controlled(variety: float, model: ControlModel) -> Decoded:
@@ -45,17 +50,10 @@ def _controlled(variety: float, model: ControlModel) -> Decoded:
     return {"frames": session.frames(smooth.clip(0, 1))}
 
 
-def _describe(manifest: Mapping[str, Any], onnx: Graphs, torch: Graphs) -> Runs:
-    models = [DescribeModel(manifest, graphs) for graphs in (onnx, torch)]
-    return _pairs(
-        models,
-        {
-            "greedy": partial(_described, 1, 0),
-            "beam": partial(_described, 5, 0),
-            "consensus": partial(_described, 5, 50),
-            "scores": _sentence_scores,
-        },
-    )
+def _describe(model: DescribeModel) -> Named:
+    searches = {"greedy": (1, 0), "beam": (5, 0), "consensus": (5, 50)}
+    runs: Named = {name: partial(_described, *settings) for name, settings in searches.items()}
+    return {**runs, "scores": _sentence_scores} if "score" in model.graphs else runs
 
 
 def _described(beams: int, draws: int, model: DescribeModel) -> Decoded:
@@ -75,19 +73,22 @@ def _sentence_scores(model: DescribeModel) -> Decoded:
     return {"scores": np.array([model.score(motion, sentence) for motion, sentence in pairs])}
 
 
-def _generate(manifest: Mapping[str, Any], onnx: Graphs, torch: Graphs) -> Runs:
-    models = [GenerateModel(manifest, graphs) for graphs in (onnx, torch)]
-    return _pairs(models, {"samples": partial(_generated, 1), "beam": partial(_generated, 4), "scores": _motion_scores})
+def _generate(model: GenerateModel) -> Named:
+    runs: Named = {"samples": partial(_generated, 1), "beam": partial(_generated, 4)}
+    if "candidates" not in model.defaults:
+        runs = {"decoded": partial(_generated, None)}
+    return {**runs, "scores": _motion_scores} if "score" in model.graphs else runs
 
 
-def _generated(candidates: int, model: GenerateModel) -> Decoded:
+def _generated(candidates: int | None, model: GenerateModel) -> Decoded:
     """Three motions of each of eight sentences: normalised frames, lengths and log-likelihoods, and the contexts."""
-    rows = model.generate(_sentences(model), hypotheses=3, candidates=candidates, seed=7, max_seconds=4)
+    hypotheses = 3 if "hypotheses" in model.defaults else None
+    rows = model.generate(_sentences(model), hypotheses, candidates=candidates, seed=7, max_seconds=4)
     found = [generated for row in rows for generated in row]
     return {
         "frames": np.concatenate([model.contract.normalised(g.frames) for g in found]),
         "lengths": np.array([len(g.frames) for g in found]),
-        "log_likelihoods": np.array([g.log_likelihood for g in found]),
+        "log_likelihoods": np.array([g.log_likelihood or 0.0 for g in found]),
         "contexts": model.embed(_sentences(model)),
     }
 
@@ -97,9 +98,8 @@ def _motion_scores(model: GenerateModel) -> Decoded:
     return {"scores": np.array([model.score(sentence, motion) for sentence, motion in pairs])}
 
 
-def _predict(manifest: Mapping[str, Any], onnx: Graphs, torch: Graphs) -> Runs:
-    models = [PredictModel(manifest, graphs) for graphs in (onnx, torch)]
-    return _pairs(models, {"horizon": partial(_predicted, 1), "beyond": partial(_predicted, 3)})
+def _predict(_: PredictModel) -> Named:
+    return {"horizon": partial(_predicted, 1), "beyond": partial(_predicted, 3)}
 
 
 def _predicted(horizons: int, model: PredictModel) -> Decoded:
@@ -108,10 +108,6 @@ def _predicted(horizons: int, model: PredictModel) -> Decoded:
     seeds = walks(contract, np.random.default_rng(3), 8, model.seed_frames)
     found = model.next_frames(seeds, horizons * model.horizon)
     return {"frames": contract.normalised(found)}
-
-
-def _pairs(models: Sequence[Any], runs: Mapping[str, Callable[[Any], Decoded]]) -> Runs:
-    return {name: partial(_pair, models, run) for name, run in runs.items()}
 
 
 def _pair(models: Sequence[Any], run: Callable[[Any], Decoded]) -> tuple[Decoded, Decoded]:
@@ -137,4 +133,9 @@ def _sentences(model: DescribeModel | GenerateModel) -> list[str]:
     return [" ".join(rng.choice(words, length)) for length in range(1, 17, 2)]
 
 
-_RUNS = {"control": _control, "describe": _describe, "generate": _generate, "predict": _predict}
+_RUNS: Mapping[str, Callable[..., Named]] = {
+    "control": _control,
+    "describe": _describe,
+    "generate": _generate,
+    "predict": _predict,
+}

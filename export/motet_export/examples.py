@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.bundle.graph import Arrays, Graph, GraphSpec
+from motet.bundle.manifest import Manifest
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
 
@@ -17,27 +18,41 @@ LONGEST = 12
 PACE = 0.1
 """Of a random walk from frame to frame, in standard deviations of the training data."""
 
+_LIKE_DATA = ("frames", "frame", "history")
+"""Inputs that are drawn as the training data is."""
+
 Examples = Callable[[np.random.Generator, int], Arrays]
 """Draws all inputs of a graph for so many rows."""
 
 
-def examples(manifest: Mapping[str, Any], torch: Mapping[str, Graph]) -> dict[str, Examples]:
-    """What draws the inputs of each graph, by role.
+def examples(manifest: Manifest, torch: Mapping[str, Graph]) -> dict[str, Examples]:
+    """What draws the inputs of each graph, by role: :func:`example`, with frames as likely as the training data's.
 
-    :func:`example`, but for predictors: their encoder gets :func:`walks`, their step what the encoder makes of them in
-    torch. They were trained on motions, and from numbers far from any a net that feeds its frames back can make much
-    of a rounding.
+    A history of codes is what the encoder makes of such frames in torch; and a predictor's step gets all that its
+    encoder gives: from numbers far from any frames a net that feeds its frames back can make much of a rounding.
     """
-    if manifest["verb"] != "predict":
-        words = len(manifest.get("vocabulary", "-"))
-        return {role: partial(example, graph.spec, vocabulary=words) for role, graph in torch.items()}
-    encoder, contract = torch["encoder"], MotionContract.from_json(manifest["motion"])
-    frames = encoder.spec.input("frames").size(1)
+    encoder, contract = torch["encoder"], manifest.motion
 
-    def seeds(rng: np.random.Generator, rows: int) -> Arrays:
-        return {"frames": walks(contract, rng, rows, frames)}
+    def draw(spec: GraphSpec, rng: np.random.Generator, rows: int) -> Arrays:
+        found = example(spec, rng, rows, vocabulary=max(1, len(manifest.vocabulary)))
+        return {**found, **{name: _like(value, name, rng) for name, value in found.items() if name in _LIKE_DATA}}
 
-    return {"encoder": seeds, "step": lambda rng, rows: encoder(seeds(rng, rows))}
+    def _like(value: NDArray[Any], name: str, rng: np.random.Generator) -> NDArray[Any]:
+        if name == "history":
+            frames = walks(contract, rng, *value.shape[:2])
+            return encoder({"frames": frames.reshape(-1, frames.shape[2])})["codes"].reshape(value.shape)
+        frames = walks(contract, rng, len(value), value.shape[1] if value.ndim == 3 else 1).reshape(
+            *value.shape[:-1], -1
+        )
+        if value.shape[-1] == frames.shape[-1]:
+            return frames
+        flags = np.ones((*value.shape[:-1], 1), dtype=np.float32)  # of frames as generators take them
+        return np.concatenate([contract.normalised(frames).astype(np.float32), flags], axis=-1)
+
+    draws: dict[str, Examples] = {role: partial(draw, graph.spec) for role, graph in torch.items()}
+    if manifest.verb == "predict":
+        draws["step"] = lambda rng, rows: encoder(draws["encoder"](rng, rows))
+    return draws
 
 
 def example(spec: GraphSpec, rng: np.random.Generator, batch: int, vocabulary: int = 1) -> dict[str, NDArray[Any]]:

@@ -1,9 +1,9 @@
 """From a torch module to the bytes of an ONNX graph that keeps a contract; all settings of the exporter are here."""
 
-import io
 import logging
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 
 import numpy as np
 import onnx
@@ -11,7 +11,8 @@ import torch
 from torch import nn
 
 from motet.bundle.graph import GraphSpec
-from motet.errors import MotetError
+from motet.bundle.graph_safety import check_graph
+from motet.errors import BundleError, MotetError
 
 OPSET = 18
 MAX_IR_VERSION = 10
@@ -32,7 +33,7 @@ def export_graph(module: nn.Module, spec: GraphSpec, metadata: Mapping[str, str]
     # a batch of 2: torch would take an axis of size 1 for a constant
     example = {tensor.name: torch.from_numpy(tensor.example(rng, batch=2)) for tensor in spec.inputs}
     # gradients off: torch does not export a scan over weights that ask for them
-    with warnings.catch_warnings(), _quiet(), torch.no_grad():
+    with warnings.catch_warnings(), _log_silenced(), torch.no_grad():
         warnings.simplefilter("ignore")
         program = torch.onnx.export(
             module.eval(),
@@ -48,11 +49,11 @@ def export_graph(module: nn.Module, spec: GraphSpec, metadata: Mapping[str, str]
         )
     if program is None:
         raise ExportError("torch gave no ONNX program")
-    return finished(program.model_proto, metadata)
+    return self_contained(program.model_proto, metadata)
 
 
-def finished(model: onnx.ModelProto, metadata: Mapping[str, str]) -> bytes:
-    """Strip what names the building machine, annotate, check; the bytes of the model."""
+def self_contained(model: onnx.ModelProto, metadata: Mapping[str, str]) -> bytes:
+    """Strip what names the building machine, annotate, check; the bytes of a model that needs no other file."""
     strip(model)
     del model.metadata_props[:]
     for key, value in metadata.items():
@@ -62,11 +63,12 @@ def finished(model: onnx.ModelProto, metadata: Mapping[str, str]) -> bytes:
         onnx.checker.check_model(model, full_check=True)
     except (onnx.checker.ValidationError, onnx.shape_inference.InferenceError) as error:
         raise ExportError(f"the exported graph is not valid ONNX: {error}") from error
-    if any(tensor.data_location == onnx.TensorProto.EXTERNAL for tensor in model.graph.initializer):
-        raise ExportError("the exported graph keeps weights outside of its file")
-    buffer = io.BytesIO()
-    onnx.save(model, buffer)
-    return buffer.getvalue()
+    data: bytes = model.SerializeToString(deterministic=True)
+    try:
+        check_graph(data)
+    except BundleError as error:
+        raise ExportError(f"the exported graph would be refused: {error}") from error
+    return data
 
 
 def strip(model: onnx.ModelProto) -> None:
@@ -89,15 +91,15 @@ def _dynamic_shapes(spec: GraphSpec) -> dict[str, dict[int, torch.export.Dim]]:
     }
 
 
-class _quiet:  # noqa: N801
-    """Silence the exporter's log while it works."""
-
-    def __enter__(self) -> None:
-        self._loggers = [logging.getLogger(name) for name in ("torch.onnx", "onnxscript", "onnx_ir")]
-        self._levels = [logger.level for logger in self._loggers]
-        for logger in self._loggers:
-            logger.setLevel(logging.ERROR)
-
-    def __exit__(self, *exception: object) -> None:
-        for logger, level in zip(self._loggers, self._levels, strict=True):
+@contextmanager
+def _log_silenced() -> Iterator[None]:
+    """Only errors of the exporter are logged."""
+    loggers = [logging.getLogger(name) for name in ("torch.onnx", "onnxscript", "onnx_ir")]
+    levels = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        for logger, level in zip(loggers, levels, strict=True):
             logger.setLevel(level)

@@ -12,8 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from motet.bundle.golden import difference
 from motet.bundle.graph import Graph
 from motet.decode.rollout import advance
+from motet.errors import BundleError
 from motet_export.examples import Examples, example
 from motet_export.exporter import ExportError
 
@@ -37,16 +39,10 @@ def error(found: Arrays, expected: Arrays) -> float:
 
     ExportError where shapes or dtypes differ, or a value is not finite.
     """
-    largest = 0.0
-    for name, array in expected.items():
-        if name not in found or found[name].shape != array.shape or found[name].dtype != array.dtype:
-            raise ExportError(f"output {name!r} has another shape or dtype than in torch")
-        if not np.isfinite(found[name]).all():
-            raise ExportError(f"output {name!r} has values that are not finite")
-        expected_values = array.astype(np.float64)
-        scale = np.maximum(max(1.0, np.sqrt(np.mean(expected_values**2))), np.abs(expected_values))
-        largest = max(largest, float((np.abs(found[name] - expected_values) / scale).max(initial=0)))
-    return largest
+    try:
+        return difference(found, expected)
+    except BundleError as fault:
+        raise ExportError(str(fault)) from fault
 
 
 def check_one_step(name: str, onnx: Graph, torch: Graph, draw: Examples | None = None) -> dict[str, Any]:
@@ -95,7 +91,10 @@ def check_carried(
 def _nudged(state: Arrays, rng: np.random.Generator) -> dict[str, NDArray[Any]]:
     """A state whose numbers have moved to one of their two neighbours in float32."""
     ends = np.array([-np.inf, np.inf], dtype=np.float32)
-    return {name: np.nextafter(values, rng.choice(ends, values.shape)) for name, values in state.items()}
+    return {
+        name: np.nextafter(values, rng.choice(ends, values.shape)) if values.dtype == np.float32 else values
+        for name, values in state.items()
+    }
 
 
 def check_runs(runs: Mapping[str, Callable[[], tuple[Arrays, Arrays]]]) -> dict[str, Any]:

@@ -4,15 +4,15 @@ import logging
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import onnx
 from onnxruntime.quantization import QuantType, quantize_dynamic
 
 from motet.bundle.graph import Graph
+from motet.bundle.manifest import Manifest
 from motet_export.decoded import whole_runs
-from motet_export.exporter import finished
+from motet_export.exporter import self_contained
 
 OPERATORS = ["MatMul", "Gemm", "Gather"]
 """Products, and the look-up of word vectors."""
@@ -32,12 +32,12 @@ def quantised(model: bytes) -> bytes:
             quantize_dynamic(
                 proto, path, op_types_to_quantize=OPERATORS, weight_type=QuantType.QInt8, extra_options=options
             )
-            return finished(onnx.load(path), {**metadata, "weights": "int8"})
+            return self_contained(onnx.load(path), {**metadata, "weights": "int8"})
     finally:
         logging.getLogger().removeFilter(_without_advice)
 
 
-def difference(manifest: Mapping[str, Any], int8: Mapping[str, Graph], exact: Mapping[str, Graph]) -> dict[str, float]:
+def difference(manifest: Manifest, int8: Mapping[str, Graph], exact: Mapping[str, Graph]) -> dict[str, float]:
     """What int8 changes in the runs of the parity ladder, for the manifest.
 
     "<run>.equal": share of the decoded sentences that are the same. "<run>.score": mean |difference| of the

@@ -1,11 +1,15 @@
 """motet: sequence models of human motion, run by numpy and onnxruntime.
 
-``motet.load("cmu-control")`` gives a model, ``motet.read`` and ``motet.write`` take motion files.
+``motet.load("cmu-control")`` gives a model, ``motet.read`` and ``motet.write`` take motion files; geometry is in
+:mod:`motet.motion`. What happens on the way is logged by the logger "motet".
 """
 
+import logging
 from importlib.metadata import version
 
+from motet import motion
 from motet.bundle.bundle import Bundle, list_bundles
+from motet.bundle.session import SessionOptions
 from motet.errors import (
     BundleError,
     ControlError,
@@ -17,22 +21,16 @@ from motet.errors import (
     ScriptError,
     TextError,
     TextWarning,
+    UnitError,
 )
 from motet.formats import read_motion as read
 from motet.formats import write_motion as write
 from motet.models.control import ControlModel, ControlSession, Snapshot
 from motet.models.describe import DescribeModel, Description
 from motet.models.generate import Generated, GenerateModel
-from motet.models.load import load
+from motet.models.load import load, load_as
 from motet.models.predict import PredictModel, PredictSession
-from motet.models.text import Vocabulary
-from motet.motion.heading import without_heading
-from motet.motion.kinematics import positions
-from motet.motion.mirror import mirror
 from motet.motion.motion import Motion
-from motet.motion.root_path import lay_root_path
-from motet.motion.skeleton import Joint, Skeleton
-from motet.representation.root_block import from_root_block, plant_feet, to_root_block
 
 __version__ = version("motet")
 
@@ -48,7 +46,6 @@ __all__ = [
     "FormatError",
     "GenerateModel",
     "Generated",
-    "Joint",
     "MotetError",
     "Motion",
     "MotionError",
@@ -56,20 +53,17 @@ __all__ = [
     "PredictModel",
     "PredictSession",
     "ScriptError",
-    "Skeleton",
+    "SessionOptions",
     "Snapshot",
     "TextError",
     "TextWarning",
-    "Vocabulary",
-    "from_root_block",
-    "lay_root_path",
+    "UnitError",
     "list_bundles",
     "load",
-    "mirror",
-    "plant_feet",
-    "positions",
+    "load_as",
+    "motion",
     "read",
-    "to_root_block",
-    "without_heading",
     "write",
 ]
+
+logging.getLogger("motet").addHandler(logging.NullHandler())

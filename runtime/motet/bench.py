@@ -1,14 +1,17 @@
 """How fast a model runs here: whole calls as a user makes them, Python included."""
 
+import tempfile
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from motet.bundle.graph import Arrays, Graph
-from motet.models.base import Bundled
+from motet.formats import read_motion, write_motion
+from motet.models.base import BundleModel
 from motet.models.control import ControlModel
 from motet.models.describe import DescribeModel
 from motet.models.generate import GenerateModel
@@ -20,6 +23,9 @@ BATCHES = (64, 256, 512, 1024, 2048, 4096)
 
 BEAMS, WORDS, SECONDS = 5, 10, 7.0
 """Of descriptions and of motions, all as long as these: so that a model's speed does not depend on what it says."""
+
+FILE_SECONDS = 2.8
+"""How long the motion in the file is that is described."""
 
 DRAWS = 100
 """Sentences that a consensus is of."""
@@ -63,16 +69,26 @@ def _until(call: Callable[[], object], seconds: float, least: int) -> list[float
     return taken
 
 
-def figures(model: Bundled, seconds: float) -> Figures:
-    """The figures of a model by name, each measured for about ``seconds``: values and units."""
-    if isinstance(model, ControlModel):
-        return control_figures(model, seconds)
-    if isinstance(model, DescribeModel):
-        return describe_figures(model, seconds)
-    if isinstance(model, PredictModel):
-        return predict_figures(model, seconds)
-    assert isinstance(model, GenerateModel)
-    return generate_figures(model, seconds)
+def figures(model: BundleModel, seconds: float, file: Path | None = None) -> Figures:
+    """The figures of a model by name, each measured for about ``seconds``: values and units.
+
+    file: the motion file that is described; by default one of :data:`FILE_SECONDS` that is made for it.
+    """
+    measured: Figures = _FIGURES[model.VERB](model, seconds)
+    if isinstance(model, DescribeModel) and (file or model.contract.skeleton):
+        with tempfile.TemporaryDirectory() as folder:
+            path = file or _made_file(model, Path(folder))
+            measured["describe.file"] = (_milliseconds(lambda: model.describe(read_motion(path)), seconds), "ms")
+    return measured
+
+
+def _made_file(model: DescribeModel, folder: Path) -> Path:
+    """An AMC and its ASF at 120 frames per second: a random walk from near the mean of the training data."""
+    rng, contract = np.random.default_rng(0), model.contract
+    steps = rng.normal(size=(round(FILE_SECONDS * model.fps), len(contract.channels)))
+    motion = contract.motion(contract.mean + 0.1 * contract.std * steps.cumsum(axis=0), plant=False)
+    write_motion(folder / "motion.amc", motion.resample(120.0))
+    return folder / "motion.amc"
 
 
 def control_figures(model: ControlModel, seconds: float) -> Figures:
@@ -103,7 +119,7 @@ def describe_figures(model: DescribeModel, seconds: float) -> Figures:
     end = model.vocabulary.ids[EOS]
     never = {"log_probabilities": lambda found: np.where(np.arange(found.shape[1]) == end, np.float32(-1e9), found)}
     defaults = {"beams": BEAMS, "max_words": WORDS}
-    steady = DescribeModel({**model.manifest, "defaults": defaults}, _steady(model.graphs, never))
+    steady = DescribeModel(replace(model.manifest, defaults=defaults, loop="beam"), _steady(model.graphs, never))
     size = (round(SECONDS * model.fps), len(model.contract.channels))
     motion = model.contract.features(np.random.default_rng(0).normal(model.contract.mean, model.contract.std, size))
     return {
@@ -119,7 +135,7 @@ def generate_figures(model: GenerateModel, seconds: float) -> Figures:
     """Motions of :data:`SECONDS` a second, many at once and one alone; encoder and step of one alone."""
     always = {"active": np.ones_like}
     defaults = {**model.defaults, "hypotheses": BEAMS, "max_seconds": SECONDS}
-    steady = GenerateModel({**model.manifest, "defaults": defaults}, _steady(model.graphs, always))
+    steady = GenerateModel(replace(model.manifest, defaults=defaults), _steady(model.graphs, always))
     known = model.vocabulary.words[len(SPECIALS) :]
     text = model.vocabulary.decode(range(len(SPECIALS), len(SPECIALS) + min(WORDS, len(known))))
     return {
@@ -142,8 +158,16 @@ def predict_figures(model: PredictModel, seconds: float) -> Figures:
     }
 
 
+_FIGURES: Mapping[str, Callable[[Any, float], Figures]] = {
+    "control": control_figures,
+    "describe": describe_figures,
+    "generate": generate_figures,
+    "predict": predict_figures,
+}
+
+
 class _Steady:
-    """A graph some of whose outputs are changed."""
+    """A graph some of whose outputs are changed: so that sentences and motions are all of one length."""
 
     def __init__(self, graph: Graph, changes: Mapping[str, Callable[..., Any]]) -> None:
         self.spec, self._graph, self._changes = graph.spec, graph, changes

@@ -2,6 +2,14 @@
 
 from pathlib import Path
 
+SHOWN = 60
+"""Characters of a faulty word that an error repeats."""
+
+
+def quoted(text: str) -> str:
+    """What was given or a file says, for an error: not more of it than fits on a line."""
+    return repr(text if len(text) <= SHOWN else text[:SHOWN] + "...")
+
 
 class MotetError(Exception):
     """Base of every error that motet raises on purpose."""
@@ -20,8 +28,11 @@ class FormatError(MotionError):
 
     def __init__(self, path: str | Path, reason: str, line: int | None = None) -> None:
         self.path, self.reason, self.line = Path(path), reason, line
-        place = f"{path}" if line is None else f"{path}, line {line}"
-        super().__init__(f"{place}: {reason}")
+        super().__init__(path, reason, line)  # what unpickling calls the class with
+
+    def __str__(self) -> str:
+        place = f"{self.path}" if self.line is None else f"{self.path}, line {self.line}"
+        return f"{place}: {self.reason}"
 
 
 class BundleError(MotetError, ValueError):
@@ -48,8 +59,11 @@ class ScriptError(MotetError, ValueError):
     """A control script that does not parse: shows the script and marks the place."""
 
     def __init__(self, script: str, position: int, reason: str) -> None:
-        self.script, self.position = script, position
-        super().__init__(f"{reason}\n  {script}\n  {' ' * position}^")
+        self.script, self.position, self.reason = script, position, reason
+        super().__init__(script, position, reason)  # what unpickling calls the class with
+
+    def __str__(self) -> str:
+        return f"{self.reason}\n  {self.script}\n  {' ' * self.position}^"
 
 
 class OutputError(MotetError, OSError):

@@ -1,28 +1,99 @@
-"""Writing files whole or not at all."""
+"""Writing files whole or not at all, and what stands for a file: a path, or an open binary file."""
 
+import shutil
 import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
 
 from motet.errors import OutputError
 
+File = str | Path | BinaryIO
+"""A path, or a file object of bytes."""
+
+PARTIAL = ".partial"
+"""How the temporary files end that a killed program may leave behind: ``.NAME.HEX.partial``. Nothing reads them."""
+
+
+def place_of(file: File) -> Path:
+    """The path of a file, or the name by which errors call a file object."""
+    if isinstance(file, str | Path):
+        return Path(file)
+    name = getattr(file, "name", None)
+    return Path(name) if isinstance(name, str) else Path("<file object>")
+
 
 def check_place(path: str | Path) -> Path:
-    """``path`` as a Path; OutputError if a file cannot be there: no such folder, or a folder of that name."""
+    """``path`` as a Path; OutputError if a file cannot be there: no such folder, or a folder or device of that name."""
     path = Path(path)
-    if not path.parent.is_dir():
-        raise OutputError(f"cannot write {path}: the folder {path.parent} does not exist")
-    if path.is_dir():
-        raise OutputError(f"cannot write {path}: it is a folder")
+    try:
+        if not path.parent.is_dir():
+            raise OutputError(f"cannot write {path}: the folder {path.parent} does not exist")
+        if path.is_dir():
+            raise OutputError(f"cannot write {path}: it is a folder")
+        if path.exists() and not path.is_file():
+            raise OutputError(f"cannot write {path}: it is not a regular file")
+    except OSError as error:
+        raise _refusal(path, error) from error
     return path
 
 
-def write_whole(path: str | Path, content: str | bytes) -> None:
-    """Write a file beside its place and move it there, so that nobody ever sees half of it."""
-    path = check_place(path)
-    temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
+def write_whole(file: File, content: str | bytes) -> None:
+    """Write atomically: to a temporary sibling, then rename. A link is followed, the mode of a replaced file is kept.
+
+    OutputError if the file cannot be written. A file object just gets the content.
+    """
     try:
-        temporary.write_bytes(content.encode() if isinstance(content, str) else content)
+        data = content.encode() if isinstance(content, str) else content
+        if isinstance(file, str | Path):
+            _replace(check_place(file).resolve(), data)
+        else:
+            file.write(data)
+    except (OSError, ValueError) as error:
+        raise _refusal(place_of(file), error) from error
+
+
+def _replace(path: Path, data: bytes) -> None:
+    temporary = temporary_beside(path)
+    try:
+        temporary.write_bytes(data)
+        if path.exists():
+            shutil.copymode(path, temporary)
         temporary.replace(path)
-    except OSError as error:
+    except BaseException:
         temporary.unlink(missing_ok=True)
-        raise OutputError(f"cannot write {path}: {error.strerror}") from error
+        raise
+
+
+@contextmanager
+def new_folder(path: str | Path) -> Iterator[Path]:
+    """A new folder to write into, which becomes ``path`` in the end; after an exception nothing is left of it.
+
+    Missing parents are made. OutputError if there is something at ``path``, or it cannot be written.
+    """
+    path = Path(path)
+    temporary = temporary_beside(path)
+    try:
+        if path.exists() or path.is_symlink():
+            raise OutputError(f"cannot write {path}: it exists; remove it first or choose another folder")
+        temporary.mkdir(parents=True)
+        yield temporary
+        temporary.rename(path)
+    except OSError as error:
+        raise _refusal(path, error) from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def temporary_beside(path: Path) -> Path:
+    """A new name in the same folder that ends in :data:`PARTIAL`, short enough where the name itself is long."""
+    stem = path.name.encode(errors="replace")[:200].decode(errors="ignore")
+    return path.with_name(f".{stem}.{uuid.uuid4().hex}{PARTIAL}")
+
+
+def _refusal(path: Path, error: Exception) -> OutputError:
+    if isinstance(error, OutputError):
+        return error
+    reason = error.strerror if isinstance(error, OSError) and error.strerror else error
+    return OutputError(f"cannot write {path}: {reason}")

@@ -23,6 +23,7 @@ def test_the_bundle_predicts_what_torch_predicts(tmp_path: Path) -> None:
     net = stepwise("convseq2seq", config)
     net.mean.copy_(torch.randn(45)), net.scale.copy_(torch.rand(45) + 0.5)
     motion = {
+        "representation": "angles",
         "channels": [f"joint{n}.e{axis}" for n in range(16) for axis in "xyz"],
         "units": ["rad"] * CHANNELS,
         "fps": 60.0,
@@ -30,7 +31,14 @@ def test_the_bundle_predicts_what_torch_predicts(tmp_path: Path) -> None:
         "std": [0.5] * CHANNELS,
         "skeleton": None,
     }
-    manifest = {"name": "x", "verb": "predict", "model": "convseq2seq", "motion": motion, "defaults": {"horizon": 25}}
+    manifest = {
+        "name": "x",
+        "verb": "predict",
+        "model": "convseq2seq",
+        "loop": "free_run",
+        "motion": motion,
+        "defaults": {"horizon": 25},
+    }
     run = Run({**manifest, "config": config, "licence": {}}, net)
     export_run(run, tmp_path / "x.zip")
     bundle = load(tmp_path / "x.zip")

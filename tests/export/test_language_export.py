@@ -12,7 +12,8 @@ from motet.bundle.bundle import Bundle
 from motet.models.describe import DescribeModel
 from motet.models.generate import GenerateModel
 from motet.models.load import load
-from motet.models.text import SPECIALS
+from motet.models.text import RULES, SPECIALS
+from motet.models.verify import verify
 from motet.representation.contract import LIMIT
 from motet_export.bundles import export_run, parity_of
 from motet_export.examples import example
@@ -25,6 +26,7 @@ from motet_train.runs import Run
 D = 3
 WORDS = [*SPECIALS, "a", "person", "walks", "runs", "left", "right", "slowly"]
 MOTION = {
+    "representation": "angles",
     "channels": ["hip", "knee", "ankle"],
     "units": ["rad"] * D,
     "fps": 10.0,
@@ -51,8 +53,20 @@ def run(verb: str) -> Run:
         defaults = {"hypotheses": 5, "candidates": 4, "temperature": 1.0, "max_seconds": 15}
     net.mean.copy_(torch.tensor(MOTION["mean"]))
     net.scale.copy_(torch.tensor(motion["std"]))
-    manifest = {"name": f"small-{verb}", "verb": verb, "model": model, "motion": motion, "vocabulary": WORDS}
-    return Run({**manifest, "config": config, "defaults": defaults, "licence": {}, "training": {}}, net.train())
+    loop = {"describe": "beam", "generate": "mixture"}[verb]
+    manifest = {"name": f"small-{verb}", "verb": verb, "model": model, "loop": loop, "motion": motion}
+    return Run(
+        {
+            **manifest,
+            "text": RULES.to_json(),
+            "vocabulary": WORDS,
+            "config": config,
+            "defaults": defaults,
+            "licence": {},
+            "training": {},
+        },
+        net.train(),
+    )
 
 
 @pytest.fixture(scope="module")
@@ -66,8 +80,10 @@ def bundles(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 @pytest.mark.parametrize("verb", ["describe", "generate"])
 def test_a_bundle_keeps_its_contracts_and_carries_its_parity(bundles: dict[str, Path], verb: str) -> None:
     bundle = Bundle.open(bundles[verb])
-    assert bundle.verify() == ["encoder.onnx", "score.onnx", "step.onnx"]
-    report = bundle.manifest["parity"]
+    found = verify(bundle)
+    assert found.files == ("encoder.onnx", "golden.npz", "score.onnx", "step.onnx")
+    assert max(found.errors.values()) < 1e-5
+    report = bundle.manifest.parity
     rungs = {"encoder.one_step", "step.one_step", "score.one_step", "step.carried", "runs"}
     assert rungs <= report.keys()
     assert all(report[rung]["error"] < report[rung]["bound"] / 2 for rung in rungs)
@@ -112,7 +128,7 @@ def test_a_description_scores_what_its_beam_says(bundles: dict[str, Path]) -> No
     model = load(bundles["describe"])
     assert isinstance(model, DescribeModel)
     motion = model.contract.features(np.random.default_rng(0).normal(size=(20, D)))
-    for found in model.describe(motion, beams=5)[0]:
+    for found in model.describe(motion, beams=5):
         if found.text:
             assert model.score(motion, found.text) == pytest.approx(found.log_probability, abs=1e-4)
 
@@ -120,7 +136,7 @@ def test_a_description_scores_what_its_beam_says(bundles: dict[str, Path]) -> No
 def test_a_generated_motion_scores_what_its_beam_says(bundles: dict[str, Path]) -> None:
     model = load(bundles["generate"])
     assert isinstance(model, GenerateModel)
-    for found in model.generate("a person walks", hypotheses=4, candidates=2, seed=3)[0]:
+    for found in model.generate("a person walks", hypotheses=4, candidates=2, seed=3):
         if len(found.frames) > 1:
             score = model.score("a person walks", model.contract.features(found.frames))
             assert score == pytest.approx(found.log_likelihood, rel=1e-3, abs=1e-2)
@@ -155,8 +171,8 @@ def test_weights_of_8_bits_load_and_their_difference_is_noted(
     monkeypatch.setattr("motet_export.bundles.export_graph", lambda _, __, label: exact.read(f"{label['role']}.onnx"))
     report = export_run(run(verb), tmp_path / "int8.zip", int8=True)
     bundle = Bundle.open(tmp_path / "int8.zip")
-    assert bundle.manifest["parity"]["int8"] == report["int8"]
+    assert bundle.manifest.parity["int8"] == report["int8"]
     assert 0 < report["int8"]["scores.score"] < 0.05
-    assert all(b"MatMulInteger" in bundle.read(f"{role}.onnx") for role in bundle.manifest["graphs"])
+    assert all(b"MatMulInteger" in bundle.read(f"{role}.onnx") for role in bundle.manifest.graphs)
     with pytest.raises(ExportError, match="8 bits"):
         parity_of(run(verb), bundle)

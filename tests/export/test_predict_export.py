@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from motet.bundle.manifest import Manifest
 from motet.models.load import load
 from motet.models.predict import PredictModel
 from motet_export.bundles import export_run
@@ -33,6 +34,7 @@ def run() -> Run:
         for parameter in net.parameters():
             parameter.add_(0.1 * torch.randn_like(parameter))
     motion = {
+        "representation": "angles",
         "channels": [f"joint{n}.e{axis}" for n in range(3) for axis in "xyz"],
         "units": ["rad"] * CHANNELS,
         "fps": 60.0,
@@ -40,7 +42,14 @@ def run() -> Run:
         "std": [0.5] * CHANNELS,
         "skeleton": None,
     }
-    manifest = {"name": "x", "verb": "predict", "model": "trajectory", "motion": motion, "defaults": {"horizon": 6}}
+    manifest = {
+        "name": "x",
+        "verb": "predict",
+        "model": "trajectory",
+        "loop": "free_run",
+        "motion": motion,
+        "defaults": {"horizon": 6},
+    }
     return Run({**manifest, "config": vars(config), "licence": {}}, net)
 
 
@@ -48,12 +57,12 @@ def test_the_bundle_predicts_what_torch_predicts(run: Run, tmp_path: Path) -> No
     report = export_run(run, tmp_path / "x.zip")
     assert set(report["runs"]) >= {"horizon", "beyond"}
     assert max(rung["error"] for rung in report.values() if "bound" in rung) <= 1e-5
-    bundle, torch_model = load(tmp_path / "x.zip"), PredictModel(run.manifest, run.torch_graphs())
+    bundle, torch_model = load(tmp_path / "x.zip"), PredictModel(Manifest.from_json(run.manifest), run.torch_graphs())
     assert isinstance(bundle, PredictModel)
     seeds = 0.3 * np.random.default_rng(0).normal(size=(7, 10, CHANNELS))
     np.testing.assert_allclose(bundle.next_frames(seeds, 15), torch_model.next_frames(seeds, 15), rtol=1e-4, atol=1e-4)
     np.testing.assert_array_equal(bundle.next_frames(seeds[:1], 15)[0], bundle.next_frames(seeds, 15)[0])
-    motion = bundle.contract.motion(seeds[0])
+    motion = bundle.contract.features(seeds[0])
     found = bundle.predict(motion, append=True)
     assert (len(found), found.channels) == (16, motion.channels)
     np.testing.assert_allclose(found.values[10:], bundle.next_frames(seeds[:1])[0], atol=1e-6)

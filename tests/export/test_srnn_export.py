@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from motet.bundle.graph import OnnxGraph
-from motet.decode.rollout import free_run
+from motet.decode.free_run import free_run
 from motet_export.exporter import export_graph
 from motet_train.models.predict.srnn import EDGES, NODES, SRNN, Config
 from motet_train.models.predict.stepwise import Stepwise

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.bundle.graph import Arrays, GraphSpec, TensorSpec
+from motet.bundle.manifest import Manifest
 from motet.models.describe import DescribeModel
 from motet.models.generate import GenerateModel
 from motet.models.text import SPECIALS, Vocabulary
@@ -23,6 +24,15 @@ CONTRACT = MotionContract(
 )
 VOCABULARY = Vocabulary([*SPECIALS, "walks", "person", "a", "left", "8", "0"])
 STATE = 6
+
+
+def manifest(
+    verb: str, loop: str, contract: MotionContract, defaults: dict[str, Any], vocabulary: Vocabulary | None = None
+) -> Manifest:
+    """The manifest of a fake model."""
+    words = {} if vocabulary is None else {"text": vocabulary.rules.to_json(), "vocabulary": vocabulary.to_json()}
+    named = {"name": f"fake-{verb}", "verb": verb, "model": "fake", "loop": loop}
+    return Manifest.from_json({**named, "motion": contract.to_json(), **words, "defaults": defaults})
 
 
 class FakeGraph:
@@ -182,14 +192,8 @@ def moving(frames: int, fps: float = FPS, seed: int = 0) -> Motion:
     return Motion(values, ("knee.ry", "knee.rz", "hips.ty", "knee.rx"), ("deg", "deg", "m", "rad"), fps, SKELETON)
 
 
-def _manifest(verb: str, defaults: dict[str, Any]) -> dict[str, Any]:
-    return {
-        "name": f"fake-{verb}",
-        "verb": verb,
-        "motion": CONTRACT.to_json(),
-        "vocabulary": VOCABULARY.to_json(),
-        "defaults": defaults,
-    }
+def _manifest(verb: str, defaults: dict[str, Any]) -> Manifest:
+    return manifest(verb, {"describe": "beam", "generate": "mixture"}[verb], CONTRACT, defaults, VOCABULARY)
 
 
 def _means(values: Array, lengths: Array) -> Array:

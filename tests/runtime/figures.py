@@ -1,9 +1,15 @@
 """A small motion of a made-up person, for tests that draw or write figures."""
 
+from importlib.util import find_spec
+
 import numpy as np
 
+from motet.formats import WRITABLE
 from motet.motion.motion import Motion
 from motet.motion.skeleton import Joint, Skeleton
+
+WRITTEN = [extension for extension in WRITABLE if extension != ".gif" or find_spec("PIL")]
+"""The formats that can be written here."""
 
 JOINTS = (
     Joint("hips", -1, (0.0, 0.0, 0.0), "xyz"),

@@ -1,6 +1,10 @@
 import json
+import os
+import pickle
+import time
 import zipfile
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -8,8 +12,10 @@ import numpy as np
 import pytest
 
 from motet.bundle.bundle import FORMAT, Bundle, list_bundles, write_bundle, zip_bytes
+from motet.bundle.session import SessionOptions
 from motet.errors import BundleError, OutputError
 from motet.models.load import load
+from motet.models.verify import verify
 
 SHIPPED = list_bundles()["cmu-control"]
 
@@ -28,12 +34,16 @@ def edit(folder: Path, change: Callable[[dict[str, Any]], None]) -> None:
     (folder / "manifest.json").write_text(json.dumps(manifest))
 
 
-def test_the_shipped_bundles_are_whole() -> None:
+def test_the_shipped_bundles_are_whole_and_give_their_golden_vectors() -> None:
     assert list(list_bundles()) == ["cmu-control", "cmu-describe", "cmu-generate", "cmu-predict"]
     for name, path in list_bundles().items():
         bundle = Bundle.open(name)
         assert bundle.name == name == path.stem
-        assert {"encoder.onnx", "step.onnx"} <= set(bundle.verify())
+        found = verify(bundle)
+        assert {"encoder.onnx", "step.onnx", "golden.npz"} <= set(found.files)
+        assert {"encoder", "step", "run"} <= found.errors.keys()
+        assert max(found.errors.values()) < found.tolerance
+        assert found.providers == ("CPUExecutionProvider",)
 
 
 def test_folder_and_zip_run_alike_and_pack_to_the_same_bytes(folder: Path, tmp_path: Path) -> None:
@@ -62,47 +72,211 @@ def test_a_missing_file_is_refused(folder: Path) -> None:
         load(folder)
 
 
-def test_verify_names_a_file_that_does_not_belong(folder: Path) -> None:
+def test_a_file_that_does_not_belong_is_refused(folder: Path) -> None:
     (folder / "notes.txt").write_text("x")
     with pytest.raises(BundleError, match=r"not in its manifest: notes.txt"):
-        Bundle.open(folder).verify()
+        Bundle.open(folder)
+
+
+def set_at(manifest: dict[str, Any], path: str, value: Any) -> None:
+    """Set what stands at a path such as "motion.skeleton.joints.3.parent"; None removes it."""
+    *way, last = [int(key) if key.isdecimal() else key for key in path.split(".")]
+    place: Any = manifest
+    for key in way:
+        place = place[key]
+    if value is None:
+        place.pop(last)
+    else:
+        place[last] = value
+
+
+NAN, HUGE = float("nan"), 10**400
 
 
 @pytest.mark.parametrize(
-    ("change", "reason"),
+    ("path", "value", "reason"),
     [
-        (lambda m: m.update(format=FORMAT + 1), f"this motet reads format {FORMAT}"),
-        (lambda m: m.pop("motion"), "lacks motion"),
-        (lambda m: m["motion"].pop("fps"), "motion.fps: numbers are needed"),
+        ("format", 1, "format 1, of an older motet: export its training run again"),
+        ("format", 3, f"format 3; this motet reads format {FORMAT}"),
+        ("format", True, "format True"),
+        ("motion", None, "manifest, motion: is missing"),
+        ("motion", [1], r"motion: must be an object, not \[1\]"),
+        ("motion.fps", None, "motion.fps: is missing"),
+        ("motion.fps", "25", "motion.fps: must be a number between 1 and 1000, not '25'"),
+        ("motion.fps", True, "motion.fps: must be a number between 1 and 1000, not True"),
+        ("motion.fps", 1e9, "motion.fps: must be a number between 1 and 1000, not 1000000000.0"),
+        ("motion.fps", NAN, "JSON has no number NaN"),
+        ("motion.representation", "quaternions", "representation must be one of angles"),
+        ("motion.mean", 0, "motion.mean: must be a list"),
+        ("motion.mean", [0.0], "motion.mean: must hold 59 numbers, not 1"),
+        ("motion.std", [0.0] * 58, "motion.std: must hold 59 numbers, not 58"),
+        ("motion.std", [-1.0] * 59, "motion.std: must be numbers between 0"),
+        ("motion.mean", [HUGE] * 59, "motion.mean: must be numbers between"),
+        ("motion.units", ["deg"], "motion.units: 59 are needed"),
+        ("motion.channels", ["a", "a"], "motion.channels: holds a string twice"),
+        ("motion.skeleton.joints.3.parent", 9, "the first has none|must come after its parent"),
+        ("motion.skeleton.joints.3.parent", 1.5, r"motion.skeleton.joints\[3\].parent: must be a whole number"),
+        ("motion.skeleton.joints.3.offset", [0, 0], "offset: must hold 3 numbers"),
+        ("motion.skeleton.joints", [], "motion.skeleton.joints: must be a skeleton with the joints of all channels"),
+        ("motion.skeleton.metres_per_unit", -1, "metres_per_unit: must be a number between 1e-06"),
+        ("verb", "swim", "verb: 'swim' is unknown; expected one of control, describe, generate, predict"),
+        ("verb", ["swim"], "verb: must be a string"),
+        ("verb", "describe", "loop: 'session' does not describe|text: is missing|beam"),
+        ("loop", None, "loop: is missing"),
+        ("loop", "beam", "loop: 'beam' does not control; expected one of session"),
+        ("control", None, "control: is missing"),
+        ("control.labels", ["walk", "walk", "run"], "control.labels: holds a string twice"),
+        ("control.labels", ["walk", "run"], "control.starts: must be frames for each of walk, run"),
+        ("control.starts.walk", [[0.0] * 59], "control.starts.walk: must hold 3 frames, not 1"),
+        ("control.starts.walk", [[0.0] * 58] * 3, "control.starts.walk.0: must hold 59 numbers, not 58"),
+        ("control.starts.walk", 3, "control.starts.walk: must be a list"),
+        ("defaults", {}, "defaults.temperature: is missing"),
+        ("defaults.temperature", "x", "defaults.temperature: temperature must be between 0.01 and 100, not x"),
+        ("defaults.temperature", True, "defaults.temperature: temperature must be between"),
+        ("graphs", [], "graphs: must be an object"),
+        ("graphs", {}, "it needs graphs and golden vectors"),
+        ("graphs.step", None, "no graph for the role 'step'"),
+        ("graphs.step.inputs", None, "graphs.step.inputs: is missing"),
+        ("graphs.step.inputs.0.shape", ["batch", 2, 150], "does not keep its contract|does not fit the input"),
         (
-            lambda m: m["motion"]["skeleton"]["joints"][3].update(parent=9),
-            "motion.skeleton: .*after its parent",
+            "graphs.step.inputs.0.shape",
+            ["batch", -1, 150],
+            r"graphs.step.inputs\[0\].shape: must be names, and numbers",
         ),
-        (lambda m: m.update(verb="swim"), "for 'swim'"),
-        (lambda m: m.pop("control"), "no control model"),
-        (lambda m: m["graphs"].pop("step"), "no graph for the role 'step'"),
-        (lambda m: m["graphs"]["step"].pop("inputs"), "step graph"),
-        (lambda m: m["graphs"]["step"]["inputs"][0].update(shape=["batch", 2, 150]), "does not keep its contract"),
-        (lambda m: m["graphs"]["step"]["outputs"][0].update(name="other"), "does not keep its contract"),
-        (lambda m: m["graphs"]["step"].update(file="manifest.json"), "not in its manifest"),
+        ("graphs.step.inputs.0.shape", ["batch", 1 << 20, 150], "at most 8 axes with at most"),
+        ("graphs.step.inputs.1.shape", ["batch", 2], "does not keep its contract|expected"),
+        ("graphs.step.inputs.0.dtype", "object", "dtype: must be one of float32"),
+        ("graphs.step.outputs.0.name", "other", "does not keep its contract"),
+        ("graphs.step.outputs.0.name", "frame", "two tensors have the same name"),
+        ("graphs.step.feedback", {"history": "none"}, "the graph has no output 'none'"),
+        ("graphs.step.feedback", {"none": "next_history"}, "the graph has no input 'none'"),
+        (
+            "graphs.step.feedback",
+            {"noise": "next_codes", "history": "frame"},
+            "'frame' does not fit the input 'history'",
+        ),
+        ("graphs.step.feedback", {}, "graphs.step.feedback: nothing gives the next history"),
+        ("graphs.step.start", {"history": [3]}, "graphs.step.start: .* does not fit the state 'history'"),
+        ("graphs.step.file", "manifest.json", "graphs.step.file: 'manifest.json' is not among its files"),
+        ("golden", None, "needs graphs and golden vectors"),
+        ("golden.file", "step.npz", "golden.file: 'step.npz' is not among its files"),
+        ("files", None, "is not among its files"),
+        ("files", [], "files: must be an object"),
+        ("files", {"../x": {"size": 1, "sha256": ""}}, "'../x' is not a plain file name"),
+        ("files.step.onnx", None, ""),
     ],
 )
-def test_a_manifest_that_does_not_fit_is_refused(
-    folder: Path, change: Callable[[dict[str, Any]], None], reason: str
-) -> None:
-    edit(folder, change)
+def test_a_manifest_that_does_not_fit_is_refused(folder: Path, path: str, value: Any, reason: str) -> None:
+    if path == "files.step.onnx":
+        edit(folder, lambda m: m["files"].pop("step.onnx"))
+        reason = "'step.onnx' is not among its files"
+    else:
+        edit(folder, lambda m: set_at(m, path, value))
+    with pytest.raises(BundleError, match=reason) as caught:
+        load(folder)
+    assert str(caught.value).startswith(f"bundle {folder}")
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        (b"{", "not valid JSON"),
+        (b"[" * 100_000, "not valid JSON"),
+        (b'{"a":' * 100_000, "not valid JSON"),
+        (b"\xff\xfe", "not valid JSON"),
+        (b"[]", "format None"),
+        (b" " * (5 << 20), "more than 4194304 bytes"),
+    ],
+)
+def test_a_manifest_that_is_not_one_is_refused(tmp_path: Path, text: bytes, reason: str) -> None:
+    (tmp_path / "manifest.json").write_bytes(text)
     with pytest.raises(BundleError, match=reason):
+        load(tmp_path)
+
+
+def test_what_is_not_a_bundle_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "text.zip").write_text("hello")
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "loop").symlink_to(tmp_path / "loop")
+    (tmp_path / "secret").mkdir()
+    for name, reason in (
+        ("empty", "'manifest.json' is missing"),
+        ("text.zip", "not a zip"),
+        ("pipe", "neither a folder nor a file"),
+        ("loop", "no such path|symbolic links"),
+        ("x" * 300, "no such path|too long"),
+        ("a\0b", "null byte|no such path"),
+    ):
+        with pytest.raises(BundleError, match=reason):
+            load(tmp_path / name)
+    with pytest.raises(BundleError, match="neither a folder nor a file"):
+        load("/dev/null")
+
+
+def test_a_folder_that_cannot_be_listed_is_refused(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(self: Path) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "iterdir", refuse)
+    with pytest.raises(BundleError, match="cannot read the folder: Permission denied"):
         load(folder)
 
 
-def test_what_is_no_bundle_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "empty").mkdir()
-    (tmp_path / "text.zip").write_text("hello")
-    (tmp_path / "broken").mkdir()
-    (tmp_path / "broken" / "manifest.json").write_text("{")
-    for name, reason in (("empty", "no manifest.json"), ("text.zip", "not a zip"), ("broken", "is no JSON")):
+def test_a_path_loads_where_the_default_bundles_were_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("motet.bundle.bundle.DEFAULT_BUNDLES", tmp_path / "gone")
+    assert load(SHIPPED).manifest.name == "cmu-control"
+    with pytest.raises(BundleError, match="unknown bundle 'cmu-control'"):
+        load("cmu-control")
+
+
+def test_a_model_of_a_relative_path_pickles_to_another_folder(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(folder.parent)
+    data = pickle.dumps(load(folder.name, SessionOptions(threads=2)))
+    monkeypatch.chdir("/")
+    model = pickle.loads(data)
+    assert model.manifest.name == "cmu-control"
+    assert model._source == (folder, SessionOptions(threads=2))
+
+
+def test_bombs_are_refused_at_once(folder: Path, tmp_path: Path) -> None:
+    started = time.perf_counter()
+    zeros = tmp_path / "zeros.zip"
+    with zipfile.ZipFile(zeros, "w", zipfile.ZIP_DEFLATED) as archive, archive.open("manifest.json", "w") as member:
+        for _ in range(30):
+            member.write(bytes(1 << 20))
+    many = tmp_path / "many.zip"
+    with zipfile.ZipFile(many, "w") as archive:
+        for number in range(3_000):
+            archive.writestr(f"{number}", b"")
+    written = time.perf_counter() - started
+    for path, reason in ((zeros, "unpacks to more than 100 times"), (many, "too many files")):
         with pytest.raises(BundleError, match=reason):
-            load(tmp_path / name)
+            load(path)
+    for number in range(70):
+        (folder / f"{number}").touch()
+    with pytest.raises(BundleError, match="it holds 74 files; a bundle has at most 64"):
+        load(folder)
+    assert time.perf_counter() - started - written < 0.5
+
+
+def test_a_member_longer_than_declared_is_not_read_to_its_end(folder: Path) -> None:
+    with (folder / "step.onnx").open("ab") as file:
+        file.truncate(1 << 31)  # of holes: it takes no room, and would take two gigabytes of memory
+    with pytest.raises(BundleError, match=r"'step.onnx' is larger than|has more than 3[0-9]+ bytes"):
+        load(folder)
+
+
+def test_damage_within_a_zip_is_a_bundle_error(tmp_path: Path) -> None:
+    data, rng = SHIPPED.read_bytes(), np.random.default_rng(0)
+    for number in range(60):
+        damaged = bytearray(data)
+        damaged[int(rng.integers(len(data)))] ^= 1 << int(rng.integers(8))
+        (tmp_path / f"{number}.zip").write_bytes(damaged)
+        with suppress(BundleError):
+            load(tmp_path / f"{number}.zip")
 
 
 @pytest.mark.parametrize("name", ["../evil", "/evil", "a/b", "a\\b", "folder/"])
@@ -118,7 +292,7 @@ def test_links_are_refused(folder: Path, tmp_path: Path) -> None:
     link.external_attr = 0o120777 << 16
     with zipfile.ZipFile(tmp_path / "b.zip", "w") as archive:
         archive.writestr(link, "/etc/passwd")
-    with pytest.raises(BundleError, match="is a link"):
+    with pytest.raises(BundleError, match="not a plain file"):
         Bundle.open(tmp_path / "b.zip")
     (folder / "step.onnx").unlink()
     (folder / "step.onnx").symlink_to("/etc/hostname")
@@ -127,18 +301,37 @@ def test_links_are_refused(folder: Path, tmp_path: Path) -> None:
 
 
 def test_a_graph_that_is_none_is_refused(folder: Path, tmp_path: Path) -> None:
+    files = {path.name: path.read_bytes() for path in folder.iterdir() if path.name != "manifest.json"}
     manifest = json.loads((folder / "manifest.json").read_text())
-    files = {"encoder.onnx": (folder / "encoder.onnx").read_bytes(), "step.onnx": b"no graph"}
-    write_bundle(tmp_path / "b.zip", manifest, files)
-    with pytest.raises(BundleError, match="refuses the graph"):
+    write_bundle(tmp_path / "b.zip", manifest, {**files, "step.onnx": b"no graph"})
+    with pytest.raises(BundleError, match="step graph: the graph is not valid ONNX"):
         load(tmp_path / "b.zip")
 
 
-def test_a_bundle_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
-    with pytest.raises(BundleError, match="it exists"):
-        write_bundle(tmp_path, {}, {})
+def test_a_bundle_is_written_whole_or_not_at_all(folder: Path, tmp_path: Path) -> None:
+    files = {path.name: path.read_bytes() for path in folder.iterdir() if path.name != "manifest.json"}
+    manifest = json.loads((folder / "manifest.json").read_text())
+    with pytest.raises(OutputError, match="it exists"):
+        write_bundle(tmp_path, manifest, files)
     with pytest.raises(OutputError, match="does not exist"):
-        write_bundle(tmp_path / "no" / "b.zip", {}, {})
-    write_bundle(tmp_path / "new", {"name": "x"}, {"a.onnx": b"1"})
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["new"]
+        write_bundle(tmp_path / "no" / "b.zip", manifest, files)
+    with pytest.raises(BundleError, match="manifest, motion: must be an object"):
+        write_bundle(tmp_path / "b.zip", {**manifest, "motion": None}, files)
+    write_bundle(tmp_path / "new", manifest, files)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bundle", "new"]
+    assert (tmp_path / "new" / "manifest.json").read_bytes() == (folder / "manifest.json").read_bytes()
     assert zip_bytes({"a": b"1", "b": b"2"}, b"m") == zip_bytes({"b": b"2", "a": b"1"}, b"m")
+
+
+@pytest.mark.parametrize("threads", [0, -1, 257, 10_000, True, 1.5])
+def test_threads_are_bounded(threads: Any) -> None:
+    with pytest.raises(BundleError, match="threads must be a number between 1 and 256"):
+        SessionOptions(threads=threads)
+
+
+def test_a_provider_that_is_not_here_is_refused_and_what_is_active_is_said() -> None:
+    with pytest.raises(BundleError, match=r"no provider 'NoExecutionProvider' here; it has .*CPUExecutionProvider"):
+        SessionOptions(providers=("NoExecutionProvider",))
+    with pytest.raises(BundleError, match="options for each provider or for none"):
+        SessionOptions(provider_options=({}, {}))
+    assert load("cmu-control", SessionOptions(threads=2)).providers == ("CPUExecutionProvider",)

@@ -38,7 +38,7 @@ def test_describe_prints_json_for_every_file(files: list[Path]) -> None:
     assert [row["input"] for row in rows] == [str(path) for path in files]
     expected = describe_model().describe([read_motion(path) for path in files], 3)
     for row, wanted in zip(rows, expected, strict=True):
-        assert [set(h) for h in row["hypotheses"]] == [{"text", "log_probability"}] * 3
+        assert [set(h) for h in row["hypotheses"]] == [{"text", "log_probability", "score"}] * 3
         assert [h["text"] for h in row["hypotheses"]] == [d.text for d in wanted]
         np.testing.assert_allclose(
             [h["log_probability"] for h in row["hypotheses"]], [d.log_probability for d in wanted], atol=1e-5
@@ -51,12 +51,51 @@ def test_describe_draws_sentences_that_agree(files: list[Path]) -> None:
     assert [[h["text"] for h in row["hypotheses"]] for row in rows] == [[d.text for d in row] for row in expected]
 
 
-def test_describe_says_that_it_resampled(files: list[Path]) -> None:
-    result = run("describe", *files)
-    assert result.stderr == f"motet: {files[1]}: resampled from 40 to 10 fps\n"
+def test_describe_says_that_it_resampled_if_asked_to(files: list[Path]) -> None:
+    result = run("--verbose", "describe", *files)
+    assert result.stderr == "motet: resampled 1 of 2 motions to 10 fps\n"
     lines = result.stdout.splitlines()
     assert (len(lines), lines[0], lines[6]) == (12, str(files[0]), str(files[1]))
     assert run("describe", files[0]).stdout.splitlines() == lines[1:6]
+    assert run("describe", files[1]).stderr == ""
+
+
+def test_the_list_is_ordered_by_the_score_it_shows(files: list[Path]) -> None:
+    for options in ([], ["--draws", 50]):
+        scores = [float(line.split()[0]) for line in run("describe", files[0], *options).stdout.splitlines()]
+        assert scores == sorted(scores, reverse=True)
+
+
+def test_a_file_that_fails_is_named_and_the_others_are_described(files: list[Path], tmp_path: Path) -> None:
+    (tmp_path / "bad.npz").write_text("hello")
+    write_motion(tmp_path / "lacking.npz", moving(20).select(("knee.ry", "knee.rz")))
+    paths = [tmp_path / "bad.npz", files[0], tmp_path / "lacking.npz", tmp_path / "none.npz", files[1]]
+    result = run("describe", *paths, "--json")
+    assert result.exit_code == 1
+    rows = json.loads(result.stdout)
+    assert rows == json.loads(run("describe", *files, "--json").stdout)
+    for path in (paths[0], paths[2], paths[3]):
+        assert result.stderr.count(f"motet: {path}: ") == 1
+    assert len(result.stderr.splitlines()) == 3
+    out = tmp_path / "out.npy"
+    result = run("embed", *paths, "-o", out)
+    assert (result.exit_code, len(result.stderr.splitlines())) == (1, 3)
+    np.testing.assert_array_equal(np.load(out), describe_model().embed([read_motion(path) for path in files]))
+
+
+def test_a_long_motion_is_described_in_windows(tmp_path: Path, files: list[Path]) -> None:
+    write_motion(tmp_path / "long.npz", moving(450))
+    rows = json.loads(run("describe", tmp_path / "long.npz", "--json").stdout)
+    assert [(row["start"], row["stop"]) for row in rows] == [(0.0, 22.5), (22.5, 45.0)]
+    parts = [part for _, part in describe_model().windows(moving(450))]
+    assert [row["hypotheses"][0]["text"] for row in rows] == [d[0].text for d in describe_model().describe(parts)]
+    lines = run("describe", tmp_path / "long.npz", files[0]).stdout.splitlines()
+    assert [lines[0], lines[1], lines[7], lines[13]] == [
+        str(tmp_path / "long.npz"),
+        "0.0 to 22.5 s",
+        "22.5 to 45.0 s",
+        str(files[0]),
+    ]
 
 
 def test_generate_writes_the_same_bytes_every_time(tmp_path: Path) -> None:
@@ -92,6 +131,7 @@ def test_unknown_words_are_said_and_the_rest_is_used(tmp_path: Path) -> None:
     result = run("generate", "a zebra walks", "-o", tmp_path / "out.bvh")
     assert result.exit_code == 0
     assert result.stderr == "motet: the model does not know zebra (in 'a zebra walks')\n"
+    assert run("--quiet", "generate", "a zebra walks", "-o", tmp_path / "out.bvh").stderr == ""
     result = run("embed", "--text", "a zebra walks", "--text", "walks", "-o", tmp_path / "out.npy")
     assert result.stderr == "motet: the model does not know zebra (in 'a zebra walks')\n"
 
@@ -107,39 +147,45 @@ def test_embed(tmp_path: Path, files: list[Path]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("code", "arguments", "said"),
     [
-        (["describe", "{bad}/none.npz"], "none.npz: no such file"),
-        (["describe", "{bad}/good.npz", "{bad}/lacking.npz"], "lacking.npz: the motion lacks 2 of 3 channels: hips.ty"),
-        (["describe", "{bad}/frame.npz"], "frame.npz: the model needs two frames at 10 fps, and the motion has 1"),
-        (["describe", "{bad}/long.npz"], "long.npz: the motion lasts 31.0 s"),
-        (["describe", "{bad}/nan.csv"], "nan.csv"),
-        (["describe", "{bad}/good.npz", "--beams", "0"], "beams must be between 1 and 100"),
-        (["describe", "{bad}/good.npz", "--draws", "-1"], "draws must be between 0 and 1000"),
-        (["describe", "{bad}/good.npz", "--bundle", "nothing"], "unknown bundle 'nothing'"),
-        (["describe", "{bad}/good.npz", "--bundle", "cmu-generate"], "is for 'generate', and one for 'describe'"),
-        (["describe"], "Missing argument"),
-        (["generate", "", "-o", "{out}/a.bvh"], "has no words"),
-        (["generate", "walks", "zebra", "-o", "{out}/a.bvh"], "knows no word of 'zebra'"),
-        (["generate", "walks " * 41, "-o", "{out}/a.bvh"], "41 words, and at most 40"),
-        (["generate", "walks", "-o", "{out}/a.xyz"], "known are .amc"),
-        (["generate", "walks", "-o", "{out}/no/a.bvh"], "does not exist"),
-        (["generate", "walks", "-o", "{out}/a.bvh", "--seed", "-1"], "seed of 0 or more"),
-        (["generate", "walks", "-o", "{out}/a.bvh", "--temperature", "0"], "temperature must be between"),
-        (["generate", "walks", "-o", "{out}/a.bvh", "--candidates", "0"], "candidates must be between"),
-        (["generate", "walks", "-o", "{out}/a.bvh", "--hypotheses", "0"], "hypotheses must be between"),
-        (["generate", "walks", "-o", "{out}/a.bvh", "--max-seconds", "-3"], "max_seconds must be between"),
-        (["generate", "walks", "-o", "{out}/a.bvh", "--fps", "0"], "positive number"),
-        (["generate", "walks", "-o", "{out}/a.bvh", "--bundle", "cmu-control"], "is for 'control'"),
-        (["embed", "-o", "{out}/a.npy"], "either motion files or --text"),
-        (["embed", "{bad}/good.npz", "--text", "walks", "-o", "{out}/a.npy"], "either motion files or --text"),
-        (["embed", "{bad}/good.npz", "-o", "{out}/a.txt"], "written as .npy"),
-        (["embed", "{bad}/lacking.npz", "-o", "{out}/a.npy"], "lacking.npz: the motion lacks 2"),
-        (["embed", "--text", "zebra", "-o", "{out}/a.npy"], "knows no word"),
-        (["embed", "--text", "walks", "-o", "{out}/no/a.npy"], "does not exist"),
+        (1, ["describe", "{bad}/none.npz"], "none.npz: no such file"),
+        (
+            1,
+            ["describe", "{bad}/lacking.npz"],
+            "lacking.npz: the motion lacks 2 of 3 channels: hips.ty",
+        ),
+        (1, ["describe", "{bad}/frame.npz"], "frame.npz: the model needs two frames at 10 fps, and the motion has 1"),
+        (1, ["embed", "{bad}/long.npz", "-o", "{out}/a.npy"], "long.npz: the motion lasts 31.0 s"),
+        (1, ["describe", "{bad}/nan.csv"], "nan.csv"),
+        (2, ["describe", "{bad}/good.npz", "--beams", "0"], "range 1<=x<=100"),
+        (2, ["describe", "{bad}/good.npz", "--draws", "-1"], "range 0<=x<=1000"),
+        (2, ["describe", "{bad}/good.npz", "--bundle", "nothing"], "unknown bundle 'nothing'"),
+        (2, ["describe", "{bad}/good.npz", "--bundle", "cmu-generate"], "is for 'generate', and one for 'describe'"),
+        (2, ["describe"], "Missing argument"),
+        (2, ["generate", "", "-o", "{out}/a.bvh"], "has no words"),
+        (2, ["generate", "walks", "zebra", "-o", "{out}/a.bvh"], "knows no word of 'zebra'"),
+        (2, ["generate", "walks " * 41, "-o", "{out}/a.bvh"], "41 words, and at most 40"),
+        (2, ["generate", "walks", "-o", "{out}/a.xyz"], "expected one of .amc"),
+        (2, ["generate", "walks", "-o", "{out}/no/a.bvh"], "does not exist"),
+        (2, ["generate", "walks", "-o", "{out}/a.bvh", "--seed", "-1"], "x>=0"),
+        (2, ["generate", "walks", "-o", "{out}/a.bvh", "--temperature", "0"], "range 0.01<=x<=100"),
+        (2, ["generate", "walks", "-o", "{out}/a.bvh", "--candidates", "0"], "range 1<=x<=100"),
+        (2, ["generate", "walks", "-o", "{out}/a.bvh", "--hypotheses", "0"], "range 1<=x<=100"),
+        (2, ["generate", "walks", "-o", "{out}/a.bvh", "--max-seconds", "-3"], "range 0<=x<=600"),
+        (2, ["generate", "walks", "-o", "{out}/a.bvh", "--fps", "0"], "range 0<x<=10000"),
+        (2, ["generate", "walks", "-o", "{out}/a.bvh", "--bundle", "cmu-control"], "is for 'control'"),
+        (2, ["embed", "-o", "{out}/a.npy"], "either motion files or --text"),
+        (2, ["embed", "{bad}/good.npz", "--text", "walks", "-o", "{out}/a.npy"], "either motion files or --text"),
+        (2, ["embed", "{bad}/good.npz", "-o", "{out}/a.txt"], "written as .npy"),
+        (1, ["embed", "{bad}/lacking.npz", "-o", "{out}/a.npy"], "lacking.npz: the motion lacks 2"),
+        (2, ["embed", "--text", "zebra", "-o", "{out}/a.npy"], "knows no word"),
+        (2, ["embed", "--text", "walks", "-o", "{out}/no/a.npy"], "does not exist"),
     ],
 )
-def test_bad_input_gets_one_message_and_writes_nothing(arguments: list[str], said: str, tmp_path: Path) -> None:
+def test_bad_input_gets_one_message_and_writes_nothing(
+    code: int, arguments: list[str], said: str, tmp_path: Path
+) -> None:
     out, bad = tmp_path / "out", tmp_path / "bad"
     out.mkdir()
     bad.mkdir()
@@ -152,7 +198,7 @@ def test_bad_input_gets_one_message_and_writes_nothing(arguments: list[str], sai
     text = (bad / "nan.csv").read_text().splitlines()
     (bad / "nan.csv").write_text("\n".join([*text[:-1], ",".join(["nan"] * len(text[-1].split(",")))]))
     result = run(*(argument.format(out=out, bad=bad) for argument in arguments))
-    check_refused(result, said, out)
+    check_refused(result, said, out, code)
 
 
 def test_load_as_gives_models_of_one_verb() -> None:
@@ -163,7 +209,7 @@ def test_load_as_gives_models_of_one_verb() -> None:
 def test_a_file_without_a_unit_of_length_is_refused_until_it_is_told(tmp_path: Path) -> None:
     write_motion(tmp_path / "a.bvh", without_unit())
     result = run("describe", tmp_path / "a.bvh")
-    assert (result.exit_code, "--unit-in" in result.stderr) == (2, True)
+    assert (result.exit_code, "--unit-in" in result.stderr) == (1, True)
     assert run("describe", tmp_path / "a.bvh", "--unit-in", "m").exit_code == 0
 
 

@@ -157,14 +157,16 @@ def test_a_model_from_a_bundle_pickles(model: ControlModel) -> None:
 @pytest.mark.parametrize(
     ("options", "reason"),
     [
-        ({"characters": 0}, "at least one character"),
-        ({"characters": 2, "seed": [1]}, "as many seeds"),
+        ({"characters": 0}, "1 to 100000 characters, not 0"),
+        ({"characters": 10**12}, "1 to 100000 characters"),
+        ({"characters": 2, "seed": [1]}, "one for each of 2"),
+        ({"seed": 1.5}, "not 1.5"),
         ({"seed": -1}, "seed of 0 or more"),
         ({"variety": 1.5}, "between 0 and 1"),
         ({"variety": float("nan")}, "between 0 and 1"),
         ({"temperature": 0}, "between 0.01 and 100"),
         ({"iterations": 2}, "without free hidden units"),
-        ({"start": "swim"}, "known are walk, run, bend"),
+        ({"start": "swim"}, "expected one of walk, run, bend"),
     ],
 )
 def test_a_start_out_of_range_is_refused(model: ControlModel, options: dict[str, object], reason: str) -> None:
@@ -177,7 +179,7 @@ def test_a_control_out_of_range_changes_nothing(model: ControlModel) -> None:
     session.control(run=0.5)
     before = session.snapshot().control
     for values, reason in (
-        ({"fly": 1.0}, "unknown control fly; known are walk, run, bend"),
+        ({"fly": 1.0}, "unknown control fly; expected one of walk, run, bend"),
         ({"walk": 1.1}, "between 0 and 1"),
         ({"walk": [0.1, float("nan")]}, "between 0 and 1"),
         ({"walk": [0.1, 0.2, 0.3]}, "2 characters"),
@@ -190,6 +192,21 @@ def test_a_control_out_of_range_changes_nothing(model: ControlModel) -> None:
         session.set_control(np.zeros((3, 3)))
     with pytest.raises(ControlError, match="one value for each"):
         session.set_control([1.0])
+
+
+def test_a_control_is_copied(model: ControlModel) -> None:
+    session, control = model.start(), np.array([[1.0, 0.0, 0.0]], dtype=np.float32)
+    session.set_control(control)
+    control[:] = 5.0
+    np.testing.assert_array_equal(session.snapshot().control, [[1, 0, 0]])
+
+
+def test_one_figure_runs_a_script_in_one_call(model: ControlModel) -> None:
+    motion = model.run("run .2s, walk .1s", seed=np.int64(3), variety=0.5)
+    session = model.start("run", seed=3, variety=0.5)
+    np.testing.assert_array_equal(motion.values, session.run("run .2s, walk .1s")[0].values)
+    assert repr(session) == "ControlSession(1 characters, tick 12, ControlModel('cmu-control', 59 channels, 40 fps))"
+    assert repr(session.snapshot()) == "Snapshot(1 characters, tick 12)"
 
 
 def test_a_motion_that_does_not_fit_is_refused(model: ControlModel, clips: Path) -> None:

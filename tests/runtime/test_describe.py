@@ -1,11 +1,14 @@
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from fake_models import CHANNELS, CONTRACT, FakeGraph, describe_model, moving
+from fake_models import CHANNELS, CONTRACT, VOCABULARY, FakeGraph, describe_model, moving
 
 from motet.bench import WORDS, describe_figures, figures
 from motet.errors import BundleError, DecodingError, MotionError, TextError, TextWarning
+from motet.formats import write_motion
 from motet.models.describe import DescribeModel, Description
 from motet.models.language import batches, padded
 
@@ -17,10 +20,11 @@ def model() -> DescribeModel:
 
 def test_hypotheses_are_ranked_and_scored(model: DescribeModel) -> None:
     motion = moving(20)
-    (row,) = model.describe(motion)
+    row = model.describe(motion)
     assert [type(d) for d in row] == [Description] * 5
     scores = [d.log_probability for d in row]
     assert scores == sorted(scores, reverse=True)
+    assert scores == [d.score for d in row]
     for description in row:
         if description.text:
             assert model.score(motion, description.text) == pytest.approx(description.log_probability, abs=1e-4)
@@ -30,7 +34,7 @@ def test_a_motion_gets_what_it_gets_alone(model: DescribeModel) -> None:
     motions = [moving(length, seed=length) for length in (5, 30, 2, 17, 30)]
     together = model.describe(motions, beams=3)
     for motion, row in zip(motions, together, strict=True):
-        (alone,) = model.describe(motion, beams=3)
+        alone = model.describe(motion, beams=3)
         assert [d.text for d in alone] == [d.text for d in row]
         np.testing.assert_allclose([d.log_probability for d in alone], [d.log_probability for d in row], rtol=1e-5)
     assert model.describe([]) == []
@@ -41,7 +45,7 @@ def test_more_motions_than_fit_one_batch_come_back_in_order(
 ) -> None:
     motions = [moving(3 + i % 7, seed=i) for i in range(11)]
     whole, vectors = model.describe(motions), model.embed(motions)
-    monkeypatch.setattr("motet.models.describe.BATCH", 4)
+    monkeypatch.setattr(model, "loop", replace(model.loop, batch=4))
     assert [[d.text for d in row] for row in model.describe(motions)] == [[d.text for d in row] for row in whole]
     np.testing.assert_allclose(model.embed(motions), vectors, atol=1e-5)
 
@@ -52,6 +56,8 @@ def test_context_vectors(model: DescribeModel) -> None:
     found = model.embed(motions)
     assert (found.dtype, found.shape) == (np.float32, (2, 3))
     np.testing.assert_allclose(found, wanted, atol=1e-5)
+    assert model.embed(motions[0]).shape == (3,)
+    np.testing.assert_array_equal(model.embed(motions[0]), found[0])
 
 
 def test_channels_in_another_order_and_unit_and_rate_are_the_same_motion(model: DescribeModel) -> None:
@@ -63,7 +69,7 @@ def test_channels_in_another_order_and_unit_and_rate_are_the_same_motion(model: 
     np.testing.assert_array_equal(model.frames(ordered), frames)
     fast = ordered.resample(40)
     np.testing.assert_allclose(model.frames(fast), frames, atol=1e-9)
-    assert model.describe(fast)[0][0].text == model.describe(motion)[0][0].text
+    assert model.describe(fast)[0].text == model.describe(motion)[0].text
 
 
 def test_a_motion_that_does_not_fit(model: DescribeModel) -> None:
@@ -82,6 +88,30 @@ def test_a_motion_that_does_not_fit(model: DescribeModel) -> None:
     assert model.describe(moving(300))
 
 
+def test_a_long_motion_goes_in_windows(model: DescribeModel) -> None:
+    long = moving(901)  # 90.1 s
+    windows = model.windows(long)
+    assert [start for start, _ in windows] == [0.0, 22.5, 45.0, 67.6]
+    np.testing.assert_array_equal(np.concatenate([part.values for _, part in windows]), long.values)
+    assert max(part.duration for _, part in windows) <= 30
+    assert len(model.describe([part for _, part in windows])) == 4
+    ((start, whole),) = model.windows(moving(300))
+    assert (start, len(whole)) == (0.0, 300)
+    assert len(model.windows(moving(0))) == 1
+
+
+def test_what_the_model_sees_is_prepared_once(model: DescribeModel) -> None:
+    motion = moving(47, fps=25.0)
+    np.testing.assert_array_equal(model.frames(model.prepared(motion)), model.frames(motion))
+
+
+def test_progress_is_told(model: DescribeModel, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(model, "loop", replace(model.loop, batch=2))
+    told: list[tuple[int, int]] = []
+    model.describe([moving(9)] * 5, progress=lambda done, total: told.append((done, total)))
+    assert told == [(2, 5), (4, 5), (5, 5)]
+
+
 def test_frames_that_are_not_finite_never_become_a_motion() -> None:
     values = np.array(moving(20).values)
     values[3, 1] = np.nan
@@ -93,7 +123,7 @@ def drawing(temperature: float) -> DescribeModel:
     """The model with 30 draws as its default; it is sharp, so that only hot draws differ."""
     model = describe_model()
     defaults = {**model.defaults, "draws": 30, "temperature": temperature}
-    return DescribeModel({**model.manifest, "defaults": defaults}, model.graphs)
+    return DescribeModel(replace(model.manifest, loop="consensus", defaults=defaults), model.graphs)
 
 
 def test_a_motion_is_described_by_draws_as_it_is_alone_and_every_time() -> None:
@@ -102,7 +132,8 @@ def test_a_motion_is_described_by_draws_as_it_is_alone_and_every_time() -> None:
     together = model.describe(motions, beams=4)
     for motion, row in zip(motions, together, strict=True):
         assert len({found.text for found in row}) == len(row) == 4
-        (alone,) = model.describe(motion, beams=4)
+        assert 1 >= row[0].score >= row[1].score >= row[3].score >= 0
+        alone = model.describe(motion, beams=4)
         assert [found.text for found in alone] == [found.text for found in row]
         for found in row:
             if found.text:
@@ -120,7 +151,7 @@ def test_the_bundle_says_how_hypotheses_are_ranked(model: DescribeModel) -> None
 
 @pytest.mark.parametrize("draws", [-1, 1001])
 def test_draws_out_of_range(model: DescribeModel, draws: int) -> None:
-    with pytest.raises(DecodingError, match=f"draws must be between 0 and 1000, not {draws}"):
+    with pytest.raises(DecodingError, match=f"draws must be between 1 and 1000, not {draws}"):
         model.describe(moving(20), draws=draws)
 
 
@@ -148,13 +179,34 @@ def test_the_model_holds_no_state(model: DescribeModel) -> None:
     assert vars(model) == before
 
 
-@pytest.mark.parametrize("key", ["vocabulary", "defaults"])
-def test_a_manifest_that_lacks_something(model: DescribeModel, key: str) -> None:
-    manifest = {name: value for name, value in model.manifest.items() if name != key}
-    with pytest.raises(BundleError, match=key):
-        DescribeModel(manifest, model.graphs)
-    with pytest.raises(BundleError, match="starts with PAD"):
-        DescribeModel({**model.manifest, "vocabulary": ["a"]}, model.graphs)
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"vocabulary": ("a",)}, "manifest, vocabulary: a vocabulary starts with PAD"),
+        ({"vocabulary": (*VOCABULARY.words, "more")}, r"graphs.step: 'log_probabilities' is float32 \['batch', 10\]"),
+        ({"text": None}, "manifest, text: is missing"),
+        ({"text": {"rules": 2}}, "manifest, text.rules: must be a whole number between 1 and 1, not 2"),
+        ({"defaults": {"beams": 5}}, "manifest, defaults.max_words: is missing"),
+        (
+            {"defaults": {"beams": 5, "max_words": "x"}},
+            "defaults.max_words: max_words must be between 1 and 1000, not x",
+        ),
+        ({"defaults": {"beams": 2.5, "max_words": 5}}, "beams must be a whole number, not 2.5"),
+        ({"loop": "mixture"}, "manifest, loop: 'mixture' does not describe; expected one of beam, consensus"),
+        ({"verb": "generate"}, "manifest, verb: 'generate', expected 'describe'"),
+    ],
+)
+def test_a_manifest_that_does_not_fit(model: DescribeModel, change: dict[str, Any], reason: str) -> None:
+    with pytest.raises(BundleError, match=reason):
+        DescribeModel(replace(model.manifest, **change), model.graphs)
+
+
+def test_without_a_score_graph_only_scoring_is_refused(model: DescribeModel) -> None:
+    graphs = {role: graph for role, graph in model.graphs.items() if role != "score"}
+    other = DescribeModel(model.manifest, graphs)
+    assert other.describe(moving(20)) == model.describe(moving(20))
+    with pytest.raises(BundleError, match="no graph 'score'"):
+        other.score(moving(20), "walks")
 
 
 def test_one_step_call_serves_the_batch(model: DescribeModel) -> None:
@@ -172,10 +224,11 @@ def test_batches_and_padding() -> None:
     assert (values[1, 1] == 0).all()
 
 
-def test_the_benchmark_measures_sentences_of_one_length() -> None:
+def test_the_benchmark_measures_sentences_of_one_length(tmp_path: Path) -> None:
     model = describe_model()
-    found = figures(model, 0.001)
-    parts = ("descriptions", "one", "consensus", "encoder", "step")
+    write_motion(tmp_path / "a.npz", moving(20))
+    found = figures(model, 0.001, tmp_path / "a.npz")
+    parts = ("descriptions", "one", "consensus", "encoder", "step", "file")
     assert set(found) == {f"describe.{part}" for part in parts}
     assert all(value > 0 for value, _ in found.values())
     step = model.graphs["step"]

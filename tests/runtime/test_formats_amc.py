@@ -153,6 +153,29 @@ def test_faults_are_named_with_file_and_line(pair, old, new, line, words):
     assert (error.value.path, error.value.line) == (path, line)
 
 
+@pytest.mark.parametrize(
+    ("said", "options", "fps"),
+    [
+        ("", {}, 120),
+        ("", {"fps": 60}, 60),
+        ("# fps 50\n", {}, 50),
+        ("# fps 50\n", {"fps": 50}, 50),
+        ("# fps 50\n", {"fps": 60}, "not 60 as given"),
+        ("# fps 0\n", {}, "line 1: a motion cannot have 0 frames"),
+        ("", {"fps": 0}, "cannot have 0 frames"),
+        ("", {"fps": -1.0}, "cannot have -1 frames"),
+        ("", {"fps": 1e9}, r"cannot have 1e\+09 frames"),
+    ],
+)
+def test_the_frame_rate_is_the_comments_or_the_callers(pair, said, options, fps):
+    path = pair(said + AMC)
+    if isinstance(fps, str):
+        with pytest.raises(FormatError, match=fps):
+            read_motion(path, **options)
+    else:
+        assert read_motion(path, **options).fps == fps
+
+
 @pytest.mark.parametrize("broken", ["2\n", "2\nleg 7", "2\nleg 7 8\nroot 1 2 3 4", "2\nleg 7 -"])
 def test_a_file_that_breaks_off_gives_its_whole_frames_when_asked_to(pair, broken):
     path = pair(AMC[: AMC.index("2\nleg")] + broken)
@@ -164,13 +187,19 @@ def test_a_file_that_breaks_off_gives_its_whole_frames_when_asked_to(pair, broke
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("hip leg", "hip arm", "'arm', which :bonedata lacks"),
+        ("hip leg", "hip arm", "'arm', which :bonedata does not have"),
         ("root hip", "root hip leg", "hangs on two bones"),
         ("10 20 30 ZXY", "10 20 30", "three angles and their order"),
         ("direction 0 -1 0", "direction 0 -1", "three numbers"),
         ("dof rz rx", "dof rz tx", "at most once"),
         ("name leg", "name hip", "name of its own"),
-        ("angle deg", "angle gon", "known are deg and rad"),
+        ("    direction 1 0 0\n", "", "has no direction"),
+        ("    length 4\n    axis 10 20 30 ZXY\n", "", "has no length or axis"),
+        ("direction 1 0 0\n    length 2", "direction 1e308 0 0\n    length 1e9", "'inf' is not a finite number"),
+        ("    root hip\n", "", "does not lead to bone 'hip'"),
+        ("    hip leg\n", "", "does not lead to bone 'leg'"),
+        ("    root hip\n    hip leg\n", "    hip leg\n    leg hip\n", "does not lead to bone"),
+        ("angle deg", "angle gon", "expected deg or rad"),
         (":hierarchy", ":tree", "needs the sections"),
     ],
 )

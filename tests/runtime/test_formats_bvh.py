@@ -1,3 +1,5 @@
+import time
+
 import numpy as np
 import pytest
 from figures import walker
@@ -32,6 +34,8 @@ Frame Time: 0.033333
 1 2 3 10 20 30 40 50 60
 4 5 6 11 21 31 41 51 61
 """
+
+END = "}\nMOTION\nFrames: 1\nFrame Time: 0.1\n"
 
 CHEST = "CHANNELS 3 Zrotation Xrotation Yrotation\n    End"
 
@@ -139,6 +143,8 @@ def test_no_channels_at_all(read):
     motion = read(text[: text.index("1 2 3")])
     assert motion.values.shape == (2, 0)
     assert len(positions(motion)) == 2
+    with pytest.raises(FormatError, match="and has no channels"):
+        read(text[: text.index("1 2 3")].replace("Frames: 2", "Frames: 1" + "0" * 14))
 
 
 def test_no_frames(read):
@@ -168,6 +174,11 @@ def test_equal_names_are_told_apart(read):
         ("0.033366700033366704", 29.97),
         ("0.01666667", 60),
         ("2", 0.5),
+        ("0.03", 1 / 0.03),
+        ("0.017", 1 / 0.017),
+        ("0.033", 30),
+        ("0.0167", 60),
+        ("0.1", 10),
     ],
 )
 def test_a_frame_time_is_a_whole_rate_as_far_as_it_tells(read, time, fps):
@@ -191,10 +202,16 @@ def test_another_number_of_frames_than_declared(read, declared):
         ("OFFSET 0 5 0", "OFFSET 0 5", 8, "three numbers, not 2"),
         ("CHANNELS 3 Z", "CHANNELS 4 Z", 9, "as many different channels"),
         ("Xrotation Yrotation\n    End", "Xrotation Zrotation\n    End", 9, "as many different channels"),
-        ("Xposition", "Xscale", 5, "'Xscale': known are"),
+        ("Xposition", "Xscale", 5, "'Xscale': expected one of"),
         ("0.033333", "0", 18, "cannot take 0 seconds"),
         ("0.033333", "fast", 18, "'fast' is not a finite number"),
         ("Frames: 2", "Frames: two", 17, "'Frames: N'"),
+        ("0.033333", "1e-320", 18, "cannot have inf frames"),
+        ("0.033333", "1e9", 18, "cannot have 1e-09 frames"),
+        ("Frames: 2", "Frames: ²", 17, "'Frames: N'"),
+        ("Frames: 2", "Frames: " + "9" * 5000, 17, "'Frames: 9999"),
+        ("    OFFSET 0 5 0\n", "", 6, "joint 'Chest' has no OFFSET"),
+        ("      OFFSET 0 3 0\n", "", 10, "joint 'Chest_end' has no OFFSET"),
         ("MOTION", "ROOT Other\n{\n}\nMOTION", 16, "one tree of joints"),
         ("  OFFSET 0 5 0\n", "  SIZE 0 5 0\n", 8, "'SIZE 0 5 0' does not belong here"),
         ("\n}\nMOTION", "\nMOTION", 15, "'MOTION' does not belong here"),
@@ -224,6 +241,18 @@ def test_a_file_that_breaks_off_gives_its_whole_frames_when_asked_to(read):
 def test_partial_does_not_excuse_a_broken_frame_before_the_last(read):
     with pytest.raises(FormatError, match="breaks off"):
         read(f"{PLAIN.rsplit(' ', 1)[0]}\n{PLAIN.rstrip().rsplit(chr(10), 1)[1]}\n", partial=True)
+
+
+def test_many_joints_of_one_name_and_long_chains(read, tmp_path):
+    started, node = time.monotonic(), "JOINT a\n{\nOFFSET 0 1 0\nCHANNELS 0\n"
+    wide = read("HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 0\n" + (node + "}\n") * 5000 + END)
+    assert wide.skeleton.names[:3] == ("a", "a_2", "a_3")
+    joints = [Joint("a", -1, (0, 0, 0)), *(Joint(f"a{i}", i, (0, 1, 0)) for i in range(2000))]
+    chain = Motion(np.ones((1, 1)), ("a7.rx",), ("deg",), 30, Skeleton(tuple(joints)))
+    write_motion(tmp_path / "chain.bvh", chain)
+    assert (tmp_path / "chain.bvh").stat().st_size < 2_000_000
+    assert same_positions(chain, read_motion(tmp_path / "chain.bvh"), chain.skeleton.names) < 1e-9
+    assert time.monotonic() - started < 10
 
 
 def same_positions(one, other, names=None):

@@ -111,6 +111,16 @@ def test_ground():
     assert figure_of(still).points[:, :14, 1].min() == pytest.approx(0)
 
 
+def test_a_joint_that_stays_above_the_hips_is_not_drawn():
+    motion = walker()
+    below = [replace(joint, parent=joint.parent + 1) for joint in motion.skeleton.joints]
+    joints = (Joint("joint_Root", -1, (0, 0, 0)), *below)
+    deeper = replace(motion, skeleton=Skeleton(joints, motion.skeleton.metres_per_unit))
+    one, other = figure_of(motion), figure_of(deeper)
+    np.testing.assert_allclose(other.points, one.points, atol=1e-12)
+    assert (other.bones, other.heading) == (one.bones, one.heading)
+
+
 def test_heading_is_where_the_figure_faces():
     motion = walker(frames=1)
     values = np.zeros((1, len(motion.channels)))

@@ -33,6 +33,12 @@ def savez(**arrays):
     return content.getvalue()
 
 
+def with_byte(content, place, value):
+    """A zip with another byte in the directory's entry of its first file."""
+    place += content.index(b"PK\1\2")
+    return content[:place] + bytes([value]) + content[place + 1 :]
+
+
 WHOLE = {
     "values": np.zeros((2, 1)),
     "channels": np.array(["a"]),
@@ -55,6 +61,14 @@ BAD_NPZ = {
     "no frame rate": savez(**{**WHOLE, "fps": np.zeros(3)}),
     "a broken skeleton": savez(**{**WHOLE, "skeleton": "{"}),
     "no skeleton": savez(**{**WHOLE, "skeleton": "{}"}),
+    "complex numbers": savez(**{**WHOLE, "values": np.zeros((2, 1), complex)}),
+    "text for values": savez(**{**WHOLE, "values": np.array([["1"], ["2"]])}),
+    "a deep skeleton": savez(**{**WHOLE, "skeleton": "[" * 100_000}),
+    "an unknown method": with_byte(savez(**WHOLE), 10, 99),
+    "an encrypted array": with_byte(savez(**WHOLE), 8, 1),
+    "a shape of 10^14 rows": savez(**WHOLE).replace(
+        b"'shape': (2, 1), }" + b" " * 13, b"'shape': (200000000000000, 1), }"
+    ),
     "a flat list": savez(**{**WHOLE, "values": np.zeros(2)}),
 }
 
@@ -100,9 +114,12 @@ def test_csv_from_elsewhere_has_its_rate_in_its_times(tmp_path):
         ("# motet motion, fps 30\ntime,a.rx [deg]\n0,one\n", 3, "'one' is not a finite number"),
         ("# motet motion, fps 30\ntime,a.rx [deg]\n0,inf\n", 3, "'inf' is not a finite number"),
         ("# motet motion, fps fast\ntime,a.rx [deg]\n0,1\n", 1, "'fast' is not a finite number"),
-        ("# motet motion, fps -1\ntime,a.rx [deg]\n0,1\n", None, "frame rate must be a positive"),
+        ("# motet motion, fps -1\ntime,a.rx [deg]\n0,1\n", 1, "cannot have -1 frames"),
         ("# motet motion, fps 30\ntime,a.rx [gon]\n0,1\n", None, "one unit for each channel"),
         ("# motet motion, fps 30\ntime,a.rx [deg],a.rx [deg]\n0,1,2\n", None, "must differ"),
+        ("# motet motion, fps 0\ntime,a.rx [deg]\n0,1\n", 1, "cannot have 0 frames"),
+        (f"time,a.rx [deg]\n0,{'1' * 200_000}\n", 2, "not a table: field larger"),
+        ("time,a.rx [deg]\n-1e308,1\n1e308,1\n", None, "cannot have 0 frames"),
         ("time,a.rx [deg]\n0,1\n", None, "evenly spaced"),
         ("time,a.rx [deg]\n0,1\n1,1\n5,1\n", None, "evenly spaced"),
         ("time,a.rx [deg]\n1,1\n0,1\n", None, "evenly spaced"),
@@ -112,7 +129,7 @@ def test_csv_names_what_is_wrong(tmp_path, text, line, words):
     path = tmp_path / "c.csv"
     path.write_text(text)
     with pytest.raises(FormatError, match=words) as error:
-        csv.read(path)
+        read_motion(path)
     assert (error.value.path, error.value.line) == (path, line)
 
 

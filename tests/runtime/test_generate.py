@@ -10,7 +10,7 @@ from figures import walker
 from motet.bench import figures
 from motet.decode.mixture import Sample
 from motet.errors import DecodingError, MotionError, TextError, TextWarning
-from motet.formats import read_motion, write_motion
+from motet.formats import read_motion
 from motet.models.generate import Generated, GenerateModel
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
@@ -57,7 +57,7 @@ def test_the_log_likelihood_is_the_score_of_the_motion(model: GenerateModel) -> 
 def test_a_sentence_gets_what_it_gets_alone_with_its_seed(model: GenerateModel) -> None:
     together = model.generate(TEXTS, seed=5)
     for i, text in enumerate(TEXTS):
-        assert_same(model.generate(text, seed=5 + i)[0], together[i])
+        assert_same(model.generate(text, seed=np.int64(5 + i)), together[i])
         assert_same(model.generate([text], seed=[5 + i])[0], together[i])
     assert len({row[0].log_likelihood for row in model.generate(["walks"] * 4)}) == 4
     assert model.generate([]) == []
@@ -68,28 +68,28 @@ def test_more_sentences_than_fit_one_batch_come_back_in_order(
 ) -> None:
     texts = [TEXTS[i % 3] for i in range(7)]
     whole, vectors = model.generate(texts, seed=range(7)), model.embed(texts)
-    monkeypatch.setattr("motet.models.generate.BATCH", 2)
+    monkeypatch.setattr(model, "loop", replace(model.loop, batch=2))
     for one, other in zip(model.generate(texts, seed=range(7)), whole, strict=True):
         assert_same(one, other)
     np.testing.assert_allclose(model.embed(texts), vectors, atol=1e-6)
+    np.testing.assert_allclose(model.embed(texts[0]), vectors[0], atol=1e-6)
 
 
 def test_settings_are_the_bundles_unless_given(model: GenerateModel) -> None:
     assert_same(
-        model.generate("walks")[0],
-        model.generate("walks", 3, candidates=4, temperature=1.0, max_seconds=3)[0],
+        model.generate("walks"),
+        model.generate("walks", 3, candidates=4, temperature=1.0, max_seconds=3),
     )
-    assert max(len(g.frames) for g in model.generate("walks", 20, max_seconds=0.5)[0]) == 5
+    assert max(len(g.frames) for g in model.generate("walks", 20, max_seconds=0.5)) == 5
     cold, hot = (
-        np.std([g.frames[0, 0] for g in model.generate("walks", 50, candidates=1, temperature=t)[0]])
-        for t in (0.05, 1.0)
+        np.std([g.frames[0, 0] for g in model.generate("walks", 50, candidates=1, temperature=t)]) for t in (0.05, 1.0)
     )
     assert cold < 0.7 * hot
 
 
 def test_unknown_words_are_named(model: GenerateModel) -> None:
     with pytest.warns(TextWarning, match="does not know zebra, backwards"):
-        ((generated, *_),) = model.generate("a zebra walks backwards")
+        generated, *_ = model.generate("a zebra walks backwards")
     assert generated.unknown == ("zebra", "backwards")
     assert model.unknown("a person") == []
     with pytest.warns(TextWarning, match="zebra"):
@@ -111,9 +111,10 @@ def test_a_sentence_that_cannot_be_moved(model: GenerateModel, text: str, reason
         ({"candidates": 0}, "candidates must be between 1 and 100"),
         ({"temperature": 0.0}, r"temperature must be between 0.01 and 100, not 0.0"),
         ({"temperature": float("nan")}, "not nan"),
-        ({"max_seconds": 0}, "max_seconds must be between 0.1 and 600"),
+        ({"max_seconds": 0}, "max_seconds must be between 0.01 and 600"),
         ({"seed": -1}, "seed of 0 or more"),
-        ({"seed": [1, 2]}, "1 sentences need"),
+        ({"seed": 1.5}, "not 1.5"),
+        ({"seed": [1, 2]}, "one for each of 1"),
     ],
 )
 def test_settings_out_of_range(model: GenerateModel, settings: dict[str, float], reason: str) -> None:
@@ -151,8 +152,8 @@ def test_a_motion_has_planted_feet_and_is_there_as_drawn(monkeypatch: pytest.Mon
     model = generate_model()
     model.contract = contract_of(plain)
     drawn = Sample((plain.values - model.contract.mean).astype(np.float32), -1.0)
-    monkeypatch.setattr("motet.models.generate.mixture_search", lambda *given: [[drawn]])
-    ((found,),) = model.generate("walks")
+    monkeypatch.setattr(model, "loop", replace(model.loop, run=lambda *given, **settings: [[drawn]]))
+    (found,) = model.generate("walks")
     np.testing.assert_allclose(found.frames, plain.values, atol=1e-4)
     planted = plant_feet(model.contract.features(found.frames))
     np.testing.assert_array_equal(found.features.values, planted.values)
@@ -160,7 +161,7 @@ def test_a_motion_has_planted_feet_and_is_there_as_drawn(monkeypatch: pytest.Mon
     np.testing.assert_array_equal(found.motion.values, from_root_block(planted).resample(30).values)
     assert np.abs(positions(found.motion) - positions(found.playable(plant=False))).max() > 0.05
     model.contract = replace(model.contract, skeleton=None)
-    ((found,),) = model.generate("walks")
+    (found,) = model.generate("walks")
     np.testing.assert_array_equal(found.features.values, found.frames)
 
 
@@ -169,12 +170,15 @@ def test_a_result_is_written_as_it_is(monkeypatch: pytest.MonkeyPatch, tmp_path:
     model = generate_model()
     model.contract = contract_of(plain)
     drawn = Sample((plain.values - model.contract.mean).astype(np.float32), -1.0)
-    monkeypatch.setattr("motet.models.generate.mixture_search", lambda *given: [[drawn]])
-    ((found,),) = model.generate("walks")
-    write_motion(tmp_path / "x.bvh", found.motion)
+    monkeypatch.setattr(model, "loop", replace(model.loop, run=lambda *given, **settings: [[drawn]]))
+    (found,) = model.generate("walks")
+    found.write(tmp_path / "x.bvh")
     again = read_motion(tmp_path / "x.bvh")
     assert (again.fps, len(again)) == (30.0, 88)
     np.testing.assert_allclose(positions(again), positions(found.motion), atol=1e-6)
+    found.write(tmp_path / "y.npz", fps=15, plant=False)
+    np.testing.assert_array_equal(read_motion(tmp_path / "y.npz").values, found.playable(15, plant=False).values)
+    assert repr(found) == "Generated(30 frames, 3.0 s, log-likelihood -1.0)"
 
 
 def test_the_benchmark_measures_motions_of_one_length(model: GenerateModel) -> None:

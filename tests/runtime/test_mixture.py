@@ -1,3 +1,5 @@
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 from fake_models import STATE, FakeGraph, frame_step, log_likelihood
@@ -45,10 +47,23 @@ def naive(
     return [Sample(frames, score) for frames, score, _, _ in beam]
 
 
+def search(
+    step: FakeGraph,
+    context: NDArray[np.float32],
+    seeds: Sequence[int],
+    width: int,
+    candidates: int,
+    heat: float,
+    longest: int,
+) -> list[list[Sample]]:
+    noise = [np.random.Generator(np.random.PCG64(seed)) for seed in seeds]
+    return mixture_search(step, context, noise, longest, width, candidates, heat)
+
+
 @pytest.mark.parametrize(("width", "candidates", "heat"), [(1, 1, 1.0), (4, 1, 1.0), (3, 4, 1.0), (5, 2, 0.3)])
 def test_as_the_naive_search_of_each_row(width: int, candidates: int, heat: float) -> None:
     step, context, seeds = frame_step(2, SIZE, CONTEXT), contexts(6), [3, 1, 4, 1, 5, 9]
-    together = mixture_search(step, context, seeds, width, candidates, heat, 12)
+    together = search(step, context, seeds, width, candidates, heat, 12)
     for row, seed, found in zip(context, seeds, together, strict=True):
         wanted = naive(step, row, seed, width, candidates, heat, 12)
         assert [len(s.frames) for s in found] == [len(s.frames) for s in wanted]
@@ -59,20 +74,20 @@ def test_as_the_naive_search_of_each_row(width: int, candidates: int, heat: floa
 
 def test_a_row_does_not_depend_on_its_batch() -> None:
     step, context, seeds = frame_step(2, SIZE, CONTEXT), contexts(5), [8, 7, 6, 5, 4]
-    together = mixture_search(step, context, seeds, 3, 2, 1.0, 10)
+    together = search(step, context, seeds, 3, 2, 1.0, 10)
     for i in (0, 3):
-        (alone,) = mixture_search(step, context[i : i + 1], seeds[i : i + 1], 3, 2, 1.0, 10)
+        (alone,) = search(step, context[i : i + 1], seeds[i : i + 1], 3, 2, 1.0, 10)
         for one, other in zip(together[i], alone, strict=True):
             np.testing.assert_array_equal(one.frames, other.frames)
             assert one.log_likelihood == other.log_likelihood
-    other = mixture_search(step, context[:1], [9], 3, 2, 1.0, 10)
+    other = search(step, context[:1], [9], 3, 2, 1.0, 10)
     assert not np.array_equal(other[0][0].frames[0], together[0][0].frames[0])
 
 
 def test_one_candidate_gives_independent_samples_of_the_mixture() -> None:
     """Against the mixture's own moments and the flag's probability, over many hypotheses."""
     step, context = frame_step(2, SIZE, CONTEXT, stop=0.5), contexts(1)
-    samples = mixture_search(step, context, [0], 20_000, 1, 1.0, 2)[0]
+    samples = search(step, context, [0], 20_000, 1, 1.0, 2)[0]
     zeros = np.zeros((1, STATE), np.float32)
     out = step({"frame": np.ones((1, SIZE + 1), np.float32), "context": context, "state": zeros})
     weights, means, stds = np.exp(out["log_weights"][0])[:, None], out["means"][0], out["stds"][0]
@@ -124,22 +139,21 @@ def test_motions_are_neither_empty_nor_longer_than_allowed() -> None:
     context = contexts(4)
     for stop, length in ((50.0, 1), (-50.0, 7)):
         step = frame_step(2, SIZE, CONTEXT, stop=stop)
-        for row in mixture_search(step, context, range(4), 3, 2, 1.0, 7):
+        for row in search(step, context, range(4), 3, 2, 1.0, 7):
             assert [len(sample.frames) for sample in row] == [length] * 3
             assert all(np.isfinite(sample.log_likelihood) for sample in row)
 
 
 def test_no_motion_comes_twice() -> None:
     step, context = frame_step(2, SIZE, CONTEXT), contexts(6)
-    for row in mixture_search(step, context, range(6), 4, 6, 1.0, 5):
+    for row in search(step, context, range(6), 4, 6, 1.0, 5):
         assert len({sample.frames.tobytes() for sample in row}) == 4
 
 
 def test_more_candidates_find_likelier_frames() -> None:
     step, context = frame_step(2, SIZE, CONTEXT, stop=-50.0), contexts(8)
     likelihoods = [
-        np.mean([row[0].log_likelihood for row in mixture_search(step, context, range(8), 3, n, 1.0, 10)])
-        for n in (1, 4, 16)
+        np.mean([row[0].log_likelihood for row in search(step, context, range(8), 3, n, 1.0, 10)]) for n in (1, 4, 16)
     ]
     assert likelihoods[0] < likelihoods[1] < likelihoods[2]
 
@@ -154,8 +168,8 @@ def test_a_hypothesis_that_ended_is_ranked_by_its_own_length() -> None:
         out = step({"frame": np.where(first, frame, frame * units), **rest})
         return out["log_weights"], out["means"] / 1000, out["stds"] / 1000, out["active"], out["next_state"]
 
-    plain = mixture_search(step, context, range(6), 3, 3, 1.0, 12)
-    other = mixture_search(FakeGraph(step.spec, scaled), context, range(6), 3, 3, 1.0, 12)
+    plain = search(step, context, range(6), 3, 3, 1.0, 12)
+    other = search(FakeGraph(step.spec, scaled), context, range(6), 3, 3, 1.0, 12)
     for row, changed in zip(plain, other, strict=True):
         assert [len(s.frames) for s in row] == [len(s.frames) for s in changed]
         for one, two in zip(row, changed, strict=True):

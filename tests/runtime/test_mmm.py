@@ -1,3 +1,4 @@
+import time
 from pathlib import Path
 
 import numpy as np
@@ -60,8 +61,13 @@ def test_only_the_first_motion_is_read(tmp_path: Path) -> None:
     ("text", "reason"),
     [
         (xml(frame(0), frame(0.01)).replace("</JointPosition>", "</Joint>", 1), r"00001_mmm\.xml, line 10: .* XML"),
-        (xml(frame(0), frame(0.01))[:-300], r", line \d+: this is no whole XML file"),
-        ("no xml at all", ", line 1: this is no whole XML file"),
+        (xml(frame(0), frame(0.01))[:-300], r", line \d+: not XML, or truncated"),
+        ("no xml at all", ", line 1: not XML, or truncated"),
+        (xml(frame(0)).replace("'1.0'", "'1.0' encoding='foo'"), ", line 1: its encoding cannot be read"),
+        (xml(frame(0)).replace("'1.0'", "'1.0' encoding='shift_jis'"), ", line 1: its encoding cannot be read"),
+        (xml(frame(0), "<JointOrder/>", frame(0.01)), "one JointOrder"),
+        (xml(frame(0), frame(1e-9)), "cannot have 1e.09 frames"),
+        (xml(frame(-1e308), frame(1e308)), "cannot have 0 frames"),
         ("<MMM><Model/></MMM>", "needs a Motion with JointOrder"),
         (xml(), "needs a Motion with JointOrder and MotionFrames"),
         (xml(frame(0), frame(0.01, "1 2 3")), "frame 1: JointPosition needs 2 values, not 3"),
@@ -76,3 +82,10 @@ def test_only_the_first_motion_is_read(tmp_path: Path) -> None:
 def test_what_is_no_motion_is_refused_with_its_place(tmp_path: Path, text: str, reason: str) -> None:
     with pytest.raises(FormatError, match=reason):
         read_motion(write(tmp_path, text))
+
+
+def test_an_attribute_of_20_megabytes_takes_no_time(tmp_path: Path) -> None:
+    started = time.monotonic()
+    motion = read_motion(write(tmp_path, xml(frame(0), frame(0.01), name="n" * 20_000_000)))
+    assert len(motion) == 2
+    assert time.monotonic() - started < 10

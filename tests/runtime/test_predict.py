@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fake_models import FakeGraph, spec
+from fake_models import FakeGraph, manifest, spec
 from figures import walker
 
-from motet.decode.rollout import free_run
+from motet.decode.free_run import free_run
 from motet.errors import BundleError, DecodingError, MotionError
 from motet.formats import read_motion, write_motion
 from motet.models.predict import PredictModel
@@ -44,8 +44,8 @@ def model_of(motion: Motion, change: float = 1.0) -> PredictModel:
     zeros = np.zeros(len(motion.channels))
     name = "root_vectors" if joints_of(motion.channels) else "angles"
     contract = MotionContract(name, motion.channels, motion.units, motion.fps, zeros, zeros + 1, motion.skeleton)
-    manifest = {"name": "fake", "verb": "predict", "motion": contract.to_json(), "defaults": {"horizon": HORIZON}}
-    return PredictModel(manifest, graphs(len(motion.channels), change))
+    found = manifest("predict", "free_run", contract, {"horizon": HORIZON})
+    return PredictModel(found, graphs(len(motion.channels), change))
 
 
 def circle(frames: int = 12, fps: float = FPS) -> Motion:
@@ -74,10 +74,10 @@ def test_a_free_run_asks_again_after_each_horizon() -> None:
 def test_a_circle_goes_on_where_it_ended() -> None:
     whole = circle(30)
     model = model_of(to_joint_vectors(whole), change=0.0)  # root block held: the same step and turn again and again
-    found = model.predict(whole[:12], 18)
+    found = model.predict(whole[:12], frames=18)
     assert (found.channels, found.units, found.fps) == (whole.channels, whole.units, whole.fps)
     np.testing.assert_allclose(found.values, whole.values[12:], atol=1e-3)
-    np.testing.assert_allclose(model.predict(whole[:12], 18, append=True).values, whole.values, atol=1e-3)
+    np.testing.assert_allclose(model.predict(whole[:12], frames=18, append=True).values, whole.values, atol=1e-3)
 
 
 def test_what_is_appended_does_not_leap() -> None:
@@ -139,12 +139,12 @@ def test_a_stream_gives_what_the_whole_motion_gives() -> None:
     session = model.stream(whole[:30])
     session.push(whole.values[30])
     session.push(whole.values[31:70])
-    np.testing.assert_allclose(session.predict(5).values, model.predict(whole[:70], 5).values, atol=1e-3)
+    np.testing.assert_allclose(session.predict(5).values, model.predict(whole[:70], frames=5).values, atol=1e-3)
     with pytest.raises(MotionError, match="not finite"):
         session.push(np.full(len(whole.channels), np.nan))
     with pytest.raises(MotionError, match=r"shape \(3,\) does not fit 24 channels"):
         session.push([1.0, 2.0, 3.0])
-    np.testing.assert_allclose(session.predict(5).values, model.predict(whole[:70], 5).values, atol=1e-3)
+    np.testing.assert_allclose(session.predict(5).values, model.predict(whole[:70], frames=5).values, atol=1e-3)
 
 
 def test_a_stream_without_a_start_takes_the_contracts_channels() -> None:
@@ -183,18 +183,20 @@ def test_what_does_not_fit_is_refused() -> None:
     with pytest.raises(MotionError, match=r"metres_per_unit"):
         model.predict(replace(whole, skeleton=replace(walker(metres_per_unit=None).skeleton)))
     with pytest.raises(DecodingError, match="not 0"):
-        model.predict(whole, 0)
+        model.predict(whole, frames=0)
+    with pytest.raises(MotionError, match="finite"):
+        model.next_frames(np.full((1, model.seed_frames, len(model.contract.channels)), np.nan))
     with pytest.raises(MotionError, match="do not fit"):
         model.next_frames(np.zeros((1, SEED, 5)))
-    with pytest.raises(BundleError, match="no model that predicts"):
-        PredictModel({**model.manifest, "defaults": {}}, model.graphs)
+    with pytest.raises(BundleError, match=r"manifest, defaults.horizon: is missing"):
+        PredictModel(replace(model.manifest, defaults={}), model.graphs)
 
 
 def test_the_root_faces_where_it_faced() -> None:
     whole = circle(30)
     turned = replace(whole, values=whole.values + np.array([5.0, 0, 2, 0, 90, 0, 0, 0, 0]))
     model = model_of(to_joint_vectors(whole))
-    found, other = model.predict(whole[:10], 5), model.predict(turned[:10], 5)
+    found, other = model.predict(whole[:10], frames=5), model.predict(turned[:10], frames=5)
     step, other_step = (np.diff(positions(m)[:, 0], axis=0) for m in (found, other))
     # the path does not turn with the figure: it goes sideways now
     assert np.linalg.norm(other_step, axis=1) == pytest.approx(np.linalg.norm(step, axis=1), abs=1e-3)

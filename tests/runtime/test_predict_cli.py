@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import check_refused, run
-from figures import walker
+from figures import WRITTEN, walker
 
 from motet.formats import read_motion, write_motion
 from motet.models.load import load
@@ -28,12 +28,12 @@ def test_a_walk_goes_on(clips: Path) -> None:
     assert off[-1] < 0.25 < still[-1]
 
 
-@pytest.mark.parametrize("extension", ["amc", "bvh", "npz", "csv", "html", "gif", "glb"])
+@pytest.mark.parametrize("extension", WRITTEN)
 def test_predict_writes_every_format(tmp_path: Path, clips: Path, extension: str) -> None:
-    out = tmp_path / f"out.{extension}"
-    result = run("predict", clips / WALK, "-o", out, "--frames", 5)
+    out = tmp_path / f"out{extension}"
+    result = run("-v", "predict", clips / WALK, "-o", out, "--frames", 5)
     assert (result.exit_code, result.stdout) == (0, f"{out}: 5 frames at 30 fps, 0.166667 s\n")
-    assert "resampled from 120 to 30 fps" in result.stderr
+    assert "resampled 1 of 1 motions to 30 fps" in result.stderr
     assert out.stat().st_size > 500
 
 
@@ -67,23 +67,27 @@ def test_bench_says_how_long_a_frame_takes() -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("code", "arguments", "said"),
     [
-        (["{clips}/39_14.amc", "-o", "{out}/a.xyz"], "known are .amc"),
-        (["{clips}/39_14.amc", "-o", "{out}/no/a.bvh"], "does not exist"),
-        (["{clips}/none.amc", "-o", "{out}/a.bvh"], "no such file"),
-        (["{clips}/39_14.amc", "-o", "{out}/a.bvh", "--bundle", "cmu"], "unknown bundle 'cmu'"),
-        (["{clips}/39_14.amc", "-o", "{out}/a.bvh", "--bundle", "cmu-control"], "is for 'control'"),
-        (["{clips}/39_14.amc", "-o", "{out}/a.bvh", "--frames", "0"], "x>=1"),
-        (["{bad}/walker.npz", "-o", "{out}/a.bvh"], "joints that this motion lacks: lhipjoint"),
-        (["{bad}/short.npz", "-o", "{out}/a.bvh"], "needs 10 frames at 30 fps, and the motion has 9 (36 at 120 fps)"),
-        (["{bad}/unit.bvh", "-o", "{out}/a.bvh"], "--unit-in"),
-        (["{bad}/still.npz", "-o", "{out}/a.bvh"], "lacks root.tx"),
-        (["{bad}/nan.bvh", "-o", "{out}/a.bvh"], "nan.bvh, line "),
+        (2, ["{clips}/39_14.amc", "-o", "{out}/a.xyz"], "expected one of .amc"),
+        (2, ["{clips}/39_14.amc", "-o", "{out}/no/a.bvh"], "does not exist"),
+        (1, ["{clips}/none.amc", "-o", "{out}/a.bvh"], "no such file"),
+        (2, ["{clips}/39_14.amc", "-o", "{out}/a.bvh", "--bundle", "cmu"], "unknown bundle 'cmu'"),
+        (2, ["{clips}/39_14.amc", "-o", "{out}/a.bvh", "--bundle", "cmu-control"], "is for 'control'"),
+        (2, ["{clips}/39_14.amc", "-o", "{out}/a.bvh", "--frames", "0"], "range 1<=x<=100000"),
+        (1, ["{bad}/walker.npz", "-o", "{out}/a.bvh"], "joints that this motion lacks: lhipjoint"),
+        (
+            1,
+            ["{bad}/short.npz", "-o", "{out}/a.bvh"],
+            "needs 10 frames at 30 fps, and the motion has 9 (36 at 120 fps)",
+        ),
+        (1, ["{bad}/unit.bvh", "-o", "{out}/a.bvh"], "--unit-in"),
+        (1, ["{bad}/still.npz", "-o", "{out}/a.bvh"], "lacks root.tx"),
+        (1, ["{bad}/nan.bvh", "-o", "{out}/a.bvh"], "nan.bvh, line "),
     ],
 )
 def test_bad_input_gets_one_message_and_writes_nothing(
-    arguments: list[str], said: str, tmp_path: Path, clips: Path
+    code: int, arguments: list[str], said: str, tmp_path: Path, clips: Path
 ) -> None:
     out, bad = tmp_path / "out", tmp_path / "bad"
     out.mkdir()
@@ -96,4 +100,4 @@ def test_bad_input_gets_one_message_and_writes_nothing(
     text = (bad / "unit.bvh").read_text().splitlines()
     (bad / "nan.bvh").write_text("\n".join([*text[:-1], text[-1].replace(text[-1].split()[7], "nan", 1)]))
     result = run("predict", *(argument.format(out=out, clips=clips, bad=bad) for argument in arguments))
-    check_refused(result, said, out)
+    check_refused(result, said, out, code)

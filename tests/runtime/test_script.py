@@ -1,7 +1,9 @@
+import time
+
 import numpy as np
 import pytest
 
-from motet.errors import ScriptError
+from motet.errors import ControlError, ScriptError
 from motet.models.script import Segment, control_track, parse_script, starts_of
 
 LABELS = ("walk", "run", "bend_over")
@@ -27,9 +29,10 @@ def test_labels_mix_with_weights() -> None:
         ("walk 3s,", 8, "name of a control"),
         ("walk 3", 5, "duration in seconds"),
         ("walk 3s run 3s", 8, "comma"),
-        ("walk 3s, fly 1s", 9, "unknown control 'fly'; known are walk, run, bend_over"),
+        ("walk 3s, fly 1s", 9, "unknown control 'fly'; expected one of walk, run, bend_over"),
         ("walk 0s", 5, "more than 0"),
         ("walk 99999s", 5, "at most 3600"),
+        ("walk 3000s, run 601s", 20, "at most 3600"),
         ("walk -3s", 5, "duration"),
         ("walk*2 3s", 5, "between 0 and 1"),
         ("walk+walk 3s", 5, "twice"),
@@ -54,8 +57,21 @@ def test_a_track_holds_ramps_and_loses_no_frame() -> None:
     np.testing.assert_allclose(track.sum(axis=1), 1, rtol=1e-6)
 
 
-def test_a_segment_shorter_than_half_a_frame_is_empty() -> None:
-    assert len(control_track(parse_script("walk>run .001s", LABELS), LABELS, 40)) == 0
+def test_a_segment_shorter_than_half_a_frame_is_empty_and_such_a_script_is_refused() -> None:
+    assert len(control_track(parse_script("walk>run .001s, run 1s", LABELS), LABELS, 40)) == 40
+    with pytest.raises(ControlError, match="less than one frame at 40 fps"):
+        control_track(parse_script("walk .001s", LABELS), LABELS, 40)
+
+
+@pytest.mark.parametrize(
+    "script", ["walk " + "9" * 300_000 + "x", "walk" + "-" * 300_000, "walk 0.01s," * 30_000 + "x"]
+)
+def test_long_scripts_are_read_in_no_time_and_refused_in_few_words(script: str) -> None:
+    started = time.monotonic()
+    with pytest.raises(ScriptError) as caught:
+        parse_script(script, LABELS)
+    assert time.monotonic() - started < 2
+    assert len(str(caught.value)) < 1000
 
 
 def test_captions_come_with_their_starts() -> None:

@@ -1,8 +1,28 @@
+import json
+import time
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 
-from motet.errors import TextError
-from motet.models.text import EOS, MAX_WORDS, PAD, SOS, SPECIALS, SPELLING, UNK, Vocabulary, normalise, words
+from motet.errors import BundleError, TextError
+from motet.models.text import (
+    EOS,
+    MAX_WORDS,
+    PAD,
+    RULES,
+    SOS,
+    SPECIALS,
+    SPELLING,
+    UNK,
+    TextRules,
+    Vocabulary,
+    normalise,
+    words,
+)
+
+LENIENT = replace(RULES, spelling={})
 
 SENTENCES = [
     "A person walks forward.",
@@ -26,7 +46,7 @@ SENTENCES = [
         ("a hundred and walks", "a 100 and walks"),
         ("two hundred twenty", "220"),
         ("twenty ten", "20 10"),
-        ("a 90° turn, 1.5 m", "a 90 turn 1 5 m"),
+        ("a 90° turn, 1.5 m", "a 90 turn 1 point 5 m"),
         ("someone, everyone", "someone everyone"),
         ("?!", ""),
     ],
@@ -39,9 +59,72 @@ def test_normalise(sentence: str, normal: str) -> None:
 
 def test_the_spelling_table_is_normal_and_settled() -> None:
     for wrong, right in SPELLING.items():
-        assert normalise(wrong, {}) == wrong or wrong in {"fourty"}
-        assert normalise(right, SPELLING) == normalise(right, {})
-    assert normalise("teh walk", {"teh": "the"}) == "the walk"
+        assert LENIENT.normalise(wrong) == wrong
+        assert normalise(right) == LENIENT.normalise(right)
+    assert replace(RULES, spelling={"teh": "the"}).normalise("teh walk") == "the walk"
+
+
+def test_rules_travel_and_the_codes_own_do_not_change_what_a_vocabulary_reads() -> None:
+    plain = json.loads(json.dumps(replace(RULES, spelling={"wlak": "walk"}, spelled=3).to_json()))
+    rules = TextRules.from_json(plain)
+    old = Vocabulary([*SPECIALS, "walk", "wlaks", "2", "5", "one", "steps"], rules)
+    assert rules.to_json() == plain
+    assert old.decode(old.encode("wlak wlaks two 5 steps")[0]) == "walk wlaks 25 steps"
+    new = Vocabulary(old.words)
+    assert new.encode("wlak wlaks 2")[1] == ["wlak", "walks"]
+    assert old.encode("wlak wlaks")[1] == []
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"rules": 2}, "text.rules: must be"),
+        ({"dropped": 1}, "text.dropped: must be a string"),
+        ({"spelling": ["a"]}, "text.spelling: must be an object"),
+        ({"spelling": {"a": 1}}, "text.spelling.a: must be a string"),
+        ({"numbers": {"one": 100}}, "text.numbers.one: must be a whole number between 0 and 99"),
+        ({"spelling": {str(n): "" for n in range(3000)}}, "at most 2000 words"),
+        ({"spelled": True}, "text.spelled: must be a whole number"),
+    ],
+)
+def test_what_is_not_a_set_of_rules(change: dict[str, Any], reason: str) -> None:
+    with pytest.raises(BundleError, match=reason):
+        TextRules.from_json({**RULES.to_json(), **change})
+    with pytest.raises(BundleError, match=r"text\.hundred: is missing"):
+        TextRules.from_json({key: value for key, value in RULES.to_json().items() if key != "hundred"})
+
+
+@pytest.mark.parametrize(
+    ("sentence", "again"),
+    [
+        ("putting 1 foot in front of the other", "putting one foot in front of the other"),
+        ("turns ninety degrees", "turns 90 degrees"),
+        ("walks 12 steps", "walks twelve steps"),
+        ("walks 13 steps", "walks 13 steps"),
+        ("walks 1.5 m", "walks 1.5 m"),
+        ("walks 0.5 m", "walks 0.5 m"),
+        ("agent 007", "agent 007"),
+    ],
+)
+def test_small_numbers_come_back_as_words_and_points_stay(sentence: str, again: str) -> None:
+    vocabulary = Vocabulary.of([sentence])
+    ids = vocabulary.encode(sentence)[0]
+    assert vocabulary.decode(ids) == again
+    np.testing.assert_array_equal(vocabulary.encode(again)[0], ids)
+
+
+def test_a_point_that_is_not_known_does_not_make_another_number() -> None:
+    vocabulary = Vocabulary([*SPECIALS, "walks", "1", "5", "m"])
+    ids, unknown = vocabulary.encode("walks 1.5 m")
+    assert unknown == ["point"]
+    assert vocabulary.decode(ids) == "walks one five m"
+
+
+def test_a_long_sentence_is_refused_at_once() -> None:
+    vocabulary, started = Vocabulary.of(SENTENCES), time.perf_counter()
+    with pytest.raises(TextError, match="400000 letters, and at most 2000"):
+        vocabulary.encode("a " * 200_000)
+    assert time.perf_counter() - started < 0.1
 
 
 def test_each_digit_is_a_word() -> None:
@@ -61,8 +144,9 @@ def test_sentences_survive_the_way_there_and_back() -> None:
     for sentence in SENTENCES:
         ids, unknown = vocabulary.encode(sentence)
         assert (ids.dtype, unknown) == (np.int64, [])
-        assert vocabulary.decode(ids) == normalise(sentence)
-        assert vocabulary.decode([1, *ids.tolist(), 2, 0, 0]) == normalise(sentence)
+        wanted = normalise(sentence).replace(" 1 ", " one ")
+        assert vocabulary.decode(ids) == wanted
+        assert vocabulary.decode([1, *ids.tolist(), 2, 0, 0]) == wanted
     assert Vocabulary.from_json(vocabulary.to_json()) == vocabulary
     assert len(vocabulary) == len(vocabulary.to_json())
 

@@ -12,7 +12,7 @@ from motet.models.describe import Description
 from motet.motion.motion import Motion
 from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS
 from motet_train.data.store import Entry, Store
-from motet_train.evaluate.language.corpus import plain
+from motet_train.evaluate.language.split_store import plain
 
 FPS, FRAMES = 10.0, 21
 HEIGHT = 0.85  # of the hips above the feet of SKELETON
@@ -70,7 +70,7 @@ class FakeDescribe:
 
     def describe(self, motions: Sequence[Motion], beams: int = 5) -> list[list[Description]]:
         rows = [self.said.get(motion.values.astype(np.float32).tobytes(), ("somebody dances",)) for motion in motions]
-        return [[Description(plain(text), -float(i)) for i, text in enumerate(row[:beams])] for row in rows]
+        return [[Description(plain(text), -float(i), -float(i)) for i, text in enumerate(row[:beams])] for row in rows]
 
     def score(self, motion: Motion, sentence: str) -> float:
         return -2.0 * (len(sentence.split()) + 1)

@@ -11,8 +11,8 @@ import torch
 from motet.models.control import ControlModel
 from motet_export.bundles import export_run
 from motet_train.data.clips import read_clips
+from motet_train.evaluate.control.experiments import experiments, study_of
 from motet_train.evaluate.control.gaits import limit_cycle, switch
-from motet_train.evaluate.control.report import experiments, lab_of
 from motet_train.models.control.angle_crbm import AngleCRBM, AngleCRBMConfig, from_config, to_config
 from motet_train.models.control.contrastive import DivergedError, Learning
 from motet_train.models.control.crbm import CRBM
@@ -38,10 +38,10 @@ def train(*labels: str, config: AngleCRBMConfig = SHORT) -> Run:
 
 def test_a_slow_rate_from_the_past_keeps_walking() -> None:
     run = train("walk", config=replace(AngleCRBMConfig(), iterations=10))
-    lab = lab_of(ControlModel(run.manifest, run.torch_graphs()), read_clips())
-    assert lab.run is None
-    assert set(experiments(lab)) == {"cycle", "sync"}
-    figures = limit_cycle(lab, seconds=30.0)
+    study = study_of(ControlModel(run.manifest, run.torch_graphs()), read_clips())
+    assert study.run is None
+    assert set(experiments(study)) == {"cycle", "sync"}
+    figures = limit_cycle(study, seconds=30.0)
     assert figures["period_error"] < 0.05
     assert figures["drift"] < 0.005
     assert 0.6 < figures["energy"] < 1.1
@@ -50,9 +50,9 @@ def test_a_slow_rate_from_the_past_keeps_walking() -> None:
 def test_with_one_control_unit_running_starts_and_never_ends() -> None:
     config = replace(AngleCRBMConfig(), iterations=10)
     run = train("walk", "run", config=replace(config, crbm=replace(config.crbm, epochs=150)))
-    lab = lab_of(ControlModel(run.manifest, run.torch_graphs()), read_clips())
-    assert np.isfinite(switch(lab, "walk", "run", 4)[0]).all()
-    assert not np.isfinite(switch(lab, "run", "walk", 4)[0]).any()
+    study = study_of(ControlModel(run.manifest, run.torch_graphs()), read_clips())
+    assert np.isfinite(switch(study, "walk", "run", 4)[0]).all()
+    assert not np.isfinite(switch(study, "run", "walk", 4)[0]).any()
 
 
 @pytest.mark.parametrize("labels", [("walk",), ("walk", "run")])

@@ -1,5 +1,6 @@
 import json
 import shutil
+import time
 import zipfile
 from pathlib import Path
 
@@ -9,8 +10,9 @@ from kit_zip import JOINTS, mmm_xml, write_kit_zip
 
 from motet.formats import read_motion, write_motion
 from motet.formats.mmm import read
+from motet_train.data.archive import Archive
 from motet_train.data.clips import CMU
-from motet_train.data.corpus import read_corpus, read_table
+from motet_train.data.corpus import read_corpus, read_table, recordings
 from motet_train.data.errors import DataError
 from motet_train.data.preparation import ANGLES, FULL
 from motet_train.data.records import Record, Skipped
@@ -95,6 +97,43 @@ def test_clips_of_one_name_in_two_folders_are_told_apart_by_their_path(tmp_path:
         "ann/run": ("Ann runs.",),
         "bob/run": ("Bob runs.",),
     }
+
+
+def test_who_moved_is_what_the_table_says_or_the_beginning_of_the_name(own: Path) -> None:
+    rows = (
+        "02_06\tann\tSomeone bends.",
+        "09_07\t\tA person runs.",
+        "09_07\t\tSomebody runs.",
+        "stroll\tann\tHe walks.",
+    )
+    table(own / "texts.tsv", *rows, header="clip\tsubject\tsentence")
+    records, _ = of(read_corpus(own))
+    assert {name: record.subject for name, record in records.items()} == {
+        "02_06": "ann",
+        "09_07": "09",
+        "stroll": "ann",
+    }
+    with pytest.raises(DataError, match="line 3: the subject of a is 'y', and 'x' above"):
+        read_table(table(own / "texts.tsv", "a\tx\tOne.", "a\ty\tTwo.", header="clip\tsubject\tsentence"))
+
+
+def test_recordings_need_no_table(own: Path) -> None:
+    (own / "02_06.npz").write_bytes(b"no motion")
+    with Archive(own) as archive:
+        found = {item.name: item for item in recordings(archive)}
+    assert list(found) == ["02_06", "09_07", "stroll"]
+    assert isinstance(found["02_06"], Skipped)
+    run = found["09_07"]
+    assert isinstance(run, Record)
+    assert (run.subject, run.sentences) == ("09", ())
+
+
+def test_a_long_table_is_read_in_time(tmp_path: Path) -> None:
+    path = table(tmp_path / "texts.tsv", *(f"clip\t{'word ' * 5}{i}" for i in range(100_000)), f"long\t{'x' * 200_000}")
+    start = time.process_time()
+    found = read_table(path)
+    assert time.process_time() - start < 5
+    assert (len(found["clip"].sentences), len(found["long"].sentences[0])) == (100_000, 200_000)
 
 
 def test_a_length_unit_can_be_given(tmp_path: Path) -> None:

@@ -28,20 +28,20 @@ from motet.models.text import Vocabulary
 from motet.motion.motion import Motion
 from motet_train.data.store import FRAMES as FRAMES_FILE
 from motet_train.data.store import INDEX, Store
-from motet_train.evaluate.language.chain import answers, bounds_chained, chained, told
-from motet_train.evaluate.language.corpus import Corpus, corpus_of
+from motet_train.evaluate.language.chain import answers, best_descriptions, bounds_chained, chained
 from motet_train.evaluate.language.motions import energy, feet_of, last_energy, measures, skate, speed
-from motet_train.evaluate.language.prompts import kinds, prompted, recognised, thresholds, travel
+from motet_train.evaluate.language.prompts import kinds, measurable, prompted, recognised, thresholds, travel
 from motet_train.evaluate.language.report import GOALS, describe_report, generate_report
-from motet_train.evaluate.tables import json_ready, reached, table
+from motet_train.evaluate.language.split_store import SplitStore, split_as
+from motet_train.evaluate.tables import aligned, json_ready, reached, report_table
 from motet_train.runs import MODELS, Run
 
 STORE = small_store()
 
 
 @pytest.fixture(scope="module")
-def corpus() -> Corpus:
-    return corpus_of(manifest(STORE, "generate"), STORE)
+def corpus() -> SplitStore:
+    return split_as(manifest(STORE, "generate"), STORE)
 
 
 def test_speed_turn_and_rise() -> None:
@@ -82,24 +82,33 @@ def test_energy_of_a_ramp_and_of_a_motion_that_stops() -> None:
     assert energy(ramp[:1], FPS) == 0
 
 
-def test_a_motion_that_freezes_is_counted(corpus: Corpus) -> None:
+def test_a_motion_that_freezes_is_counted(corpus: SplitStore) -> None:
     motion = moving(1, 0, 0)
     frozen = replace(motion, values=np.repeat(motion.values[:1], FRAMES, axis=0))
     found = measures([motion, frozen], corpus.contract, 1e-6)
     assert (found["frozen"], found["seconds"], found["speed"]) == pytest.approx((0.5, 2.1, 1.0))
 
 
-def test_thresholds_lie_between_the_training_motions(corpus: Corpus) -> None:
+def test_thresholds_lie_between_the_training_motions(corpus: SplitStore) -> None:
     limits = thresholds(kinds(corpus))
-    assert limits is not None
     assert (limits.slow, limits.run, limits.turn, limits.rise) == pytest.approx((0.5, 2.0, 45, 0.25))
     assert recognised(kinds(corpus), limits) == dict.fromkeys(("walks", "runs", "left", "right", "jumps"), 1.0)
-    assert thresholds(kinds(Corpus(replace(STORE, channels=tuple("abcdefgh")), corpus.parts))) is None
+    assert measurable(thresholds(kinds(SplitStore(replace(STORE, channels=tuple("abcdefgh")), corpus.parts)))) == {}
 
 
-def test_prompts_tell_the_kinds_apart(corpus: Corpus) -> None:
+def test_what_the_training_motions_do_not_show_is_not_measured(corpus: SplitStore) -> None:
+    found = kinds(corpus) | {"jumps": [], "left": []}
+    limits, asked = thresholds(found), ("walks", "runs", "left", "right")
+    assert (limits.run, limits.turn, np.isnan(limits.rise)) == pytest.approx((2.0, 45, True))
+    assert tuple(prompted(FakeGenerate(STORE), limits, 2)) == asked  # type: ignore[arg-type]
+    shares = recognised(found, limits)
+    assert tuple(shares) == asked
+    assert np.isnan(shares.pop("left"))
+    assert set(shares.values()) == {1.0}
+
+
+def test_prompts_tell_the_kinds_apart(corpus: SplitStore) -> None:
     limits, model = thresholds(kinds(corpus)), FakeGenerate(STORE)
-    assert limits is not None
     asked = ("walks", "runs", "left", "right", "jumps")
     assert prompted(model, limits, 3) == dict.fromkeys(asked, 1.0)  # type: ignore[arg-type]
     wrong = FakeGenerate(STORE)
@@ -107,7 +116,7 @@ def test_prompts_tell_the_kinds_apart(corpus: Corpus) -> None:
     assert prompted(wrong, limits, 3) == dict.fromkeys(asked, 0.0) | {"walks": 1.0}  # type: ignore[arg-type]
 
 
-def test_the_chain_of_perfect_models(corpus: Corpus) -> None:
+def test_the_chain_of_perfect_models(corpus: SplitStore) -> None:
     generate: Any = FakeGenerate(STORE)
     describe: Any = FakeDescribe(STORE)
     found = answers(generate, corpus, corpus.parts.test)
@@ -115,10 +124,10 @@ def test_the_chain_of_perfect_models(corpus: Corpus) -> None:
     assert found.records[:4] == (*[corpus.parts.test[0]] * 3, corpus.parts.test[1])
     assert chained(describe, found, corpus) == dict.fromkeys("12345", 1.0)
     assert bounds_chained(describe, found, corpus) == {"retrieval": 1.0, "data": 1.0}
-    assert told(describe, [moving(1, 0, 0)[:1], moving(9, 9, 9)]) == ["", "somebody dances"]
+    assert best_descriptions(describe, [moving(1, 0, 0)[:1], moving(9, 9, 9)]) == ["", "somebody dances"]
 
 
-def test_the_report_of_a_perfect_describe_model(corpus: Corpus) -> None:
+def test_the_report_of_a_perfect_describe_model(corpus: SplitStore) -> None:
     parts: list[str] = []
     model: Any = FakeDescribe(STORE)
     report = describe_report(model, corpus, parts.append)
@@ -130,14 +139,19 @@ def test_the_report_of_a_perfect_describe_model(corpus: Corpus) -> None:
     }
     for group in ("bleu_train", "bleu_test", "bleu_train_marked", "bleu_test_marked"):
         assert report[group] == pytest.approx(dict.fromkeys("12345", 1.0))
+    # two of three sentences of each test motion were said of training motions of the same kind
+    assert report["wording"] == pytest.approx(
+        {"test_sentences": 15, "test_sentences_seen": 2 / 3, "test_motions_unseen": 5}
+    )
+    assert report["bleu_unseen"]["1"] < report["bleu_unseen"]["3"] == pytest.approx(1.0)
     assert report["words"] == {"verbs": 1, "sides": 1, "turns": 1, "verbs_of": 5, "sides_of": 2, "turns_of": 4}
     assert report["gain"]["frequent"] == 1 - report["floor"]["frequent"]
     assert report["likelihood"] == {"test": -2.0}
     assert reached(GOALS, "words.verbs", report["words"]["verbs"])
-    assert "words.sides1>=0.8" in table({"fake": report}, GOALS).replace(" ", "").splitlines()
+    assert "words.sides1>=0.8" in report_table({"fake": report}, GOALS).replace(" ", "").splitlines()
 
 
-def test_the_report_of_a_perfect_generate_model(corpus: Corpus) -> None:
+def test_the_report_of_a_perfect_generate_model(corpus: SplitStore) -> None:
     model: Any = FakeGenerate(STORE)
     describe: Any = FakeDescribe(STORE)
     report = generate_report(model, corpus, describe)
@@ -148,7 +162,7 @@ def test_the_report_of_a_perfect_generate_model(corpus: Corpus) -> None:
         assert report["motion"][key] == pytest.approx(report["motion_data"][key])
     alone = generate_report(model, corpus)
     assert set(report) - set(alone) == {"chain_train", "chain_test", "relative_train", "relative_test", "bound"}
-    rows = table({"with": report, "alone": alone}, GOALS).splitlines()
+    rows = report_table({"with": report, "alone": alone}, GOALS).splitlines()
     assert len(rows) == 1 + sum(map(len, report.values()))
 
 
@@ -158,9 +172,22 @@ def test_without_a_root_block_nothing_is_said_of_the_path() -> None:
     entries = tuple(replace(entry, skeleton=None) for entry in STORE.records)
     angles = replace(angles, representation="angles", records=entries)
     model: Any = FakeGenerate(angles)
-    report = generate_report(model, corpus_of(model.manifest, angles))
+    report = generate_report(model, split_as(model.manifest, angles))
     assert set(report["motion"]) == {"seconds", "energy", "end_energy", "frozen"}
     assert (set(report["threshold"]), "asked" in report) == ({"quiet"}, False)
+
+
+def test_heads_of_columns_are_whole_and_no_longer_than_they_have_to_be() -> None:
+    report = {"a": {"b": 0.5}}
+    heads = report_table({"runs/unseen-people/a-describe": report, "runs/trial/b": report}, {}).splitlines()[0]
+    assert heads.split() == ["a-describe", "b"]
+    assert report_table({"x/a": report, "y/a": {}}, {}).splitlines() == ["      x/a   y/a", "a.b   0.5"]
+
+
+def test_columns_are_as_wide_as_their_widest_cell() -> None:
+    rows = [("a heading of any width",), ("one", "1", "x"), ("three", "100", "yy")]
+    assert aligned(rows, left=(0, 2)).splitlines() == ["a heading of any width", "one       1   x", "three   100   yy"]
+    assert aligned([("alone",)]) == "alone"
 
 
 def test_numbers_that_json_lacks_are_null() -> None:
@@ -220,6 +247,19 @@ def test_evaluate_draws_the_papers_figures(runs: Path) -> None:
         "generate/figure-8-generated.png",
         "generate/figure-9b",
     ]
+
+
+def test_evaluate_refuses_before_it_measures(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def measured(*_: object) -> None:
+        raise AssertionError("it has measured")
+
+    monkeypatch.setattr("motet_train.cli.evaluate_language.describe_report", measured)
+    (runs / "file").touch()
+    arguments = ["evaluate", str(runs / "describe"), "--data", str(runs / "store")]
+    result = CliRunner().invoke(main, [*arguments, "--plots", str(runs / "file" / "plots")])
+    assert (result.exit_code, "cannot write plots to" in result.stderr) == (2, True)
+    result = CliRunner().invoke(main, [*arguments, "cmu-describe", "--save"])
+    assert (result.exit_code, "cmu-describe is a bundle" in result.stderr) == (2, True)
 
 
 def test_evaluate_says_what_it_lacks(runs: Path) -> None:

@@ -18,7 +18,6 @@ from motet_train.evaluate.language.attributes import (
     verbs_right,
 )
 from motet_train.evaluate.language.bleu import agreement, bleu, ranks
-from motet_train.evaluate.language.corpus import Corpus, corpus_of
 from motet_train.evaluate.language.floors import (
     frequent_bleu,
     frequent_sentence,
@@ -26,12 +25,13 @@ from motet_train.evaluate.language.floors import (
     nearest_motions,
     retrieved,
 )
+from motet_train.evaluate.language.split_store import SplitStore, split_as
 
 
 @pytest.fixture(scope="module")
-def corpus() -> Corpus:
+def corpus() -> SplitStore:
     store = small_store()
-    return corpus_of(manifest(store, "describe"), store)
+    return split_as(manifest(store, "describe"), store)
 
 
 def naive_bleu(hypotheses: list[list[str]], references: list[list[list[str]]]) -> float:
@@ -137,7 +137,7 @@ def test_what_is_right_of_a_hypothesis() -> None:
     assert common_side(["left", "right"]) is None
 
 
-def test_the_nearest_motion_and_sentence(corpus: Corpus) -> None:
+def test_the_nearest_motion_and_sentence(corpus: SplitStore) -> None:
     test = corpus.parts.test
     kinds = [record % 5 for record in test]
     assert [record % 5 for record in nearest_motions(corpus, corpus.motions(test))] == kinds
@@ -152,7 +152,7 @@ def test_the_nearest_motion_and_sentence(corpus: Corpus) -> None:
     assert nearest_bleu(corpus, test) == pytest.approx(expected)
 
 
-def test_the_most_frequent_sentence(corpus: Corpus) -> None:
+def test_the_most_frequent_sentence(corpus: SplitStore) -> None:
     assert frequent_sentence(corpus) == "a person jumps"  # of five as frequent the first by name
     references = [["a person jumps", "x"], ["a person walks"]]
     assert frequent_bleu(corpus, references) == bleu(["a person jumps"] * 2, references)
@@ -163,10 +163,10 @@ def test_a_model_of_other_data_is_refused() -> None:
     told = manifest(store, "describe")
     told["training"]["split"]["train"] += 1
     with pytest.raises(DataError, match="was not trained on this data: its 21 training"):
-        corpus_of(told, store)
+        split_as(told, store)
     with pytest.raises(DataError, match="does not say which motions"):
-        corpus_of({"name": "x"}, store)
+        split_as({"name": "x"}, store)
     told = manifest(store, "describe")
     told["training"]["split"]["test"][0] = "elsewhere"
     with pytest.raises(DataError, match="was not trained on this data"):
-        corpus_of(told, store)
+        split_as(told, store)

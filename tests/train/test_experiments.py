@@ -2,19 +2,28 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from motet.bundle.graph import Arrays, GraphSpec, TensorSpec
+from motet.errors import OutputError
+from motet.formats import read_motion, write_motion
 from motet.models.control import ControlModel
 from motet.models.load import load
 from motet.representation.contract import MotionContract
-from motet_train.data.clips import Clips, read_clips
+from motet_train.cli.evaluate import _clips
+from motet_train.data.clips import CMU, Clips, read_clips
+from motet_train.data.errors import DataError
+from motet_train.evaluate.control.experiments import GOALS, by_label, control_report, study_of
 from motet_train.evaluate.control.gaits import gait_transitions, limit_cycle
-from motet_train.evaluate.control.lab import Lab
-from motet_train.evaluate.control.report import GOALS, control_report, lab_of
+from motet_train.evaluate.control.plots import drawings
+from motet_train.evaluate.control.study import ControlStudy
+from motet_train.evaluate.figures import save
 from motet_train.evaluate.tables import reached
 from motet_train.models.control.tdbn import TDBNConfig
 from motet_train.recipes.control import About, train_control
@@ -27,7 +36,7 @@ def clips() -> Clips:
 
 def test_the_shipped_bundle_reaches_every_goal_and_says_what_is_measured(clips: Clips) -> None:
     model = load("cmu-control")
-    report = control_report(lab_of(model, clips), lambda _: None)
+    report = control_report(study_of(model, clips), lambda _: None)
     missed = {
         name: report[name.split(".")[0]][name.split(".")[1]]
         for name in GOALS
@@ -45,15 +54,52 @@ def test_unclamped_control_units_make_the_state_leap(clips: Clips, clamped: bool
     config = TDBNConfig().unclamped()
     config = replace(config, clamped=clamped, rbm=replace(config.rbm, epochs=300))
     run = train_control(clips, config, 0, About("leaps", "a test", "MIT"), lambda *_: None)
-    lab = lab_of(ControlModel(run.manifest, run.torch_graphs()), clips)
-    assert least < gait_transitions(lab, count=8)["jump_ratio"] < most
+    study = study_of(ControlModel(run.manifest, run.torch_graphs()), clips)
+    assert least < gait_transitions(study, count=8)["jump_ratio"] < most
 
 
 def test_a_linear_autoregression_has_no_cycle(clips: Clips) -> None:
-    lab = autoregression(lab_of(load("cmu-control"), clips))
-    figures = limit_cycle(lab, seconds=60.0)
+    study = autoregression(study_of(load("cmu-control"), clips))
+    figures = limit_cycle(study, seconds=60.0)
     # what is linear dies out or blows up: no motion of the right size and period is left after a minute
+    assert np.isfinite(figures["energy"])
     assert not (0.7 <= figures["energy"] <= 1.1 and figures["period_error"] < 0.02)
+
+
+def test_figures_have_the_names_of_the_labels(clips: Clips) -> None:
+    study = study_of(load("cmu-control"), clips)
+    other = replace(study, walk="stroll", run="jog", bend="wave")
+    names = ("bend.share_from_run", "cycle_run.period_s", "hysteresis.walk_to", "gait.share")
+    assert [by_label(study, name) for name in names] == list(names)
+    expected = ["wave.share_from_jog", "cycle_jog.period_s", "hysteresis.stroll_to", "gait.share"]
+    assert [by_label(other, name) for name in names] == expected
+    assert by_label(replace(study, run=None), "bend.share_from_run") == "bend.share_from_run"
+
+
+def test_figures_that_the_clips_allow_are_drawn(clips: Clips, tmp_path: Path) -> None:
+    study = study_of(load("cmu-control"), clips)
+    assert len(drawings(study)) == 7
+    assert list(drawings(replace(study, run=None, bend=None, legs=None))) == ["figure-5.2-limit-cycle"]
+    some = {name: draw for name, draw in drawings(study).items() if "5.3" in name or "5.7" in name}
+    for path in save(some, tmp_path / "new" / "plots"):
+        assert path.read_bytes().startswith(b"\x89PNG")
+    (tmp_path / "file").touch()
+    with pytest.raises(OutputError, match="cannot write plots"):
+        save({}, tmp_path / "file")
+
+
+def test_a_run_is_evaluated_on_the_clips_that_it_was_trained_on(tmp_path: Path) -> None:
+    def clips_of(command: str, data: Path | None = None) -> tuple[str, ...]:
+        model: Any = SimpleNamespace(manifest={"training": {"command": command}})
+        return _clips("runs/x", model, data).labels
+
+    write_motion(tmp_path / "stroll.bvh", read_motion(CMU / "39_14.amc")[:50])
+    assert clips_of(f"motet train tdbn --data {tmp_path} --out x") == ("stroll",)
+    assert clips_of(f"motet train tdbn --data={tmp_path} --out x") == ("stroll",)
+    assert clips_of("motet train tdbn --out x") == ("walk", "run", "bend")
+    assert clips_of("motet train tdbn --data gone --out x", tmp_path) == ("stroll",)
+    with pytest.raises(DataError, match=r"runs/x was trained on, gone, are not here: give --data"):
+        clips_of("motet train tdbn --data gone")
 
 
 def _of(report: Mapping[str, Mapping[str, float]], name: str) -> float:
@@ -83,15 +129,17 @@ class Linear:
         return {"frame": frame.astype(np.float32), "next_history": after.astype(np.float32)}
 
 
-def autoregression(lab: Lab) -> Lab:
-    """The lab with an autoregression on the walk in place of its model."""
-    contract, channels = lab.model.contract, len(lab.model.contract.channels)
-    linear = Linear(contract, list(lab.reference.motions["walk"]))
+def autoregression(study: ControlStudy) -> ControlStudy:
+    """The study with an autoregression on the walk in place of its model."""
+    contract, channels = study.model.contract, len(study.model.contract.channels)
+    linear = Linear(contract, list(study.reference.motions["walk"]))
     history = TensorSpec("history", ("batch", 3, channels))
     inputs = (history, TensorSpec("control", ("batch", 3)), TensorSpec("noise", ("batch", 1)))
     step = FunctionGraph(linear.step, GraphSpec(inputs, (), {"history": "next_history"}))
-    model = ControlModel(lab.model.manifest, {"encoder": FunctionGraph(linear.encode, GraphSpec((), ())), "step": step})
-    return Lab(model, lab.reference, lab.walk, lab.run, lab.bend, None)
+    model = ControlModel(
+        study.model.manifest, {"encoder": FunctionGraph(linear.encode, GraphSpec((), ())), "step": step}
+    )
+    return ControlStudy(model, study.reference, study.walk, study.run, study.bend, None)
 
 
 class FunctionGraph:

@@ -15,8 +15,8 @@ from motet.models.predict import PredictModel
 from motet_train.data.clips import CMU as CLIPS
 from motet_train.data.expmap_files import CMU_ACTIONS, read_expmap
 from motet_train.data.predict_data import expmap_material
+from motet_train.evaluate.predict.curves import FEW, MEAN, ZERO, complete, curves
 from motet_train.evaluate.predict.published_h36m import CONV
-from motet_train.evaluate.predict.report import FEW, MEAN, ZERO, complete, curves
 from motet_train.models.predict.predictor import Predictor, PredictorConfig
 from motet_train.recipes.predict import About, Recipe, train_predict
 from motet_train.runs import Run
@@ -98,8 +98,8 @@ def test_train_and_evaluate_from_the_command_line(tmp_path: Path) -> None:
     assert "lacks 42 files: train/basketball/basketball_1.txt" in trained.stderr
     shown = run("evaluate", out, "--data", data, "--plots", tmp_path / "plots")
     assert shown.exit_code == 0, shown.output
-    assert "     33     67    133    167    233    417" in shown.stdout
-    assert "     80    160    320    400    560   1000" in shown.stdout
+    assert "true 33 67 133 167 233 417" in " ".join(shown.stdout.split())
+    assert "label them 80 160 320 400 560 1000" in " ".join(shown.stdout.split())
     assert f"published: {CONV}" in shown.stdout
     assert (tmp_path / "plots" / "predict-error.png").stat().st_size > 1000
     found = json.loads(run("evaluate", out, "--data", data, "--json", "--save").stdout)
@@ -126,7 +126,7 @@ def test_motion_files_are_trained_on_and_measured_in_centimetres(tmp_path: Path)
     names = sorted(path.name for path in (tmp_path / "plots").iterdir())
     assert names == sorted(["predict-distance.png", f"predict-{manifest['training']['data']['test'][0]}.png"])
     shown = run("evaluate", out, "--data", data).stdout
-    assert "     67    133    267    333    467    833" in shown
+    assert "milliseconds 67 133 267 333 467 833" in " ".join(shown.split())
 
 
 def test_the_mean_is_that_of_complete_actions(tmp_path: Path) -> None:

@@ -23,15 +23,15 @@ from motet_train.data.clips import CMU as CLIPS
 from motet_train.data.expmap_files import CMU, H36M, ExpmapCorpus, Layout, parse, read_expmap
 from motet_train.data.predict_data import expmap_material
 from motet_train.evaluate.predict import published
-from motet_train.evaluate.predict.ablations import ablated, ablations
-from motet_train.evaluate.predict.costs import costs
+from motet_train.evaluate.predict.ablations import ablated, ablation_table
+from motet_train.evaluate.predict.costs import cost_table
+from motet_train.evaluate.predict.curves import COUNTS, MANY, MEAN, ZERO, Curves
 from motet_train.evaluate.predict.plots import _looks
 from motet_train.evaluate.predict.protocol import windows
+from motet_train.evaluate.predict.protocol_table import protocol_table
 from motet_train.evaluate.predict.published_h36m import CONV, ERD, RRNN
-from motet_train.evaluate.predict.report import COUNTS, MANY, MEAN, ZERO, Curves
-from motet_train.evaluate.predict.rows import Row, mean, pooled, rows_of, spread
+from motet_train.evaluate.predict.seed_groups import SeedGroup, mean, pooled, seed_groups, spread
 from motet_train.evaluate.predict.strips import EVERY, GIVEN, places, strips
-from motet_train.evaluate.predict.table import table
 from motet_train.models.predict.convseq2seq import Config
 from motet_train.models.predict.systems import stepwise
 from motet_train.runs import Run
@@ -91,7 +91,7 @@ def test_runs_that_differ_in_the_seed_alone_are_one_row() -> None:
         "old": manifest(None),
         "older": manifest(None),
     }
-    assert [(row.title, row.runs) for row in rows_of(models)] == [
+    assert [(row.title, row.runs) for row in seed_groups(models)] == [
         ("conv-4x4 (2 seeds)", ("runs/conv-4x4-0", "runs/conv-4x4-1")),
         ("rrnn-0", ("runs/rrnn-0",)),
         ("none-0", ("runs/none-0",)),
@@ -104,18 +104,18 @@ def test_runs_that_differ_in_the_seed_alone_are_one_row() -> None:
 
 def test_titles_stay_different() -> None:
     same = {"a/x-0": manifest(0), "b/x-0": manifest(0, window=5)}
-    assert [row.title for row in rows_of(same)] == ["a/x-0", "b/x-0"]
+    assert [row.title for row in seed_groups(same)] == ["a/x-0", "b/x-0"]
     stems = {f"x-{n}": manifest(n, window=5 if n > 1 else 20) for n in range(4)}
-    assert [row.title for row in rows_of(stems)] == ["x-0 (2 seeds)", "x-2 (2 seeds)"]
+    assert [row.title for row in seed_groups(stems)] == ["x-0 (2 seeds)", "x-2 (2 seeds)"]
     apart = {"one": manifest(0), "two": manifest(1)}
-    assert [row.title for row in rows_of(apart)] == ["one (2 seeds)"]
+    assert [row.title for row in seed_groups(apart)] == ["one (2 seeds)"]
 
 
 def test_rows_are_means_and_spreads() -> None:
     errors = {
         name: {"walking": values} for name, values in zip("zabc", np.random.default_rng(0).random((4, 25)), strict=True)
     }
-    rows = [Row("ac (2 seeds)", ("a", "c")), Row("b", ("b",))]
+    rows = [SeedGroup("ac (2 seeds)", ("a", "c")), SeedGroup("b", ("b",))]
     one, other = errors["a"]["walking"], errors["c"]["walking"]
     found, apart = pooled(errors, rows, mean), pooled(errors, rows, spread)
     assert list(found) == ["z", "ac (2 seeds)", "b"]
@@ -127,7 +127,7 @@ def test_rows_are_means_and_spreads() -> None:
 
 def shown(layout: Layout, actions: tuple[str, ...]) -> str:
     found: Curves = {kind: {ZERO: {part: np.ones(25) for part in (*actions, MEAN)}} for kind in COUNTS}
-    return table(found, ExpmapCorpus(layout, {}, {action: {} for action in actions}, ()))
+    return protocol_table(found, ExpmapCorpus(layout, {}, {action: {} for action in actions}, ()))
 
 
 def test_published_rows_stand_under_ours() -> None:
@@ -149,7 +149,7 @@ def test_published_rows_stand_under_ours() -> None:
 
 def test_published_rows_of_human36m() -> None:
     text = shown(H36M, ("walking", "posing"))
-    assert line(text, f"published: {ERD}").endswith("   0.93   1.18   1.59   1.78" + " " * 14)
+    assert line(text, f"published: {ERD}").endswith("   0.93   1.18   1.59   1.78")
     ours, *papers = text.split("mean of walking, posing\n")[1].splitlines()[:3]
     assert (ours.split()[:2], papers[0].split()[1], papers[1].split()[1]) == (
         ["zero", "velocity"],
@@ -173,7 +173,7 @@ def test_ablations_say_what_differs_from_the_first() -> None:
         "f-1": manifest(1, recipe={"adversary": 0.01}, kernel=[4, 4], padding="same"),
         "g": manifest(0, recipe={"adversary": 0}, window=5),
     }
-    rows = rows_of(models)
+    rows = seed_groups(models)
     said = ablated(models, rows)
     assert said == {
         "c (2 seeds)": "c (2 seeds), as it is",
@@ -184,15 +184,17 @@ def test_ablations_say_what_differs_from_the_first() -> None:
     }
     found = constant(**dict(zip(said, (0.5, 0.625, 0.75, 0.875, 1.0), strict=True)))
     found[MANY]["g"][MEAN] = np.arange(25.0)
-    text = ablations(found, said)
-    assert line(text, "without long").split()[-10:] == ["0.62"] * 10
-    assert line(text, "window 5").split()[-10:] == ["1.00"] * 5 + ["1.00", "3.00", "7.00", "9.00", "24.00"]
+    text = ablation_table(found, said)
+    few, many = text.split("256 windows of each")
+    assert line(few, "without long").split()[-5:] == line(many, "without long").split()[-5:] == ["0.62"] * 5
+    assert line(few, "window 5").split()[-5:] == ["1.00"] * 5
+    assert line(many, "window 5").split()[-5:] == ["1.00", "3.00", "7.00", "9.00", "24.00"]
     assert ablated(models, rows[:2]) == {}  # a single row of the model shows no difference
 
 
 def test_costs_are_those_of_the_manifests() -> None:
     models = {"c-1": manifest(1), "c-2": manifest(2), "old": manifest(None)}
-    text = costs(models, rows_of(models))
+    text = cost_table(models, seed_groups(models))
     assert line(text, "c (2 seeds)").split()[3:] == ["12,345", "15", "M,", "CPU,", "threads:", "1"]
     assert line(text, "old").split() == ["old", "12,345", "M,", "CPU"]
 

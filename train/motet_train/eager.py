@@ -1,17 +1,13 @@
 """The same models run by torch eagerly: the baseline of ``motet bench``."""
 
-from collections.abc import Mapping
-from typing import Any
-
 import torch
 
-from motet.models.load import VERBS, Model
+from motet.bundle.manifest import Manifest
+from motet.models.load import Model, build
 from motet_train.runs import MODELS, Run
 
 
-def eager_model(manifest: Mapping[str, Any], threads: int) -> Model:
+def eager_model(manifest: Manifest, threads: int) -> Model:
     """A bundle's model with the same sizes in torch, its weights untrained: speed does not depend on them."""
     torch.set_num_threads(threads)
-    return VERBS[manifest["verb"]](
-        manifest, Run(manifest, MODELS[manifest["model"]](manifest["config"])).torch_graphs()
-    )
+    return build(manifest, Run(manifest.source, MODELS[manifest.model](manifest.config)).torch_graphs())

@@ -3,7 +3,6 @@
 import io
 import json
 import pickle
-import platform
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -18,10 +17,13 @@ from motet.errors import MotetError
 from motet.files import write_whole
 from motet_train.models.control import angle_crbm, tdbn
 from motet_train.models.language import language_to_motion, motion_to_language
+from motet_train.models.net import Net
 from motet_train.models.predict import predictor, systems
 from motet_train.torch_graph import TorchGraph
 
-MODELS: Mapping[str, Callable[[Mapping[str, Any]], nn.Module]] = {
+MANIFEST, WEIGHTS = "run.json", "weights.pt"
+
+MODELS: Mapping[str, Callable[[Mapping[str, Any]], Net]] = {
     "tdbn": tdbn.from_config,
     "motion-to-language": motion_to_language.from_config,
     "language-to-motion": language_to_motion.from_config,
@@ -33,54 +35,54 @@ MODELS: Mapping[str, Callable[[Mapping[str, Any]], nn.Module]] = {
 
 
 class RunError(MotetError, ValueError):
-    """A folder that is no training run."""
+    """A training run that cannot be read, or cannot go on."""
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A trained model with all that its bundle will say about it.
-
-    manifest: name, verb, model, the config that the model is built from, motion contract, defaults, licence,
-        training, quality and what the verb needs; ready for JSON.
-    """
+    """A trained model with all that its bundle will say about it: see :func:`motet_train.manifest.manifest_of`."""
 
     manifest: Mapping[str, Any]
-    model: nn.Module
+    model: Net
 
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """For each role the module to export and the contract that its forward keeps."""
-        found: dict[str, tuple[nn.Module, GraphSpec]] = self.model.graphs()  # type: ignore[operator]
-        return found
+        return self.model.graphs()
 
     def torch_graphs(self) -> dict[str, Graph]:
-        """The same graphs, run by torch."""
+        """The graphs, run by torch."""
         return {role: TorchGraph(module, spec) for role, (module, spec) in self.graphs().items()}
 
     def save(self, folder: Path) -> None:
         """Write the run into an existing folder."""
-        buffer = io.BytesIO()
-        torch.save(self.model.state_dict(), buffer)
-        write_whole(folder / "weights.pt", buffer.getvalue())
-        write_whole(folder / "run.json", json.dumps(self.manifest, indent=1) + "\n")
+        write_whole(folder / WEIGHTS, to_bytes(self.model.state_dict()))
+        write_whole(folder / MANIFEST, json.dumps(self.manifest, indent=1) + "\n")
 
     @staticmethod
     def load(folder: Path) -> "Run":
-        """Read what :meth:`save` wrote; RunError where that is not possible."""
+        """Read what :meth:`save` wrote, onto the CPU; RunError where that is not possible."""
+        for name in (MANIFEST, WEIGHTS):
+            if not (folder / name).is_file():
+                raise RunError(f"{folder} is not a training run: it has no {name}")
         try:
-            manifest = json.loads((folder / "run.json").read_text())
+            manifest = json.loads((folder / MANIFEST).read_text())
             model = MODELS[manifest["model"]](manifest["config"])
-            model.load_state_dict(torch.load(folder / "weights.pt", weights_only=True))
-        except FileNotFoundError as error:
-            raise RunError(f"{folder} is no training run: it has no {Path(error.filename).name}") from error
-        except (KeyError, TypeError, ValueError, RuntimeError, OSError, pickle.UnpicklingError) as error:
+            model.load_state_dict(read_state(folder / WEIGHTS))
+        except (KeyError, TypeError, ValueError, RuntimeError, OSError) as error:
             raise RunError(f"the training run {folder} cannot be read: {error}") from error
         return Run(manifest, model)
 
 
-def surroundings(device: str = "cpu") -> dict[str, Any]:
-    """Where a training runs, for its manifest."""
-    return {
-        "threads": torch.get_num_threads(),
-        "machine": f"{platform.system()} {platform.machine()}, {device.upper()}",
-        "torch": torch.__version__,
-    }
+def to_bytes(state: Any) -> bytes:
+    """States of modules and optimisers, and plain values, as bytes."""
+    buffer = io.BytesIO()
+    torch.save(state, buffer)
+    return buffer.getvalue()
+
+
+def read_state(path: Path) -> Any:
+    """What was written by :func:`to_bytes`, on the CPU wherever it was; RunError where that is not possible."""
+    try:
+        return torch.load(path, map_location="cpu", weights_only=True)
+    except (OSError, EOFError, RuntimeError, ValueError, pickle.UnpicklingError) as error:
+        raise RunError(f"{path} cannot be read: {error}") from error

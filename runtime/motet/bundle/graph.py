@@ -6,15 +6,20 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
-import onnxruntime
 from numpy.typing import NDArray
 
+from motet.bundle.fields import Fields
+from motet.bundle.graph_safety import check_graph
+from motet.bundle.session import SessionOptions
 from motet.errors import BundleError
 
 Arrays = Mapping[str, NDArray[Any]]
 
 DTYPES = {"float32": "tensor(float)", "int64": "tensor(int64)", "bool": "tensor(bool)"}
 """dtype in a manifest -> type in ONNX Runtime."""
+
+MAX_AXIS, MAX_ROW = 1 << 20, 1 << 22
+"""Of a fixed axis, and of all the fixed axes of a tensor multiplied."""
 
 _creation = threading.Lock()  # ONNX Runtime sessions are safe to share but not to create concurrently
 
@@ -28,14 +33,21 @@ class TensorSpec:
     dtype: str = "float32"
 
     def to_json(self) -> dict[str, Any]:
-        """A JSON object; :meth:`from_json` is the inverse."""
+        """A JSON object; :meth:`read` is the inverse."""
         return {"name": self.name, "dtype": self.dtype, "shape": list(self.shape)}
 
     @staticmethod
-    def from_json(data: Mapping[str, Any]) -> "TensorSpec":
-        """Read what :meth:`to_json` wrote."""
-        shape = tuple(axis if isinstance(axis, str) else int(axis) for axis in data["shape"])
-        return TensorSpec(str(data["name"]), shape, str(data["dtype"]))
+    def read(data: Fields) -> "TensorSpec":
+        """Read what :meth:`to_json` wrote; BundleError where it is no tensor."""
+        shape = data.items("shape")
+        fixed = [axis for axis in shape if not isinstance(axis, str)]
+        if any(isinstance(axis, bool) or not isinstance(axis, int) or not 1 <= axis <= MAX_AXIS for axis in fixed):
+            raise data.fault(f"names, and numbers between 1 and {MAX_AXIS}", shape, "shape")
+        if len(shape) > 8 or np.prod(fixed, dtype=np.float64) > MAX_ROW:
+            raise data.fault(f"at most 8 axes with at most {MAX_ROW} numbers a row", shape, "shape")
+        if data.text("dtype") not in DTYPES:
+            raise data.fault(f"one of {', '.join(DTYPES)}", data.text("dtype"), "dtype")
+        return TensorSpec(data.text("name"), tuple(shape), data.text("dtype"))
 
     def size(self, axis: int) -> int:
         """The size of a fixed axis; BundleError if the axis is dynamic."""
@@ -52,36 +64,80 @@ class TensorSpec:
 
 @dataclass(frozen=True)
 class GraphSpec:
-    """What a graph takes and gives, and which outputs are fed back into which inputs at the next step."""
+    """What a graph takes and gives, and which outputs are fed back into which inputs at the next step.
+
+    start: for a fed back input with dynamic axes besides the batch, the sizes that all its axes but the batch have
+        before the first step: (heads, 0, width) for a cache that grows by one along its second axis.
+    """
 
     inputs: tuple[TensorSpec, ...]
     outputs: tuple[TensorSpec, ...]
     feedback: Mapping[str, str] = field(default_factory=dict)
+    start: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
 
     def input(self, name: str) -> TensorSpec:
         """The input called ``name``; BundleError if there is none."""
-        for spec in self.inputs:
-            if spec.name == name:
-                return spec
-        raise BundleError(f"the graph has no input {name!r}, only {', '.join(spec.name for spec in self.inputs)}")
+        return _named(name, self.inputs, "input")
+
+    def output(self, name: str) -> TensorSpec:
+        """The output called ``name``; BundleError if there is none."""
+        return _named(name, self.outputs, "output")
 
     def takes(self, name: str) -> bool:
         """Whether there is an input of that name."""
         return any(spec.name == name for spec in self.inputs)
 
+    def start_shape(self, name: str) -> tuple[int, ...]:
+        """The sizes (batch left out) of a fed back input before the first step; BundleError where nothing says them."""
+        spec = self.input(name)
+        return self.start.get(name) or tuple(spec.size(axis) for axis in range(1, len(spec.shape)))
+
     def to_json(self) -> dict[str, Any]:
-        """A JSON object; :meth:`from_json` is the inverse."""
-        return {
+        """A JSON object; :meth:`read` is the inverse."""
+        found: dict[str, Any] = {
             "inputs": [spec.to_json() for spec in self.inputs],
             "outputs": [spec.to_json() for spec in self.outputs],
             "feedback": dict(self.feedback),
         }
+        return {**found, "start": {name: list(sizes) for name, sizes in self.start.items()}} if self.start else found
 
     @staticmethod
-    def from_json(data: Mapping[str, Any]) -> "GraphSpec":
-        """Read what :meth:`to_json` wrote."""
-        inputs, outputs = (tuple(TensorSpec.from_json(t) for t in data[key]) for key in ("inputs", "outputs"))
-        return GraphSpec(inputs, outputs, {str(k): str(v) for k, v in data["feedback"].items()})
+    def read(data: Fields) -> "GraphSpec":
+        """Read what :meth:`to_json` wrote; BundleError where it contradicts itself."""
+        inputs, outputs = (tuple(map(TensorSpec.read, data.list_of_fields(key))) for key in ("inputs", "outputs"))
+        fed = data.fields("feedback") if "feedback" in data else Fields({})
+        feedback = {name: fed.text(name) for name in fed.data}
+        start = data.fields("start") if "start" in data else Fields({})
+        sizes = {name: tuple(int(size) for size in start.numbers(name, len(start.items(name)))) for name in start.data}
+        found = GraphSpec(inputs, outputs, feedback, sizes)
+        found._check(data.path)
+        return found
+
+    def _check(self, path: str) -> None:
+        for tensors in (self.inputs, self.outputs):
+            if len({spec.name for spec in tensors}) != len(tensors):
+                raise BundleError(f"manifest, {path}: two tensors have the same name")
+        for name, source in self.feedback.items():
+            given, taken = self.output(source), self.input(name)
+            alike = [
+                b in {a, given.shape[0]} or isinstance(b, str) for a, b in zip(given.shape, taken.shape, strict=False)
+            ]
+            if given.dtype != taken.dtype or len(given.shape) != len(taken.shape) or not all(alike):
+                raise BundleError(f"manifest, {path}.feedback: {source!r} does not fit the input {name!r}")
+        for name, sizes in self.start.items():
+            shape = self.input(name).shape[1:]
+            fits = len(sizes) == len(shape) and all(
+                isinstance(b, str) or a == b for a, b in zip(sizes, shape, strict=True)
+            )
+            if name not in self.feedback or not fits or not all(0 <= size <= MAX_AXIS for size in sizes):
+                raise BundleError(f"manifest, {path}.start: {list(sizes)} does not fit the state {name!r}")
+
+
+def _named(name: str, tensors: tuple[TensorSpec, ...], kind: str) -> TensorSpec:
+    for spec in tensors:
+        if spec.name == name:
+            return spec
+    raise BundleError(f"the graph has no {kind} {name!r}, only {', '.join(spec.name for spec in tensors)}")
 
 
 class Graph(Protocol):
@@ -96,39 +152,48 @@ class Graph(Protocol):
 
 
 class OnnxGraph:
-    """A graph run by ONNX Runtime on the CPU; safe to share between threads.
+    """A graph run by ONNX Runtime; safe to share between threads.
 
-    threads: of one call. 1 is right for step graphs: no idle spinning, and many sessions side by side.
+    BundleError for a graph that is damaged, does not keep the contract ``spec``, or could reach outside of its bytes.
     """
 
-    def __init__(self, model: bytes, spec: GraphSpec, threads: int = 1) -> None:
+    def __init__(self, model: bytes, spec: GraphSpec, options: SessionOptions | None = None) -> None:
         self.spec = spec
-        options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = threads
-        options.inter_op_num_threads = 1
-        options.enable_cpu_mem_arena = False  # memory goes back after a large batch, at the same speed
-        options.log_severity_level = 3
+        check_graph(model)
         try:
             with _creation:
-                self._session = onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
+                self._session = (options or SessionOptions()).session(model)
         except Exception as error:  # ONNX Runtime's errors share no base class of their own
-            raise BundleError(f"ONNX Runtime refuses the graph: {str(error).splitlines()[0]}") from error
+            raise BundleError(f"ONNX Runtime refuses the graph: {str(error).partition(chr(10))[0]}") from error
         _check(self._session.get_inputs(), spec.inputs, "input")
         _check(self._session.get_outputs(), spec.outputs, "output")
         self._outputs = [tensor.name for tensor in spec.outputs]
 
+    @property
+    def providers(self) -> tuple[str, ...]:
+        """The execution providers that are active, the preferred first."""
+        return tuple(self._session.get_providers())
+
     def __call__(self, feeds: Arrays) -> dict[str, NDArray[Any]]:
-        """Named inputs to named outputs; arrays must have the contract's dtypes."""
-        return dict(zip(self._outputs, self._session.run(self._outputs, feeds), strict=True))
+        """Named inputs to named outputs; arrays must have the contract's dtypes. BundleError where the graph fails."""
+        try:
+            return dict(zip(self._outputs, self._session.run(self._outputs, feeds), strict=True))
+        except Exception as error:
+            raise BundleError(f"the graph cannot be run: {str(error).partition(chr(10))[0]}") from error
 
 
 def _check(found: list[Any], declared: tuple[TensorSpec, ...], kind: str) -> None:
-    """Refuse a graph whose tensors are not those that the manifest declares."""
-    actual = {node.name: (node.type, tuple(node.shape)) for node in found}
-    wanted = {spec.name: (DTYPES.get(spec.dtype, spec.dtype), tuple(spec.shape)) for spec in declared}
+    """Refuse a graph whose tensors are not those that the manifest declares; dynamic axes may have other names."""
+    actual = {node.name: (node.type, _sizes(node.shape)) for node in found}
+    wanted = {spec.name: (DTYPES[spec.dtype], _sizes(spec.shape)) for spec in declared}
     for name in actual.keys() | wanted.keys():
         if actual.get(name) != wanted.get(name):
             raise BundleError(
                 f"the graph does not keep its contract: {kind} {name!r} is {actual.get(name, 'absent')}, "
                 f"declared {wanted.get(name, 'nowhere')}"
             )
+
+
+def _sizes(shape: Any) -> tuple[int | None, ...]:
+    """A shape with None for dynamic axes."""
+    return tuple(axis if isinstance(axis, int) else None for axis in shape)

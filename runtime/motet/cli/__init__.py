@@ -2,32 +2,39 @@
 
 import importlib
 import importlib.util
+import logging
+import os
 import sys
 from typing import Any
 
 import click
 
+from motet.cli.notes import show_log
 from motet.errors import MotetError
 
 COMMANDS = {
-    "describe": ("motet.cli.describe:describe", None),
-    "generate": ("motet.cli.generate:generate", None),
-    "predict": ("motet.cli.predict:predict", None),
-    "control": ("motet.cli.control:control", None),
-    "embed": ("motet.cli.embed:embed", None),
-    "convert": ("motet.cli.convert:convert", None),
-    "view": ("motet.cli.convert:view", None),
-    "bundle": ("motet.cli.bundle:bundle", None),
-    "bench": ("motet.cli.bench:bench", None),
-    "prepare": ("motet_train.cli.prepare:prepare", "train"),
-    "train": ("motet_train.cli.train:train", "train"),
-    "evaluate": ("motet_train.cli.evaluate:evaluate", "train"),
-    "export": ("motet_export.cli:export", "export"),
-    "parity": ("motet_export.cli:parity", "export"),
+    "describe": ("motet.cli.describe:describe", "", "Motion files in, ranked sentences out."),
+    "generate": ("motet.cli.generate:generate", "", "Sentences in, motion files out."),
+    "predict": ("motet.cli.predict:predict", "", "Motion files in, what follows them out."),
+    "control": ("motet.cli.control:control", "", "A script such as 'walk 3s, run 3s' in, a motion file out."),
+    "embed": ("motet.cli.embed:embed", "", "Context vectors of motions or sentences, for search and clusters."),
+    "convert": ("motet.cli.convert:convert", "", "Motion files to other formats, rates and units."),
+    "view": ("motet.cli.convert:view", "", "A web page that plays a motion file."),
+    "bundle": ("motet.cli.bundle:bundle", "", "List, inspect, verify and pack bundles: the models."),
+    "bench": ("motet.cli.bench:bench", "", "How fast the models run on this machine."),
+    "prepare": ("motet_train.cli.prepare:prepare", "train", "Motion files and sentences to a store for training."),
+    "train": ("motet_train.cli.train:train", "train", "Train a model."),
+    "evaluate": ("motet_train.cli.evaluate:evaluate", "evaluate", "Measure a trained run or a bundle."),
+    "export": ("motet_export.cli:export", "export", "A trained run to a bundle."),
+    "parity": ("motet_export.cli:parity", "export", "Compare a bundle with the trained run it came from."),
 }
-"""Command -> where it is, and the extra that it needs."""
+"""Command -> where it is, the extra that it needs, and what it does."""
 
-NEEDS = {"train": ("torch", "tqdm", "scipy", "sklearn", "sacrebleu"), "export": ("torch", "onnx", "onnxscript")}
+NEEDS = {
+    "train": ("torch", "tqdm"),
+    "evaluate": ("torch", "tqdm", "matplotlib", "sklearn", "sacrebleu"),
+    "export": ("torch", "tqdm", "onnx", "onnxscript"),
+}
 """Extra -> the packages by which it is recognised."""
 
 
@@ -36,13 +43,18 @@ class Commands(click.Group):
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """The commands whose extra is installed."""
-        return [name for name, (_, extra) in COMMANDS.items() if not missing(extra)]
+        return [name for name, (_, extra, _) in COMMANDS.items() if not missing(extra)]
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """List the commands without importing them."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, COMMANDS[name][2]) for name in self.list_commands(ctx)])
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Import one command; a clear refusal where its extra is not installed."""
         if cmd_name not in COMMANDS:
             return None
-        place, extra = COMMANDS[cmd_name]
+        place, extra, _ = COMMANDS[cmd_name]
         if lacking := missing(extra):
             raise click.UsageError(
                 f"motet {cmd_name} needs {', '.join(lacking)}: install the extra with  pip install 'motet[{extra}]'"
@@ -59,13 +71,25 @@ class Commands(click.Group):
             click.echo(f"motet: {error}", err=True)
             sys.exit(2)
 
+    def main(self, *args: Any, **kwargs: Any) -> Any:
+        """Run as a program; results that cannot be printed, as on a full disk, are one message and exit code 1."""
+        try:
+            return super().main(*args, **kwargs)
+        except OSError as error:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what Python still holds goes nowhere
+            click.echo(f"motet: cannot print the results: {error.strerror}", err=True)
+            sys.exit(1)
 
-def missing(extra: str | None) -> list[str]:
+
+def missing(extra: str) -> list[str]:
     """The packages of an extra that are not installed."""
-    return [name for name in NEEDS.get(extra or "", ()) if importlib.util.find_spec(name) is None]
+    return [name for name in NEEDS.get(extra, ()) if importlib.util.find_spec(name) is None]
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.option("-q", "--quiet", is_flag=True, help="Say nothing on stderr but errors.")
+@click.option("-v", "--verbose", is_flag=True, help="Say on stderr what is done, such as resampling.")
 @click.version_option(package_name="motet")
-def main() -> None:
+def main(quiet: bool, verbose: bool) -> None:
     """Models of human motion that run anywhere: describe, generate, predict, control."""
+    show_log(logging.ERROR if quiet else logging.INFO if verbose else logging.WARNING)

@@ -3,29 +3,36 @@
 import importlib
 import importlib.util
 import json
+from pathlib import Path
 
 import click
 
 from motet.bench import Row, figures, rows
+from motet.bundle.session import SessionOptions
+from motet.cli.options import session_options
 from motet.models.load import load
 
 
 @click.command()
 @click.option("--bundle", default="cmu-control", show_default=True, help="Name or path of a bundle.")
-@click.option("--threads", default=1, show_default=True, help="Threads of one call of a graph.")
+@click.option("--motion", type=Path, help="Motion file to describe.  [default: one of 2.8 s that is made for it]")
 @click.option("--seconds", default=1.0, show_default=True, help="How long to measure each figure.")
+@session_options
 @click.option("--json", "as_json", is_flag=True, help="Print a list of rows.")
-def bench(bundle: str, threads: int, seconds: float, as_json: bool) -> None:
+def bench(bundle: str, motion: Path | None, seconds: float, as_json: bool, session: SessionOptions) -> None:
     """Measure a bundle's speed, beside torch eager where torch is installed."""
-    model = load(bundle, threads)
-    found = figures(model, seconds)
+    model = load(bundle, session)
+    found = figures(model, seconds, motion)
     baseline = None
     if importlib.util.find_spec("torch"):
         # by name: the runtime does not depend on the training package
-        eager = importlib.import_module("motet_train.eager").eager_model(model.manifest, threads)
-        baseline = figures(eager, seconds)
+        eager = importlib.import_module("motet_train.eager").eager_model(model.manifest, session.threads)
+        baseline = figures(eager, seconds, motion)
     table = rows(found, baseline)
-    click.echo(json.dumps([row.to_json() for row in table]) if as_json else "\n".join(map(_line, table)))
+    if as_json:
+        click.echo(json.dumps([row.to_json() for row in table]))
+        return
+    click.echo("\n".join([f"on {', '.join(model.providers)}, threads: {session.threads}", *map(_line, table)]))
 
 
 def _line(row: Row) -> str:

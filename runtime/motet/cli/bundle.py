@@ -7,6 +7,12 @@ from typing import Any
 import click
 
 from motet.bundle.bundle import Bundle, list_bundles
+from motet.bundle.session import SessionOptions
+from motet.cli.options import session_options
+from motet.models.verify import verify as verify_bundle
+
+NOT_STATED = "not stated"
+"""What is said of a licence that is null."""
 
 _NAME = click.argument("name")
 
@@ -25,14 +31,14 @@ def list_(as_json: bool) -> None:
         click.echo(json.dumps(rows))
         return
     for row in rows:
-        click.echo(f"{row['name']:<16} {row['verb']:<10} {row['size'] / 1e6:6.2f} MB  {row['licence']}")
+        click.echo(f"{row['name']:<16} {row['verb']:<10} {row['size'] / 1e6:6.2f} MB  {row['licence'] or NOT_STATED}")
 
 
 def _row(bundle: Bundle) -> dict[str, Any]:
     manifest = bundle.manifest
-    size = sum(entry["size"] for entry in manifest["files"].values())
-    licence = manifest.get("licence", {}).get("weights", "unknown")
-    return {"name": bundle.name, "verb": manifest["verb"], "model": manifest["model"], "size": size, "licence": licence}
+    size = sum(entry.size for entry in manifest.files.values())
+    licence = manifest.licence.get("weights")
+    return {"name": bundle.name, "verb": manifest.verb, "model": manifest.model, "size": size, "licence": licence}
 
 
 @bundle.command()
@@ -42,15 +48,14 @@ def info(name: str, as_json: bool) -> None:
     """Describe a bundle: what it takes and gives, its licence, parity and quality."""
     manifest = Bundle.open(name).manifest
     if as_json:
-        click.echo(json.dumps(manifest, indent=1))
+        click.echo(json.dumps(manifest.source, indent=1))
         return
-    motion = manifest["motion"]
-    click.echo(f"{manifest['name']}: {manifest['verb']} by {manifest['model']}")
-    click.echo(f"{len(motion['channels'])} channels at {motion['fps']:g} fps")
+    click.echo(f"{manifest.name} {manifest.version}: {manifest.verb} by {manifest.model}, decoded by {manifest.loop}")
+    click.echo(f"{len(manifest.motion.channels)} channels at {manifest.motion.fps:g} fps")
     for key in ("control", "defaults", "licence", "training", "quality", "parity"):
-        if key in manifest:
+        if values := manifest.source.get(key):
             click.echo(f"\n{key}")
-            _tree({k: v for k, v in manifest[key].items() if k != "starts"})
+            _tree({k: v for k, v in values.items() if k != "starts"})
 
 
 def _tree(values: dict[str, Any], indent: str = "  ") -> None:
@@ -59,15 +64,22 @@ def _tree(values: dict[str, Any], indent: str = "  ") -> None:
             click.echo(f"{indent}{key}")
             _tree(value, indent + "  ")
         else:
-            click.echo(f"{indent}{key}: {value}")
+            click.echo(f"{indent}{key}: {NOT_STATED if value is None else value}")
 
 
 @bundle.command()
 @_NAME
-def verify(name: str) -> None:
-    """Check every file of a bundle against its manifest, and every graph against its contract."""
+@session_options
+def verify(name: str, session: SessionOptions) -> None:
+    """Check that a bundle works here: its files and graphs, its model, and its golden vectors computed again."""
     opened = Bundle.open(name)
-    click.echo(f"{opened.path}: {len(opened.verify())} files are as the manifest lists them")
+    found = verify_bundle(opened, session)
+    worst = max(found.errors, key=found.errors.__getitem__)
+    click.echo(f"{opened.path}: {len(found.files)} files are as the manifest lists them")
+    click.echo(f"the model runs on {', '.join(found.providers)}")
+    click.echo(
+        f"golden vectors: the largest difference is {found.errors[worst]:.1e} ({worst}), tolerance {found.tolerance:g}"
+    )
 
 
 @bundle.command()

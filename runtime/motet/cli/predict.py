@@ -1,45 +1,47 @@
-"""``motet predict``: a motion in, what follows out."""
+"""``motet predict``: motion files in, what follows them out."""
 
 from pathlib import Path
 
 import click
 
-from motet.cli.convert import METRES
-from motet.cli.notes import note, refused, unit_option
-from motet.errors import MotionError
-from motet.formats import check_writable, read_motion, write_motion
+from motet.bundle.session import SessionOptions
+from motet.cli.options import session_options
+from motet.cli.reading import Read, Tries, out_option, places, read_options, say_resampled
+from motet.formats import write_motion
 from motet.models.load import load_as
 from motet.models.predict import PredictModel
-from motet.motion.motion import Motion
 
 
 @click.command()
-@click.argument("source", type=Path, metavar="MOTION")
-@click.option("-o", "--out", required=True, type=Path, help="File to write; its extension says the format.")
+@click.argument("sources", nargs=-1, required=True, type=Path, metavar="MOTION...")
+@out_option
 @click.option("--bundle", default="cmu-predict", show_default=True, help="Name or path of a bundle.")
-@click.option("--frames", type=click.IntRange(1), help="How many to predict. [default: the bundle's horizon]")
+@click.option("--frames", type=click.IntRange(1, 100_000), help="How many to predict. [default: the bundle's horizon]")
 @click.option("--append", is_flag=True, help="Write the motion too, and what follows behind it.")
-@unit_option
-def predict(source: Path, out: Path, bundle: str, frames: int | None, append: bool, unit_in: str | None) -> None:
-    """Carry the motion file MOTION on from its last frames, and write what follows.
+@session_options
+@read_options
+def predict(
+    sources: tuple[Path, ...],
+    out: Path,
+    bundle: str,
+    frames: int | None,
+    append: bool,
+    session: SessionOptions,
+    read: Read,
+) -> None:
+    """Carry motion files on from their last frames, and write what follows.
 
-    The file must have the joints of the bundle's figure; the frames come at the bundle's frame rate.
+    A file must have the joints of the bundle's figure; the frames come at the bundle's frame rate. With several files
+    OUT holds {name} for their names, or the results are numbered: out-1.bvh, out-2.bvh, ...
     """
-    check_writable(out)
-    model = load_as(PredictModel, bundle)
-    motion = _read(source, unit_in)
-    try:
-        found = model.predict(motion, frames, append)
-    except MotionError as error:
-        raise refused(source, error) from error
-    if abs(motion.fps - model.fps) > 1e-6:
-        note(f"{source}: resampled from {motion.fps:g} to {model.fps:g} fps")
-    write_motion(out, found)
-    click.echo(f"{out}: {len(found)} frames at {found.fps:g} fps, {found.duration:g} s")
-
-
-def _read(path: Path, unit_in: str | None) -> Motion:
-    motion = read_motion(path)
-    if unit_in and motion.skeleton and motion.skeleton.metres_per_unit is None:
-        motion = motion.with_unit(METRES[unit_in])
-    return motion
+    outs = places(out, [source.stem for source in sources])
+    model, tries, rates = load_as(PredictModel, bundle, session), Tries(), []
+    for source, place in zip(sources, outs, strict=True):
+        with tries.of(source):
+            motion = read(source)
+            found = model.predict(motion, frames=frames, append=append)
+            write_motion(place, found)
+            rates.append(motion.fps)
+            click.echo(f"{place}: {len(found)} frames at {found.fps:g} fps, {found.duration:g} s")
+    say_resampled(rates, model.fps)
+    tries.finish()

@@ -1,25 +1,15 @@
 """Sentences drawn word by word from what a model holds possible (ancestral sampling), spread evenly over it."""
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from motet.bundle.graph import Graph
-from motet.decode.beam import Floats, Ids, Scores
+from motet.decode.beam import Floats, Ids, Limits, Scores
 from motet.decode.rollout import advance, two_rows, zero_state
 
 SEED = 0
 """Every row draws by the noise of this seed: a row gets the same sequences each time, and in any batch."""
-
-
-class Limits(NamedTuple):
-    """Ids of start and end, how many words a sequence has at most, and ids that never come."""
-
-    start: int
-    end: int
-    longest: int
-    banned: Sequence[int] = ()
 
 
 class Drawn(NamedTuple):
@@ -33,7 +23,14 @@ class Drawn(NamedTuple):
     times: int
 
 
-def draw_sequences(step: Graph, context: Floats, draws: int, temperature: float, limits: Limits) -> list[list[Drawn]]:
+def noise_of(limits: Limits, draws: int) -> Floats:
+    """The uniform numbers (longest + 1, draws) float32 that every row is drawn with."""
+    return np.random.Generator(np.random.PCG64(SEED)).random((limits.longest + 1, draws), np.float32)
+
+
+def draw_sequences(
+    step: Graph, context: Floats, limits: Limits, draws: int, temperature: float, noise: Floats | None = None
+) -> list[list[Drawn]]:
     """For each row of ``context`` (B, C) the different ones of ``draws`` sequences; ``draws`` in all.
 
     step: word (N,), context (N, C) and fed back states -> log_probabilities (N, V); N is how many different beginnings
@@ -42,9 +39,11 @@ def draw_sequences(step: Graph, context: Floats, draws: int, temperature: float,
     The n draws that begin alike take the words at u / n, (1 + u) / n, ... (n - 1 + u) / n of the distribution, with one
     uniform number u (systematic sampling). A word of probability p then comes n p times, rounded up or down, and n p
     times on average: the draws show the distribution better than independent ones.
+
+    noise: uniform numbers (longest + 1, draws), those of :func:`noise_of` by default.
     """
     rows = len(context)
-    noise = np.random.Generator(np.random.PCG64(SEED)).random((limits.longest + 1, draws), np.float32)
+    noise = noise_of(limits, draws) if noise is None else noise
     found = np.full((rows * draws, limits.longest + 1), limits.end, dtype=np.int64)
     scores = np.zeros(rows * draws)
     alive = np.arange(rows * draws)  # the draws that have not ended; those that begin alike are neighbours

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.bundle.graph import Arrays, Graph
+from motet.decode.loop import Loop, Setting
 from motet.decode.rollout import advance, two_rows, zero_state
 
 Floats = NDArray[np.float32]
@@ -14,34 +15,50 @@ Scores = NDArray[np.float64]
 Ids = NDArray[np.int64]
 
 
+WORDS = Setting(1, 1000, whole=True)
+"""How many words a sentence has at most."""
+
+
+class Limits(NamedTuple):
+    """Ids of start and end, how many words a sequence has at most, and ids that never come."""
+
+    start: int
+    end: int
+    longest: int
+    banned: Sequence[int] = ()
+
+
 class Hypothesis(NamedTuple):
-    """A finished sequence: its ids without start and end, and the sum of its steps' log-probabilities, end included."""
+    """A finished sequence: its ids without start and end, and the sum of its steps' log-probabilities, end included.
+
+    score: what sequences are ranked by, the higher the better.
+    """
 
     ids: tuple[int, ...]
     log_probability: float
+    score: float
 
 
-def beam_search(
-    step: Graph, context: Floats, beams: int, start: int, end: int, max_length: int, banned: Sequence[int] = ()
-) -> list[list[Hypothesis]]:
+def beam_search(step: Graph, context: Floats, limits: Limits, beams: int) -> list[list[Hypothesis]]:
     """For each row of ``context`` (B, C) up to ``beams`` hypotheses, the most probable first.
 
     step: word (N,), context (N, C) and fed back states -> log_probabilities (N, V). One call for all rows and beams.
     Scores are not divided by length. A hypothesis that ended keeps its score and its place as long as no ``beams``
-    others are better; a row is done when all of its have ended. After ``max_length`` words nothing but the end is
-    possible, so every score is that of a whole sequence. Words in ``banned`` are never chosen.
+    others are better; a row is done when all of its have ended. After the longest sequence nothing but the end is
+    possible, so every score is that of a whole sequence. Scores are log-probabilities.
     """
-    rows = len(context)
+    rows, end = len(context), limits.end
     scores = np.where(np.arange(beams) == 0, 0.0, -np.inf) * np.ones((rows, 1))
-    words = np.full((rows, beams, 1), start, dtype=np.int64)
+    words = np.full((rows, beams, 1), limits.start, dtype=np.int64)
     state = zero_state(step, rows * beams)
-    for length in range(max_length + 1):
+    for length in range(limits.longest + 1):
         alive = two_rows(np.flatnonzero((words[:, :, -1] != end) & np.isfinite(scores)))
         if not len(alive):
             break
         inputs: Arrays = {"word": words[:, :, -1].ravel()[alive], "context": context[alive // beams]}
         outputs, following = advance(step, {name: array[alive] for name, array in state.items()}, inputs)
-        best, gains = _best_words(outputs["log_probabilities"], beams, end if length == max_length else None, banned)
+        only = end if length == limits.longest else None
+        best, gains = _best_words(outputs["log_probabilities"], beams, only, limits.banned)
         scores, parents, chosen = _merge(scores, alive, best, gains, end)
         words = np.concatenate([np.take_along_axis(words, parents[:, :, None], 1), chosen[:, :, None]], axis=2)
         places = np.searchsorted(alive, parents + np.arange(rows)[:, None] * beams).ravel() % len(alive)
@@ -84,5 +101,13 @@ def _hypotheses(ids: Ids, scores: Scores, end: int) -> list[Hypothesis]:
     found = []
     for sequence, score in zip(ids.tolist(), scores.tolist(), strict=True):
         if np.isfinite(score):
-            found.append(Hypothesis(tuple(sequence[: sequence.index(end)]), score))
+            found.append(Hypothesis(tuple(sequence[: sequence.index(end)]), score, score))
     return found
+
+
+INPUTS, OUTPUTS = {"word": "*batch", "context": "batch C"}, {"log_probabilities": "batch V"}
+"""Of the step of every loop over words."""
+
+LOOP = Loop(
+    "describe", beam_search, INPUTS, OUTPUTS, {"beams": Setting(1, 100, whole=True), "max_words": WORDS}, batch=128
+)

@@ -9,11 +9,30 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.decode.ancestral import Drawn
-from motet.decode.beam import Hypothesis
+from motet.bundle.graph import Graph
+from motet.decode.ancestral import Drawn, draw_sequences
+from motet.decode.beam import INPUTS, OUTPUTS, WORDS, Floats, Hypothesis, Limits
+from motet.decode.loop import Loop, Setting
 
 ORDERS = (1, 2)
 """Words, and pairs of words that follow each other."""
+
+
+def consensus(
+    step: Graph,
+    context: Floats,
+    limits: Limits,
+    beams: int,
+    draws: int,
+    temperature: float,
+    noise: Floats | None = None,
+) -> list[list[Hypothesis]]:
+    """For each row of ``context`` (B, C) up to ``beams`` of the sequences drawn, the one that agrees best first.
+
+    step, draws, temperature, noise: see :func:`motet.decode.ancestral.draw_sequences`. Scores are agreements, 0 to 1.
+    """
+    drawn = draw_sequences(step, context, limits, draws, temperature, noise)
+    return [by_consensus(row)[:beams] for row in drawn]
 
 
 def by_consensus(drawn: Sequence[Drawn]) -> list[Hypothesis]:
@@ -21,7 +40,7 @@ def by_consensus(drawn: Sequence[Drawn]) -> list[Hypothesis]:
     scores = agreement([one.ids for one in drawn], np.array([one.times for one in drawn]))
     falling = -scores.round(9)  # what only rounding tells apart is equal
     order = sorted(range(len(drawn)), key=lambda i: (falling[i], -drawn[i].log_probability))
-    return [Hypothesis(drawn[i].ids, drawn[i].log_probability) for i in order]
+    return [Hypothesis(drawn[i].ids, drawn[i].log_probability, float(scores[i])) for i in order]
 
 
 def agreement(sequences: Sequence[tuple[int, ...]], times: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -53,3 +72,18 @@ def _marks(sequences: Sequence[tuple[int, ...]], order: int) -> NDArray[np.float
     marks = np.zeros((len(sequences), len(columns)))
     marks[tuple(np.array(places, dtype=np.intp).reshape(-1, 2).T)] = 1
     return marks
+
+
+LOOP = Loop(
+    "describe",
+    consensus,
+    INPUTS,
+    OUTPUTS,
+    {
+        "max_words": WORDS,
+        "beams": Setting(1, 100, whole=True, default=5),
+        "draws": Setting(1, 1000, whole=True, default=100),
+        "temperature": Setting(0.01, 100, default=1.0),
+    },
+    batch=16,
+)

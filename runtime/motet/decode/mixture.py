@@ -1,12 +1,13 @@
 """Beam search over frames drawn from a mixture of Gaussians. Section 4.3.3 of Plappert et al. 2017."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motet.bundle.graph import Arrays, Graph
+from motet.decode.loop import Loop, Setting
 from motet.decode.rollout import advance, two_rows, zero_state
 
 Floats = NDArray[np.float32]
@@ -18,20 +19,33 @@ SMALLEST = 2.0**-24
 
 
 class Sample(NamedTuple):
-    """A finished sequence: its normalised frames (T, D) float32, and the sum of its steps' log-likelihoods."""
+    """A finished sequence: its normalised frames (T, D) float32, and the sum of its steps' log-likelihoods.
+
+    None where a loop has no likelihoods.
+    """
 
     frames: Floats
-    log_likelihood: float
+    log_likelihood: float | None
+
+
+class Noise(Protocol):
+    """Where the random numbers of a row come from: a :class:`numpy.random.Generator`, or numbers that are given."""
+
+    def standard_normal(self, size: tuple[int, ...], dtype: type[np.float32]) -> Floats:
+        """Normal numbers."""
+
+    def random(self, size: tuple[int, ...], dtype: type[np.float32]) -> Floats:
+        """Uniform numbers in [0, 1)."""
 
 
 def mixture_search(
     step: Graph,
     context: Floats,
-    seeds: Sequence[int],
+    noise: Sequence[Noise],
+    max_frames: int,
     hypotheses: int,
     candidates: int,
     temperature: float,
-    max_frames: int,
 ) -> list[list[Sample]]:
     """For each row of ``context`` (B, C) ``hypotheses`` samples of 1 to ``max_frames`` frames.
 
@@ -49,12 +63,11 @@ def mixture_search(
     figure tremble. The flag is drawn as it is: 1 in the first step, so that no motion is empty, and 0 after
     ``max_frames``. A hypothesis that draws its end several times ends once.
 
-    Row i draws from its own generator, of ``seeds[i]``, and does not depend on the rows around it.
+    Row i draws from ``noise[i]``, and does not depend on the rows around it.
     """
     beam = _Beam(step, context, hypotheses, candidates)
-    generators = [np.random.Generator(np.random.PCG64(seed)) for seed in seeds]
     for length in range(max_frames + 1):
-        if not beam.advance(generators, temperature, forced=_forced(length, max_frames)):
+        if not beam.advance(noise, temperature, forced=_forced(length, max_frames)):
             break
     return beam.samples()
 
@@ -86,7 +99,7 @@ class _Beam:
         self.state = zero_state(step, rows * hypotheses)
         self.history: list[tuple[Floats, Ids]] = []  # of each step the frames (B, W, D) and parents (B, W)
 
-    def advance(self, generators: list[np.random.Generator], temperature: float, forced: bool | None) -> bool:
+    def advance(self, generators: Sequence[Noise], temperature: float, forced: bool | None) -> bool:
         """One step of all hypotheses that have not ended; whether there were any."""
         alive = two_rows(np.flatnonzero(~self.ended))
         if not len(alive):
@@ -105,7 +118,7 @@ class _Beam:
         self.state = {name: np.take(array, places.ravel(), axis=0) for name, array in state.items()}
         return True
 
-    def _noise(self, generators: list[np.random.Generator], alive: Ids) -> tuple[Floats, Floats]:
+    def _noise(self, generators: Sequence[Noise], alive: Ids) -> tuple[Floats, Floats]:
         """Normal (n, C, D) and uniform (n, C, 2) numbers of the hypotheses ``alive``."""
         hypotheses, size = self.shape[1], self.frame.shape[1] - 1
         rows, place = np.unique(alive // hypotheses, return_inverse=True)
@@ -174,3 +187,17 @@ def log_density(frames: Floats, log_weights: Floats, means: Floats, stds: Floats
         top = log_terms.max(axis=1, keepdims=True)
         found[:, candidate] = (top + np.log(np.exp(log_terms - top).sum(axis=1, keepdims=True)))[:, 0]
     return found
+
+
+LOOP = Loop(
+    "generate",
+    mixture_search,
+    {"frame": "batch F", "context": "batch C"},
+    {"log_weights": "batch K", "means": "batch K D", "stds": "batch K D", "active": "batch"},
+    {
+        "hypotheses": Setting(1, 100, whole=True),
+        "candidates": Setting(1, 100, whole=True),
+        "temperature": Setting(0.01, 100),
+        "max_seconds": Setting(0.01, 600),
+    },
+)

@@ -1,9 +1,14 @@
-"""Uniform noise for step graphs: reproducible per row, and independent of the batch around it."""
+"""Noise for step graphs: reproducible per row, independent of the batch around it, recorded and played again."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from motet.errors import BundleError
+
+Floats = NDArray[np.float32]
 
 BLOCK = 16
 """Ticks drawn at once."""
@@ -32,3 +37,55 @@ class RowNoise:
     def _draw(self, seed: int, index: int) -> NDArray[np.float32]:
         generator = np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, index])))
         return generator.random((BLOCK, self.width), dtype=np.float32)
+
+
+class RowsOfNoise:
+    """Uniform numbers (ticks, width) that are given, for one row; BundleError for a tick beyond them."""
+
+    def __init__(self, rows: NDArray[Any]) -> None:
+        self._rows = rows.astype(np.float32)
+
+    def at(self, tick: int) -> Floats:
+        """As :meth:`RowNoise.at`."""
+        if tick >= len(self._rows):
+            raise BundleError(f"the golden vectors have noise for {len(self._rows)} ticks only")
+        return self._rows[tick : tick + 1]
+
+
+class Recording:
+    """A generator whose numbers are kept: ``drawn`` has them by kind ("normal", "uniform"), call by call."""
+
+    def __init__(self, generator: np.random.Generator) -> None:
+        self._generator = generator
+        self.drawn: dict[str, list[Floats]] = {"normal": [], "uniform": []}
+
+    def standard_normal(self, size: tuple[int, ...], dtype: type[np.float32]) -> Floats:
+        """Normal numbers."""
+        self.drawn["normal"].append(self._generator.standard_normal(size, dtype))
+        return self.drawn["normal"][-1]
+
+    def random(self, size: tuple[int, ...], dtype: type[np.float32]) -> Floats:
+        """Uniform numbers in [0, 1)."""
+        self.drawn["uniform"].append(self._generator.random(size, dtype))
+        return self.drawn["uniform"][-1]
+
+
+class Recorded:
+    """The numbers of a recording, (calls, ...) of each kind, given again; BundleError where they do not fit."""
+
+    def __init__(self, drawn: Mapping[str, NDArray[Any]]) -> None:
+        self._left = {kind: iter(drawn[kind]) for kind in ("normal", "uniform")}
+
+    def standard_normal(self, size: tuple[int, ...], dtype: type[np.float32]) -> Floats:
+        """Normal numbers."""
+        return self._next("normal", size, dtype)
+
+    def random(self, size: tuple[int, ...], dtype: type[np.float32]) -> Floats:
+        """Uniform numbers in [0, 1)."""
+        return self._next("uniform", size, dtype)
+
+    def _next(self, kind: str, size: tuple[int, ...], dtype: type[np.float32]) -> Floats:
+        found = next(self._left[kind], None)
+        if found is None or found.shape != size:
+            raise BundleError(f"the golden vectors lack {kind} numbers of the shape {size}")
+        return found.astype(dtype)

@@ -1,5 +1,6 @@
-"""The free run: a step graph whose outputs become its next inputs."""
+"""What all decoding loops share: a step graph whose outputs become its next inputs."""
 
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -19,29 +20,13 @@ def advance(step: Graph, state: State, inputs: Arrays) -> tuple[dict[str, NDArra
     return outputs, {name: outputs[source] for name, source in step.spec.feedback.items()}
 
 
-def free_run(encoder: Graph, step: Graph, seed: NDArray[np.float32], count: int, horizon: int) -> NDArray[np.float32]:
-    """The ``count`` frames (B, count, C) float32 that follow the seed frames (B, L, C) float32.
+def zero_state(step: Graph, rows: int, given: Collection[str] = ()) -> State:
+    """The fed back inputs (rows, ...) of a step before the first one, but for those ``given``: zeros.
 
-    What the encoder gives are the step's inputs, by name: those that are fed back begin there, others stay. After
-    every ``horizon`` frames the encoder is asked again, about the L frames before.
+    A state that grows starts with the sizes that the contract says, 0 along the axis that it grows on.
     """
-    given = seed.shape[1]
-    frames = np.concatenate([seed, np.empty((len(seed), count, seed.shape[2]), dtype=np.float32)], axis=1)
-    for n in range(count):
-        if n % horizon == 0:
-            found = encoder({"frames": np.ascontiguousarray(frames[:, n : n + given])})
-            state = {name: found[name] for name in step.spec.feedback}
-            constant = {name: value for name, value in found.items() if name not in state}
-        outputs, state = advance(step, state, constant)
-        frames[:, n + given] = outputs["frame"]
-    return frames[:, given:]
-
-
-def zero_state(step: Graph, rows: int) -> State:
-    """The fed back inputs (rows, ...) float32 of a step before the first one: zeros."""
-    specs = [step.spec.input(name) for name in step.spec.feedback]
-    shapes = {spec.name: [spec.size(axis) for axis in range(1, len(spec.shape))] for spec in specs}
-    return {name: np.zeros((rows, *shape), dtype=np.float32) for name, shape in shapes.items()}
+    names = [name for name in step.spec.feedback if name not in given]
+    return {name: np.zeros((rows, *step.spec.start_shape(name)), dtype=step.spec.input(name).dtype) for name in names}
 
 
 def two_rows(indices: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -1,6 +1,6 @@
 """The figure that pictures of a motion show: the points of its body in every frame, standing on the ground."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.motion.sides import LEFT, RIGHT
+from motet.motion.skeleton import Skeleton
 
 NEAR_GROUND = 0.1
 """Within this height of y = 0 the lowest point of a motion is taken to stand on y = 0."""
@@ -39,12 +40,30 @@ def figure_of(motion: Motion) -> Figure:
     skeleton = skeleton_of(motion)
     if not len(motion):
         raise MotionError("this motion has no frames: there is nothing to show")
+    skeleton, places = _moving_part(motion, skeleton)
     body = Body(skeleton)
-    points = positions(motion) / body.height
+    points = places / body.height
     if not np.abs(points).max() < LARGEST:
         raise MotionError(f"joints are further than {LARGEST:g} body heights from the origin: this cannot be shown")
     points[:, :, 1] -= _ground(points, moves=f"{skeleton.names[0]}.ty" in motion.channels)
     return Figure(body.points(points), body.bones, _heading(points[0], body.sides), motion.fps)
+
+
+def _moving_part(motion: Motion, skeleton: Skeleton) -> tuple[Skeleton, Array]:
+    """The skeleton from the joint on that carries the figure about, and the positions (T, J, 3) of its joints.
+
+    Some programs put a joint above the hips that stays at the origin: it is not a part of the figure.
+    """
+    places, first = positions(motion), 0
+    travelled = {name.rpartition(".")[0] for name in motion.channels if name[-3:-1] == ".t"}
+    while (
+        skeleton.children[first] == (first + 1,)
+        and not np.ptp(places[:, first], axis=0).any()
+        and skeleton.names[first + 1] in travelled
+    ):
+        first += 1
+    joints = (replace(joint, parent=max(joint.parent - first, -1)) for joint in skeleton.joints[first:])
+    return replace(skeleton, joints=tuple(joints)), places[:, first:]
 
 
 def _ground(points: Array, moves: bool) -> float:

@@ -1,64 +1,146 @@
-"""Files of motion: one module per format, chosen by the extension.
+"""Files of motion: one record per format, chosen by the extension.
 
-A module that reads has ``read(path) -> Motion``, one that writes has ``write(path, motion)``; both raise motet's
-errors and leave nothing half-written.
+A format's module has ``read(file, **options) -> Motion``, ``write(file, motion)`` or both, where a file is a path or a
+file object of bytes; both raise motet's errors and leave nothing half-written. To add a format, write its module and
+add its record to :data:`FORMATS`: help texts, the table of docs/formats.md and the lists of corpora are made from it.
 """
 
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
-from types import ModuleType
+from typing import Any
 
-from motet.errors import FormatError
-from motet.files import check_place
+import numpy as np
+
+from motet.errors import FormatError, MotionError, OutputError
+from motet.files import File, check_place, place_of
 from motet.motion.motion import Motion
-
-MODULES = {
-    ".amc": "amc",
-    ".bvh": "bvh",
-    ".npz": "npz",
-    ".csv": "csv",
-    ".xml": "mmm",
-    ".html": "html",
-    ".gif": "gif",
-    ".glb": "glb",
-}
-"""Extension -> name of the module in this package."""
-
-BROKEN = (".amc", ".bvh")
-"""Formats whose files break off in practice; their ``read`` takes ``partial``."""
-
-READABLE = (".amc", ".bvh", ".npz", ".csv", ".xml")
-WRITABLE = (".amc", ".bvh", ".npz", ".csv", ".html", ".gif", ".glb")
+from motet.motion.units import metres
 
 
-def read_motion(path: str | Path, partial: bool = False) -> Motion:
-    """Read a motion file; FormatError for an unknown extension, a missing file or one that is no motion.
+@dataclass(frozen=True)
+class Format:
+    """One format of motion files.
 
-    partial: take the whole frames of a file that breaks off, which is refused otherwise.
+    module: its module in this package, imported when it is used.
+    keeps: what of a motion a file holds, for the docs.
+    reads, writes: whether the module has ``read`` and ``write``.
+    options: the keyword arguments of its ``read``.
+    mocap: whether a file holds motion and skeleton, which the files of a corpus must.
+    needs: the package that writing takes, out of the extra "plot".
     """
-    path = Path(path)
-    module = _module(path, READABLE, "read")
-    if not path.is_file():
-        raise FormatError(path, "no such file")
-    options = {"partial": True} if partial and path.suffix.lower() in BROKEN else {}
-    motion: Motion = module.read(path, **options)
-    return motion
+
+    extension: str
+    name: str
+    module: str
+    keeps: str
+    reads: bool = True
+    writes: bool = True
+    options: tuple[str, ...] = ()
+    mocap: bool = False
+    needs: str = ""
+
+    def function(self, verb: str) -> Callable[..., Any]:
+        """Its "read" or "write"."""
+        found: Callable[..., Any] = getattr(import_module(f"motet.formats.{self.module}"), verb)
+        return found
 
 
-def write_motion(path: str | Path, motion: Motion) -> None:
-    """Write a motion in the format of the extension; FormatError or OutputError if that is not possible."""
-    check_writable(path)
-    _module(Path(path), WRITABLE, "write").write(Path(path), motion)
+_AMC = "everything; AMC has no frame rate: 120 unless motet wrote another into a comment, or `fps=` says it"
+_GIF = "a picture that moves; needs Pillow: `pip install 'motet[plot]'`"
+
+FORMATS = (
+    Format(".amc", "Acclaim, with its .asf", "amc", _AMC, options=("asf", "fps", "partial"), mocap=True),
+    Format(".bvh", "Biovision", "bvh", "everything but the unit of length", options=("partial",), mocap=True),
+    Format(".npz", "motet's own", "npz", "everything, to the last bit", mocap=True),
+    Format(".csv", "table", "csv", "values, units and frame rate, no skeleton"),
+    Format(".xml", "MMM of KIT", "mmm", "angles and root; the skeleton is not in the file", writes=False),
+    Format(".html", "web page", "html", "a page with a player: orbit, play, scrub, no network", reads=False),
+    Format(".gif", "picture", "gif", _GIF, reads=False, needs="PIL"),
+    Format(".glb", "glTF 2.0", "glb", "a skeleton with a body, for viewers and engines", reads=False),
+)
+
+READABLE = tuple(kind.extension for kind in FORMATS if kind.reads)
+WRITABLE = tuple(kind.extension for kind in FORMATS if kind.writes)
+MOCAP = tuple(kind.extension for kind in FORMATS if kind.mocap)
+READS = ", ".join(f"{kind.extension} ({kind.name})" for kind in FORMATS if kind.reads)
+WRITES = ", ".join(f"{kind.extension} ({kind.name})" for kind in FORMATS if kind.writes)
+"""The formats as help texts list them."""
 
 
-def check_writable(path: str | Path) -> None:
+def read_motion(
+    file: File,
+    *,
+    fps: float | None = None,
+    asf: str | Path | None = None,
+    unit: str | float | None = None,
+    partial: bool = False,
+    format: str | None = None,
+) -> Motion:
+    """Read a motion file, or a file object of bytes.
+
+    fps: the frame rate where the format has none, which is AMC.
+    asf: the skeleton of an AMC file; by default it is looked for beside it.
+    unit: the length unit where the file does not say its own: "m", "cm", "mm", "inch" or a number of metres.
+    partial: take the complete frames of a truncated AMC or BVH file, which is refused otherwise.
+    format: the extension, such as "bvh", where it is not the path's; a file object needs it.
+    FormatError for an unknown extension, a missing file, one that is not a motion, and an option that the format does
+    not take or the file contradicts.
+    """
+    kind, path = _format(file, format, READABLE, "read"), place_of(file)
+    given = {"fps": fps, "asf": asf, "partial": partial or None}
+    options = {name: value for name, value in given.items() if value is not None}
+    for name in options.keys() - set(kind.options):
+        takers = " ".join(known.extension for known in FORMATS if name in known.options)
+        raise FormatError(path, f"{name!r} is an option of {takers} files only")
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):  # what gets infinite is refused by Motion
+            motion: Motion = kind.function("read")(file, **options)
+        return motion if unit is None else _in_unit(path, motion, metres(unit))
+    except FormatError:
+        raise
+    except MotionError as error:
+        raise FormatError(path, str(error)) from error
+
+
+def write_motion(file: File, motion: Motion, *, format: str | None = None) -> None:
+    """Write a motion in the format of the path's extension, or in ``format``, which a file object needs.
+
+    FormatError, MotionError or OutputError if that is not possible; nothing is written then.
+    """
+    check_writable(file, format)
+    with np.errstate(over="ignore", invalid="ignore"):  # writers refuse what is too large by themselves
+        _format(file, format, WRITABLE, "write").function("write")(file, motion)
+
+
+def check_writable(file: File, format: str | None = None) -> None:
     """Refuse a place that cannot be written to, or an unknown extension, before long work starts."""
-    _module(Path(path), WRITABLE, "write")
-    check_place(path)
+    kind = _format(file, format, WRITABLE, "write")
+    if kind.needs and find_spec(kind.needs) is None:
+        reason = (
+            f"{kind.extension} files need the package {kind.needs}: install the extra with  pip install 'motet[plot]'"
+        )
+        raise OutputError(f"cannot write {place_of(file)}: {reason}")
+    if isinstance(file, str | Path):
+        check_place(file)
 
 
-def _module(path: Path, allowed: tuple[str, ...], verb: str) -> ModuleType:
-    extension = path.suffix.lower()
-    if extension not in allowed:
-        raise FormatError(path, f"cannot {verb} files of type {extension or 'none'!r}; known are {' '.join(allowed)}")
-    return import_module(f"motet.formats.{MODULES[extension]}")
+def _format(file: File, format: str | None, allowed: tuple[str, ...], verb: str) -> Format:
+    extension = place_of(file).suffix.lower() if format is None else f".{format.lower().removeprefix('.')}"
+    if extension in allowed:
+        return next(kind for kind in FORMATS if kind.extension == extension)
+    what = f"files of type {extension!r}" if extension else "a file without an extension"
+    raise FormatError(place_of(file), f"cannot {verb} {what}; expected one of {' '.join(allowed)}")
+
+
+def _in_unit(path: Path, motion: Motion, unit: float) -> Motion:
+    """The motion with the length unit that its file does not say, or says alike."""
+    if motion.skeleton is None:
+        raise FormatError(path, "it has no skeleton, and so no length unit that could be given")
+    said = motion.skeleton.metres_per_unit
+    if said is not None and not math.isclose(said, unit, rel_tol=1e-6):
+        raise FormatError(path, f"its length unit is {said:.6g} m, as the file says, and not {unit:.6g} m as given")
+    return motion.with_unit(unit) if said is None else motion

@@ -1,17 +1,17 @@
 """AMC motion with its ASF skeleton (Acclaim), the format of the CMU motion capture database."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from itertools import islice
+from itertools import compress, cycle, islice
 from pathlib import Path
 
 import numpy as np
 
-from motet.errors import FormatError
-from motet.files import check_place, write_whole
+from motet.errors import FormatError, quoted
+from motet.files import File, check_place, place_of, write_whole
 from motet.formats.asf import CMU_METRES, ROOT, Asf, read_skeleton, write_skeleton
-from motet.formats.lines import numbers, plain_names, read_text
+from motet.formats.lines import frame_rate, number, numbers, plain_names, read_text
 from motet.formats.writable import ANGLES, TRANSLATIONS, with_names, with_still_offsets
 from motet.motion.kinematics import skeleton_of
 from motet.motion.motion import Motion
@@ -29,34 +29,43 @@ FORBIDDEN = r"[\s#]|^(?=\d+$)|^(?=:)"
 Layout = list[tuple[str, int]]
 
 
-def read(path: str | Path, asf: str | Path | None = None, fps: float | None = None, partial: bool = False) -> Motion:
+def read(file: File, asf: str | Path | None = None, fps: float | None = None, partial: bool = False) -> Motion:
     """Read an AMC file and the ASF file of its skeleton.
 
     asf: the skeleton; if not given, the file of the same stem, else of the same subject (``39.asf`` for
         ``39_14.amc``), else the only ASF file, looked for beside the motion and then in ``../asf``.
     fps: AMC does not say. If not given: what the file's own comment ``# fps 60`` says (motet writes one), else 120,
-        the rate of nearly all of CMU.
-    partial: take the whole frames of a file that breaks off within its last one, which is refused otherwise.
+        the rate of nearly all of CMU. A comment that says something else is an error.
+    partial: take the complete frames of a file that breaks off within its last one, which is refused otherwise.
     Channels come in the file's order of bones, units "length" for translations, "deg" or "rad" as in the file.
     FormatError names the file, and the line where it breaks off or does not fit the skeleton.
     """
-    path = Path(path)
-    asf = Path(asf) if asf is not None else _find_asf(path)
-    skeleton = read_skeleton(asf)
-    text = read_text(path)
+    path, text = place_of(file), read_text(file)
+    if asf is None and not isinstance(file, str | Path):
+        raise FormatError(path, "a file object has no folder where its skeleton would be: give it as asf")
+    skeleton = read_skeleton(asf if asf is not None else _find_asf(path))
     header, unit, said_fps = _header(path, text, skeleton)
     layout = _layout(path, _frame_lines(text, header), skeleton.dofs)
     values = _values(path, text, header, layout, partial)
     channels = [(bone, dof) for bone, _ in layout for dof in skeleton.dofs[bone]]
     names = tuple(f"{bone}.{dof}" for bone, dof in channels)
     units = tuple("length" if dof[0] == "t" else unit for _, dof in channels)
-    return Motion(values, names, units, fps or said_fps, skeleton.skeleton)
+    return Motion(values, names, units, _rate(path, said_fps, fps), skeleton.skeleton)
+
+
+def _rate(path: Path, said: float | None, given: float | None) -> float:
+    if said is not None and given is not None and abs(said - given) > 1e-6 * said:
+        raise FormatError(path, f"its frame rate is {said:g}, as the file says, and not {given:g} as given")
+    return frame_rate(CMU_FPS if said is None and given is None else said or given or 0.0, path)
 
 
 def _find_asf(path: Path) -> Path:
     stems = list(dict.fromkeys([path.stem, path.stem.split("_")[0]]))
     for folder in (path.parent, path.parent.parent / "asf"):
-        found = sorted(folder.iterdir()) if folder.is_dir() else []
+        try:
+            found = sorted(folder.iterdir()) if folder.is_dir() else []
+        except OSError as error:
+            raise FormatError(path, f"no skeleton can be looked for in {folder}: {error.strerror}") from error
         by_stem = {file.stem: file for file in found if file.suffix.lower() == ".asf"}
         for stem in stems:
             if stem in by_stem:
@@ -67,15 +76,15 @@ def _find_asf(path: Path) -> Path:
     raise FormatError(path, f"its skeleton is missing: no {names}, nor a single .asf, beside it or in ../asf")
 
 
-def _header(path: Path, text: str, asf: Asf) -> tuple[int, str, float]:
-    """The number of lines before the first frame, the unit of angles and the frame rate."""
-    unit, fps, line = asf.angle, CMU_FPS, -1
+def _header(path: Path, text: str, asf: Asf) -> tuple[int, str, float | None]:
+    """The number of lines before the first frame, the unit of angles and the frame rate where a comment says it."""
+    unit, fps, line = asf.angle, None, -1
     for line, content in enumerate(re.finditer(EACH_LINE, text)):
         word = content[0].strip().lower()
         if word in (":degrees", ":radians"):
             unit = word[1:4]
         elif word.startswith(FPS_COMMENT):
-            fps = numbers([word.removeprefix(FPS_COMMENT)], path, line + 1)[0]
+            fps = frame_rate(number(word.removeprefix(FPS_COMMENT), path, line + 1), path, line + 1)
         elif word and word[0] not in "#:":
             return line, unit, fps
     return line + 1, unit, fps
@@ -89,21 +98,22 @@ def _frame_lines(text: str, header: int) -> Iterator[tuple[int, list[str]]]:
             yield line, words
 
 
-def _layout(path: Path, lines: Iterator[tuple[int, list[str]]], dofs: dict[str, tuple[str, ...]]) -> Layout:
+def _layout(path: Path, lines: Iterator[tuple[int, list[str]]], dofs: Mapping[str, tuple[str, ...]]) -> Layout:
     """The first frame's bones, each with its number of values; those of the skeleton if there is no frame."""
     line, words = next(lines, (0, [""]))
     if not words[0]:
         return [(bone, len(names)) for bone, names in dofs.items()]
     if not _is_frame_number(words):
-        raise FormatError(path, f"a frame begins with its number alone on a line, not {' '.join(words)!r}", line)
+        reason = f"a frame begins with its number alone on a line, not {quoted(' '.join(words))}"
+        raise FormatError(path, reason, line)
     layout: dict[str, int] = {}
     for line, words in lines:
         if _is_frame_number(words):
             break
         if words[0] in layout:
-            raise FormatError(path, f"bone {words[0]!r} comes twice in a frame", line)
+            raise FormatError(path, f"bone {quoted(words[0])} comes twice in a frame", line)
         if words[0] not in dofs:
-            raise FormatError(path, f"bone {words[0]!r} has no degrees of freedom in the skeleton file", line)
+            raise FormatError(path, f"bone {quoted(words[0])} has no degrees of freedom in the skeleton file", line)
         layout[words[0]] = len(dofs[words[0]])
     return list(layout.items())
 
@@ -132,22 +142,20 @@ def _values_at_once(text: str, header: int, layout: Layout) -> Array | None:
     frames, rest = divmod(len(words), width)
     if rest or not all(map(str.isdigit, words[::width])):
         return None
-    columns: list[list[str]] = []
-    here = 1
+    is_value, here = [False] * width, 1
     for bone, count in layout:
         if words[here::width] != [bone] * frames:
             return None
-        columns += [words[column::width] for column in range(here + 1, here + 1 + count)]
+        is_value[here + 1 : here + 1 + count] = [True] * count
         here += 1 + count
+    found = list(compress(words, cycle(is_value)))
     # Python would read 1_000, which no other program does
-    if "_" in text and any("_" in word for column in columns for word in column):
+    if "_" in text and "_" in "".join(found):
         return None
-    values = np.empty((frames, len(columns)))
     with suppress(ValueError):
-        for i, column in enumerate(columns):
-            values[:, i] = np.fromiter(map(float, column), np.float64, frames)
+        values = np.fromiter(map(float, found), np.float64, len(found))
         if np.isfinite(values).all():
-            return values
+            return values.reshape(frames, sum(is_value))
     return None
 
 
@@ -164,7 +172,7 @@ def _values_by_line(path: Path, lines: Iterator[tuple[int, list[str]]], layout: 
             continue
         if not expected or words[0] != expected[-1][0]:
             wanted = f"bone {expected[-1][0]!r}" if expected else "a frame number"
-            raise FormatError(path, f"{words[0]!r} where the order of the first frame has {wanted}", line)
+            raise FormatError(path, f"{quoted(words[0])} where the order of the first frame has {wanted}", line)
         bone, count = expected.pop()
         if len(words) - 1 != count:
             raise FormatError(path, f"bone {bone!r} needs {count} values, not {len(words) - 1}", line)
@@ -178,8 +186,8 @@ def _refuse_rest(path: Path, expected: Layout, line: int) -> None:
         raise FormatError(path, f"the frame breaks off here: it lacks bone {expected[-1][0]!r}", line)
 
 
-def write(path: str | Path, motion: Motion) -> None:
-    """Write ``path`` and beside it, with the same stem, the ASF file of the skeleton; both are replaced if there.
+def write(file: File, motion: Motion) -> None:
+    """Write ``file``, a path, and beside it the ASF file of the same stem; both are replaced if there.
 
     The frame rate goes into a comment that :func:`read` understands. The root becomes "root"; characters that the
     format cannot hold become ``_``. Values are written without loss, translations in the skeleton's unit; a skeleton
@@ -187,7 +195,9 @@ def write(path: str | Path, motion: Motion) -> None:
     FormatError for channels other than Euler angles and translations, and for a joint besides the root that really
     moves within its parent's frame; MotionError for a motion without skeleton.
     """
-    path = check_place(path)
+    if not isinstance(file, str | Path):
+        raise FormatError(place_of(file), "AMC is two files, which do not go into one file object")
+    path = check_place(file)
     motion, moving = with_still_offsets(path, motion)
     if moving:
         raise FormatError(path, f"only the root can move in an AMC file, not {', '.join(moving)}")
@@ -212,7 +222,7 @@ def _dofs(motion: Motion, joint: Joint) -> tuple[str, ...]:
     return (*(dof for dof in dofs if dof in TRANSLATIONS), *turns)
 
 
-def _text(motion: Motion, dofs: dict[str, tuple[str, ...]]) -> str:
+def _text(motion: Motion, dofs: Mapping[str, tuple[str, ...]]) -> str:
     bones = list(dict.fromkeys(channel.rpartition(".")[0] for channel in motion.channels))
     unit = "rad" if "rad" in motion.units and "deg" not in motion.units else "deg"
     channels = tuple(f"{bone}.{dof}" for bone in bones for dof in dofs[bone])

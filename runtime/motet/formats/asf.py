@@ -6,15 +6,16 @@ root's ``order`` name a bone's channels, the one applied first comes first: ``rx
 is ``axis ... XYZ``. The root's ``orientation`` is read as its axis, its ``position`` as its offset.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
-from motet.errors import FormatError
+from motet.errors import FormatError, MotionError, quoted
 from motet.files import write_whole
-from motet.formats.lines import complete_order, numbers, read_text, unique_name
+from motet.formats.lines import Names, complete_order, numbers, read_text
 from motet.motion.rotations import euler_to_rotmat, rotmat_to_euler
 from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
 
@@ -29,10 +30,13 @@ Lines = list[tuple[int, list[str]]]
 
 @dataclass(frozen=True)
 class Asf:
-    """A skeleton; for every joint with channels their names ("rx", "tx", ...); the unit of angles, deg or rad."""
+    """A skeleton; for every joint with channels their names ("rx", "tx", ...); the unit of angles, deg or rad.
+
+    Files of the same skeleton share one: nothing of it is to be changed.
+    """
 
     skeleton: Skeleton
-    dofs: dict[str, tuple[str, ...]]
+    dofs: Mapping[str, tuple[str, ...]]
     angle: str
 
 
@@ -47,33 +51,48 @@ class _Bone:
 
 
 def read_skeleton(path: str | Path) -> Asf:
-    """Read an ASF file; FormatError with file and line where it is none. Limits and masses are left out."""
-    path = Path(path)
-    sections = _sections(path)
+    """Read an ASF file, without limits and masses.
+
+    FormatError with file and line where it is not one, where a bone has no direction, length or axis, and where the
+    hierarchy leaves one out.
+    """
+    return _skeleton(Path(path), read_text(path))
+
+
+@lru_cache(maxsize=16)
+def _skeleton(path: Path, text: str) -> Asf:
+    """A folder's motions are mostly of a few people: each skeleton is parsed once."""
+    sections = _sections(path, text)
     units = {words[0].lower(): words[1] for _, words in sections.get("units", []) if len(words) > 1}
     angle = units.get("angle", "deg").lower()[:3]
     if angle not in ("deg", "rad"):
-        raise FormatError(path, f"angles in {units['angle']!r}: known are deg and rad")
+        raise FormatError(path, f"angles in {quoted(units['angle'])}: expected deg or rad")
     factor = 1.0 if angle == "deg" else 180 / np.pi
     root, position = _root(path, sections.get("root", []), factor)
     bones = {ROOT: root}
     for line, block in _blocks(path, sections.get("bonedata", [])):
-        bone = _bone(path, block, factor)
+        bone = _bone(path, line, block, factor)
         if not bone.name or bone.name in bones:
-            raise FormatError(path, f"a bone needs a name of its own, not {bone.name!r}", line)
+            raise FormatError(path, f"a bone needs a name of its own, not {quoted(bone.name)}", line)
         bones[bone.name] = bone
     _hang_children(path, sections.get("hierarchy", []), bones)
     metres = CMU_METRES if units.get("length") == str(CMU_LENGTH) else None
-    skeleton = Skeleton(tuple(_joints(bones, position)), metres)
+    joints = _joints(bones, position)
+    if lost := bones.keys() - {joint.name for joint in joints}:
+        raise FormatError(path, f"the hierarchy does not lead to bone {quoted(min(lost))}")
+    try:
+        skeleton = Skeleton(tuple(joints), metres)
+    except MotionError as error:
+        raise FormatError(path, str(error)) from error
     return Asf(skeleton, {bone.name: bone.dofs for bone in bones.values() if bone.dofs}, angle)
 
 
-def _sections(path: Path) -> dict[str, Lines]:
+def _sections(path: Path, text: str) -> dict[str, Lines]:
     """The lines of each ``:section``, as line number and words, without comments."""
     sections: dict[str, Lines] = {}
     current: Lines = []
-    for line, text in enumerate(read_text(path).split("\n"), start=1):
-        words = text.split("#")[0].split()
+    for line, content in enumerate(text.split("\n"), start=1):
+        words = content.split("#")[0].split()
         if words and words[0].startswith(":"):
             current = sections.setdefault(words[0][1:].lower(), [])
         elif words:
@@ -90,7 +109,7 @@ def _blocks(path: Path, lines: Lines) -> Iterator[tuple[int, Lines]]:
     for line, words in lines:
         word = words[0].lower()
         if word in ("begin", "end") and (word == "begin") == bool(start):
-            raise FormatError(path, f"{word!r} where a bone {'has begun' if start else 'has not begun'}", line)
+            raise FormatError(path, f"{word!r} where {'a bone' if start else 'no bone'} has begun", line)
         if word == "begin":
             start, block = line, []
         elif word == "end":
@@ -119,8 +138,11 @@ def _root(path: Path, lines: Lines, factor: float) -> tuple[_Bone, Triple]:
     return root, position
 
 
-def _bone(path: Path, lines: Lines, factor: float) -> _Bone:
+def _bone(path: Path, begin: int, lines: Lines, factor: float) -> _Bone:
     bone, direction, length = _Bone(), (0.0, 0.0, 0.0), 0.0
+    said = {words[0].lower() for _, words in lines}
+    if missing := [word for word in ("direction", "length", "axis") if word not in said]:
+        raise FormatError(path, f"this bone has no {' or '.join(missing)}", begin)
     for line, words in lines:
         match words[0].lower():
             case "name":
@@ -133,7 +155,7 @@ def _bone(path: Path, lines: Lines, factor: float) -> _Bone:
                 bone.axis = _axis(path, line, words[1:], factor)
             case "dof":
                 bone.dofs = _dofs(path, line, words[1:], ("rx", "ry", "rz"))
-    bone.reach = (direction[0] * length, direction[1] * length, direction[2] * length)
+    bone.reach = _triple(path, begin, [repr(value * length) for value in direction])
     return bone
 
 
@@ -148,7 +170,8 @@ def _axis(path: Path, line: int, words: list[str], factor: float) -> Triple:
     """Angles in the order of the letters that follow them, as angles about x, y, z of ``Joint.axis``."""
     order = words[-1].lower() if words else ""
     if sorted(order) != ["x", "y", "z"]:
-        raise FormatError(path, f"an axis is three angles and their order such as XYZ, not {' '.join(words)!r}", line)
+        reason = f"an axis is three angles and their order such as XYZ, not {quoted(' '.join(words))}"
+        raise FormatError(path, reason, line)
     x, y, z = _triple(path, line, words[:-1])
     if order == "xyz":
         return x * factor, y * factor, z * factor
@@ -161,7 +184,8 @@ def _dofs(path: Path, line: int, words: list[str], known: tuple[str, ...]) -> tu
     dofs = tuple(word.lower() for word in words)
     unknown = [word for word in dofs if word not in known]
     if unknown or len(set(dofs)) < len(dofs):
-        raise FormatError(path, f"degrees of freedom {' '.join(words)!r}: each of {' '.join(known)} at most once", line)
+        reason = f"degrees of freedom {quoted(' '.join(words))}: each of {' '.join(known)} at most once"
+        raise FormatError(path, reason, line)
     return dofs
 
 
@@ -172,10 +196,10 @@ def _hang_children(path: Path, lines: Lines, bones: dict[str, _Bone]) -> None:
             continue
         for name in words:
             if name not in bones:
-                raise FormatError(path, f"the hierarchy has a bone {name!r}, which :bonedata lacks", line)
+                raise FormatError(path, f"the hierarchy has a bone {quoted(name)}, which :bonedata does not have", line)
         for child in words[1:]:
             if child in hung:
-                raise FormatError(path, f"bone {child!r} hangs on two bones", line)
+                raise FormatError(path, f"bone {quoted(child)} hangs on two bones", line)
             hung.add(child)
             bones[words[0]].children.append(child)
 
@@ -221,7 +245,7 @@ def write_skeleton(path: str | Path, asf: Asf) -> None:
 def _bones(asf: Asf) -> list[_Bone]:
     """The root, with the position in place of its reach, and all bones that the skeleton needs."""
     bones: dict[str, _Bone] = {}
-    joints, tips = asf.skeleton.joints, _tips(asf)
+    joints, tips, names = asf.skeleton.joints, _tips(asf), Names(asf.skeleton.names)
     for joint, children in zip(joints, asf.skeleton.children, strict=True):
         if joint.name in tips:
             continue
@@ -236,7 +260,7 @@ def _bones(asf: Asf) -> list[_Bone]:
         for child in (joints[i] for i in children if joints[i].name not in tips):
             name = child.name
             if any(child.offset) if joint.parent == -1 else child.offset != bone.reach:
-                name = unique_name(f"{child.name}_base", {*asf.skeleton.names, *bones})
+                name = names.unique(f"{child.name}_base")
                 bones[name] = _Bone(name, child.offset, children=[child.name])
             bone.children.append(name)
     return list(bones.values())

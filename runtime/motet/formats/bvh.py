@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from motet.errors import FormatError
-from motet.files import check_place, write_whole
-from motet.formats.lines import complete_order, numbers, plain_names, read_text, unique_name
+from motet.errors import FormatError, MotionError, quoted
+from motet.files import File, place_of, write_whole
+from motet.formats.lines import Names, complete_order, frame_rate, number, numbers, plain_names, read_text
 from motet.formats.writable import with_names, with_still_offsets
 from motet.motion.kinematics import local_rotations, local_translations, skeleton_of
 from motet.motion.motion import TURN, Motion
@@ -28,38 +28,49 @@ POSITION, ROTATION = "Xposition Yposition Zposition", "Zrotation Yrotation Xrota
 FORBIDDEN = r"[^\w.-]"
 """What the writer keeps out of names: readers stumble over blanks and colons."""
 
+MAX_FRAMES = 10**7
+"""Of a file without channels, whose number of frames nothing else bears out."""
 
-def read(path: str | Path, partial: bool = False) -> Motion:
+DEEPEST = 40
+"""Tabs before a line at most: a long chain of joints is not a long file."""
+
+
+def read(file: File, partial: bool = False) -> Motion:
     """Read a BVH file: channels in the file's order, units "deg" and "length".
 
-    A frame time that is a whole number of frames per second as far as its digits tell is read as that rate:
-    0.0083333 is 120 fps.
-    partial: take the whole frames of a file that breaks off or declares another number, which is refused otherwise.
+    A frame time is read as a whole number of frames per second if that is the only one which its digits allow:
+    0.0083333 is 120 fps, and 0.03, which may stand for 29 to 40, is 33.33.
+    partial: take the complete frames of a file that is truncated or declares another number, which is refused
+        otherwise.
     FormatError names file and line.
     """
-    path = Path(path)
-    lines = read_text(path).split("\n")
+    path, lines = place_of(file), read_text(file).split("\n")
     nodes, motion_line = _hierarchy(path, lines)
     start, declared, fps = _motion_header(path, lines, motion_line)
     channels = [f"{node.name}.{kind}" for node in nodes for kind in node.channels]
+    if not channels and declared > MAX_FRAMES:
+        raise FormatError(path, f"the file declares {declared} frames and has no channels", start)
     kept = _without_broken_end(lines, start, len(channels)) if partial else lines
     values = _values(path, kept, start, len(channels)) if channels else np.zeros((declared, 0))
     if len(values) != declared and not partial:
         reason = f"the file declares {declared} frames and holds {len(values)}: correct the line 'Frames:'"
         raise FormatError(path, f"{reason}, or read it as partial", start)
     units = tuple("deg" if name[-2] == "r" else "length" for name in channels)
-    return Motion(values, tuple(channels), units, fps, Skeleton(tuple(_joint(node) for node in nodes)))
+    return Motion(values, tuple(channels), units, fps, Skeleton(tuple(_joint(path, node) for node in nodes)))
 
 
 @dataclass
 class _Node:
     name: str
     parent: int
-    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    line: int
+    offset: tuple[float, float, float] | None = None
     channels: tuple[str, ...] = ()
 
 
-def _joint(node: _Node) -> Joint:
+def _joint(path: Path, node: _Node) -> Joint:
+    if node.offset is None:
+        raise FormatError(path, f"joint {quoted(node.name)} has no OFFSET", node.line)
     turns = "".join(kind[1] for kind in node.channels if kind[0] == "r")
     return Joint(node.name, node.parent, node.offset, complete_order(turns))
 
@@ -68,16 +79,18 @@ def _hierarchy(path: Path, lines: list[str]) -> tuple[list[_Node], int]:
     """The joints, and the number of the line MOTION behind them."""
     nodes: list[_Node] = []
     open_nodes: list[int] = []
+    names = Names()
     declared = False  # a joint has been named and its brace must come now
     for line, statement in _statements(lines):
         keyword, _, rest = statement.replace("\t", " ").partition(" ")
         match keyword.lower():
             case "root" | "joint" | "end" as kind:
                 if declared or bool(open_nodes) == (kind == "root") or (nodes and not open_nodes):
-                    raise FormatError(
-                        path, f"{statement!r} does not belong here: a file holds one tree of joints", line
-                    )
-                nodes.append(_Node(_name(kind, rest.strip(), nodes, open_nodes), open_nodes[-1] if open_nodes else -1))
+                    reason = f"{quoted(statement)} does not belong here: a file holds one tree of joints"
+                    raise FormatError(path, reason, line)
+                parent = open_nodes[-1] if open_nodes else -1
+                wanted = nodes[parent].name + END_SUFFIX if kind == "end" else rest.strip() or "joint"
+                nodes.append(_Node(names.unique(wanted), parent, line))
             case "{" if declared:
                 open_nodes.append(len(nodes) - 1)
             case "}" if open_nodes and not declared:
@@ -91,9 +104,9 @@ def _hierarchy(path: Path, lines: list[str]) -> tuple[list[_Node], int]:
             case "hierarchy" if not nodes:
                 pass
             case _:
-                raise FormatError(path, f"{statement!r} does not belong here", line)
+                raise FormatError(path, f"{quoted(statement)} does not belong here", line)
         declared = keyword.lower() in ("root", "joint", "end")
-    raise FormatError(path, "this is no whole BVH file: the line MOTION is missing")
+    raise FormatError(path, "not a BVH file, or a truncated one: the line MOTION is missing")
 
 
 def _statements(lines: list[str]) -> Iterator[tuple[int, str]]:
@@ -101,11 +114,6 @@ def _statements(lines: list[str]) -> Iterator[tuple[int, str]]:
         for piece in re.split("([{}])", text):
             if piece.strip():
                 yield line, piece.strip()
-
-
-def _name(kind: str, name: str, nodes: list[_Node], open_nodes: list[int]) -> str:
-    wanted = nodes[open_nodes[-1]].name + END_SUFFIX if kind == "end" else name or "joint"
-    return unique_name(wanted, [node.name for node in nodes])
 
 
 def _offset(path: Path, words: list[str], line: int) -> tuple[float, float, float]:
@@ -119,12 +127,12 @@ def _channels(path: Path, words: list[str], line: int) -> tuple[str, ...]:
     kinds = [re.fullmatch("([xyz])(position|rotation)", word.lower()) for word in words[1:]]
     channels = tuple(("t" if kind[2] == "position" else "r") + kind[1] for kind in kinds if kind)
     if len(channels) < len(kinds):
-        unknown = next(word for word, kind in zip(words[1:], kinds, strict=True) if not kind)
-        raise FormatError(
-            path, f"channel {unknown!r}: known are Xposition ... Zposition, Xrotation ... Zrotation", line
-        )
+        unknown = quoted(next(word for word, kind in zip(words[1:], kinds, strict=True) if not kind))
+        reason = f"channel {unknown}: expected one of Xposition ... Zposition, Xrotation ... Zrotation"
+        raise FormatError(path, reason, line)
     if words[:1] != [str(len(channels))] or len(set(channels)) < len(channels):
-        raise FormatError(path, f"CHANNELS is a number and as many different channels, not {' '.join(words)!r}", line)
+        reason = f"CHANNELS is a number and as many different channels, not {quoted(' '.join(words))}"
+        raise FormatError(path, reason, line)
     return channels
 
 
@@ -133,24 +141,27 @@ def _motion_header(path: Path, lines: list[str], motion_line: int) -> tuple[int,
     frames, time = None, None
     for line, text in enumerate(lines[motion_line:], start=motion_line + 1):
         found = re.fullmatch(r"\s*(frames|frame\s+time)\s*:\s*(\S+)\s*", text, re.IGNORECASE)
-        if found and found[1].lower() == "frames" and found[2].isdigit():
+        if found and found[1].lower() == "frames" and re.fullmatch("[0-9]{1,15}", found[2]):
             frames = int(found[2])
         elif found and found[1].lower() != "frames":
             time = _fps(path, found[2], line)
         elif text.strip():
-            raise FormatError(path, f"{text.strip()!r} where 'Frames: N' and 'Frame Time: SECONDS' should be", line)
+            reason = f"{quoted(text.strip())} where 'Frames: N' and 'Frame Time: SECONDS' should be"
+            raise FormatError(path, reason, line)
         if frames is not None and time is not None:
             return line, frames, time
     raise FormatError(path, "the file ends before 'Frames:' and 'Frame Time:'", len(lines))
 
 
 def _fps(path: Path, word: str, line: int) -> float:
-    seconds = numbers([word], path, line)[0]
-    if not 0 < seconds < np.inf:
+    seconds = number(word, path, line)
+    if not seconds > 0:
         raise FormatError(path, f"a frame cannot take {word} seconds", line)
-    last_digit = 10.0 ** int(Decimal(word).as_tuple().exponent)
-    whole = max(1, round(1 / seconds))
-    return whole if abs(1 / whole - seconds) <= 0.51 * last_digit else 1 / seconds
+    fps = frame_rate(1 / seconds, path, line)
+    precision = 0.51 * 10.0 ** int(Decimal(word).as_tuple().exponent)
+    near = [rate for rate in (round(fps) - 1, round(fps), round(fps) + 1) if rate > 0]
+    whole = [rate for rate in near if abs(1 / rate - seconds) <= precision]
+    return whole[0] if len(whole) == 1 else fps
 
 
 def _without_broken_end(lines: list[str], start: int, width: int) -> list[str]:
@@ -170,14 +181,15 @@ def _values(path: Path, lines: list[str], start: int, width: int) -> Array:
             return values.reshape(-1, width)
     except ValueError:
         pass
-    found = [
-        (line, numbers(content.split(), path, line)) for line, content in enumerate(lines[start:], start=start + 1)
-    ]
-    line, short = next((line, row) for line, row in found if len(row) not in (0, width))
-    raise FormatError(path, f"the frame breaks off: a frame has {width} values, this line {len(short)}", line)
+    for line, content in enumerate(lines[start:], start=start + 1):
+        row = numbers(content.split(), path, line)
+        if len(words) % width and len(row) not in (0, width):
+            reason = f"the frame breaks off: a frame has {width} values, this line {len(row)}"
+            raise FormatError(path, reason, line)
+    raise FormatError(path, f"{len(words)} values are not complete frames of {width}")
 
 
-def write(path: str | Path, motion: Motion) -> None:
+def write(file: File, motion: Motion) -> None:
     """Write a BVH file that every reader accepts; OutputError if it cannot be written.
 
     The root's OFFSET is 0 and the root alone has six channels; all rotations are Z Y X in degrees; names are plain
@@ -186,16 +198,18 @@ def write(path: str | Path, motion: Motion) -> None:
     A motion without translation of the root stays at the skeleton's origin.
     FormatError for channels other than Euler angles and translations; MotionError for a motion without skeleton.
     """
-    path = check_place(path)
-    motion, moving = with_still_offsets(path, motion)
+    motion, moving = with_still_offsets(place_of(file), motion)
     names = plain_names(skeleton_of(motion).names, FORBIDDEN)
     translated = {names[0], *(names[skeleton_of(motion).index(name)] for name in moving)}
     motion = with_names(motion, names)
     joints = _jointed(motion)
-    lines = ["HIERARCHY", *_tree(skeleton_of(motion), 0, joints, translated), "MOTION"]
+    lines = ["HIERARCHY", *_tree(skeleton_of(motion), joints, translated), "MOTION"]
     lines += [f"Frames: {len(motion)}", f"Frame Time: {1 / motion.fps!r}"]
-    lines += [" ".join(map(repr, row)) for row in _rows(motion, joints, translated).tolist()]
-    write_whole(path, "\n".join([*lines, ""]))
+    rows = _rows(motion, joints, translated)
+    if not np.isfinite(rows).all():
+        raise MotionError("values of this motion are too large to convert")
+    lines += [" ".join(map(repr, row)) for row in rows.tolist()]
+    write_whole(file, "\n".join([*lines, ""]))
 
 
 def _jointed(motion: Motion) -> list[int]:
@@ -213,18 +227,29 @@ def _jointed(motion: Motion) -> list[int]:
     return order
 
 
-def _tree(skeleton: Skeleton, i: int, joints: list[int], translated: set[str], indent: str = "") -> list[str]:
-    joint = skeleton.joints[i]
-    keyword, offset = ("JOINT", joint.offset) if i else ("ROOT", (0.0, 0.0, 0.0))
-    channels = f"CHANNELS 6 {POSITION} {ROTATION}" if joint.name in translated else f"CHANNELS 3 {ROTATION}"
-    lines = [f"{keyword} {joint.name}", "{", f"\tOFFSET {_text(offset)}", f"\t{channels}"]
-    for child in skeleton.children[i]:
-        if child in joints:
-            lines += _tree(skeleton, child, joints, translated, "\t")
-    if not any(child in joints for child in skeleton.children[i]):
-        tip = skeleton.joints[skeleton.children[i][0]].offset if skeleton.children[i] else (0.0, 0.0, 0.0)
-        lines += ["\tEnd Site", "\t{", f"\t\tOFFSET {_text(tip)}", "\t}"]
-    return [indent + line for line in [*lines, "}"]]
+def _tree(skeleton: Skeleton, joints: list[int], translated: set[str]) -> Iterator[str]:
+    """The lines of the hierarchy; ``joints`` come each branch to its end before the next."""
+    written = set(joints)
+    indents = ["\t" * min(depth, DEEPEST) for depth in range(len(joints))]
+    open_joints: list[int] = []
+    for i in joints:
+        joint, children = skeleton.joints[i], skeleton.children[i]
+        while open_joints and open_joints[-1] != joint.parent:
+            yield indents[len(open_joints) - 1] + "}"
+            open_joints.pop()
+        indent = indents[len(open_joints)]
+        open_joints.append(i)
+        yield from (indent + line for line in _joint_lines(skeleton, i, joint.name in translated))
+        if written.isdisjoint(children):
+            tip = skeleton.joints[children[0]].offset if children else (0.0, 0.0, 0.0)
+            yield from (f"{indent}\t{line}" for line in ("End Site", "{", f"\tOFFSET {_text(tip)}", "}"))
+    yield from (indents[depth] + "}" for depth in reversed(range(len(open_joints))))
+
+
+def _joint_lines(skeleton: Skeleton, i: int, translated: bool) -> list[str]:
+    name, offset = skeleton.joints[i].name, skeleton.joints[i].offset if i else (0.0, 0.0, 0.0)
+    channels = f"6 {POSITION} {ROTATION}" if translated else f"3 {ROTATION}"
+    return [f"{'JOINT' if i else 'ROOT'} {name}", "{", f"\tOFFSET {_text(offset)}", f"\tCHANNELS {channels}"]
 
 
 def _text(values: tuple[float, float, float]) -> str:

@@ -11,39 +11,41 @@ from pathlib import Path
 
 import numpy as np
 
-from motet.errors import FormatError, MotionError
-from motet.files import write_whole
-from motet.formats.lines import numbers, read_text
+from motet.errors import FormatError
+from motet.files import File, place_of, write_whole
+from motet.formats.lines import frame_rate, number, numbers, read_text
 from motet.motion.motion import Motion
 
 TIME = "time"
 COMMENT = "# motet motion, fps "
 
 
-def read(path: str | Path) -> Motion:
+def read(file: File) -> Motion:
     """Read a table: values as they are written, no skeleton. FormatError names file and line of what is wrong."""
-    path = Path(path)
+    path, text = place_of(file), read_text(file)
     fps, header, rows = None, None, []
-    reader = csv.reader(io.StringIO(read_text(path)))
-    for row in reader:
-        if not row or row[0].startswith("#"):
-            fps = _said_fps(path, ",".join(row), reader.line_num) or fps
-        elif header is None:
-            header = row
-        elif len(row) == len(header):
-            rows.append(numbers(row, path, reader.line_num))
-        else:
-            raise FormatError(path, f"a row has {len(header)} values, this one {len(row)}", reader.line_num)
+    reader = csv.reader(io.StringIO(text))
+    try:
+        for row in reader:
+            if not row or row[0].startswith("#"):
+                fps = _said_fps(path, ",".join(row), reader.line_num) or fps
+            elif header is None:
+                header = row
+            elif len(row) == len(header):
+                rows.append(numbers(row, path, reader.line_num))
+            else:
+                raise FormatError(path, f"a row has {len(header)} values, this one {len(row)}", reader.line_num)
+    except csv.Error as error:
+        raise FormatError(path, f"this is not a table: {error}", reader.line_num) from error
     names, units = _columns(path, header or [])
     table = np.array(rows).reshape(len(rows), 1 + len(names))
-    try:
-        return Motion(table[:, 1:], names, units, fps or _fps_of(path, table[:, 0]))
-    except MotionError as error:
-        raise FormatError(path, str(error)) from error
+    return Motion(table[:, 1:], names, units, fps or _fps_of(path, table[:, 0]))
 
 
 def _said_fps(path: Path, text: str, line: int) -> float | None:
-    return numbers([text.removeprefix(COMMENT)], path, line)[0] if text.startswith(COMMENT) else None
+    if not text.startswith(COMMENT):
+        return None
+    return frame_rate(number(text.removeprefix(COMMENT), path, line), path, line)
 
 
 def _columns(path: Path, header: list[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -57,10 +59,10 @@ def _fps_of(path: Path, times: np.ndarray[tuple[int, ...], np.dtype[np.float64]]
     steps = np.diff(times)
     if not len(steps) or steps.min() <= 0 or np.ptp(steps) > 0.01 * steps.mean():
         raise FormatError(path, f"without evenly spaced times the frame rate needs a comment line '{COMMENT}30'")
-    return float(1 / steps.mean())
+    return frame_rate(float(1 / steps.mean()), path)
 
 
-def write(path: str | Path, motion: Motion) -> None:
+def write(file: File, motion: Motion) -> None:
     """Write a table; values come back exactly, the skeleton does not. OutputError if it cannot be written."""
     text = io.StringIO()
     text.write(f"{COMMENT}{motion.fps!r}\n")
@@ -69,4 +71,4 @@ def write(path: str | Path, motion: Motion) -> None:
     writer.writerow([TIME, *titles])
     for frame, row in enumerate(motion.values.tolist()):
         writer.writerow([repr(frame / motion.fps), *map(repr, row)])
-    write_whole(path, text.getvalue())
+    write_whole(file, text.getvalue())

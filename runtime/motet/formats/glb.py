@@ -8,7 +8,6 @@ in a skin, by which viewers and Blender know them as bones.
 
 import json
 import struct
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 
 from motet.draw.body import COLOURS, Body, Bone
 from motet.errors import MotionError
-from motet.files import write_whole
+from motet.files import File, write_whole
 from motet.motion.kinematics import local_rotations, local_translations, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, rotmat_to_quat
@@ -46,6 +45,8 @@ class _Buffer:
         """Index of the new accessor of values (N, ...) of a component type, for a use in a mesh or none."""
         types = {FLOAT: "<f4", UINT8: "<u1", UINT16: "<u2", UINT32: "<u4"}
         content = np.ascontiguousarray(values, dtype=types[kind])
+        if not np.isfinite(content).all():
+            raise MotionError("values of this motion are too large for glTF's numbers of 32 bits")
         view = {"buffer": 0, "byteOffset": len(self.content), "byteLength": content.nbytes}
         self.views.append(view | ({"target": target} if target else {}))
         self.content += content.tobytes() + bytes(-content.nbytes % 4)
@@ -61,7 +62,7 @@ class _Buffer:
         return self.add(values, FLOAT, target, min=least, max=greatest)
 
 
-def write(path: str | Path, motion: Motion) -> None:
+def write(file: File, motion: Motion) -> None:
     """Write a motion; MotionError for one without skeleton or frames, OutputError if the file cannot be written."""
     skeleton = skeleton_of(motion)
     if not len(motion):
@@ -84,7 +85,7 @@ def write(path: str | Path, motion: Motion) -> None:
         "accessors": buffer.accessors,
         "buffers": [{"byteLength": len(buffer.content)}],
     }
-    write_whole(path, _container(document, bytes(buffer.content)))
+    write_whole(file, _container(document, bytes(buffer.content)))
 
 
 def _facts(motion: Motion, skeleton: Skeleton) -> dict[str, Any]:

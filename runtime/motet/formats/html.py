@@ -12,7 +12,6 @@ from base64 import b64encode
 from collections.abc import Sequence
 from html import escape
 from importlib.resources import files
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,7 @@ import numpy as np
 from motet.draw.body import Bone
 from motet.draw.figure import figure_of
 from motet.errors import MotionError
-from motet.files import write_whole
+from motet.files import File, place_of, write_whole
 from motet.motion.motion import Motion
 
 Captions = Sequence[tuple[float, str]]
@@ -29,21 +28,21 @@ Captions = Sequence[tuple[float, str]]
 STEP = 1e-4
 
 
-def write(path: str | Path, motion: Motion, captions: Captions | None = None, title: str | None = None) -> None:
+def write(file: File, motion: Motion, captions: Captions | None = None, title: str | None = None) -> None:
     """Write the page of one motion, with captions that change with time and a title (the file's name if None).
 
     MotionError for a motion without skeleton or frames, OutputError if the file cannot be written.
     """
-    title = Path(path).stem if title is None else title
-    write_whole(path, page([figure_data(motion, "", captions)], title))
+    title = place_of(file).stem if title is None else title
+    write_whole(file, page([figure_data(motion, "", captions)], title))
 
 
-def write_many(path: str | Path, motions: Sequence[Motion], names: Sequence[str], title: str | None = None) -> None:
+def write_many(file: File, motions: Sequence[Motion], names: Sequence[str], title: str | None = None) -> None:
     """Write one page of several motions side by side on one clock, each with its name; errors as :func:`write`."""
     if not motions or len(motions) != len(names):
         raise MotionError(f"a page needs motions and a name for each, not {len(motions)} and {len(names)} names")
-    title = Path(path).stem if title is None else title
-    write_whole(path, page([figure_data(m, name) for m, name in zip(motions, names, strict=True)], title))
+    title = place_of(file).stem if title is None else title
+    write_whole(file, page([figure_data(m, name) for m, name in zip(motions, names, strict=True)], title))
 
 
 def page(figures: list[dict[str, Any]], title: str) -> str:

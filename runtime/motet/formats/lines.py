@@ -1,4 +1,4 @@
-"""What the text formats share: reading a file's text, its numbers, and names that a file can hold."""
+"""What the formats share: reading a file's bytes or text, its numbers, and names that a file can hold."""
 
 import math
 import re
@@ -6,42 +6,63 @@ from collections.abc import Iterable
 from itertools import permutations
 from pathlib import Path
 
-from motet.errors import FormatError
+from motet.errors import FormatError, quoted
+from motet.files import File, place_of
+
+MAX_FPS = 1e6
+MIN_FPS = 1e-3
 
 
-def read_text(path: str | Path) -> str:
-    """The text of a file in UTF-8, with or without byte order mark, else Latin-1; FormatError if it is no text.
+def read_bytes(file: File) -> bytes:
+    """All bytes of a file or file object; FormatError if there is no such file or it cannot be read."""
+    path = place_of(file)
+    try:
+        if not isinstance(file, str | Path):
+            return file.read()
+        if not path.is_file():
+            raise FormatError(path, "it is not a file" if path.exists() else "no such file")
+        return path.read_bytes()
+    except OSError as error:
+        raise FormatError(path, f"cannot be read: {error.strerror}") from error
+
+
+def read_text(file: File) -> str:
+    """The text of a file in UTF-8, with or without byte order mark, else Latin-1; FormatError if it is not text.
 
     Lines end with ``\\n`` whatever the file has: split them with ``split("\\n")`` to count as editors count.
     """
-    path = Path(path)
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise FormatError(path, f"cannot be read: {error.strerror}") from error
+    content = read_bytes(file)
     if b"\0" in content:
-        raise FormatError(path, "this is no text file")
+        raise FormatError(place_of(file), "this is not a text file")
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
         text = content.decode("latin-1")
-    return text.replace("\r\n", "\n").replace("\r", "\n")
+    return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
 
 
-def numbers(words: Iterable[str], path: Path, line: int) -> list[float]:
+def numbers(words: Iterable[str], path: Path, line: int | None) -> list[float]:
     """Finite numbers; FormatError with file and line for any other word."""
-    return [_number(word, path, line) for word in words]
+    return [number(word, path, line) for word in words]
 
 
-def _number(word: str, path: Path, line: int) -> float:
+def number(word: str, path: Path, line: int | None) -> float:
+    """One finite number; FormatError as :func:`numbers`."""
     try:
         # Python would read 1_000, which no other program does
         value = math.nan if "_" in word else float(word)
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise FormatError(path, f"{word!r} is not a finite number", line)
+        raise FormatError(path, f"{quoted(word)} is not a finite number", line)
     return value
+
+
+def frame_rate(fps: float, path: Path, line: int | None = None) -> float:
+    """A frame rate that a file states, if a motion can have it; else FormatError."""
+    if not MIN_FPS <= fps <= MAX_FPS:
+        raise FormatError(path, f"a motion cannot have {fps:g} frames a second", line)
+    return fps
 
 
 def complete_order(axes: str) -> str:
@@ -50,18 +71,24 @@ def complete_order(axes: str) -> str:
     return next(order for order in orders if [axis for axis in order if axis in axes] == list(axes))
 
 
-def unique_name(name: str, taken: Iterable[str]) -> str:
-    """``name``, with _2, _3, ... behind it if it is taken."""
-    taken = set(taken)
-    candidate, number = name, 2
-    while candidate in taken:
-        candidate, number = f"{name}_{number}", number + 1
-    return candidate
+class Names:
+    """Names given out once each: one that is taken gets _2, _3, ... behind it."""
+
+    def __init__(self, taken: Iterable[str] = ()) -> None:
+        self._taken = set(taken)
+        self._next: dict[str, int] = {}
+
+    def unique(self, name: str) -> str:
+        """``name``, with a number behind it if it is taken; from now on that is taken, too."""
+        candidate = name
+        while candidate in self._taken:
+            number = self._next.get(name, 2)
+            candidate, self._next[name] = f"{name}_{number}", number + 1
+        self._taken.add(candidate)
+        return candidate
 
 
 def plain_names(names: Iterable[str], forbidden: str) -> list[str]:
     """Different names, not empty, with ``_`` for every character that matches the regular expression ``forbidden``."""
-    plain: list[str] = []
-    for name in names:
-        plain.append(unique_name(re.sub(forbidden, "_", name) or "_", plain))
-    return plain
+    given = Names()
+    return [given.unique(re.sub(forbidden, "_", name) or "_") for name in names]

@@ -6,36 +6,40 @@ joint, and the root's pose. MMM has z up, millimetres, and figures that face y; 
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 from xml.etree import ElementTree
 
 import numpy as np
 
 from motet.errors import FormatError
-from motet.formats.lines import numbers
+from motet.files import File, place_of
+from motet.formats.lines import frame_rate, numbers, read_bytes
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 
 ROOT = ("root.tx", "root.ty", "root.tz", "root.rx", "root.ry", "root.rz")
 ROOT_UNITS = ("m",) * 3 + ("rad",) * 3
 MILLIMETRE = 0.001
-
+CHUNK = 2**20
+"""Bytes that the XML parser is given at once: it starts anew on a token that is longer, so few large ones are fast."""
 
 PARTS = {"Timestep": 1, "RootPosition": 3, "RootRotation": 3}
 """Element of a frame -> how many numbers it has; behind these come the joints' angles."""
 
 
-def read(path: str | Path) -> Motion:
+def read(file: File) -> Motion:
     """Read the first motion of an MMM file, without skeleton.
 
     Channels: "root.tx" to "root.tz" in "m", "root.rx" to "root.rz" in "rad" with R = Ry Rz Rx, then one for each joint
     in "rad". The frame rate comes from the time steps. FormatError names the file, and the line or frame that is wrong.
     """
-    path = Path(path)
+    path = place_of(file)
     joints: list[str] = []
     frames: list[Array] = []
-    for element in _elements(path):
+    for element in _elements(file):
         if element.tag == "JointOrder":
+            if joints or frames:
+                raise FormatError(path, "a motion has one JointOrder, before its frames")
             joints = [joint.get("name", "") for joint in element.iter("Joint")]
         elif element.tag == "MotionFrame":
             frames.append(_frame(path, element, len(joints), len(frames)))
@@ -43,29 +47,34 @@ def read(path: str | Path) -> Motion:
     if len(set(joints)) != len(joints) or not all(joints):
         raise FormatError(path, "each joint of the JointOrder needs a name of its own")
     if not joints or not frames:
-        raise FormatError(path, "this is no MMM motion: it needs a Motion with JointOrder and MotionFrames")
+        raise FormatError(path, "this is not an MMM motion: it needs a Motion with JointOrder and MotionFrames")
     rows = np.array(frames)
     values = np.column_stack([_root(rows[:, 1:4], rows[:, 4:7]), rows[:, 7:]])
     return Motion(values, (*ROOT, *joints), ROOT_UNITS + ("rad",) * len(joints), _fps(path, rows[:, 0]))
 
 
-def motion_name(path: str | Path) -> str:
+def motion_name(file: File) -> str:
     """The name of the first motion, which in KIT's files says who moved; empty if it has none."""
-    path = Path(path)
-    return next((element.get("name", "") for element in _elements(path, "start") if element.tag == "Motion"), "")
+    return next((element.get("name", "") for element in _elements(file, "start") if element.tag == "Motion"), "")
 
 
-def _elements(path: Path, event: Literal["start", "end"] = "end") -> Iterator[ElementTree.Element]:
+def _elements(file: File, event: Literal["start", "end"] = "end") -> Iterator[ElementTree.Element]:
     """The elements up to the end of the first motion, as they come; nothing behind it is looked at."""
+    path, content = place_of(file), read_bytes(file)
+    parser: ElementTree.XMLPullParser[Any] = ElementTree.XMLPullParser([event])
     try:
-        for _, element in ElementTree.iterparse(path, events=[event]):
-            yield element
-            if element.tag == "Motion":
-                return
+        for start in range(0, len(content), CHUNK):
+            parser.feed(content[start : start + CHUNK])
+            events: Iterator[Any] = parser.read_events()
+            for _, element in events:
+                yield element
+                if element.tag == "Motion":
+                    return
+        parser.close()
     except ElementTree.ParseError as error:
-        raise FormatError(path, f"this is no whole XML file: {error.msg}", error.position[0]) from error
-    except OSError as error:
-        raise FormatError(path, f"cannot be read: {error.strerror}") from error
+        raise FormatError(path, f"not XML, or truncated: {error.msg.split(':')[0]}", error.position[0]) from error
+    except (LookupError, ValueError) as error:  # an encoding that Python or its XML parser does not have
+        raise FormatError(path, f"its encoding cannot be read: {error}", 1) from error
 
 
 def _frame(path: Path, element: ElementTree.Element, joints: int, number: int) -> Array:
@@ -76,7 +85,7 @@ def _frame(path: Path, element: ElementTree.Element, joints: int, number: int) -
         if len(words) != count:
             raise FormatError(path, f"frame {number}: {tag} needs {count} values, not {len(words)}")
         try:
-            found += numbers(words, path, 0)
+            found += numbers(words, path, None)
         except FormatError as error:
             raise FormatError(path, f"frame {number}: {tag}: {error.reason}") from error
     return np.array(found)
@@ -95,4 +104,4 @@ def _fps(path: Path, times: Array) -> float:
     uneven = np.flatnonzero(np.abs(steps - steps.mean()) > 0.5 * abs(steps.mean()))
     if steps.mean() <= 0 or len(uneven):
         raise FormatError(path, f"frame {uneven[0] + 1 if len(uneven) else 1}: the time steps are not even")
-    return round(float(1 / steps.mean()), 3)
+    return frame_rate(round(float(1 / steps.mean()), 3), path)

@@ -5,31 +5,53 @@ from pathlib import Path
 from typing import Any, ClassVar, Self
 
 from motet.bundle.bundle import Bundle
-from motet.bundle.graph import Graph
-from motet.representation.contract import MotionContract
+from motet.bundle.graph import Arrays, Graph
+from motet.bundle.manifest import Manifest
+from motet.bundle.session import SessionOptions
+from motet.bundle.signature import Sizes, bind
+from motet.decode.loops import loop_of
+from motet.errors import BundleError
 
 
-class Bundled:
+class BundleModel:
     """A model that runs graphs; without state, so that requests and threads share it.
 
-    manifest: of a bundle of the model's verb, or of a training run with the same keys.
+    manifest: of a bundle of the model's verb, or of a training run.
+    graphs: by role.
+    BundleError where the graphs are not those of the verb, or do not fit the manifest.
     """
 
-    ROLES: ClassVar[tuple[str, ...]] = ("encoder", "step")
-    """The graphs that a bundle of this verb has."""
+    VERB: ClassVar[str]
 
-    _source: tuple[Path, int] | None = None
+    _source: tuple[Path, SessionOptions] | None = None
 
-    def __init__(self, manifest: Mapping[str, Any], graphs: Mapping[str, Graph]) -> None:
+    def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph]) -> None:
+        if manifest.verb != self.VERB:
+            raise BundleError(f"manifest, verb: {manifest.verb!r}, expected {self.VERB!r}")
+        for role in ("encoder", "step"):
+            if role not in graphs:
+                raise BundleError(f"manifest, graphs: there is no graph for the role {role!r}")
         self.manifest = manifest
-        self.contract = MotionContract.from_json(manifest["motion"])
+        self.contract = manifest.motion
         self.graphs = graphs
+        self.loop = loop_of(manifest.loop, self.VERB)
+        self.defaults = self.loop.defaults(manifest.defaults)
+        self.sizes: Sizes = {"D": len(self.contract.channels)}
+
+    def bind(self, role: str, inputs: Mapping[str, str], outputs: Mapping[str, str]) -> None:
+        """Check the graph of a role against :attr:`sizes`, and note the sizes it adds; BundleError as :func:`bind`."""
+        bind(role, self.graphs[role].spec, inputs, outputs, self.sizes)
 
     @classmethod
-    def load(cls, bundle: Bundle, threads: int = 1) -> Self:
-        """The model of an opened bundle; ``threads`` of one call of a graph pay in large batches."""
-        model = cls(bundle.manifest, {role: bundle.graph(role, threads) for role in cls.ROLES})
-        model._source = (bundle.path, threads)
+    def load(cls, bundle: Bundle, options: SessionOptions | None = None) -> Self:
+        """The model of an opened bundle."""
+        options = options or SessionOptions()
+        graphs = {role: bundle.graph(role, options) for role in bundle.manifest.graphs}
+        try:
+            model = cls(bundle.manifest, graphs)
+        except BundleError as error:
+            raise BundleError(f"bundle {bundle.path}: {error}") from error
+        model._source = (bundle.path, options)
         return model
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -38,11 +60,24 @@ class Bundled:
             raise TypeError("only a model loaded from a bundle can be pickled")
         return _reload, (type(self), *self._source)
 
+    def __repr__(self) -> str:
+        size = f"{len(self.contract.channels)} channels, {self.fps:g} fps"
+        return f"{type(self).__name__}({self.manifest.name!r}, {size})"
+
     @property
     def fps(self) -> float:
         """Frames per second that the model takes and gives."""
         return self.contract.fps
 
+    @property
+    def providers(self) -> tuple[str, ...]:
+        """The execution providers of ONNX Runtime that are active, the preferred first; torch's models have none."""
+        return tuple(getattr(self.graphs["step"], "providers", ()))
 
-def _reload(kind: type[Bundled], path: Path, threads: int) -> Bundled:
-    return kind.load(Bundle.open(path), threads)
+    def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
+        """The whole run of the golden vectors (docs/bundle.md): what follows from its inputs and settings."""
+        raise NotImplementedError
+
+
+def _reload(kind: type[BundleModel], path: Path, options: SessionOptions) -> BundleModel:
+    return kind.load(Bundle.open(path), options)

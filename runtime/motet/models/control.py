@@ -7,19 +7,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from motet.bundle.graph import Graph
-from motet.decode.noise import RowNoise
-from motet.decode.rollout import State, advance
+from motet.bundle.graph import Arrays, Graph
+from motet.bundle.manifest import Manifest
+from motet.decode.noise import RowNoise, RowsOfNoise
+from motet.decode.session import tick
 from motet.errors import BundleError, ControlError, MotionError
-from motet.models.base import Bundled
+from motet.models.base import BundleModel
 from motet.models.script import control_track, parse_script
+from motet.models.seeds import Seed, seeds_of
 from motet.motion.heading import without_heading
 from motet.motion.motion import Motion
 
 Floats = NDArray[np.float32]
 
+MAX_CHARACTERS = 100_000
+"""Of one session, whose state is in memory."""
 
-class ControlModel(Bundled):
+
+class ControlModel(BundleModel):
     """A model of labelled motions that runs live; shared between any number of sessions and threads.
 
     manifest: of a control bundle, or of a training run with the same keys.
@@ -27,19 +32,25 @@ class ControlModel(Bundled):
         next history), and for models with free hidden units also codes -> step.
     """
 
-    def __init__(self, manifest: Mapping[str, Any], graphs: Mapping[str, Graph]) -> None:
+    VERB = "control"
+
+    def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph]) -> None:
         super().__init__(manifest, graphs)
+        if manifest.control is None:
+            raise BundleError("manifest, control: is missing")
         self.encoder, self.stepper = graphs["encoder"], graphs["step"]
-        try:
-            control = manifest["control"]
-            self.labels: tuple[str, ...] = tuple(control["labels"])
-            self.starts = {label: np.array(frames, dtype=np.float64) for label, frames in control["starts"].items()}
-            self.defaults: dict[str, float] = dict(manifest["defaults"])
-        except (KeyError, TypeError, ValueError) as error:
-            raise BundleError(f"the manifest describes no control model: {error}") from error
-        history = self.stepper.spec.input("history")
-        self.taps, self.codes = history.size(1), history.size(2)
+        self.labels, self.starts = manifest.control.labels, manifest.control.starts
         self.has_free_units = self.stepper.spec.takes("codes")
+        self.sizes["L"] = len(self.labels)
+        self.bind("encoder", {"frames": "batch D"}, {"codes": "batch H"})
+        free = {"codes": "batch H"} if self.has_free_units else {}
+        self.bind("step", {**self.loop.inputs, **free}, self.loop.outputs)
+        self.taps, self.codes = self.sizes["K"], self.sizes["H"]
+        if "history" not in self.stepper.spec.feedback:
+            raise BundleError("manifest, graphs.step.feedback: nothing gives the next history")
+        for label, frames in self.starts.items():
+            if len(frames) != self.taps:
+                raise BundleError(f"manifest, control.starts.{label}: must hold {self.taps} frames, not {len(frames)}")
 
     def encode(self, frames: ArrayLike) -> Floats:
         """Frames (B, D) in the contract's units to codes (B, H) float32."""
@@ -51,7 +62,7 @@ class ControlModel(Bundled):
         start: Motion | str | None = None,
         *,
         characters: int = 1,
-        seed: int | Sequence[int] = 0,
+        seed: Seed = 0,
         variety: float = 0.0,
         temperature: float | None = None,
         iterations: int | None = None,
@@ -67,23 +78,53 @@ class ControlModel(Bundled):
             with free hidden units.
         Raises ControlError for values out of range, MotionError for a motion that does not fit.
         """
-        seeds = _seeds(seed, characters)
+        if not 1 <= characters <= MAX_CHARACTERS:
+            raise ControlError(f"a session has 1 to {MAX_CHARACTERS} characters, not {characters}")
+        seeds = seeds_of(seed, characters, ControlError)
         if isinstance(start, Motion):
             history, label = self._history_of(start), None
         else:
             label = self.labels[0] if start is None else start
             history = self._history_at(label)
         temperature = self.defaults["temperature"] if temperature is None else temperature
-        iterations = int(self.defaults.get("iterations", 1)) if iterations is None else iterations
+        iterations = int(self.defaults["iterations"]) if iterations is None else iterations
         settings = self._settings(variety, temperature, iterations)
         session = ControlSession(self, np.repeat(history[None], characters, axis=0), seeds, settings)
         if label is not None:
             session.control(**{label: 1.0})
         return session
 
+    def run(
+        self,
+        script: str,
+        start: Motion | str | None = None,
+        *,
+        seed: Seed = 0,
+        variety: float = 0.0,
+        temperature: float | None = None,
+        in_place: bool = False,
+    ) -> Motion:
+        """The motion of one figure that runs a control script, from the script's first label unless ``start`` says.
+
+        The parameters are those of :meth:`start` and :meth:`ControlSession.run`.
+        """
+        first = parse_script(script, self.labels)[0].start
+        begin = max(first, key=first.__getitem__) if start is None else start
+        session = self.start(begin, seed=seed, variety=variety, temperature=temperature)
+        return session.run(script, in_place)[0]
+
+    def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
+        """From the start of the first label, at variety 1: a track (T, labels) and noise (T, N) to frames (T, D).
+
+        With several iterations a tick (of the settings), there are so many rows of noise for each.
+        """
+        session = self.start(variety=1.0, iterations=settings.get("iterations"))
+        session.noise = RowsOfNoise(given["noise"])
+        return {"frames": session.frames(given["track"])[0]}
+
     def _history_at(self, label: str) -> Floats:
         if label not in self.starts:
-            raise ControlError(f"cannot start from {label!r}; known are {', '.join(self.starts)}")
+            raise ControlError(f"cannot start from {label!r}; expected one of {', '.join(self.starts)}")
         return self.encode(self.starts[label])
 
     def _history_of(self, motion: Motion) -> Floats:
@@ -110,7 +151,7 @@ class _Settings:
     iterations: int
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Snapshot:
     """All that changes in a session, for n characters: history (n, K, H), control (n, labels), the tick."""
 
@@ -118,13 +159,16 @@ class Snapshot:
     control: Floats
     tick: int
 
+    def __repr__(self) -> str:
+        return f"Snapshot({len(self.history)} characters, tick {self.tick})"
+
 
 class ControlSession:
     """Characters that move in one batch, each with its own control; holds their whole state."""
 
     def __init__(self, model: ControlModel, history: Floats, seeds: Sequence[int], settings: _Settings) -> None:
         self.model, self.settings, self.characters = model, settings, len(history)
-        self._state: State = {"history": history}
+        self._history = history
         self._tick = 0
         column = np.ones((self.characters, 1), dtype=np.float32)
         self._inputs: dict[str, Floats] = {
@@ -133,9 +177,12 @@ class ControlSession:
             "temperature": column * settings.temperature,
         }
         width = model.stepper.spec.input("noise").size(1)
-        self._noise = RowNoise(seeds, width) if settings.variety > 0 else None
-        if self._noise is None:  # noise has no effect: any array will do
+        self.noise: RowNoise | RowsOfNoise | None = RowNoise(seeds, width) if settings.variety > 0 else None
+        if self.noise is None:  # noise has no effect: any array will do
             self._inputs["noise"] = np.zeros((self.characters, width), dtype=np.float32)
+
+    def __repr__(self) -> str:
+        return f"ControlSession({self.characters} characters, tick {self._tick}, {self.model!r})"
 
     def control(self, **values: ArrayLike) -> None:
         """Set the control from now on: labels to numbers, or arrays (characters,), between 0 and 1.
@@ -154,7 +201,7 @@ class ControlSession:
             raise ControlError("control values must be between 0 and 1")
         shape = (self.characters, len(self.model.labels))
         try:
-            self._inputs["control"] = np.ascontiguousarray(np.broadcast_to(wanted, shape))
+            self._inputs["control"] = np.array(np.broadcast_to(wanted, shape))  # a copy: the caller's may change
         except ValueError as error:
             raise ControlError(
                 f"a control of shape {wanted.shape} does not fit {self.characters} characters"
@@ -163,7 +210,7 @@ class ControlSession:
     def _control_of(self, values: Mapping[str, ArrayLike]) -> Floats:
         unknown = sorted(values.keys() - set(self.model.labels))
         if unknown:
-            raise ControlError(f"unknown control {', '.join(unknown)}; known are {', '.join(self.model.labels)}")
+            raise ControlError(f"unknown control {', '.join(unknown)}; expected one of {', '.join(self.model.labels)}")
         control = np.zeros((self.characters, len(self.model.labels)), dtype=np.float32)
         for label, value in values.items():
             try:
@@ -176,19 +223,14 @@ class ControlSession:
 
     def step(self) -> Floats:
         """One tick: the next frame (characters, D) float32, in the units of ``model.contract``."""
-        if self.model.has_free_units:  # a Gibbs chain starts at the codes of the last frame
-            self._state["codes"] = self._state["history"][:, -1]
-            for _ in range(self.settings.iterations - 1):
-                self._state["codes"] = self._iterate()[0]["next_codes"]
-        outputs, self._state = self._iterate()
-        frame: Floats = outputs["frame"]
+        frame, self._history = tick(self.model.stepper, self._history, self._next_inputs, self.settings.iterations)
         return frame
 
-    def _iterate(self) -> tuple[dict[str, NDArray[Any]], State]:
-        if self._noise is not None:
-            self._inputs["noise"] = self._noise.at(self._tick)
+    def _next_inputs(self) -> Arrays:
+        if self.noise is not None:
+            self._inputs["noise"] = self.noise.at(self._tick)
         self._tick += 1
-        return advance(self.model.stepper, self._state, self._inputs)
+        return self._inputs
 
     def run(self, script: str, in_place: bool = False) -> list[Motion]:
         """Run a control script (:mod:`motet.models.script`) for all characters; one motion for each.
@@ -211,23 +253,12 @@ class ControlSession:
 
     def snapshot(self) -> Snapshot:
         """The whole state; restoring it continues with the same frames."""
-        return Snapshot(self._state["history"].copy(), self._inputs["control"].copy(), self._tick)
+        return Snapshot(self._history.copy(), self._inputs["control"].copy(), self._tick)
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go back to a snapshot, of this session or of one with as many characters of the same model."""
-        if snapshot.history.shape != self._state["history"].shape:
-            raise ControlError(
-                f"a snapshot of history {snapshot.history.shape} does not fit {self._state['history'].shape}"
-            )
+        if snapshot.history.shape != self._history.shape:
+            raise ControlError(f"a snapshot of history {snapshot.history.shape} does not fit {self._history.shape}")
         self.set_control(snapshot.control)
         self._tick = snapshot.tick
-        self._state = {"history": np.array(snapshot.history, dtype=np.float32)}
-
-
-def _seeds(seed: int | Sequence[int], characters: int) -> list[int]:
-    if characters < 1:
-        raise ControlError(f"a session needs at least one character, not {characters}")
-    seeds = [seed + i for i in range(characters)] if isinstance(seed, int) else [int(s) for s in seed]
-    if len(seeds) != characters or min(seeds) < 0:
-        raise ControlError(f"{characters} characters need a seed of 0 or more, or as many seeds, not {seed}")
-    return seeds
+        self._history = np.array(snapshot.history, dtype=np.float32)

@@ -2,16 +2,17 @@
 
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motet.bundle.graph import Graph
+from motet.bundle.manifest import Manifest
 from motet.decode.rollout import two_rows
-from motet.errors import BundleError, DecodingError, MotionError, TextWarning
-from motet.models.base import Bundled
-from motet.models.text import Vocabulary
+from motet.errors import BundleError, MotionError, TextError, TextWarning
+from motet.models.base import BundleModel
+from motet.models.text import TextRules, Vocabulary
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 
@@ -23,18 +24,18 @@ BATCH = 64
 """Sequences that are encoded at once."""
 
 
-class LanguageModel(Bundled):
-    """A model between motion and language: a motion contract, a vocabulary, graphs, and defaults of decoding."""
+class LanguageModel(BundleModel):
+    """A model between motion and language: a motion contract, a vocabulary, graphs, and a decoding loop."""
 
-    ROLES: ClassVar[tuple[str, ...]] = ("encoder", "step", "score")
-
-    def __init__(self, manifest: Mapping[str, Any], graphs: Mapping[str, Graph]) -> None:
+    def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph]) -> None:
         super().__init__(manifest, graphs)
+        if manifest.text is None:
+            raise BundleError("manifest, text: is missing")
         try:
-            self.vocabulary = Vocabulary.from_json(manifest["vocabulary"])
-            self.defaults: dict[str, Any] = dict(manifest["defaults"])
-        except (KeyError, TypeError, ValueError) as error:
-            raise BundleError(f"the manifest describes no model of motion and language: {error}") from error
+            self.vocabulary = Vocabulary(manifest.vocabulary, TextRules.from_json(manifest.text))
+        except TextError as error:
+            raise BundleError(f"manifest, vocabulary: {error}") from error
+        self.sizes["V"] = len(self.vocabulary)
 
     def unknown(self, sentence: str) -> list[str]:
         """The words of a sentence that the model does not know; TextError as in :meth:`ids`."""
@@ -56,12 +57,16 @@ class LanguageModel(Bundled):
         MotionError names the channels that the motion lacks, and refuses less than two frames and more than 30 s.
         """
         if motion.duration > MAX_SECONDS:
-            limit = f"the model takes at most {MAX_SECONDS:g} s: cut it"
+            limit = f"the model takes at most {MAX_SECONDS:g} s: cut it, or describe its windows"
             raise MotionError(f"the motion lasts {motion.duration:.1f} s, and {limit}")
         frames = self.contract.frames(motion)
         if len(frames) < 2:
             raise MotionError(f"the model needs two frames at {self.fps:g} fps, and the motion has {len(frames)}")
         return frames
+
+    def prepared(self, motion: Motion) -> Motion:
+        """What the model sees of a motion, to be prepared once and asked about often; MotionError as :meth:`frames`."""
+        return self.contract.features(self.frames(motion))
 
     def contexts(self, sequences: Sequence[NDArray[Any]]) -> NDArray[np.float32]:
         """Context vectors (N, C) float32 of the sequences (T_i, ...) that the encoder takes."""
@@ -74,14 +79,11 @@ class LanguageModel(Bundled):
             found[rows] = encoder({given.name: values, "lengths": lengths})[context.name]
         return found
 
-    def setting(self, name: str, value: float | None, low: float, high: float) -> float:
-        """A setting of decoding, or the bundle's default for None; DecodingError out of ``low`` to ``high``."""
-        value = self.defaults.get(name) if value is None else value
-        if value is None:
-            raise DecodingError(f"the bundle has no default for {name}: give one")
-        if not low <= value <= high:
-            raise DecodingError(f"{name} must be between {low:g} and {high:g}, not {value}")
-        return value
+    def score_graph(self) -> Graph:
+        """The graph that scores known pairs; BundleError where the model has none, as one without likelihoods."""
+        if "score" not in self.graphs:
+            raise BundleError("this model has no graph 'score': it cannot say how probable a pair is")
+        return self.graphs["score"]
 
 
 def batches(lengths: Sequence[int], size: int) -> Iterator[list[int]]:

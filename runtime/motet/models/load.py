@@ -1,54 +1,67 @@
 """Loading a model: from a bundle's name or path to what its verb offers."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal, TypeVar, overload
 
 from motet.bundle.bundle import Bundle
+from motet.bundle.graph import Graph
+from motet.bundle.manifest import Manifest
+from motet.bundle.session import SessionOptions
 from motet.errors import BundleError
-from motet.models.base import Bundled
+from motet.models.base import BundleModel
 from motet.models.control import ControlModel
 from motet.models.describe import DescribeModel
 from motet.models.generate import GenerateModel
 from motet.models.predict import PredictModel
 
 Model = ControlModel | DescribeModel | GenerateModel | PredictModel
-Kind = TypeVar("Kind", bound=Bundled)
+Kind = TypeVar("Kind", bound=BundleModel)
 
-VERBS: dict[str, type[Model]] = {
-    "control": ControlModel,
-    "describe": DescribeModel,
-    "generate": GenerateModel,
-    "predict": PredictModel,
-}
+_KINDS: tuple[type[Model], ...] = (ControlModel, DescribeModel, GenerateModel, PredictModel)
+VERBS: dict[str, type[Model]] = {kind.VERB: kind for kind in _KINDS}
 """Verb of a bundle -> the class of its model."""
 
 
 @overload
-def load(name_or_path: Literal["cmu-control"], threads: int = 1) -> ControlModel: ...
+def load(name_or_path: Literal["cmu-control"], options: SessionOptions | None = None) -> ControlModel: ...
 @overload
-def load(name_or_path: Literal["cmu-describe"], threads: int = 1) -> DescribeModel: ...
+def load(name_or_path: Literal["cmu-describe"], options: SessionOptions | None = None) -> DescribeModel: ...
 @overload
-def load(name_or_path: Literal["cmu-generate"], threads: int = 1) -> GenerateModel: ...
+def load(name_or_path: Literal["cmu-generate"], options: SessionOptions | None = None) -> GenerateModel: ...
 @overload
-def load(name_or_path: Literal["cmu-predict"], threads: int = 1) -> PredictModel: ...
+def load(name_or_path: Literal["cmu-predict"], options: SessionOptions | None = None) -> PredictModel: ...
 @overload
-def load(name_or_path: str | Path, threads: int = 1) -> Model: ...
-def load(name_or_path: str | Path, threads: int = 1) -> Model:
+def load(name_or_path: str | Path, options: SessionOptions | None = None) -> Model: ...
+def load(name_or_path: str | Path, options: SessionOptions | None = None) -> Model:
     """The model of a bundle: a name (``motet bundle list``), or the path of a folder or zip.
 
-    threads: for one call of a graph. BundleError if there is no such bundle, or if it is damaged.
+    options: threads and execution providers; by default one thread of the CPU. BundleError if there is no such bundle,
+    or if it is damaged.
     """
     bundle = Bundle.open(name_or_path)
-    verb = bundle.manifest["verb"]
-    if verb not in VERBS:
-        raise BundleError(f"bundle {bundle.path} is for {verb!r}; this motet runs {', '.join(VERBS)}")
-    return VERBS[verb].load(bundle, threads)
+    try:
+        kind = kind_of(bundle.manifest)
+    except BundleError as error:
+        raise BundleError(f"bundle {bundle.path}: {error}") from error
+    return kind.load(bundle, options)
 
 
-def load_as(kind: type[Kind], name_or_path: str | Path, threads: int = 1) -> Kind:
+def load_as(kind: type[Kind], name_or_path: str | Path, options: SessionOptions | None = None) -> Kind:
     """As :func:`load`, for one verb: BundleError where the bundle is for another."""
-    model = load(name_or_path, threads)
+    model = load(name_or_path, options)
     if not isinstance(model, kind):
-        wanted = next(verb for verb, known in VERBS.items() if known is kind)
-        raise BundleError(f"bundle {name_or_path} is for {model.manifest['verb']!r}, and one for {wanted!r} is needed")
+        raise BundleError(f"bundle {name_or_path} is for {model.VERB!r}, and one for {kind.VERB!r} is needed")
     return model
+
+
+def build(manifest: Manifest, graphs: Mapping[str, Graph]) -> Model:
+    """The model of a manifest's verb over graphs of any kind; BundleError where they do not fit."""
+    return kind_of(manifest)(manifest, graphs)
+
+
+def kind_of(manifest: Manifest) -> type[Model]:
+    """The class of a manifest's verb; BundleError for a verb that is unknown."""
+    if manifest.verb not in VERBS:
+        raise BundleError(f"manifest, verb: {manifest.verb!r} is unknown; expected one of {', '.join(VERBS)}")
+    return VERBS[manifest.verb]

@@ -1,76 +1,126 @@
 """Predict: the next frames of a motion, from its last ones."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from motet.bundle.graph import Graph
-from motet.decode.rollout import free_run, two_rows
+from motet.bundle.graph import Arrays, Graph
+from motet.bundle.manifest import Manifest
+from motet.bundle.signature import bind
+from motet.decode.rollout import two_rows
 from motet.errors import BundleError, DecodingError, MotionError
-from motet.models.base import Bundled
+from motet.models.base import BundleModel
+from motet.models.progress import Progress, silent
 from motet.motion.motion import Motion
+from motet.motion.rotations import Array
 
 Floats = NDArray[np.float32]
 
+MAX_FRAMES, MAX_GOLDEN = 100_000, 1000
+"""Of one prediction, which is in memory as a whole; and of one among the golden vectors."""
 
-class PredictModel(Bundled):
+
+class PredictModel(BundleModel):
     """A model that carries motions on; shared between any number of sessions and threads.
 
     graphs: "encoder" (frames (B, L, C) -> what the step takes first) and "step" (-> frame (B, C), and what it takes
         next). After ``horizon`` frames, its default, a prediction goes on from its own last frames.
     """
 
-    def __init__(self, manifest: Mapping[str, Any], graphs: Mapping[str, Graph]) -> None:
-        super().__init__(manifest, graphs)
-        try:
-            self.horizon = int(manifest["defaults"]["horizon"])
-        except (KeyError, TypeError, ValueError) as error:
-            raise BundleError(f"the manifest describes no model that predicts: {error}") from error
-        self.seed_frames = graphs["encoder"].spec.input("frames").size(1)
+    VERB = "predict"
 
-    def predict(self, motion: Motion, frames: int | None = None, append: bool = False) -> Motion:
+    def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph]) -> None:
+        super().__init__(manifest, graphs)
+        self.horizon = int(self.defaults["horizon"])
+        encoder, step = graphs["encoder"].spec, graphs["step"].spec
+        self.bind("encoder", {"frames": "batch L D"}, {})
+        bind("step", step, self.loop.inputs, self.loop.outputs, self.sizes, given=encoder.outputs)
+        self.seed_frames = self.sizes["L"]
+
+    @overload
+    def predict(
+        self, motions: Motion, *, frames: int | None = None, append: bool = False, progress: Progress = ...
+    ) -> Motion: ...
+    @overload
+    def predict(
+        self, motions: Sequence[Motion], *, frames: int | None = None, append: bool = False, progress: Progress = ...
+    ) -> list[Motion]: ...
+    def predict(
+        self,
+        motions: Motion | Sequence[Motion],
+        *,
+        frames: int | None = None,
+        append: bool = False,
+        progress: Progress = silent,
+    ) -> Motion | list[Motion]:
         """The ``frames`` (as many as the horizon by default) that follow a motion, at the model's frame rate.
 
         A mocap motion of the model's figure is carried on in its own channels, units and skeleton, from where its root
         is; features, in the channels of :attr:`contract`, as features. Only the last :attr:`seed_frames` at the model's
         frame rate are looked at; one at another rate is resampled, so that its last frame is kept.
         append: give the motion, resampled, and what follows it.
-        MotionError for a motion that is too short, or lacks joints or channels of the model, which are named.
+        progress: called with the number of motions done and of all.
+        Several motions are carried on in one batch, each as it would be alone. MotionError for a motion that is too
+        short, or lacks joints or channels of the model, which are named.
         """
+        given = [motions] if isinstance(motions, Motion) else list(motions)
+        seeds = [self._seed(motion) for motion in given]
+        found: list[Motion] = []
+        for place in range(0, len(given), self.loop.batch):
+            part = seeds[place : place + self.loop.batch]
+            following = self.next_frames([last for _, _, last in part], frames)
+            found += [self._carried_on(*one[:2], new, append) for one, new in zip(part, following, strict=True)]
+            progress(len(found), len(given))
+        return found[0] if isinstance(motions, Motion) else found
+
+    def _seed(self, motion: Motion) -> tuple[Motion, Motion, Array]:
+        """The motion at the model's frame rate, its end, and the frames (L, C) of that."""
         whole = motion if motion.fps == self.fps else motion.continuous().resample(self.fps, to_end=True)
         seed = whole[max(0, len(whole) - self.seed_frames - 1) :]
-        given = self.contract.frames(seed)
-        if len(given) < self.seed_frames:
+        frames = self.contract.frames(seed)
+        if len(frames) < self.seed_frames:
             limit = f"the model needs {self.seed_frames} frames at {self.fps:g} fps"
-            raise MotionError(f"{limit}, and the motion has {len(given)} ({len(motion)} at {motion.fps:g} fps)")
-        found = self.next_frames(given[None, -self.seed_frames :], frames)[0]
-        following = self.contract.motion(found, after=seed, plant=False)
-        if append:
-            whole = whole.select(following.channels, following.units)
-            following = replace(following, values=np.concatenate([whole.values, following.values]))
-        return following
+            raise MotionError(f"{limit}, and the motion has {len(frames)} ({len(motion)} at {motion.fps:g} fps)")
+        return whole, seed, frames[-self.seed_frames :]
+
+    def _carried_on(self, whole: Motion, seed: Motion, frames: Floats, append: bool) -> Motion:
+        following = self.contract.motion(frames, after=seed, plant=False)
+        if not append:
+            return following
+        before = whole.select(following.channels, following.units)
+        return replace(following, values=np.concatenate([before.values, following.values]))
 
     def next_frames(self, seeds: ArrayLike, frames: int | None = None) -> Floats:
         """Seed frames (B, L, C) in the contract's channels, to the next frames (B, frames, C) float32.
 
         Each row gives what it gives alone, to the bit with one thread.
-        DecodingError for less than one frame, MotionError for seeds of another shape.
+        DecodingError for a number of frames out of range, MotionError for seeds of another shape.
         """
         given = np.asarray(seeds, dtype=np.float32)
         count = self.horizon if frames is None else frames
-        if count < 1:
-            raise DecodingError(f"at least one frame can be predicted, not {count}")
+        if not 1 <= count <= MAX_FRAMES:
+            raise DecodingError(f"1 to {MAX_FRAMES} frames can be predicted, not {count}")
         shape = (self.seed_frames, len(self.contract.channels))
         if given.ndim != 3 or given.shape[1:] != shape:
             raise MotionError(
                 f"seeds of shape {given.shape} do not fit: the model takes (batch, {shape[0]}, {shape[1]})"
             )
+        if not np.isfinite(given).all():
+            raise MotionError("seeds must be finite numbers")
         rows = two_rows(np.arange(len(given)))
-        return free_run(self.graphs["encoder"], self.graphs["step"], given[rows], count, self.horizon)[: len(given)]
+        found: Floats = self.loop.run(self.graphs["encoder"], self.graphs["step"], given[rows], count, self.horizon)
+        return found[: len(given)]
+
+    def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
+        """Seed frames (L, C) and the number of "frames" of the settings to the next frames (frames, C)."""
+        count = int(settings["frames"])
+        if count > MAX_GOLDEN:
+            raise BundleError(f"golden vectors hold at most {MAX_GOLDEN} frames, not {count}")
+        return {"frames": self.next_frames(given["frames"][None], count)[0]}
 
     def stream(self, start: Motion | None = None) -> "PredictSession":
         """A session that frames are pushed into as they come.
@@ -99,6 +149,9 @@ class PredictSession:
         values = np.concatenate([self._motion.values, new])[-self._kept :]
         self._motion = replace(self._motion, values=values)
 
+    def __repr__(self) -> str:
+        return f"PredictSession({self._motion!r} kept, {self.model!r})"
+
     def predict(self, frames: int | None = None) -> Motion:
         """As :meth:`PredictModel.predict`, after all that was pushed so far."""
-        return self.model.predict(self._motion, frames)
+        return self.model.predict(self._motion, frames=frames)

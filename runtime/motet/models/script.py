@@ -12,13 +12,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.errors import ScriptError
+from motet.errors import ControlError, ScriptError, quoted
 
 _TOKEN = re.compile(
-    r"\s*(?:(?P<number>\d+\.?\d*|\.\d+)(?![\w.])|(?P<seconds>\d+\.?\d*s|\.\d+s)\b|(?P<label>[^\W\d][\w-]*)|(?P<sign>[,>+*]))"
+    r"\s*+(?:(?P<number>\d++\.?\d*+|\.\d++)(?![\w.])|(?P<seconds>\d++\.?\d*+s|\.\d++s)\b"
+    r"|(?P<label>[^\W\d][\w-]*+)|(?P<sign>[,>+*]))"
 )
 
+_END = re.compile(r"\s*+\Z")
+
 Weights = dict[str, float]
+
+SHOWN = 200
+"""Characters of a long script that an error shows around the place."""
 
 MAX_SECONDS = 3600.0
 """A script is laid out in memory before it runs; longer ones are for a loop over ``ControlSession.step``."""
@@ -46,12 +52,19 @@ def parse_script(script: str, labels: Sequence[str]) -> list[Segment]:
     while not parser.done():
         parser.expect("sign", ",", "a comma between segments")
         segments.append(parser.segment())
+    if sum(segment.seconds for segment in segments) > MAX_SECONDS:
+        raise parser.fail(f"a script lasts at most {MAX_SECONDS:g} s")
     return segments
 
 
 def control_track(segments: Sequence[Segment], labels: Sequence[str], fps: float) -> NDArray[np.float32]:
-    """The control values (T, labels) float32 of a script, frame by frame; no frame is lost to rounding."""
+    """The control values (T, labels) float32 of a script, frame by frame; no frame is lost to rounding.
+
+    ControlError for a script of less than one frame.
+    """
     ends = np.round(np.cumsum([segment.seconds for segment in segments]) * fps).astype(int)
+    if not ends[-1]:
+        raise ControlError(f"the script lasts less than one frame at {fps:g} fps")
     counts = np.diff(ends, prepend=0)
     return np.concatenate(
         [_ramp(s, labels, count) for s, count in zip(segments, counts, strict=True)], dtype=np.float32
@@ -79,11 +92,15 @@ class _Parser:
         self.script, self.labels, self.position = script, labels, 0
 
     def done(self) -> bool:
-        return not self.script[self.position :].strip()
+        return _END.match(self.script, self.position) is not None
 
     def fail(self, reason: str) -> ScriptError:
         rest = self.script[self.position :]
-        return ScriptError(self.script, self.position + len(rest) - len(rest.lstrip()), reason)
+        position = self.position + len(rest) - len(rest.lstrip())
+        if len(self.script) <= SHOWN:
+            return ScriptError(self.script, position, reason)
+        start = max(0, position - SHOWN // 2)
+        return ScriptError(self.script[start : start + SHOWN], position - start, f"{reason} (at character {position})")
 
     def accept(self, kind: str, text: str | None = None) -> str | None:
         """The next token if it is of that kind (and text), else None."""
@@ -116,7 +133,7 @@ class _Parser:
             label, weight = self.weight()
             if label in weights:
                 self.position = before
-                raise self.fail(f"{label!r} stands twice in one mix")
+                raise self.fail(f"{quoted(label)} stands twice in one mix")
             weights[label] = weight
         return weights
 
@@ -125,7 +142,7 @@ class _Parser:
         label = self.expect("label", None, "the name of a control")
         if label not in self.labels:
             self.position = before
-            raise self.fail(f"unknown control {label!r}; known are {', '.join(self.labels)}")
+            raise self.fail(f"unknown control {quoted(label)}; expected one of {', '.join(self.labels)}")
         if not self.accept("sign", "*"):
             return label, 1.0
         before = self.position

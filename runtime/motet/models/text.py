@@ -4,19 +4,30 @@ import re
 import unicodedata
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from motet.bundle.fields import Fields
 from motet.errors import TextError
 
 PAD, SOS, EOS, UNK = SPECIALS = ("PAD", "SOS", "EOS", "UNK")
 """Padding, start and end of a sentence, unknown word: ids 0 to 3. Upper case, so that no normal word is one."""
 
 MAX_WORDS = 40
-"""Words of the longest sentence that a model takes or gives."""
+"""Words of the longest sentence that a model takes."""
+
+MAX_LETTERS = 2000
+"""Letters of the longest sentence that is looked at."""
+
+RULES_VERSION = 1
+"""Of what :class:`TextRules` does with its tables."""
+
+MAX_RULES = 2000
+"""Entries of its tables."""
 
 SPELLING = {
     "aound": "around",
@@ -58,62 +69,125 @@ SPELLING = {
 """Common misspellings, of one word or several, without punctuation."""
 
 # fmt: off
-TEENS = {name: value for value, name in enumerate((
+NUMBERS = {name: value for value, name in enumerate((
     "zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve",
     "thirteen", "fourteen", "fifteen", "sixteen", "seventeen", "eighteen", "nineteen",
-))}
-TENS = {name: 10 * value for value, name in enumerate((
+))} | {name: 10 * value for value, name in enumerate((
     "twenty", "thirty", "forty", "fifty", "sixty", "seventy", "eighty", "ninety",
 ), start=2)}
 # fmt: on
+"""Number words below a hundred."""
 
-_APOSTROPHES = re.compile("['`\u2018\u2019\u00b4]")
-_PUNCTUATION = re.compile(r"[\W_]+")
+_SEPARATORS = re.compile(r"[\W_]+")
 _TOKENS = re.compile(r"\d|[^\W\d]+")
 
 
-def normalise(sentence: str, spelling: Mapping[str, str] = SPELLING) -> str:
-    """Lower case without accents and punctuation, spelling mended, number words as digits: "90 degrees"."""
-    plain = unicodedata.normalize("NFKD", _APOSTROPHES.sub("", sentence)).lower()
-    plain = "".join(letter for letter in plain if not unicodedata.combining(letter))
-    plain = " ".join(_PUNCTUATION.sub(" ", plain).split())
-    if spelling:
-        longest_first = sorted(spelling, key=len, reverse=True)
-        plain = re.sub(rf"\b({'|'.join(map(re.escape, longest_first))})\b", lambda m: spelling[m[0]], plain)
-    return " ".join(_with_digits(plain.split()))
+@dataclass(frozen=True)
+class TextRules:
+    """How a sentence becomes words; a bundle has its own, so that its words stay what they were in training.
+
+    dropped: characters that vanish, so that "isn't" is one word. spelling: what replaces a word, or several.
+    numbers: number words and their values, 0 to 99. hundred, conjunction, point: the words in "a hundred and five" and
+    for the point in 1.5. spelled: whole numbers up to this are words again in a sentence that a model gives.
+    """
+
+    dropped: str = "'`\u2018\u2019\u00b4"
+    spelling: Mapping[str, str] = field(default_factory=lambda: dict(SPELLING))
+    numbers: Mapping[str, int] = field(default_factory=lambda: dict(NUMBERS))
+    hundred: str = "hundred"
+    conjunction: str = "and"
+    point: str = "point"
+    spelled: int = 12
+
+    def to_json(self) -> dict[str, Any]:
+        """A JSON object; :meth:`from_json` is the inverse."""
+        return {"rules": RULES_VERSION, **asdict(self)}
+
+    @staticmethod
+    def from_json(data: Mapping[str, Any]) -> "TextRules":
+        """Read what :meth:`to_json` wrote; BundleError where it is not a set of rules."""
+        top = Fields(data, "text")
+        top.whole("rules", RULES_VERSION, RULES_VERSION)
+        spelling, numbers = top.fields("spelling"), top.fields("numbers")
+        if len(spelling.data) + len(numbers.data) > MAX_RULES:
+            raise top.fault(f"at most {MAX_RULES} words in its tables", len(spelling.data) + len(numbers.data))
+        return TextRules(
+            top.text("dropped"),
+            {wrong: spelling.text(wrong) for wrong in spelling.data},
+            {word: numbers.whole(word, 0, 99) for word in numbers.data},
+            *(top.text(key) for key in ("hundred", "conjunction", "point")),
+            top.whole("spelled", 0, 99),
+        )
+
+    def normalise(self, sentence: str) -> str:
+        """Lower case without accents and punctuation, spelling mended, number words as digits: "90 degrees"."""
+        plain = sentence.translate(dict.fromkeys(map(ord, self.dropped)))
+        plain = unicodedata.normalize("NFKD", plain).lower()
+        plain = "".join(letter for letter in plain if not unicodedata.combining(letter))
+        plain = re.sub(r"(?<=\d)\.(?=\d)", f" {self.point} ", plain)
+        plain = " ".join(_SEPARATORS.sub(" ", plain).split())
+        plain = self._misspelt.sub(lambda match: self.spelling[match[0]], plain)
+        return " ".join(self._with_digits(plain.split()))
+
+    def words(self, sentence: str) -> list[str]:
+        """The words of a sentence after :meth:`normalise`; each digit is a word of its own."""
+        return _TOKENS.findall(self.normalise(sentence))
+
+    def sentence(self, words: Iterable[str]) -> str:
+        """The sentence of words: digits that follow each other become one number, and small numbers words.
+
+        A word "" stands between its neighbours, and vanishes.
+        """
+        joined = re.sub(r"(?<=\d) (?=\d)", "", " ".join(words))
+        joined = re.sub(rf"(?<=\d) {re.escape(self.point)} (?=\d)", ".", joined)
+        return " ".join(self._spelled.get(word, word) for word in joined.split())
+
+    @cached_property
+    def _misspelt(self) -> re.Pattern[str]:
+        longest_first = sorted(self.spelling, key=len, reverse=True)
+        return re.compile(rf"\b({'|'.join(map(re.escape, longest_first))})\b" if longest_first else r"(?!)")
+
+    @cached_property
+    def _spelled(self) -> dict[str, str]:
+        return {str(value): word for word, value in self.numbers.items() if value <= self.spelled}
+
+    def _with_digits(self, tokens: list[str]) -> list[str]:
+        result, place = [], 0
+        while place < len(tokens):
+            value, used = self._number(tokens[place : place + 5])
+            result.append(str(value) if used else tokens[place])
+            place += used or 1
+        return result
+
+    def _number(self, tokens: list[str]) -> tuple[int, int]:
+        """The number that ``tokens`` start with, and how many of them it takes: 0 where they start with none."""
+        value, used = self._below_hundred(tokens)
+        if tokens[used : used + 1] != [self.hundred]:
+            return value, used
+        value, used = 100 * (value if used else 1), used + 1
+        skipped = tokens[used : used + 1] == [self.conjunction]
+        more, length = self._below_hundred(tokens[used + skipped :])
+        return (value + more, used + skipped + length) if length else (value, used)
+
+    def _below_hundred(self, tokens: list[str]) -> tuple[int, int]:
+        first, second = (self.numbers.get(token) for token in (*tokens[:2], "", "")[:2])
+        if first is not None and first >= 20 and second is not None and 0 < second < 10:
+            return first + second, 2
+        return (0, 0) if first is None else (first, 1)
+
+
+RULES = TextRules()
+"""Those that new models are trained with."""
+
+
+def normalise(sentence: str) -> str:
+    """:meth:`TextRules.normalise` of :data:`RULES`."""
+    return RULES.normalise(sentence)
 
 
 def words(sentence: str) -> list[str]:
-    """The words of a sentence after :func:`normalise`; each digit is a word of its own."""
-    return _TOKENS.findall(normalise(sentence))
-
-
-def _with_digits(tokens: list[str]) -> list[str]:
-    result, place = [], 0
-    while place < len(tokens):
-        value, used = _number(tokens[place:])
-        result.append(str(value) if used else tokens[place])
-        place += used or 1
-    return result
-
-
-def _number(tokens: list[str]) -> tuple[int, int]:
-    """The number that ``tokens`` start with, and how many of them it takes; 0 of them where they start with none."""
-    value, used = _below_hundred(tokens)
-    if tokens[used : used + 1] != ["hundred"]:
-        return value, used
-    value, used = 100 * (value if used else 1), used + 1
-    skipped = tokens[used : used + 1] == ["and"]
-    more, length = _below_hundred(tokens[used + skipped :])
-    return (value + more, used + skipped + length) if length else (value, used)
-
-
-def _below_hundred(tokens: list[str]) -> tuple[int, int]:
-    first, second = (*tokens[:2], "", "")[:2]
-    if first in TENS:
-        unit = TEENS.get(second, 0)
-        return (TENS[first] + unit, 2) if 0 < unit < 10 else (TENS[first], 1)
-    return (TEENS[first], 1) if first in TEENS else (0, 0)
+    """:meth:`TextRules.words` of :data:`RULES`."""
+    return RULES.words(sentence)
 
 
 @dataclass(frozen=True)
@@ -121,12 +195,15 @@ class Vocabulary:
     """The words a model knows; a word's place is its id.
 
     words: all of them, PAD, SOS, EOS and UNK first. TextError where they are not, or a word is there twice.
+    rules: how sentences become words.
     """
 
     words: tuple[str, ...]
+    rules: TextRules = field(default=RULES, hash=False)
 
-    def __init__(self, words: Sequence[str]) -> None:
+    def __init__(self, words: Sequence[str], rules: TextRules = RULES) -> None:
         object.__setattr__(self, "words", tuple(words))
+        object.__setattr__(self, "rules", rules)
         if self.words[: len(SPECIALS)] != SPECIALS:
             raise TextError(f"a vocabulary starts with {', '.join(SPECIALS)}, not with {', '.join(self.words[:4])}")
         if len(self.ids) != len(self.words):
@@ -149,9 +226,12 @@ class Vocabulary:
     def encode(self, sentence: str) -> tuple[NDArray[np.int64], list[str]]:
         """Ids (words,) int64 of a sentence, without SOS and EOS, and its words that are not known: their id is UNK's.
 
-        TextError for a sentence without words, one without a known word, and one of more than :data:`MAX_WORDS` words.
+        TextError for a sentence without words, one without a known word, and one of more than :data:`MAX_WORDS` words
+        or :data:`MAX_LETTERS` letters.
         """
-        found = words(sentence)
+        if len(sentence) > MAX_LETTERS:
+            raise TextError(f"the sentence has {len(sentence)} letters, and at most {MAX_LETTERS} are possible")
+        found = self.rules.words(sentence)
         unknown = [word for word in found if word not in self.ids]
         if not found:
             raise TextError(f"the sentence {sentence!r} has no words")
@@ -165,9 +245,8 @@ class Vocabulary:
         return ", ".join(self.words[len(SPECIALS) : len(SPECIALS) + 20])
 
     def decode(self, ids: Iterable[int]) -> str:
-        """The sentence of ids, without PAD, SOS, EOS and UNK; digits that follow each other become one number."""
-        text = " ".join(self.words[i] for i in ids if i >= len(SPECIALS))
-        return re.sub(r"(?<=\d) (?=\d)", "", text)
+        """The sentence of ids (:meth:`TextRules.sentence`), without PAD, SOS, EOS and UNK."""
+        return self.rules.sentence(self.words[i] if i >= len(SPECIALS) else "" for i in ids)
 
     def to_json(self) -> list[str]:
         """The whole list of words; :meth:`from_json` is the inverse."""

@@ -19,6 +19,9 @@ UNITS = ("deg", "rad", "length", "m", "deg/s", "rad/s", "m/s", "1")
 TURN = {"deg": 360.0, "rad": 2 * np.pi}
 """A whole turn in each unit of angle."""
 
+MAX_VALUES = 2**28
+"""Numbers that a motion is resampled to at most: 2 GiB, of a hundred channels six hours at 120 frames a second."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Motion:
@@ -97,7 +100,10 @@ class Motion:
         stop = self.duration if stop is None else stop
         if not 0 <= start < stop <= self.duration + 0.5 / self.fps:
             raise MotionError(f"cannot cut {start:g} to {stop:g} s out of a motion of {self.duration:g} s")
-        return self[round(start * self.fps) : round(stop * self.fps)]
+        part = self[round(start * self.fps) : round(stop * self.fps)]
+        if not len(part):
+            raise MotionError(f"there is no frame from {start:g} to {stop:g} s at {self.fps:g} fps")
+        return part
 
     def select(self, channels: tuple[str, ...], units: tuple[str, ...] | None = None) -> "Motion":
         """The named channels in the order given, converted to ``units``; MotionError names what is missing."""
@@ -149,6 +155,8 @@ class Motion:
         if fps == self.fps:
             return self
         ratio = self.fps / fps
+        if self.values.size / ratio > MAX_VALUES:
+            raise MotionError(f"{self.duration:g} s at {fps:g} fps are too many frames")
         picked = abs(ratio - round(ratio)) < 1e-9 and ratio > 0.5
         values = (self if picked else self.continuous()).values
         return replace(self, values=resampled(values, ratio, to_end), fps=fps)

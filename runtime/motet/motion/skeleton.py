@@ -1,5 +1,6 @@
 """The skeleton: a tree of joints with offsets, and how each joint turns its angles into a rotation."""
 
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -55,9 +56,11 @@ class Skeleton:
         if self.metres_per_unit is not None and not 0 < self.metres_per_unit < np.inf:
             raise MotionError(f"a unit of length has a positive number of metres, not {self.metres_per_unit}")
         names = [joint.name for joint in self.joints]
-        double = sorted({name for name in names if names.count(name) > 1})
+        double = sorted(name for name, count in Counter(names).items() if count > 1)
         if double:
             raise MotionError(f"joint names must differ, twice in this skeleton: {', '.join(double)}")
+        if not np.isfinite([[*joint.offset, *joint.axis] for joint in self.joints]).all():
+            raise MotionError("offsets and axes of joints must be finite")
         for i, joint in enumerate(self.joints):
             if not (joint.parent == -1 if i == 0 else 0 <= joint.parent < i):
                 raise MotionError(f"joint {joint.name!r} must come after its parent, and only the first has none")
@@ -86,10 +89,10 @@ class Skeleton:
     @cached_property
     def children(self) -> tuple[tuple[int, ...], ...]:
         """For each joint the indices of its children."""
-        return tuple(
-            tuple(i for i, joint in enumerate(self.joints) if joint.parent == parent)
-            for parent in range(len(self.joints))
-        )
+        found: list[list[int]] = [[] for _ in self.joints]
+        for i, joint in enumerate(self.joints[1:], start=1):
+            found[joint.parent].append(i)
+        return tuple(map(tuple, found))
 
     @cached_property
     def levels(self) -> tuple[NDArray[np.intp], ...]:

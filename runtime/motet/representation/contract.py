@@ -120,7 +120,7 @@ class MotionContract:
         channels, units = _texts(data, "channels"), _texts(data, "units", len(data["channels"]))
         fps = float(_numbers([data.get("fps")], "fps", 1)[0])
         mean, std = (_numbers(data.get(key), key, len(channels)) for key in ("mean", "std"))
-        name = str(data.get("representation", _inferred_name(channels)))
+        name = str(data.get("representation"))
         lacking = [channel for channel in named(name).required if channel not in channels]
         _refuse(bool(lacking), "channels", f"{name} needs {', '.join(lacking)}")
         _refuse(len(set(channels)) < len(channels), "channels", "names must differ")
@@ -139,13 +139,6 @@ def sequences(representation: str, motion: Motion, fps: float, like: Motion | No
     if like is not None:
         motion = in_joints_of(motion, like.skeleton)
     return (named(representation).features(phase, like) for phase in phases(motion, fps))
-
-
-def _inferred_name(channels: Sequence[str]) -> str:
-    """To be deleted with format 1, whose manifests do not name the representation."""
-    if "root.forward" not in channels:
-        return "angles"
-    return "root_vectors" if any(name.endswith(".ex") for name in channels) else "root_angles"
 
 
 def living(std: ArrayLike, units: Sequence[str]) -> Array:

@@ -1,23 +1,29 @@
 """``motet evaluate``."""
 
 import json
+import shlex
+from collections.abc import Mapping
+from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import click
 import torch
 from tqdm import tqdm
 
+from motet.bundle.manifest import Manifest
 from motet.models.control import ControlModel
 from motet.models.describe import DescribeModel
 from motet.models.generate import GenerateModel
-from motet.models.load import VERBS, Model, load
+from motet.models.load import Model, build, load
 from motet.models.predict import PredictModel
 from motet_train.cli.evaluate_language import by_subject, language_reports
 from motet_train.cli.evaluate_predict import predict_reports
-from motet_train.data.clips import read_clips
-from motet_train.evaluate.control.report import GOALS, control_report, lab_of
+from motet_train.data.clips import Clips, read_clips
+from motet_train.data.errors import DataError
+from motet_train.evaluate.control.experiments import GOALS, control_report, study_of
 from motet_train.evaluate.language.report import GOALS as LANGUAGE_GOALS
-from motet_train.evaluate.tables import Report, json_ready, table
+from motet_train.evaluate.tables import Report, json_ready, report_table
 from motet_train.runs import Run
 
 
@@ -26,7 +32,7 @@ from motet_train.runs import Run
 @click.option(
     "--data",
     type=Path,
-    help="Control: the clips it was trained on [default: three CMU trials]. Describe and generate: the store. "
+    help="Control: the clips. [default: those it was trained on] Describe and generate: the store. "
     "Predict: text files of the protocol, or motion files.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one nested object with stable keys.")
@@ -41,42 +47,61 @@ def evaluate(models: tuple[str, ...], data: Path | None, as_json: bool, plots: P
     """
     torch.set_num_threads(1)
     runs = {name: Run.load(Path(name)) for name in models if (Path(name) / "run.json").is_file()}
+    if save and (bundles := [name for name in models if name not in runs]):
+        raise click.UsageError(f"--save keeps figures in training runs; {', '.join(bundles)} is a bundle")
     loaded = {name: _model(runs[name]) if name in runs else load(name) for name in models}
-    controls = {name: model for name, model in loaded.items() if isinstance(model, ControlModel)}
-    others = {name: model for name, model in loaded.items() if isinstance(model, DescribeModel | GenerateModel)}
-    predicts = {name: model for name, model in loaded.items() if isinstance(model, PredictModel)}
-    if sum(map(bool, (controls, others, predicts))) > 1:
-        raise click.UsageError("evaluate models that control, that predict, and others apart: their data differ")
-    if predicts:
-        ready, text = predict_reports(predicts, data, plots)
-    else:
-        reports = _control(controls, data, plots) if controls else language_reports(others, data, plots)
-        ready = {name: json_ready(report) for name, report in reports.items()}
-        for name in others:
-            if (other := by_subject(others, name)) is not None:
-                ready[name]["people_unseen"] = json_ready(reports[other])
-        text = table(reports, GOALS if controls else LANGUAGE_GOALS)
+    ready, text = _measured(loaded, data, plots)
     for name in runs if save else ():
         Run({**runs[name].manifest, "quality": ready[name]}, runs[name].model).save(Path(name))
-    if as_json:
-        click.echo(json.dumps(ready[models[0]] if len(models) == 1 else ready))
-    else:
-        click.echo(text)
+    click.echo(json.dumps(ready[models[0]] if len(models) == 1 else ready) if as_json else text)
 
 
 def _model(run: Run) -> Model:
-    return VERBS[run.manifest["verb"]](run.manifest, run.torch_graphs())
+    return build(Manifest.from_json(run.manifest), run.torch_graphs())
 
 
-def _control(models: dict[str, ControlModel], data: Path | None, plots: Path | None) -> dict[str, Report]:
+def _measured(models: Mapping[str, Model], data: Path | None, plots: Path | None) -> tuple[dict[str, Any], str]:
+    """The figures of each model, ready for JSON, and all of them as text."""
+    controls = {name: model for name, model in models.items() if isinstance(model, ControlModel)}
+    others = {name: model for name, model in models.items() if isinstance(model, DescribeModel | GenerateModel)}
+    predicts = {name: model for name, model in models.items() if isinstance(model, PredictModel)}
+    if sum(map(bool, (controls, others, predicts))) > 1:
+        raise click.UsageError("evaluate models that control, that predict, and others apart: their data differ")
+    if plots is not None:
+        from motet_train.evaluate.figures import make_folder
+
+        make_folder(plots)  # what cannot be written is said before hours of measuring
+    if predicts:
+        return predict_reports(predicts, data, plots)
+    reports = _control(controls, data, plots) if controls else language_reports(others, data, plots)
+    ready: dict[str, Any] = {name: json_ready(report) for name, report in reports.items()}
+    for name in others:
+        if (other := by_subject(others, name)) is not None:
+            ready[name]["people_unseen"] = json_ready(reports[other])
+    return ready, report_table(reports, GOALS if controls else LANGUAGE_GOALS)
+
+
+def _control(models: Mapping[str, ControlModel], data: Path | None, plots: Path | None) -> dict[str, Report]:
     reports: dict[str, Report] = {}
     for name, model in models.items():
-        lab = lab_of(model, read_clips(data))
-        bar = tqdm(desc=name, unit=" experiments", disable=None, leave=False)
-        reports[name] = control_report(lab, lambda key, bar=bar: bar.update())  # type: ignore[misc]
-        bar.close()
+        study = study_of(model, _clips(name, model, data))
+        with tqdm(desc=name, unit=" experiments", disable=None, leave=False) as bar:
+            reports[name] = control_report(study, lambda key, bar=bar: bar.update())  # type: ignore[misc]
         if plots is not None:
-            from motet_train.evaluate.control.plots import draw_all
+            from motet_train.evaluate.control.plots import drawings
+            from motet_train.evaluate.figures import save
 
-            draw_all(lab, plots)
+            save(drawings(study), plots if len(models) == 1 else plots / Path(name).name)
     return reports
+
+
+def _clips(name: str, model: ControlModel, data: Path | None) -> Clips:
+    """The clips in ``data``, else those that training was given, else CMU's; DataError where they are gone."""
+    if data is None:
+        words = shlex.split(str(model.manifest.training.get("command", "")))
+        given = [word.removeprefix("--data=") for word in words if word.startswith("--data=")]
+        given += [after for word, after in pairwise(words) if word == "--data"]
+        data = Path(given[-1]) if given else None
+        if data is not None and not data.exists():
+            raise DataError(f"the clips that {name} was trained on, {data}, are not here: give --data")
+    return read_clips(data)

@@ -10,8 +10,9 @@ from tqdm import tqdm
 from motet.models.describe import DescribeModel
 from motet.models.generate import GenerateModel
 from motet_train.data.store import Store
-from motet_train.evaluate.language.corpus import Corpus, corpus_of
+from motet_train.evaluate.language.prompts import ASKED
 from motet_train.evaluate.language.report import describe_report, generate_report
+from motet_train.evaluate.language.split_store import SplitStore, split_as
 from motet_train.evaluate.tables import Report
 
 Models = Mapping[str, DescribeModel | GenerateModel]
@@ -22,7 +23,7 @@ def language_reports(models: Models, data: Path | None, plots: Path | None) -> d
     if data is None:
         raise click.UsageError("models between motion and language need --data: the store that they were trained on")
     store = Store.open(data)
-    corpora = {name: corpus_of(model.manifest, store) for name, model in models.items()}
+    corpora = {name: split_as(model.manifest, store) for name, model in models.items()}
     reports = {}
     with tqdm(unit=" parts", disable=None, leave=False) as bar:
         for name, model in models.items():
@@ -35,12 +36,12 @@ def language_reports(models: Models, data: Path | None, plots: Path | None) -> d
 
 def by_subject(models: Models, name: str) -> str | None:
     """The model that shows how well this one would do with people never seen: the same verb, split by subject."""
-    by = {other: model.manifest["training"]["split"]["by"] for other, model in models.items()}
-    alike = (other for other, model in models.items() if model.manifest["verb"] == models[name].manifest["verb"])
+    by = {other: model.manifest.training["split"]["by"] for other, model in models.items()}
+    alike = (other for other, model in models.items() if model.manifest.verb == models[name].manifest.verb)
     return next((other for other in alike if by[other] == "subject" and by[name] != "subject"), None)
 
 
-def _report(name: str, models: Models, corpora: Mapping[str, Corpus], bar: "tqdm[Any]") -> Report:
+def _report(name: str, models: Models, corpora: Mapping[str, SplitStore], bar: "tqdm[Any]") -> Report:
     def progress(part: str) -> None:
         bar.set_description(f"{name}: {part}")
         bar.update()
@@ -56,14 +57,19 @@ def _report(name: str, models: Models, corpora: Mapping[str, Corpus], bar: "tqdm
     partner = next(describe, None)
     if partner is None:
         click.echo(f"{name}: tables 3 and 4 need a describe model of the same split too; they are left out", err=True)
-    return generate_report(model, corpus, partner, progress)
+    report = generate_report(model, corpus, partner, progress)
+    if lacking := [f"asked.{key}" for key in ASKED if key not in report.get("asked", {})]:
+        said = "training motions of that kind, or a root block, are missing"
+        click.echo(f"{name}: {', '.join(lacking)} cannot be measured: {said}", err=True)
+    return report
 
 
-def _draw(name: str, model: DescribeModel | GenerateModel, corpus: Corpus, folder: Path) -> None:
-    from motet_train.evaluate.language.pictures import draw_describe, draw_generate
+def _draw(name: str, model: DescribeModel | GenerateModel, corpus: SplitStore, folder: Path) -> None:
+    from motet_train.evaluate.figures import save
+    from motet_train.evaluate.language.pictures import describe_drawings, generate_drawings
 
     run = Path(name) if (Path(name) / "log.jsonl").is_file() else None
     if isinstance(model, DescribeModel):
-        draw_describe(model, corpus, run, folder)
+        save(describe_drawings(model, corpus, run), folder)
     else:
-        draw_generate(model, corpus, run, folder)
+        save(generate_drawings(model, corpus, run), folder)

@@ -14,11 +14,11 @@ from motet.motion.kinematics import skeleton_of
 from motet_train.data.clips import CMU as CLIPS
 from motet_train.data.expmap_files import CMU, ExpmapCorpus, is_expmap, read_expmap
 from motet_train.data.predict_data import STRIDE, Trial, read_trials
-from motet_train.evaluate.predict import mocap, report, strips
-from motet_train.evaluate.predict.ablations import ablated, ablations
-from motet_train.evaluate.predict.costs import costs
-from motet_train.evaluate.predict.rows import Row, pooled, rows_of, spread
-from motet_train.evaluate.predict.table import table
+from motet_train.evaluate.predict import curves, mocap, strips
+from motet_train.evaluate.predict.ablations import ablated, ablation_table
+from motet_train.evaluate.predict.costs import cost_table
+from motet_train.evaluate.predict.protocol_table import protocol_table
+from motet_train.evaluate.predict.seed_groups import SeedGroup, pooled, seed_groups, spread
 
 STRIPS = 3
 """Trials of motion files, about, of which stick figures are drawn."""
@@ -46,77 +46,81 @@ def predict_reports(models: Models, data: Path | None, plots: Path | None) -> Re
 
 
 def _protocol(models: Models, data: Path, plots: Path | None) -> Result:
-    corpus, rows = read_expmap(data), rows_of(models)
+    corpus, groups = read_expmap(data), seed_groups(models)
     if corpus.missing:
         click.echo(f"motet: {data} lacks {len(corpus.missing)} files: {', '.join(corpus.missing)}", err=True)
-    with tqdm(total=len(report.COUNTS) * (1 + len(models)), unit=" systems", disable=None, leave=False) as bar:
-        found = report.curves(models, corpus, lambda name: bar.update())
-    shown, apart = report.by_row(found, rows), report.by_row(found, rows, spread)
+    with tqdm(total=len(curves.COUNTS) * (1 + len(models)), unit=" systems", disable=None, leave=False) as bar:
+        found = curves.curves(models, corpus, lambda name: bar.update())
+    shown, apart = curves.by_group(found, groups), curves.by_group(found, groups, spread)
     if plots is not None:
-        _draw_protocol(_drawn(models, rows), corpus, shown, plots)
-    parts = [table(shown, corpus), costs(models, rows)]
-    if said := ablated(models, rows):
-        parts.append(ablations(shown, said))
-    runs, means, spreads = (partial(report.to_json, curves) for curves in (found, shown, apart))
-    return _ready(models, rows, runs, means, spreads), "\n\n".join(parts)
+        _draw_protocol(_drawn(models, groups), corpus, shown, plots)
+    parts = [protocol_table(shown, corpus), cost_table(models, groups)]
+    if said := ablated(models, groups):
+        parts.append(ablation_table(shown, said))
+    runs, means, spreads = (partial(curves.to_json, errors) for errors in (found, shown, apart))
+    return _ready(models, groups, runs, means, spreads), "\n\n".join(parts)
 
 
-def _draw_protocol(models: Models, corpus: ExpmapCorpus, shown: report.Curves, plots: Path) -> None:
-    from motet_train.evaluate.predict.plots import error_over_time, stick_figures
+def _draw_protocol(models: Models, corpus: ExpmapCorpus, shown: curves.Curves, plots: Path) -> None:
+    from motet_train.evaluate.figures import save
+    from motet_train.evaluate.predict.plots import error_over_time, strips_drawing
 
-    many = shown[report.MANY]
-    panels = {action: {name: many[name][action] for name in many} for action in many[report.ZERO]}
-    error_over_time(panels, corpus.layout.fps / STRIDE, "Euler error", plots / "predict-error.png")
+    many = shown[curves.MANY]
+    errors = {action: {name: many[name][action] for name in many} for action in many[curves.ZERO]}
+    drawings = {"predict-error": partial(error_over_time, errors, corpus.layout.fps / STRIDE, "Euler error")}
     if corpus.layout is CMU:  # of Human3.6M's figure there are no bones
         skeleton = skeleton_of(read_motion(CLIPS / BONES))
         for action in (action for action in DRAWN if action in corpus.test):
             drawn = strips.strips(models, corpus, action, skeleton)
-            stick_figures(drawn, skeleton, plots / f"predict-{action}.png", strips.GIVEN)
+            drawings[f"predict-{action}"] = partial(strips_drawing, drawn, skeleton, strips.GIVEN)
+    save(drawings, plots)
 
 
 def _mocap(models: Models, data: Path, plots: Path | None) -> Result:
-    first, rows = next(iter(models.values())), rows_of(models)
+    first, groups = next(iter(models.values())), seed_groups(models)
     with tqdm(unit=" files", disable=None, leave=False) as bar:
         trials = mocap.held_out(first, read_trials(data, lambda clip: bar.update())[0])
     found = mocap.distances(models, trials)
-    shown, apart = pooled(found, rows), pooled(found, rows, spread)
+    shown, apart = pooled(found, groups), pooled(found, groups, spread)
     if plots is not None:
-        _draw_mocap(_drawn(models, rows), trials, shown, plots)
+        _draw_mocap(_drawn(models, groups), trials, shown, plots)
     runs, means, spreads = (partial(mocap.to_json, distances) for distances in (found, shown, apart))
-    text = f"{mocap.table(shown, first.fps)}\n\n{costs(models, rows)}"
-    return _ready(models, rows, runs, means, spreads), text
+    text = f"{mocap.distance_table(shown, first.fps)}\n\n{cost_table(models, groups)}"
+    return _ready(models, groups, runs, means, spreads), text
 
 
 def _draw_mocap(models: Models, trials: Sequence[Trial], shown: mocap.Distances, plots: Path) -> None:
-    from motet_train.evaluate.predict.plots import error_over_time, stick_figures
+    from motet_train.evaluate.figures import save
+    from motet_train.evaluate.predict.plots import error_over_time, strips_drawing
 
     first = next(iter(models.values()))
-    panels = {measure: {name: shown[name][measure] for name in shown} for measure in shown[report.ZERO]}
-    error_over_time(panels, first.fps, "cm", plots / "predict-distance.png")
+    errors = {measure: {name: shown[name][measure] for name in shown} for measure in shown[curves.ZERO]}
+    drawings = {"predict-distance": partial(error_over_time, errors, first.fps, "cm")}
     for trial in trials[:: max(1, len(trials) // STRIPS)]:
         drawn = mocap.strips(models, trial.motion, every=3)
-        stick_figures(drawn, skeleton_of(trial.motion), plots / f"predict-{trial.name}.png")
+        drawings[f"predict-{trial.name}"] = partial(strips_drawing, drawn, skeleton_of(trial.motion))
+    save(drawings, plots)
 
 
-def _drawn(models: Models, rows: Sequence[Row]) -> Models:
-    """The first run of each row: a mean of poses is none."""
-    return {row.runs[0]: models[row.runs[0]] for row in rows}
+def _drawn(models: Models, groups: Sequence[SeedGroup]) -> Models:
+    """The first run of each group: a mean of poses is none."""
+    return {group.runs[0]: models[group.runs[0]] for group in groups}
 
 
 Figures = Callable[[str], dict[str, Any]]
 
 
-def _ready(models: Models, rows: Sequence[Row], runs: Figures, means: Figures, spreads: Figures) -> Ready:
+def _ready(models: Models, groups: Sequence[SeedGroup], runs: Figures, means: Figures, spreads: Figures) -> Ready:
     """The figures of each run and, under "zero_velocity", of the baseline.
 
-    Of several models also "grouped": title of each row of several runs -> their names as "runs", the figures of their
+    Of several models also "grouped": title of each group of several runs -> their names as "runs", the figures of their
     mean, and as "spread" the largest minus the smallest.
     """
-    ready: Ready = {name: {**runs(name), "zero_velocity": runs(report.ZERO)} for name in models}
+    ready: Ready = {name: {**runs(name), "zero_velocity": runs(curves.ZERO)} for name in models}
     if len(models) > 1:
         ready["grouped"] = {
-            row.title: {"runs": list(row.runs), **means(row.title), "spread": spreads(row.title)}
-            for row in rows
-            if len(row.runs) > 1
+            group.title: {"runs": list(group.runs), **means(group.title), "spread": spreads(group.title)}
+            for group in groups
+            if len(group.runs) > 1
         }
     return ready

@@ -5,9 +5,10 @@ from pathlib import Path
 import click
 from tqdm import tqdm
 
-from motet.cli.convert import METRES
-from motet_train.data.corpus import read_corpus
-from motet_train.data.records import Skipped
+from motet_train.cli.train_options import metres, unit_in
+from motet_train.data.corpus import Corpus, read_corpus
+from motet_train.data.errors import DataError
+from motet_train.data.records import Record, Skipped
 from motet_train.data.store import Item
 from motet_train.data.store import prepare as prepare_store
 
@@ -16,14 +17,16 @@ from motet_train.data.store import prepare as prepare_store
 @click.argument("data", type=Path)
 @click.option("--out", type=Path, required=True, help="Folder of the store to write; must not exist.")
 @click.option("--sentences", type=Path, help="Table of sentences. [default: the only .tsv in or beside DATA]")
-@click.option("--unit-in", type=click.Choice(list(METRES)), help="Length unit of motion files that do not say it.")
+@unit_in
 def prepare(data: Path, out: Path, sentences: Path | None, unit_in: str | None) -> None:
     """Prepare the corpus DATA once: a folder or zip of motions with sentences becomes a store to train on.
 
     DATA is the KIT Motion-Language data, or motion files .amc (with .asf) .bvh .npz with a table of tabs between the
     columns clip and sentence. A motion that cannot be used is named and skipped.
     """
-    corpus = read_corpus(data, sentences, None if unit_in is None else METRES[unit_in])
+    corpus = read_corpus(data, sentences, metres(unit_in))
+    _check_unit(corpus)
+    out.absolute().parent.mkdir(parents=True, exist_ok=True)
     with tqdm(total=len(corpus), unit="motion", disable=None) as bar:
 
         def progress(item: Item) -> None:
@@ -38,3 +41,14 @@ def prepare(data: Path, out: Path, sentences: Path | None, unit_in: str | None) 
         f"{out}: {len(store.records)} motions of {seconds:.0f} s with {texts} sentences, "
         f"{len(store.channels)} channels at {store.fps:g} fps; {len(store.skipped)} skipped"
     )
+
+
+def _check_unit(corpus: Corpus) -> None:
+    """DataError where the first motion does not say its unit and nobody else does: the others will not, either."""
+    first = (
+        next((item for item in corpus if isinstance(item, Record)), None) if corpus.preparation.root_block else None
+    )
+    if first is not None and first.motion.skeleton is not None and first.motion.skeleton.metres_per_unit is None:
+        raise DataError(
+            f"{first.name} does not say how long a unit of its skeleton is: give --unit-in for files that do not say it"
+        )

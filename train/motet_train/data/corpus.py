@@ -1,18 +1,23 @@
 """Corpora: motions with sentences, from the KIT Motion-Language data or from mocap files beside a table."""
 
-import csv
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from motet.formats import read_motion
+from motet.formats import MOCAP, read_motion
 from motet_train.data import kit
 from motet_train.data.archive import BROKEN, Archive
 from motet_train.data.errors import DataError
 from motet_train.data.preparation import ANGLES, FULL, Preparation
 from motet_train.data.records import Record, Skipped
 
-MOCAP = (".amc", ".bvh", ".npz")
+
+@dataclass(frozen=True)
+class Described:
+    """What a table says of a clip: sentences, and who moved, "" where it does not say that."""
+
+    sentences: tuple[str, ...]
+    subject: str = ""
 
 
 @dataclass(frozen=True)
@@ -35,33 +40,10 @@ class Corpus:
 
     def __iter__(self) -> Iterator[Record | Skipped]:
         with Archive(self.path) as archive:
-            yield from kit.records(archive) if self.table is None else self._mocap(archive, read_table(self.table))
-
-    def _mocap(self, archive: Archive, sentences: dict[str, tuple[str, ...]]) -> Iterator[Record | Skipped]:
-        for name in archive.names:
-            if name.lower().endswith(".asf"):
-                archive.place(name)  # the reader of an AMC file looks for its skeleton near it
-        seen: set[str] = set()
-        for file in self.names:
-            clip = _clip(file, sentences)
-            if clip not in sentences:
-                yield Skipped(clip, "no sentence")
-            elif clip in seen:
-                yield Skipped(clip, f"a second motion of this name: {file}")
+            if self.table is None:
+                yield from kit.records(archive)
             else:
-                yield self._record(archive, file, clip, sentences[clip])
-            seen.add(clip)
-        yield from (Skipped(clip, "no motion file of this name") for clip in sentences if clip not in seen)
-
-    def _record(self, archive: Archive, file: str, clip: str, sentences: tuple[str, ...]) -> Record | Skipped:
-        try:
-            with archive.opened(file) as place:
-                motion = read_motion(place)
-            if self.metres_per_unit is not None:
-                motion = motion.with_unit(self.metres_per_unit)
-            return Record(clip, clip.rpartition("/")[2].split("_")[0], motion, sentences)
-        except BROKEN as error:
-            return Skipped(clip, archive.reason(error))
+                yield from recordings(archive, self.metres_per_unit, read_table(self.table))
 
 
 def read_corpus(path: Path, table: Path | None = None, metres_per_unit: float | None = None) -> Corpus:
@@ -72,10 +54,9 @@ def read_corpus(path: Path, table: Path | None = None, metres_per_unit: float | 
     metres_per_unit: the length unit of mocap files, where they do not say it.
     """
     with Archive(path) as archive:
-        names = archive.names
+        names, motions = archive.names, motion_files(archive)
     if any(name.endswith(kit.ANNOTATIONS) for name in names):
         return Corpus(path, tuple(name for name in names if name.endswith(kit.MOTION)), ANGLES)
-    motions = tuple(name for name in names if PurePosixPath(name).suffix.lower() in MOCAP)
     if not motions:
         raise DataError(
             f"no corpus in {path}: it has neither KIT's NNNNN{kit.ANNOTATIONS} nor motion files ({' '.join(MOCAP)})"
@@ -83,35 +64,84 @@ def read_corpus(path: Path, table: Path | None = None, metres_per_unit: float | 
     return Corpus(path, motions, FULL, table or _only_table(path), metres_per_unit)
 
 
-def read_table(path: Path) -> dict[str, tuple[str, ...]]:
-    """Clip -> its sentences, from a table with tabs and a header that has the columns ``clip`` and ``sentence``.
+def motion_files(archive: Archive) -> tuple[str, ...]:
+    """The motion files of an archive, in order of their names."""
+    return tuple(name for name in archive.names if PurePosixPath(name).suffix.lower() in MOCAP)
 
-    Several lines of a clip give several sentences, empty ones are left out. DataError names the line that does not fit.
+
+def recordings(
+    archive: Archive, metres_per_unit: float | None = None, table: Mapping[str, Described] | None = None
+) -> Iterator[Record | Skipped]:
+    """The motion of each file of an archive, one of each clip's name; Skipped where it cannot be read or used.
+
+    metres_per_unit: the length unit of files that do not say it. table: what is said of each clip, without which a
+    motion is skipped, as is a clip without a motion; by default all motions are given, without sentences. A clip's
+    subject is what the table says, or else its name up to the first "_".
+    """
+    for name in archive.names:
+        if name.lower().endswith(".asf"):
+            archive.place(name)  # the reader of an AMC file looks for its skeleton near it
+    seen: set[str] = set()
+    for file in motion_files(archive):
+        clip = _clip(file, table or {})
+        said = Described(()) if table is None else table.get(clip)
+        if said is None:
+            yield Skipped(clip, "no sentence")
+        elif clip in seen:
+            yield Skipped(clip, f"a second motion of this name: {file}")
+        else:
+            yield _record(archive, file, clip, said, metres_per_unit)
+        seen.add(clip)
+    yield from (Skipped(clip, "no motion file of this name") for clip in table or () if clip not in seen)
+
+
+def read_table(path: Path) -> dict[str, Described]:
+    """What a table says of each clip: tabs between, and a header that has the columns ``clip`` and ``sentence``.
+
+    Several lines of a clip give several sentences, empty ones are left out. A column ``subject`` says who moved, once
+    for each clip or always alike. DataError names the line that does not fit.
     """
     try:
-        lines = list(
-            csv.reader(path.read_text(encoding="utf-8-sig").splitlines(), delimiter="\t", quoting=csv.QUOTE_NONE)
-        )
+        lines = [line.split("\t") for line in path.read_text(encoding="utf-8-sig").split("\n")]
     except (OSError, UnicodeDecodeError) as error:
         raise DataError(f"the table of sentences {path} cannot be read: {error}") from error
     header = lines[0] if lines else []
     if not {"clip", "sentence"} <= set(header):
         raise DataError(f"{path}, line 1: the header needs the columns clip and sentence, with tabs between: {header}")
-    found: dict[str, tuple[str, ...]] = {}
+    sentences: dict[str, list[str]] = {}
+    subjects: dict[str, str] = {}
     for number, line in enumerate(lines[1:], start=2):
-        if line and len(line) != len(header):
+        if line == [""]:
+            continue
+        if len(line) != len(header):
             raise DataError(f"{path}, line {number}: {len(line)} columns where the header has {len(header)}")
-        row = dict(zip(header, map(str.strip, line), strict=False))
-        if row.get("clip") and row["sentence"]:
-            found[row["clip"]] = (*found.get(row["clip"], ()), row["sentence"])
-    return found
+        row = dict(zip(header, map(str.strip, line), strict=True))
+        clip, subject = row["clip"], row.get("subject", "")
+        if clip and row["sentence"]:
+            sentences.setdefault(clip, []).append(row["sentence"])
+        if subject and subjects.setdefault(clip, subject) != subject:
+            raise DataError(
+                f"{path}, line {number}: the subject of {clip} is {subject!r}, and {subjects[clip]!r} above"
+            )
+    return {clip: Described(tuple(said), subjects.get(clip, "")) for clip, said in sentences.items()}
 
 
-def _clip(file: str, sentences: dict[str, tuple[str, ...]]) -> str:
+def _record(archive: Archive, file: str, clip: str, said: Described, metres_per_unit: float | None) -> Record | Skipped:
+    try:
+        with archive.opened(file) as place:
+            motion = read_motion(place)
+        if metres_per_unit is not None:
+            motion = motion.with_unit(metres_per_unit)
+        return Record(clip, said.subject or clip.rpartition("/")[2].split("_")[0], motion, said.sentences)
+    except BROKEN as error:
+        return Skipped(clip, archive.reason(error))
+
+
+def _clip(file: str, table: Mapping[str, Described]) -> str:
     """The name of a motion file in the table: its path without the extension, or else its stem."""
     path = PurePosixPath(file)
     whole = path.with_suffix("").as_posix()
-    return whole if whole in sentences else path.stem
+    return whole if whole in table else path.stem
 
 
 def _only_table(path: Path) -> Path:

@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.errors import MotionError
-from motet.formats import read_motion
+from motet.formats import MOCAP
 from motet.motion.kinematics import skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract, living, sequences
 from motet_train.data.archive import BROKEN, Archive
-from motet_train.data.clips import CMU_LICENCE
-from motet_train.data.corpus import MOCAP
+from motet_train.data.clips import CMU_LICENCE, read_with_unit
 from motet_train.data.errors import DataError
 from motet_train.data.expmap_files import ROOT, ExpmapCorpus, Layout, scaling_of
 from motet_train.data.records import Skipped
@@ -50,7 +49,7 @@ class Material:
     held: int = 0
     mirrored: tuple[int, ...] = ()
     signs: tuple[float, ...] = ()
-    licence: str = ""
+    licence: str | None = None
     about: dict[str, Any] = field(default_factory=dict)
     validation: Sequence[NDArray[np.float32]] = ()
     layout: Layout | None = None
@@ -148,8 +147,13 @@ class Trial:
     motion: Motion
 
 
-def read_trials(path: Path, progress: Callable[[str], object] = lambda name: None) -> tuple[list[Trial], list[Skipped]]:
-    """The motion files of a folder or zip, one of each name, idle ends cut off, and those that cannot be used."""
+def read_trials(
+    path: Path, progress: Callable[[str], object] = lambda name: None, metres_per_unit: float | None = None
+) -> tuple[list[Trial], list[Skipped]]:
+    """The motion files of a folder or zip, one of each name, idle ends cut off, and those that cannot be used.
+
+    metres_per_unit: the length unit of files that do not say it.
+    """
     trials, skipped = {}, []
     with Archive(path) as archive:
         names = [name for name in archive.names if PurePosixPath(name).suffix.lower() in MOCAP]
@@ -161,7 +165,8 @@ def read_trials(path: Path, progress: Callable[[str], object] = lambda name: Non
             progress(clip)
             try:
                 with archive.opened(name) as place:
-                    trials[clip] = Trial(clip, clip.split("_")[0], trim(read_motion(place)))
+                    motion = read_with_unit(place, metres_per_unit)
+                trials[clip] = Trial(clip, clip.split("_")[0], trim(motion))
             except BROKEN as error:
                 skipped.append(Skipped(clip, archive.reason(error)))
     if not trials:
@@ -175,7 +180,7 @@ def test_names(trials: Sequence[Trial]) -> tuple[str, ...]:
     return tuple(trials[index].name for index in split(entries, 0, "subject").test)
 
 
-def mocap_material(trials: Sequence[Trial], skipped: Sequence[Skipped], name: str, licence: str) -> Material:
+def mocap_material(trials: Sequence[Trial], skipped: Sequence[Skipped], name: str, licence: str | None) -> Material:
     """Motions of one figure as root block and exponential maps at :data:`FPS`, all phases, without the test trials."""
     test = set(test_names(trials))
     found, left_out = _figures([trial for trial in trials if trial.name not in test])

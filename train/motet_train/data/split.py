@@ -39,6 +39,13 @@ def split(entries: Sequence[Entry], seed: int, by: str = "trial") -> Split:
         fits = (part for part in room if part == 0 or len(parts[part]) + len(groups[key]) <= wanted)
         parts[next(fits)].extend(groups[key])
     if not all(parts):
-        raise DataError(f"{len(entries)} motions of {len(groups)} {by}s are too few for training, validation and test")
+        who = (
+            " (who moved: the column subject of the table, or else the name up to its first _)"
+            if by == "subject"
+            else ""
+        )
+        raise DataError(
+            f"{len(entries)} motions of {len(groups)} {by}s are too few for training, validation and test{who}"
+        )
     train, validation, test = (tuple(sorted(part)) for part in parts)
     return Split(train, validation, test)

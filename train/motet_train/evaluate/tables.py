@@ -1,6 +1,7 @@
-"""Reports: groups of figures with stable keys, as JSON and as a table beside the goals."""
+"""Reports, groups of figures with stable keys, as JSON and as text; and tables in general."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -8,6 +9,8 @@ Report = dict[str, dict[str, float]]
 
 Goals = Mapping[str, tuple[float | None, float | None]]
 """Name of a figure, "GROUP.KEY" -> (least, most) that is to be reached."""
+
+GAP = "   "
 
 
 def json_ready(report: Report) -> dict[str, dict[str, float | None]]:
@@ -18,15 +21,36 @@ def json_ready(report: Report) -> dict[str, dict[str, float | None]]:
     }
 
 
-def table(reports: Mapping[str, Report], goals: Goals) -> str:
+def aligned(rows: Sequence[Sequence[str]], left: Sequence[int] = (0,)) -> str:
+    """Rows of cells as text, each column as wide as its widest cell; a row of one cell is a heading of any width.
+
+    left: the columns that stand to the left; the others stand to the right.
+    """
+    several = [row for row in rows if len(row) > 1]
+    widths = [max(len(row[i]) for row in several if i < len(row)) for i in range(max(map(len, several), default=0))]
+
+    def line(row: Sequence[str]) -> str:
+        cells = zip(row, widths, strict=False)
+        padded = [cell.ljust(width) if i in left else cell.rjust(width) for i, (cell, width) in enumerate(cells)]
+        return GAP.join(padded).rstrip() if len(row) > 1 else "".join(row)
+
+    return "\n".join(map(line, rows))
+
+
+def report_table(reports: Mapping[str, Report], goals: Goals) -> str:
     """One line per figure that any report has, one column per report, and the goal behind those that have one."""
-    lines = [" " * 28 + "".join(f"{name[-14:]:>15}" for name in reports)]
+    rows = [["", *short_names(list(reports)), ""]]
     for group, key in _names(reports):
-        values = [report.get(group, {}).get(key) for report in reports.values()]
-        name = f"{group}.{key}"
-        cells = "".join(" " * 15 if value is None else f"{value:>15.4g}" for value in values)
-        lines.append(f"{name:<28}{cells}{_goal(goals, name, [value for value in values if value is not None])}")
-    return "\n".join(lines)
+        name, values = f"{group}.{key}", [report.get(group, {}).get(key) for report in reports.values()]
+        cells = ["" if value is None else f"{value:.4g}" for value in values]
+        rows.append([name, *cells, _goal(goals, name, [value for value in values if value is not None])])
+    return aligned(rows, left=(0, len(reports) + 1))
+
+
+def short_names(names: Sequence[str]) -> list[str]:
+    """Names of runs and bundles without their folders, where they stay different."""
+    short = [Path(name).name or name for name in names]
+    return short if len(set(short)) == len(names) else list(names)
 
 
 def reached(goals: Goals, name: str, value: float) -> bool:
@@ -50,4 +74,4 @@ def _goal(goals: Goals, name: str, values: list[float]) -> str:
     text = (
         f"{least:g} to {most:g}" if None not in (least, most) else f">= {least:g}" if most is None else f"<= {most:g}"
     )
-    return f"   {text:<12}" + ("" if all(reached(goals, name, value) for value in values) else "  NOT REACHED")
+    return f"{text:<12}" + ("" if all(reached(goals, name, value) for value in values) else "  NOT REACHED")

@@ -1,15 +1,14 @@
 """Training of a control model: from labelled clips to a run."""
 
-import platform
-import time
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from copy import deepcopy
 from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor
 
+from motet.bundle.manifest import Manifest
 from motet.models.control import ControlModel
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract, living
@@ -17,33 +16,30 @@ from motet_train.data.body import body_parts
 from motet_train.data.clips import Clips, sequences
 from motet_train.data.errors import DataError
 from motet_train.data.period import is_periodic
-from motet_train.evaluate.control.report import lab_of, missed_goals
+from motet_train.divergence import DivergenceLearner
+from motet_train.evaluate.control.experiments import missed_goals, study_of
 from motet_train.models.control import angle_crbm, tdbn
 from motet_train.models.control.angle_crbm import AngleCRBM, AngleCRBMConfig
-from motet_train.models.control.contrastive import Progress
 from motet_train.models.control.tdbn import TDBN, TDBNConfig
-from motet_train.recipes.audition import audition
+from motet_train.recipes.recipe import Job, Recipe
 from motet_train.runs import Run
+from motet_train.trainer import Line, kept
 
-
-@dataclass(frozen=True)
-class About:
-    """What a manifest says that no computation finds out."""
-
-    name: str
-    command: str
-    weights_licence: str
-
+RECIPES = {
+    "default": Recipe("control", "tdbn", TDBNConfig()),
+    "unclamped": Recipe("control", "tdbn", TDBNConfig().unclamped()),
+    "thesis": Recipe("control", "tdbn", TDBNConfig.thesis()),
+}
+BASELINES = {"default": Recipe("control", "angle-crbm", AngleCRBMConfig())}
 
 Net = TDBN | AngleCRBM
-Config = TDBNConfig | AngleCRBMConfig
 
 
-def train_control(clips: Clips, config: Config, seed: int, about: About, progress: Progress) -> Run:
-    """Train the net of the configuration on labelled clips; DataError where a clip is too short for it."""
+def train_control(clips: Clips, job: Job) -> Run:
+    """Train on labelled clips, see :meth:`motet_train.recipes.recipe.Job.run`; DataError where one is too short."""
+    config = job.recipe.config
     found = _sequences(clips, config.fps)
     _check_lengths(found, config.taps)
-    started = time.perf_counter()
     net = _untrained(clips, config)
     units = ("deg",) * len(clips.channels)
     mean, std = _statistics(found, units)
@@ -52,22 +48,23 @@ def train_control(clips: Clips, config: Config, seed: int, about: About, progres
         torch.tensor(std * config.sigma).float(),
     )
     onsets = [1.0 if is_periodic(frames) else config.onset for frames in found.values()]
-    generator = torch.Generator().manual_seed(seed)
     contract = MotionContract("angles", clips.channels, units, config.fps, mean, std, clips.skeleton)
-    manifest = _manifest(about, clips, contract, net, found)
-    candidates = _candidates(net, _tensors(found), onsets, generator, progress)
-    tried = _choose(Run(manifest, net), clips, candidates)
-    training = {
-        "command": about.command,
-        "seed": seed,
-        "seconds": round(time.perf_counter() - started, 2),
-        "reconstruction": round(reconstruction(net, found, std), 6),
-        **tried,
-        "threads": torch.get_num_threads(),
-        "machine": f"{platform.system()} {platform.machine()}, CPU",
-        "torch": torch.__version__,
-    }
-    return Run({**manifest, "training": training}, net)
+    manifest = _manifest(job, clips, contract, net, found)
+    net.to(job.device)
+    generator = torch.Generator(job.device).manual_seed(job.about.seed)
+    given = [[frames.to(job.device) for frames in group] for group in _tensors(found)]
+    if isinstance(net, TDBN):
+        stages, others = tdbn.stages(net, given, onsets, generator)
+    else:
+        stages, others = angle_crbm.stages(net, given, onsets, generator)
+    learner = DivergenceLearner(net, stages, generator, _missed(net, manifest, clips, found), others)
+
+    def more(log: Sequence[Line]) -> dict[str, Any]:
+        tried = sum("missed" in line for line in log)
+        chosen = {"candidates": tried, "missed": kept(log, "best")["missed"]} if tried else {}
+        return {"reconstruction": round(reconstruction(net.cpu(), found, std), 6), **chosen}
+
+    return job.run(net, learner, manifest, more)
 
 
 def _sequences(clips: Clips, fps: float) -> dict[str, list[Array]]:
@@ -75,48 +72,37 @@ def _sequences(clips: Clips, fps: float) -> dict[str, list[Array]]:
     return {label: [s for motion in group for s in sequences(motion, fps)] for label, group in clips.motions.items()}
 
 
-def _untrained(clips: Clips, config: Config) -> Net:
+def _untrained(clips: Clips, config: TDBNConfig | AngleCRBMConfig) -> Net:
     if isinstance(config, AngleCRBMConfig):
         return AngleCRBM(config, len(clips.channels), len(clips.labels))
     parts = body_parts(clips.skeleton, clips.channels).of_channel.tolist()
     return TDBN(config, parts, len(clips.labels))
 
 
-def _candidates(
-    net: Net,
-    found: Sequence[Sequence[Tensor]],
-    onsets: Sequence[float],
-    generator: torch.Generator,
-    progress: Progress,
-) -> Iterator[None]:
-    if isinstance(net, AngleCRBM):
-        return angle_crbm.train_angle_crbm(net, found, onsets, generator, progress)
-    return tdbn.train_tdbn(net, found, onsets, generator, progress)
-
-
-def _choose(run: Run, clips: Clips, candidates: Iterator[None]) -> dict[str, Any]:
-    """Train candidates until one moves as it should; says how many there were and what the chosen one misses.
-
-    A net of which there is one candidate only, or whose clips show no gait to try it with, is taken as it is.
-    """
-    single = not isinstance(run.model, TDBN) or run.model.config.restarts * run.model.config.tries == 1
-    if single or not any(map(is_periodic, _sequences(clips, run.manifest["motion"]["fps"]).values())):
-        next(candidates)
-        return {}
+def _missed(
+    net: Net, manifest: Mapping[str, Any], clips: Clips, found: Mapping[str, list[Array]]
+) -> Callable[[int], list[str]] | None:
+    """How candidates are chosen; None if there is one only, or if the clips show no gait to try it with."""
+    single = not isinstance(net, TDBN) or net.config.restarts * net.config.tries == 1
+    if single or not any(map(is_periodic, found.values())):
+        return None
 
     def missed(enough: int) -> list[str]:
-        return missed_goals(lab_of(ControlModel(run.manifest, run.torch_graphs()), clips), enough)
+        run = Run(manifest, deepcopy(net).cpu())
+        return missed_goals(study_of(ControlModel(Manifest.from_json(run.manifest), run.torch_graphs()), clips), enough)
 
-    tried, goals = audition(run.model, candidates, missed)
-    return {"candidates": tried, "missed": goals}
+    return missed
 
 
-def _model(net: Net) -> dict[str, Any]:
-    """What a manifest says of the net alone."""
+def _manifest(
+    job: Job, clips: Clips, contract: MotionContract, net: Net, found: Mapping[str, list[Array]]
+) -> dict[str, Any]:
+    starts = {label: np.round(group[0][: net.taps], 6).tolist() for label, group in found.items()}
+    defaults = {"temperature": net.config.temperature}
     if isinstance(net, AngleCRBM):
-        defaults = {"temperature": net.config.temperature, "iterations": net.config.iterations}
-        return {"model": "angle-crbm", "defaults": defaults, "config": angle_crbm.to_config(net)}
-    return {"model": "tdbn", "defaults": {"temperature": net.config.temperature}, "config": tdbn.to_config(net)}
+        defaults["iterations"] = net.config.iterations
+    config = angle_crbm.to_config(net) if isinstance(net, AngleCRBM) else tdbn.to_config(net)
+    return job.manifest(contract, config, defaults, clips.licence, control={"labels": list(found), "starts": starts})
 
 
 def reconstruction(net: Net, found: Mapping[str, Sequence[Array]], std: Array) -> float:
@@ -125,25 +111,6 @@ def reconstruction(net: Net, found: Mapping[str, Sequence[Array]], std: Array) -
     with torch.no_grad():
         error = (net.decode(net.encode(frames)) - frames).numpy()[:, std > 0] / std[std > 0]
     return float(np.sqrt(np.mean(error**2)))
-
-
-def _manifest(
-    about: About,
-    clips: Clips,
-    contract: MotionContract,
-    net: Net,
-    found: Mapping[str, Sequence[Array]],
-) -> dict[str, Any]:
-    starts = {label: np.round(group[0][: net.taps], 6).tolist() for label, group in found.items()}
-    return {
-        "name": about.name,
-        "version": "1",
-        "verb": "control",
-        **_model(net),
-        "motion": contract.to_json(),
-        "control": {"labels": list(found), "starts": starts},
-        "licence": {"weights": about.weights_licence, "data": clips.licence},
-    }
 
 
 def _statistics(found: Mapping[str, Sequence[Array]], units: Sequence[str]) -> tuple[Array, Array]:

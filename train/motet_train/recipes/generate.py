@@ -1,22 +1,31 @@
 """Recipes of the language-to-motion model: ``paper`` is table 1 of Plappert et al. 2017."""
 
 from dataclasses import replace
-from functools import partial
 
-from motet_train.fit import Fitting
+from motet_train.descent import Training
 from motet_train.models.language.language_to_motion import LanguageToMotionConfig
-from motet_train.recipes.language import Recipe
+from motet_train.recipes.language import SIZES, LanguageVisits
+from motet_train.recipes.recipe import Recipe
 
 BEAM = {"hypotheses": 5, "candidates": 4, "temperature": 1.0, "max_seconds": 15}
 """Decoding by the beam of section 4.3.3."""
 
-PAPER = Recipe("generate", "language-to-motion", LanguageToMotionConfig, Fitting(clip=25.0), BEAM)
+PAPER = Recipe(
+    "generate",
+    "language-to-motion",
+    LanguageToMotionConfig(0, 0),
+    SIZES,
+    Training(epochs=100, batch=128, optimiser="nadam", clip=25.0),
+    LanguageVisits(),
+    BEAM,
+)
 """Encoder 2 x 64, 2 x 64; decoder 3 x 400; embedding 64; 20 components; dropout 0.1; loss 12; 100 epochs."""
 
 DEFAULT = replace(
     PAPER,
-    config=partial(
-        LanguageToMotionConfig,
+    config=LanguageToMotionConfig(
+        0,
+        0,
         decoder_units=(200, 200),
         components=5,
         loss="likelihood",
@@ -25,11 +34,9 @@ DEFAULT = replace(
         frame_dropout=0.3,
         summary=60.0,
     ),
-    fitting=Fitting(
-        clip=25.0, epochs=400, batch=16, learning_rate=2e-3, offsets=1, windows=(50, 50), decay=0.5, keep="last"
-    ),
+    training=Training(epochs=400, batch=16, optimiser="nadam", learning_rate=2e-3, falling=0.5, clip=25.0, keep="last"),
+    data=LanguageVisits(offsets=1, windows=(50, 50), mirror=True),
     defaults={**BEAM, "hypotheses": 10, "candidates": 1, "temperature": 0.05},
-    mirror=True,
 )
 """What is shipped: trained on the true likelihood (eq. 11), on windows of motions, and to find back from small errors.
 

@@ -10,12 +10,12 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from motet.motion.resample import lines
 from motet.motion.rotations import Array
 from motet_train.data.clips import CONSTANT
 from motet_train.data.period import period
+from motet_train.evaluate.nearest import nearest
 
 ARRIVED = 0.25
 """z: a pose nearer to a loop than this is on it. As near as the frames of one recorded cycle of 39_14 are to another of
@@ -60,9 +60,9 @@ class Reference:
         z = self.z(frames)
         flat = z.reshape(-1, z.shape[-1])
         finite = np.isfinite(flat).all(axis=1)
-        nearest = np.full(len(flat), np.inf)
-        nearest[finite] = KDTree(self.z(points)).query(flat[finite])[0] / np.sqrt(flat.shape[1])
-        return nearest.reshape(z.shape[:-1])
+        distance = np.full(len(flat), np.inf)
+        distance[finite] = nearest(flat[finite], self.z(points))[1] / np.sqrt(flat.shape[1])
+        return distance.reshape(z.shape[:-1])
 
     def jumps(self, frames: Array) -> Array:
         """RMS z change (T-1, ...) from each of frames (T, ..., D) to the next."""

@@ -4,23 +4,23 @@ import re
 from collections.abc import Sequence
 
 from motet_train.evaluate.language.bleu import References
-from motet_train.evaluate.language.corpus import plain
+from motet_train.evaluate.language.split_store import plain
 
-Table = dict[str, str]
+Patterns = dict[str, str]
 """Name of an attribute -> regular expression of the words that say it."""
 
-VERBS: Table = {
+VERBS: Patterns = {
     "walk": r"walk\w*|stroll\w*|strid\w*|on foot|(?:several|few|slow) steps|steps? forwards?",
     "run": r"run|runs|ran|running|runner\w*|jog\w*|sprint\w*",
     "jump": r"jump\w*|leap\w*|hop|hops|hopp\w*|springs?",
 }
-SIDES: Table = {
+SIDES: Patterns = {
     "left": r"left(?:wards?|most|handed)?",
     "right": r"right(?:wards?|most|handed)?(?! (?:angles?|angled|away))",
 }
-TURNS: Table = {"turn": r"(?<!in )turn\w*|veer\w*|swerv\w*|curv\w*|corner|rotat\w*|spin\w*|dodg\w*|circle"}
-DIRECTIONS: Table = SIDES | {"backward": r"backwards?"}
-ACTIONS: Table = VERBS | {
+TURNS: Patterns = {"turn": r"(?<!in )turn\w*|veer\w*|swerv\w*|curv\w*|corner|rotat\w*|spin\w*|dodg\w*|circle"}
+DIRECTIONS: Patterns = SIDES | {"backward": r"backwards?"}
+ACTIONS: Patterns = VERBS | {
     "dance": r"danc\w*|ballet|arabesque|pirouette\w*",
     "kick or punch": r"kick\w*|punch\w*|karate|box\w*",
     "wave": r"wav(?:e|es|ing)",
@@ -36,7 +36,7 @@ Score = tuple[int, int]
 """How many are right, out of how many."""
 
 
-def said(table: Table, sentence: str) -> frozenset[str]:
+def said(table: Patterns, sentence: str) -> frozenset[str]:
     """The attributes that a sentence names."""
     text = _DENIED.sub("", plain(sentence))
     return frozenset(name for name, pattern in table.items() if re.search(rf"\b(?:{pattern})\b", text))

@@ -7,7 +7,7 @@ import numpy as np
 from sacrebleu.metrics.bleu import BLEU
 
 from motet.models.text import EOS, SOS
-from motet_train.evaluate.language.corpus import plain
+from motet_train.evaluate.language.split_store import plain
 
 RANKS = 5
 """Hypotheses for each motion, as in the paper."""

@@ -10,8 +10,8 @@ from motet.models.describe import DescribeModel
 from motet.models.generate import Generated, GenerateModel
 from motet.motion.motion import Motion
 from motet_train.evaluate.language.bleu import RANKS, bleu, ranks
-from motet_train.evaluate.language.corpus import Corpus, unknown_words_allowed
 from motet_train.evaluate.language.floors import retrieved
+from motet_train.evaluate.language.split_store import SplitStore, unknown_words_allowed
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,33 +28,36 @@ class Answers:
         return [row[0].features for row in self.rows]
 
 
-def answers(model: GenerateModel, corpus: Corpus, records: Sequence[int]) -> Answers:
+def answers(model: GenerateModel, corpus: SplitStore, records: Sequence[int]) -> Answers:
     """Ranked motions for every sentence of the records; one of which the model knows no word is left out.
 
     As many hypotheses as the model keeps by default, as users get them; from one that keeps less than five the last
     stands for those that lack.
     """
-    asked = prompts(model, corpus, records)
+    asked = known_sentences(model, corpus, records)
     with unknown_words_allowed():
         rows = model.generate([sentence for _, sentence in asked])
     return Answers(tuple(r for r, _ in asked), tuple(s for _, s in asked), tuple(rows))
 
 
-def prompts(model: GenerateModel, corpus: Corpus, records: Sequence[int]) -> list[tuple[int, str]]:
+def known_sentences(model: GenerateModel, corpus: SplitStore, records: Sequence[int]) -> list[tuple[int, str]]:
     """Every record with every sentence of it that the model can take."""
-    return [(record, said) for record in records for said in corpus.sentences(record) if _known(model, said)]
+    return [(record, said) for record in records for said in corpus.sentences(record) if knows(model, said)]
 
 
-def chained(describe: DescribeModel, found: Answers, corpus: Corpus) -> dict[str, float]:
+def chained(describe: DescribeModel, found: Answers, corpus: SplitStore) -> dict[str, float]:
     """A row of table 3: BLEU of the descriptions of the first to the fifth motion, "1" to "5".
 
     One entry for each sentence that a motion was made for; references are all that was said about its record.
     """
-    texts = [told(describe, [row[min(rank, len(row) - 1)].features for row in found.rows]) for rank in range(RANKS)]
+    texts = [
+        best_descriptions(describe, [row[min(rank, len(row) - 1)].features for row in found.rows])
+        for rank in range(RANKS)
+    ]
     return ranks(list(zip(*texts, strict=True)), corpus.references(found.records))
 
 
-def bounds_chained(describe: DescribeModel, found: Answers, corpus: Corpus) -> dict[str, float]:
+def bounds_chained(describe: DescribeModel, found: Answers, corpus: SplitStore) -> dict[str, float]:
     """The same with motions that are not generated.
 
     retrieval: the training motion about which the most alike sentence was said, the floor. data: the very motion that
@@ -62,10 +65,12 @@ def bounds_chained(describe: DescribeModel, found: Answers, corpus: Corpus) -> d
     """
     references = corpus.references(found.records)
     records = {"retrieval": retrieved(corpus, found.sentences), "data": found.records}
-    return {key: bleu(told(describe, corpus.motions(chosen)), references) for key, chosen in records.items()}
+    return {
+        key: bleu(best_descriptions(describe, corpus.motions(chosen)), references) for key, chosen in records.items()
+    }
 
 
-def told(describe: DescribeModel, motions: Sequence[Motion]) -> list[str]:
+def best_descriptions(describe: DescribeModel, motions: Sequence[Motion]) -> list[str]:
     """The best description of each motion; nothing for one that is too short to be described."""
     usable = [i for i, motion in enumerate(motions) if round(motion.duration * describe.fps) >= 2]
     rows = describe.describe([motions[i] for i in usable]) if usable else []
@@ -73,20 +78,20 @@ def told(describe: DescribeModel, motions: Sequence[Motion]) -> list[str]:
     return [texts.get(i, "") for i in range(len(motions))]
 
 
-def likelihood(model: GenerateModel, corpus: Corpus, records: Sequence[int]) -> float:
+def likelihood(model: GenerateModel, corpus: SplitStore, records: Sequence[int]) -> float:
     """Log-likelihood of a frame of the records' motions given each of their sentences, the ending frame included."""
     total, frames = 0.0, 0
     with unknown_words_allowed():
-        for record, sentence in prompts(model, corpus, records):
+        for record, sentence in known_sentences(model, corpus, records):
             motion = corpus.motion(record)
             total += model.score(sentence, motion)
             frames += len(motion) + 1
     return total / frames if frames else np.nan
 
 
-def _known(model: GenerateModel, sentence: str) -> bool:
+def knows(model: GenerateModel, sentence: str, every_word: bool = False) -> bool:
+    """Whether a model knows a word of a sentence, or every word."""
     try:
-        model.unknown(sentence)
+        return not (model.unknown(sentence) and every_word)
     except TextError:
         return False
-    return True

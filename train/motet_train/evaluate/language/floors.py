@@ -5,43 +5,43 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.distance import cdist
 from sklearn.feature_extraction.text import TfidfVectorizer
 
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet_train.evaluate.language.bleu import References, bleu
-from motet_train.evaluate.language.corpus import Corpus
+from motet_train.evaluate.language.split_store import SplitStore
+from motet_train.evaluate.nearest import nearest
 
 
-def nearest_motions(corpus: Corpus, motions: Sequence[Motion]) -> list[int]:
+def nearest_motions(corpus: SplitStore, motions: Sequence[Motion]) -> list[int]:
     """For each motion the training record with the most alike pose features: mean and deviation of each channel."""
     train = corpus.described(corpus.parts.train)
     known = np.array([_features(corpus, motion) for motion in corpus.motions(train)])
     asked = np.array([_features(corpus, motion) for motion in motions])
-    return [train[i] for i in cdist(asked, known).argmin(axis=1)]
+    return [train[i] for i in nearest(asked, known)[0]]
 
 
-def nearest_bleu(corpus: Corpus, records: Sequence[int]) -> float:
+def nearest_bleu(corpus: SplitStore, records: Sequence[int]) -> float:
     """BLEU of saying what was said about the nearest motion: the mean over which of its sentences that is."""
-    nearest = corpus.references(nearest_motions(corpus, corpus.motions(records)))
+    found = corpus.references(nearest_motions(corpus, corpus.motions(records)))
     references = corpus.references(records)
-    most = max(map(len, nearest))
-    return float(np.mean([bleu([said[place % len(said)] for said in nearest], references) for place in range(most)]))
+    most = max(map(len, found))
+    return float(np.mean([bleu([said[place % len(said)] for said in found], references) for place in range(most)]))
 
 
-def frequent_sentence(corpus: Corpus) -> str:
+def frequent_sentence(corpus: SplitStore) -> str:
     """The sentence that was said most often about training motions, the first by name of several."""
     counts = Counter(sentence for said in corpus.references(corpus.parts.train) for sentence in said)
     return min(counts, key=lambda sentence: (-counts[sentence], sentence))
 
 
-def frequent_bleu(corpus: Corpus, references: References) -> float:
+def frequent_bleu(corpus: SplitStore, references: References) -> float:
     """BLEU of always saying the most frequent training sentence."""
     return bleu([frequent_sentence(corpus)] * len(references), references)
 
 
-def retrieved(corpus: Corpus, sentences: Sequence[str]) -> list[int]:
+def retrieved(corpus: SplitStore, sentences: Sequence[str]) -> list[int]:
     """For each sentence the training record about which the most alike sentence was said.
 
     Alike by the cosine of their words, weighted by TF-IDF: what applications ship that take no risk.
@@ -53,7 +53,7 @@ def retrieved(corpus: Corpus, sentences: Sequence[str]) -> list[int]:
     return [known[i][0] for i in alike.argmax(axis=1)]
 
 
-def _features(corpus: Corpus, motion: Motion) -> Array:
+def _features(corpus: SplitStore, motion: Motion) -> Array:
     """(2 D,): mean and standard deviation over time of each channel, in the training motions' units of deviation."""
     z = corpus.z(motion)
     features: Array = np.concatenate([z.mean(axis=0), z.std(axis=0)])

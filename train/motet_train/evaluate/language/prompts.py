@@ -9,12 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from motet.errors import TextError
 from motet.models.generate import GenerateModel
 from motet.motion.motion import Motion
 from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS
 from motet_train.evaluate.language.attributes import common_side, common_verbs, turns
-from motet_train.evaluate.language.corpus import Corpus
+from motet_train.evaluate.language.chain import knows
+from motet_train.evaluate.language.split_store import SplitStore, unknown_words_allowed
 
 SEEDS = 10
 
@@ -37,7 +37,7 @@ class Thresholds:
 
     slow: m/s, half of the speed that nine of ten training walks exceed. run: m/s, between the median speeds of walks
     and of runs. turn: degrees, between the median turns of straight and of turning ones. rise: m, between the median
-    rises of walks and of jumps.
+    rises of walks and of jumps. NaN where there are no training motions of a kind.
     """
 
     slow: float
@@ -46,14 +46,21 @@ class Thresholds:
     rise: float
 
 
-ASKED: Mapping[str, tuple[str, Callable[[Travel, Thresholds], bool]]] = {
-    "walks": ("a person walks", lambda travel, limits: limits.slow <= travel.speed < limits.run),
-    "runs": ("a person runs", lambda travel, limits: travel.speed >= limits.run),
-    "left": ("a person walks and turns left", lambda travel, limits: travel.turn >= limits.turn),
-    "right": ("a person walks and turns right", lambda travel, limits: travel.turn <= -limits.turn),
-    "jumps": ("a person jumps", lambda travel, limits: travel.rise >= limits.rise),
+class Asked(NamedTuple):
+    """A sentence, whether a motion is what it says, and the thresholds that this takes."""
+
+    sentence: str
+    is_so: Callable[[Travel, Thresholds], bool]
+    needs: tuple[str, ...]
+
+
+ASKED: Mapping[str, Asked] = {
+    "walks": Asked("a person walks", lambda travel, than: than.slow <= travel.speed < than.run, ("slow", "run")),
+    "runs": Asked("a person runs", lambda travel, than: travel.speed >= than.run, ("run",)),
+    "left": Asked("a person walks and turns left", lambda travel, than: travel.turn >= than.turn, ("turn",)),
+    "right": Asked("a person walks and turns right", lambda travel, than: travel.turn <= -than.turn, ("turn",)),
+    "jumps": Asked("a person jumps", lambda travel, than: travel.rise >= than.rise, ("rise",)),
 }
-"""Key -> the sentence, and whether a motion is what it says."""
 
 
 def travel(motion: Motion) -> Travel:
@@ -64,7 +71,7 @@ def travel(motion: Motion) -> Travel:
     return Travel(forward, float(steps[:, 2].sum() / motion.fps), float(height.max() - np.median(height)))
 
 
-def kinds(corpus: Corpus) -> dict[str, list[Travel]]:
+def kinds(corpus: SplitStore) -> dict[str, list[Travel]]:
     """How the training motions move that people say walk, run, jump, go straight, turn left, turn right.
 
     Empty without a root block. A motion that does two of walking, running and jumping is none of them.
@@ -77,23 +84,32 @@ def kinds(corpus: Corpus) -> dict[str, list[Travel]]:
     return found
 
 
-def thresholds(found: Mapping[str, Sequence[Travel]]) -> Thresholds | None:
-    """The thresholds between :func:`kinds`; None where there are no motions of some kind."""
-    if not all(found.values()):
-        return None
+def thresholds(found: Mapping[str, Sequence[Travel]]) -> Thresholds:
+    """The thresholds between :func:`kinds`."""
     speeds, rises = ({key: [getattr(t, name) for t in found[key]] for key in found} for name in ("speed", "rise"))
     turning = [abs(t.turn) for key in ("left", "right") for t in found[key]]
     return Thresholds(
-        slow=float(np.percentile(speeds["walks"], 10)) / 2,
+        slow=float(np.percentile(speeds["walks"], 10)) / 2 if speeds["walks"] else np.nan,
         run=_between(speeds["walks"], speeds["runs"]),
         turn=_between([abs(t.turn) for t in found["straight"]], turning),
         rise=_between(rises["walks"], rises["jumps"]),
     )
 
 
+def measurable(limits: Thresholds) -> dict[str, Asked]:
+    """Those of ASKED whose thresholds exist."""
+    return {
+        key: asked for key, asked in ASKED.items() if all(np.isfinite(getattr(limits, name)) for name in asked.needs)
+    }
+
+
 def recognised(found: Mapping[str, Sequence[Travel]], limits: Thresholds) -> dict[str, float]:
-    """For each of ASKED the share of the training motions of that kind that count as such: what a model can reach."""
-    return {key: float(np.mean([is_so(t, limits) for t in found[key]])) for key, (_, is_so) in ASKED.items()}
+    """What a model can reach: for each measurable one of ASKED the share of the training motions of that kind that
+    count as such; NaN where there are none."""
+    return {
+        key: float(np.mean([asked.is_so(t, limits) for t in found[key]])) if found[key] else np.nan
+        for key, asked in measurable(limits).items()
+    }
 
 
 def _kinds(sentences: Sequence[str]) -> list[str]:
@@ -107,19 +123,18 @@ def _kinds(sentences: Sequence[str]) -> list[str]:
 
 
 def _between(*samples: Sequence[float]) -> float:
-    return float(np.mean([np.median(sample) for sample in samples]))
+    return float(np.mean([np.median(sample) for sample in samples])) if all(samples) else np.nan
 
 
 def prompted(model: GenerateModel, limits: Thresholds, seeds: int = SEEDS) -> dict[str, float]:
-    """For each of ASKED the share of seeds whose likeliest motion is what the sentence says.
+    """For each measurable one of ASKED the share of seeds whose likeliest motion is what the sentence says.
 
     A sentence of which the model knows no word counts as failed.
     """
     shares = {}
-    for key, (sentence, is_so) in ASKED.items():
-        try:
-            rows = model.generate([sentence] * seeds, seed=range(seeds))
-        except TextError:
-            rows = []
-        shares[key] = sum(is_so(travel(row[0].features), limits) for row in rows) / seeds
+    for key, asked in measurable(limits).items():
+        known = knows(model, asked.sentence)
+        with unknown_words_allowed():
+            rows = model.generate([asked.sentence] * seeds, seed=range(seeds)) if known else []
+        shares[key] = sum(asked.is_so(travel(row[0].features), limits) for row in rows) / seeds
     return shares

@@ -1,22 +1,22 @@
 """All figures of a describe or generate model in one nested object with stable keys, and the goals of those we ship."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import asdict
-from typing import Any
 
 import numpy as np
 
+from motet.bundle.manifest import Manifest
 from motet.errors import TextError
 from motet.models.describe import DescribeModel
 from motet.models.generate import GenerateModel
 from motet.models.text import words
 from motet_train.evaluate.language.attributes import Score, sides_right, turns_right, verbs_right
 from motet_train.evaluate.language.bleu import RANKS, References, agreement, bleu, ranks
-from motet_train.evaluate.language.chain import Answers, answers, bounds_chained, chained, likelihood, told
-from motet_train.evaluate.language.corpus import Corpus, unknown_words_allowed
+from motet_train.evaluate.language.chain import Answers, answers, best_descriptions, bounds_chained, chained, likelihood
 from motet_train.evaluate.language.floors import frequent_bleu, nearest_bleu
 from motet_train.evaluate.language.motions import measures, quiet_energy
-from motet_train.evaluate.language.prompts import kinds, prompted, recognised, thresholds
+from motet_train.evaluate.language.prompts import kinds, measurable, prompted, recognised, thresholds
+from motet_train.evaluate.language.split_store import SplitStore, unknown_words_allowed
 from motet_train.evaluate.tables import Goals, Report
 
 Progress = Callable[[str], object]
@@ -42,9 +42,11 @@ SAMPLE, CHAIN_SAMPLE = 200, 40
 TRAINING = ("seconds", "epochs", "kept_epoch", "train_loss", "validation_loss", "steps_per_second")
 
 
-def describe_report(model: DescribeModel, corpus: Corpus, progress: Progress = lambda group: None) -> Report:
+def describe_report(model: DescribeModel, corpus: SplitStore, progress: Progress = lambda group: None) -> Report:
     """Table 2, with and without SOS and EOS; floors and ceiling; what the best description of test motions says right.
 
+    "bleu_unseen" is of those references alone that nobody said, word for word, about a training motion: where people
+    describe from a pool of phrases, BLEU rewards knowing the pool. Motions without such a reference are left out.
     A figure that does not exist is NaN. ``progress`` is called with the name of each part before it starts.
     """
     report = _origin(model.manifest, corpus)
@@ -57,6 +59,7 @@ def describe_report(model: DescribeModel, corpus: Corpus, progress: Progress = l
         said = corpus.references(records)
         report[f"bleu_{part}"] = ranks(found[part], said)
         report[f"bleu_{part}_marked"] = ranks(found[part], said, marks=True)
+    report |= _unseen(found["test"], corpus, test)
     progress("floors")
     report["floor"] = _floors(corpus, test, references)
     best = report["bleu_test"]["1"]
@@ -69,7 +72,7 @@ def describe_report(model: DescribeModel, corpus: Corpus, progress: Progress = l
 
 def generate_report(
     model: GenerateModel,
-    corpus: Corpus,
+    corpus: SplitStore,
     describe: DescribeModel | None = None,
     progress: Progress = lambda group: None,
 ) -> Report:
@@ -89,10 +92,12 @@ def generate_report(
     progress("prompts")
     known = kinds(corpus)
     limits, quiet = thresholds(known), quiet_energy(corpus.motions(corpus.parts.train), corpus.contract)
-    report["threshold"] = {"quiet": quiet}
-    if limits is not None:
+    report["threshold"] = {
+        "quiet": quiet,
+        **{key: value for key, value in asdict(limits).items() if np.isfinite(value)},
+    }
+    if measurable(limits):
         report["asked"], report["asked_data"] = prompted(model, limits), recognised(known, limits)
-        report["threshold"] |= asdict(limits)
     progress("motions")
     report["motion"] = measures(found.best, corpus.contract, quiet)
     report["motion_data"] = measures(corpus.motions(found.records), corpus.contract, quiet)
@@ -102,13 +107,13 @@ def generate_report(
     return report
 
 
-def hypotheses(model: DescribeModel, corpus: Corpus, records: tuple[int, ...]) -> list[list[str]]:
+def hypotheses(model: DescribeModel, corpus: SplitStore, records: tuple[int, ...]) -> list[list[str]]:
     """Five ranked descriptions of each record's motion."""
     return [[found.text for found in row] for row in model.describe(corpus.motions(records), RANKS)]
 
 
-def _origin(manifest: Mapping[str, Any], corpus: Corpus) -> Report:
-    training, parts, store = manifest["training"], corpus.parts, corpus.store
+def _origin(manifest: Manifest, corpus: SplitStore) -> Report:
+    training, parts, store = manifest.training, corpus.parts, corpus.store
     people = [{store.records[i].subject for i in part} for part in (parts.train, parts.test)]
     return {
         "train": {key: float(training[key]) for key in TRAINING if key in training},
@@ -123,7 +128,21 @@ def _origin(manifest: Mapping[str, Any], corpus: Corpus) -> Report:
     }
 
 
-def _floors(corpus: Corpus, test: tuple[int, ...], references: References) -> dict[str, float]:
+def _unseen(hypotheses: list[list[str]], corpus: SplitStore, records: tuple[int, ...]) -> Report:
+    """BLEU on references that stand in no training sentence, and how many do."""
+    unseen = corpus.unseen(records)
+    kept = [i for i, said in enumerate(unseen) if said]
+    sentences = sum(map(len, corpus.references(records)))
+    counts = {
+        "test_sentences": float(sentences),
+        "test_sentences_seen": 1 - sum(map(len, unseen)) / sentences,
+        "test_motions_unseen": float(len(kept)),
+    }
+    figures = ranks([hypotheses[i] for i in kept], [unseen[i] for i in kept]) if kept else {}
+    return {"wording": counts, "bleu_unseen": figures or dict.fromkeys(map(str, range(1, RANKS + 1)), np.nan)}
+
+
+def _floors(corpus: SplitStore, test: tuple[int, ...], references: References) -> dict[str, float]:
     return {
         "nearest": nearest_bleu(corpus, test),
         "frequent": frequent_bleu(corpus, references),
@@ -142,7 +161,7 @@ def _words(texts: list[str], references: References) -> dict[str, float]:
     return shares | {f"{key}_of": float(count) for key, (_, count) in scores.items()}
 
 
-def _log_probability(model: DescribeModel, corpus: Corpus, records: tuple[int, ...]) -> float:
+def _log_probability(model: DescribeModel, corpus: SplitStore, records: tuple[int, ...]) -> float:
     """Log-probability of a word of the records' sentences given their motions, EOS included."""
     total, count = 0.0, 0
     with unknown_words_allowed():
@@ -157,10 +176,12 @@ def _log_probability(model: DescribeModel, corpus: Corpus, records: tuple[int, .
     return total / count if count else np.nan
 
 
-def _chain(model: GenerateModel, describe: DescribeModel, corpus: Corpus, found: Answers, progress: Progress) -> Report:
+def _chain(
+    model: GenerateModel, describe: DescribeModel, corpus: SplitStore, found: Answers, progress: Progress
+) -> Report:
     progress("describe train")
     train = corpus.described(corpus.parts.train, SAMPLE)
-    base = bleu(told(describe, corpus.motions(train)), corpus.references(train))
+    base = bleu(best_descriptions(describe, corpus.motions(train)), corpus.references(train))
     progress("chain train")
     some = answers(model, corpus, corpus.described(corpus.parts.train, CHAIN_SAMPLE))
     rows = {"train": chained(describe, some, corpus)}

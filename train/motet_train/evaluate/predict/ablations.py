@@ -3,10 +3,13 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from motet.bundle.manifest import Manifest
 from motet.models.predict import PredictModel
+from motet_train.evaluate.predict.curves import COUNTS, MEAN, Curves
+from motet_train.evaluate.predict.protocol_table import error_row, frame_heads
 from motet_train.evaluate.predict.published import FRAMES
-from motet_train.evaluate.predict.report import COUNTS, MEAN, Curves
-from motet_train.evaluate.predict.rows import Row
+from motet_train.evaluate.predict.seed_groups import SeedGroup
+from motet_train.evaluate.tables import aligned
 
 MODEL = "convseq2seq"
 
@@ -20,23 +23,23 @@ WORDS = {
 """Setting and its value -> how papers put it; other settings are called by their names."""
 
 
-def ablated(models: Mapping[str, PredictModel], rows: Sequence[Row]) -> dict[str, str]:
-    """Title of each of the model's rows -> how it differs in settings from the first; {} where there is one only."""
-    ours = [row for row in rows if models[row.runs[0]].manifest.get("model") == MODEL]
+def ablated(models: Mapping[str, PredictModel], groups: Sequence[SeedGroup]) -> dict[str, str]:
+    """Title of each of the model's groups -> how its settings differ from the first; {} where there is one only."""
+    ours = [group for group in groups if models[group.runs[0]].manifest.model == MODEL]
     if len(ours) < 2:
         return {}
     first, *others = ours
     given = _settings(models[first.runs[0]].manifest)
     said = {first.title: f"{first.title}, as it is"}
-    for row in others:
-        words = _differing(given, _settings(models[row.runs[0]].manifest))
-        said[row.title] = f"{words}{row.count}" if words else row.title
+    for group in others:
+        words = _differing(given, _settings(models[group.runs[0]].manifest))
+        said[group.title] = f"{words}{group.count}" if words else group.title
     return said
 
 
-def _settings(manifest: Mapping[str, Any]) -> dict[str, Any]:
+def _settings(manifest: Manifest) -> dict[str, Any]:
     """Config and recipe of a run as one."""
-    config, recipe = manifest["config"], manifest.get("training", {}).get("recipe", {})
+    config, recipe = manifest.config, manifest.training.get("recipe", {})
     return {**config, **config.get("system", {}), **recipe}
 
 
@@ -52,16 +55,10 @@ def _said(name: str, value: Any) -> str:
     return WORDS.get((name, value), f"{name.replace('_', ' ')} {value}")
 
 
-def ablations(found: Curves, said: Mapping[str, str]) -> str:
+def ablation_table(found: Curves, said: Mapping[str, str]) -> str:
     """The means of such rows as text, at the frames that papers report, on few windows and on many."""
-    width = max(36, *(len(words) + 3 for words in said.values()))
-    frames = "".join(f"{frame:>6}" for frame in FRAMES)
-    counts = "  ".join(f"{f'{count} windows':>30}" for count in COUNTS.values())
-    lines = [
-        f"{'ablations, mean of the actions':<{width}}{counts}",
-        f"{'output frame':<{width}}" + "  ".join([frames] * len(COUNTS)),
-    ]
-    for title, words in said.items():
-        parts = ("".join(f"{found[kind][title][MEAN][frame]:>6.2f}" for frame in FRAMES) for kind in COUNTS)
-        lines.append(f"  {words:<{width - 2}}" + "  ".join(parts))
-    return "\n".join(lines)
+    rows = [*frame_heads(FRAMES)]
+    for kind, count in COUNTS.items():
+        rows.append((f"ablations, mean of the actions, {count} windows of each",))
+        rows += [error_row(words, found[kind][title][MEAN], FRAMES) for title, words in said.items()]
+    return aligned(rows)

@@ -6,21 +6,20 @@ from typing import Any
 import numpy as np
 
 from motet.models.predict import PredictModel
-from motet_train.evaluate.predict.rows import Row
+from motet_train.evaluate.predict.seed_groups import SeedGroup
+from motet_train.evaluate.tables import aligned
 
 
-def costs(models: Mapping[str, PredictModel], rows: Sequence[Row]) -> str:
-    """As text, a line for each row: parameters, the mean seconds of its runs' training, and where that was."""
-    width = max(36, *(len(row.title) + 3 for row in rows))
-    lines = [f"{'':<{width}}{'parameters':>12}{'training, s':>13}  on"]
-    for row in rows:
-        trainings = [models[name].manifest.get("training", {}) for name in row.runs]
+def cost_table(models: Mapping[str, PredictModel], groups: Sequence[SeedGroup]) -> str:
+    """As text, a line for each group: parameters, the mean seconds of its runs' training, and where that was."""
+    rows = [("", "parameters", "training, s", "on")]
+    for group in groups:
+        trainings = [models[name].manifest.training for name in group.runs]
         seconds = [training["seconds"] for training in trainings if "seconds" in training]
-        places = sorted({_place(training) for training in trainings})
         parameters = f"{trainings[0]['parameters']:,}" if "parameters" in trainings[0] else ""
-        time = f"{np.mean(seconds):.0f}" if seconds else ""
-        lines.append(f"  {row.title:<{width - 2}}{parameters:>12}{time:>13}  {'; '.join(places)}".rstrip())
-    return "\n".join(lines)
+        places = "; ".join(sorted({_place(training) for training in trainings}))
+        rows.append((f"  {group.title}", parameters, f"{np.mean(seconds):.0f}" if seconds else "", places))
+    return aligned(rows, left=(0, 3))
 
 
 def _place(training: Mapping[str, Any]) -> str:

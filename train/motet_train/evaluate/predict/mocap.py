@@ -10,9 +10,10 @@ from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet_train.data.errors import DataError
 from motet_train.data.predict_data import Trial
+from motet_train.evaluate.predict.curves import ZERO
 from motet_train.evaluate.predict.protocol import REPORTED
-from motet_train.evaluate.predict.report import ZERO
-from motet_train.evaluate.tables import Report
+from motet_train.evaluate.predict.protocol_table import error_row, frame_heads
+from motet_train.evaluate.tables import Report, aligned
 
 Distances = dict[str, dict[str, Array]]
 """System -> measure -> mean distance (N,) in centimetres at each predicted frame."""
@@ -23,7 +24,7 @@ PLACE, POSE = "place_cm", "pose_cm"
 
 def held_out(model: PredictModel, trials: Sequence[Trial]) -> list[Trial]:
     """The trials that the model did not see in training; DataError where none of them is here."""
-    test = set(model.manifest["training"]["data"].get("test", ()))
+    test = set(model.manifest.training.get("data", {}).get("test", ()))
     found = [trial for trial in trials if trial.name in test]
     if not found:
         raise DataError("none of the trials that the model was not trained on is here")
@@ -44,7 +45,7 @@ def distances(models: Mapping[str, PredictModel], trials: Sequence[Trial]) -> Di
             truth = _places(motion[start + first.seed_frames :][: first.horizon])
             found[ZERO].append(_distance(_places(seed)[-1:], truth))
             for name, model in models.items():
-                found[name].append(_distance(_places(model.predict(seed, first.horizon)), truth))
+                found[name].append(_distance(_places(model.predict(seed, frames=first.horizon)), truth))
     if not found[ZERO]:
         raise DataError(f"the trials are shorter than {first.seed_frames + first.horizon} frames at the model's rate")
     means = {name: np.mean(windows, axis=0) for name, windows in found.items()}
@@ -66,14 +67,14 @@ def _distance(found: Array, truth: Array) -> tuple[Array, Array]:
 def strips(models: Mapping[str, PredictModel], motion: Motion, every: int) -> dict[str, Array]:
     """One horizon from the middle of a motion: what was, and what each model says, one frame in ``every``.
 
-    Places (K, J, 3) as :func:`motet_train.evaluate.predict.plots.stick_figures` takes them: the root moves up and down
+    Places (K, J, 3) as :func:`motet_train.evaluate.predict.plots.strips_drawing` takes them: the root moves up and down
     only. Models are as above.
     """
     first = next(iter(models.values()))
     whole = motion.resample(first.fps, to_end=True)
     middle = max(first.seed_frames, (len(whole) - first.horizon) // 2)
     found = {"truth": whole[middle:][: first.horizon]}
-    found |= {name: model.predict(whole[:middle], first.horizon) for name, model in models.items()}
+    found |= {name: model.predict(whole[:middle], frames=first.horizon) for name, model in models.items()}
     return {name: _in_place(positions(predicted)[::every]) for name, predicted in found.items()}
 
 
@@ -82,18 +83,12 @@ def _in_place(points: Array) -> Array:
     return result
 
 
-def table(found: Distances, fps: float) -> str:
+def distance_table(found: Distances, fps: float) -> str:
     """The distances as text, one block for each measure."""
-    width = max(22, *(len(name) + 3 for name in found))
-    lines = [
-        f"{'output frame':<{width}}" + "".join(f"{frame:>7}" for frame in REPORTED),
-        f"{'milliseconds':<{width}}" + "".join(f"{(frame + 1) / fps * 1000:>7.0f}" for frame in REPORTED),
-    ]
+    rows = [*frame_heads(), ("milliseconds", *(f"{(frame + 1) / fps * 1000:.0f}" for frame in REPORTED))]
     for measure, title in ((PLACE, "joints in the world, cm"), (POSE, "joints relative to the root, cm")):
-        lines.append(title)
-        for name, values in found.items():
-            lines.append(f"  {name:<{width - 2}}" + "".join(f"{values[measure][frame]:>7.1f}" for frame in REPORTED))
-    return "\n".join(lines)
+        rows += [(title,), *(error_row(name, values[measure], digits=1) for name, values in found.items())]
+    return aligned(rows)
 
 
 def to_json(found: Distances, name: str) -> Report:

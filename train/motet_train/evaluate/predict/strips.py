@@ -15,8 +15,8 @@ from motet.models.predict import PredictModel
 from motet.motion.rotations import Array, axis_to_rotmat, rotvec_to_rotmat
 from motet.motion.skeleton import Skeleton
 from motet_train.data.expmap_files import ExpmapCorpus
+from motet_train.evaluate.predict.curves import predictor
 from motet_train.evaluate.predict.protocol import OUTPUT_FRAMES, SEED_FRAMES, windows
-from motet_train.evaluate.predict.report import predictor
 
 EVERY, GIVEN = 2, 4
 """Frames from one stick figure to the next, and stick figures of seed frames."""

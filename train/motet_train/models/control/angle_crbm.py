@@ -9,7 +9,7 @@ Letters in shapes: B rows, T frames, D channels, K taps, L labels, C control uni
 
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -17,9 +17,9 @@ import torch
 from torch import Tensor
 
 from motet.representation.contract import LIMIT
-from motet_train.models.control.contrastive import Learning, Progress
+from motet_train.models.control.contrastive import Learning, Stage
 from motet_train.models.control.control_net import ControlNet
-from motet_train.models.control.crbm import CRBM, Past, train_crbm, windows
+from motet_train.models.control.crbm import CRBM, CRBMLayer, Past, transitions
 from motet_train.models.normalised import normalised
 
 
@@ -89,24 +89,24 @@ def to_config(net: AngleCRBM) -> dict[str, Any]:
     return {**config, "channels": len(net.mean), "labels": len(net.expansion)}
 
 
-@torch.no_grad()
-def train_angle_crbm(
-    net: AngleCRBM,
-    sequences: Sequence[Sequence[Tensor]],
-    onsets: Sequence[float],
-    generator: torch.Generator,
-    progress: Progress,
-) -> Iterator[None]:
-    """Train on the sequences (T, D) of each label and yield; DivergedError where the weights blow up.
+def stages(
+    net: AngleCRBM, sequences: Sequence[Sequence[Tensor]], onsets: Sequence[float], generator: torch.Generator
+) -> tuple[list[Stage], dict[str, Any]]:
+    """The CRBM learns on the sequences (T, D) of each label; nothing else has a state.
 
-    net.mean and net.scale must be set. onsets: see :func:`motet_train.models.control.crbm.windows`.
+    net.mean and net.scale must be set. onsets: see :func:`motet_train.models.control.crbm.transitions`.
     """
     config, crbm = net.config, net.crbm
-    for weight in (crbm.past_weight, crbm.hidden_weight, crbm.free_past_weight):
-        assert weight is not None
-        weight.normal_(0.0, config.initial, generator=generator)
-    codes = [[net.encode(frames) for frames in found] for found in sequences]
-    data = windows(codes, net.expansion, config.taps, onsets)
-    recall = Past(config.past_noise, config.past_rate / config.crbm.rate)
-    train_crbm(crbm, data, config.crbm, generator, progress, clamped=True, recall=recall)
-    yield
+
+    def begin() -> None:
+        for weight in (crbm.past_weight, crbm.hidden_weight, crbm.free_past_weight):
+            assert weight is not None
+            weight.normal_(0.0, config.initial, generator=generator)
+
+    def layer() -> CRBMLayer:
+        codes = [[net.encode(frames) for frames in found] for found in sequences]
+        data = transitions(codes, net.expansion, config.taps, onsets)
+        recall = Past(config.past_noise, config.past_rate / config.crbm.rate)
+        return CRBMLayer(crbm, data, config.crbm, generator, clamped=True, recall=recall)
+
+    return [Stage(config.crbm.epochs, begin, layer, whole=True)], {}

@@ -3,17 +3,15 @@
 Letters in shapes: B rows of a mini-batch, N all rows, D visible units, H hidden units.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor
 
 from motet.errors import MotetError
-
-Progress = Callable[[str, int, int], None]
-"""Called after each epoch with the layer's name, the epochs done and their number."""
 
 
 class DivergedError(MotetError, ArithmeticError):
@@ -54,16 +52,15 @@ class Epoch:
     batches: Tensor
 
 
-def epochs(learning: Learning, probabilities: Tensor, generator: torch.Generator) -> Iterator[Epoch]:
-    """The schedule; rows are drawn with the given probabilities (N,), about N of them in an epoch."""
+def schedule(learning: Learning, number: int, probabilities: Tensor, generator: torch.Generator) -> Epoch:
+    """One epoch, counted from 0; rows are drawn with the given probabilities (N,), about N of them."""
     first, last = learning.temperature
     updates = max(1, len(probabilities) // learning.batch)
-    for epoch in range(learning.epochs):
-        done = epoch / max(1, learning.epochs - 1)
-        momentum = learning.momentum if epoch >= learning.momentum_after else 0.0
-        rows = torch.multinomial(probabilities, updates * learning.batch, replacement=True, generator=generator)
-        rate, temperature = learning.rate * learning.final_rate**done, first * (last / first) ** done
-        yield Epoch(rate, momentum, temperature, rows.view(updates, learning.batch))
+    done = number / max(1, learning.epochs - 1)
+    momentum = learning.momentum if number >= learning.momentum_after else 0.0
+    rows = torch.multinomial(probabilities, updates * learning.batch, replacement=True, generator=generator)
+    rate, temperature = learning.rate * learning.final_rate**done, first * (last / first) ** done
+    return Epoch(rate, momentum, temperature, rows.view(updates, learning.batch))
 
 
 def balanced(weights: Sequence[Tensor]) -> Tensor:
@@ -108,6 +105,38 @@ class Ascent:
 
     def _climb(self, epoch: Epoch) -> None:
         self.value.mul_(1.0 - epoch.rate * self.decay).add_(self.velocity)
+
+
+class Layer(ABC):
+    """A layer that learns. probabilities: (N,), to draw each row. ascents: of its parameters, by name."""
+
+    def __init__(
+        self, learning: Learning, probabilities: Tensor, ascents: Mapping[str, Ascent], generator: torch.Generator
+    ) -> None:
+        self.learning, self.probabilities, self.ascents, self.generator = learning, probabilities, ascents, generator
+
+    def epoch(self, number: int) -> float:
+        """Learn for an epoch, counted from 0; the mean squared error of the last reconstruction.
+
+        DivergedError where the weights leave all bounds.
+        """
+        return self.learn(schedule(self.learning, number, self.probabilities, self.generator))
+
+    @abstractmethod
+    def learn(self, epoch: Epoch) -> float:
+        """Visit the epoch's batches; the mean squared error of the last reconstruction."""
+
+
+class Stage(NamedTuple):
+    """A layer's turn. begin: sets its first weights. layer: what learns, for weights that have begun.
+
+    whole: whether the net is trained when it ends, so that it can be tried.
+    """
+
+    epochs: int
+    begin: Callable[[], None]
+    layer: Callable[[], Layer]
+    whole: bool
 
 
 def parameter(*shape: int) -> torch.nn.Parameter:

@@ -3,23 +3,22 @@
 Letters in shapes: B rows, D channels, H codes, K taps, L labels, C control units, F free hidden units, N noise.
 """
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 
 import torch
 from torch import Tensor, nn
 
 from motet.bundle.graph import GraphSpec, TensorSpec
 from motet_train.models.control.crbm import CRBM
+from motet_train.models.net import Net
 
 
-class ControlNet(nn.Module, ABC):
+class ControlNet(Net):
     """A CRBM over codes of frames; subclasses say how frames become codes, and codes frames.
 
     mean, scale: (D,) of the channels, set before training. noise_units: N, numbers of noise for the codes of a frame.
     """
 
-    mean: Tensor
-    scale: Tensor
     expansion: Tensor
 
     def __init__(self, crbm: CRBM, labels: int, channels: int, taps: int) -> None:

@@ -12,10 +12,10 @@ from torch import Tensor, nn
 from motet_train.models.control.contrastive import (
     Ascent,
     DivergedError,
+    Epoch,
+    Layer,
     Learning,
-    Progress,
     balanced,
-    epochs,
     parameter,
 )
 
@@ -67,7 +67,7 @@ class CRBM(nn.Module):
 
 
 @dataclass(frozen=True, eq=False)
-class Windows:
+class Transitions:
     """What a CRBM learns from: past (N, K H), visible (N, H), control (N, C), and probabilities (N,) to draw each."""
 
     past: Tensor
@@ -76,7 +76,9 @@ class Windows:
     probabilities: Tensor
 
 
-def windows(codes: Sequence[Sequence[Tensor]], expansion: Tensor, taps: int, onsets: Sequence[float]) -> Windows:
+def transitions(
+    codes: Sequence[Sequence[Tensor]], expansion: Tensor, taps: int, onsets: Sequence[float]
+) -> Transitions:
     """Cut the sequences (T, H) of each label into windows of K past frames and the one after them.
 
     expansion: (L, C), the control units of each label. onsets: for each label how many times as often the first
@@ -89,7 +91,7 @@ def windows(codes: Sequence[Sequence[Tensor]], expansion: Tensor, taps: int, ons
     ]
     every = torch.cat(cut)
     control = torch.cat([units.expand(len(part), -1) for units, part in zip(expansion, cut, strict=True)])
-    return Windows(every[:, :taps].flatten(1), every[:, taps], control, balanced(weights))
+    return Transitions(every[:, :taps].flatten(1), every[:, taps], control, balanced(weights))
 
 
 @dataclass(frozen=True)
@@ -102,44 +104,43 @@ class Past:
     """Learning rate of the weights from the past to the visible units over that of the others."""
 
 
-@torch.no_grad()
-def train_crbm(
-    crbm: CRBM,
-    data: Windows,
-    learning: Learning,
-    generator: torch.Generator,
-    progress: Progress,
-    *,
-    clamped: bool,
-    recall: Past,
-) -> None:
-    """Train by contrastive divergence with the past held fixed (thesis 3.2, 5.2).
+class CRBMLayer(Layer):
+    """A CRBM that learns by contrastive divergence with the past held fixed (thesis 3.2, 5.2).
 
     clamped: control units keep their values in the reconstruction; else they are inferred from it (thesis 5.3).
-    Raises DivergedError where the weights leave all bounds.
     """
-    past_weight, hidden_weight, bias, hidden_bias = (
-        Ascent(p, learning.decay) for p in (crbm.past_weight, crbm.hidden_weight, crbm.visible_bias, crbm.hidden_bias)
-    )
-    free_past = None if crbm.free_past_weight is None else Ascent(crbm.free_past_weight, learning.decay)
-    for number, epoch in enumerate(epochs(learning, data.probabilities, generator), start=1):
+
+    def __init__(
+        self, crbm: CRBM, data: Transitions, learning: Learning, generator: torch.Generator, clamped: bool, recall: Past
+    ) -> None:
+        self.crbm, self.data, self.clamped, self.recall = crbm, data, clamped, recall
+        ascents = {name: Ascent(value, learning.decay) for name, value in crbm.named_parameters()}
+        super().__init__(learning, data.probabilities, ascents, generator)
+
+    @torch.no_grad()
+    def learn(self, epoch: Epoch) -> float:
+        """Visit the epoch's batches; DivergedError where the weights leave all bounds."""
         for rows in epoch.batches:
-            past, visible, control = data.past[rows], data.visible[rows], data.control[rows]
-            if recall.noise:
-                past = past + recall.noise * torch.randn(past.shape, generator=generator)
-            free = _sampled_free(crbm, visible, past, epoch.temperature, generator)
-            end, end_free = settle(crbm, past, control, free, learning.steps, epoch.temperature, generator)
-            end_control = control if clamped else crbm.control(end, epoch.temperature)
-            hidden, end_hidden = torch.cat([control, free], 1), torch.cat([end_control, end_free], 1)
-            past_weight.outer(past, visible - end, replace(epoch, rate=epoch.rate * recall.rate))
-            if free_past is not None:
-                free_past.outer(past, free - end_free, epoch)
-            hidden_weight.contrast((hidden, visible), (end_hidden, end), epoch)
-            hidden_bias.mean(hidden - end_hidden, epoch)
-            bias.mean(visible - end, epoch)
-        if not crbm.past_weight.abs().max() <= LARGEST:
-            raise DivergedError(f"learning blew up: the CRBM has weights beyond {LARGEST:g} after epoch {number}")
-        progress("CRBM", number, learning.epochs)
+            error = self._update(self.data.past[rows], self.data.visible[rows], self.data.control[rows], epoch)
+        if not self.crbm.past_weight.abs().max() <= LARGEST:
+            raise DivergedError(f"learning blew up: the CRBM has weights beyond {LARGEST:g}")
+        return float(error.square().mean())
+
+    def _update(self, past: Tensor, visible: Tensor, control: Tensor, epoch: Epoch) -> Tensor:
+        crbm, recall, generator, climb = self.crbm, self.recall, self.generator, self.ascents
+        if recall.noise:
+            past = past + recall.noise * torch.randn(past.shape, generator=generator, device=past.device)
+        free = _sampled_free(crbm, visible, past, epoch.temperature, generator)
+        end, end_free = settle(crbm, past, control, free, self.learning.steps, epoch.temperature, generator)
+        end_control = control if self.clamped else crbm.control(end, epoch.temperature)
+        hidden, end_hidden = torch.cat([control, free], 1), torch.cat([end_control, end_free], 1)
+        climb["past_weight"].outer(past, visible - end, replace(epoch, rate=epoch.rate * recall.rate))
+        if crbm.free_past_weight is not None:
+            climb["free_past_weight"].outer(past, free - end_free, epoch)
+        climb["hidden_weight"].contrast((hidden, visible), (end_hidden, end), epoch)
+        climb["hidden_bias"].mean(hidden - end_hidden, epoch)
+        climb["visible_bias"].mean(visible - end, epoch)
+        return visible - end
 
 
 def settle(
@@ -164,4 +165,4 @@ def _sampled_free(crbm: CRBM, visible: Tensor, past: Tensor, temperature: float,
     if not crbm.free_units:
         return free
     # not torch.bernoulli: learning that blows up is noticed at the end of its epoch
-    return (torch.rand(free.shape, generator=generator) < free).to(free.dtype)
+    return (torch.rand(free.shape, generator=generator, device=free.device) < free).to(free.dtype)

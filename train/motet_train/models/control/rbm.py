@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor, nn
 
-from motet_train.models.control.contrastive import Ascent, Learning, Progress, epochs, parameter
+from motet_train.models.control.contrastive import Ascent, Epoch, Layer, Learning, parameter
 
 
 class RBM(nn.Module):
@@ -53,37 +53,38 @@ def block_mask(visible_parts: Sequence[int], hidden_per_part: int) -> Tensor:
     return (torch.tensor(visible_parts)[:, None] == parts).float()
 
 
-@torch.inference_mode()
-def train_rbm(
-    rbm: RBM,
-    frames: Tensor,
-    probabilities: Tensor,
-    learning: Learning,
-    generator: torch.Generator,
-    progress: Progress,
-) -> None:
-    """Train on normalised frames (N, D), drawn with probabilities (N,), by contrastive divergence (thesis 3.2).
+class RBMLayer(Layer):
+    """An RBM that learns normalised frames (N, D) by contrastive divergence (thesis 3.2).
 
     Hidden units are sampled in the positive phase; the reconstruction ends in a mean field.
     """
-    weight, bias, hidden_bias = (
-        Ascent(p.data, learning.decay) for p in (rbm.weight, rbm.visible_bias, rbm.hidden_bias)
-    )
-    visible_units, hidden_units = rbm.mask.shape
-    for number, epoch in enumerate(epochs(learning, probabilities, generator), start=1):
+
+    def __init__(
+        self, rbm: RBM, frames: Tensor, probabilities: Tensor, learning: Learning, generator: torch.Generator
+    ) -> None:
+        self.rbm, self.frames = rbm, frames
+        ascents = {name: Ascent(value.data, learning.decay) for name, value in rbm.named_parameters()}
+        super().__init__(learning, probabilities, ascents, generator)
+
+    @torch.inference_mode()
+    def learn(self, epoch: Epoch) -> float:
+        """Visit the epoch's batches."""
+        rbm, generator = self.rbm, self.generator
+        stack = rbm.weight.shape[:-2]
+        visible_units, hidden_units = rbm.mask.shape
         # one draw for a whole epoch: small draws cost more than the arithmetic
-        shape = (len(epoch.batches), learning.steps + 1, *rbm.weight.shape[:-2], learning.batch)
-        uniform = torch.rand(*shape, hidden_units, generator=generator)
-        normal = torch.randn(*shape, visible_units, generator=generator)
+        shape = (len(epoch.batches), self.learning.steps + 1, *stack, self.learning.batch)
+        uniform = torch.rand(*shape, hidden_units, generator=generator, device=generator.device)
+        normal = torch.randn(*shape, visible_units, generator=generator, device=generator.device)
         for rows, noise, jitter in zip(epoch.batches, uniform, normal, strict=True):
-            visible = frames[rows].expand(*rbm.weight.shape[:-2], -1, -1)
+            visible = self.frames[rows].expand(*stack, -1, -1)
             hidden = (noise[0] < rbm.encode(visible, epoch.temperature)).float()
             end, end_hidden = reconstruct(rbm, hidden, noise[1:], jitter[1:], epoch.temperature)
-            weight.contrast((visible, hidden), (end, end_hidden), epoch)
+            self.ascents["weight"].contrast((visible, hidden), (end, end_hidden), epoch)
             rbm.weight.mul_(rbm.mask)
-            bias.mean(visible - end, epoch)
-            hidden_bias.mean(hidden - end_hidden, epoch)
-        progress("RBM", number, learning.epochs)
+            self.ascents["visible_bias"].mean(visible - end, epoch)
+            self.ascents["hidden_bias"].mean(hidden - end_hidden, epoch)
+        return float((visible - end).square().mean())
 
 
 def reconstruct(rbm: RBM, hidden: Tensor, noise: Tensor, jitter: Tensor, temperature: float) -> tuple[Tensor, Tensor]:

@@ -8,18 +8,19 @@ Letters in shapes: B rows, T frames, D channels, H codes, K taps, L labels, C co
 """
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import torch
 from torch import Tensor
 
 from motet.representation.contract import LIMIT
-from motet_train.models.control.contrastive import Learning, Progress, balanced
+from motet_train.models.control.contrastive import Learning, Stage, balanced
 from motet_train.models.control.control_net import ControlNet, binary
-from motet_train.models.control.crbm import CRBM, Past, train_crbm, windows
-from motet_train.models.control.rbm import RBM, block_mask, train_rbm
+from motet_train.models.control.crbm import CRBM, CRBMLayer, Past, transitions
+from motet_train.models.control.rbm import RBM, RBMLayer, block_mask
 from motet_train.models.normalised import normalised
 
 Sequences = Sequence[Sequence[Tensor]]
@@ -125,37 +126,36 @@ def to_config(net: TDBN) -> dict[str, Any]:
     return {**config, "parts": parts, "labels": len(net.expansion)}
 
 
-def train_tdbn(
-    net: TDBN, sequences: Sequences, onsets: Sequence[float], generator: torch.Generator, progress: Progress
-) -> Iterator[None]:
-    """Train RBM and CRBM, one after the other, on the sequences (T, D) of each label (thesis 3.3).
+def stages(
+    net: TDBN, sequences: Sequences, onsets: Sequence[float], generator: torch.Generator
+) -> tuple[list[Stage], dict[str, RBM]]:
+    """RBM and CRBM learn one after the other on the sequences (T, D) of each label (thesis 3.3).
 
-    Yields whenever ``net`` is trained, again and again with other random numbers: ``tries`` times on each of the
-    ``restarts`` of the RBM. net.mean and net.scale must be set. onsets: see
-    :func:`motet_train.models.control.crbm.windows`.
+    The CRBM learns again and again with other random numbers: ``tries`` times on each of the ``restarts`` of the RBM,
+    which are what else has a state. net.mean and net.scale must be set. onsets: see
+    :func:`motet_train.models.control.crbm.transitions`.
     """
     config = net.config
-    rbms = RBM(net.rbm.mask, config.restarts)
+    rbms = RBM(net.rbm.mask, config.restarts).to(net.mean.device)
     frames = net.normalised(torch.cat([frames for found in sequences for frames in found]))
-    uniform = balanced([torch.ones(sum(map(len, found))) for found in sequences])
-    rbms.weight.normal_(0.0, config.initial, generator=generator).mul_(rbms.mask)
-    train_rbm(rbms, frames, uniform, config.rbm, generator, progress)
-    for number in list(range(config.restarts)) * config.tries:
+    uniform = balanced([torch.ones(sum(map(len, found))) for found in sequences]).to(net.mean.device)
+
+    def lower() -> None:
+        rbms.weight.normal_(0.0, config.initial, generator=generator).mul_(rbms.mask)
+
+    def upper(number: int) -> None:
         net.rbm.take(rbms, number)
-        _train_upper(net, sequences, onsets, generator, progress)
-        yield
+        for parameter in net.crbm.parameters():
+            parameter.zero_()
+        for weight in (net.crbm.past_weight, net.crbm.hidden_weight):
+            weight.normal_(0.0, config.initial, generator=generator)
 
+    def crbm() -> CRBMLayer:
+        codes = [[net.encode(frames) for frames in found] for found in sequences]
+        data = transitions(codes, net.expansion, config.taps, onsets)
+        return CRBMLayer(net.crbm, data, config.crbm, generator, config.clamped, Past(config.past_noise))
 
-@torch.no_grad()
-def _train_upper(
-    net: TDBN, sequences: Sequences, onsets: Sequence[float], generator: torch.Generator, progress: Progress
-) -> None:
-    """Train the CRBM anew on the codes that the RBM gives."""
-    config, crbm = net.config, net.crbm
-    for parameter in crbm.parameters():
-        parameter.zero_()
-    for weight in (crbm.past_weight, crbm.hidden_weight):
-        weight.normal_(0.0, config.initial, generator=generator)
-    codes = [[net.encode(frames) for frames in found] for found in sequences]
-    data = windows(codes, net.expansion, config.taps, onsets)
-    train_crbm(crbm, data, config.crbm, generator, progress, clamped=config.clamped, recall=Past(config.past_noise))
+    first = Stage(config.rbm.epochs, lower, lambda: RBMLayer(rbms, frames, uniform, config.rbm, generator), whole=False)
+    numbers = list(range(config.restarts)) * config.tries
+    tries = [Stage(config.crbm.epochs, partial(upper, number), crbm, whole=True) for number in numbers]
+    return [first, *tries], {"rbms": rbms}

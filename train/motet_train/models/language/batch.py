@@ -21,6 +21,15 @@ class Batch:
     words: Tensor
     ended: Tensor | None = None
 
+    def __len__(self) -> int:
+        """B."""
+        return len(self.lengths)
+
+    def __getitem__(self, rows: slice) -> "Batch":
+        """Some of the rows, padded as all of them are."""
+        ended = None if self.ended is None else self.ended[rows]
+        return Batch(self.frames[rows], self.lengths[rows], self.words[rows], ended)
+
     def to(self, device: torch.device | str) -> "Batch":
         """The same batch on a device."""
         ended = None if self.ended is None else self.ended.to(device)

@@ -8,7 +8,6 @@ from collections.abc import Callable
 
 import torch
 from torch import Tensor, nn
-from torch._higher_order_ops.scan import scan
 
 from motet_train.models.language.dropout import mask
 
@@ -79,6 +78,8 @@ def recur(advance: Callable[[Tensor, list[Tensor]], Tensor], start: Tensor, sequ
     A loop, and in an exported graph, where the number of steps is not known, one scan over the same function.
     """
     if torch.compiler.is_exporting():
+        from torch._higher_order_ops.scan import scan  # private, and so needed by nothing but the export
+
         moved = [sequence.transpose(0, 1) for sequence in sequences]
 
         def body(state: Tensor, given: list[Tensor]) -> tuple[Tensor, Tensor]:

@@ -18,6 +18,7 @@ from motet_train.models.language.batch import Batch, before
 from motet_train.models.language.dropout import WordEmbedding
 from motet_train.models.language.layer_norm_gru import LayerNormGRU
 from motet_train.models.language.mixture import Mixture, MixtureHead
+from motet_train.models.language.net import LanguageNet
 from motet_train.models.language.sequence import Decoder, Encoder
 from motet_train.models.language.summary import SummaryHead
 from motet_train.models.normalised import normalised
@@ -56,11 +57,8 @@ class LanguageToMotionConfig:
         return LanguageToMotionConfig(channels=44, words=1344)
 
 
-class LanguageToMotion(nn.Module):
+class LanguageToMotion(LanguageNet):
     """The net with its normalisation. mean, scale: (D,) of the channels, set before training."""
-
-    mean: Tensor
-    scale: Tensor
 
     def __init__(self, config: LanguageToMotionConfig) -> None:
         super().__init__()
@@ -87,28 +85,24 @@ class LanguageToMotion(nn.Module):
         found: Tensor = self.decoder(given, context)
         return found
 
-    def losses(self, batch: Batch) -> Tensor:
-        """The loss of every frame of the batch and of the one after it where a motion ends (N,)."""
-        losses = LOSSES[self.config.loss](*self._predictions(batch))
-        if self.summary is None or not self.training:
-            return losses
+    def terms(self, batch: Batch) -> tuple[Tensor, Tensor | None]:
+        """The loss of every frame and of the one after it where a motion ends (N,), eq. 12 or 11; and the summary's."""
         context = self.encode(batch.words, (batch.words != 0).sum(dim=1))
-        return losses + self.config.summary * self.summary.loss(context, self.normal(batch), batch.lengths)
-
-    def loss(self, batch: Batch) -> Tensor:
-        """The mean over frames of :meth:`losses` (eq. 12, or eq. 11)."""
-        return self.losses(batch).mean()
+        losses = LOSSES[self.config.loss](*self._predictions(batch, context))
+        if self.summary is None or not self.training:
+            return losses, None
+        return losses, self.config.summary * self.summary.loss(context, self.normal(batch), batch.lengths)
 
     def likelihoods(self, batch: Batch) -> Tensor:
         """The log-likelihood (eq. 8) of the same frames as in :meth:`losses`, whichever loss is trained (N,)."""
-        return Mixture.log_likelihood(*self._predictions(batch))
+        context = self.encode(batch.words, (batch.words != 0).sum(dim=1))
+        return Mixture.log_likelihood(*self._predictions(batch, context))
 
-    def _predictions(self, batch: Batch) -> tuple[Mixture, Tensor, Tensor]:
+    def _predictions(self, batch: Batch, context: Tensor) -> tuple[Mixture, Tensor, Tensor]:
         """Mixtures, frames (N, D) and flags (N,) of all active steps, in one row."""
         normal = functional.pad(self.normal(batch), (0, 0, 0, 1))
         flags = before(batch.lengths, normal.shape[1]).to(normal.dtype)
         active = before(batch.lengths + (1 if batch.ended is None else batch.ended), normal.shape[1])
-        context = self.encode(batch.words, (batch.words != 0).sum(dim=1))
         fed = self._blurred(normal) if self.training else normal
         outputs = self.outputs(torch.cat([fed, flags[..., None]], dim=-1), context)
         # padded steps are left out before the output layer, which is the largest product of all

@@ -75,7 +75,7 @@ class MixtureHead(nn.Module):
     def forward(self, x: Tensor) -> Mixture:
         """Outputs (..., S) of the decoder to mixtures."""
         keep = mask(self, self.dropout, x, *x.shape)
-        parameters = self.linear(x if keep is None else x * keep)
+        parameters = self.linear(x if keep is None else x * keep).float()
         means, variances, weights, active = torch.split_with_sizes(parameters, self.sizes, dim=-1)
         shape = (*x.shape[:-1], self.components, -1)
         return Mixture(

@@ -15,6 +15,7 @@ from motet.bundle.graph import GraphSpec, TensorSpec
 from motet_train.models.language.batch import Batch, before
 from motet_train.models.language.dropout import WordEmbedding
 from motet_train.models.language.gru import GRU
+from motet_train.models.language.net import LanguageNet
 from motet_train.models.language.sequence import Decoder, Encoder
 from motet_train.models.language.summary import SummaryHead
 from motet_train.models.normalised import normalised
@@ -45,11 +46,8 @@ class MotionToLanguageConfig:
         return MotionToLanguageConfig(channels=44, words=1344)
 
 
-class MotionToLanguage(nn.Module):
+class MotionToLanguage(LanguageNet):
     """The net with its normalisation. mean, scale: (D,) of the channels, set before training."""
-
-    mean: Tensor
-    scale: Tensor
 
     def __init__(self, config: MotionToLanguageConfig) -> None:
         super().__init__()
@@ -81,10 +79,10 @@ class MotionToLanguage(nn.Module):
     def log_probabilities(self, outputs: Tensor) -> Tensor:
         """Outputs of the decoder (..., S) to log-probabilities of the next word (..., V), eq. 5 and 6."""
         dropped = functional.dropout(outputs, self.config.dropout, self.training)
-        return functional.log_softmax(self.output(dropped), dim=-1)
+        return functional.log_softmax(self.output(dropped).float(), dim=-1)
 
-    def losses(self, batch: Batch) -> Tensor:
-        """Cross-entropy of every word and every EOS of the batch (N,): the terms of eq. 7."""
+    def terms(self, batch: Batch) -> tuple[Tensor, Tensor | None]:
+        """Cross-entropy of every word and every EOS of the batch (N,), whose mean is eq. 7; and the summary's loss."""
         lengths = (batch.words != PAD).sum(dim=1)
         words = functional.pad(batch.words, (1, 0), value=SOS)
         targets = functional.pad(batch.words, (0, 1), value=PAD).scatter(1, lengths[:, None], EOS)
@@ -94,13 +92,9 @@ class MotionToLanguage(nn.Module):
         # padded steps are left out before the output layer, which is the largest product of all
         losses = functional.nll_loss(self.log_probabilities(outputs[active]), targets[active], reduction="none")
         if self.summary is None or not self.training:
-            return losses
+            return losses, None
         normal = normalised(batch.frames, self.mean, self.scale)
-        return losses + self.config.summary * self.summary.loss(context, normal, batch.lengths)
-
-    def loss(self, batch: Batch) -> Tensor:
-        """The mean over words of :meth:`losses` (eq. 7)."""
-        return self.losses(batch).mean()
+        return losses, self.config.summary * self.summary.loss(context, normal, batch.lengths)
 
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """The encoder, the step and the score, each with its contract."""

@@ -18,6 +18,7 @@ from torch import Tensor, nn
 from torch.nn.functional import gelu
 
 from motet.bundle.graph import GraphSpec, TensorSpec
+from motet_train.models.net import Net
 from motet_train.models.normalised import normalised
 
 GAIN = 3.0
@@ -116,15 +117,13 @@ class Trajectory(nn.Module):
         return ordinary + torch.einsum("blc,clk->bkc", step - usual, self.outlying)
 
 
-class Predictor(nn.Module):
+class Predictor(Net):
     """Seed frames (B, L, C) to the next frames (B, N, C), both in the contract's units.
 
     mean, scale: (D,) of the kept channels, set before training; a held channel is seen as its difference to the last
     frame over its scale. Channels that are held or do not vary stay as they are in the last frame.
     """
 
-    mean: Tensor
-    scale: Tensor
     kept: Tensor
     relative: Tensor
     placing: Tensor

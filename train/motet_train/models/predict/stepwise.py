@@ -11,6 +11,7 @@ import torch
 from torch import Tensor, nn
 
 from motet.bundle.graph import GraphSpec, TensorSpec
+from motet_train.models.net import Net
 from motet_train.models.normalised import normalised
 
 State = dict[str, Tensor]
@@ -78,15 +79,13 @@ def free_run(system: System, seed: Tensor, count: int, truth: Tensor | None = No
     return torch.stack(frames, dim=1)
 
 
-class Stepwise(nn.Module):
+class Stepwise(Net):
     """A system with its units: frames of all channels, in those of the contract.
 
     kept: the channels that vary; others stay as they are in the last seed frame. mean, scale: (D,) of the kept ones,
     set before training.
     """
 
-    mean: Tensor
-    scale: Tensor
     kept: Tensor
     placing: Tensor
 

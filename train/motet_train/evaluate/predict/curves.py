@@ -17,7 +17,7 @@ from motet_train.evaluate.predict.protocol import (
     rotation_errors,
     zero_velocity,
 )
-from motet_train.evaluate.predict.rows import Row, mean, pooled
+from motet_train.evaluate.predict.seed_groups import SeedGroup, mean, pooled
 
 COUNTS = {"windows_8": 8, "windows_256": 256}
 """Windows of each action: as many as papers take, and enough for a figure without much noise."""
@@ -79,9 +79,9 @@ def predictor(name: str, model: PredictModel, corpus: ExpmapCorpus) -> Predictor
     return predict
 
 
-def by_row(found: Curves, rows: Sequence[Row], how: Callable[[Sequence[Array]], Array] = mean) -> Curves:
-    """The same with rows in place of runs, see :func:`motet_train.evaluate.predict.rows.pooled`."""
-    return {kind: pooled(systems, rows, how) for kind, systems in found.items()}
+def by_group(found: Curves, groups: Sequence[SeedGroup], how: Callable[[Sequence[Array]], Array] = mean) -> Curves:
+    """The same with groups in place of runs, see :func:`motet_train.evaluate.predict.seed_groups.pooled`."""
+    return {kind: pooled(systems, groups, how) for kind, systems in found.items()}
 
 
 def to_json(found: Curves, name: str) -> dict[str, dict[str, dict[str, float]]]:

@@ -1,28 +1,29 @@
-"""Rows of a table: runs that differ in nothing but their seed are one row."""
+"""Runs that differ in nothing but their seed are measured as one: a row of a table."""
 
 import json
 import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from motet.bundle.manifest import Manifest
 from motet.models.predict import PredictModel
 from motet.motion.rotations import Array
+from motet_train.evaluate.tables import short_names
 
 SEED = re.compile(r"[-_. ]?(seed)?\d+$")
 """How the name of a run ends that says its seed."""
 
 Errors = Mapping[str, Mapping[str, Array]]
-"""Run or row, or the baseline -> action or measure -> error at each predicted frame (N,)."""
+"""Run or group, or the baseline -> action or measure -> error at each predicted frame (N,)."""
 
 
 @dataclass(frozen=True)
-class Row:
-    """A line of a table: its title, and the runs whose mean it is, by the names they were given by."""
+class SeedGroup:
+    """Runs of one system: what they are called together, and the names they were given by."""
 
     title: str
     runs: tuple[str, ...]
@@ -33,36 +34,34 @@ class Row:
         return _count(self.runs)
 
 
-def rows_of(models: Mapping[str, PredictModel]) -> list[Row]:
-    """The rows of some models by name, in their order.
+def seed_groups(models: Mapping[str, PredictModel]) -> list[SeedGroup]:
+    """The groups of some models by name, in their order.
 
-    Runs of equal model, config, recipe and data are one row; another one with the same seed is a row of its own.
+    Runs of equal model, config, recipe and data are one group; another one with the same seed is a group of its own.
     """
     groups: dict[tuple[str, int], list[str]] = {}
     seen: Counter[tuple[str, Any]] = Counter()
     for name, model in models.items():
-        training = model.manifest.get("training", {})
+        training = model.manifest.training
         system = _system(model.manifest) if "seed" in training else name
         twins = seen[system, training.get("seed")]
         seen[system, training.get("seed")] += 1
         groups.setdefault((system, twins), []).append(name)
     together = [tuple(names) for names in groups.values()]
-    return [Row(title, runs) for title, runs in zip(_titles(together), together, strict=True)]
+    return [SeedGroup(title, runs) for title, runs in zip(_titles(together), together, strict=True)]
 
 
-def _system(manifest: Mapping[str, Any]) -> str:
+def _system(manifest: Manifest) -> str:
     """What all seeds of a system have in common."""
-    training = manifest["training"]
-    parts = manifest.get("model"), manifest.get("config"), training.get("recipe"), training.get("data")
+    training = manifest.training
+    parts = manifest.model, manifest.config, training.get("recipe"), training.get("data")
     return json.dumps(parts, sort_keys=True)
 
 
 def _titles(together: Sequence[tuple[str, ...]]) -> list[str]:
-    """Names without folders where they stay different, of several runs without their seed and with their number."""
+    """Short names, of several runs without their seed and with their number."""
     names = [name for runs in together for name in runs]
-    short = {name: Path(name).name or name for name in names}
-    if len(set(short.values())) < len(names):
-        short = {name: name for name in names}
+    short = dict(zip(names, short_names(names), strict=True))
     first = [short[runs[0]] for runs in together]
     stems = [_stem([short[name] for name in runs]) for runs in together]
     # names of different systems can have a stem in common
@@ -93,12 +92,12 @@ def spread(errors: Sequence[Array]) -> Array:
 
 
 def pooled(
-    errors: Errors, rows: Sequence[Row], how: Callable[[Sequence[Array]], Array] = mean
+    errors: Errors, groups: Sequence[SeedGroup], how: Callable[[Sequence[Array]], Array] = mean
 ) -> dict[str, dict[str, Array]]:
-    """The errors with rows, by their titles, in place of runs; what is no run stays in front."""
-    runs = {name for row in rows for name in row.runs}
+    """The errors with groups, by their titles, in place of runs; what is no run stays in front."""
+    runs = {name for group in groups for name in group.runs}
     found = {name: dict(parts) for name, parts in errors.items() if name not in runs}
-    for row in rows:
-        parts = errors[row.runs[0]]
-        found[row.title] = {part: how([errors[name][part] for name in row.runs]) for part in parts}
+    for group in groups:
+        parts = errors[group.runs[0]]
+        found[group.title] = {part: how([errors[name][part] for name in group.runs]) for part in parts}
     return found

@@ -1,14 +1,14 @@
 """A prepared corpus, divided as it was when a model was trained on it."""
 
 import warnings
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
+from motet.bundle.manifest import Manifest
 from motet.errors import TextWarning
 from motet.models.text import words
 from motet.motion.motion import Motion
@@ -21,7 +21,7 @@ from motet_train.data.store import Store
 
 
 @dataclass(frozen=True, eq=False)
-class Corpus:
+class SplitStore:
     """A store and the parts that a model was trained, validated and is tested on."""
 
     store: Store
@@ -57,6 +57,11 @@ class Corpus:
             found = np.sort(np.random.default_rng(0).choice(found, most, replace=False))
         return tuple(found.tolist())
 
+    def unseen(self, records: Iterable[int]) -> list[tuple[str, ...]]:
+        """The sentences of several records, without those that were also said about a training motion."""
+        known = {sentence for said in self.references(self.parts.train) for sentence in said}
+        return [tuple(sentence for sentence in said if sentence not in known) for said in self.references(records)]
+
     def unknown_words(self, records: Iterable[int]) -> set[str]:
         """The words said about some records that were not said about training motions: models read UNK."""
         train, asked = (_vocabulary(self.references(part)) for part in (self.parts.train, records))
@@ -67,22 +72,22 @@ class Corpus:
         return self.contract.normalised(self.contract.frames(motion))
 
 
-def corpus_of(manifest: Mapping[str, Any], store: Store) -> Corpus:
+def split_as(manifest: Manifest, store: Store) -> SplitStore:
     """The store divided as the manifest of a run or bundle says; DataError where it is not what it was trained on."""
     try:
-        told = manifest["training"]["split"]
+        told = manifest.training["split"]
         validation, test, count = set(told["validation"]), set(told["test"]), int(told["train"])
     except (KeyError, TypeError, ValueError) as error:
-        raise DataError(f"{manifest.get('name')} does not say which motions it was trained on") from error
+        raise DataError(f"{manifest.name} does not say which motions it was trained on") from error
     names = [entry.name for entry in store.records]
     train = tuple(i for i, name in enumerate(names) if name not in validation | test)
     if (validation | test) - set(names) or len(train) != count or len(names) != count + len(validation) + len(test):
         raise DataError(
-            f"{manifest.get('name')} was not trained on this data: its {count} training, {len(validation)} validation "
+            f"{manifest.name} was not trained on this data: its {count} training, {len(validation)} validation "
             f"and {len(test)} test motions are not the {len(names)} that are here"
         )
     parts = ([i for i, name in enumerate(names) if name in part] for part in (validation, test))
-    return Corpus(store, Split(train, *(tuple(part) for part in parts)))
+    return SplitStore(store, Split(train, *(tuple(part) for part in parts)))
 
 
 def _vocabulary(rows: Iterable[Iterable[str]]) -> set[str]:

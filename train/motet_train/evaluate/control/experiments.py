@@ -1,5 +1,6 @@
 """All figures of a control model in one nested object with stable keys, and the goals of the one we ship."""
 
+import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -19,8 +20,8 @@ from motet_train.evaluate.control.gaits import (
     ramp_hysteresis,
     synchronisation,
 )
-from motet_train.evaluate.control.lab import Lab, Leg
 from motet_train.evaluate.control.measures import Reference
+from motet_train.evaluate.control.study import ControlStudy, Leg
 from motet_train.evaluate.control.variety import sampled_runs
 from motet_train.evaluate.tables import Goals, Report, reached
 
@@ -45,10 +46,12 @@ GOALS: Goals = {
     "bend.share_from_run": (0.95, None),
     "bend.interrupt_s": (None, 0.8),
 }
-"""Figure -> (least, most) that the default recipe is to reach."""
+"""Figure -> (least, most) that the default recipe is to reach; its clips show walk, run and bend."""
+
+ROLES = re.compile(r"(?<![a-z])(?:walk|run|bend)(?![a-z])")
 
 
-def lab_of(model: ControlModel, clips: Clips) -> Lab:
+def study_of(model: ControlModel, clips: Clips) -> ControlStudy:
     """A model beside the clips it was trained on; DataError where clips and model do not go together.
 
     The first two periodic labels are taken for walk and run (those of these names first), the first other for bend.
@@ -66,25 +69,25 @@ def lab_of(model: ControlModel, clips: Clips) -> Lab:
     if not gaits:
         raise DataError("the experiments need clips of a periodic motion, such as walking")
     run, bend = (next(iter(found), None) for found in (gaits[1:], [label for label in motions if label not in gaits]))
-    return Lab(model, reference, gaits[0], run, bend, _legs(model, parts))
+    return ControlStudy(model, reference, gaits[0], run, bend, _legs(model, parts))
 
 
-def experiments(lab: Lab) -> dict[str, list[Callable[[], Mapping[str, float]]]]:
-    """For each key of the report the experiments whose figures stand under it."""
+def experiments(study: ControlStudy) -> dict[str, list[Callable[[], Mapping[str, float]]]]:
+    """For each group of figures the experiments that give them; names are those of CMU's labels."""
     found: dict[str, list[Callable[[], Mapping[str, float]]]] = {
-        "cycle": [lambda: limit_cycle(lab), lambda: convergence(lab)],
-        "sync": [lambda: synchronisation(lab)],
+        "cycle": [lambda: limit_cycle(study), lambda: convergence(study)],
+        "sync": [lambda: synchronisation(study)],
     }
-    if lab.run is None:
+    if study.run is None:
         return found
     found |= {
-        "cycle_run": [lambda: limit_cycle(lab, "run")],
-        "gait": [lambda: gait_transitions(lab)],
-        "hysteresis": [lambda: ramp_hysteresis(lab), lambda: constant_hysteresis(lab)],
-        "variety": [lambda: sampled_runs(lab)],
+        "cycle_run": [lambda: limit_cycle(study, "run")],
+        "gait": [lambda: gait_transitions(study)],
+        "hysteresis": [lambda: ramp_hysteresis(study), lambda: constant_hysteresis(study)],
+        "variety": [lambda: sampled_runs(study)],
     }
-    if lab.bend is not None:
-        found["bend"] = [lambda: bends(lab), lambda: interruptions(lab)]
+    if study.bend is not None:
+        found["bend"] = [lambda: bends(study), lambda: interruptions(study)]
     return found
 
 
@@ -92,30 +95,36 @@ REHEARSED = ("gait", "bend", "sync", "cycle_run", "cycle", "hysteresis")
 """Groups of experiments with goals, quick ones first."""
 
 
-def missed_goals(lab: Lab, enough: int) -> list[str]:
+def missed_goals(study: ControlStudy, enough: int) -> list[str]:
     """Goals that a model misses in the :data:`REHEARSED` experiments; stops at ``enough`` of them."""
     missed: list[str] = []
-    groups = experiments(lab)
+    groups = experiments(study)
     for group, run in ((name, run) for name in REHEARSED for run in groups.get(name, [])):
         named = {f"{group}.{key}": value for key, value in run().items()}
-        missed += [name for name in named if name in GOALS and not reached(GOALS, name, named[name])]
+        missed += [by_label(study, name) for name in named if name in GOALS and not reached(GOALS, name, named[name])]
         if len(missed) >= enough:
             break
     return missed
 
 
-def control_report(lab: Lab, progress: Callable[[str], None]) -> Report:
+def control_report(study: ControlStudy, progress: Callable[[str], None]) -> Report:
     """Run all experiments; ``progress`` is called with the name of each group before it starts.
 
     "train" repeats what training measured. A figure that does not exist (a period of no loop) is NaN, a time that
     never came infinite.
     """
-    training: Mapping[str, Any] = lab.model.manifest.get("training", {})
+    training: Mapping[str, Any] = study.model.manifest.training
     report: Report = {"train": {key: float(training[key]) for key in ("seconds", "reconstruction") if key in training}}
-    for name, group in experiments(lab).items():
+    for name, group in experiments(study).items():
         progress(name)
-        report[name] = {key: value for run in group for key, value in run().items()}
+        figures = {by_label(study, key): value for run in group for key, value in run().items()}
+        report[by_label(study, name)] = figures
     return report
+
+
+def by_label(study: ControlStudy, name: str) -> str:
+    """The name of a figure, "bend.share_from_run", with the labels of the clips: "wave.share_from_jog"."""
+    return ROLES.sub(lambda role: getattr(study, role[0]) or role[0], name)
 
 
 def _legs(model: ControlModel, parts: BodyParts) -> tuple[Leg, Leg] | None:

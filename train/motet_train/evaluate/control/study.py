@@ -1,4 +1,4 @@
-"""A control model on the bench: runs from any state, with all their codes, beside the training motions.
+"""A control model under study: runs from any state, with all their codes, beside the training motions.
 
 Letters in shapes: T frames, B characters, D channels, K taps, H codes, L labels.
 """
@@ -43,7 +43,7 @@ class Leg:
 
 
 @dataclass(frozen=True, eq=False)
-class Lab:
+class ControlStudy:
     """A control model beside its training motions, with the loops that several experiments need.
 
     walk, run: the labels of two periodic motions, run None where there is one; bend: of one that ends, or None.

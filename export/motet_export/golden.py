@@ -1,0 +1,82 @@
+"""The golden vectors of a bundle that is being exported: inputs of its graphs and of one whole run of its verb."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from motet.bundle.golden import TOLERANCE, vectors
+from motet.bundle.graph import Arrays, Graph
+from motet.bundle.manifest import Manifest
+from motet.decode.ancestral import noise_of
+from motet.decode.noise import Recording
+from motet.models.control import ControlModel
+from motet.models.describe import DescribeModel
+from motet.models.generate import GenerateModel
+from motet.models.load import build
+from motet.models.predict import PredictModel
+from motet.models.text import SPECIALS
+from motet_export.examples import Examples, walks
+
+FILE = "golden.npz"
+
+ROWS, FRAMES, TICKS = 2, 20, 12
+"""Of the inputs of a graph; of a motion that is described; of a control track."""
+
+INT8_TOLERANCE = 0.1
+"""Products of 8 bits are rounded differently from one kind of processor to the next."""
+
+Run = tuple[Arrays, dict[str, Any]]
+"""The inputs of a whole run, and its settings."""
+
+
+def golden_vectors(
+    manifest: Manifest, graphs: Mapping[str, Graph], draws: Mapping[str, Examples], int8: bool
+) -> tuple[bytes, dict[str, Any]]:
+    """The file of golden vectors, and what the manifest says of it."""
+    rng, model = np.random.default_rng(5), build(manifest, graphs)
+    feeds = {role: draws[role](rng, ROWS) for role in graphs}
+    given, settings = _RUNS[manifest.verb](model, rng)
+    entry = {"file": FILE, "tolerance": INT8_TOLERANCE if int8 else TOLERANCE, "run": settings}
+    return vectors(model, feeds, given, settings), entry
+
+
+def _control(model: ControlModel, rng: np.random.Generator) -> Run:
+    """From the first label to each other one."""
+    places = np.linspace(0, len(model.labels) - 1, TICKS)[:, None]
+    track = np.maximum(0, 1 - np.abs(places - np.arange(len(model.labels)))).astype(np.float32)
+    iterations = 2 if model.has_free_units else 1
+    noise = rng.random((TICKS * iterations, model.sizes["N"]), np.float32)
+    return {"track": track, "noise": noise}, {"iterations": iterations}
+
+
+def _describe(model: DescribeModel, rng: np.random.Generator) -> Run:
+    frames = walks(model.contract, rng, 1, FRAMES)[0]
+    if "draws" not in model.defaults:
+        return {"frames": frames}, {}
+    return {"frames": frames, "noise": noise_of(model.limits(model.defaults), int(model.defaults["draws"]))}, {}
+
+
+def _generate(model: GenerateModel, rng: np.random.Generator) -> Run:
+    """Two seconds for a sentence of five words, with few hypotheses where the loop has such."""
+    text = " ".join(rng.choice(model.vocabulary.words[len(SPECIALS) :], 5))
+    settings: dict[str, Any] = {
+        name: 2 for name in ("hypotheses", "candidates", "max_seconds") if name in model.defaults
+    }
+    noise = Recording(rng)
+    model.decode(model.contexts([model.ids(text)]), [noise], {**model.defaults, **settings})
+    given = {kind: np.array(drawn, dtype=np.float32) for kind, drawn in noise.drawn.items()}
+    return given, {**settings, "text": text}
+
+
+def _predict(model: PredictModel, rng: np.random.Generator) -> Run:
+    """One frame more than the horizon, so that the encoder is asked again."""
+    return {"frames": walks(model.contract, rng, 1, model.seed_frames)[0]}, {"frames": model.horizon + 1}
+
+
+_RUNS: Mapping[str, Callable[..., Run]] = {
+    "control": _control,
+    "describe": _describe,
+    "generate": _generate,
+    "predict": _predict,
+}

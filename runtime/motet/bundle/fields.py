@@ -1,0 +1,133 @@
+"""JSON read with types: every refusal is a BundleError with the path of the key, such as ``motion.mean``."""
+
+import json
+import math
+import reprlib
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motet.errors import BundleError
+
+LARGEST = 1e9
+"""Of any number: what is larger is an error, and would overflow in float32 soon."""
+
+
+def parse(text: bytes) -> Any:
+    """A JSON document; BundleError where it is not one, with NaN and Infinity, and nested too deeply."""
+    try:
+        return json.loads(text, parse_constant=_no_constant)
+    except (ValueError, RecursionError) as error:
+        raise BundleError(f"manifest.json is not valid JSON: {error}") from error
+
+
+def _no_constant(name: str) -> None:
+    raise ValueError(f"JSON has no number {name}")
+
+
+class Fields:
+    """A JSON object that is read key by key.
+
+    data: what stands at ``path`` ("" for the whole document); BundleError where it is not an object.
+    """
+
+    def __init__(self, data: object, path: str = "") -> None:
+        self.path = path
+        if not isinstance(data, Mapping):
+            raise self.fault("an object", data)
+        self.data: Mapping[str, Any] = data
+
+    def __contains__(self, key: str) -> bool:
+        return self.data.get(key) is not None
+
+    def fault(self, wanted: str, found: object, key: str = "") -> BundleError:
+        """The error that says what must stand at a key, and what stands there."""
+        return BundleError(f"manifest, {self.at(key) or 'all of it'}: must be {wanted}, not {reprlib.repr(found)}")
+
+    def at(self, key: str) -> str:
+        """The path of a key."""
+        return ".".join(filter(None, (self.path, key)))
+
+    def value(self, key: str) -> Any:
+        """What stands at a key; BundleError where there is no such key."""
+        if key not in self.data:
+            raise BundleError(f"manifest, {self.at(key)}: is missing")
+        return self.data[key]
+
+    def text(self, key: str) -> str:
+        """A string."""
+        found = self.value(key)
+        if not isinstance(found, str):
+            raise self.fault("a string", found, key)
+        return found
+
+    def number(self, key: str, low: float = -LARGEST, high: float = LARGEST) -> float:
+        """A number between two others."""
+        found = self.value(key)
+        if not is_number(found) or not low <= found <= high:
+            raise self.fault(f"a number between {low:g} and {high:g}", found, key)
+        return float(found)
+
+    def whole(self, key: str, low: int, high: int) -> int:
+        """A whole number between two others."""
+        found = self.value(key)
+        if isinstance(found, bool) or not isinstance(found, int) or not low <= found <= high:
+            raise self.fault(f"a whole number between {low} and {high}", found, key)
+        return found
+
+    def items(self, key: str) -> list[Any]:
+        """A list of anything."""
+        found = self.value(key)
+        if not isinstance(found, list):
+            raise self.fault("a list", found, key)
+        return found
+
+    def texts(self, key: str) -> tuple[str, ...]:
+        """A list of strings, each there once."""
+        found = self.items(key)
+        if not all(isinstance(item, str) for item in found):
+            raise self.fault("a list of strings", found, key)
+        if len(set(found)) != len(found):
+            raise BundleError(f"manifest, {self.at(key)}: holds a string twice")
+        return tuple(found)
+
+    def numbers(self, key: str, count: int, low: float = -LARGEST) -> NDArray[np.float64]:
+        """A list of ``count`` numbers as (count,) float64."""
+        found = self.items(key)
+        if len(found) != count:
+            raise BundleError(f"manifest, {self.at(key)}: must hold {count} numbers, not {len(found)}")
+        for item in found:
+            if not is_number(item) or not low <= item <= LARGEST:
+                raise self.fault(f"numbers between {low:g} and {LARGEST:g}", item, key)
+        return np.array(found, dtype=np.float64)
+
+    def table(self, key: str, columns: int) -> NDArray[np.float64]:
+        """A list of lists of ``columns`` numbers as (rows, columns) float64."""
+        rows = Fields({str(n): row for n, row in enumerate(self.items(key))}, self.at(key))
+        return np.array([rows.numbers(row, columns) for row in rows.data]).reshape(-1, columns)
+
+    def fields(self, key: str) -> "Fields":
+        """An object."""
+        return Fields(self.value(key), self.at(key))
+
+    def mapping(self, key: str) -> Mapping[str, Any]:
+        """An object of anything; empty where there is none."""
+        return self.fields(key).data if key in self else {}
+
+    def entries(self, key: str) -> Iterator[tuple[str, "Fields"]]:
+        """The objects of an object, by name."""
+        found = self.fields(key)
+        return ((name, found.fields(name)) for name in found.data)
+
+    def list_of_fields(self, key: str) -> "list[Fields]":
+        """A list of objects."""
+        return [Fields(item, self.at(f"{key}[{n}]")) for n, item in enumerate(self.items(key))]
+
+
+def is_number(value: object) -> bool:
+    """Whether a value is a finite number, and not true or false."""
+    return (isinstance(value, int) and not isinstance(value, bool)) or (
+        isinstance(value, float) and math.isfinite(value)
+    )

@@ -1,0 +1,139 @@
+"""Golden vectors: inputs, noise and outputs of a bundle's graphs and of one whole run, to be computed again anywhere.
+
+They are arrays in an .npz: ``ROLE.in.NAME`` and ``ROLE.out.NAME`` of one call of each graph, ``run.in.NAME`` and
+``run.out.NAME`` of the run, whose settings are in the manifest. docs/bundle.md says what the run of each verb is.
+"""
+
+import io
+import math
+import struct
+import tokenize
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motet.bundle.bundle import archive_bytes
+from motet.bundle.graph import Arrays, Graph
+from motet.bundle.manifest import Golden
+from motet.bundle.members import Archive
+from motet.errors import BundleError
+
+TOLERANCE = 1e-3
+"""On :func:`difference`, for graphs in float32: processors round differently, and a run carries that on."""
+
+MAX_GOLDEN = 16 << 20
+"""Bytes of all arrays together."""
+
+DTYPES = ("<f4", "<f8", "<i8")
+
+_NOT_AN_ARRAY = (
+    ValueError,
+    SyntaxError,
+    TypeError,
+    EOFError,
+    struct.error,
+    tokenize.TokenError,
+    RecursionError,
+    MemoryError,
+)
+
+
+class Replayable(Protocol):
+    """A model that can compute its golden vectors again."""
+
+    graphs: Mapping[str, Graph]
+
+    def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
+        """The outputs of the whole run."""
+
+
+def vectors(model: Replayable, feeds: Mapping[str, Arrays], given: Arrays, settings: Mapping[str, Any]) -> bytes:
+    """The golden vectors of a model: of its graphs from the ``feeds`` of each role, and of a run."""
+    arrays = {}
+    for role, inputs in feeds.items():
+        arrays.update({f"{role}.in.{name}": value for name, value in inputs.items()})
+        arrays.update({f"{role}.out.{name}": value for name, value in model.graphs[role](inputs).items()})
+    arrays.update({f"run.in.{name}": value for name, value in given.items()})
+    arrays.update({f"run.out.{name}": value for name, value in model.replay(given, settings).items()})
+    return archive_bytes({f"{name}.npy": _bytes(value) for name, value in arrays.items()})
+
+
+def replay(model: Replayable, data: bytes, golden: Golden) -> dict[str, float]:
+    """The :func:`difference` of each graph and of the run from the vectors ``data``.
+
+    BundleError where one is above the tolerance, or the vectors do not fit the model.
+    """
+    arrays, found = read(data), {}
+    for role, graph in model.graphs.items():
+        found[role] = difference(graph(_part(arrays, f"{role}.in.")), _part(arrays, f"{role}.out."))
+    try:
+        run = model.replay(_part(arrays, "run.in."), golden.run)
+    except (KeyError, TypeError, IndexError, ValueError) as error:
+        raise BundleError(f"the golden run cannot be replayed: {error}") from error
+    found["run"] = difference(run, _part(arrays, "run.out."))
+    for name, error in found.items():
+        if not error <= golden.tolerance:
+            raise BundleError(
+                f"golden vectors, {name}: it differs by {error:.2e}, the tolerance is {golden.tolerance:g}"
+            )
+    return found
+
+
+def difference(found: Arrays, expected: Arrays) -> float:
+    """The largest |a - b| / max(1, RMS of b, |b|) over arrays of equal names; of whole numbers, infinity for any.
+
+    BundleError where shapes or dtypes differ, or a value is not finite.
+    """
+    largest = 0.0
+    for name, array in expected.items():
+        if name not in found or found[name].shape != array.shape or found[name].dtype != array.dtype:
+            raise BundleError(f"the output {name!r} has another shape or dtype than expected")
+        if not np.isfinite(found[name]).all() or not np.isfinite(array).all():
+            raise BundleError(f"the output {name!r} has values that are not finite")
+        if array.dtype.kind in "bi":
+            largest = largest if np.array_equal(found[name], array) else math.inf
+        elif array.size:
+            wanted = array.astype(np.float64)
+            scale = np.maximum(max(1.0, math.sqrt(np.mean(np.square(wanted)))), np.abs(wanted))
+            largest = max(largest, float((np.abs(found[name] - wanted) / scale).max()))
+    return largest
+
+
+def read(data: bytes) -> dict[str, NDArray[Any]]:
+    """The arrays of an .npz by name; BundleError where it is damaged, too large, or holds anything but numbers."""
+    archive, left, found = Archive(data), MAX_GOLDEN, {}
+    for member in sorted(archive.names):
+        content = archive.read(member, left)
+        left -= len(content)
+        if left < 0:
+            raise BundleError(f"the golden vectors are larger than {MAX_GOLDEN} bytes")
+        found[member.removesuffix(".npy")] = _array(member, content)
+    return found
+
+
+def _array(member: str, content: bytes) -> NDArray[Any]:
+    file = io.BytesIO(content)
+    try:
+        version = np.lib.format.read_magic(file)
+        shape, fortran, dtype = np.lib.format.read_array_header_1_0(file)
+        rest = content[file.tell() :]
+        if version != (1, 0) or fortran or dtype.str not in DTYPES or math.prod(shape) * dtype.itemsize != len(rest):
+            raise ValueError("expected float32, float64 or int64 in C order, and nothing behind it")
+        return np.frombuffer(rest, dtype).reshape(shape)
+    except _NOT_AN_ARRAY as error:
+        raise BundleError(f"the golden vectors hold {member!r}, which is not a plain array: {error}") from error
+
+
+def _bytes(array: NDArray[Any]) -> bytes:
+    buffer = io.BytesIO()
+    np.lib.format.write_array(buffer, np.ascontiguousarray(array), (1, 0), allow_pickle=False)
+    return buffer.getvalue()
+
+
+def _part(arrays: Arrays, prefix: str) -> dict[str, NDArray[Any]]:
+    found = {name.removeprefix(prefix): value for name, value in arrays.items() if name.startswith(prefix)}
+    if not found:
+        raise BundleError(f"the golden vectors have no {prefix}*")
+    return found

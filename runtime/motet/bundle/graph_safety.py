@@ -1,0 +1,109 @@
+"""Graphs that could reach outside of their own bytes are refused before ONNX Runtime sees them.
+
+ONNX Runtime opens the files that a tensor's ``external_data`` names, also where it is given a model as bytes: some
+versions only below the working directory, older ones anywhere. So this walks the whole protocol buffer, with every
+graph in the attributes of If, Loop and Scan, and refuses data outside of the file, operators that ONNX does not define,
+functions, and all fields of ONNX's messages that it does not know.
+"""
+
+from typing import NamedTuple
+
+from motet.bundle.protobuf import Value, fields
+from motet.errors import BundleError
+
+DOMAINS = ("", "ai.onnx")
+"""Of operators: ONNX's own. Quantised graphs need no other (MatMulInteger, DynamicQuantizeLinear)."""
+
+MAX_DEPTH, MAX_FIELDS = 64, 500_000
+"""Messages within messages, and fields of a whole graph."""
+
+
+class Message(NamedTuple):
+    """What may be in a message of ONNX: plain fields by number, and messages that are looked into."""
+
+    plain: frozenset[int]
+    nested: dict[int, str]
+    name: int = 0
+    domain: int = 0
+
+
+MESSAGES = {
+    "model": Message(frozenset({1, 2, 3, 4, 5, 6, 14}), {7: "graph", 8: "opset"}),
+    "opset": Message(frozenset({1, 2}), {}, domain=1),
+    "graph": Message(frozenset({2, 10, 11, 12, 13, 14, 16}), {1: "node", 5: "tensor", 15: "sparse"}, name=2),
+    "node": Message(frozenset({1, 2, 3, 4, 6, 7, 8, 9}), {5: "attribute"}, name=3, domain=7),
+    "attribute": Message(
+        frozenset({1, 2, 3, 4, 7, 8, 9, 13, 14, 15, 20}),
+        {5: "tensor", 6: "graph", 10: "tensor", 11: "graph", 22: "sparse", 23: "sparse"},
+        name=1,
+    ),
+    "sparse": Message(frozenset({3}), {1: "tensor", 2: "tensor"}),
+    "tensor": Message(frozenset({1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 16}), {}, name=8),
+}
+"""The fields of onnx.proto by number. Types of values (fields 11 to 13 of a graph, 14 and 15 of an attribute) and
+annotations hold neither tensors nor nodes."""
+
+_REFUSED = {
+    ("tensor", 13): "has its data in another file",
+    ("model", 20): "holds training information",
+    ("model", 25): "holds functions",
+}
+_LOCATION = 14  # of a tensor's data: 0 is in the file
+
+
+def check_graph(model: bytes) -> None:
+    """BundleError where an ONNX model is damaged or could reach outside of its bytes: what was found, and where."""
+    if model[4:8] == b"ORTM":
+        raise BundleError("the graph is in ONNX Runtime's own format, which cannot be checked")
+    waiting, count = [("model", memoryview(model), "the graph", 0)], 0
+    while waiting:
+        kind, data, outer, depth = waiting.pop()
+        if depth > MAX_DEPTH:
+            raise BundleError(f"the graph is nested more than {MAX_DEPTH} messages deep")
+        inner = []
+        for number, value in fields(data):
+            count += 1
+            if count > MAX_FIELDS:
+                raise BundleError(f"the graph has more than {MAX_FIELDS} fields")
+            if number in MESSAGES[kind].nested:
+                inner.append((MESSAGES[kind].nested[number], _bytes(value)))
+            elif fault := _fault(kind, number, value):
+                raise BundleError(f"{_place(kind, data, outer)} {fault}")
+        if inner:
+            place = _place(kind, data, outer)
+            waiting += [(message, part, place, depth + 1) for message, part in inner]
+
+
+def _fault(kind: str, number: int, value: Value) -> str | None:
+    """What is wrong with a field that holds no message to look into."""
+    if (kind, number) in _REFUSED:
+        return _REFUSED[kind, number]
+    if (kind, number) == ("tensor", _LOCATION):
+        return "has its data in another file" if value != 0 else None
+    if number not in MESSAGES[kind].plain:
+        return f"has the unknown field {number}"
+    if number == MESSAGES[kind].domain and (domain := _text(value)) not in DOMAINS:
+        return f"needs operators of the domain {domain[:60]!r}; only those of ONNX itself are run"
+    return None
+
+
+def _place(kind: str, data: memoryview, outer: str) -> str:
+    """What a message is called: its name, after that of the message around it."""
+    number = MESSAGES[kind].name
+    if not number or (kind == "graph" and outer == "the graph"):
+        return outer
+    names = [_text(value) for at, value in fields(data) if at == number]
+    return f"{outer}, {kind} {names[-1][:60]!r}" if names else f"{outer}, a {kind} without a name"
+
+
+def _text(value: Value) -> str:
+    try:
+        return str(_bytes(value), "utf-8")
+    except UnicodeDecodeError as error:
+        raise BundleError("the graph is not valid ONNX: a name is not UTF-8") from error
+
+
+def _bytes(value: Value) -> memoryview:
+    if isinstance(value, int):
+        raise BundleError("the graph is not valid ONNX: a number stands where a message belongs")
+    return value

@@ -1,0 +1,187 @@
+"""The manifest of a bundle or of a training run, read once and with types; docs/bundle.md says what is in it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motet.bundle.fields import Fields, parse
+from motet.bundle.graph import GraphSpec
+from motet.bundle.members import MAX_SIZE, NAME
+from motet.errors import BundleError
+from motet.representation.contract import FASTEST, MotionContract
+
+FORMAT = 2
+"""Version of the bundle format that this motet writes and reads."""
+
+MANIFEST = "manifest.json"
+
+MAX_CHANNELS = 10_000
+
+
+@dataclass(frozen=True)
+class FileEntry:
+    """A file of the bundle: its size in bytes and its sha256, in hexadecimal digits."""
+
+    size: int
+    sha256: str
+
+
+@dataclass(frozen=True)
+class GraphEntry:
+    """The graph of a role: the file that it is in, and its contract."""
+
+    file: str
+    spec: GraphSpec
+
+
+@dataclass(frozen=True, eq=False)
+class Control:
+    """What a model of control is told: its labels, and for each the frames (K, D) that a run starts from."""
+
+    labels: tuple[str, ...]
+    starts: Mapping[str, NDArray[np.float64]]
+
+
+@dataclass(frozen=True)
+class Golden:
+    """The golden vectors: their file, the largest error that is taken for rounding, and the settings of the run."""
+
+    file: str
+    tolerance: float
+    run: Mapping[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Manifest:
+    """All that is known about a model.
+
+    A training run has no graphs, files and golden vectors. text, vocabulary and control are those of the verbs that
+    need them. ``source`` is the JSON object that the rest was read from.
+    """
+
+    name: str
+    verb: str
+    model: str
+    loop: str
+    version: str
+    motion: MotionContract
+    defaults: Mapping[str, Any]
+    text: Mapping[str, Any] | None
+    vocabulary: tuple[str, ...]
+    control: Control | None
+    config: Mapping[str, Any]
+    licence: Mapping[str, Any]
+    training: Mapping[str, Any]
+    quality: Mapping[str, Any]
+    parity: Mapping[str, Any]
+    graphs: Mapping[str, GraphEntry]
+    files: Mapping[str, FileEntry]
+    golden: Golden | None
+    source: Mapping[str, Any]
+
+    @staticmethod
+    def from_json(data: object) -> "Manifest":
+        """Read the manifest of a bundle or of a training run; BundleError names the key that is wrong."""
+        top = Fields(data)
+        motion = _motion(top.fields("motion"))
+        return Manifest(
+            name=top.text("name"),
+            verb=top.text("verb"),
+            model=top.text("model"),
+            loop=top.text("loop"),
+            version=top.text("version") if "version" in top else "",
+            motion=motion,
+            defaults=top.fields("defaults").data,
+            text=top.mapping("text") if "text" in top else None,
+            vocabulary=top.texts("vocabulary") if "vocabulary" in top else (),
+            control=_control(top.fields("control"), len(motion.channels)) if "control" in top else None,
+            config=top.mapping("config"),
+            licence=top.mapping("licence"),
+            training=top.mapping("training"),
+            quality=top.mapping("quality"),
+            parity=top.mapping("parity"),
+            graphs={role: _graph(entry) for role, entry in top.entries("graphs")} if "graphs" in top else {},
+            files={name: _file(name, entry) for name, entry in top.entries("files")} if "files" in top else {},
+            golden=_golden(top.fields("golden")) if "golden" in top else None,
+            source=top.data,
+        )
+
+    @staticmethod
+    def of_bundle(text: bytes) -> "Manifest":
+        """Read the ``manifest.json`` of a bundle; BundleError for another format, and where it contradicts itself."""
+        data = parse(text)
+        version = data.get("format") if isinstance(data, dict) else None
+        if version == 1 and not isinstance(version, bool):
+            raise BundleError(
+                "it has format 1, of an older motet: export its training run again with this one, or use the older one"
+            )
+        if version != FORMAT:
+            raise BundleError(f"it has the format {version!r}; this motet reads format {FORMAT}")
+        found = Manifest.from_json(data)
+        if found.golden is None or not found.graphs:
+            raise BundleError("manifest: it needs graphs and golden vectors")
+        named = {
+            **{f"graphs.{role}.file": g.file for role, g in found.graphs.items()},
+            "golden.file": found.golden.file,
+        }
+        for key, file in named.items():
+            if file not in found.files:
+                raise BundleError(f"manifest, {key}: {file!r} is not among its files")
+        return found
+
+
+def _motion(data: Fields) -> MotionContract:
+    channels = data.texts("channels")
+    if not 1 <= len(channels) <= MAX_CHANNELS:
+        raise data.fault(f"1 to {MAX_CHANNELS} names", len(channels), "channels")
+    data.text("representation")
+    data.number("fps", 1, FASTEST)
+    data.numbers("mean", len(channels))
+    data.numbers("std", len(channels), low=0.0)
+    if "skeleton" in data:
+        _check_skeleton(data.fields("skeleton"), channels)
+    try:
+        return MotionContract.from_json(data.data)
+    except BundleError as error:
+        raise BundleError(f"manifest, {error}") from error
+
+
+def _check_skeleton(data: Fields, channels: tuple[str, ...]) -> None:
+    if "metres_per_unit" in data:
+        data.number("metres_per_unit", 1e-6, 1e6)
+    joints = data.list_of_fields("joints")
+    if len(joints) > MAX_CHANNELS:
+        raise data.fault(f"at most {MAX_CHANNELS} joints", len(joints), "joints")
+    for joint in joints:
+        joint.whole("parent", -1, len(joints))
+        joint.numbers("offset", 3)
+        joint.numbers("axis", 3)
+        joint.text("order")
+    known = {joint.text("name") for joint in joints} | {"root"}
+    unknown = [name for name in channels if name.rpartition(".")[0] not in known]
+    if unknown:
+        raise data.fault("a skeleton with the joints of all channels", f"one without {unknown[0]}", "joints")
+
+
+def _control(data: Fields, channels: int) -> Control:
+    labels, starts = data.texts("labels"), data.fields("starts")
+    if not labels or set(starts.data) != set(labels):
+        raise data.fault(f"frames for each of {', '.join(labels)}", list(starts.data), "starts")
+    return Control(labels, {label: starts.table(label, channels) for label in labels})
+
+
+def _graph(data: Fields) -> GraphEntry:
+    return GraphEntry(data.text("file"), GraphSpec.read(data))
+
+
+def _file(name: str, data: Fields) -> FileEntry:
+    if not NAME.fullmatch(name):
+        raise BundleError(f"manifest, files: {name[:80]!r} is not a plain file name")
+    return FileEntry(data.whole("size", 0, MAX_SIZE), data.text("sha256"))
+
+
+def _golden(data: Fields) -> Golden:
+    return Golden(data.text("file"), data.number("tolerance", 0.0, 1.0), data.mapping("run"))

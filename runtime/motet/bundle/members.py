@@ -1,0 +1,123 @@
+"""The files of a folder or zip, read within limits: nothing is unpacked that was not announced."""
+
+import io
+import re
+import stat
+import struct
+import zipfile
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import BinaryIO, Protocol
+
+from motet.errors import BundleError
+
+MAX_FILES, MAX_SIZE, MAX_TOTAL = 64, 1 << 30, 2 << 30
+"""Files of a bundle, and bytes of one and of all."""
+
+MAX_RATIO, FREE = 100, 1 << 20
+"""A file of a zip that unpacks to more than ``FREE`` bytes has at most so many times its packed size. Weights hardly
+shrink; a bomb of zeros does by a thousand."""
+
+NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,127}")
+"""A plain file name on every system."""
+
+
+_DAMAGE = (zipfile.BadZipFile, zlib.error, struct.error, OSError, EOFError, RuntimeError, ValueError, OverflowError)
+"""What reading a damaged zip raises."""
+
+
+class Members(Protocol):
+    """Files by name."""
+
+    names: frozenset[str]
+
+    def read(self, name: str, limit: int) -> bytes:
+        """One file's bytes, the first ``limit`` + 1 of them where it is longer; BundleError where it cannot be read."""
+
+
+class Folder:
+    """The files of a folder; BundleError where something in it is not a plain file, or too much."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        try:
+            found = {member.name: member.lstat() for member in path.iterdir()}
+        except OSError as error:
+            raise BundleError(f"cannot read the folder: {error.strerror}") from error
+        _check({name: state.st_size for name, state in found.items()})
+        for name, state in found.items():
+            if not stat.S_ISREG(state.st_mode):
+                raise BundleError(f"{name!r} is not a plain file")
+        self.names = frozenset(found)
+
+    def read(self, name: str, limit: int) -> bytes:
+        """As :meth:`Members.read`."""
+        try:
+            with (self._path / name).open("rb") as file:
+                return file.read(limit + 1)
+        except OSError as error:
+            raise BundleError(f"cannot read {name!r}: {error.strerror}") from error
+
+
+class Archive:
+    """The files of a zip, given by its path or as bytes; BundleError where it is damaged, or holds what it must not."""
+
+    def __init__(self, source: Path | bytes) -> None:
+        self._source = source
+        try:
+            with self._file() as file:
+                file.seek(max(0, file.seek(0, io.SEEK_END) - 42))
+                small = _is_small(file.read())
+                infos = zipfile.ZipFile(file).infolist() if small else []
+        except _DAMAGE as error:
+            raise BundleError(f"not a zip that can be read ({error})") from error
+        if not small:
+            raise BundleError(f"it holds too many files; a bundle has at most {MAX_FILES}")
+        _check({info.orig_filename: info.file_size for info in infos})
+        for info in infos:
+            _check_entry(info)
+        self._infos: Mapping[str, zipfile.ZipInfo] = {info.filename: info for info in infos}
+        if len(self._infos) != len(infos):
+            raise BundleError("a file is in the zip twice")
+        self.names = frozenset(self._infos)
+
+    def read(self, name: str, limit: int) -> bytes:
+        """As :meth:`Members.read`: by reading, whatever size the zip announces."""
+        try:
+            with self._file() as source, zipfile.ZipFile(source) as archive, archive.open(self._infos[name]) as file:
+                return file.read(limit + 1)
+        except _DAMAGE as error:
+            raise BundleError(f"cannot read {name!r}: {error}") from error
+
+    def _file(self) -> BinaryIO:
+        return io.BytesIO(self._source) if isinstance(self._source, bytes) else self._source.open("rb")
+
+
+def _is_small(end: bytes) -> bool:
+    """Whether the table of contents of a plain zip is short, by its last 42 bytes, which say so before it is read."""
+    record = end[-22:]
+    if record[:4] != b"PK\x05\x06" or end[:4] == b"PK\x06\x07":
+        raise zipfile.BadZipFile("its end is not that of a plain zip")
+    return int.from_bytes(record[12:16], "little") <= MAX_FILES * 1024
+
+
+def _check_entry(info: zipfile.ZipInfo) -> None:
+    if stat.S_IFMT(info.external_attr >> 16) not in {0, stat.S_IFREG}:
+        raise BundleError(f"{info.filename!r} is not a plain file")
+    if info.compress_type not in {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED} or info.flag_bits & 1:
+        raise BundleError(f"{info.filename!r} is encrypted, or packed by another method than deflate")
+    if info.file_size > max(FREE, MAX_RATIO * info.compress_size):
+        raise BundleError(f"{info.filename!r} unpacks to more than {MAX_RATIO} times its size")
+
+
+def _check(sizes: Mapping[str, int]) -> None:
+    if len(sizes) > MAX_FILES:
+        raise BundleError(f"it holds {len(sizes)} files; a bundle has at most {MAX_FILES}")
+    for name, size in sizes.items():
+        if not NAME.fullmatch(name):
+            raise BundleError(f"{name[:80]!r} is not a plain file name")
+        if size > MAX_SIZE:
+            raise BundleError(f"{name!r} is larger than {MAX_SIZE} bytes")
+    if sum(sizes.values()) > MAX_TOTAL:
+        raise BundleError(f"its files are larger than {MAX_TOTAL} bytes together")

@@ -1,0 +1,51 @@
+"""How ONNX Runtime is to run a model: threads and execution providers."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import onnxruntime
+
+from motet.errors import BundleError
+
+MAX_THREADS = 256
+
+Options = Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class SessionOptions:
+    """Options of every session of a model; the default is one thread of the CPU.
+
+    threads: of one call of a graph, 1 to 256. 1 is right for step graphs: no idle spinning, and many sessions side by
+        side; more pay in large batches.
+    providers: execution providers of ONNX Runtime, the preferred first. ONNX Runtime gives the CPU what the others
+        cannot run, all of it where one does not start: a model's ``providers`` are those that are really active.
+    provider_options: options of each provider, in the same order; none by default.
+    BundleError for a number of threads out of range, and for a provider that this build of ONNX Runtime does not have.
+    """
+
+    threads: int = 1
+    providers: tuple[str, ...] = ("CPUExecutionProvider",)
+    provider_options: tuple[Options, ...] = ()
+
+    def __post_init__(self) -> None:
+        if isinstance(self.threads, bool) or not isinstance(self.threads, int) or not 1 <= self.threads <= MAX_THREADS:
+            raise BundleError(f"threads must be a number between 1 and {MAX_THREADS}, not {self.threads!r}")
+        available = onnxruntime.get_available_providers()
+        for provider in self.providers:
+            if provider not in available:
+                raise BundleError(f"ONNX Runtime has no provider {provider!r} here; it has {', '.join(available)}")
+        if not self.providers or len(self.provider_options) not in {0, len(self.providers)}:
+            raise BundleError("give at least one provider, and options for each provider or for none")
+
+    def session(self, model: bytes) -> Any:
+        """A session of ONNX Runtime for a model in memory; raises what ONNX Runtime raises."""
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = self.threads
+        options.inter_op_num_threads = 1
+        options.enable_cpu_mem_arena = False  # memory goes back after a large batch, at the same speed
+        options.log_severity_level = 4
+        options.add_session_config_entry("session.load_model_format", "ONNX")  # the one that was checked
+        given = [dict(one) for one in self.provider_options] or None
+        return onnxruntime.InferenceSession(model, options, list(self.providers), given)

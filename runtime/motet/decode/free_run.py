@@ -1,0 +1,35 @@
+"""The loop of predictors: a step graph whose frames go on from seed frames."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motet.bundle.graph import Graph
+from motet.decode.loop import Loop, Setting
+from motet.decode.rollout import advance, zero_state
+
+MAX_HORIZON = 10_000
+
+
+def free_run(encoder: Graph, step: Graph, seed: NDArray[np.float32], count: int, horizon: int) -> NDArray[np.float32]:
+    """The ``count`` frames (B, count, C) float32 that follow the seed frames (B, L, C) float32.
+
+    What the encoder gives are the step's inputs, by name: those that are fed back begin there, others stay; a fed back
+    input that the encoder does not give begins as zeros. After every ``horizon`` frames the encoder is asked again,
+    about the L frames before.
+    """
+    given = seed.shape[1]
+    frames = np.concatenate([seed, np.empty((len(seed), count, seed.shape[2]), dtype=np.float32)], axis=1)
+    for n in range(count):
+        if n % horizon == 0:
+            found = encoder({"frames": np.ascontiguousarray(frames[:, n : n + given])})
+            state = {
+                **zero_state(step, len(seed), found),
+                **{k: v for k, v in found.items() if k in step.spec.feedback},
+            }
+            constant = {name: value for name, value in found.items() if name not in state}
+        outputs, state = advance(step, state, constant)
+        frames[:, n + given] = outputs["frame"]
+    return frames[:, given:]
+
+
+LOOP = Loop("predict", free_run, {}, {"frame": "batch D"}, {"horizon": Setting(1, MAX_HORIZON, whole=True)}, batch=4096)

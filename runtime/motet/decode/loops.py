@@ -1,0 +1,23 @@
+"""All decoding loops, by the names that manifests use. A new one is a file here and a line in this table."""
+
+from collections.abc import Mapping
+
+from motet.decode import beam, consensus, free_run, mixture, session
+from motet.decode.loop import Loop
+from motet.errors import BundleError
+
+LOOPS: Mapping[str, Loop] = {
+    "beam": beam.LOOP,
+    "consensus": consensus.LOOP,
+    "mixture": mixture.LOOP,
+    "free_run": free_run.LOOP,
+    "session": session.LOOP,
+}
+
+
+def loop_of(name: str, verb: str) -> Loop:
+    """The loop that a manifest names; BundleError where it is unknown, or for another verb."""
+    fitting = [known for known, loop in LOOPS.items() if loop.verb == verb]
+    if name not in fitting:
+        raise BundleError(f"manifest, loop: {name!r} does not {verb}; expected one of {', '.join(fitting)}")
+    return LOOPS[name]

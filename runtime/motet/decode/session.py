@@ -1,0 +1,39 @@
+"""The loop of control: one frame a tick, from what the figure did and what it is told."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motet.bundle.graph import Arrays, Graph
+from motet.decode.loop import Loop, Setting
+
+Floats = NDArray[np.float32]
+
+
+def tick(step: Graph, history: Floats, inputs: Callable[[], Arrays], iterations: int) -> tuple[Floats, Floats]:
+    """The next frame (B, D) and history (B, K, H), both float32.
+
+    inputs: gives all other inputs of the step, with new noise each time. A step that takes ``codes`` is asked
+    ``iterations`` times: a Gibbs chain that starts at the codes of the last frame.
+    """
+    chain = {"codes": history[:, -1]} if step.spec.takes("codes") else {}
+    for _ in range(iterations - 1):
+        chain = {"codes": step({**inputs(), "history": history, **chain})["next_codes"]}
+    outputs = step({**inputs(), "history": history, **chain})
+    return outputs["frame"], outputs[step.spec.feedback["history"]]
+
+
+LOOP = Loop(
+    "control",
+    tick,
+    {
+        "history": "batch K H",
+        "control": "batch L",
+        "noise": "batch N",
+        "variety": "batch 1",
+        "temperature": "batch 1",
+    },
+    {"next_codes": "batch H", "frame": "batch D"},
+    {"temperature": Setting(0.01, 100), "iterations": Setting(1, 100, whole=True, default=1)},
+)

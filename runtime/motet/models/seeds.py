@@ -1,0 +1,24 @@
+"""Seeds: one for each row of a batch, so that it gets what it would get alone."""
+
+import operator
+from collections.abc import Sequence
+from typing import SupportsIndex
+
+from motet.errors import MotetError
+
+Seed = SupportsIndex | Sequence[SupportsIndex]
+"""An integer, Python's or numpy's, from which on the rows count; or one for each row."""
+
+
+def seeds_of(seed: Seed, count: int, error: type[MotetError]) -> list[int]:
+    """A seed for each of ``count`` rows; ``error`` for a negative one, another number of them, or another type."""
+    try:
+        if isinstance(seed, SupportsIndex):
+            found = [operator.index(seed) + i for i in range(count)]
+        else:
+            found = [operator.index(one) for one in seed]
+    except TypeError:
+        found = []
+    if len(found) != count or any(one < 0 for one in found):
+        raise error(f"expected a seed of 0 or more, or one for each of {count}, not {seed}")
+    return found

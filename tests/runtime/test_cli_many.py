@@ -1,0 +1,123 @@
+"""The command line over many files, its help and its log; and that it does what three lines of Python do."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import run
+
+import motet
+from motet.cli import COMMANDS, main
+from motet.formats import MOCAP, READABLE, WRITABLE
+
+WALK, RUN = "39_14.amc", "09_07.amc"
+
+
+def test_describe_is_three_lines_of_python(clips: Path) -> None:
+    printed = json.loads(run("describe", clips / WALK, "--json").stdout)[0]["hypotheses"]
+    model = motet.load("cmu-describe")
+    motion = motet.read(clips / WALK)
+    assert printed == [vars(found) for found in model.describe(motion)]
+
+
+def test_generate_is_three_lines_of_python(tmp_path: Path) -> None:
+    run("generate", "a person walks", "-o", tmp_path / "cli.bvh")
+    model = motet.load("cmu-generate")
+    best = model.generate("a person walks")[0]
+    best.write(tmp_path / "library.bvh")
+    assert (tmp_path / "cli.bvh").read_bytes() == (tmp_path / "library.bvh").read_bytes()
+
+
+def test_predict_is_three_lines_of_python(tmp_path: Path, clips: Path) -> None:
+    run("predict", clips / WALK, "-o", tmp_path / "cli.bvh")
+    model = motet.load("cmu-predict")
+    following = model.predict(motet.read(clips / WALK))
+    motet.write(tmp_path / "library.bvh", following)
+    assert (tmp_path / "cli.bvh").read_bytes() == (tmp_path / "library.bvh").read_bytes()
+
+
+def test_control_is_three_lines_of_python(tmp_path: Path) -> None:
+    run("control", "run 1s, walk 1s", "-o", tmp_path / "cli.bvh")
+    model = motet.load("cmu-control")
+    motion = model.run("run 1s, walk 1s")
+    motet.write(tmp_path / "library.bvh", motion)
+    assert (tmp_path / "cli.bvh").read_bytes() == (tmp_path / "library.bvh").read_bytes()
+
+
+def test_embed_is_three_lines_of_python(tmp_path: Path, clips: Path) -> None:
+    run("embed", clips / WALK, clips / RUN, "-o", tmp_path / "cli.npy")
+    model = motet.load("cmu-describe")
+    vectors = model.embed([motet.read(clips / WALK), motet.read(clips / RUN)])
+    np.save(tmp_path / "library.npy", vectors)
+    assert (tmp_path / "cli.npy").read_bytes() == (tmp_path / "library.npy").read_bytes()
+
+
+@pytest.mark.parametrize("command", [["convert"], ["predict", "--frames", 3], ["view"]])
+def test_each_file_is_tried_and_each_failure_is_named(tmp_path: Path, clips: Path, command: list[object]) -> None:
+    (tmp_path / "bad.bvh").write_text("hello")
+    files = [clips / RUN, tmp_path / "bad.bvh", tmp_path / "none.npz", clips / WALK]
+    result = run(*command, *files, "-o", tmp_path / "{name}.html")
+    assert result.exit_code == 1
+    assert [line.split(": ")[1] for line in result.stderr.splitlines()] == [f"{files[1]}, line 1", f"{files[2]}"]
+    assert len(result.stdout.splitlines()) == 2
+    assert {path.name for path in tmp_path.glob("*.html")} == {"09_07.html", "39_14.html"}
+
+
+def test_results_are_numbered_where_no_name_is_asked_for(tmp_path: Path, clips: Path) -> None:
+    assert run("convert", clips / RUN, clips / WALK, "-o", tmp_path / "out.npz").exit_code == 0
+    for number, source in enumerate((RUN, WALK), start=1):
+        expected = motet.read(clips / source).values
+        np.testing.assert_array_equal(motet.read(tmp_path / f"out-{number}.npz").values, expected)
+
+
+def test_predict_carries_several_motions_on_as_it_does_each(clips: Path) -> None:
+    model, motions = motet.load("cmu-predict"), [motet.read(clips / WALK), motet.read(clips / RUN)]
+    for one, motion in zip(model.predict(motions, frames=4), motions, strict=True):
+        np.testing.assert_array_equal(one.values, model.predict(motion, frames=4).values)
+
+
+def test_the_frame_rate_and_the_skeleton_of_an_amc_can_be_told(tmp_path: Path, clips: Path) -> None:
+    skeleton = tmp_path / "skeleton.asf"
+    skeleton.write_bytes((clips / WALK).with_suffix(".asf").read_bytes())
+    (tmp_path / "walk.amc").write_bytes((clips / WALK).read_bytes())
+    skeleton = skeleton.rename(tmp_path / "elsewhere.txt")
+    out = tmp_path / "out.npz"
+    assert run("convert", tmp_path / "walk.amc", out, "--fps-in", 60, "--asf", skeleton).exit_code == 0
+    assert motet.read(out).fps == 60
+
+
+def test_help_ends_its_lines_in_whole_words() -> None:
+    text = run("--help").stdout.partition("Commands:")[2]
+    for name, (_, _, help_line) in COMMANDS.items():
+        if name in main.list_commands(None):  # type: ignore[arg-type]
+            assert re.search(rf"^  {name} +\S", text, re.MULTILINE)
+            assert help_line.endswith(".")
+    assert "..." not in text
+    help_of_convert = " ".join(run("convert", "--help").stdout.split())
+    assert f"Reads {' '.join(READABLE)}; writes {' '.join(WRITABLE)}" in help_of_convert
+    assert set(MOCAP) <= set(READABLE)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no full device here")
+@pytest.mark.parametrize("arguments", [["bundle", "list"], ["--help"], ["convert", "{clips}/39_14.amc", "{out}/a.npz"]])
+def test_a_full_disk_behind_stdout_is_one_message(arguments: list[str], tmp_path: Path, clips: Path) -> None:
+    code = "from motet.cli import main; main()"
+    words = [argument.format(clips=clips, out=tmp_path) for argument in arguments]
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-c", code, *words], stdout=full, stderr=subprocess.PIPE, text=True, check=False
+        )
+    assert done.returncode == 1
+    assert done.stderr == f"motet: cannot print the results: {os.strerror(28)}\n"
+
+
+def test_the_public_names_are_there_and_geometry_is_in_its_module() -> None:
+    assert all(hasattr(motet, name) for name in motet.__all__)
+    assert {"read", "write", "load", "Motion"} <= set(motet.__all__)
+    assert motet.motion.lateral_axis is not None
+    assert repr(motet.load("cmu-describe")) == "DescribeModel('cmu-describe', 62 channels, 10 fps)"

@@ -1,0 +1,73 @@
+"""A file is written whole or not at all, whatever happens."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from motet.errors import OutputError
+from motet.files import PARTIAL, temporary_beside, write_whole
+
+
+def test_text_and_bytes_are_written_and_replaced(tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    write_whole(path, "one")
+    write_whole(str(path), b"two")
+    assert path.read_bytes() == b"two"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("stop", [OSError(28, "No space left on device"), KeyboardInterrupt(), MemoryError()])
+@pytest.mark.parametrize("function", ["write_bytes", "replace"])
+def test_an_interrupted_write_leaves_the_old_file_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, function: str, stop: BaseException
+) -> None:
+    path, original = tmp_path / "a", getattr(Path, function)
+    path.write_text("old")
+
+    def breaks(self: Path, *arguments: object) -> None:
+        if function == "write_bytes":
+            original(self, b"ne")
+        raise stop
+
+    monkeypatch.setattr(Path, function, breaks)
+    with pytest.raises(OutputError if isinstance(stop, OSError) else type(stop)):
+        write_whole(path, "new")
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_replaced_file_keeps_its_mode_and_a_link_its_target(tmp_path: Path) -> None:
+    target, link = tmp_path / "target", tmp_path / "link"
+    target.write_text("old")
+    target.chmod(0o640)
+    link.symlink_to(target)
+    write_whole(link, "new")
+    assert link.is_symlink()
+    assert (target.read_text(), target.stat().st_mode & 0o777) == ("new", 0o640)
+
+
+def test_a_long_name_has_a_temporary_file_too(tmp_path: Path) -> None:
+    path = tmp_path / ("ä" * 127)
+    write_whole(path, "x")
+    assert path.read_text() == "x"
+    name = temporary_beside(path).name
+    assert name.startswith(".ä")
+    assert name.endswith(PARTIAL)
+    with pytest.raises(OutputError, match="cannot write"):
+        write_whole(tmp_path / ("a" * 256), "x")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
+def test_places_that_are_no_files_are_refused(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    for place, said in (
+        (tmp_path / "pipe", "not a regular file"),
+        (tmp_path, "it is a folder"),
+        (tmp_path / "no" / "a", "does not exist"),
+        (tmp_path / "a\0b", "cannot write"),
+        (Path("/dev/null"), "not a regular file"),
+    ):
+        with pytest.raises(OutputError, match=said):
+            write_whole(place, "x")
+    assert [path.name for path in tmp_path.iterdir()] == ["pipe"]

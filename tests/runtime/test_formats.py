@@ -1,0 +1,169 @@
+"""What holds for every format: one table of them, files and file objects, options, and readers that never fall over."""
+
+import io
+import random
+import re
+import time
+from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+from figures import WRITTEN, walker
+from test_mmm import frame, xml
+
+from motet.errors import FormatError, MotetError, MotionError, OutputError
+from motet.formats import FORMATS, MOCAP, READABLE, WRITABLE, read_motion, write_motion
+
+DOCS = Path(__file__).parents[2] / "docs" / "formats.md"
+
+
+def test_the_table_of_the_docs_is_made_of_the_formats() -> None:
+    found = re.search("<!-- formats -->\n(.*?)<!-- /formats -->", DOCS.read_text(encoding="utf-8"), re.DOTALL)
+    rows = [f"| `{f.extension}` | {f.name} | {'yes' * f.reads} | {'yes' * f.writes} | {f.keeps} |" for f in FORMATS]
+    head = ["| extension | format | reads | writes | what it keeps |", "|---|---|---|---|---|"]
+    assert found is not None
+    assert found[1].splitlines() == head + rows
+
+
+def test_every_format_has_the_functions_that_its_record_says() -> None:
+    for kind in FORMATS:
+        if kind.needs and find_spec(kind.needs) is None:
+            continue
+        for verb, there in (("read", kind.reads), ("write", kind.writes)):
+            assert there == callable(getattr(__import__(f"motet.formats.{kind.module}", fromlist="x"), verb, None))
+    assert set(MOCAP) <= set(READABLE) & set(WRITABLE)
+
+
+@pytest.mark.parametrize("extension", ["bvh", "npz", "csv"])
+def test_file_objects_are_read_and_written(tmp_path: Path, extension: str) -> None:
+    content = io.BytesIO()
+    write_motion(content, walker(), format=extension)
+    write_motion(tmp_path / f"a.{extension}", walker())
+    assert content.getvalue() == (tmp_path / f"a.{extension}").read_bytes()
+    content.seek(0)
+    again = read_motion(content, format=f".{extension.upper()}")
+    np.testing.assert_array_equal(again.values, read_motion(tmp_path / f"a.{extension}").values)
+    with (tmp_path / f"a.{extension}").open("rb") as opened:
+        assert len(read_motion(opened)) == len(again)  # its name says the format
+    with pytest.raises(FormatError, match="<file object>: cannot read a file without an extension; expected one of"):
+        read_motion(content)
+    with pytest.raises(OutputError, match="cannot write"), (tmp_path / f"a.{extension}").open("rb") as opened:
+        write_motion(opened, walker())
+
+
+def test_an_amc_file_object_needs_its_skeleton(tmp_path: Path) -> None:
+    write_motion(tmp_path / "a.amc", walker())
+    content = io.BytesIO((tmp_path / "a.amc").read_bytes())
+    assert len(read_motion(content, format="amc", asf=tmp_path / "a.asf")) == 40
+    with pytest.raises(FormatError, match="give it as asf"):
+        read_motion(io.BytesIO(), format="amc")
+    with pytest.raises(FormatError, match="AMC is two files"):
+        write_motion(io.BytesIO(), walker(), format="amc")
+
+
+def test_a_unit_is_told_where_the_file_does_not_say_it(tmp_path: Path) -> None:
+    write_motion(tmp_path / "a.bvh", walker())
+    assert read_motion(tmp_path / "a.bvh").skeleton.metres_per_unit is None
+    assert read_motion(tmp_path / "a.bvh", unit="cm").skeleton.metres_per_unit == 0.01
+    assert read_motion(tmp_path / "a.bvh", unit=0.5).skeleton.metres_per_unit == 0.5
+    write_motion(tmp_path / "b.npz", walker(metres_per_unit=0.01))
+    assert read_motion(tmp_path / "b.npz", unit="cm").skeleton.metres_per_unit == 0.01
+    write_motion(tmp_path / "c.csv", walker())
+    for name, unit, said in (
+        ("b.npz", "m", "b.npz: its length unit is 0.01 m, as the file says, and not 1 m as given"),
+        ("c.csv", "m", "no skeleton, and so no length unit"),
+        ("a.bvh", "mile", r"a.bvh: expected a length unit \(m, cm"),
+        ("a.bvh", 0, "number of metres, not 0"),
+        ("a.bvh", float("nan"), "number of metres, not nan"),
+    ):
+        with pytest.raises(FormatError, match=said):
+            read_motion(tmp_path / name, unit=unit)
+
+
+def test_options_that_a_format_does_not_take_are_refused(tmp_path: Path) -> None:
+    write_motion(tmp_path / "a.bvh", walker())
+    for options, said in (
+        ({"fps": 30}, "'fps' is an option of .amc files only"),
+        ({"asf": "a.asf"}, "'asf' is an option of .amc files only"),
+        ({"format": "npz", "partial": True}, "'partial' is an option of .amc .bvh files only"),
+    ):
+        with pytest.raises(FormatError, match=said):
+            read_motion(tmp_path / "a.bvh", **options)
+    assert len(read_motion(tmp_path / "a.bvh", partial=True)) == 40
+
+
+def test_places_that_are_no_files_are_named(tmp_path: Path) -> None:
+    (tmp_path / "folder.bvh").mkdir()
+    for name, said in (
+        ("none.bvh", "no such file"),
+        ("folder.bvh", "it is not a file"),
+        ("a" * 300 + ".bvh", "cannot be read"),
+        ("a.bvh/b.bvh", "no such file"),
+        ("a.txt", "cannot read files of type '.txt'; expected one of .amc .bvh .npz .csv .xml"),
+    ):
+        with pytest.raises(FormatError, match=said):
+            read_motion(tmp_path / name)
+
+
+@pytest.mark.parametrize("extension", WRITTEN)
+def test_what_cannot_be_written_leaves_nothing(tmp_path: Path, extension: str) -> None:
+    motion = walker()
+    high = replace(motion.skeleton.joints[-1], offset=(0.0, 1e308, 0.0))
+    tall = replace(motion, skeleton=replace(motion.skeleton, joints=(*motion.skeleton.joints[:-1], high)))
+    huge = motion.values / np.abs(motion.values).max() * 1.7e308
+    radians = replace(motion, values=huge, units=tuple(unit.replace("deg", "rad") for unit in motion.units))
+    for broken in (replace(motion, values=motion.values + 1e308), radians, tall):
+        path = tmp_path / f"a{extension}"
+        try:
+            write_motion(path, broken)
+        except MotionError:
+            assert list(tmp_path.iterdir()) == []
+            continue
+        if extension in READABLE:
+            assert len(read_motion(path)) == len(motion)
+        for file in tmp_path.iterdir():
+            file.unlink()
+    with pytest.raises(OutputError, match="does not exist"):
+        write_motion(tmp_path / "no" / f"a{extension}", motion)
+
+
+def mutated(content: bytes, rng: random.Random) -> bytes:
+    """The content with some bytes changed, cut out, doubled or put in, as transfers and editors break files."""
+    for _ in range(rng.choice((1, 1, 2, 8))):
+        place, size = rng.randrange(len(content) + 1), rng.choice((1, 1, 4, 60))
+        part = content[place : place + size]
+        new = (
+            bytes(rng.randrange(256) for _ in part),
+            b"",
+            part * rng.choice((2, 50)),
+            rng.choice((b"-", b" ", b"\n", b"}", b"{", b"1e999", b"9" * 400, b"nan", "²".encode(), b"\0", b"<", b'"')),
+        )
+        content = content[:place] + rng.choice(new) + content[place + size :]
+    return content
+
+
+@pytest.mark.parametrize("extension", READABLE)
+def test_damaged_files_give_a_motion_or_an_error_of_motet(tmp_path: Path, extension: str) -> None:
+    path, rng, slowest = tmp_path / f"a{extension}", random.Random(extension), 0.0
+    if extension == ".xml":
+        path.write_text(xml(frame(0), frame(0.01), frame(0.02)))
+    else:
+        write_motion(path, walker(3))
+    original = {file: file.read_bytes() for file in tmp_path.iterdir()}
+    messages: list[str] = []
+    for n in range(400):
+        file = sorted(original)[n % len(original)]
+        file.write_bytes(mutated(original[file], rng))
+        started = time.monotonic()
+        try:
+            motion = read_motion(path)
+            assert np.isfinite(motion.values).all()
+        except MotetError as error:
+            messages.append(str(error))
+        slowest = max(slowest, time.monotonic() - started)
+        file.write_bytes(original[file])
+    assert 50 < len(messages) < 400
+    assert max(map(len, messages)) < 2000
+    assert slowest < 2

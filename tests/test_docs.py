@@ -1,0 +1,104 @@
+"""What README and docs say works: Python blocks run, links lead somewhere, commands exist with their options."""
+
+import re
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+import pytest
+
+from motet.cli import main
+from motet.formats import read_motion, write_motion
+
+ROOT = Path(__file__).parents[1]
+PAGES = {path.relative_to(ROOT).as_posix(): path for path in (*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"))}
+CLIPS = {"walk": "39_14", "run": "09_07", "bend": "02_06"}
+"""What files that pages only name, such as walk.bvh, are here."""
+
+
+def blocks(text: str, language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```$", text, flags=re.DOTALL | re.MULTILINE)
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working directory in which the folders of the repository are to be found, and the files that pages name."""
+    for place in ROOT.iterdir():
+        if place.is_dir() and not place.name.startswith("."):
+            (tmp_path / place.name).symlink_to(place)
+    for name, trial in CLIPS.items():
+        motion = read_motion(ROOT / f"train/motet_train/data/cmu/{trial}.amc")
+        for extension in ("amc", "bvh", "npz"):
+            write_motion(tmp_path / f"{name}.{extension}", motion)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("page", [page for page, path in PAGES.items() if blocks(path.read_text(), "python")])
+def test_python_blocks_run_one_after_the_other(page: str, folder: Path) -> None:
+    namespace: dict[str, object] = {}
+    for number, block in enumerate(blocks(PAGES[page].read_text(), "python"), start=1):
+        exec(compile(block, f"{page}, Python block {number}", "exec"), namespace)
+
+
+def test_the_readme_has_python_blocks() -> None:
+    assert blocks(PAGES["README.md"].read_text(), "python")
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_links_lead_somewhere(page: str) -> None:
+    text = re.sub(r"^```.*?^```$", "", PAGES[page].read_text(), flags=re.DOTALL | re.MULTILINE)
+    found = re.findall(r"\]\(([^)\s]+)\)", text)
+    here = {target.partition("#")[0] for target in found if not re.match(r"\w+:", target)} - {""}
+    assert [target for target in sorted(here) if not (PAGES[page].parent / target).exists()] == []
+
+
+def commands(text: str) -> Iterator[str]:
+    """The ``motet`` command lines in code blocks of a page, fenced or indented."""
+    fenced = re.findall(r"^```\w*\n(.*?)^```$", text, flags=re.DOTALL | re.MULTILINE)
+    indented = re.findall(r"^ {4}.*$", text, flags=re.MULTILINE)
+    lines = "\n".join([*fenced, *(line[4:] for line in indented)]).replace("\\\n", " ").splitlines()
+    return (line[found.start(1) :] for line in lines if (found := re.search(r"(?:^|&& )(motet .*)", line)))
+
+
+def mentions(text: str) -> list[str]:
+    """What stands between backticks and begins with ``motet``: a command, or the beginning of one, or its synopsis."""
+    found: list[str] = re.findall(r"`(motet [^`]+)`", text)
+    return [re.sub(r"\.\.\.|[][]", " ", line) for line in found]
+
+
+def check(line: str, whole: bool = True) -> None:
+    """A command exists and has the options, and where it is whole those that it needs; nothing is run."""
+    words = shlex.split(line, comments=True)[1:]
+    command: click.Command = main
+    context = click.Context(main, info_name="motet")
+    while isinstance(command, click.Group) and words and not words[0].startswith("-"):
+        found = command.get_command(context, words[0])
+        assert found is not None, f"there is no command {words[0]!r}"
+        command, context = found, click.Context(found, context, info_name=words.pop(0))
+    given = {option.name for option in command.make_parser(context).parse_args(words)[2]}
+    needed = {option.name for option in command.params if isinstance(option, click.Option) and option.required}
+    assert not whole or needed <= given, f"it needs {', '.join(map(str, needed - given))}"
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_commands_exist_with_their_options(page: str) -> None:
+    text = PAGES[page].read_text()
+    for line, whole in [*((line, True) for line in commands(text)), *((line, False) for line in mentions(text))]:
+        try:
+            check(line, whole)
+        except (AssertionError, click.ClickException) as error:
+            raise AssertionError(f"{line!r}: {error}") from error
+
+
+def test_the_readme_names_commands_and_wrong_ones_are_found() -> None:
+    assert len(list(commands(PAGES["README.md"].read_text()))) > 3
+    check("motet describe walk.bvh --json  # as it is")
+    with pytest.raises(click.NoSuchOption, match="--jsonn"):
+        check("motet describe walk.bvh --jsonn")
+    with pytest.raises(AssertionError, match="descibe"):
+        check("motet descibe walk.bvh")
+    with pytest.raises(AssertionError, match="needs out"):
+        check('motet generate "a person walks"')
+    check("motet generate", whole=False)

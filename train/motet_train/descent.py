@@ -1,0 +1,204 @@
+"""Learning by gradient descent: the settings, a step, and the learner of all nets that autograd can train."""
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+from types import MappingProxyType
+from typing import Any, Literal, NamedTuple, Protocol
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
+
+from motet_train import distributed
+from motet_train.runs import RunError
+from motet_train.trainer import Part
+
+OPTIMISERS: Mapping[str, Callable[..., torch.optim.Optimizer]] = {
+    "adam": torch.optim.Adam,
+    "adamw": partial(torch.optim.AdamW, betas=(0.9, 0.98)),
+    "nadam": torch.optim.NAdam,
+    "sgd": torch.optim.SGD,
+}
+
+
+@dataclass(frozen=True)
+class Training:
+    """How a net is trained.
+
+    epochs or steps: how long; one of the two. every: of these from one line of the log, validation and checkpoint to
+    the next. warm_up: over so many the learning rate rises from zero; falling: the share, at the end, over which it
+    falls linearly to zero; cosine: it falls to a hundredth along half a cosine; decay: a factor for every so many.
+    l2: the weight of the squared weights, not biases, in the loss. weight_decay: of "adamw", apart from the loss. clip:
+    the greatest norm of the gradient. adversary: the weight of a discriminator's opinion in the loss. average: of the
+    running mean of weights, which is then what is kept. keep: the weights of the "best" validation or the "last".
+    patience: training ends when so many validations in a row brought nothing better. precision: of the products of
+    matrices in training; what is trained is float32.
+    """
+
+    epochs: int = 0
+    steps: int = 0
+    every: int = 1
+    batch: int = 16
+    optimiser: Literal["adam", "adamw", "nadam", "sgd"] = "adam"
+    learning_rate: float = 1e-3
+    warm_up: int = 0
+    falling: float = 0.0
+    cosine: bool = False
+    decay: tuple[float, int] | None = None
+    l2: float = 0.0
+    weight_decay: float = 0.0
+    clip: float | None = None
+    adversary: float = 0.0
+    average: float = 0.0
+    keep: Literal["best", "last"] = "best"
+    patience: int | None = None
+    precision: Literal["float32", "bfloat16"] = "float32"
+
+    @property
+    def unit(self) -> Literal["epoch", "step"]:
+        """What the length is counted in."""
+        return "epoch" if self.epochs else "step"
+
+    @property
+    def length(self) -> int:
+        """Of the whole training."""
+        return self.epochs or self.steps
+
+
+def rate(training: Training, done: int) -> float:
+    """The learning rate after so many epochs or steps."""
+    factor = min(1.0, done / training.warm_up) if training.warm_up else 1.0
+    if training.falling:
+        factor *= min(1.0, (training.length - done) / (training.falling * training.length))
+    if training.cosine:
+        factor *= 0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * done / training.length))
+    if training.decay is not None:
+        factor *= training.decay[0] ** (done // training.decay[1])
+    return training.learning_rate * factor
+
+
+class Term(NamedTuple):
+    """Losses of any shape, whose mean is made small, and how many things that is the mean of."""
+
+    losses: Tensor
+    things: int
+
+
+Terms = tuple[Term, ...]
+"""The losses of a batch, and means that are added to each of them."""
+
+
+class Batch(Protocol):
+    """Rows to train on; a tensor is one."""
+
+    def to(self, device: Any, /) -> Any:
+        """The same on a device."""
+
+    def __len__(self) -> int: ...
+
+    def __getitem__(self, rows: slice, /) -> Any: ...
+
+
+class _Called(nn.Module):
+    """A net with its loss as what it computes, which is what several processes have to agree on."""
+
+    def __init__(self, net: nn.Module, loss: Callable[[Any], Terms]) -> None:
+        super().__init__()
+        self.net, self.loss = net, loss
+
+    def forward(self, batch: Any) -> Terms:
+        return self.loss(batch)
+
+
+class Descent:
+    """Steps of gradient descent of one net on one loss."""
+
+    def __init__(self, net: nn.Module, loss: Callable[[Any], Terms], training: Training) -> None:
+        self.net, self.training = net, training
+        # added to the loss, l2 times the squared weights is a decay of twice as much
+        decay = training.weight_decay if training.optimiser == "adamw" else 2 * training.l2
+        weights = [parameter for parameter in net.parameters() if parameter.ndim > 1]
+        biases = [parameter for parameter in net.parameters() if parameter.ndim <= 1]
+        groups = [{"params": weights, "weight_decay": decay}, {"params": biases, "weight_decay": 0.0}]
+        self.optimiser = OPTIMISERS[training.optimiser](groups, lr=training.learning_rate)
+        self._called = distributed.wrapped(_Called(net, loss))
+
+    def step(self, batch: Any, clip: float | None = None, real: bool = True) -> tuple[float, float]:
+        """One step on this process' rows of a batch; its share of the mean loss, and how many things that is of.
+
+        Of several processes each weighs what it has so that their mean is the loss of the whole batch. real: False if
+        the rows are there only because a process needs some.
+        """
+        device = next(self.net.parameters()).device
+        with torch.autocast(device.type, torch.bfloat16, enabled=self.training.precision == "bfloat16"):
+            terms: Terms = self._called(batch.to(device))
+        counts = distributed.summed([term.things * real for term in terms], device)
+        shares = [term.things * real / count for term, count in zip(terms, counts, strict=True)]
+        losses = terms[0].losses
+        for term, share in zip(terms[1:], shares[1:], strict=True):
+            losses = losses + term.losses * (share / shares[0] if real else 0.0)
+        loss = losses.mean() * shares[0]
+        if not torch.isfinite(loss):
+            raise RunError("the loss is no longer finite: start again with a lower learning rate or another seed")
+        self.optimiser.zero_grad(set_to_none=True)
+        torch.autograd.backward(loss * distributed.count())
+        if clip is not None:
+            nn.utils.clip_grad_norm_(self.net.parameters(), clip)
+        self.optimiser.step()
+        return loss.item(), counts[0]
+
+
+class GradientLearner:
+    """A net that learns by gradient descent, see :class:`motet_train.trainer.Learner`.
+
+    loss: of some rows. batches: those of an epoch, or the one of a step. validate: of the net that is kept. told: told
+    before each step which share of the training is done. others: what else has a state.
+    """
+
+    target = -math.inf
+
+    def __init__(
+        self,
+        net: nn.Module,
+        training: Training,
+        loss: Callable[[Any], Terms],
+        batches: Callable[[np.random.Generator], Iterable[Batch]],
+        validate: Callable[[], Mapping[str, Any]] = dict,
+        told: Callable[[float], object] = lambda share: None,
+        others: Mapping[str, Part] = MappingProxyType({}),
+    ) -> None:
+        if training.batch < distributed.count():
+            raise RunError(f"{distributed.count()} processes need batches of at least as many: use a larger --batch")
+        self.training, self.net, self.batches = training, net, batches
+        self.validate, self.told = validate, told
+        self.descent = Descent(net, loss, training)
+        self.parts: dict[str, Part] = {"net": net, "optimiser": self.descent.optimiser, **others}
+        self.kept, self.average = net, None
+        if training.average:
+            self.average = self.parts["average"] = AveragedModel(
+                net,
+                multi_avg_fn=get_ema_multi_avg_fn(training.average),  # type: ignore[no-untyped-call]
+            )
+            self.kept = self.average.module
+        self.unit, self.keep, self.patience = training.unit, training.keep, training.patience
+        self.ends = [*range(training.every, training.length, training.every), training.length]
+        self.first = 1 if training.epochs else 0
+
+    def chunk(self, start: int, stop: int, rng: np.random.Generator) -> Iterator[tuple[int, float, float]]:
+        """Train from one epoch or step to another."""
+        self.net.train()
+        for done in range(start, stop):
+            for group in self.descent.optimiser.param_groups:
+                group["lr"] = rate(self.training, done)
+            self.told(done / self.training.length)
+            for batch in self.batches(rng):
+                mine = batch[distributed.rank() :: distributed.count()]
+                real = len(mine) > 0
+                loss, weight = self.descent.step(mine if real else batch[:1], self.training.clip, real)
+                if self.average is not None:
+                    self.average.update_parameters(self.net)
+                yield done + 1, loss, weight
+        self.net.eval()

@@ -1,0 +1,75 @@
+"""Figures: axes, stick figures, files. They are drawn without pyplot and need no display."""
+
+import io
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+
+from motet.errors import OutputError
+from motet.files import write_whole
+from motet.motion.rotations import Array
+from motet.motion.skeleton import Skeleton
+
+SPACING = 0.6
+"""Body heights from one stick figure to the next."""
+
+Drawings = Mapping[str, Callable[[], Figure]]
+"""Name of a figure -> what draws it."""
+
+Bones = Sequence[tuple[int, int]]
+
+
+def save(drawings: Drawings, folder: Path) -> list[Path]:
+    """Draw figures into NAME.png of a folder, which is made; the files. OutputError where that is not possible."""
+    make_folder(folder)
+    paths = [folder / f"{name}.png" for name in drawings]
+    for path, draw in zip(paths, drawings.values(), strict=True):
+        buffer = io.BytesIO()
+        draw().savefig(buffer, dpi=110, format="png")
+        write_whole(path, buffer.getvalue())
+    return paths
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder for figures, with the folders around it; OutputError where that is not possible."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"cannot write plots to {folder}: {error.strerror}") from error
+
+
+def panels(rows: int, columns: int, size: tuple[float, float], title: str = "") -> tuple[Figure, list[Axes]]:
+    """A figure of ``size`` inches with rows x columns axes."""
+    figure = Figure(figsize=size, layout="constrained")
+    axes = figure.subplots(rows, columns, squeeze=False)
+    figure.suptitle(title)
+    return figure, list(axes.flat)
+
+
+def in_profile(points: Array, skeleton: Skeleton) -> Array:
+    """Places (K, J, 3) of joints seen along x: (K, J, 2) in body heights."""
+    seen: Array = points[..., [2, 1]] / skeleton.height
+    return seen
+
+
+def bones_of(skeleton: Skeleton) -> Bones:
+    """Each bone as the joints at its ends."""
+    return [(joint.parent, i) for i, joint in enumerate(skeleton.joints) if joint.parent >= 0]
+
+
+def stick_figures(axes: Axes, points: Array, bones: Bones, colours: Sequence[Any], width: float = 0.9) -> None:
+    """Draw poses (K, J, 2) in body heights, each :data:`SPACING` to the right of the one before.
+
+    colours: for each pose one, or one for each of its bones.
+    """
+    placed = points + SPACING * np.arange(len(points))[:, None, None] * [1, 0]
+    for pose, colour in zip(placed[:, np.array(bones)], colours, strict=True):
+        axes.add_collection(LineCollection(list(pose), colors=colour, linewidths=width))
+    axes.autoscale_view()
+    axes.set_aspect("equal")
+    axes.axis("off")

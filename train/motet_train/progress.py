@@ -1,0 +1,83 @@
+"""How far a training is: a bar on a terminal, elsewhere a line for each chunk; and TensorBoard."""
+
+import logging
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Protocol
+
+from tqdm import tqdm
+
+from motet_train import distributed
+from motet_train.runs import RunError
+
+
+class Progress(Protocol):
+    """What hears of a training as it goes on; of its units, epochs or steps, ``done`` of ``total`` are done."""
+
+    def step(self, done: int, total: int, unit: str, loss: float) -> None:
+        """After each step."""
+
+    def chunk(self, line: Mapping[str, Any], total: int, unit: str) -> None:
+        """After each chunk, with its line of the log."""
+
+
+class Silent:
+    """Says nothing."""
+
+    def step(self, done: int, total: int, unit: str, loss: float) -> None:
+        """Nothing."""
+
+    def chunk(self, line: Mapping[str, Any], total: int, unit: str) -> None:
+        """Nothing."""
+
+
+SILENT = Silent()
+
+
+class Shown:
+    """A bar with loss, speed and remaining time; where nobody watches, a line for each chunk by the logger "motet".
+
+    boards: the folder for TensorBoard; RunError where that is not installed.
+    """
+
+    def __init__(self, boards: Path | None = None) -> None:
+        self.watched = sys.stderr.isatty() and distributed.rank() == 0
+        self.writer = _writer(boards) if boards is not None and distributed.rank() == 0 else None
+        self.bar: tqdm[Any] | None = None
+        self.done = 0
+
+    def step(self, done: int, total: int, unit: str, loss: float) -> None:
+        """Move the bar."""
+        if self.bar is None:
+            self.done = done - 1
+            self.bar = tqdm(total=total, initial=self.done, unit=f" {unit}s", disable=not self.watched)
+        self.bar.set_postfix(loss=f"{loss:.4g}", refresh=False)
+        self.bar.update(done - (unit == "epoch") - self.bar.n)  # an epoch is done after its last step
+
+    def chunk(self, line: Mapping[str, Any], total: int, unit: str) -> None:
+        """Write the line where it is wanted."""
+        figures = {key: value for key, value in line.items() if isinstance(value, int | float) and key != unit}
+        if self.writer is not None:
+            for key, value in figures.items():
+                self.writer.add_scalar(key, value, line[unit])
+        if distributed.rank() == 0 and not self.watched:
+            left = figures["seconds"] / (line[unit] - self.done) * (total - line[unit])
+            said = ", ".join(f"{key.replace('_', ' ')} {value:.5g}" for key, value in figures.items())
+            logging.getLogger("motet").info("%s %d of %d: %s, %.0f s left", unit, line[unit], total, said, left)
+        self.done = line[unit]
+
+    def close(self) -> None:
+        """Leave the terminal and the files in order."""
+        if self.bar is not None:
+            self.bar.close()
+        if self.writer is not None:
+            self.writer.close()
+
+
+def _writer(folder: Path) -> Any:
+    try:
+        from torch.utils.tensorboard import SummaryWriter
+    except ImportError as error:
+        raise RunError("--tensorboard needs the package tensorboard: pip install 'motet[tensorboard]'") from error
+    return SummaryWriter(folder)

@@ -1,0 +1,135 @@
+"""A recipe, and the job of training by it: from a learner and a manifest to a run."""
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from motet.files import write_whole
+from motet.representation.contract import MotionContract
+from motet_train import distributed
+from motet_train.descent import Training
+from motet_train.manifest import About, loop_of, refuse_other, surroundings
+from motet_train.models.net import Net
+from motet_train.progress import SILENT, Progress
+from motet_train.runs import MANIFEST, Run
+from motet_train.trainer import Learner, Line, kept, train
+
+SETTINGS = "run.toml"
+
+
+@dataclass(frozen=True)
+class Visits:
+    """How the windows of motions vary that a predictor is trained on, see :class:`motet_train.data.windows.Windows`."""
+
+    warp: float = 0.0
+    reverse: float = 0.0
+    mirror: float = 0.0
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """What is trained, and how.
+
+    verb, model: as in the manifest. config: the model's sizes, a dataclass, of which ``derived`` are found in the data.
+    training: None where the config says it. data: how the data is visited, a dataclass. defaults: the verb's.
+    """
+
+    verb: str
+    model: str
+    config: Any
+    derived: tuple[str, ...] = ()
+    training: Training | None = None
+    data: Any = None
+    defaults: Mapping[str, Any] = field(default_factory=dict)
+
+    def sized(self, **found: Any) -> Any:
+        """The config with what was found in the data."""
+        assert set(found) == set(self.derived)
+        return replace(self.config, **found)
+
+    def to_json(self) -> dict[str, Any]:
+        """How it is trained, for the manifest."""
+        parts = (part for part in (self.training, self.data) if part is not None)
+        return {key: value for part in parts for key, value in asdict(part).items()}
+
+
+@dataclass(frozen=True)
+class Job:
+    """Training by a recipe in an existing folder. settings: the text of ``run.toml``, which repeats the run."""
+
+    recipe: Recipe
+    about: About
+    folder: Path
+    device: str = "cpu"
+    progress: Progress = SILENT
+    settings: str | None = None
+
+    def manifest(
+        self,
+        contract: MotionContract,
+        config: Mapping[str, Any],
+        defaults: Mapping[str, Any],
+        data_licence: str | None,
+        training: Mapping[str, Any] | None = None,
+        **more: Any,
+    ) -> dict[str, Any]:
+        """The manifest of a run that begins, ready for JSON; the bundle's begins with it.
+
+        data_licence: what the data itself says, which counts if nobody stated another. training: what was trained on.
+        more: what only some verbs have.
+        """
+        about, recipe = self.about, self.recipe
+        trained = {} if recipe.training is None else {"recipe": recipe.to_json()}
+        manifest = {
+            "name": about.name,
+            "version": "1",
+            "verb": recipe.verb,
+            "model": recipe.model,
+            "loop": loop_of(recipe.verb, defaults),
+            "motion": contract.to_json(),
+            **more,
+            "defaults": dict(defaults),
+            "config": dict(config),
+            "licence": {"weights": about.licence, "data": about.data_licence or data_licence},
+            "training": {"command": about.command, "seed": about.seed, **trained, **(training or {})},
+        }
+        plain: dict[str, Any] = json.loads(json.dumps(manifest))
+        return plain
+
+    def run(
+        self,
+        net: Net,
+        learner: Learner,
+        manifest: Mapping[str, Any],
+        more: Callable[[Sequence[Line]], Mapping[str, Any]] = lambda log: {},
+    ) -> Run:
+        """Train; the folder is a run after the first chunk, and one that was stopped goes on.
+
+        net: what the run will hold. more: what else the manifest says of the training, from its log.
+        RunError where the folder holds a run that was started with other settings; more epochs or steps are allowed.
+        """
+        if distributed.rank() == 0:
+            refuse_other(self.folder / MANIFEST, manifest)
+            write_whole(self.folder / MANIFEST, json.dumps(manifest, indent=1) + "\n")
+            if self.settings is not None:
+                write_whole(self.folder / SETTINGS, self.settings)
+        log = train(learner, self.about.seed, self.folder, self.progress)
+        training = {**manifest["training"], **_results(net, learner, log), **more(log), **surroundings(self.device)}
+        run = Run({**manifest, "training": training}, net.cpu())
+        if distributed.rank() == 0:
+            run.save(self.folder)
+        return run
+
+
+def _results(net: Net, learner: Learner, log: Sequence[Line]) -> dict[str, Any]:
+    best, seconds = kept(log, learner.keep), sum(line["seconds"] for line in log)
+    return {
+        f"{learner.unit}s": log[-1][learner.unit],
+        f"kept_{learner.unit}": best[learner.unit],
+        **{key: best[key] for key in ("loss", "validation") if key in best},
+        "seconds": round(seconds, 1),
+        "steps_per_second": round(sum(line["seconds"] * line["steps_per_second"] for line in log) / seconds, 3),
+        "parameters": sum(parameter.numel() for parameter in net.parameters()),
+    }

@@ -1,0 +1,153 @@
+"""The training loop of all models: chunk after chunk, each written down whole, so that a run can stop and go on.
+
+What is trained is a :class:`Learner`. The random numbers of a chunk depend on the seed and the chunk's number alone.
+"""
+
+import json
+import pickle
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal, Protocol
+
+import numpy as np
+import torch
+from torch import nn
+
+from motet.files import write_whole
+from motet_train import distributed
+from motet_train.progress import SILENT, Progress
+from motet_train.runs import WEIGHTS, RunError, read_state, to_bytes
+
+CHECKPOINT, LOG = "checkpoint.pt", "log.jsonl"
+
+Line = dict[str, Any]
+"""What ``log.jsonl`` says of a chunk: how many units are done, the loss, what validation found, seconds, speed."""
+
+
+class Part(Protocol):
+    """Something with a state: a net, an optimiser, an averaged net, velocities, a generator of random numbers."""
+
+    def state_dict(self) -> Any:
+        """The state, of tensors and plain values."""
+
+    def load_state_dict(self, state_dict: Any, /) -> Any:
+        """Take up a state."""
+
+
+class Learner(Protocol):
+    """What the loop trains.
+
+    kept: the net whose weights are kept. parts: all that has a state, by the names it is saved and restored by.
+    unit: what the length of a training is counted in. ends: how many units are done after each chunk. first: the
+    number of the first chunk. keep: the weights of the "best" validation, or the "last". patience: training ends when
+    so many validations in a row brought nothing better. target: it ends when validation reaches it.
+    """
+
+    kept: nn.Module
+    parts: dict[str, Part]
+    unit: Literal["epoch", "step"]
+    ends: list[int]
+    first: int
+    keep: Literal["best", "last"]
+    patience: int | None
+    target: float
+
+    def chunk(self, start: int, stop: int, rng: np.random.Generator) -> Iterator[tuple[int, float, float]]:
+        """Train from one unit to another; after each step the units done, the loss and how much it weighs."""
+
+    def validate(self) -> Mapping[str, Any]:
+        """What the log says of the chunk: under "validation" what has to become small, if there is such a thing."""
+
+
+def train(learner: Learner, seed: int, folder: Path, progress: Progress = SILENT) -> list[Line]:
+    """Train to the end; ``learner.kept`` comes back with the weights to keep. Returns the log.
+
+    After each chunk the existing ``folder`` holds ``log.jsonl``, the weights to keep and a checkpoint, each written
+    whole. Where there is a checkpoint, training goes on after it, on the CPU to the same bits as if it had never
+    stopped. RunError where the checkpoint cannot be read or is another training's, or the loss is no longer finite.
+    """
+    log = _resume(folder / CHECKPOINT, learner)
+    while not _done(log, learner):
+        start, number = log[-1][learner.unit] if log else 0, learner.first + len(log)
+        stop = min(end for end in learner.ends if end > start)
+        seed_torch(seed, number)
+        rng = np.random.default_rng((seed, number))
+        began, losses = time.perf_counter(), []
+        for done, loss, weight in learner.chunk(start, stop, rng):
+            losses.append((loss, weight))
+            progress.step(done, learner.ends[-1], learner.unit, loss)
+        seconds = time.perf_counter() - began
+        mean = _mean(losses, learner)
+        log.append(
+            {
+                learner.unit: stop,
+                "loss": round(mean, 6),
+                **distributed.from_first(learner.validate),
+                "seconds": round(seconds, 3),
+                "steps_per_second": round(len(losses) / seconds, 3),
+            }
+        )
+        if distributed.rank() == 0:
+            _write(folder, learner, log)
+        progress.chunk(log[-1], learner.ends[-1], learner.unit)
+    if distributed.rank() == 0:
+        learner.kept.load_state_dict(read_state(folder / WEIGHTS))
+    learner.kept.eval()
+    return log
+
+
+def kept(log: Sequence[Line], keep: Literal["best", "last"]) -> Line:
+    """The line of the chunk whose weights are kept: of the best validation, the first of equals."""
+    validated = [line for line in log if "validation" in line]
+    if keep == "last" or not validated:
+        return log[-1]
+    best: Line = min(validated, key=lambda line: line["validation"])
+    return best
+
+
+def seed_torch(seed: int, number: int) -> None:
+    """Let torch's random numbers depend on the seed, the number of the chunk and the process alone."""
+    entropy = (seed, number, distributed.rank()) if distributed.rank() else (seed, number)
+    torch.manual_seed(int(np.random.SeedSequence(entropy).generate_state(1, np.uint64)[0]))
+
+
+def _mean(losses: Sequence[tuple[float, float]], learner: Learner) -> float:
+    """The mean of the losses by their weights, which is that of all processes: each has its share of every loss."""
+    values, weights = np.transpose(losses)
+    device = next(learner.kept.parameters()).device
+    return distributed.summed([float(np.average(values, weights=weights))], device)[0]
+
+
+def _done(log: Sequence[Line], learner: Learner) -> bool:
+    if not log:
+        return False
+    validated = [line for line in log if "validation" in line]
+    best = kept(log, "best")
+    waited = len(validated) - 1 - validated.index(best) if validated else 0
+    reached = bool(validated) and best["validation"] <= learner.target
+    late = learner.patience is not None and waited >= learner.patience
+    return bool(log[-1][learner.unit] >= learner.ends[-1]) or reached or late
+
+
+def _write(folder: Path, learner: Learner, log: Sequence[Line]) -> None:
+    """Write a chunk down. The checkpoint goes last: a crash before it repeats the chunk, to the same weights."""
+    if kept(log, learner.keep) is log[-1]:
+        write_whole(folder / WEIGHTS, to_bytes(learner.kept.state_dict()))
+    write_whole(folder / LOG, "".join(json.dumps(line) + "\n" for line in log))
+    states = {name: part.state_dict() for name, part in learner.parts.items()}
+    write_whole(folder / CHECKPOINT, to_bytes({"log": list(log), "states": states}))
+
+
+def _resume(path: Path, learner: Learner) -> list[Line]:
+    """Restore the parts; the log so far."""
+    saved = distributed.from_first(lambda: read_state(path) if path.exists() else None)
+    if saved is None:
+        return []
+    try:
+        for name, part in learner.parts.items():
+            part.load_state_dict(saved["states"][name])
+        log: list[Line] = saved["log"]
+        return log
+    except (KeyError, TypeError, ValueError, RuntimeError, pickle.UnpicklingError) as error:
+        raise RunError(f"the checkpoint {path} is not of this training: {error}") from error
