@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from control_runs import control_run
 
 from motet.models.control import ControlModel
 from motet_export.bundles import export_run
@@ -16,10 +17,8 @@ from motet_train.evaluate.control.gaits import limit_cycle, switch
 from motet_train.models.control.angle_crbm import AngleCRBM, AngleCRBMConfig, from_config, to_config
 from motet_train.models.control.contrastive import DivergedError, Learning
 from motet_train.models.control.crbm import CRBM
-from motet_train.recipes.control import About, train_control
 from motet_train.runs import Run
 
-ABOUT = About("small", "a test", "MIT")
 SHORT = replace(AngleCRBMConfig(), iterations=3, crbm=Learning(3, 3e-2, temperature=(1.0, 1.0)))
 
 
@@ -33,7 +32,7 @@ def one_thread() -> Iterator[None]:
 
 
 def train(*labels: str, config: AngleCRBMConfig = SHORT) -> Run:
-    return train_control(read_clips().only(labels), config, 0, ABOUT, lambda *_: None)
+    return control_run(read_clips().only(labels), config)
 
 
 def test_a_slow_rate_from_the_past_keeps_walking() -> None:

@@ -13,7 +13,7 @@ from motet_train.data.errors import DataError
 from motet_train.data.mirror_text import mirror_text
 from motet_train.data.store import Store
 from motet_train.models.language.batch import Batch
-from motet_train.recipes.language import material
+from motet_train.recipes.language import divided
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +23,7 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
 
 @pytest.fixture(scope="module")
 def data(store: Store) -> Examples:
-    found = material(store, mirror=False)
+    found = divided(store, mirror=False)
     return found.examples(found.parts.train)
 
 
@@ -111,7 +111,7 @@ def test_frames_are_mirrored_as_the_motion_is(store: Store) -> None:
 
 
 def test_motion_and_sentence_are_mirrored_together(store: Store) -> None:
-    found = material(store, mirror=True)
+    found = divided(store, mirror=True)
     data = found.examples(found.parts.train)
     batch = next(data.epoch(np.random.default_rng(0), len(data.records), offsets=1))
     plain = {data.store.sequence(r, k).tobytes(): store.records[r] for r in data.records for k in range(3)}
@@ -128,7 +128,7 @@ def test_motion_and_sentence_are_mirrored_together(store: Store) -> None:
 
 
 def test_vocabulary_and_statistics_are_the_training_parts(store: Store) -> None:
-    found = material(store, mirror=False)
+    found = divided(store, mirror=False)
     odd = {f"odd{chr(97 + i)}" for i in found.parts.train if i % 5 == 0}
     assert {word for word in found.vocabulary.words if word.startswith("odd")} == odd
     frames = np.concatenate([store.sequence(r, k) for r in found.parts.train for k in range(3)], dtype=np.float64)
@@ -136,7 +136,7 @@ def test_vocabulary_and_statistics_are_the_training_parts(store: Store) -> None:
 
 
 def test_sentences_that_cannot_be_used_are_left_out(store: Store) -> None:
-    vocabulary = material(store, mirror=False).vocabulary
+    vocabulary = divided(store, mirror=False).vocabulary
     entries = [replace(store.records[0], sentences=s) for s in (("?!", "walks"), ("zzz",), ("walks " * 41,))]
     kept = examples(replace(store, records=tuple(entries)), (0, 1, 2), vocabulary, None)
     assert kept.records == (0,)

@@ -3,6 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from control_runs import control_run
 
 from motet.errors import FormatError
 from motet.formats import read_motion, write_motion
@@ -11,7 +12,6 @@ from motet_train.data.clips import CMU, read_clips, sequences
 from motet_train.data.errors import DataError
 from motet_train.models.control.contrastive import Learning
 from motet_train.models.control.tdbn import TDBNConfig
-from motet_train.recipes.control import About, train_control
 
 
 def test_the_default_clips_are_the_thesis_trials() -> None:
@@ -52,11 +52,12 @@ def test_a_folder_of_bvh_is_trained_on(tmp_path: Path) -> None:
     clips = read_clips(own_clips(tmp_path))
     assert clips.labels == ("jog", "stroll")
     short = TDBNConfig(restarts=2, tries=1, rbm=Learning(epochs=1), crbm=Learning(epochs=1))
-    run = train_control(clips, short, 0, About("mine", "a test", "CC0"), lambda *_: None)
+    run = control_run(clips, short)
     assert run.manifest["training"]["candidates"] == 2  # none of the untrained ones satisfies
     assert "cycle.energy" in run.manifest["training"]["missed"]
     assert run.manifest["control"]["labels"] == ["jog", "stroll"]
-    assert run.manifest["licence"]["weights"] == "CC0"
+    assert run.manifest["licence"] == {"weights": None, "data": None}  # as nobody stated them
+    assert run.manifest["loop"] == "session"
 
 
 def test_clips_that_do_not_go_together_are_named(tmp_path: Path) -> None:
@@ -84,4 +85,4 @@ def test_a_folder_without_clips_is_refused(tmp_path: Path) -> None:
 def test_a_clip_that_is_too_short_is_refused(tmp_path: Path) -> None:
     write_motion(tmp_path / "walk.bvh", read_motion(CMU / "39_14.amc")[:12])
     with pytest.raises(DataError, match="4 frames"):
-        train_control(read_clips(tmp_path), TDBNConfig(), 0, About("x", "x", "x"), lambda *_: None)
+        control_run(read_clips(tmp_path), TDBNConfig())

@@ -9,10 +9,10 @@ import torch
 from numpy.typing import NDArray
 
 from motet_train.data.errors import DataError
-from motet_train.fit_windows import Fitting, Learner
+from motet_train.descent import Training
 from motet_train.models.predict.convseq2seq import SLOPE, Config, Convolution, ConvSeq2Seq, Discriminator
 from motet_train.models.predict.stepwise import Stepwise, free_run
-from motet_train.runs import RunError
+from motet_train.recipes.systems import Adversary
 
 Array = NDArray[Any]
 SMALL = Config(45, filters=(3, 4, 5), units=8)
@@ -126,33 +126,22 @@ def test_windows_without_padding_must_be_long_enough() -> None:
         small(window=5)
 
 
-def learner(adversary: float, judged: bool) -> Learner:
+def test_the_adversary_is_taught_first_and_then_heard() -> None:
     torch.manual_seed(0)
     net = Stepwise(small(dropout=(0.0, 0.0, 0.0), decoder_dropout=0.0), 45, range(45), 50)
-    config = replace(SMALL, dropout=(0.0, 0.0, 0.0))
-    return Learner(net, Fitting(adversary=adversary), Discriminator(config, 75) if judged else None)
-
-
-def test_the_adversary_is_taught_first_and_then_heard() -> None:
-    trained, windows = learner(0.01, judged=True), torch.randn(4, 75, 45)
-    assert trained.judge is not None
-    predicted = trained.net.system.imagine(windows, 50)
+    judge = Discriminator(replace(SMALL, dropout=(0.0, 0.0, 0.0)), 75)
+    adversary, windows = Adversary(net, judge, Training(steps=1, adversary=0.01)), torch.randn(4, 75, 45)
+    predicted = net.system.imagine(windows, 50)
     false = torch.cat([windows[:, :50], predicted], dim=1)
 
     def doubt() -> float:
-        assert trained.judge is not None
-        odds = torch.cat([trained.judge(windows), -trained.judge(false)]).sigmoid()
-        return float(-odds.log().mean().detach())
+        return float(-torch.cat([judge(windows), -judge(false)]).sigmoid().log().mean().detach())
 
     before, squared = doubt(), float((predicted - windows[:, 50:]).square().mean().detach())
-    loss = trained.step(windows)
-    after = doubt()
-    assert after < before
-    opinion = float(-trained.judge(false).sigmoid().log().mean().detach())
-    np.testing.assert_allclose(loss, squared + 0.01 * opinion, rtol=1e-5)
-
-
-def test_an_adversary_needs_a_discriminator() -> None:
-    for adversary, judged in ((0.01, False), (0.0, True)):
-        with pytest.raises(RunError, match="not trained against an adversary"):
-            learner(adversary, judged)
+    (term,) = adversary.loss(windows)
+    assert doubt() < before
+    opinion = float(-judge(false).sigmoid().log().mean().detach())
+    np.testing.assert_allclose(term.losses.detach(), squared + 0.01 * opinion, rtol=1e-5)
+    judge.zero_grad()
+    term.losses.backward()  # type: ignore[no-untyped-call]
+    assert all(parameter.grad is None for parameter in judge.parameters())

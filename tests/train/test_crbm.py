@@ -6,7 +6,7 @@ import torch
 from torch.nn.functional import binary_cross_entropy_with_logits
 
 from motet_train.models.control.contrastive import Learning
-from motet_train.models.control.crbm import CRBM, Past, train_crbm, windows
+from motet_train.models.control.crbm import CRBM, CRBMLayer, Past, transitions
 
 
 def small_crbm(free: int = 0) -> CRBM:
@@ -27,7 +27,7 @@ def sequences() -> list[list[torch.Tensor]]:
 
 def test_windows_against_loops() -> None:
     expansion = torch.tensor([[1.0, 0.0, 0.0], [0.0, 1.0, 1.0]])
-    data = windows(sequences(), expansion, taps=2, onsets=(1.0, 16.0))
+    data = transitions(sequences(), expansion, taps=2, onsets=(1.0, 16.0))
     past, visible, control = [], [], []
     for label, found in enumerate(sequences()):
         for sequence in found:
@@ -42,7 +42,7 @@ def test_windows_against_loops() -> None:
 
 
 def test_an_update_is_the_gradient_of_the_cross_entropy() -> None:
-    data = windows(sequences(), torch.eye(2, 3), taps=2, onsets=(1.0, 1.0))
+    data = transitions(sequences(), torch.eye(2, 3), taps=2, onsets=(1.0, 1.0))
     crbm = small_crbm()
     past_weight, hidden_weight, bias = (
         p.detach().clone().requires_grad_() for p in (crbm.past_weight, crbm.hidden_weight, crbm.visible_bias)
@@ -54,7 +54,7 @@ def test_an_update_is_the_gradient_of_the_cross_entropy() -> None:
     logits = bias + data.past[rows] @ past_weight + data.control[rows] @ hidden_weight
     loss = binary_cross_entropy_with_logits(logits, data.visible[rows], reduction="sum") / len(rows)
     loss.backward()  # type: ignore[no-untyped-call]
-    train_crbm(crbm, data, learning, torch.Generator().manual_seed(5), lambda *_: None, clamped=True, recall=Past())
+    CRBMLayer(crbm, data, learning, torch.Generator().manual_seed(5), clamped=True, recall=Past()).epoch(0)
     for learned, start in (
         (crbm.past_weight, past_weight),
         (crbm.hidden_weight, hidden_weight),
@@ -66,14 +66,14 @@ def test_an_update_is_the_gradient_of_the_cross_entropy() -> None:
 
 @pytest.mark.parametrize("free", [0, 5])
 def test_clamping_free_units_and_more_steps_each_change_what_is_learned(free: int) -> None:
-    data = windows(sequences(), torch.eye(2, 3), taps=2, onsets=(1.0, 1.0))
+    data = transitions(sequences(), torch.eye(2, 3), taps=2, onsets=(1.0, 1.0))
     results = {}
     for clamped, steps in ((True, 1), (False, 1), (True, 3)):
         crbm = small_crbm(free)
         learning = Learning(epochs=20, rate=0.05, steps=steps)
-        train_crbm(
-            crbm, data, learning, torch.Generator().manual_seed(2), lambda *_: None, clamped=clamped, recall=Past()
-        )
+        layer = CRBMLayer(crbm, data, learning, torch.Generator().manual_seed(2), clamped, Past())
+        for number in range(20):
+            layer.epoch(number)
         assert all(torch.isfinite(p).all() for p in crbm.parameters())
         results[clamped, steps] = crbm.hidden_weight
     assert not torch.equal(results[True, 1], results[False, 1])

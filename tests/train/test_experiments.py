@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from control_runs import control_run
 from numpy.typing import NDArray
 
 from motet.bundle.graph import Arrays, GraphSpec, TensorSpec
@@ -26,7 +27,6 @@ from motet_train.evaluate.control.study import ControlStudy
 from motet_train.evaluate.figures import save
 from motet_train.evaluate.tables import reached
 from motet_train.models.control.tdbn import TDBNConfig
-from motet_train.recipes.control import About, train_control
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +53,7 @@ def test_unclamped_control_units_make_the_state_leap(clips: Clips, clamped: bool
     """The thesis' text unclamps them in the reconstruction; the switch is then a jump in one frame."""
     config = TDBNConfig().unclamped()
     config = replace(config, clamped=clamped, rbm=replace(config.rbm, epochs=300))
-    run = train_control(clips, config, 0, About("leaps", "a test", "MIT"), lambda *_: None)
+    run = control_run(clips, config)
     study = study_of(ControlModel(run.manifest, run.torch_graphs()), clips)
     assert least < gait_transitions(study, count=8)["jump_ratio"] < most
 

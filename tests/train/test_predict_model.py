@@ -1,6 +1,7 @@
 """The small predictor: what it is before and after training, and the commands around it."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,11 +18,19 @@ from motet_train.data.expmap_files import CMU_ACTIONS, read_expmap
 from motet_train.data.predict_data import expmap_material
 from motet_train.evaluate.predict.curves import FEW, MEAN, ZERO, complete, curves
 from motet_train.evaluate.predict.published_h36m import CONV
+from motet_train.manifest import About
 from motet_train.models.predict.predictor import Predictor, PredictorConfig
-from motet_train.recipes.predict import About, Recipe, train_predict
+from motet_train.recipes.predict import DEFAULT, train_predict
+from motet_train.recipes.recipe import Job
 from motet_train.runs import Run
 
-ABOUT = About("small", "motet train predict", "MIT")
+
+def job(folder: Path, seed: int = 0, **training: float) -> Job:
+    """A job by the recipe with other settings, in a new folder."""
+    folder.mkdir()
+    assert DEFAULT.training is not None
+    recipe = replace(DEFAULT, training=replace(DEFAULT.training, **training))  # type: ignore[arg-type]
+    return Job(recipe, About("small", "motet train predict", seed), folder)
 
 
 def run(*arguments: object) -> Result:
@@ -66,18 +75,8 @@ def test_the_mirror_image_of_a_seed_gives_the_mirror_image() -> None:
 
 def test_training_learns_and_repeats_itself(tmp_path: Path) -> None:
     material = expmap_material(read_expmap(write_files(tmp_path / "data")))
-    runs = []
-    for name in ("a", "b"):
-        (tmp_path / name).mkdir()
-        runs.append(
-            train_predict(
-                material,
-                Recipe(steps=60, batch=16, learning_rate=1e-2, warm_up=5, average=0.9),
-                3,
-                ABOUT,
-                tmp_path / name,
-            )
-        )
+    settings = {"steps": 60, "batch": 16, "learning_rate": 1e-2, "warm_up": 5, "average": 0.9}
+    runs = [train_predict(material, job(tmp_path / name, 3, **settings)) for name in ("a", "b")]
     for one, other in zip(runs[0].model.parameters(), runs[1].model.parameters(), strict=True):
         torch.testing.assert_close(one, other, atol=0, rtol=0)
     loaded = Run.load(tmp_path / "a")
@@ -157,8 +156,7 @@ def test_bad_input_is_refused(tmp_path: Path, arguments: list[str], said: str) -
     places = {name: tmp_path / name for name in ("data", "empty", "run", "out")}
     places["empty"].mkdir()
     write_files(places["data"])
-    places["run"].mkdir()
-    train_predict(expmap_material(read_expmap(places["data"])), Recipe(steps=1), 0, ABOUT, places["run"])
+    train_predict(expmap_material(read_expmap(places["data"])), job(places["run"], steps=1))
     result = run(*(argument.format(**places) for argument in arguments))
     assert (result.exit_code, said in result.stderr) == (2, True), result.output
     assert not places["out"].exists()

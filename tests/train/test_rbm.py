@@ -5,8 +5,8 @@ import math
 import numpy as np
 import torch
 
-from motet_train.models.control.contrastive import Ascent, Epoch, Learning, balanced, epochs
-from motet_train.models.control.rbm import RBM, block_mask, reconstruct, train_rbm
+from motet_train.models.control.contrastive import Ascent, Epoch, Learning, balanced, schedule
+from motet_train.models.control.rbm import RBM, RBMLayer, block_mask, reconstruct
 
 
 def small_rbm() -> RBM:
@@ -60,7 +60,8 @@ def test_ascent_has_momentum_and_decay() -> None:
 
 def test_learning_follows_the_schedule() -> None:
     learning = Learning(epochs=9, rate=0.1, final_rate=0.01, batch=5, momentum_after=2, temperature=(1.0, 0.5))
-    found = list(epochs(learning, torch.full((40,), 1 / 40), torch.Generator().manual_seed(0)))
+    generator, uniform = torch.Generator().manual_seed(0), torch.full((40,), 1 / 40)
+    found = [schedule(learning, number, uniform, generator) for number in range(9)]
     assert [epoch.momentum for epoch in found] == [0.0, 0.0] + [0.9] * 7
     np.testing.assert_allclose([epoch.rate for epoch in found], np.geomspace(0.1, 0.001, 9))
     np.testing.assert_allclose([epoch.temperature for epoch in found], np.geomspace(1.0, 0.5, 9))
@@ -78,10 +79,10 @@ def test_training_reconstructs_what_it_saw_within_its_parts() -> None:
     frames = torch.stack([phase.sin(), phase.cos(), (2 * phase).sin()], dim=1) * 2
     rbm = RBM(block_mask([0, 0, 1], hidden_per_part=12))
     rbm.weight.normal_(0, 0.01, generator=generator).mul_(rbm.mask)
-    seen: list[int] = []
     learning = Learning(epochs=150, rate=5e-3)
-    train_rbm(rbm, frames, torch.full((300,), 1 / 300), learning, generator, lambda _, done, total: seen.append(done))
+    layer = RBMLayer(rbm, frames, torch.full((300,), 1 / 300), learning, generator)
+    errors = [layer.epoch(number) for number in range(150)]
     error = (rbm.decode(rbm.encode(frames, 0.6)) - frames).pow(2).mean().sqrt()
     assert error < 0.6 * frames.pow(2).mean().sqrt()
     assert (rbm.weight[rbm.mask == 0] == 0).all()
-    assert seen == list(range(1, 151))
+    assert np.mean(errors[-10:]) < 0.8 * np.mean(errors[:10])

@@ -34,7 +34,11 @@ def test_the_loss_asks_the_context_and_is_there_in_training_only() -> None:
     assert isinstance(head, SummaryHead)
     given = batch()
     extra = 2 * head.loss(net.encode(given.words, (given.words != 0).sum(dim=1)), given.frames, given.lengths)
-    np.testing.assert_allclose(net.losses(given).detach(), (plain + extra).detach(), rtol=1e-5)
+    np.testing.assert_allclose(net.losses(given).detach(), plain.detach(), rtol=1e-5)
+    found = net.terms(given)[1]
+    assert found is not None
+    np.testing.assert_allclose(found.detach(), extra.detach(), rtol=1e-5)
+    assert net.eval().terms(given)[1] is None
     assert {name.split(".")[0] for name in LanguageToMotion(SMALL).state_dict()}.isdisjoint({"summary"})
 
 

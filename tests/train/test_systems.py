@@ -12,13 +12,14 @@ from click.testing import CliRunner, Result
 from test_predict_data import write_files
 
 from motet.cli import main
-from motet_train.checkpoint import CHECKPOINT
 from motet_train.data.expmap_files import read_expmap
 from motet_train.data.predict_data import expmap_material, validation_files
 from motet_train.models.predict.convseq2seq import Config
 from motet_train.models.predict.systems import SYSTEMS
-from motet_train.recipes.systems import RECIPES, validation_error
+from motet_train.recipes.recipe import Recipe
+from motet_train.recipes.systems import RECIPES, sized, validation_error
 from motet_train.runs import Run
+from motet_train.trainer import CHECKPOINT
 
 
 def run(*arguments: object) -> Result:
@@ -79,6 +80,8 @@ def test_what_is_kept_back_is_not_trained_on_and_is_measured(data: Path) -> None
     assert not any(np.array_equal(kept_back, sequence) for sequence in material.sequences)
 
     class Still(torch.nn.Module):
+        mean = torch.zeros(())
+
         def forward(self, frames: torch.Tensor, count: int) -> torch.Tensor:
             return frames[:, -1:].expand(-1, count, -1)
 
@@ -111,7 +114,7 @@ def test_bad_settings_are_named_and_nothing_stays(data: Path, tmp_path: Path) ->
 )
 def test_the_recipes_have_the_published_sizes(name: str, preset: str, parameters: int, data: Path) -> None:
     material = replace(expmap_material(read_expmap(data)), kept=tuple(range(70)))
-    config = RECIPES[name][preset].config(material)
+    config = sized(RECIPES[name][preset], material)
     with torch.device("meta"):
         system = SYSTEMS[name][0](config)
     assert sum(parameter.numel() for parameter in system.parameters()) == parameters
@@ -122,16 +125,21 @@ def test_a_structural_net_needs_the_same_columns_left_and_right(data: Path, tmp_
     assert (found.exit_code, "are not the same ones" in found.stderr) == (2, True)
 
 
+def settings(recipe: Recipe) -> tuple[int, float, float]:
+    assert recipe.training is not None
+    return recipe.training.batch, recipe.training.learning_rate, recipe.training.l2
+
+
 def test_the_presets_are_the_papers_and_its_codes(data: Path) -> None:
     material = replace(expmap_material(read_expmap(data)), kept=tuple(range(70)))
     paper, code = RECIPES["convseq2seq"]["paper"], RECIPES["convseq2seq"]["code"]
-    assert (paper.fitting.batch, paper.fitting.learning_rate, paper.fitting.l2) == (64, 2e-4, 0.001)
-    assert (code.fitting.batch, code.fitting.learning_rate, code.fitting.l2) == (16, 5e-5, 0.0005)
-    assert paper.config(material) == Config(70)
-    assert code.config(material) == Config(70, dropout=(0.2, 0.2, 0.5), own=0.95)
+    assert settings(paper) == (64, 2e-4, 0.001)
+    assert settings(code) == (16, 5e-5, 0.0005)
+    assert sized(paper, material) == Config(70)
+    assert sized(code, material) == Config(70, dropout=(0.2, 0.2, 0.5), own=0.95)
 
 
 def test_log_has_a_line_for_each_validation(trained: Path) -> None:
     lines = [json.loads(line) for line in (trained / "log.jsonl").read_text().splitlines()]
     assert [line["step"] for line in lines] == [2]
-    assert set(lines[0]) == {"step", "loss", "validation_error", "seconds", "steps_per_second"}
+    assert set(lines[0]) == {"step", "loss", "validation", "seconds", "steps_per_second"}

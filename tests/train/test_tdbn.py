@@ -4,21 +4,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from control_runs import control_run
 
 from motet.models.control import ControlModel
 from motet_train.data.body import body_parts
 from motet_train.data.clips import read_clips
 from motet_train.models.control.contrastive import Learning
 from motet_train.models.control.tdbn import TDBN, TDBNConfig, from_config, to_config
-from motet_train.recipes.control import About, train_control
 from motet_train.runs import Run, RunError
 
-ABOUT = About("small", "a test", "MIT")
 SHORT = replace(TDBNConfig(), restarts=1, tries=1, rbm=Learning(epochs=2), crbm=Learning(epochs=2))
 
 
 def train(config: TDBNConfig = SHORT, seed: int = 0) -> Run:
-    return train_control(read_clips(None, config.root_rotation), config, seed, ABOUT, lambda *_: None)
+    return control_run(read_clips(None, config.root_rotation), config, seed)
 
 
 def test_the_net_has_the_thesis_sizes() -> None:
@@ -62,7 +61,7 @@ def test_gibbs_iterations_run_where_there_are_free_units() -> None:
 
 
 def test_a_folder_that_is_no_run_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(RunError, match=r"no training run: it has no run.json"):
+    with pytest.raises(RunError, match=r"is not a training run: it has no run.json"):
         Run.load(tmp_path)
     train().save(tmp_path)
     (tmp_path / "weights.pt").write_bytes(b"no weights")

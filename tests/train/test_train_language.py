@@ -1,7 +1,6 @@
 import json
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -13,14 +12,16 @@ from language_data import records, small_store
 from motet.cli import main
 from motet.formats import write_motion
 from motet.representation.contract import MotionContract
-from motet_train.checkpoint import CHECKPOINT, LOG
 from motet_train.data.store import Store
-from motet_train.fit import Fitting
+from motet_train.descent import Training
 from motet_train.models.language.language_to_motion import LanguageToMotionConfig
 from motet_train.models.language.motion_to_language import MotionToLanguageConfig
+from motet_train.progress import Shown
 from motet_train.recipes import describe, generate
-from motet_train.recipes.language import Recipe, material
+from motet_train.recipes.language import LanguageVisits, divided
+from motet_train.recipes.recipe import SETTINGS, Recipe
 from motet_train.runs import Run
+from motet_train.trainer import CHECKPOINT, LOG
 
 VERBS = ("describe", "generate")
 
@@ -36,11 +37,12 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def small_nets(monkeypatch: pytest.MonkeyPatch) -> None:
     """The nets of the default recipes with few units."""
     sizes = {"encoder_units": (4, 4), "decoder_units": (6, 6), "embedding": 4}
+    training = Training(epochs=3, batch=16, optimiser="nadam", clip=8.0)
     for module, config in (
-        (describe, partial(MotionToLanguageConfig, **sizes)),  # type: ignore[arg-type]
-        (generate, partial(LanguageToMotionConfig, components=2, loss="likelihood", **sizes)),  # type: ignore[arg-type]
+        (describe, MotionToLanguageConfig(0, 0, **sizes)),  # type: ignore[arg-type]
+        (generate, LanguageToMotionConfig(0, 0, components=2, loss="likelihood", **sizes)),  # type: ignore[arg-type]
     ):
-        recipe = replace(module.RECIPES["default"], config=config, fitting=Fitting(clip=8.0, epochs=3, batch=16))
+        recipe = replace(module.RECIPES["default"], config=config, training=training)
         monkeypatch.setitem(module.RECIPES, "default", recipe)
 
 
@@ -58,16 +60,17 @@ def trained(verb: str, store: Path, out: Path, *options: object) -> Run:
 def test_the_manifest_says_all(verb: str, store: Path, tmp_path: Path) -> None:
     run = trained(verb, store, tmp_path / "run", "--name", "mine", "--data-licence", "free", "--seed", 3, "--no-mirror")
     manifest, training = run.manifest, run.manifest["training"]
-    found = material(Store.open(store), mirror=False)
+    found = divided(Store.open(store), mirror=False)
     assert (manifest["name"], manifest["verb"]) == ("mine", verb)
-    assert manifest["licence"] == {"weights": "MIT", "data": "free"}
+    assert manifest["licence"] == {"weights": None, "data": "free"}
+    assert manifest["loop"] == {"describe": "consensus", "generate": "mixture"}[verb]
     assert manifest["vocabulary"] == list(found.vocabulary.words)
     contract = MotionContract.from_json(manifest["motion"])
     np.testing.assert_allclose(contract.mean, found.contract.mean, atol=1e-9)
-    np.testing.assert_allclose(run.model.scale.numpy(), contract.std, rtol=1e-6)  # type: ignore[union-attr, operator]
+    np.testing.assert_allclose(run.model.scale.numpy(), contract.std, rtol=1e-6)
     assert training["split"]["test"] == [f"{i:02}" for i in found.parts.test]
     assert training["split"]["validation"] == [f"{i:02}" for i in found.parts.validation]
-    assert (training["seed"], training["epochs"], training["mirror"]) == (3, 3, False)
+    assert (training["seed"], training["epochs"], training["recipe"]["mirror"]) == (3, 3, False)
     assert training["data"] == {
         "name": "store",
         "motions": 20,
@@ -77,8 +80,8 @@ def test_the_manifest_says_all(verb: str, store: Path, tmp_path: Path) -> None:
     }
     lines = [json.loads(line) for line in (tmp_path / "run" / LOG).read_text().splitlines()]
     assert [line["epoch"] for line in lines] == [1, 2, 3]
-    assert lines[-1]["train_loss"] < lines[0]["train_loss"]
-    assert training["validation_loss"] == min(line["validation_loss"] for line in lines)
+    assert lines[-1]["loss"] < lines[0]["loss"]
+    assert training["validation"] == min(line["validation"] for line in lines)
 
 
 @pytest.mark.parametrize("verb", VERBS)
@@ -98,7 +101,7 @@ def test_a_stopped_run_says_how_it_goes_on(store: Path, tmp_path: Path, monkeypa
     result = motet("train", "describe", "--data", store, "--out", out)
     assert result.exit_code == 1
     assert "the same command with --resume goes on" in result.output
-    assert {path.name for path in out.iterdir()} == {CHECKPOINT, LOG, "run.json", "weights.pt"}
+    assert {path.name for path in out.iterdir()} == {CHECKPOINT, LOG, SETTINGS, "run.json", "weights.pt"}
     assert Run.load(out).manifest["verb"] == "describe"
 
 
@@ -111,18 +114,42 @@ def test_nothing_is_left_of_a_run_without_an_epoch(
 
 
 def stop_at(monkeypatch: pytest.MonkeyPatch, epoch: int) -> None:
-    def interrupt(bar: object, now: int, epochs: int) -> None:
-        if now == epoch:
+    def interrupt(progress: Shown, done: int, total: int, unit: str, loss: float) -> None:
+        if done == epoch:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr("motet_train.cli.train_language._advance", interrupt)
+    monkeypatch.setattr(Shown, "step", interrupt)
+
+
+@pytest.mark.parametrize("options", [(), ("--resume",)])
+def test_a_run_killed_before_its_first_checkpoint_starts_over(store: Path, tmp_path: Path, options: tuple[str]) -> None:
+    whole, killed = trained("describe", store, tmp_path / "whole"), tmp_path / "killed"
+    killed.mkdir()
+    for name in (SETTINGS, LOG, "weights.pt", ".run.json.0123"):
+        (killed / name).write_bytes(b"half")
+    again = trained("describe", store, killed, *options)
+    assert all(torch.equal(value, again.model.state_dict()[name]) for name, value in whole.model.state_dict().items())
+
+
+def test_a_folder_with_anything_else_is_not_touched(store: Path, tmp_path: Path) -> None:
+    trained("describe", store, tmp_path / "ended", "--epochs", 1)
+    (tmp_path / "ended" / CHECKPOINT).unlink()
+    (tmp_path / "mine" / "deep").mkdir(parents=True)
+    for name in ("ended", "mine"):
+        for options in ((), ("--resume",)):
+            result = motet("train", "describe", "--data", store, "--out", tmp_path / name, *options)
+            assert (result.exit_code, "cannot write the run" in result.output) == (2, True)
+    assert (tmp_path / "mine" / "deep").is_dir()
+    assert Run.load(tmp_path / "ended")
 
 
 def test_refusals(store: Path, tmp_path: Path) -> None:
     out = tmp_path / "run"
     (tmp_path / "empty").mkdir()
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "thesis.txt").write_text("")
     refused = ("train", "describe", "--data", store)
-    assert "it has no checkpoint.pt" in motet(*refused, "--out", tmp_path / "empty", "--resume").output
+    assert "it has no checkpoint.pt" in motet(*refused, "--out", tmp_path / "other", "--resume").output
     assert "no corpus in" in motet("train", "describe", "--data", tmp_path / "empty", "--out", out).output
     trained("describe", store, out, "--epochs", 1)
     before = (out / CHECKPOINT).read_bytes()
@@ -152,7 +179,7 @@ def test_a_corpus_is_prepared_beside_the_run(tmp_path: Path) -> None:
 def test_either_loss_can_be_trained(store: Path, tmp_path: Path) -> None:
     runs = [trained("generate", store, tmp_path / loss, "--loss", loss) for loss in ("surrogate", "likelihood")]
     assert [run.manifest["config"]["loss"] for run in runs] == ["surrogate", "likelihood"]
-    assert runs[0].manifest["training"]["train_loss"] != runs[1].manifest["training"]["train_loss"]
+    assert runs[0].manifest["training"]["loss"] != runs[1].manifest["training"]["loss"]
 
 
 PAPER: list[tuple[Recipe, Callable[[int, int], object], float]] = [
@@ -163,6 +190,6 @@ PAPER: list[tuple[Recipe, Callable[[int, int], object], float]] = [
 
 @pytest.mark.parametrize(("recipe", "config", "clip"), PAPER)
 def test_the_paper_preset_is_table_1(recipe: Recipe, config: Callable[[int, int], object], clip: float) -> None:
-    assert recipe.config(44, 1344) == config(44, 1344)
-    assert recipe.fitting == Fitting(clip=clip, epochs=100, batch=128, learning_rate=1e-3, offsets=None, decay=0.0)
-    assert not recipe.mirror
+    assert recipe.sized(channels=44, words=1344) == config(44, 1344)
+    assert recipe.training == Training(epochs=100, batch=128, learning_rate=1e-3, optimiser="nadam", clip=clip)
+    assert recipe.visits == LanguageVisits(offsets=None, windows=None, mirror=False)

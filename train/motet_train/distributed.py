@@ -45,7 +45,7 @@ def count() -> int:
 
 def wrapped(module: nn.Module) -> nn.Module:
     """The module, whose gradients are means over all processes where there are several."""
-    return module if count() == 1 else DistributedDataParallel(module, broadcast_buffers=False)
+    return module if count() == 1 else DistributedDataParallel(module)
 
 
 def summed(values: Sequence[float], device: torch.device) -> list[float]:

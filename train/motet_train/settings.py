@@ -5,7 +5,7 @@ seed = 1
 learning_rate = 1e-3
 [model]                 # sizes: the fields of the model's configuration
 dropout = 0.3
-[data]                  # how the data is visited
+[visits]                # how the data is visited
 mirror = false
 """
 
@@ -20,7 +20,7 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 from motet.errors import MotetError
 from motet_train.recipes.recipe import Recipe
 
-TABLES = {"training": "training", "model": "config", "data": "data"}
+TABLES = {"training": "training", "model": "config", "visits": "visits"}
 """Table of a file -> what of the recipe it changes."""
 
 

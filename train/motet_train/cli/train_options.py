@@ -119,7 +119,7 @@ def _train(
 
 
 def _is_of(name: str, recipe: Recipe) -> bool:
-    return any(hasattr(part, name) for part in (recipe.training, recipe.config, recipe.data) if part is not None)
+    return any(hasattr(part, name) for part in (recipe.training, recipe.config, recipe.visits) if part is not None)
 
 
 def _kept(context: click.Context, given: Mapping[str, Any]) -> dict[str, Any]:

@@ -35,7 +35,7 @@ DEFAULT = replace(
         summary=60.0,
     ),
     training=Training(epochs=400, batch=16, optimiser="nadam", learning_rate=2e-3, falling=0.5, clip=25.0, keep="last"),
-    data=LanguageVisits(offsets=1, windows=(50, 50), mirror=True),
+    visits=LanguageVisits(offsets=1, windows=(50, 50), mirror=True),
     defaults={**BEAM, "hypotheses": 10, "candidates": 1, "temperature": 0.05},
 )
 """What is shipped: trained on the true likelihood (eq. 11), on windows of motions, and to find back from small errors.

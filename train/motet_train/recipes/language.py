@@ -77,7 +77,7 @@ def train_language(store: Store, job: Job, data: str = "", by: str = "trial") ->
     data: its name.
     """
     recipe = job.recipe
-    found = divided(store, recipe.data.mirror, by)
+    found = divided(store, recipe.visits.mirror, by)
     config = asdict(recipe.sized(channels=len(found.contract.channels), words=len(found.vocabulary)))
     torch.manual_seed(job.about.seed)
     net = MODELS[recipe.model](config)
@@ -94,7 +94,7 @@ def train_language(store: Store, job: Job, data: str = "", by: str = "trial") ->
 
 def _learner(net: LanguageNet, found: Divided, job: Job) -> GradientLearner:
     assert job.recipe.training is not None
-    training, visits = job.recipe.training, job.recipe.data
+    training, visits = job.recipe.training, job.recipe.visits
     train, validation = (found.examples(part) for part in (found.parts.train, found.parts.validation))
 
     def batches(rng: np.random.Generator) -> Iterator[Batch]:

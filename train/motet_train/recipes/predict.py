@@ -44,8 +44,8 @@ RECIPES = {"default": DEFAULT}
 
 def train_predict(material: Material, job: Job) -> Run:
     """Train a predictor, see :meth:`motet_train.recipes.recipe.Job.run`; DataError for unfit sequences."""
-    visits = possible(job.recipe.data, material)
-    job = replace(job, recipe=replace(job.recipe, data=visits))
+    visits = possible(job.recipe.visits, material)
+    job = replace(job, recipe=replace(job.recipe, visits=visits))
     training = job.recipe.training
     assert training is not None
     torch.manual_seed(job.about.seed)

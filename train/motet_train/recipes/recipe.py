@@ -33,7 +33,7 @@ class Recipe:
     """What is trained, and how.
 
     verb, model: as in the manifest. config: the model's sizes, a dataclass, of which ``derived`` are found in the data.
-    training: None where the config says it. data: how the data is visited, a dataclass. defaults: the verb's.
+    training: None where the config says it. visits: how the data is visited, a dataclass. defaults: the verb's.
     """
 
     verb: str
@@ -41,7 +41,7 @@ class Recipe:
     config: Any
     derived: tuple[str, ...] = ()
     training: Training | None = None
-    data: Any = None
+    visits: Any = None
     defaults: Mapping[str, Any] = field(default_factory=dict)
 
     def sized(self, **found: Any) -> Any:
@@ -51,7 +51,7 @@ class Recipe:
 
     def to_json(self) -> dict[str, Any]:
         """How it is trained, for the manifest."""
-        parts = (part for part in (self.training, self.data) if part is not None)
+        parts = (part for part in (self.training, self.visits) if part is not None)
         return {key: value for part in parts for key, value in asdict(part).items()}
 
 

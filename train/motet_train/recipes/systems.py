@@ -77,8 +77,8 @@ def train_system(material: Material, job: Job) -> Run:
 
     The weights kept are those with the smallest :func:`validation_error`.
     """
-    visits = possible(job.recipe.data, material)
-    job = replace(job, recipe=replace(job.recipe, data=visits))
+    visits = possible(job.recipe.visits, material)
+    job = replace(job, recipe=replace(job.recipe, visits=visits))
     torch.manual_seed(job.about.seed)
     config = sized(job.recipe, material)
     sizes = {"channels": len(material.contract.channels), "kept": list(material.kept), "seed_frames": SEED_FRAMES}
@@ -134,16 +134,16 @@ class Adversary:
         normal, given = self.net.normalised(windows), self.net.seed_frames
         predicted = self.net.system.imagine(normal, given)
         false = torch.cat([normal[:, :given], predicted], dim=1)
-        self.descent.step(torch.stack([false.detach(), normal], dim=1))
+        self.descent.step(torch.cat([false.detach(), normal]))
         self.judge.requires_grad_(False)
         opinion = softplus(-self.judge(false).float()).mean()
         self.judge.requires_grad_(True)
         return (Term(self.net.system.error(predicted, normal[:, given:]) + self.weight * opinion, len(windows)),)
 
-    def _doubt(self, pairs: Tensor) -> Terms:
-        """Of false and true windows (B, 2, L + N, D)."""
-        false, true = pairs.unbind(1)
-        return (Term(softplus(self.judge(false).float()) + softplus(-self.judge(true).float()), len(pairs)),)
+    def _doubt(self, windows: Tensor) -> Terms:
+        """Of false windows and as many true ones (2 B, L + N, D)."""
+        false, true = windows.chunk(2)
+        return (Term(softplus(self.judge(false).float()) + softplus(-self.judge(true).float()), len(true)),)
 
 
 @torch.no_grad()
