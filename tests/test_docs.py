@@ -82,7 +82,7 @@ def check(line: str, whole: bool = True) -> None:
     assert not whole or needed <= given, f"it needs {', '.join(map(str, needed - given))}"
 
 
-@pytest.mark.parametrize("page", PAGES)
+@pytest.mark.parametrize("page", [page for page in PAGES if page != "CHANGELOG.md"])  # which names what is gone
 def test_commands_exist_with_their_options(page: str) -> None:
     text = PAGES[page].read_text()
     for line, whole in [*((line, True) for line in commands(text)), *((line, False) for line in mentions(text))]:

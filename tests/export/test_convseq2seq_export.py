@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 import torch
 
 from motet.models.load import load
@@ -11,6 +12,8 @@ from motet_export.bundles import export_run
 from motet_train.models.predict.stepwise import Stepwise
 from motet_train.models.predict.systems import stepwise
 from motet_train.runs import Run
+
+pytestmark = pytest.mark.slow  # torch's exporter
 
 CHANNELS = 48
 KEPT = range(3, 48)

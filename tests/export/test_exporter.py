@@ -11,6 +11,8 @@ from motet_export.exporter import MAX_IR_VERSION, OPSET, ExportError, export_gra
 from motet_export.parity import check_carried, check_one_step, error
 from motet_train.torch_graph import TorchGraph
 
+pytestmark = pytest.mark.slow  # torch's exporter
+
 SPEC = GraphSpec(
     inputs=(TensorSpec("state", ("batch", 4)), TensorSpec("push", ("batch", 3))),
     outputs=(TensorSpec("frame", ("batch", 2)), TensorSpec("next_state", ("batch", 4))),
@@ -31,31 +33,29 @@ class Cell(nn.Module):
         return self.out(state), state
 
 
-def exported(cell: Cell) -> bytes:
-    return export_graph(cell, SPEC, {"motet": "test", "role": "step"})
+@pytest.fixture(scope="module")
+def exported() -> bytes:
+    return export_graph(Cell(), SPEC, {"motet": "test", "role": "step"})
 
 
-def test_a_graph_is_dynamic_annotated_and_stripped() -> None:
-    data = exported(Cell())
-    model = onnx.load_from_string(data)
+def test_a_graph_is_dynamic_annotated_and_stripped(exported: bytes) -> None:
+    model = onnx.load_from_string(exported)
     assert model.ir_version <= MAX_IR_VERSION
     assert [(i.domain, i.version) for i in model.opset_import] == [("", OPSET)]
     assert {p.key: p.value for p in model.metadata_props} == {"motet": "test", "role": "step"}
     assert not any(node.metadata_props or node.doc_string for node in model.graph.node)
-    assert b".py" not in data
-    assert data == exported(Cell())
+    assert b".py" not in exported
+    assert exported == export_graph(Cell(), SPEC, {"motet": "test", "role": "step"})
 
 
-def test_a_graph_computes_what_torch_computes_at_any_batch() -> None:
-    cell = Cell()
-    pair = OnnxGraph(exported(cell), SPEC), TorchGraph(cell, SPEC)
+def test_a_graph_computes_what_torch_computes_at_any_batch(exported: bytes) -> None:
+    pair = OnnxGraph(exported, SPEC), TorchGraph(Cell(), SPEC)
     assert check_one_step("step", *pair)["error"] <= 1e-6
     assert check_carried(*pair)["error"] <= 1e-5
 
 
-def test_another_model_fails_the_ladder() -> None:
-    cell = Cell()
-    graph = OnnxGraph(exported(cell), SPEC)
+def test_another_model_fails_the_ladder(exported: bytes) -> None:
+    cell, graph = Cell(), OnnxGraph(exported, SPEC)
     with torch.no_grad():
         cell.turn.weight += 1e-3
     with pytest.raises(ExportError, match="one_step"):
@@ -64,11 +64,10 @@ def test_another_model_fails_the_ladder() -> None:
         check_carried(graph, TorchGraph(cell, SPEC))
 
 
-def test_the_contract_is_the_first_rung() -> None:
-    cell = Cell()
+def test_the_contract_is_the_first_rung(exported: bytes) -> None:
     other = GraphSpec(SPEC.inputs, SPEC.outputs)
     with pytest.raises(ExportError, match="contracts differ"):
-        check_one_step("step", OnnxGraph(exported(cell), SPEC), TorchGraph(cell, other))
+        check_one_step("step", OnnxGraph(exported, SPEC), TorchGraph(Cell(), other))
 
 
 def test_error_is_relative_to_large_outputs_and_refuses_what_is_not_finite() -> None:

@@ -23,6 +23,8 @@ from motet_train.models.language.language_to_motion import LanguageToMotion, Lan
 from motet_train.models.language.motion_to_language import MotionToLanguage, MotionToLanguageConfig
 from motet_train.runs import Run
 
+pytestmark = pytest.mark.slow  # torch's exporter
+
 D = 3
 WORDS = [*SPECIALS, "a", "person", "walks", "runs", "left", "right", "slowly"]
 MOTION = {

@@ -13,6 +13,8 @@ from motet_export.bundles import export_run
 from motet_train.models.predict.predictor import Predictor, PredictorConfig
 from motet_train.runs import Run
 
+pytestmark = pytest.mark.slow  # torch's exporter
+
 CHANNELS = 9
 
 

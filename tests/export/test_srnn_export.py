@@ -12,6 +12,8 @@ from motet_train.models.predict.srnn import EDGES, NODES, SRNN, Config
 from motet_train.models.predict.stepwise import Stepwise
 from motet_train.torch_graph import TorchGraph
 
+pytestmark = pytest.mark.slow  # torch's exporter
+
 SEED, CHANNELS = 7, 11
 KEPT = (0, 1, 2, 4, 5, 6, 7, 9, 10)
 CONFIG = Config(9, ((8, 0, 4), (1, 2), (5, 6), (3,), (7,)), linear=6, units=5, narrow=4)

@@ -18,6 +18,8 @@ from motet_train.models.predict.rrnn import RRNN
 from motet_train.models.predict.stepwise import Stepwise, System
 from motet_train.torch_graph import TorchGraph
 
+pytestmark = pytest.mark.slow  # torch's exporter
+
 SEED, CHANNELS = 6, 7
 KEPT = (0, 1, 3, 4, 6)
 SYSTEMS: dict[str, Callable[[], System]] = {

@@ -35,6 +35,7 @@ def train(*labels: str, config: AngleCRBMConfig = SHORT) -> Run:
     return control_run(read_clips().only(labels), config)
 
 
+@pytest.mark.slow
 def test_a_slow_rate_from_the_past_keeps_walking() -> None:
     run = train("walk", config=replace(AngleCRBMConfig(), iterations=10))
     study = study_of(ControlModel(run.manifest, run.torch_graphs()), read_clips())
@@ -46,6 +47,7 @@ def test_a_slow_rate_from_the_past_keeps_walking() -> None:
     assert 0.6 < figures["energy"] < 1.1
 
 
+@pytest.mark.slow
 def test_with_one_control_unit_running_starts_and_never_ends() -> None:
     config = replace(AngleCRBMConfig(), iterations=10)
     run = train("walk", "run", config=replace(config, crbm=replace(config.crbm, epochs=150)))
@@ -85,6 +87,7 @@ def test_variety_is_normal_about_the_mean() -> None:
     np.testing.assert_allclose(away.T.cov(), 0.25 * np.eye(5), atol=0.02)
 
 
+@pytest.mark.slow
 def test_a_run_reads_back_exports_and_iterates_as_its_manifest_says(tmp_path: Path) -> None:
     run = train("walk", "run")
     run.save(tmp_path)

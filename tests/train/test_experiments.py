@@ -48,6 +48,7 @@ def test_the_shipped_bundle_reaches_every_goal_and_says_what_is_measured(clips: 
         assert model.manifest["quality"][group][key] == pytest.approx(_of(report, name), rel=0.05, abs=0.05), name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("clamped", "least", "most"), [(False, 1.5, np.inf), (True, 0.0, 1.0)])
 def test_unclamped_control_units_make_the_state_leap(clips: Clips, clamped: bool, least: float, most: float) -> None:
     """The thesis' text unclamps them in the reconstruction; the switch is then a jump in one frame."""

@@ -16,12 +16,12 @@ from motet_train.data.clips import CMU as CLIPS
 from motet_train.data.errors import DataError
 from motet_train.data.expmap_files import CMU, H36M, Scaling, is_expmap, parse, read_expmap, scaling_of
 from motet_train.data.predict_data import (
-    Trial,
     expmap_material,
     mocap_material,
     read_trials,
 )
 from motet_train.data.predict_data import test_names as names_held_out
+from motet_train.data.records import Record
 from motet_train.data.windows import Windows
 from motet_train.evaluate.predict.protocol import (
     REPORTED,
@@ -197,7 +197,7 @@ def test_the_mirror_of_the_text_files_is_its_own_inverse(tmp_path: Path) -> None
 
 def test_motion_files_become_sequences_at_30_fps() -> None:
     walk = read_motion(CLIPS / "39_14.amc")[:120]
-    trials = [Trial(f"{n:02}_01", f"{n:02}", walk) for n in range(12)]
+    trials = [Record(f"{n:02}_01", f"{n:02}", walk, ()) for n in range(12)]
     material = mocap_material(trials, [], "x", "free")
     assert (material.contract.fps, len(names_held_out(trials))) == (30.0, 1)
     assert material.about["files"] == 11
@@ -207,7 +207,7 @@ def test_motion_files_become_sequences_at_30_fps() -> None:
     np.testing.assert_array_equal(mirror_of.columns, material.mirrored)
     np.testing.assert_array_equal(mirror_of.signs, material.signs)
     one, other = (
-        mocap_material([Trial(str(n), str(n), m) for n in range(12)], [], "x", "free").sequences[0]
+        mocap_material([Record(str(n), str(n), m, ()) for n in range(12)], [], "x", "free").sequences[0]
         for m in (walk, mirror(walk))
     )
     np.testing.assert_allclose(mirror_of(one), other, atol=1e-4)
@@ -225,7 +225,7 @@ def spun(frames: int = 240) -> Motion:
 
 def test_what_is_trained_does_not_leap_and_is_what_inference_sees() -> None:
     motion = spun()
-    material = mocap_material([Trial(f"{n:02}_01", f"{n:02}", motion) for n in range(12)], [], "x", "free")
+    material = mocap_material([Record(f"{n:02}_01", f"{n:02}", motion, ()) for n in range(12)], [], "x", "free")
     hand = material.contract.channels.index("lhand.ez")
     sequence = material.sequences[0]
     assert np.abs(np.diff(sequence[:, hand - 2 : hand + 1], axis=0)).max() < 0.3

@@ -13,7 +13,8 @@ from motet.models.predict import PredictModel
 from motet.motion.kinematics import skeleton_of
 from motet_train.data.clips import CMU as CLIPS
 from motet_train.data.expmap_files import CMU, ExpmapCorpus, is_expmap, read_expmap
-from motet_train.data.predict_data import STRIDE, Trial, read_trials
+from motet_train.data.predict_data import STRIDE, read_trials
+from motet_train.data.records import Record
 from motet_train.evaluate.predict import curves, mocap, strips
 from motet_train.evaluate.predict.ablations import ablated, ablation_table
 from motet_train.evaluate.predict.costs import cost_table
@@ -89,7 +90,7 @@ def _mocap(models: Models, data: Path, plots: Path | None) -> Result:
     return _ready(models, groups, runs, means, spreads), text
 
 
-def _draw_mocap(models: Models, trials: Sequence[Trial], shown: mocap.Distances, plots: Path) -> None:
+def _draw_mocap(models: Models, trials: Sequence[Record], shown: mocap.Distances, plots: Path) -> None:
     from motet_train.evaluate.figures import save
     from motet_train.evaluate.predict.plots import error_over_time, strips_drawing
 

@@ -1,8 +1,8 @@
 """What a predictor is trained on: the exponential-map text files of the protocol, or ordinary motion files."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from pathlib import Path, PurePosixPath
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,11 +14,12 @@ from motet.motion.kinematics import skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract, living, sequences
-from motet_train.data.archive import BROKEN, Archive
-from motet_train.data.clips import CMU_LICENCE, read_with_unit
+from motet_train.data.archive import Archive
+from motet_train.data.clips import CMU_LICENCE
+from motet_train.data.corpus import recordings
 from motet_train.data.errors import DataError
 from motet_train.data.expmap_files import ROOT, ExpmapCorpus, Layout, scaling_of
-from motet_train.data.records import Skipped
+from motet_train.data.records import Record, Skipped
 from motet_train.data.split import split
 from motet_train.data.store import Entry
 from motet_train.data.trim import trim
@@ -138,49 +139,38 @@ def _mirrored_columns(layout: Layout) -> tuple[tuple[int, ...], tuple[float, ...
     return tuple(columns.tolist()), tuple(signs.tolist())
 
 
-@dataclass(frozen=True, eq=False)
-class Trial:
-    """One motion file: its name, who moved, and its motion in the file's channels."""
-
-    name: str
-    subject: str
-    motion: Motion
-
-
 def read_trials(
     path: Path, progress: Callable[[str], object] = lambda name: None, metres_per_unit: float | None = None
-) -> tuple[list[Trial], list[Skipped]]:
+) -> tuple[list[Record], list[Skipped]]:
     """The motion files of a folder or zip, one of each name, idle ends cut off, and those that cannot be used.
 
     metres_per_unit: the length unit of files that do not say it.
     """
-    trials, skipped = {}, []
+    items = []
     with Archive(path) as archive:
-        names = [name for name in archive.names if PurePosixPath(name).suffix.lower() in MOCAP]
-        for name in archive.names:
-            if name.lower().endswith(".asf"):
-                archive.place(name)  # the reader of an AMC file looks for its skeleton near it
-        for name in names:
-            clip = PurePosixPath(name).stem
-            progress(clip)
-            try:
-                with archive.opened(name) as place:
-                    motion = read_with_unit(place, metres_per_unit)
-                trials[clip] = Trial(clip, clip.split("_")[0], trim(motion))
-            except BROKEN as error:
-                skipped.append(Skipped(clip, archive.reason(error)))
+        for item in recordings(archive, metres_per_unit):
+            progress(item.name)
+            items.append(_trimmed(item))
+    trials = [item for item in items if isinstance(item, Record)]
     if not trials:
         raise DataError(f"no motion files in {path} ({' '.join(MOCAP)}), or none that can be used")
-    return list(trials.values()), skipped
+    return trials, [item for item in items if isinstance(item, Skipped)]
 
 
-def test_names(trials: Sequence[Trial]) -> tuple[str, ...]:
+def _trimmed(item: Record | Skipped) -> Record | Skipped:
+    try:
+        return replace(item, motion=trim(item.motion)) if isinstance(item, Record) else item
+    except MotionError as error:
+        return Skipped(item.name, str(error))
+
+
+def test_names(trials: Sequence[Record]) -> tuple[str, ...]:
     """The trials that are held out: all those of some people, a tenth at most."""
     entries = [Entry(trial.name, trial.subject, (), ()) for trial in trials]
     return tuple(trials[index].name for index in split(entries, 0, "subject").test)
 
 
-def mocap_material(trials: Sequence[Trial], skipped: Sequence[Skipped], name: str, licence: str | None) -> Material:
+def mocap_material(trials: Sequence[Record], skipped: Sequence[Skipped], name: str, licence: str | None) -> Material:
     """Motions of one figure as root block and exponential maps at :data:`FPS`, all phases, without the test trials."""
     test = set(test_names(trials))
     found, left_out = _figures([trial for trial in trials if trial.name not in test])
@@ -210,7 +200,7 @@ def mocap_material(trials: Sequence[Trial], skipped: Sequence[Skipped], name: st
     )
 
 
-def _figures(trials: Sequence[Trial]) -> tuple[dict[str, list[Motion]], list[Skipped]]:
+def _figures(trials: Sequence[Record]) -> tuple[dict[str, list[Motion]], list[Skipped]]:
     """The features of each trial in all phases, in the joints of the first one, and the trials that have others."""
     found: dict[str, list[Motion]] = {}
     left_out, first = [], None

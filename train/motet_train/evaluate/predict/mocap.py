@@ -9,7 +9,7 @@ from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet_train.data.errors import DataError
-from motet_train.data.predict_data import Trial
+from motet_train.data.records import Record
 from motet_train.evaluate.predict.curves import ZERO
 from motet_train.evaluate.predict.protocol import REPORTED
 from motet_train.evaluate.predict.protocol_table import error_row, frame_heads
@@ -22,7 +22,7 @@ PLACE, POSE = "place_cm", "pose_cm"
 """Of joints in the world, and of joints relative to the root's place."""
 
 
-def held_out(model: PredictModel, trials: Sequence[Trial]) -> list[Trial]:
+def held_out(model: PredictModel, trials: Sequence[Record]) -> list[Record]:
     """The trials that the model did not see in training; DataError where none of them is here."""
     test = set(model.manifest.training.get("data", {}).get("test", ()))
     found = [trial for trial in trials if trial.name in test]
@@ -31,7 +31,7 @@ def held_out(model: PredictModel, trials: Sequence[Trial]) -> list[Trial]:
     return found
 
 
-def distances(models: Mapping[str, PredictModel], trials: Sequence[Trial]) -> Distances:
+def distances(models: Mapping[str, PredictModel], trials: Sequence[Record]) -> Distances:
     """The mean over windows that begin every ``horizon`` frames, of all systems, zero velocity first.
 
     Models must have the same frame rate, seed and horizon; DataError where the trials are too short.
