@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -56,7 +57,13 @@ def manifest(store: Store, verb: str, by: str = "trial") -> dict[str, Any]:
     """What a run says that left the last ten records, two of each kind, for validation and test."""
     names = [entry.name for entry in store.records]
     split = {"by": by, "train": len(names) - 10, "validation": names[-10:-5], "test": names[-5:]}
-    return {"name": f"fake-{verb}", "verb": verb, "training": {"split": split, "seconds": 1.5, "epochs": 3}}
+    training = {"split": split, "seconds": 1.5, "epochs": 3}
+    return {"name": f"fake-{verb}", "verb": verb, "training": training}
+
+
+def told(store: Store, verb: str) -> Any:
+    """The same as a model has it."""
+    return SimpleNamespace(**manifest(store, verb))
 
 
 class FakeDescribe:
@@ -65,7 +72,7 @@ class FakeDescribe:
     fps = FPS
 
     def __init__(self, store: Store) -> None:
-        self.manifest = manifest(store, "describe")
+        self.manifest = told(store, "describe")
         self.said = {store.sequence(i).tobytes(): entry.sentences for i, entry in enumerate(store.records)}
 
     def describe(self, motions: Sequence[Motion], beams: int = 5) -> list[list[Description]]:
@@ -90,7 +97,7 @@ class FakeGenerate:
     fps = FPS
 
     def __init__(self, store: Store) -> None:
-        self.manifest = manifest(store, "generate")
+        self.manifest = told(store, "generate")
         self.motions = {
             plain(sentence): Motion(store.sequence(i), store.channels, store.units, FPS, store.skeleton)
             for i, entry in reversed(list(enumerate(store.records)))

@@ -21,10 +21,11 @@ from language_models import (
     manifest,
     moving,
     small_store,
+    told,
 )
 
 from motet.cli import main
-from motet.models.text import Vocabulary
+from motet.models.text import RULES, Vocabulary
 from motet.motion.motion import Motion
 from motet_train.data.store import FRAMES as FRAMES_FILE
 from motet_train.data.store import INDEX, Store
@@ -41,7 +42,7 @@ STORE = small_store()
 
 @pytest.fixture(scope="module")
 def corpus() -> SplitStore:
-    return split_as(manifest(STORE, "generate"), STORE)
+    return split_as(told(STORE, "generate"), STORE)
 
 
 def test_speed_turn_and_rise() -> None:
@@ -206,14 +207,18 @@ def runs(tmp_path: Path) -> Path:
     _write(STORE, tmp_path / "store")
     vocabulary = Vocabulary.of(s for entry in STORE.records for s in entry.sentences).to_json()
     shared = {"channels": len(CHANNELS), "words": len(vocabulary), **SIZES}
-    more = {"motion": STORE.contract(range(20)).to_json(), "vocabulary": vocabulary}
+    more = {"motion": STORE.contract(range(20)).to_json(), "text": RULES.to_json(), "vocabulary": vocabulary}
     for name, verb, by in (("describe", "describe", "trial"), ("unseen", "describe", "subject")):
         net = MODELS["motion-to-language"](shared | {"dropout": 0.4, "gates": "sigmoid"})
-        settings = {"model": "motion-to-language", "config": shared | {"dropout": 0.4, "gates": "sigmoid"}}
+        settings = {
+            "model": "motion-to-language",
+            "loop": "beam",
+            "config": shared | {"dropout": 0.4, "gates": "sigmoid"},
+        }
         defaults = {"defaults": {"beams": 5, "max_words": 5}}
         _save(Run(manifest(STORE, verb, by) | more | settings | defaults, net), tmp_path / name)
     net = MODELS["language-to-motion"](shared | {"components": 2})
-    settings = {"model": "language-to-motion", "config": shared | {"components": 2}}
+    settings = {"model": "language-to-motion", "loop": "mixture", "config": shared | {"components": 2}}
     defaults = {"defaults": {"hypotheses": 2, "candidates": 2, "temperature": 1.0, "max_seconds": 1}}
     _save(Run(manifest(STORE, "generate") | more | settings | defaults, net), tmp_path / "generate")
     return tmp_path

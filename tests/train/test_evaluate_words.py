@@ -4,7 +4,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from language_models import manifest, small_store
+from language_models import small_store, told
 
 from motet_train.data.errors import DataError
 from motet_train.evaluate.language.attributes import VERBS as TABLE
@@ -31,7 +31,7 @@ from motet_train.evaluate.language.split_store import SplitStore, split_as
 @pytest.fixture(scope="module")
 def corpus() -> SplitStore:
     store = small_store()
-    return split_as(manifest(store, "describe"), store)
+    return split_as(told(store, "describe"), store)
 
 
 def naive_bleu(hypotheses: list[list[str]], references: list[list[list[str]]]) -> float:
@@ -160,13 +160,14 @@ def test_the_most_frequent_sentence(corpus: SplitStore) -> None:
 
 def test_a_model_of_other_data_is_refused() -> None:
     store = small_store()
-    told = manifest(store, "describe")
-    told["training"]["split"]["train"] += 1
+    other = told(store, "describe")
+    other.training["split"]["train"] += 1
     with pytest.raises(DataError, match="was not trained on this data: its 21 training"):
-        split_as(told, store)
+        split_as(other, store)
+    other.training.clear()
     with pytest.raises(DataError, match="does not say which motions"):
-        split_as({"name": "x"}, store)
-    told = manifest(store, "describe")
-    told["training"]["split"]["test"][0] = "elsewhere"
+        split_as(other, store)
+    other = told(store, "describe")
+    other.training["split"]["test"][0] = "elsewhere"
     with pytest.raises(DataError, match="was not trained on this data"):
-        split_as(told, store)
+        split_as(other, store)

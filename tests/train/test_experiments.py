@@ -12,6 +12,7 @@ from control_runs import control_run
 from numpy.typing import NDArray
 
 from motet.bundle.graph import Arrays, GraphSpec, TensorSpec
+from motet.bundle.manifest import Manifest
 from motet.errors import OutputError
 from motet.formats import read_motion, write_motion
 from motet.models.control import ControlModel
@@ -45,7 +46,7 @@ def test_the_shipped_bundle_reaches_every_goal_and_says_what_is_measured(clips: 
     assert missed == {}
     for name in GOALS:
         group, key = name.split(".")
-        assert model.manifest["quality"][group][key] == pytest.approx(_of(report, name), rel=0.05, abs=0.05), name
+        assert model.manifest.quality[group][key] == pytest.approx(_of(report, name), rel=0.05, abs=0.05), name
 
 
 @pytest.mark.slow
@@ -55,7 +56,7 @@ def test_unclamped_control_units_make_the_state_leap(clips: Clips, clamped: bool
     config = TDBNConfig().unclamped()
     config = replace(config, clamped=clamped, rbm=replace(config.rbm, epochs=300))
     run = control_run(clips, config)
-    study = study_of(ControlModel(run.manifest, run.torch_graphs()), clips)
+    study = study_of(ControlModel(Manifest.from_json(run.manifest), run.torch_graphs()), clips)
     assert least < gait_transitions(study, count=8)["jump_ratio"] < most
 
 
@@ -135,11 +136,13 @@ def autoregression(study: ControlStudy) -> ControlStudy:
     contract, channels = study.model.contract, len(study.model.contract.channels)
     linear = Linear(contract, list(study.reference.motions["walk"]))
     history = TensorSpec("history", ("batch", 3, channels))
-    inputs = (history, TensorSpec("control", ("batch", 3)), TensorSpec("noise", ("batch", 1)))
-    step = FunctionGraph(linear.step, GraphSpec(inputs, (), {"history": "next_history"}))
-    model = ControlModel(
-        study.model.manifest, {"encoder": FunctionGraph(linear.encode, GraphSpec((), ())), "step": step}
-    )
+    codes, frame = (TensorSpec(name, ("batch", channels)) for name in ("codes", "frame"))
+    settings = (TensorSpec(name, ("batch", 1)) for name in ("noise", "variety", "temperature"))
+    inputs = (history, TensorSpec("control", ("batch", 3)), *settings)
+    outputs = (replace(codes, name="next_codes"), frame, replace(history, name="next_history"))
+    step = FunctionGraph(linear.step, GraphSpec(inputs, outputs, {"history": "next_history"}))
+    encoder = FunctionGraph(linear.encode, GraphSpec((replace(frame, name="frames"),), (codes,)))
+    model = ControlModel(study.model.manifest, {"encoder": encoder, "step": step})
     return ControlStudy(model, study.reference, study.walk, study.run, study.bend, None)
 
 

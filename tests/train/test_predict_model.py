@@ -10,6 +10,7 @@ import torch
 from click.testing import CliRunner, Result
 from test_predict_data import write_files
 
+from motet.bundle.manifest import Manifest
 from motet.cli import main
 from motet.formats import read_motion, write_motion
 from motet.models.predict import PredictModel
@@ -80,7 +81,7 @@ def test_training_learns_and_repeats_itself(tmp_path: Path) -> None:
     for one, other in zip(runs[0].model.parameters(), runs[1].model.parameters(), strict=True):
         torch.testing.assert_close(one, other, atol=0, rtol=0)
     loaded = Run.load(tmp_path / "a")
-    models = {"a": PredictModel(loaded.manifest, loaded.torch_graphs())}
+    models = {"a": PredictModel(Manifest.from_json(loaded.manifest), loaded.torch_graphs())}
     corpus = read_expmap(tmp_path / "data")
     errors = curves(models, corpus)[FEW]
     assert complete(corpus) == ["running", "walking"]  # none is, so all count

@@ -12,6 +12,7 @@ import pytest
 import torch
 from test_predict_data import write_files
 
+from motet.bundle.manifest import Manifest
 from motet.errors import MotionError
 from motet.formats import read_motion
 from motet.models.predict import PredictModel
@@ -47,7 +48,7 @@ def manifest(seed: int | None, model: str = "convseq2seq", recipe: dict[str, Any
     seeded = {} if seed is None else {"seed": seed, "seconds": 10.0 * seed, "threads": 1}
     settings = {"window": 20, "kernel": [2, 7], "padding": "valid", "long_term": "convolutional", **system}
     config = {"channels": 117, "system": settings}
-    return SimpleNamespace(manifest={"model": model, "config": config, "training": {**training, **seeded}})
+    return SimpleNamespace(manifest=SimpleNamespace(model=model, config=config, training={**training, **seeded}))
 
 
 def constant(**values: float) -> Curves:
@@ -240,7 +241,7 @@ def saved(folder: Path, data: Path, seed: int, **settings: Any) -> Path:
     config = json.loads(json.dumps(config))
     net = stepwise("convseq2seq", config)
     training = {"seed": seed, "recipe": {}, "data": material.about, "parameters": 1, "seconds": 1.0}
-    parts = {"name": folder.name, "version": "1", "verb": "predict", "model": "convseq2seq"}
+    parts = {"name": folder.name, "version": "1", "verb": "predict", "model": "convseq2seq", "loop": "free_run"}
     more = {"motion": material.contract.to_json(), "defaults": {"horizon": 25}, "config": config, "licence": {}}
     folder.mkdir()
     Run({**parts, **more, "training": training}, net.eval()).save(folder)
@@ -249,7 +250,7 @@ def saved(folder: Path, data: Path, seed: int, **settings: Any) -> Path:
 
 def loaded(run: Path) -> PredictModel:
     found = Run.load(run)
-    return PredictModel(found.manifest, found.torch_graphs())
+    return PredictModel(Manifest.from_json(found.manifest), found.torch_graphs())
 
 
 def test_all_runs_are_evaluated_at_once(tmp_path: Path) -> None:
