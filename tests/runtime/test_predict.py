@@ -80,6 +80,17 @@ def test_a_circle_goes_on_where_it_ended() -> None:
     np.testing.assert_allclose(model.predict(whole[:12], frames=18, append=True).values, whole.values, atol=1e-3)
 
 
+def test_what_is_appended_does_not_leap() -> None:
+    whole = circle(240, fps=120.0)
+    column = whole.channels.index("hips.ry")
+    leaping = np.array(whole.values)
+    leaping[:, column] = (leaping[:, column] + 180) % 360 - 180
+    assert np.abs(np.diff(leaping[:, column])).max() > 300
+    model = model_of(to_joint_vectors(circle()), change=0.0)
+    found = model.predict(replace(whole, values=leaping), 18, append=True)
+    assert np.abs(np.diff(found.values[:, column])).max() < 5
+
+
 @pytest.mark.parametrize("scale", [1.0, 0.01])
 def test_a_figure_and_back_is_the_motion_whatever_its_channels(scale: float) -> None:
     whole = walker(40, metres_per_unit=1 / scale, scale=scale)

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import torch
 from click.testing import CliRunner, Result
-from motet_train.checkpoint import CHECKPOINT
 from test_predict_data import write_files
 
 from motet.cli import main

@@ -8,7 +8,6 @@ import pytest
 import torch
 from click.testing import CliRunner, Result
 from language_data import records, small_store
-from motet_train.checkpoint import CHECKPOINT, LOG
 
 from motet.cli import main
 from motet.formats import write_motion

@@ -57,8 +57,8 @@ class Windows:
         if self.mirror:
             windows = torch.where(_some(rng, batch, self.mirror), windows[..., self.columns] * self.signs, windows)
         if self.seed is not None and self.maps:
-            vectors = windows[..., self.maps].reshape(batch, self.frames, -1, 3)
-            windows[..., self.maps] = anchored(vectors, self.seed - 1).flatten(2)
+            maps = windows[..., self.maps].reshape(batch, self.frames, -1, 3)
+            windows[..., self.maps] = anchored(maps, self.seed - 1).flatten(2)
         return windows
 
     def _interpolated(self, which: Any, times: Any) -> Tensor:

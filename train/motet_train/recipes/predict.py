@@ -52,9 +52,8 @@ def train_predict(material: Material, job: Job) -> Run:
     net = _untrained(material, job.recipe)
     defaults = {"horizon": net.config.frames}
     manifest = job.manifest(material.contract, asdict(net.config), defaults, material.licence, {"data": material.about})
-    seed_frames = net.config.seed_frames if material.layout is None else None  # text files are taken as they are
-    chances = visits.warp, visits.reverse, visits.mirror
-    windows = Windows(material, net.config.seed_frames + net.config.frames, *chances, seed_frames)
+    seed = net.config.seed_frames if material.layout is None else None  # text files are taken as they are
+    windows = Windows(material, net.config.seed_frames + net.config.frames, **asdict(visits), seed=seed)
     times, batch = _importance(net.config.frames).to(job.device), training.batch
 
     def batches(rng: np.random.Generator) -> Iterator[Tensor]:
