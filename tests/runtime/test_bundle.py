@@ -201,7 +201,7 @@ def test_what_is_not_a_bundle_is_refused(tmp_path: Path) -> None:
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
     (tmp_path / "secret").mkdir()
     for name, reason in (
-        ("empty", "'manifest.json' is missing"),
+        ("empty", "is not a bundle: it holds no manifest.json"),
         ("text.zip", "not a zip"),
         ("pipe", "neither a folder nor a file"),
         ("loop", "no such path|symbolic links"),

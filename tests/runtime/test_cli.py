@@ -86,9 +86,11 @@ def test_bundle_commands(tmp_path: Path) -> None:
     rows = json.loads(run("bundle", "list", "--json").stdout)
     assert {("cmu-control", "control"), ("cmu-predict", "predict")} <= {(row["name"], row["verb"]) for row in rows}
     assert "cmu-control" in run("bundle", "list").stdout
-    assert json.loads(run("bundle", "info", "cmu-control", "--json").stdout)["format"] == 1
+    assert json.loads(run("bundle", "info", "cmu-control", "--json").stdout)["format"] == 2
     assert "NSF EIA-0196217" in run("bundle", "info", "cmu-control").stdout
-    assert "2 files are as the manifest lists them" in run("bundle", "verify", "cmu-control").stdout
+    verified = run("bundle", "verify", "cmu-control", "--threads", 2, "--provider", "cpu").stdout
+    assert "3 files are as the manifest lists them\nthe model runs on CPUExecutionProvider\n" in verified
+    assert "golden vectors: the largest difference is " in verified
     assert run("bundle", "pack", "cmu-control", "-o", tmp_path / "b.zip").exit_code == 0
     assert (tmp_path / "b.zip").read_bytes() == list_bundles()["cmu-control"].read_bytes()
 
@@ -97,6 +99,13 @@ def test_bench_prints_rows() -> None:
     rows = json.loads(run("bench", "--seconds", 0.01, "--json").stdout)
     assert {"name", "value", "unit", "baseline", "ratio"} == set(rows[0])
     assert all(row["value"] > 0 for row in rows)
+
+
+def test_bench_describes_a_file_and_says_where_it_ran(clips: Path) -> None:
+    for motion in ([], ["--motion", clips / WALK]):
+        lines = run("bench", "--bundle", "cmu-describe", "--seconds", 0.001, "--threads", 2, *motion).stdout.splitlines()
+        assert lines[0] == "on CPUExecutionProvider, threads: 2"
+        assert any(line.startswith("describe.file") for line in lines)
 
 
 @pytest.mark.parametrize(
@@ -140,6 +149,9 @@ def test_bench_prints_rows() -> None:
         (2, ["bundle", "verify", "{bad}"], "no manifest.json"),
         (2, ["bundle", "pack", "cmu-control", "-o", "{out}/b.tar"], "is a .zip"),
         (2, ["bundle", "info", "nothing"], "known names are cmu-control"),
+        (2, ["control", "walk 3s", "-o", "{out}/a.bvh", "--provider", "none"], "has no provider 'none' here; it has"),
+        (2, ["describe", "{clips}/39_14.amc", "--threads", "257"], "257 is not in the range 1<=x<=256"),
+        (2, ["bundle", "verify", "cmu-control", "--provider", "none"], "has no provider 'none' here"),
     ],
 )
 def test_bad_input_gets_one_message_and_writes_nothing(

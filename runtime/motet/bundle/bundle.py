@@ -38,6 +38,8 @@ class Bundle:
     def __init__(self, path: Path, members: Members) -> None:
         self.path = path
         self._members = members
+        if MANIFEST not in members.names:
+            raise BundleError(f"{path} is not a bundle: it holds no {MANIFEST}")
         with self._named():
             self.manifest = Manifest.of_bundle(self._read(MANIFEST, MAX_MANIFEST))
             extra = sorted(members.names - self.manifest.files.keys() - {MANIFEST})

@@ -73,11 +73,9 @@ def replay(model: Replayable, data: bytes, golden: Golden) -> dict[str, float]:
     except (KeyError, TypeError, IndexError, ValueError) as error:
         raise BundleError(f"the golden run cannot be replayed: {error}") from error
     found["run"] = difference(run, _part(arrays, "run.out."))
-    for name, error in found.items():
-        if not error <= golden.tolerance:
-            raise BundleError(
-                f"golden vectors, {name}: it differs by {error:.2e}, the tolerance is {golden.tolerance:g}"
-            )
+    for name, off in found.items():
+        if not off <= golden.tolerance:
+            raise BundleError(f"golden vectors, {name}: it differs by {off:.2e}, the tolerance is {golden.tolerance:g}")
     return found
 
 

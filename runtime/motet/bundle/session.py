@@ -48,4 +48,4 @@ class SessionOptions:
         options.log_severity_level = 4
         options.add_session_config_entry("session.load_model_format", "ONNX")  # the one that was checked
         given = [dict(one) for one in self.provider_options] or None
-        return onnxruntime.InferenceSession(model, options, list(self.providers), given)
+        return onnxruntime.InferenceSession(model, options, list(self.providers), given, enable_fallback=0)

@@ -39,5 +39,6 @@ def session_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 def _provider(name: str) -> str:
     """ONNX Runtime's name of a provider: its letters may be of any case, and its ending left out."""
-    known = {provider.removesuffix(_SUFFIX).lower(): provider for provider in onnxruntime.get_available_providers()}
+    available: list[str] = onnxruntime.get_available_providers()
+    known = {provider.removesuffix(_SUFFIX).lower(): provider for provider in available}
     return known.get(name.removesuffix(_SUFFIX).lower(), name)

@@ -49,7 +49,8 @@ class RowsOfNoise:
         """As :meth:`RowNoise.at`."""
         if tick >= len(self._rows):
             raise BundleError(f"the golden vectors have noise for {len(self._rows)} ticks only")
-        return self._rows[tick : tick + 1]
+        row: Floats = self._rows[tick : tick + 1]
+        return row
 
 
 class Recording:
@@ -88,4 +89,5 @@ class Recorded:
         found = next(self._left[kind], None)
         if found is None or found.shape != size:
             raise BundleError(f"the golden vectors lack {kind} numbers of the shape {size}")
-        return found.astype(dtype)
+        numbers: Floats = found.astype(dtype)
+        return numbers

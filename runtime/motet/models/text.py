@@ -115,7 +115,9 @@ class TextRules:
             top.text("dropped"),
             {wrong: spelling.text(wrong) for wrong in spelling.data},
             {word: numbers.whole(word, 0, 99) for word in numbers.data},
-            *(top.text(key) for key in ("hundred", "conjunction", "point")),
+            top.text("hundred"),
+            top.text("conjunction"),
+            top.text("point"),
             top.whole("spelled", 0, 99),
         )
 
