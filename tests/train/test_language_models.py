@@ -7,8 +7,8 @@ import pytest
 import torch
 from torch import Tensor
 
+from motet_train.data.batch import Batch
 from motet_train.models.language import language_to_motion, motion_to_language
-from motet_train.models.language.batch import Batch
 from motet_train.models.language.language_to_motion import LanguageToMotion, LanguageToMotionConfig
 from motet_train.models.language.motion_to_language import EOS, PAD, SOS, MotionToLanguage, MotionToLanguageConfig
 from motet_train.runs import MODELS

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import torch
 
-from motet_train.models.language.batch import Batch
+from motet_train.data.batch import Batch
 from motet_train.models.language.language_to_motion import LanguageToMotion, LanguageToMotionConfig
 from motet_train.models.language.summary import LARGEST, SummaryHead, summary
 

@@ -12,10 +12,10 @@ from motet.errors import MotionError
 from motet.models.text import MAX_WORDS, PAD, SPECIALS, Vocabulary, words
 from motet.representation.base import FrameMirror
 from motet.representation.contract import MotionContract
+from motet_train.data.batch import Batch
 from motet_train.data.errors import DataError
 from motet_train.data.mirror_text import mirror_text
 from motet_train.data.store import Store
-from motet_train.models.language.batch import Batch
 
 Ids = NDArray[np.int64]
 Floats = NDArray[np.float32]

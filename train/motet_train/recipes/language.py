@@ -11,12 +11,12 @@ import torch
 from motet.models.text import RULES, Vocabulary
 from motet.representation.base import FrameMirror
 from motet.representation.contract import MotionContract
+from motet_train.data.batch import Batch
 from motet_train.data.batches import Examples, examples, frame_mirror, usable
 from motet_train.data.mirror_text import mirror_text
 from motet_train.data.split import Split, split
 from motet_train.data.store import Store
 from motet_train.descent import GradientLearner, Term, Terms
-from motet_train.models.language.batch import Batch
 from motet_train.models.language.net import LanguageNet
 from motet_train.recipes.recipe import Job
 from motet_train.runs import MODELS, Run

@@ -14,7 +14,7 @@ from torch.nn import functional
 
 from motet.bundle.graph import GraphSpec, TensorSpec
 from motet.representation.contract import LIMIT
-from motet_train.models.language.batch import Batch, before
+from motet_train.data.batch import Batch, before
 from motet_train.models.language.dropout import WordEmbedding
 from motet_train.models.language.layer_norm_gru import LayerNormGRU
 from motet_train.models.language.mixture import Mixture, MixtureHead

@@ -12,7 +12,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from motet.bundle.graph import GraphSpec, TensorSpec
-from motet_train.models.language.batch import Batch, before
+from motet_train.data.batch import Batch, before
 from motet_train.models.language.dropout import WordEmbedding
 from motet_train.models.language.gru import GRU
 from motet_train.models.language.net import LanguageNet

@@ -4,7 +4,7 @@ from abc import abstractmethod
 
 from torch import Tensor
 
-from motet_train.models.language.batch import Batch
+from motet_train.data.batch import Batch
 from motet_train.models.net import Net
 
 

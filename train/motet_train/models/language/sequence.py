@@ -9,7 +9,7 @@ from typing import cast
 import torch
 from torch import Tensor, nn
 
-from motet_train.models.language.batch import before
+from motet_train.data.batch import before
 from motet_train.models.language.gru import GRU
 
 

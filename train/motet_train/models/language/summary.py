@@ -11,7 +11,7 @@ Letters in shapes: B rows, T frames, D channels, C units of the context.
 import torch
 from torch import Tensor, nn
 
-from motet_train.models.language.batch import before
+from motet_train.data.batch import before
 
 LARGEST = 5.0
 """Normalised values are cut off here: a few wild frames would else outweigh the motion."""
