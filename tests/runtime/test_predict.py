@@ -87,7 +87,7 @@ def test_what_is_appended_does_not_leap() -> None:
     leaping[:, column] = (leaping[:, column] + 180) % 360 - 180
     assert np.abs(np.diff(leaping[:, column])).max() > 300
     model = model_of(to_joint_vectors(circle()), change=0.0)
-    found = model.predict(replace(whole, values=leaping), 18, append=True)
+    found = model.predict(replace(whole, values=leaping), frames=18, append=True)
     assert np.abs(np.diff(found.values[:, column])).max() < 5
 
 
