@@ -92,7 +92,7 @@ def test_figures_that_the_clips_allow_are_drawn(clips: Clips, tmp_path: Path) ->
 
 def test_a_run_is_evaluated_on_the_clips_that_it_was_trained_on(tmp_path: Path) -> None:
     def clips_of(command: str, data: Path | None = None) -> tuple[str, ...]:
-        model: Any = SimpleNamespace(manifest={"training": {"command": command}})
+        model: Any = SimpleNamespace(manifest=SimpleNamespace(training={"command": command}))
         return _clips("runs/x", model, data).labels
 
     write_motion(tmp_path / "stroll.bvh", read_motion(CMU / "39_14.amc")[:50])

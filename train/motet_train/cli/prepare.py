@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 from tqdm import tqdm
 
+from motet.representation import named
 from motet_train.cli.train_options import metres, unit_in
 from motet_train.data.corpus import Corpus, read_corpus
 from motet_train.data.errors import DataError
@@ -45,8 +46,9 @@ def prepare(data: Path, out: Path, sentences: Path | None, unit_in: str | None) 
 
 def _check_unit(corpus: Corpus) -> None:
     """DataError where the first motion does not say its unit and nobody else does: the others will not, either."""
-    travels = corpus.preparation.representation != "angles"
-    first = next((item for item in corpus if isinstance(item, Record)), None) if travels else None
+    if not named(corpus.preparation.representation).required:
+        return  # joint angles alone have no lengths
+    first = next((item for item in corpus if isinstance(item, Record)), None)
     if first is not None and first.motion.skeleton is not None and first.motion.skeleton.metres_per_unit is None:
         raise DataError(
             f"{first.name} does not say how long a unit of its skeleton is: give --unit-in for files that do not say it"
