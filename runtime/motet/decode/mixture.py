@@ -50,7 +50,7 @@ def mixture_search(
     """For each row of ``context`` (B, C) ``hypotheses`` samples of 1 to ``max_frames`` frames.
 
     step: frame (N, D + 1), context (N, C) and fed back states -> log_weights (N, K), means, stds (N, K, D) and active
-    (N,), the probability that there is a further frame.
+    (N,), the probability that there is a further frame. A channel of std 0 stays at its mean and counts for nothing.
 
     At every step each hypothesis draws ``candidates`` frames from its mixture, each with its flag, and the best
     ``hypotheses`` of a row's candidates go on. Among those of equal length this is the order of their summed
@@ -177,6 +177,8 @@ def draw(outputs: Arrays, normal: Floats, uniform: Floats, temperature: float, f
 
 def log_density(frames: Floats, log_weights: Floats, means: Floats, stds: Floats) -> Scores:
     """Log of equation 8, by log-sum-exp: frames (n, C, D) under mixtures (n, K), (n, K, D), (n, K, D) -> (n, C)."""
+    # a dead channel, of deviation 0, is at its mean: with this one it adds nothing
+    stds = np.where(stds > 0, stds, np.float32(1 / np.sqrt(2 * np.pi)))
     size = means.shape[2]
     constant = log_weights - np.log(stds).sum(axis=2) - 0.5 * size * np.log(2 * np.pi)
     inverse = 1 / stds

@@ -60,7 +60,8 @@ class Generated:
 
     def __repr__(self) -> str:
         seconds = len(self.frames) / self.contract.fps
-        return f"Generated({len(self.frames)} frames, {seconds:.1f} s, log-likelihood {self.log_likelihood:.1f})"
+        score = "" if self.log_likelihood is None else f", log-likelihood {self.log_likelihood:.1f}"
+        return f"Generated({len(self.frames)} frames, {seconds:.1f} s{score})"
 
 
 class GenerateModel(LanguageModel):

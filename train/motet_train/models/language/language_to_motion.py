@@ -5,7 +5,7 @@ is normalised and has the active flag at its end: 1 on every frame of a motion a
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import torch
@@ -85,6 +85,12 @@ class LanguageToMotion(LanguageNet):
         found: Tensor = self.decoder(given, context)
         return found
 
+    def mixture(self, outputs: Tensor) -> Mixture:
+        """The distributions of frames from outputs (..., S) of the decoder; dead channels stay at 0."""
+        found, living = self.head(outputs), self.scale > 0
+        means, variances = (torch.where(living, values, 0.0) for values in (found.means, found.variances))
+        return replace(found, means=means, variances=variances)
+
     def terms(self, batch: Batch) -> tuple[Tensor, Tensor | None]:
         """The loss of every frame and of the one after it where a motion ends (N,), eq. 12 or 11; and the summary's."""
         context = self.encode(batch.words, (batch.words != 0).sum(dim=1))
@@ -106,7 +112,7 @@ class LanguageToMotion(LanguageNet):
         fed = self._blurred(normal) if self.training else normal
         outputs = self.outputs(torch.cat([fed, flags[..., None]], dim=-1), context)
         # padded steps are left out before the output layer, which is the largest product of all
-        return self.head(outputs[active]), normal[active], flags[active]
+        return self.mixture(outputs[active]), normal[active], flags[active]
 
     def normal(self, batch: Batch) -> Tensor:
         """The normalised frames (B, T, D) of a batch."""
@@ -166,7 +172,7 @@ class Step(nn.Module):
     def forward(self, frame: Tensor, context: Tensor, state: Tensor) -> tuple[Tensor, ...]:
         """One frame."""
         following = self.net.decoder.step(frame.clamp(-LIMIT, LIMIT), context, state)
-        mixture = self.net.head(following)
+        mixture = self.net.mixture(following)
         stds = mixture.variances.sqrt()
         return mixture.log_weights, mixture.means, stds, mixture.active.sigmoid(), following
 
@@ -180,7 +186,7 @@ class Score(nn.Module):
 
     def forward(self, context: Tensor, frames: Tensor) -> Tensor:
         """Score known motions."""
-        mixture: Mixture = self.net.head(self.net.outputs(frames, context))
+        mixture = self.net.mixture(self.net.outputs(frames, context))
         return mixture.log_likelihood(frames[..., :-1], frames[..., -1])
 
 

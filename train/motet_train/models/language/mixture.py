@@ -18,7 +18,10 @@ DENSITY_FLOOR = 1e-8
 
 @dataclass(frozen=True, eq=False)
 class Mixture:
-    """The distribution of one frame: log_weights (..., K), means and variances (..., K, D), active (...) a logit."""
+    """The distribution of one frame: log_weights (..., K), means and variances (..., K, D), active (...) a logit.
+
+    A channel whose variance is 0 is dead: it is always at its mean, and no part of the density.
+    """
 
     log_weights: Tensor
     means: Tensor
@@ -52,8 +55,10 @@ class Mixture:
 
     def _log_densities(self, frames: Tensor) -> Tensor:
         """Of each channel under each component (..., K, D)."""
-        square = (frames[..., None, :] - self.means) ** 2 / self.variances
-        return -0.5 * (square + self.variances.log() + math.log(2 * math.pi))
+        living = self.variances > 0
+        variances = torch.where(living, self.variances, 1.0)
+        square = (frames[..., None, :] - self.means) ** 2 / variances
+        return torch.where(living, -0.5 * (square + variances.log() + math.log(2 * math.pi)), 0.0)
 
 
 class MixtureHead(nn.Module):
