@@ -48,9 +48,9 @@ def _sessions(files: Mapping[str, bytes], torch: Mapping[str, Graph]) -> dict[st
 
 
 def parity_of(run: Run, bundle: Bundle) -> dict[str, Any]:
-    """The parity report of a bundle that is there against a run; ExportError at the first rung that fails."""
+    """The parity report of an existing bundle against a run; ExportError at the first rung that fails."""
     if "int8" in bundle.manifest.parity:
-        raise ExportError(f"bundle {bundle.path} has weights of 8 bits, which torch has not; export without --int8")
+        raise ExportError(f"bundle {bundle.path} has 8-bit weights, which torch cannot check; export without --int8")
     return parity(bundle.manifest, {role: bundle.graph(role) for role in run.graphs()}, run.torch_graphs())
 
 

@@ -13,9 +13,9 @@ from motet_train.runs import Run
 @click.command()
 @click.argument("run", type=Path)
 @click.option("--out", required=True, type=Path, help="Bundle to write: a .zip, or a new folder.")
-@click.option("--int8", is_flag=True, help="Weights of 8 bits: a quarter of the size; says what changes.")
+@click.option("--int8", is_flag=True, help="8-bit weights: a quarter of the size; reports changes.")
 def export(run: Path, out: Path, int8: bool) -> None:
-    """Export the training run RUN to ONNX and pack it as a bundle, if ONNX Runtime gives what torch gives."""
+    """Export the training run RUN to ONNX as a bundle, if ONNX Runtime computes what torch does."""
     report = export_run(Run.load(run), out, int8)
     click.echo(_lines(report))
     for name, value in report.get("int8", {}).items():
@@ -28,7 +28,7 @@ def export(run: Path, out: Path, int8: bool) -> None:
 @click.argument("bundle")
 @click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
 def parity(run: Path, bundle: str, as_json: bool) -> None:
-    """Check again that BUNDLE computes what the training run RUN computes in torch."""
+    """Check that BUNDLE computes what the training run RUN computes in torch."""
     report = parity_of(Run.load(run), Bundle.open(bundle))
     click.echo(json.dumps(report) if as_json else _lines(report))
 

@@ -81,7 +81,7 @@ def _generate(model: GenerateModel) -> Named:
 
 
 def _generated(candidates: int | None, model: GenerateModel) -> Decoded:
-    """Three motions of each of eight sentences: normalised frames, lengths and log-likelihoods, and the contexts."""
+    """Three motions for each of eight sentences: normalised frames, lengths and log-likelihoods, and the contexts."""
     hypotheses = 3 if "hypotheses" in model.defaults else None
     rows = model.generate(_sentences(model), hypotheses, candidates=candidates, seed=7, max_seconds=4)
     found = [generated for row in rows for generated in row]

@@ -16,7 +16,7 @@ from motet.errors import BundleError, MotetError
 
 OPSET = 18
 MAX_IR_VERSION = 10
-"""The newest IR version that runtimes of the last years still read."""
+"""The newest IR version that older versions of ONNX Runtime still read."""
 
 
 class ExportError(MotetError, RuntimeError):
@@ -26,7 +26,7 @@ class ExportError(MotetError, RuntimeError):
 def export_graph(module: nn.Module, spec: GraphSpec, metadata: Mapping[str, str]) -> bytes:
     """Export ``module``, whose forward takes and gives the tensors of ``spec`` in order, as ONNX bytes.
 
-    Dynamic axes are those that the contract names. ``metadata`` goes into the graph so that a lone file is
+    Dynamic axes are those that the contract names. ``metadata`` goes into the graph so that a single file is
     identifiable. Raises ExportError where the result is not a self-contained, valid ONNX model.
     """
     rng = np.random.default_rng(0)

@@ -1,8 +1,8 @@
-"""The parity ladder: what ONNX Runtime gives is what torch gave, from the contract up to whole runs.
+"""The parity ladder: ONNX Runtime computes what torch does, from the contract up to complete runs.
 
 An error is the largest |a - b| of an output, over the root mean square of b or over |b| itself where those are above 1
 (frames in degrees, cells of an LSTM): float32 rounds in proportion to what it rounds.
-Every rung raises ExportError where its bound is not kept, so a bundle that differs is never written.
+Every rung raises ExportError where its bound is exceeded, so a bundle that differs is never written.
 """
 
 from collections.abc import Callable, Mapping

@@ -1,4 +1,4 @@
-"""Weights of 8 bits: a bundle of a quarter of the size, and what that changes in whole runs."""
+"""8-bit weights: a bundle of a quarter of the size, and what that changes in complete runs."""
 
 import logging
 import tempfile

@@ -1,4 +1,4 @@
-"""How fast a model runs here: whole calls as a user makes them, Python included."""
+"""How fast a model runs here: complete calls, as a user makes them."""
 
 import tempfile
 import time
@@ -19,19 +19,19 @@ from motet.models.predict import PredictModel
 from motet.models.text import EOS, SPECIALS
 
 BATCHES = (64, 256, 512, 1024, 2048, 4096)
-"""Numbers of characters among which the best is looked for."""
+"""Numbers of characters to find the best batch among."""
 
 BEAMS, WORDS, SECONDS = 5, 10, 7.0
-"""Of descriptions and of motions, all as long as these: so that a model's speed does not depend on what it says."""
+"""Lengths of all descriptions and motions, so that the speed does not depend on what a model produces."""
 
 FILE_SECONDS = 2.8
 """How long the motion in the file is that is described."""
 
 DRAWS = 100
-"""Sentences that a consensus is of."""
+"""Draws of a consensus."""
 
 TIMES = ("us", "ms")
-"""Units of which less is better."""
+"""Units where less is better."""
 
 Figures = dict[str, tuple[float, str]]
 
@@ -197,7 +197,7 @@ def _batch_rate(call: Callable[[list[Any]], object], given: list[Any], batch: in
 
 
 def rows(figures: Figures, baseline: Figures | None) -> list[Row]:
-    """Figures beside those of the baseline; a ratio above 1 is in favour of the figure, for times as for rates."""
+    """Figures beside those of the baseline; a ratio above 1 favours the figure, for times and rates alike."""
     result = []
     for name, (value, unit) in figures.items():
         other = baseline[name][0] if baseline else None

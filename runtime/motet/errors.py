@@ -1,4 +1,4 @@
-"""motet's own errors: each is also a builtin, and says what was wrong, where, and what would be right."""
+"""motet's own errors: each is also a builtin, and says what is wrong, where, and what was expected."""
 
 from pathlib import Path
 
@@ -24,7 +24,7 @@ class UnitError(MotionError):
 
 
 class FormatError(MotionError):
-    """A file that is not what its format promises: names the file, the line (from 1) and the reason."""
+    """A file that breaks its format's rules: names the file, the line (from 1) and the reason."""
 
     def __init__(self, path: str | Path, reason: str, line: int | None = None) -> None:
         self.path, self.reason, self.line = Path(path), reason, line
@@ -44,7 +44,7 @@ class TextError(MotetError, ValueError):
 
 
 class TextWarning(UserWarning):
-    """A sentence holds words that the model does not know; it goes on with UNK in their place."""
+    """A sentence has words that the model does not know; UNK takes their place."""
 
 
 class DecodingError(MotetError, ValueError):
@@ -67,4 +67,4 @@ class ScriptError(MotetError, ValueError):
 
 
 class OutputError(MotetError, OSError):
-    """A place that cannot be written to; nothing was written."""
+    """A path that cannot be written; nothing was written."""

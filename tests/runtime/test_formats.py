@@ -72,8 +72,8 @@ def test_a_unit_is_told_where_the_file_does_not_say_it(tmp_path: Path) -> None:
     assert read_motion(tmp_path / "b.npz", unit="cm").skeleton.metres_per_unit == 0.01
     write_motion(tmp_path / "c.csv", walker())
     for name, unit, said in (
-        ("b.npz", "m", "b.npz: its length unit is 0.01 m, as the file says, and not 1 m as given"),
-        ("c.csv", "m", "no skeleton, and so no length unit"),
+        ("b.npz", "m", "b.npz: its length unit is 0.01 m according to the file, not 1 m as given"),
+        ("c.csv", "m", "no skeleton, so it has no unit of length"),
         ("a.bvh", "mile", r"a.bvh: expected a length unit \(m, cm"),
         ("a.bvh", 0, "number of metres, not 0"),
         ("a.bvh", float("nan"), "number of metres, not nan"),

@@ -97,7 +97,7 @@ def test_unknown_words_are_named(model: GenerateModel) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "reason"), [("", "no words"), ("zebra", "knows no word"), ("walks " * 41, "41 words, and at most 40")]
+    ("text", "reason"), [("", "no words"), ("zebra", "knows no word"), ("walks " * 41, "41 words, but at most 40")]
 )
 def test_a_sentence_that_cannot_be_moved(model: GenerateModel, text: str, reason: str) -> None:
     with pytest.raises(TextError, match=reason):

@@ -55,7 +55,7 @@ def body(inner: bytes, number: int = 6) -> bytes:
         (doubling() + b"\0", "impossible number"),
         (doubling() + varint(1 << 35) + b"\0", "impossible number"),
         (doubling() + b"\xff" * 10, "does not end"),
-        (doubling() + field(7, 1), "a number stands where a message belongs"),
+        (doubling() + field(7, 1), "a number where a message belongs"),
         (doubling(field(7, b"\xff")), "is not UTF-8"),
         (bytes(1000), "impossible number"),
         (b"\x12\x06abORTM" + doubling(), "ONNX Runtime's own format"),

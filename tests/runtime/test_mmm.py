@@ -73,9 +73,9 @@ def test_only_the_first_motion_is_read(tmp_path: Path) -> None:
         (xml(frame(0), frame(0.01, "1 2 3")), "frame 1: JointPosition needs 2 values, not 3"),
         (xml(frame(0), frame(0.01, "1 nan")), "frame 1: JointPosition: 'nan' is not a finite number"),
         (xml(frame(0), frame(0.01, place="1 2")), "frame 1: RootPosition needs 3 values"),
-        (xml(frame(0)), "one frame alone does not say the frame rate"),
-        (xml(frame(0), frame(0.01), frame(0.02), frame(0.04), frame(0.05)), "frame 3: the time steps are not even"),
-        (xml(frame(0), frame(0)), "time steps are not even"),
+        (xml(frame(0)), "a single frame does not give the frame rate"),
+        (xml(frame(0), frame(0.01), frame(0.02), frame(0.04), frame(0.05)), "frame 3: the time steps are uneven"),
+        (xml(frame(0), frame(0)), "time steps are uneven"),
         (xml(frame(0), frame(0.01), joints=("a", "a")), "a name of its own"),
     ],
 )

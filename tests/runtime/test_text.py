@@ -122,7 +122,7 @@ def test_a_point_that_is_not_known_does_not_make_another_number() -> None:
 
 def test_a_long_sentence_is_refused_at_once() -> None:
     vocabulary, started = Vocabulary.of(SENTENCES), time.perf_counter()
-    with pytest.raises(TextError, match="400000 letters, and at most 2000"):
+    with pytest.raises(TextError, match="400000 letters, but at most 2000"):
         vocabulary.encode("a " * 200_000)
     assert time.perf_counter() - started < 0.1
 
@@ -165,7 +165,7 @@ def test_unknown_words_become_unk_and_are_named() -> None:
         ("", "has no words"),
         (" .,! ", "has no words"),
         ("colourless green ideas", "knows no word of 'colourless green ideas'; it knows words such as 0, a"),
-        ("walks " * (MAX_WORDS + 1), f"{MAX_WORDS + 1} words, and at most {MAX_WORDS}"),
+        ("walks " * (MAX_WORDS + 1), f"{MAX_WORDS + 1} words, but at most {MAX_WORDS}"),
     ],
 )
 def test_a_sentence_that_no_model_can_take(sentence: str, reason: str) -> None:

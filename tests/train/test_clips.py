@@ -64,7 +64,7 @@ def test_clips_that_do_not_go_together_are_named(tmp_path: Path) -> None:
     own_clips(tmp_path)
     walk = read_motion(CMU / "39_14.amc")
     write_motion(tmp_path / "half.npz", walk.select(walk.channels[:30]))
-    with pytest.raises(DataError, match=r"first\.bvh does not go with .*half\.npz: only one of them has"):
+    with pytest.raises(DataError, match=r"first\.bvh does not match .*half\.npz: only one of them has"):
         read_clips(tmp_path)
 
 

@@ -165,7 +165,7 @@ def test_what_is_no_corpus_is_refused(tmp_path: Path, own: Path) -> None:
     with pytest.raises(DataError, match="no such corpus"):
         read_corpus(tmp_path / "none")
     (tmp_path / "bad.zip").write_text("no zip")
-    with pytest.raises(DataError, match="neither a folder nor a whole zip"):
+    with pytest.raises(DataError, match="neither a folder nor a readable zip"):
         read_corpus(tmp_path / "bad.zip")
     with zipfile.ZipFile(tmp_path / "silent.zip", "w") as archive:
         archive.writestr("00001_mmm.xml", mmm_xml(10))
@@ -206,8 +206,8 @@ def test_bad_files_of_kit_are_named_and_skipped(tmp_path: Path) -> None:
     assert list(records) == ["6"]
     assert [skipped[name] for name in "137"] == ["no sentence"] * 3
     assert skipped["2"].startswith("2_mmm.xml, line ")
-    assert skipped["4"] == "4_annotations.json is no list of sentences"
-    assert skipped["5"].startswith("5_annotations.json is no JSON")
+    assert skipped["4"] == "4_annotations.json is not a list of sentences"
+    assert skipped["5"].startswith("5_annotations.json is not JSON")
 
 
 def test_a_damaged_zip_member_is_skipped(tmp_path: Path) -> None:

@@ -100,7 +100,7 @@ def test_a_run_is_evaluated_on_the_clips_that_it_was_trained_on(tmp_path: Path) 
     assert clips_of(f"motet train tdbn --data={tmp_path} --out x") == ("stroll",)
     assert clips_of("motet train tdbn --out x") == ("walk", "run", "bend")
     assert clips_of("motet train tdbn --data gone --out x", tmp_path) == ("stroll",)
-    with pytest.raises(DataError, match=r"runs/x was trained on, gone, are not here: give --data"):
+    with pytest.raises(DataError, match=r"runs/x was trained on, gone, are missing: give --data"):
         clips_of("motet train tdbn --data gone")
 
 

@@ -149,7 +149,7 @@ def test_the_mean_is_that_of_complete_actions(tmp_path: Path) -> None:
         (["train", "predict", "--data", "{data}/none", "--out", "{out}"], "no such corpus"),
         (["train", "predict", "--data", "{empty}", "--out", "{out}"], "no motion files"),
         (["evaluate", "{run}"], "need --data"),
-        (["evaluate", "{run}", "cmu-control", "--data", "{data}"], "apart"),
+        (["evaluate", "{run}", "cmu-control", "--data", "{data}"], "separately"),
         (["evaluate", "{run}", "--data", "{empty}"], "no motion files"),
     ],
 )

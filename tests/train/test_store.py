@@ -199,12 +199,12 @@ def test_a_store_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
 
 
 def test_a_folder_that_is_no_store_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match="no store"):
+    with pytest.raises(DataError, match="not a prepared store"):
         Store.open(tmp_path)
     prepare([cmu()], tmp_path / "store", PLAIN)
     frames = np.load(tmp_path / "store" / "frames.npy")
     np.save(tmp_path / "store" / "frames.npy", frames[:-1])
-    with pytest.raises(DataError, match="does not go with"):
+    with pytest.raises(DataError, match="does not match"):
         Store.open(tmp_path / "store")
 
 

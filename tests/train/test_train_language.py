@@ -100,7 +100,7 @@ def test_a_stopped_run_says_how_it_goes_on(store: Path, tmp_path: Path, monkeypa
     stop_at(monkeypatch, epoch=2)
     result = motet("train", "describe", "--data", store, "--out", out)
     assert result.exit_code == 1
-    assert "the same command with --resume goes on" in result.output
+    assert "the same command with --resume continues" in result.output
     assert {path.name for path in out.iterdir()} == {CHECKPOINT, LOG, SETTINGS, "run.json", "weights.pt"}
     assert Run.load(out).manifest["verb"] == "describe"
 
@@ -156,7 +156,7 @@ def test_refusals(store: Path, tmp_path: Path) -> None:
     assert "it exists" in motet(*refused, "--out", out).output
     result = motet(*refused, "--out", out, "--resume", "--seed", 1, "--batch", 8)
     assert result.exit_code == 2
-    assert "cannot go on: seed, batch" in result.output
+    assert "cannot be resumed: seed, batch" in result.output
     assert (out / CHECKPOINT).read_bytes() == before
     if not torch.cuda.is_available():
         assert "no CUDA device" in motet(*refused, "--out", tmp_path / "x", "--device", "cuda").output

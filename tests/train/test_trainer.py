@@ -333,7 +333,7 @@ def test_bad_trainings_are_named(tmp_path: Path) -> None:
         trained(learner, tmp_path)
     assert list(tmp_path.iterdir()) == []
     trained(regression(EPOCHS), tmp_path)
-    with pytest.raises(RunError, match="is not of this training"):
+    with pytest.raises(RunError, match="does not belong to this run"):
         trained(control(), tmp_path)
     (tmp_path / CHECKPOINT).write_bytes(b"nothing")
     with pytest.raises(RunError, match="cannot be read"):

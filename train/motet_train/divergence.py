@@ -17,7 +17,7 @@ EVERY = 200
 """Epochs from one checkpoint to the next, within a stage."""
 
 MANY = 1000
-"""More goals than there are."""
+"""More goals than exist."""
 
 
 class DivergenceLearner:
@@ -25,7 +25,7 @@ class DivergenceLearner:
 
     Each whole net is a candidate: the loss of contrastive divergence does not say how a figure moves. Kept is the
     first that misses no goal, which ends training, else the one that misses the fewest.
-    missed: the goals that the net misses; it may stop counting at the number given, which is no improvement. None
+    missed: the goals that the net misses; it may stop counting at the number given, as more is no improvement. None
     where there is nothing to choose. others: what else has a state.
     """
 
@@ -43,7 +43,7 @@ class DivergenceLearner:
         others: Mapping[str, Part],
     ) -> None:
         if distributed.count() > 1:
-            raise RunError("contrastive divergence learns in one process, without torchrun")
+            raise RunError("contrastive divergence trains in one process, without torchrun")
         self.kept: nn.Module = net
         self.stages, self.generator, self.missed = stages, generator, missed
         self.bounds = list(accumulate((stage.epochs for stage in stages), initial=0))

@@ -52,10 +52,10 @@ def refuse_other(path: Path, manifest: Mapping[str, Any]) -> None:
     try:
         before = _essence(json.loads(path.read_text()))
     except (AttributeError, TypeError, ValueError) as error:
-        raise RunError(f"{path} is not a run that can be continued: {error}") from error
+        raise RunError(f"{path} is not a run that can be resumed: {error}") from error
     different = [key for key, value in _essence(manifest).items() if before.get(key) != value]
     if different:
-        raise RunError(f"{path.parent} was started with other settings, and so cannot go on: {', '.join(different)}")
+        raise RunError(f"{path.parent} was started with other settings, so cannot be resumed: {', '.join(different)}")
 
 
 def _essence(manifest: Mapping[str, Any]) -> dict[str, Any]:

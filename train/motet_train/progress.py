@@ -1,4 +1,4 @@
-"""How far a training is: a bar on a terminal, elsewhere a line for each chunk; and TensorBoard."""
+"""The progress of a training: a bar on a terminal, elsewhere a line for each chunk; and TensorBoard."""
 
 import logging
 import sys
@@ -13,7 +13,7 @@ from motet_train.runs import RunError
 
 
 class Progress(Protocol):
-    """What hears of a training as it goes on; of its units, epochs or steps, ``done`` of ``total`` are done."""
+    """What is told about a training as it runs; of its units, epochs or steps, ``done`` of ``total`` are done."""
 
     def step(self, done: int, total: int, unit: str, loss: float) -> None:
         """After each step."""

@@ -35,7 +35,7 @@ MODELS: Mapping[str, Callable[[Mapping[str, Any]], Net]] = {
 
 
 class RunError(MotetError, ValueError):
-    """A training run that cannot be read, or cannot go on."""
+    """A training run that cannot be read, or not be resumed."""
 
 
 @dataclass(frozen=True, eq=False)

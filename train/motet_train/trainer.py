@@ -1,4 +1,4 @@
-"""The training loop of all models: chunk after chunk, each written down whole, so that a run can stop and go on.
+"""The training loop of all models: chunk after chunk, each written down whole, so that a run can stop and resume.
 
 What is trained is a :class:`Learner`. The random numbers of a chunk depend on the seed and the chunk's number alone.
 """
@@ -64,7 +64,7 @@ def train(learner: Learner, seed: int, folder: Path, progress: Progress = SILENT
     """Train to the end; ``learner.kept`` comes back with the weights to keep. Returns the log.
 
     After each chunk the existing ``folder`` holds ``log.jsonl``, the weights to keep and a checkpoint, each written
-    whole. Where there is a checkpoint, training goes on after it, on the CPU to the same bits as if it had never
+    whole. Where there is a checkpoint, training resumes after it, on the CPU to the same bits as if it had never
     stopped. RunError where the checkpoint cannot be read or is another training's, or the loss is no longer finite.
     """
     log = _resume(folder / CHECKPOINT, learner)
@@ -131,7 +131,7 @@ def _done(log: Sequence[Line], learner: Learner) -> bool:
 
 
 def _write(folder: Path, learner: Learner, log: Sequence[Line]) -> None:
-    """Write a chunk down. The checkpoint goes last: a crash before it repeats the chunk, to the same weights."""
+    """Persist a chunk; the checkpoint goes last, so a crash repeats the chunk, to the same weights."""
     if kept(log, learner.keep) is log[-1]:
         write_whole(folder / WEIGHTS, to_bytes(learner.kept.state_dict()))
     write_whole(folder / LOG, "".join(json.dumps(line) + "\n" for line in log))
@@ -150,4 +150,4 @@ def _resume(path: Path, learner: Learner) -> list[Line]:
         log: list[Line] = saved["log"]
         return log
     except (KeyError, TypeError, ValueError, RuntimeError, pickle.UnpicklingError) as error:
-        raise RunError(f"the checkpoint {path} is not of this training: {error}") from error
+        raise RunError(f"the checkpoint {path} does not belong to this run: {error}") from error

@@ -68,7 +68,7 @@ class Bundle:
                 raise BundleError(f"{name!r} is not in its manifest")
             data = self._read(name, declared.size)
             if entry(data) != declared:
-                raise BundleError(f"the file {name!r} was altered: it is not what the manifest lists")
+                raise BundleError(f"the file {name!r} was altered: it differs from the manifest")
             return data
 
     def graph(self, role: str, options: SessionOptions | None = None) -> OnnxGraph:
@@ -120,7 +120,7 @@ def find_bundle(name_or_path: str | Path) -> Path:
         fault = "neither a folder nor a file" if path.exists() else "no such path"
     except (OSError, ValueError) as error:
         fault = str(error)
-    raise BundleError(f"unknown bundle {str(name_or_path)!r}: {fault}, and known names are {', '.join(known)}")
+    raise BundleError(f"unknown bundle {str(name_or_path)!r}: {fault}; expected one of {', '.join(known)}")
 
 
 def list_bundles() -> dict[str, Path]:

@@ -118,7 +118,7 @@ def _array(member: str, content: bytes) -> NDArray[Any]:
         shape, fortran, dtype = np.lib.format.read_array_header_1_0(file)
         rest = content[file.tell() :]
         if version != (1, 0) or fortran or dtype.str not in DTYPES or math.prod(shape) * dtype.itemsize != len(rest):
-            raise ValueError("expected float32, float64 or int64 in C order, and nothing behind it")
+            raise ValueError("expected float32, float64 or int64 in C order, and nothing after it")
         return np.frombuffer(rest, dtype).reshape(shape)
     except _NOT_AN_ARRAY as error:
         raise BundleError(f"the golden vectors hold {member!r}, which is not a plain array: {error}") from error

@@ -189,7 +189,7 @@ def _check(found: list[Any], declared: tuple[TensorSpec, ...], kind: str) -> Non
     for name in actual.keys() | wanted.keys():
         if actual.get(name) != wanted.get(name):
             raise BundleError(
-                f"the graph does not keep its contract: {kind} {name!r} is {actual.get(name, 'absent')}, "
+                f"the graph does not match its contract: {kind} {name!r} is {actual.get(name, 'absent')}, "
                 f"declared {wanted.get(name, 'nowhere')}"
             )
 

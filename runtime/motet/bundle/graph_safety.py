@@ -83,7 +83,7 @@ def _fault(kind: str, number: int, value: Value) -> str | None:
     if number not in MESSAGES[kind].plain:
         return f"has the unknown field {number}"
     if number == MESSAGES[kind].domain and (domain := _text(value)) not in DOMAINS:
-        return f"needs operators of the domain {domain[:60]!r}; only those of ONNX itself are run"
+        return f"needs operators of the domain {domain[:60]!r}; only ONNX's own are allowed"
     return None
 
 
@@ -105,5 +105,5 @@ def _text(value: Value) -> str:
 
 def _bytes(value: Value) -> memoryview:
     if isinstance(value, int):
-        raise BundleError("the graph is not valid ONNX: a number stands where a message belongs")
+        raise BundleError("the graph is not valid ONNX: a number where a message belongs")
     return value

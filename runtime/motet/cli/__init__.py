@@ -13,19 +13,19 @@ from motet.cli.notes import show_log
 from motet.errors import MotetError
 
 COMMANDS = {
-    "describe": ("motet.cli.describe:describe", "", "Motion files in, ranked sentences out."),
-    "generate": ("motet.cli.generate:generate", "", "Sentences in, motion files out."),
-    "predict": ("motet.cli.predict:predict", "", "Motion files in, what follows them out."),
-    "control": ("motet.cli.control:control", "", "A script such as 'walk 3s, run 3s' in, a motion file out."),
-    "embed": ("motet.cli.embed:embed", "", "Context vectors of motions or sentences, for search and clusters."),
-    "convert": ("motet.cli.convert:convert", "", "Motion files to other formats, rates and units."),
-    "view": ("motet.cli.convert:view", "", "A web page that plays a motion file."),
-    "bundle": ("motet.cli.bundle:bundle", "", "List, inspect, verify and pack bundles: the models."),
-    "bench": ("motet.cli.bench:bench", "", "How fast the models run on this machine."),
-    "prepare": ("motet_train.cli.prepare:prepare", "train", "Motion files and sentences to a store for training."),
+    "describe": ("motet.cli.describe:describe", "", "Describe motions in ranked sentences."),
+    "generate": ("motet.cli.generate:generate", "", "Generate motions from sentences."),
+    "predict": ("motet.cli.predict:predict", "", "Predict how motions continue."),
+    "control": ("motet.cli.control:control", "", "Run a script such as 'walk 3s, run 3s'."),
+    "embed": ("motet.cli.embed:embed", "", "Write context vectors of motions or sentences."),
+    "convert": ("motet.cli.convert:convert", "", "Convert motion files to other formats, rates, units."),
+    "view": ("motet.cli.convert:view", "", "Write a web page that plays a motion."),
+    "bundle": ("motet.cli.bundle:bundle", "", "List, inspect, verify and pack models (bundles)."),
+    "bench": ("motet.cli.bench:bench", "", "Measure how fast a model runs here."),
+    "prepare": ("motet_train.cli.prepare:prepare", "train", "Turn motions and sentences into a store to train on."),
     "train": ("motet_train.cli.train:train", "train", "Train a model."),
     "evaluate": ("motet_train.cli.evaluate:evaluate", "evaluate", "Measure a trained run or a bundle."),
-    "export": ("motet_export.cli:export", "export", "A trained run to a bundle."),
+    "export": ("motet_export.cli:export", "export", "Export a trained run as a bundle."),
     "parity": ("motet_export.cli:parity", "export", "Compare a bundle with the trained run it came from."),
 }
 """Command -> where it is, the extra that it needs, and what it does."""
@@ -87,9 +87,9 @@ def missing(extra: str) -> list[str]:
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
-@click.option("-q", "--quiet", is_flag=True, help="Say nothing on stderr but errors.")
-@click.option("-v", "--verbose", is_flag=True, help="Say on stderr what is done, such as resampling.")
+@click.option("-q", "--quiet", is_flag=True, help="Print only errors on stderr.")
+@click.option("-v", "--verbose", is_flag=True, help="Print on stderr what is done, such as resampling.")
 @click.version_option(package_name="motet")
 def main(quiet: bool, verbose: bool) -> None:
-    """Models of human motion that run anywhere: describe, generate, predict, control."""
+    """Models of human motion that describe, generate, predict and control."""
     show_log(logging.ERROR if quiet else logging.INFO if verbose else logging.WARNING)

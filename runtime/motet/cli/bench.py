@@ -15,12 +15,12 @@ from motet.models.load import load
 
 @click.command()
 @click.option("--bundle", default="cmu-control", show_default=True, help="Name or path of a bundle.")
-@click.option("--motion", type=Path, help="Motion file to describe.  [default: one of 2.8 s that is made for it]")
+@click.option("--motion", type=Path, help="Motion file to describe.  [default: a generated one of 2.8 s]")
 @click.option("--seconds", default=1.0, show_default=True, help="How long to measure each figure.")
 @session_options
 @click.option("--json", "as_json", is_flag=True, help="Print a list of rows.")
 def bench(bundle: str, motion: Path | None, seconds: float, as_json: bool, session: SessionOptions) -> None:
-    """Measure a bundle's speed, beside torch eager where torch is installed."""
+    """Measure a bundle's speed, and torch's where it is installed."""
     model = load(bundle, session)
     found = figures(model, seconds, motion)
     baseline = None

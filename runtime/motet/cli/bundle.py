@@ -19,13 +19,13 @@ _NAME = click.argument("name")
 
 @click.group()
 def bundle() -> None:
-    """Look at bundles: the models that motet runs. NAME is a default bundle's name, or a folder or zip."""
+    """List, inspect, verify and pack models (bundles). NAME is the name of a bundle, or its folder or zip."""
 
 
 @bundle.command("list")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def list_(as_json: bool) -> None:
-    """List the bundles that come with motet."""
+    """List the bundles that ship with motet."""
     rows = [_row(Bundle.open(path)) for path in list_bundles().values()]
     if as_json:
         click.echo(json.dumps(rows))
@@ -45,7 +45,7 @@ def _row(bundle: Bundle) -> dict[str, Any]:
 @_NAME
 @click.option("--json", "as_json", is_flag=True, help="Print the whole manifest.")
 def info(name: str, as_json: bool) -> None:
-    """Describe a bundle: what it takes and gives, its licence, parity and quality."""
+    """Show a bundle's inputs and outputs, licence, parity and quality."""
     manifest = Bundle.open(name).manifest
     if as_json:
         click.echo(json.dumps(manifest.source, indent=1))
@@ -71,11 +71,11 @@ def _tree(values: dict[str, Any], indent: str = "  ") -> None:
 @_NAME
 @session_options
 def verify(name: str, session: SessionOptions) -> None:
-    """Check that a bundle works here: its files and graphs, its model, and its golden vectors computed again."""
+    """Check that a bundle works here: its files and graphs, its model, and its golden vectors, replayed."""
     opened = Bundle.open(name)
     found = verify_bundle(opened, session)
     worst = max(found.errors, key=found.errors.__getitem__)
-    click.echo(f"{opened.path}: {len(found.files)} files are as the manifest lists them")
+    click.echo(f"{opened.path}: {len(found.files)} files match the manifest")
     click.echo(f"the model runs on {', '.join(found.providers)}")
     click.echo(
         f"golden vectors: the largest difference is {found.errors[worst]:.1e} ({worst}), tolerance {found.tolerance:g}"

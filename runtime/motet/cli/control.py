@@ -1,4 +1,4 @@
-"""``motet control``: a script in, a moving figure out."""
+"""``motet control``: from a script to a motion."""
 
 from pathlib import Path
 
@@ -18,17 +18,17 @@ from motet.models.script import parse_script, starts_of
 @click.argument("script")
 @out_option
 @click.option("--bundle", default="cmu-control", show_default=True, help="Name or path of a bundle.")
-@click.option("--start", help="Label to start in, or a motion file to carry on. [default: the script's first label]")
+@click.option("--start", help="Label to start in, or a motion file to continue. [default: the script's first label]")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the noise.")
 @click.option(
-    "--variety", type=click.FloatRange(0, 1), default=0.0, show_default=True, help="0 always alike, 1 fully sampled."
+    "--variety", type=click.FloatRange(0, 1), default=0.0, show_default=True, help="0: always alike; 1: fully sampled."
 )
 @click.option(
     "--temperature",
     type=click.FloatRange(0.01, 100),
     help="Sampling temperature; lower is more deterministic. [default: the bundle's]",
 )
-@click.option("--in-place", is_flag=True, help="Keep the root where it is, instead of laying its path.")
+@click.option("--in-place", is_flag=True, help="Leave the root in place, without a path.")
 @session_options
 @read_options
 def control(
@@ -45,7 +45,7 @@ def control(
 ) -> None:
     """Run SCRIPT, such as "walk 3s, walk>run 2s, run 3s", and write the motion.
 
-    Segments have commas between them: a label and seconds; a ramp "walk>run 5s"; a mix "walk*.3+run*.7 2s".
+    Segments are separated by commas: a label and seconds; a ramp "walk>run 5s"; a mix "walk*.3+run*.7 2s".
     """
     check_writable(out)
     model = load_as(ControlModel, bundle, session)

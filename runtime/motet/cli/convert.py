@@ -1,4 +1,4 @@
-"""``motet convert`` and ``motet view``: motion files from one format to another, or to a page that plays."""
+"""``motet convert`` and ``motet view``: motion files from one format to another, or to a page that plays them."""
 
 import tempfile
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from motet.motion.units import METRES
 
 
 @click.command(
-    help=f"""Convert motion files; the extensions say the formats: IN OUT, or IN... -o OUT.
+    help=f"""Convert motion files; the extensions give the formats: IN OUT, or IN... -o OUT.
 
     With several files OUT holds {{name}} for their names, as in -o 'bvh/{{name}}.bvh', or the results are numbered.
 

@@ -32,7 +32,7 @@ def embed(
     session: SessionOptions,
     read: Read,
 ) -> None:
-    """Write context vectors of motion files, or of sentences, one row for each: for search and clusters.
+    """Write context vectors of motion files, or of sentences, one row each, to compare and cluster.
 
     Motions have those of a bundle that describes, sentences those of one that generates; the two are not comparable.
     A file that fails has no row.

@@ -21,12 +21,12 @@ from motet.models.load import load_as
 @out_option
 @click.option("--bundle", default="cmu-generate", show_default=True, help="Name or path of a bundle.")
 @click.option(
-    "--hypotheses", type=click.IntRange(1, 100), help="Motions that are kept while decoding. [default: the bundle's]"
+    "--hypotheses", type=click.IntRange(1, 100), help="Hypotheses kept while decoding. [default: the bundle's]"
 )
 @click.option(
     "--candidates",
     type=click.IntRange(1, 100),
-    help="Frames drawn for each; 1: independent samples. [default: the bundle's]",
+    help="Draws per hypothesis; 1: independent samples. [default: the bundle's]",
 )
 @click.option("--temperature", type=click.FloatRange(0.01, 100), help="Sampling temperature. [default: the bundle's]")
 @click.option("--max-seconds", type=click.FloatRange(0, 600), help="Maximum length in seconds. [default: the bundle's]")

@@ -27,7 +27,7 @@ def show_log(level: int) -> None:
 
 @contextmanager
 def text_notes() -> Iterator[None]:
-    """Unknown words are logged, once for each sentence."""
+    """Log unknown words, once for each sentence."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", TextWarning)
         yield

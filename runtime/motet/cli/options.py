@@ -20,7 +20,7 @@ def session_options(command: Callable[..., Any]) -> Callable[..., Any]:
         type=click.IntRange(1, MAX_THREADS),
         default=1,
         show_default=True,
-        help="Threads within one call of a graph.",
+        help="Threads within a graph call.",
     )
     @click.option(
         "--provider",

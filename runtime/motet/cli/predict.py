@@ -1,4 +1,4 @@
-"""``motet predict``: motion files in, what follows them out."""
+"""``motet predict``: how motions continue."""
 
 from pathlib import Path
 
@@ -16,8 +16,8 @@ from motet.models.predict import PredictModel
 @click.argument("sources", nargs=-1, required=True, type=Path, metavar="MOTION...")
 @out_option
 @click.option("--bundle", default="cmu-predict", show_default=True, help="Name or path of a bundle.")
-@click.option("--frames", type=click.IntRange(1, 100_000), help="How many to predict. [default: the bundle's horizon]")
-@click.option("--append", is_flag=True, help="Write the motion too, and what follows behind it.")
+@click.option("--frames", type=click.IntRange(1, 100_000), help="Frames to predict. [default: the bundle's horizon]")
+@click.option("--append", is_flag=True, help="Write the motion too, then the prediction.")
 @session_options
 @read_options
 def predict(
@@ -29,7 +29,7 @@ def predict(
     session: SessionOptions,
     read: Read,
 ) -> None:
-    """Carry motion files on from their last frames, and write what follows.
+    """Continue motion files from their last frames, and write the predictions.
 
     A file must have the joints of the bundle's figure; the frames come at the bundle's frame rate. With several files
     OUT holds {name} for their names, or the results are numbered: out-1.bvh, out-2.bvh, ...

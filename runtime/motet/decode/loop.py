@@ -1,4 +1,4 @@
-"""What a decoding loop says of itself: the verb it is for, and its settings with their ranges."""
+"""The record of a decoding loop: the verb it is for, and its settings with their ranges."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

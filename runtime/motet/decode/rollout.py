@@ -30,9 +30,9 @@ def zero_state(step: Graph, rows: int, given: Collection[str] = ()) -> State:
 
 
 def two_rows(indices: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Indices of rows to run, a lone one twice.
+    """Indices of the rows to run, a single one twice.
 
-    A matrix product rounds a lone row otherwise than a row among others; so a row gives, to the bit and with one
+    A matrix product rounds a single row differently from a row among others; so a row gives, to the bit and with one
     thread, what it gives in any batch.
     """
     return np.repeat(indices, 2) if len(indices) == 1 else indices

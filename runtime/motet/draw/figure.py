@@ -39,12 +39,12 @@ def figure_of(motion: Motion) -> Figure:
     """The figure of a motion; MotionError if it has no skeleton, no frames or positions far beyond any stage."""
     skeleton = skeleton_of(motion)
     if not len(motion):
-        raise MotionError("this motion has no frames: there is nothing to show")
+        raise MotionError("this motion has no frames to show")
     skeleton, places = _moving_part(motion, skeleton)
     body = Body(skeleton)
     points = places / body.height
     if not np.abs(points).max() < LARGEST:
-        raise MotionError(f"joints are further than {LARGEST:g} body heights from the origin: this cannot be shown")
+        raise MotionError(f"joints are further than {LARGEST:g} body heights from the origin: too far to be shown")
     points[:, :, 1] -= _ground(points, moves=f"{skeleton.names[0]}.ty" in motion.channels)
     return Figure(body.points(points), body.bones, _heading(points[0], body.sides), motion.fps)
 

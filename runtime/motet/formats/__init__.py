@@ -139,8 +139,8 @@ def _format(file: File, format: str | None, allowed: tuple[str, ...], verb: str)
 def _in_unit(path: Path, motion: Motion, unit: float) -> Motion:
     """The motion with the length unit that its file does not say, or says alike."""
     if motion.skeleton is None:
-        raise FormatError(path, "it has no skeleton, and so no length unit that could be given")
+        raise FormatError(path, "it has no skeleton, so it has no unit of length")
     said = motion.skeleton.metres_per_unit
     if said is not None and not math.isclose(said, unit, rel_tol=1e-6):
-        raise FormatError(path, f"its length unit is {said:.6g} m, as the file says, and not {unit:.6g} m as given")
+        raise FormatError(path, f"its length unit is {said:.6g} m according to the file, not {unit:.6g} m as given")
     return motion.with_unit(unit) if said is None else motion

@@ -34,15 +34,15 @@ def read(file: File, asf: str | Path | None = None, fps: float | None = None, pa
 
     asf: the skeleton; if not given, the file of the same stem, else of the same subject (``39.asf`` for
         ``39_14.amc``), else the only ASF file, looked for beside the motion and then in ``../asf``.
-    fps: AMC does not say. If not given: what the file's own comment ``# fps 60`` says (motet writes one), else 120,
+    fps: AMC does not state it. If not given: that of the file's comment ``# fps 60`` (motet writes one), else 120,
         the rate of nearly all of CMU. A comment that says something else is an error.
     partial: take the complete frames of a file that breaks off within its last one, which is refused otherwise.
     Channels come in the file's order of bones, units "length" for translations, "deg" or "rad" as in the file.
-    FormatError names the file, and the line where it breaks off or does not fit the skeleton.
+    FormatError names the file, and the line where it is cut or wrong.
     """
     path, text = place_of(file), read_text(file)
     if asf is None and not isinstance(file, str | Path):
-        raise FormatError(path, "a file object has no folder where its skeleton would be: give it as asf")
+        raise FormatError(path, "a file object has no folder to find its skeleton in: give it as asf")
     skeleton = read_skeleton(asf if asf is not None else _find_asf(path))
     header, unit, said_fps = _header(path, text, skeleton)
     layout = _layout(path, _frame_lines(text, header), skeleton.dofs)
@@ -55,7 +55,7 @@ def read(file: File, asf: str | Path | None = None, fps: float | None = None, pa
 
 def _rate(path: Path, said: float | None, given: float | None) -> float:
     if said is not None and given is not None and abs(said - given) > 1e-6 * said:
-        raise FormatError(path, f"its frame rate is {said:g}, as the file says, and not {given:g} as given")
+        raise FormatError(path, f"its frame rate is {said:g} according to the file, not {given:g} as given")
     return frame_rate(CMU_FPS if said is None and given is None else said or given or 0.0, path)
 
 
@@ -91,7 +91,7 @@ def _header(path: Path, text: str, asf: Asf) -> tuple[int, str, float | None]:
 
 
 def _frame_lines(text: str, header: int) -> Iterator[tuple[int, list[str]]]:
-    """Every line with words behind the header, with its number."""
+    """Every line with words after the header, and its number."""
     for line, content in enumerate(re.finditer(EACH_LINE, text), start=1):
         words = content[0].split("#")[0].split()
         if words and line > header:
@@ -104,14 +104,14 @@ def _layout(path: Path, lines: Iterator[tuple[int, list[str]]], dofs: Mapping[st
     if not words[0]:
         return [(bone, len(names)) for bone, names in dofs.items()]
     if not _is_frame_number(words):
-        reason = f"a frame begins with its number alone on a line, not {quoted(' '.join(words))}"
+        reason = f"a frame starts with its number alone on a line, not {quoted(' '.join(words))}"
         raise FormatError(path, reason, line)
     layout: dict[str, int] = {}
     for line, words in lines:
         if _is_frame_number(words):
             break
         if words[0] in layout:
-            raise FormatError(path, f"bone {quoted(words[0])} comes twice in a frame", line)
+            raise FormatError(path, f"bone {quoted(words[0])} appears twice in a frame", line)
         if words[0] not in dofs:
             raise FormatError(path, f"bone {quoted(words[0])} has no degrees of freedom in the skeleton file", line)
         layout[words[0]] = len(dofs[words[0]])
@@ -183,7 +183,7 @@ def _values_by_line(path: Path, lines: Iterator[tuple[int, list[str]]], layout: 
 
 def _refuse_rest(path: Path, expected: Layout, line: int) -> None:
     if expected:
-        raise FormatError(path, f"the frame breaks off here: it lacks bone {expected[-1][0]!r}", line)
+        raise FormatError(path, f"truncated frame: it lacks bone {expected[-1][0]!r}", line)
 
 
 def write(file: File, motion: Motion) -> None:
@@ -196,7 +196,7 @@ def write(file: File, motion: Motion) -> None:
     moves within its parent's frame; MotionError for a motion without skeleton.
     """
     if not isinstance(file, str | Path):
-        raise FormatError(place_of(file), "AMC is two files, which do not go into one file object")
+        raise FormatError(place_of(file), "AMC is two files, which one file object cannot hold")
     path = check_place(file)
     motion, moving = with_still_offsets(path, motion)
     if moving:

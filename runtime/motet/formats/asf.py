@@ -162,7 +162,7 @@ def _bone(path: Path, begin: int, lines: Lines, factor: float) -> _Bone:
 def _triple(path: Path, line: int, words: list[str]) -> Triple:
     values = numbers(words, path, line)
     if len(values) != 3:
-        raise FormatError(path, f"three numbers are needed here, not {len(values)}", line)
+        raise FormatError(path, f"expected three numbers, not {len(values)}", line)
     return values[0], values[1], values[2]
 
 
@@ -199,7 +199,7 @@ def _hang_children(path: Path, lines: Lines, bones: dict[str, _Bone]) -> None:
                 raise FormatError(path, f"the hierarchy has a bone {quoted(name)}, which :bonedata does not have", line)
         for child in words[1:]:
             if child in hung:
-                raise FormatError(path, f"bone {quoted(child)} hangs on two bones", line)
+                raise FormatError(path, f"bone {quoted(child)} has two parents", line)
             hung.add(child)
             bones[words[0]].children.append(child)
 

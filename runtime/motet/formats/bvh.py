@@ -53,8 +53,8 @@ def read(file: File, partial: bool = False) -> Motion:
     kept = _without_broken_end(lines, start, len(channels)) if partial else lines
     values = _values(path, kept, start, len(channels)) if channels else np.zeros((declared, 0))
     if len(values) != declared and not partial:
-        reason = f"the file declares {declared} frames and holds {len(values)}: correct the line 'Frames:'"
-        raise FormatError(path, f"{reason}, or read it as partial", start)
+        reason = f"the file declares {declared} frames but holds {len(values)}: correct the line 'Frames:'"
+        raise FormatError(path, f"{reason}, or read it with partial=True (--partial)", start)
     units = tuple("deg" if name[-2] == "r" else "length" for name in channels)
     return Motion(values, tuple(channels), units, fps, Skeleton(tuple(_joint(path, node) for node in nodes)))
 
@@ -76,7 +76,7 @@ def _joint(path: Path, node: _Node) -> Joint:
 
 
 def _hierarchy(path: Path, lines: list[str]) -> tuple[list[_Node], int]:
-    """The joints, and the number of the line MOTION behind them."""
+    """The joints, and the number of the line MOTION after them."""
     nodes: list[_Node] = []
     open_nodes: list[int] = []
     names = Names()
@@ -86,7 +86,7 @@ def _hierarchy(path: Path, lines: list[str]) -> tuple[list[_Node], int]:
         match keyword.lower():
             case "root" | "joint" | "end" as kind:
                 if declared or bool(open_nodes) == (kind == "root") or (nodes and not open_nodes):
-                    reason = f"{quoted(statement)} does not belong here: a file holds one tree of joints"
+                    reason = f"{quoted(statement)} does not belong here: expected a single tree of joints"
                     raise FormatError(path, reason, line)
                 parent = open_nodes[-1] if open_nodes else -1
                 wanted = nodes[parent].name + END_SUFFIX if kind == "end" else rest.strip() or "joint"
@@ -172,7 +172,7 @@ def _without_broken_end(lines: list[str], start: int, width: int) -> list[str]:
 
 
 def _values(path: Path, lines: list[str], start: int, width: int) -> Array:
-    """The frames (T, width) behind the header, one to a line or not; FormatError where one breaks off."""
+    """The frames (T, width) behind the header, one to a line or not; FormatError where one is truncated."""
     text = "\n".join(lines[start:])
     words = text.split()
     try:
@@ -184,9 +184,9 @@ def _values(path: Path, lines: list[str], start: int, width: int) -> Array:
     for line, content in enumerate(lines[start:], start=start + 1):
         row = numbers(content.split(), path, line)
         if len(words) % width and len(row) not in (0, width):
-            reason = f"the frame breaks off: a frame has {width} values, this line {len(row)}"
+            reason = f"truncated frame: a frame has {width} values, this line has {len(row)}"
             raise FormatError(path, reason, line)
-    raise FormatError(path, f"{len(words)} values are not complete frames of {width}")
+    raise FormatError(path, f"{len(words)} values do not make complete frames of {width}")
 
 
 def write(file: File, motion: Motion) -> None:

@@ -34,9 +34,9 @@ def read(file: File) -> Motion:
             elif len(row) == len(header):
                 rows.append(numbers(row, path, reader.line_num))
             else:
-                raise FormatError(path, f"a row has {len(header)} values, this one {len(row)}", reader.line_num)
+                raise FormatError(path, f"expected {len(header)} values, not {len(row)}", reader.line_num)
     except csv.Error as error:
-        raise FormatError(path, f"this is not a table: {error}", reader.line_num) from error
+        raise FormatError(path, f"not a table: {error}", reader.line_num) from error
     names, units = _columns(path, header or [])
     table = np.array(rows).reshape(len(rows), 1 + len(names))
     return Motion(table[:, 1:], names, units, fps or _fps_of(path, table[:, 0]))

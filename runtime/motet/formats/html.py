@@ -79,5 +79,5 @@ def _bone(bone: Bone) -> list[int | float | str]:
 def _checked(captions: Captions) -> list[list[float | str]]:
     starts = [start for start, _ in captions]
     if not all(math.isfinite(start) for start in starts) or starts != sorted(starts):
-        raise MotionError(f"captions must start at seconds that do not decrease, not at {starts}")
+        raise MotionError(f"captions must start at times that do not decrease, not at {starts}")
     return [[float(start), text] for start, text in captions]

@@ -33,7 +33,7 @@ def read_text(file: File) -> str:
     """
     content = read_bytes(file)
     if b"\0" in content:
-        raise FormatError(place_of(file), "this is not a text file")
+        raise FormatError(place_of(file), "not a text file")
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:

@@ -24,7 +24,7 @@ CHUNK = 2**20
 """Bytes that the XML parser is given at once: it starts anew on a token that is longer, so few large ones are fast."""
 
 PARTS = {"Timestep": 1, "RootPosition": 3, "RootRotation": 3}
-"""Element of a frame -> how many numbers it has; behind these come the joints' angles."""
+"""Element of a frame -> how many numbers it has; after these come the joints' angles."""
 
 
 def read(file: File) -> Motion:
@@ -47,19 +47,19 @@ def read(file: File) -> Motion:
     if len(set(joints)) != len(joints) or not all(joints):
         raise FormatError(path, "each joint of the JointOrder needs a name of its own")
     if not joints or not frames:
-        raise FormatError(path, "this is not an MMM motion: it needs a Motion with JointOrder and MotionFrames")
+        raise FormatError(path, "not an MMM motion: it needs a Motion with JointOrder and MotionFrames")
     rows = np.array(frames)
     values = np.column_stack([_root(rows[:, 1:4], rows[:, 4:7]), rows[:, 7:]])
     return Motion(values, (*ROOT, *joints), ROOT_UNITS + ("rad",) * len(joints), _fps(path, rows[:, 0]))
 
 
 def motion_name(file: File) -> str:
-    """The name of the first motion, which in KIT's files says who moved; empty if it has none."""
+    """The name of the first motion, which in KIT's files tells who moved; empty if it has none."""
     return next((element.get("name", "") for element in _elements(file, "start") if element.tag == "Motion"), "")
 
 
 def _elements(file: File, event: Literal["start", "end"] = "end") -> Iterator[ElementTree.Element]:
-    """The elements up to the end of the first motion, as they come; nothing behind it is looked at."""
+    """The elements up to the end of the first motion, as they come; nothing after it is read."""
     path, content = place_of(file), read_bytes(file)
     parser: ElementTree.XMLPullParser[Any] = ElementTree.XMLPullParser([event])
     try:
@@ -100,8 +100,8 @@ def _root(positions: Array, rotations: Array) -> Array:
 def _fps(path: Path, times: Array) -> float:
     steps = np.diff(times)
     if not len(steps):
-        raise FormatError(path, "one frame alone does not say the frame rate")
+        raise FormatError(path, "a single frame does not give the frame rate")
     uneven = np.flatnonzero(np.abs(steps - steps.mean()) > 0.5 * abs(steps.mean()))
     if steps.mean() <= 0 or len(uneven):
-        raise FormatError(path, f"frame {uneven[0] + 1 if len(uneven) else 1}: the time steps are not even")
+        raise FormatError(path, f"frame {uneven[0] + 1 if len(uneven) else 1}: the time steps are uneven")
     return frame_rate(round(float(1 / steps.mean()), 3), path)

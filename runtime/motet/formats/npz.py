@@ -40,7 +40,7 @@ def read(file: File) -> Motion:
         raise
     # a damaged archive makes zipfile, its unpackers, numpy and json raise errors of a dozen types
     except Exception as error:
-        raise FormatError(path, f"this is not a motion that motet wrote as .npz: {str(error)[:200]}") from error
+        raise FormatError(path, f"not a motion that motet wrote as .npz: {str(error)[:200]}") from error
 
 
 def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:

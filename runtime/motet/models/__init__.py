@@ -1,1 +1,1 @@
-"""What a user holds: one model for each verb."""
+"""The models that a user works with, one for each verb."""

@@ -14,7 +14,7 @@ from motet.errors import BundleError
 
 
 class BundleModel:
-    """A model that runs graphs; without state, so that requests and threads share it.
+    """A model that runs graphs; without state, so that requests and threads can share it.
 
     manifest: of a bundle of the model's verb, or of a training run.
     graphs: by role.

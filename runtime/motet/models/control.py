@@ -1,4 +1,4 @@
-"""Control: a figure, or thousands, that move as they are told, tick by tick."""
+"""Control: one figure, or thousands, moved tick by tick by control values."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ MAX_CHARACTERS = 100_000
 
 
 class ControlModel(BundleModel):
-    """A model of labelled motions that runs live; shared between any number of sessions and threads.
+    """A model of labelled motions that runs live; any number of sessions and threads share it.
 
     manifest: of a control bundle, or of a training run with the same keys.
     graphs: "encoder" (frames -> codes) and "step" (history, control, noise, variety, temperature -> codes, frame,
@@ -67,14 +67,14 @@ class ControlModel(BundleModel):
         temperature: float | None = None,
         iterations: int | None = None,
     ) -> "ControlSession":
-        """A session of ``characters`` figures that start alike.
+        """A session of ``characters`` figures with the same start.
 
-        start: a label of the model, or a motion whose last frames are carried on; default is the first label. A
+        start: a label of the model, or a motion to continue from its last frames; by default the first label. A
             label is also the first control; after a motion, set one before the first step.
         seed: of the noise. Character i has seed + i (or seed[i]) and moves as it would alone with that seed.
-        variety: 0 runs on probabilities, always alike; 1 draws binary codes; between, a blend.
-        temperature: of the sigmoid, the bundle's by default; lower is more decided.
-        iterations: Gibbs iterations for each frame, as many as the bundle says by default; more than 1 only in models
+        variety: 0 runs on probabilities, always the same; 1 draws binary codes; between, a blend.
+        temperature: of the sigmoid, the bundle's by default; lower is more deterministic.
+        iterations: Gibbs iterations for each frame, by default as many as the bundle's; more than 1 only in models
             with free hidden units.
         Raises ControlError for values out of range, MotionError for a motion that does not fit.
         """

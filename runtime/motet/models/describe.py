@@ -39,7 +39,7 @@ class DescribeModel(LanguageModel):
     graphs: "encoder" (frames, lengths -> context), "step" (word, context, states -> log_probabilities, next states) and
         perhaps "score" (context, words -> log_probabilities).
     Its loops (:mod:`motet.decode.loops`) take the step, contexts (B, C), limits and their settings by name, and give up
-    to ``beams`` hypotheses for each row, the best first.
+    to ``beams`` hypotheses for each row, best first.
     """
 
     VERB = "describe"

@@ -71,7 +71,7 @@ class GenerateModel(LanguageModel):
         log_weights, means, stds, active, next states) and perhaps "score" (context, frames -> log_likelihood), with
         frames normalised and the active flag last.
     Its loops (:mod:`motet.decode.loops`) take the step, contexts (B, C), a generator of noise for each row, the longest
-    number of frames and their settings by name, and give samples for each row, the best first.
+    number of frames and their settings by name, and give samples for each row, best first.
     """
 
     VERB = "generate"
@@ -122,7 +122,7 @@ class GenerateModel(LanguageModel):
     ) -> list[Generated] | list[list[Generated]]:
         """``hypotheses`` motions for a sentence, the likeliest per frame first; for several sentences a list for each.
 
-        How they are found is said in :func:`motet.decode.mixture.mixture_search`.
+        See :func:`motet.decode.mixture.mixture_search`.
         candidates: frames that each hypothesis draws in a step; 1 gives independent samples.
         temperature: of the draws about the centres of the mixture's components; lower trembles less.
         seed: sentence i has seed + i (or seed[i]), and the motions it would have alone with that seed.

@@ -1,4 +1,4 @@
-"""What describe and generate share: the vocabulary, what a model refuses, and batches of sequences."""
+"""What describe and generate share: the vocabulary, limits on inputs, and batches of sequences."""
 
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
@@ -82,7 +82,7 @@ class LanguageModel(BundleModel):
     def score_graph(self) -> Graph:
         """The graph that scores known pairs; BundleError where the model has none, as one without likelihoods."""
         if "score" not in self.graphs:
-            raise BundleError("this model has no graph 'score': it cannot say how probable a pair is")
+            raise BundleError("this model has no graph 'score': it cannot score a pair")
         return self.graphs["score"]
 
 

@@ -1,4 +1,4 @@
-"""Loading a model: from a bundle's name or path to what its verb offers."""
+"""Loading a model: from a bundle's name or path to the model of its verb."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -51,7 +51,7 @@ def load_as(kind: type[Kind], name_or_path: str | Path, options: SessionOptions 
     """As :func:`load`, for one verb: BundleError where the bundle is for another."""
     model = load(name_or_path, options)
     if not isinstance(model, kind):
-        raise BundleError(f"bundle {name_or_path} is for {model.VERB!r}, and one for {kind.VERB!r} is needed")
+        raise BundleError(f"bundle {name_or_path} is for {model.VERB!r}; need one for {kind.VERB!r}")
     return model
 
 

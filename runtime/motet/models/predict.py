@@ -25,10 +25,10 @@ MAX_FRAMES, MAX_GOLDEN = 100_000, 1000
 
 
 class PredictModel(BundleModel):
-    """A model that carries motions on; shared between any number of sessions and threads.
+    """A model that continues motions; any number of sessions and threads share it.
 
     graphs: "encoder" (frames (B, L, C) -> what the step takes first) and "step" (-> frame (B, C), and what it takes
-        next). After ``horizon`` frames, its default, a prediction goes on from its own last frames.
+        next). After ``horizon`` frames, its default, a prediction continues from its own last frames.
     """
 
     VERB = "predict"
@@ -59,7 +59,7 @@ class PredictModel(BundleModel):
     ) -> Motion | list[Motion]:
         """The ``frames`` (as many as the horizon by default) that follow a motion, at the model's frame rate.
 
-        A mocap motion of the model's figure is carried on in its own channels, units and skeleton, from where its root
+        A mocap motion of the model's figure is continued in its own channels, units and skeleton, from where its root
         is; features, in the channels of :attr:`contract`, as features. Only the last :attr:`seed_frames` at the model's
         frame rate are looked at; one at another rate is resampled, so that its last frame is kept.
         append: give the motion, resampled, and what follows it.
@@ -134,7 +134,7 @@ class PredictModel(BundleModel):
 
 
 class PredictSession:
-    """A motion that goes on: push what happens, ask what comes next. Keeps only the frames that are looked at."""
+    """A growing motion: push new frames, predict the next. Keeps only the frames that the model uses."""
 
     def __init__(self, model: PredictModel, start: Motion) -> None:
         self.model = model

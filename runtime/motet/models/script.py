@@ -1,6 +1,6 @@
-"""Control scripts: what a figure is told to do, and for how long.
+"""Control scripts: what a figure is to do, and for how long.
 
-A script is a list of segments with commas between them. ``walk 3s`` holds a label, ``walk>run 5s`` goes from one to
+A script is a list of segments separated by commas. ``walk 3s`` holds a label, ``walk>run 5s`` goes from one to
 the other in a straight line, ``walk*.3+run*.7 2s`` mixes labels (a weight is between 0 and 1; labels that are not
 named have 0).
 """
@@ -46,7 +46,7 @@ class Segment:
 
 
 def parse_script(script: str, labels: Sequence[str]) -> list[Segment]:
-    """Parse a script over known labels; ScriptError shows the place of what cannot be read."""
+    """Parse a script over known labels; ScriptError marks the place of an error."""
     parser = _Parser(script, labels)
     segments = [parser.segment()]
     while not parser.done():
@@ -133,7 +133,7 @@ class _Parser:
             label, weight = self.weight()
             if label in weights:
                 self.position = before
-                raise self.fail(f"{quoted(label)} stands twice in one mix")
+                raise self.fail(f"{quoted(label)} appears twice in one mix")
             weights[label] = weight
         return weights
 

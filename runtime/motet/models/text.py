@@ -122,7 +122,7 @@ class TextRules:
         )
 
     def normalise(self, sentence: str) -> str:
-        """Lower case without accents and punctuation, spelling mended, number words as digits: "90 degrees"."""
+        """Lower case without accents and punctuation, spelling corrected, number words as digits: "90 degrees"."""
         plain = sentence.translate(dict.fromkeys(map(ord, self.dropped)))
         plain = unicodedata.normalize("NFKD", plain).lower()
         plain = "".join(letter for letter in plain if not unicodedata.combining(letter))
@@ -232,13 +232,13 @@ class Vocabulary:
         or :data:`MAX_LETTERS` letters.
         """
         if len(sentence) > MAX_LETTERS:
-            raise TextError(f"the sentence has {len(sentence)} letters, and at most {MAX_LETTERS} are possible")
+            raise TextError(f"the sentence has {len(sentence)} letters, but at most {MAX_LETTERS} are allowed")
         found = self.rules.words(sentence)
         unknown = [word for word in found if word not in self.ids]
         if not found:
             raise TextError(f"the sentence {sentence!r} has no words")
         if len(found) > MAX_WORDS:
-            raise TextError(f"the sentence has {len(found)} words, and at most {MAX_WORDS} are possible: {sentence!r}")
+            raise TextError(f"the sentence has {len(found)} words, but at most {MAX_WORDS} are allowed: {sentence!r}")
         if len(unknown) == len(found):
             raise TextError(f"the model knows no word of {sentence!r}; it knows words such as {self._examples()}")
         return np.array([self.ids.get(word, self.ids[UNK]) for word in found], dtype=np.int64), unknown
@@ -256,5 +256,5 @@ class Vocabulary:
 
     @staticmethod
     def from_json(data: Sequence[str]) -> "Vocabulary":
-        """Read what :meth:`to_json` wrote; TextError where it is no vocabulary."""
+        """Read what :meth:`to_json` wrote; TextError where it is not a vocabulary."""
         return Vocabulary(data)

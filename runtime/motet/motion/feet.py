@@ -18,7 +18,7 @@ def feet_of(skeleton: Skeleton) -> list[int]:
     """Indices of the joints of both feet, those that lie low at rest; MotionError where no joints are in pairs."""
     paired, height = _paired(skeleton), skeleton.rest_positions[:, 1]
     if not paired:
-        raise MotionError("no joints in pairs, left and right, to find the feet among: name the joints of the feet")
+        raise MotionError("no joints in pairs, left and right, to find the feet by: name the joints of the feet")
     limit = height[paired].min() + FEET * skeleton.height
     return [i for i in paired if height[i] <= limit]
 

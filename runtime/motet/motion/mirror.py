@@ -25,7 +25,7 @@ Channels = tuple[tuple[str, ...], Array, tuple[str, ...]]
 def lateral_axis(skeleton: Skeleton) -> int:
     """0, 1 or 2: the axis along which paired joints lie apart at rest.
 
-    MotionError where no joints are paired, or where their places are no mirror images across a coordinate plane.
+    MotionError where no joints are paired, or where their places do not mirror each other across a coordinate plane.
     """
     partners = np.array(partners_of(skeleton.names))
     rest = skeleton.rest_positions
@@ -37,7 +37,7 @@ def lateral_axis(skeleton: Skeleton) -> int:
     axis = int(np.argmax(apart.sum(axis=0)))
     gap = rest[partners] * _signs(axis) - rest
     if np.abs(gap).max() > 0.2 * skeleton.height:
-        raise MotionError("left and right of this skeleton's rest pose are no mirror images across a coordinate plane")
+        raise MotionError("left and right of the rest pose are not mirror images across a coordinate plane")
     return axis
 
 

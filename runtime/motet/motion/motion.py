@@ -51,7 +51,7 @@ class Motion:
         if len(set(self.channels)) != len(self.channels):
             raise MotionError("channel names must differ")
         if len(self.units) != len(self.channels) or set(self.units) - set(UNITS):
-            raise MotionError(f"a motion needs one unit for each channel, out of {', '.join(UNITS)}")
+            raise MotionError(f"a motion needs one unit for each channel, each one of {', '.join(UNITS)}")
         if not (np.isfinite(self.fps) and self.fps > 0):
             raise MotionError(f"the frame rate must be a positive number, not {self.fps}")
         self._refuse_not_finite()
@@ -82,14 +82,14 @@ class Motion:
     def __getitem__(self, frames: slice | SupportsIndex) -> "Motion":
         """The motion of a slice of its frames, with the frame rate divided by the slice's step; or of one frame.
 
-        IndexError for one frame that there is not.
+        IndexError for a frame that does not exist.
         """
         if not isinstance(frames, slice):
             index = range(len(self))[frames]
             return replace(self, values=self.values[index : index + 1])
         step = 1 if frames.step is None else frames.step
         if step < 1:
-            raise MotionError(f"frames are taken forward: a step of {step} is not possible")
+            raise MotionError(f"the step of a slice must be positive, not {step}")
         return replace(self, values=self.values[frames], fps=self.fps / step)
 
     def __iter__(self) -> Iterator["Motion"]:
@@ -139,7 +139,7 @@ class Motion:
         return replace(self, values=self.values * factors, skeleton=self.skeleton.scaled(metres_per_unit))
 
     def with_unit(self, metres_per_unit: float) -> "Motion":
-        """The same motion, its skeleton's length unit now known: for files that do not say it."""
+        """The same motion, with the skeleton's unit of length set: for files that do not state it."""
         if self.skeleton is None:
             raise MotionError("a motion without a skeleton has no length unit")
         return replace(self, skeleton=replace(self.skeleton, metres_per_unit=metres_per_unit))

@@ -1,6 +1,6 @@
 """Frames between frames: at which times, and by lines or splines.
 
-There is one rule. New frames lie within the old ones: nothing is made up past the last frame, so T frames become
+There is one rule. New frames lie within the old ones: nothing is extrapolated past the last frame, so T frames become
 ``floor((T - 1) * new / old) + 1``. Where every n-th frame is wanted they are picked, at a lower rate frames lie on
 lines, and at a higher one on Catmull-Rom splines, which pass through every frame without a kink.
 """

@@ -44,7 +44,7 @@ class Skeleton:
     """Joints in an order where each parent comes before its children; the first is the root.
 
     A joint with a name that ends in ``_end`` marks the tip of its parent's last bone and has no channels.
-    metres_per_unit: how long one unit of the offsets is, or None where a file does not say.
+    metres_per_unit: how long one unit of the offsets is, or None where a file does not state it.
     """
 
     joints: tuple[Joint, ...]
@@ -146,7 +146,7 @@ class Skeleton:
         """What a length in this skeleton's unit is multiplied by to be in the other unit."""
         if self.metres_per_unit is None:
             raise UnitError(
-                "it is not known how long a unit of this skeleton is: give metres_per_unit, as motion.with_unit(0.01)"
+                "this skeleton's unit of length is not known: give metres_per_unit, as motion.with_unit(0.01)"
             )
         return self.metres_per_unit / metres_per_unit
 
@@ -162,7 +162,7 @@ class Skeleton:
 
     @staticmethod
     def from_json(data: dict[str, Any]) -> "Skeleton":
-        """The inverse of :meth:`to_json`; MotionError where the object is no skeleton."""
+        """The inverse of :meth:`to_json`; MotionError where it is not a skeleton."""
         try:
             joints = tuple(
                 Joint(

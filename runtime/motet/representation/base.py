@@ -1,4 +1,4 @@
-"""What every representation offers, and what they share: mirroring by columns, down-sampling in all phases."""
+"""What representations offer, and what they share: mirroring by columns, down-sampling in all phases."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ class Representation(Protocol):
         ...
 
     def motion(self, features: Motion, after: Motion | None = None) -> Motion:
-        """A motion that can be played, from features: from the origin, or such that it carries another motion on."""
+        """A motion that can be played, from features: from the origin, or as the continuation of another motion."""
         ...
 
     def mirror(self, features: Motion) -> "FrameMirror":
@@ -73,7 +73,7 @@ def lateral_x(features: Motion) -> Skeleton:
     """The skeleton, whose left and right lie along x, as the root block needs; else MotionError."""
     skeleton = skeleton_of(features)
     if lateral_axis(skeleton) != 0:
-        raise MotionError("left and right of its rest pose do not lie along x, as the root block needs")
+        raise MotionError("left and right of the rest pose must lie along x for the root block")
     return skeleton
 
 

@@ -83,7 +83,7 @@ class MotionContract:
     def motion(self, frames: ArrayLike, after: Motion | None = None, plant: bool = True) -> Motion:
         """Frames (T, D) as a motion that can be played and written, at the contract's frame rate.
 
-        after: a motion that is carried on, at the same frame rate, in its channels where the representation can; else
+        after: a motion to be continued, at the same frame rate, in its channels where the representation can; else
             the figure starts at the origin and faces z.
         plant: as :meth:`features`.
         """
@@ -116,7 +116,7 @@ class MotionContract:
     def from_json(data: Any) -> "MotionContract":
         """Read what :meth:`to_json` wrote; BundleError names the key of a manifest that is not what it must be."""
         if not isinstance(data, Mapping):
-            raise BundleError("motion: a JSON object is needed")
+            raise BundleError("motion: expected a JSON object")
         channels, units = _texts(data, "channels"), _texts(data, "units", len(data["channels"]))
         fps = float(_numbers([data.get("fps")], "fps", 1)[0])
         mean, std = (_numbers(data.get(key), key, len(channels)) for key in ("mean", "std"))
@@ -125,8 +125,8 @@ class MotionContract:
         _refuse(bool(lacking), "channels", f"{name} needs {', '.join(lacking)}")
         _refuse(len(set(channels)) < len(channels), "channels", "names must differ")
         _refuse(bool(set(units) - set(UNITS)), "units", f"each must be one of {', '.join(UNITS)}")
-        _refuse(not 0 < fps <= FASTEST, "fps", f"a number over 0 and up to {FASTEST:g} is needed, not {fps:g}")
-        _refuse(bool((std < 0).any()), "std", "a standard deviation is not negative")
+        _refuse(not 0 < fps <= FASTEST, "fps", f"expected a number over 0 and up to {FASTEST:g}, not {fps:g}")
+        _refuse(bool((std < 0).any()), "std", "a standard deviation cannot be negative")
         return MotionContract(name, channels, units, fps, mean, std, _skeleton(data))
 
 
@@ -156,20 +156,20 @@ def _refuse(wrong: bool, key: str, reason: str) -> None:
 def _texts(data: Mapping[str, Any], key: str, count: int | None = None) -> tuple[str, ...]:
     values = data.get(key)
     if not isinstance(values, list | tuple) or not all(isinstance(value, str) for value in values) or not values:
-        raise BundleError(f"motion.{key}: a list of names is needed")
+        raise BundleError(f"motion.{key}: expected a list of names")
     _refuse(count not in (None, len(values)), key, f"{count} are needed, one for each channel, not {len(values)}")
     return tuple(values)
 
 
 def _numbers(values: Any, key: str, count: int) -> Array:
     numbers = isinstance(values, list | tuple) and all(type(value) in (int, float) for value in values)
-    _refuse(not numbers, key, "numbers are needed")
+    _refuse(not numbers, key, "expected numbers")
     _refuse(len(values) != count, key, f"{count} are needed, one for each channel, not {len(values)}")
     try:
         found = np.array(values, dtype=np.float64)
     except OverflowError as error:
         raise BundleError(f"motion.{key}: {error}") from error
-    _refuse(not np.isfinite(found).all(), key, "finite numbers are needed")
+    _refuse(not np.isfinite(found).all(), key, "expected finite numbers")
     return found
 
 

@@ -75,7 +75,7 @@ def joints_of(channels: Sequence[str]) -> tuple[str, ...]:
 def to_joint_vectors(motion: Motion, joints: Sequence[str] | None = None) -> Motion:
     """The motion with the root block and with exponential maps of ``joints`` (all but the root) as its channels.
 
-    Each exponential map is at most half a turn, so it can leap between frames: :meth:`Motion.continuous` mends that.
+    Each exponential map is at most half a turn, so it can leap between frames: :meth:`Motion.continuous` repairs that.
     MotionError where a joint, the root's translation or rotation is missing, or a skeleton that knows its unit of
     length.
     """

@@ -40,7 +40,7 @@ from motet_train.runs import Run
 @click.option("--json", "as_json", is_flag=True, help="Print one nested object with stable keys.")
 @click.option("--plots", type=Path, help="Folder for the figures of the papers.")
 @session_options
-@click.option("--save", is_flag=True, help="Keep the figures in each run; export puts them into the bundle.")
+@click.option("--save", is_flag=True, help="Save the figures in each run, to be exported with it.")
 def evaluate(
     models: tuple[str, ...], data: Path | None, as_json: bool, plots: Path | None, save: bool, session: SessionOptions
 ) -> None:
@@ -71,7 +71,7 @@ def _measured(models: Mapping[str, Model], data: Path | None, plots: Path | None
     others = {name: model for name, model in models.items() if isinstance(model, DescribeModel | GenerateModel)}
     predicts = {name: model for name, model in models.items() if isinstance(model, PredictModel)}
     if sum(map(bool, (controls, others, predicts))) > 1:
-        raise click.UsageError("evaluate models that control, that predict, and others apart: their data differ")
+        raise click.UsageError("evaluate control, predict and language models separately: their data differ")
     if plots is not None:
         from motet_train.evaluate.figures import make_folder
 
@@ -108,5 +108,5 @@ def _clips(name: str, model: ControlModel, data: Path | None) -> Clips:
         given += [after for word, after in pairwise(words) if word == "--data"]
         data = Path(given[-1]) if given else None
         if data is not None and not data.exists():
-            raise DataError(f"the clips that {name} was trained on, {data}, are not here: give --data")
+            raise DataError(f"the clips that {name} was trained on, {data}, are missing: give --data")
     return read_clips(data)

@@ -21,7 +21,7 @@ Models = Mapping[str, DescribeModel | GenerateModel]
 def language_reports(models: Models, data: Path | None, plots: Path | None) -> dict[str, Report]:
     """The report of each model. Generate models are chained with the first describe model that had the same split."""
     if data is None:
-        raise click.UsageError("models between motion and language need --data: the store that they were trained on")
+        raise click.UsageError("describe and generate models need --data: the store that they were trained on")
     store = Store.open(data)
     corpora = {name: split_as(model.manifest, store) for name, model in models.items()}
     reports = {}
@@ -56,7 +56,7 @@ def _report(name: str, models: Models, corpora: Mapping[str, SplitStore], bar: "
     )
     partner = next(describe, None)
     if partner is None:
-        click.echo(f"{name}: tables 3 and 4 need a describe model of the same split too; they are left out", err=True)
+        click.echo(f"{name}: tables 3 and 4 need a describe model of the same split; they are left out", err=True)
     report = generate_report(model, corpus, partner, progress)
     if lacking := [f"asked.{key}" for key in ASKED if key not in report.get("asked", {})]:
         said = "training motions of that kind, or a root block, are missing"

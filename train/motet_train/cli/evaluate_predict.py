@@ -42,7 +42,7 @@ def predict_reports(models: Models, data: Path | None, plots: Path | None) -> Re
     Runs that differ in their seed alone are one row of the table.
     """
     if data is None:
-        raise click.UsageError("models that predict need --data: text files of the protocol, or motion files")
+        raise click.UsageError("predictors need --data: text files of the protocol, or motion files")
     return _protocol(models, data, plots) if is_expmap(data) else _mocap(models, data, plots)
 
 

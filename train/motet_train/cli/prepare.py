@@ -22,8 +22,8 @@ from motet_train.data.store import prepare as prepare_store
 def prepare(data: Path, out: Path, sentences: Path | None, unit_in: str | None) -> None:
     """Prepare the corpus DATA once: a folder or zip of motions with sentences becomes a store to train on.
 
-    DATA is the KIT Motion-Language data, or motion files .amc (with .asf) .bvh .npz with a table of tabs between the
-    columns clip and sentence. A motion that cannot be used is named and skipped.
+    DATA is the KIT Motion-Language data, or motion files .amc (with .asf) .bvh .npz with a tab-separated table
+    of the columns clip and sentence. A motion that cannot be used is named and skipped.
     """
     corpus = read_corpus(data, sentences, metres(unit_in))
     _check_unit(corpus)
@@ -51,5 +51,5 @@ def _check_unit(corpus: Corpus) -> None:
     first = next((item for item in corpus if isinstance(item, Record)), None)
     if first is not None and first.motion.skeleton is not None and first.motion.skeleton.metres_per_unit is None:
         raise DataError(
-            f"{first.name} does not say how long a unit of its skeleton is: give --unit-in for files that do not say it"
+            f"{first.name} does not state its unit of length: give --unit-in for files that do not state it"
         )

@@ -23,7 +23,7 @@ SHIPPED = {"seed": 6, "out": "runs/tdbn", "name": "cmu-control"}
 
 @train_command("tdbn", RECIPES, DATA, unit_in, defaults=SHIPPED)
 def tdbn(job: Job, data: Path | None, unit_in: str | None) -> Run:
-    """Train a temporal deep belief net that is controlled live, on short labelled clips."""
+    """Train a temporal deep belief net for live control, on short labelled clips."""
     return train_control(read_clips(data, job.recipe.config.root_rotation, metres(unit_in)), job)
 
 
@@ -33,13 +33,13 @@ def tdbn(job: Job, data: Path | None, unit_in: str | None) -> Run:
     DATA,
     unit_in,
     click.option("--labels", help='Labels to train on, such as "walk,run". [default: all]'),
-    click.option("--past-rate", type=float, help="Rate of past to angles. [default: the preset's]"),
-    click.option("--control-units", type=click.IntRange(1), help="For each label. [default: the preset's]"),
+    click.option("--past-rate", type=float, help="Rate from past to angles. [default: the preset's]"),
+    click.option("--control-units", type=click.IntRange(1), help="Units per label. [default: the preset's]"),
     click.option("--epochs", type=click.IntRange(1), help="[default: the preset's]"),
     defaults={"out": "runs/crbm", "name": "crbm"},
 )
 def crbm(job: Job, data: Path | None, unit_in: str | None, labels: str | None, epochs: int | None) -> Run:
-    """Train the baseline, a conditional RBM straight on the joint angles (Taylor 2007)."""
+    """Train the baseline, a conditional RBM on the joint angles (Taylor 2007)."""
     config = job.recipe.config
     if epochs is not None:
         config = replace(config, crbm=replace(config.crbm, epochs=epochs))

@@ -19,12 +19,12 @@ from motet_train.runs import Run
 
 OPTIONS = (
     click.option("--data", type=Path, required=True, help="A prepared store, or a corpus: folder or zip."),
-    click.option("--sentences", type=Path, help="Table of a mocap corpus' sentences. [default: the .tsv beside it]"),
+    click.option("--sentences", type=Path, help="Table of sentences of a mocap corpus. [default: the .tsv beside it]"),
     unit_in,
     click.option("--epochs", type=click.IntRange(1), help="[default: the preset's]"),
     click.option("--batch", type=click.IntRange(1), help="Motions in a batch. [default: the preset's]"),
     click.option("--split", "by", type=click.Choice(["trial", "subject"]), default="trial", show_default=True),
-    click.option("--mirror/--no-mirror", default=None, help="Mirror left and right by chance. [default: the preset's]"),
+    click.option("--mirror/--no-mirror", default=None, help="Mirror left and right at random. [default: the preset's]"),
 )
 LOSS = click.option(
     "--loss", type=click.Choice(list(LOSSES)), help="Eq. 12, or the true likelihood. [default: the preset's]"
@@ -33,7 +33,7 @@ LOSS = click.option(
 
 @train_command("describe", describing.RECIPES, *OPTIONS)
 def describe(job: Job, data: Path, by: str, **corpus: Any) -> Run:
-    """Train motion to language: a net that describes a motion in a sentence."""
+    """Train motion to language: a net that describes a motion in words."""
     return train_language(_store(data, job.folder, **corpus), job, data.name, by)
 
 

@@ -28,7 +28,7 @@ TABLES, BOARDS = "motet.tables", "tensorboard"
 
 
 def _configure(context: click.Context, option: click.Parameter, path: Path | None) -> None:
-    """Let what the file says be the options' defaults: what the command line says wins."""
+    """Make the file's settings the options' defaults; the command line wins."""
     if path is None:
         return
     options, context.meta[TABLES] = read_settings(path)
@@ -45,13 +45,13 @@ OPTIONS = (
     click.option("--out", type=Path, required=True, help="Folder to write; must not exist."),
     click.option("--seed", type=click.IntRange(0), default=0, show_default=True),
     click.option("--device", type=click.Choice(["cpu", "cuda"]), default="cpu", show_default=True),
-    click.option("--precision", type=click.Choice(["float32", "bfloat16"]), help="Of matrix products in training."),
+    click.option("--precision", type=click.Choice(["float32", "bfloat16"]), help="Precision of matrix products."),
     click.option("--threads", type=click.IntRange(1), default=1, show_default=True),
-    click.option("--resume", is_flag=True, help="Go on where the run in --out was stopped, by the same command."),
+    click.option("--resume", is_flag=True, help="Continue the run in --out, by the same command."),
     click.option("--tensorboard", is_flag=True, help="Write the log for TensorBoard, too."),
-    click.option("--name", help="Name of the bundle to be. [default: the run's folder]"),
+    click.option("--name", help="Bundle name. [default: the run's folder]"),
     click.option("--licence", help="Licence of the weights. [default: not stated]"),
-    click.option("--data-licence", help="Licence of the data. [default: what the data says, or not stated]"),
+    click.option("--data-licence", help="Licence of the data. [default: as the data states, or not stated]"),
 )
 
 
@@ -60,7 +60,7 @@ def metres(unit: str | None) -> float | None:
     return None if unit is None else METRES[unit]
 
 
-unit_in = click.option("--unit-in", type=click.Choice(list(METRES)), help="Length unit of files that do not say it.")
+unit_in = click.option("--unit-in", type=click.Choice(list(METRES)), help="Length unit of files that do not state it.")
 
 SHARED = ("out", "seed", "device", "precision", "threads", "resume", "tensorboard", "name", "licence", "data_licence")
 
@@ -98,10 +98,10 @@ def _train(
     preset = recipes[shared["preset"]]
     recipe = changed(preset, context.meta.get(TABLES, {}), {**given, "precision": shared["precision"]})
     if shared["precision"] == "bfloat16" and recipe.training is None:
-        raise SettingsError(f"{recipe.model} learns in float32 only")
+        raise SettingsError(f"{recipe.model} trains in float32 only")
     own = {name: value for name, value in given.items() if not _is_of(name, recipe)}
     if shared["device"] == "cuda" and not torch.cuda.is_available():
-        raise DataError("torch finds no CUDA device here: use --device cpu")
+        raise DataError("torch finds no CUDA device: use --device cpu")
     torch.set_num_threads(shared["threads"])
     out: Path = shared["out"]
     licences = shared["licence"], shared["data_licence"]
@@ -133,7 +133,7 @@ def _kept(context: click.Context, given: Mapping[str, Any]) -> dict[str, Any]:
 def _folder(out: Path, resume: bool) -> Iterator[None]:
     """The folder to train in. Where training ends early: say how it goes on, and leave nothing where it cannot.
 
-    OutputError if a run cannot start, or cannot go on, in that folder.
+    OutputError if a run can neither start nor resume in that folder.
     """
     if distributed.rank() != 0:
         yield
@@ -151,7 +151,7 @@ def _folder(out: Path, resume: bool) -> Iterator[None]:
         if _unborn(out):
             shutil.rmtree(out)
         elif isinstance(error, KeyboardInterrupt):
-            click.echo(f"\nstopped: the same command with --resume goes on from {out / CHECKPOINT}", err=True)
+            click.echo(f"\nstopped: the same command with --resume continues from {out / CHECKPOINT}", err=True)
         raise
 
 

@@ -27,10 +27,10 @@ from motet_train.runs import Run
     click.option("--steps", type=click.IntRange(1), help="[default: the preset's]"),
 )
 def predict(job: Job, data: Path, unit_in: str | None) -> Run:
-    """Train a predictor: a net that carries a motion on from its last frames.
+    """Train a predictor: a net that continues a motion from its last frames.
 
     From text files of the protocol it learns what `motet evaluate` measures; from motion files (.amc .bvh .npz) it
-    learns to carry on files of the same figure.
+    learns to continue files of the same figure.
     """
     return train_predict(_material(data, unit_in), job)
 

@@ -19,18 +19,16 @@ OPTIONS = (
     click.option("--steps", type=click.IntRange(1), help="[default: the preset's]"),
     click.option("--batch", type=click.IntRange(1), help="Windows in a batch. [default: the preset's]"),
     click.option("--learning-rate", type=click.FloatRange(0, min_open=True), help="[default: the preset's]"),
-    click.option("--all-files", is_flag=True, help="Hold out no training file, and validate on windows of them all."),
+    click.option("--all-files", is_flag=True, help="Hold out no training file; validate on windows of all of them."),
 )
 
 SWITCHES = (
-    click.option("--long-term", type=click.Choice(["convolutional", "recurrent", "none"]), help="Which encoder."),
+    click.option("--long-term", type=click.Choice(["convolutional", "recurrent", "none"]), help="Long-term encoder."),
     click.option("--kernel", type=click.IntRange(1), nargs=2, help="Frames and channels of the convolutions' kernels."),
     click.option("--padding", type=click.Choice(["valid", "same"]), help="Other kernels or windows need 'same'."),
     click.option("--window", type=click.IntRange(1), help="Frames that the short-term encoder sees, C."),
     click.option("--own", type=click.FloatRange(0, 1), help="Share of predicted frames in what training feeds back."),
-    click.option(
-        "--loss", type=click.Choice(["square", "distance"]), help="Of distances from true frames, or squares."
-    ),
+    click.option("--loss", type=click.Choice(["square", "distance"]), help="Mean squared distance, or mean distance."),
     click.option("--l2", type=click.FloatRange(0), help="Weight of the squared weights in the loss."),
     click.option("--adversary", type=click.FloatRange(0), help="Weight of the discriminator in the loss; 0 is none."),
 )

@@ -71,7 +71,7 @@ def _opened(path: Path) -> zipfile.ZipFile:
     try:
         return zipfile.ZipFile(path)
     except (zipfile.BadZipFile, OSError) as error:
-        raise DataError(f"{path} is neither a folder nor a whole zip file: {error}") from error
+        raise DataError(f"{path} is neither a folder nor a readable zip file: {error}") from error
 
 
 def _hidden(name: str) -> bool:

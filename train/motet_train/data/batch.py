@@ -10,10 +10,10 @@ from torch import Tensor
 class Batch:
     """B motions of up to T frames, each with one sentence of up to W words, padded on the right.
 
-    frames: (B, T, D) float32 in the contract's units; finite, of any value, behind the motion's end.
+    frames: (B, T, D) float32 in the contract's units; finite, of any value, after the motion's end.
     lengths: (B,) int64, frames of each motion, at least 1.
-    words: (B, W) int64, ids without SOS and EOS; PAD = 0 behind the sentence's end.
-    ended: (B,) bool, whether the motion ends after its last frame and is no part of a longer one; None where all do.
+    words: (B, W) int64, ids without SOS and EOS; PAD = 0 after the sentence's end.
+    ended: (B,) bool, whether the motion ends after its last frame rather than being part of a longer one; None: all do.
     """
 
     frames: Tensor

@@ -44,12 +44,12 @@ class Examples:
     def epoch(
         self, rng: np.random.Generator, batch: int, offsets: int | None = None, windows: tuple[int, int] | None = None
     ) -> Iterator[Batch]:
-        """Visit motions once in batches of at most ``batch``, each with one of its sentences drawn anew.
+        """Visit motions once in batches of at most ``batch``, each with one of its sentences, drawn afresh.
 
         Every down-sampling offset of a motion is a visit of its own; ``offsets`` draws only so many for each. With a
         mirror every other visit, by chance, is to the mirrored motion and sentence. With
         ``windows`` a batch takes no more frames of a motion than a number drawn between the two, as often short as
-        long on a logarithmic scale, and from a place drawn anew.
+        long on a logarithmic scale, and from a place drawn afresh.
         """
         longest = windows[1] if windows else MAX
         visits = [(i, int(offset)) for i in range(len(self.records)) for offset in self._drawn(rng, i, offsets)]
@@ -118,7 +118,7 @@ def frame_mirror(contract: MotionContract) -> FrameMirror:
     try:
         return contract.mirror
     except MotionError as error:
-        raise DataError(f"the motions cannot be mirrored ({error}): train without mirroring") from error
+        raise DataError(f"the motions cannot be mirrored ({error}): train with --no-mirror") from error
 
 
 def usable(sentence: str) -> bool:

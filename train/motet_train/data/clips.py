@@ -123,11 +123,11 @@ def _angles(motion: Motion, root_rotation: bool) -> Motion:
 def _fit(path: Path, motion: Motion, first_path: Path, first: Motion) -> Motion:
     different = sorted(set(motion.channels) ^ set(first.channels))
     if different:
-        raise DataError(f"{path} does not go with {first_path}: only one of them has {', '.join(different)}")
+        raise DataError(f"{path} does not match {first_path}: only one of them has {', '.join(different)}")
     try:
         return in_joints_of(motion, first.skeleton).select(first.channels)
     except MotionError as error:
-        raise DataError(f"{path} does not go with {first_path}: {error}") from error
+        raise DataError(f"{path} does not match {first_path}: {error}") from error
 
 
 def _metric(skeleton: Skeleton) -> Skeleton:

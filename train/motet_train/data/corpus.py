@@ -51,7 +51,7 @@ def read_corpus(path: Path, table: Path | None = None, metres_per_unit: float | 
 
     With files ``*_annotations.json`` it is KIT's. Else it has motion files of the types .amc (with .asf) .bvh .npz
     and a table of sentences: ``table``, or the only .tsv in the folder, or the only one beside the folder or zip.
-    metres_per_unit: the length unit of mocap files, where they do not say it.
+    metres_per_unit: the length unit of mocap files, where they do not state it.
     """
     with Archive(path) as archive:
         names, motions = archive.names, motion_files(archive)

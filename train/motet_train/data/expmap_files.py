@@ -127,14 +127,14 @@ def is_expmap(path: Path) -> bool:
 
 
 def read_expmap(path: Path) -> ExpmapCorpus:
-    """Read what there is of a corpus in a folder or zip, which of the two its files say.
+    """Read what exists of a corpus in a folder or zip; its files tell which of the two it is.
 
     DataError where there is none of its files; FormatError names file and line of one that does not fit.
     """
     with Archive(path) as archive:
         layout = _layout(archive)
         if layout is None:
-            raise DataError(f"no exponential-map files in {path}: it has no train/walking/walking_1.txt, for one")
+            raise DataError(f"no exponential-map files in {path}: for example, it has no train/walking/walking_1.txt")
         train = _groups(archive, layout.train, layout.columns)
         test = _groups(archive, layout.test, layout.columns)
         missing = tuple(name for name in _names(layout) if _found(archive, name) is None)

@@ -36,7 +36,7 @@ def _sentences(path: Path) -> tuple[str, ...]:
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as error:
-        raise DataError(f"{path.name} is no JSON: {error}") from error
+        raise DataError(f"{path.name} is not JSON: {error}") from error
     if not (isinstance(found, list) and all(isinstance(sentence, str) for sentence in found)):
-        raise DataError(f"{path.name} is no list of sentences")
+        raise DataError(f"{path.name} is not a list of sentences")
     return tuple(sentence.strip() for sentence in found if sentence.strip())

@@ -1,4 +1,4 @@
-"""Left-right mirroring of a sentence: what it says of a motion, said of the mirrored motion."""
+"""Left-right mirroring of a sentence: the same, said of the mirrored motion."""
 
 import re
 

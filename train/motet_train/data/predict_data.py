@@ -38,7 +38,7 @@ class Material:
     contract: its mean and std are those of training. kept: columns that vary, of which the first ``held`` are not
     predicted. mirrored, signs: see PredictorConfig. poses: whether all channels are poses, which can be played
     backwards and faster or slower; velocities cannot. about: what the manifest says of the data. validation: sequences
-    that were kept back. layout: of text files.
+    that were held out. layout: of text files.
     """
 
     contract: MotionContract

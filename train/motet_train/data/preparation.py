@@ -32,7 +32,7 @@ class Preparation:
         motion = trim(motion) if self.trim else motion
         if not SHORTEST <= motion.duration < self.longest:
             limits = f"at least {SHORTEST:g} s and less than {self.longest:g} s"
-            raise MotionError(f"{motion.duration:.3g} s ({len(motion)} frames): a motion to train on has {limits}")
+            raise MotionError(f"{motion.duration:.3g} s ({len(motion)} frames): a training motion has {limits}")
         return sequences(self.representation, motion, self.fps, like)
 
 

@@ -7,7 +7,7 @@ from motet.motion.motion import Motion
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """One motion and what people said about it; subject is who moved, as far as the corpus tells."""
+    """One motion and what people said about it; subject is who moved, if the corpus tells."""
 
     name: str
     subject: str

@@ -89,7 +89,7 @@ class Store:
 
     @staticmethod
     def open(path: Path) -> "Store":
-        """Open what :func:`prepare` wrote; DataError where it is no whole store."""
+        """Open what :func:`prepare` wrote; DataError where it is not a complete store."""
         try:
             data = json.loads((path / INDEX).read_text(encoding="utf-8"))
             frames = np.load(path / FRAMES, mmap_mode="r")
@@ -99,10 +99,10 @@ class Store:
             channels, units, fps = tuple(data["channels"]), tuple(data["units"]), float(data["fps"])
             representation = str(data["representation"])
         except (OSError, KeyError, TypeError, ValueError, MotetError) as error:
-            raise DataError(f"{path} is no store of a prepared corpus: {error}") from error
+            raise DataError(f"{path} is not a prepared store: {error}") from error
         stop = max((stop for entry in entries for _, stop in entry.spans), default=0)
         if frames.shape != (stop, len(channels)) or frames.dtype != np.float32:
-            raise DataError(f"{path / FRAMES} does not go with {INDEX}: prepare the corpus again")
+            raise DataError(f"{path / FRAMES} does not match {INDEX}: prepare the corpus again")
         return Store(frames, representation, channels, units, fps, skeletons, entries, skipped)
 
 
@@ -125,7 +125,7 @@ def prepare(
     OutputError if there is something at ``path``, DataError if no motion can be used.
     """
     if path.exists() or not path.absolute().parent.is_dir():
-        raise OutputError(f"cannot write the store {path}: it exists, or the folder around it does not")
+        raise OutputError(f"cannot write the store {path}: it exists, or its parent folder does not")
     partial = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
     partial.mkdir()
     try:

@@ -1,4 +1,4 @@
-"""Cutting off what is no action: T-poses put in front of a recording, and standing still at both ends."""
+"""Cutting off what is not action: a T-pose before a recording, and standing still at both ends."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Windows of motions to train predictors on, drawn anew for each batch."""
+"""Windows of motions to train predictors on, drawn afresh for each batch."""
 
 from typing import Any
 

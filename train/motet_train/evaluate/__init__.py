@@ -1,1 +1,1 @@
-"""What trained models are worth, in numbers and pictures."""
+"""How good trained models are, in numbers and pictures."""

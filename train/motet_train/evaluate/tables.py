@@ -38,7 +38,7 @@ def aligned(rows: Sequence[Sequence[str]], left: Sequence[int] = (0,)) -> str:
 
 
 def report_table(reports: Mapping[str, Report], goals: Goals) -> str:
-    """One line per figure that any report has, one column per report, and the goal behind those that have one."""
+    """One line per figure that any report has, one column per report, and the goal beside those that have one."""
     rows = [["", *short_names(list(reports)), ""]]
     for group, key in _names(reports):
         name, values = f"{group}.{key}", [report.get(group, {}).get(key) for report in reports.values()]

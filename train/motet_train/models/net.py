@@ -1,4 +1,4 @@
-"""What every model owes: its normalisation, and the graphs that are exported."""
+"""What every model must have: its normalisation, and the graphs that are exported."""
 
 from abc import ABC, abstractmethod
 

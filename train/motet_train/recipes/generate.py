@@ -38,7 +38,7 @@ DEFAULT = replace(
     visits=LanguageVisits(offsets=1, windows=(50, 50), mirror=True),
     defaults={**BEAM, "hypotheses": 10, "candidates": 1, "temperature": 0.05},
 )
-"""What is shipped: trained on the true likelihood (eq. 11), on windows of motions, and to find back from small errors.
+"""What is shipped: trained on the true likelihood (eq. 11), on windows of motions, and to recover from small errors.
 
 The last weights are kept: the sentence decides little of the likelihood of a frame whose predecessors are known, and is
 still being learned when that of validation no longer falls. By default it gives the likeliest of ten independent

@@ -105,7 +105,7 @@ class Job:
         manifest: Mapping[str, Any],
         more: Callable[[Sequence[Line]], Mapping[str, Any]] = lambda log: {},
     ) -> Run:
-        """Train; the folder is a run after the first chunk, and one that was stopped goes on.
+        """Train; the folder is a run after the first chunk, and one that was stopped resumes.
 
         net: what the run will hold. more: what else the manifest says of the training, from its log.
         RunError where the folder holds a run that was started with other settings; more epochs or steps are allowed.

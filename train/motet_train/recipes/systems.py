@@ -29,7 +29,7 @@ VALIDATION_WINDOWS = 32
 CODE = Training(steps=20_000, every=500, learning_rate=5e-5, decay=(0.99, 10_000), l2=0.0005, adversary=0.01)
 PAPER = Training(steps=20_000, every=500, learning_rate=2e-4, batch=64, l2=0.001, adversary=0.01)
 SHORT = Training(steps=2000, every=100, falling=0.7, l2=1.4e-5)
-"""What learns best in a quarter of an hour on a CPU, by the error on files that were kept back: a higher learning rate,
+"""What learns best in a quarter of an hour on a CPU, by the error on held-out files: a higher learning rate,
 which falls, the paper's weight of the squared weights, .001, relative to an error that eq. 7 sums over 70 channels, and
 no adversary, which doubles the time and brings nothing."""
 
@@ -122,7 +122,7 @@ def loss_of(net: Stepwise, windows: Tensor) -> Terms:
 
 
 class Adversary:
-    """A discriminator of whole windows that learns beside a system and says what it thinks (Li et al. 2018)."""
+    """A discriminator of whole windows trained beside a system, as a part of its loss (Li et al. 2018)."""
 
     def __init__(self, net: Stepwise, judge: nn.Module, training: Training) -> None:
         self.net, self.judge, self.weight = net, judge, training.adversary
@@ -130,7 +130,7 @@ class Adversary:
         self.parts: dict[str, Part] = {"judge": judge, "judging": self.descent.optimiser}
 
     def loss(self, windows: Tensor) -> Terms:
-        """The discriminator learns (eq. 8), then its opinion is a part of the system's loss (eq. 9)."""
+        """The discriminator learns (eq. 8), then its loss for the system (eq. 9)."""
         normal, given = self.net.normalised(windows), self.net.seed_frames
         predicted = self.net.system.imagine(normal, given)
         false = torch.cat([normal[:, :given], predicted], dim=1)
@@ -150,7 +150,7 @@ class Adversary:
 def validation_error(net: Stepwise, material: Material) -> float:
     """The mean distance of predicted and true frames, without the root, in the contract's units.
 
-    Over windows of the motions that were kept back, or of all where none could be.
+    Over windows of the held-out motions, or of all where none could be held out.
     """
     long = [s for s in material.validation or material.sequences if len(s) > material.stride * (WINDOW - 1)]
     windows = torch.from_numpy(np.concatenate([_spread(s, material.stride) for s in long])).to(net.mean.device)

@@ -94,6 +94,6 @@ def upsample(frames: Array, factor: int = UPSAMPLE) -> Array:
 
 
 def arrival(inside: NDArray[np.bool_], fps: float) -> Array:
-    """Seconds (B,) until ``inside`` (T, B) holds and goes on holding to the end; infinite where it does not."""
+    """Seconds (B,) until ``inside`` (T, B) holds until the end; infinite where it does not."""
     frames = len(inside) - np.cumprod(inside[::-1], axis=0).sum(axis=0)
     return np.where(frames < len(inside), (frames + 1) / fps, np.inf)

@@ -1,4 +1,4 @@
-"""Stochastic variety: sampled runs differ, arrive all the same, and go on walking (thesis 5.3, figure 5.7c)."""
+"""Stochastic variety: sampled runs differ, but arrive, and keep walking (thesis 5.3, figure 5.7c)."""
 
 import numpy as np
 

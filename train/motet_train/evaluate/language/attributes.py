@@ -70,7 +70,7 @@ def common_side(sentences: Sequence[str]) -> str | None:
 
 
 def turns(sentences: Sequence[str]) -> bool | None:
-    """Whether half of the sentences say that a walk or run turns; None for anything else than walking and running."""
+    """Whether half of the sentences say that a walk or run turns; None for anything but walking and running."""
     verbs = common_verbs(sentences)
     if not verbs or verbs - {"walk", "run"}:
         return None
@@ -78,7 +78,7 @@ def turns(sentences: Sequence[str]) -> bool | None:
 
 
 def verbs_right(hypotheses: Sequence[str], references: References) -> Score:
-    """A hypothesis is right that names a verb people agree on, and none that nobody named."""
+    """A hypothesis is right if it names a verb people agree on, and none that nobody named."""
     found = []
     for text, sentences in zip(hypotheses, references, strict=True):
         agreed, anyone = common_verbs(sentences), frozenset().union(*(said(VERBS, sentence) for sentence in sentences))
@@ -89,14 +89,14 @@ def verbs_right(hypotheses: Sequence[str], references: References) -> Score:
 
 
 def sides_right(hypotheses: Sequence[str], references: References) -> Score:
-    """A hypothesis is right that names the one side people agree on; one that names none, or both, is not."""
+    """A hypothesis is right if it names the one side people agree on, not if it names none or both."""
     sides = [(side(text), common_side(sentences)) for text, sentences in zip(hypotheses, references, strict=True)]
     found = [named == {agreed} for named, agreed in sides if agreed]
     return sum(found), len(found)
 
 
 def turns_right(hypotheses: Sequence[str], references: References) -> Score:
-    """Of walking and running: a hypothesis is right that says of turning what people agree on."""
+    """Of walking and running: a hypothesis is right if it says about turning what people agree on."""
     pairs = [(turning(text), turns(sentences)) for text, sentences in zip(hypotheses, references, strict=True)]
     found = [named == agreed for named, agreed in pairs if agreed is not None]
     return sum(found), len(found)

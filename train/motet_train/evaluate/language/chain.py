@@ -16,7 +16,7 @@ from motet_train.evaluate.language.split_store import SplitStore, unknown_words_
 
 @dataclass(frozen=True, eq=False)
 class Answers:
-    """Motions for sentences. records: of each sentence the record about which it was said. rows: ranked motions."""
+    """Motions for sentences. records: for each sentence the one it describes. rows: ranked motions."""
 
     records: tuple[int, ...]
     sentences: tuple[str, ...]

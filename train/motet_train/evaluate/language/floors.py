@@ -1,4 +1,4 @@
-"""What a model has to beat: answers that are looked up among the training motions."""
+"""What a model has to beat: answers looked up among the training motions."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from motet_train.evaluate.nearest import nearest
 
 
 def nearest_motions(corpus: SplitStore, motions: Sequence[Motion]) -> list[int]:
-    """For each motion the training record with the most alike pose features: mean and deviation of each channel."""
+    """For each motion the training record with the most similar pose features: mean and deviation of each channel."""
     train = corpus.described(corpus.parts.train)
     known = np.array([_features(corpus, motion) for motion in corpus.motions(train)])
     asked = np.array([_features(corpus, motion) for motion in motions])
@@ -23,7 +23,7 @@ def nearest_motions(corpus: SplitStore, motions: Sequence[Motion]) -> list[int]:
 
 
 def nearest_bleu(corpus: SplitStore, records: Sequence[int]) -> float:
-    """BLEU of saying what was said about the nearest motion: the mean over which of its sentences that is."""
+    """BLEU of repeating the sentences of the nearest motion: the mean over its sentences."""
     found = corpus.references(nearest_motions(corpus, corpus.motions(records)))
     references = corpus.references(records)
     most = max(map(len, found))
@@ -31,7 +31,7 @@ def nearest_bleu(corpus: SplitStore, records: Sequence[int]) -> float:
 
 
 def frequent_sentence(corpus: SplitStore) -> str:
-    """The sentence that was said most often about training motions, the first by name of several."""
+    """The most frequent sentence about training motions, of several the first by name."""
     counts = Counter(sentence for said in corpus.references(corpus.parts.train) for sentence in said)
     return min(counts, key=lambda sentence: (-counts[sentence], sentence))
 
@@ -42,9 +42,9 @@ def frequent_bleu(corpus: SplitStore, references: References) -> float:
 
 
 def retrieved(corpus: SplitStore, sentences: Sequence[str]) -> list[int]:
-    """For each sentence the training record about which the most alike sentence was said.
+    """For each sentence the training record with the most similar sentence.
 
-    Alike by the cosine of their words, weighted by TF-IDF: what applications ship that take no risk.
+    Alike by the cosine of their words, weighted by TF-IDF: the safe choice of applications.
     """
     known = [(record, said) for record in corpus.parts.train for said in corpus.sentences(record)]
     vectors = TfidfVectorizer(token_pattern=r"\S+")

@@ -68,7 +68,7 @@ def losses(run: Path) -> Figure:
     try:
         lines = [json.loads(line) for line in (run / "log.jsonl").read_text().splitlines()]
     except (OSError, ValueError) as error:
-        raise DataError(f"{run} has no log of its training that can be read: {error}") from error
+        raise DataError(f"{run} has no readable training log: {error}") from error
     picture, (axes,) = panels(1, 1, (7, 4), f"Loss of {run.name}")
     for key, name in (("loss", "training"), ("validation", "validation")):
         axes.plot([line["epoch"] for line in lines], [line[key] for line in lines], label=name)

@@ -43,7 +43,7 @@ TRAINING = ("seconds", "epochs", "kept_epoch", "loss", "validation", "steps_per_
 
 
 def describe_report(model: DescribeModel, corpus: SplitStore, progress: Progress = lambda group: None) -> Report:
-    """Table 2, with and without SOS and EOS; floors and ceiling; what the best description of test motions says right.
+    """Table 2, with and without SOS and EOS; floors and ceiling; what the best description of test motions gets right.
 
     "bleu_unseen" is of those references alone that nobody said, word for word, about a training motion: where people
     describe from a pool of phrases, BLEU rewards knowing the pool. Motions without such a reference are left out.

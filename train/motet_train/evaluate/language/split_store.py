@@ -52,7 +52,7 @@ class SplitStore:
         """The records that have sentences, or ``most`` of them, the same ones every time; DataError if none has."""
         found = np.array([record for record in records if self.sentences(record)], dtype=np.intp)
         if not len(found):
-            raise DataError("nothing was said about any motion of this part of the data")
+            raise DataError("no motion in this part of the data has a sentence")
         if most is not None and len(found) > most:
             found = np.sort(np.random.default_rng(0).choice(found, most, replace=False))
         return tuple(found.tolist())

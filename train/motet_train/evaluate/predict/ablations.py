@@ -44,7 +44,7 @@ def _settings(manifest: Manifest) -> dict[str, Any]:
 
 
 def _differing(first: Mapping[str, Any], other: Mapping[str, Any]) -> str:
-    """What has to be said of the second settings to who knows the first."""
+    """How the second settings differ from the first, in words."""
     names = [name for name in {**first, **other} if name != "system" and first.get(name) != other.get(name)]
     return ", ".join(_said(name, other.get(name)) for name in names)
 

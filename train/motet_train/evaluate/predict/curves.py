@@ -42,7 +42,7 @@ def curves(
     DataError where there is no test file, or a model is not one of this corpus.
     """
     if not corpus.test:
-        raise DataError("none of the test files is here")
+        raise DataError("none of the test files was found")
     scaling = scaling_of(corpus.train)
     test = {action: list(files.values()) for action, files in corpus.test.items()}
     systems: dict[str, Predictor] = {ZERO: zero_velocity}
@@ -69,9 +69,9 @@ def complete(corpus: ExpmapCorpus) -> list[str]:
 
 
 def predictor(name: str, model: PredictModel, corpus: ExpmapCorpus) -> Predictor:
-    """What a model says of windows of a corpus; DataError where it is not one of that corpus."""
+    """A model's predictions for windows of a corpus; DataError where it is not one of that corpus."""
     if len(model.contract.channels) != corpus.layout.columns or model.contract.skeleton is not None:
-        raise DataError(f"{name} is no model of these text files: it has {len(model.contract.channels)} channels")
+        raise DataError(f"{name} is not a model of these files: it has {len(model.contract.channels)} channels")
 
     def predict(seed: Array) -> Array:
         return model.next_frames(seed[:, -model.seed_frames :], OUTPUT_FRAMES).astype(np.float64)

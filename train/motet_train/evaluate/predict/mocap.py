@@ -27,7 +27,7 @@ def held_out(model: PredictModel, trials: Sequence[Record]) -> list[Record]:
     test = set(model.manifest.training.get("data", {}).get("test", ()))
     found = [trial for trial in trials if trial.name in test]
     if not found:
-        raise DataError("none of the trials that the model was not trained on is here")
+        raise DataError("none of the trials held out in training was found")
     return found
 
 
@@ -65,7 +65,7 @@ def _distance(found: Array, truth: Array) -> tuple[Array, Array]:
 
 
 def strips(models: Mapping[str, PredictModel], motion: Motion, every: int) -> dict[str, Array]:
-    """One horizon from the middle of a motion: what was, and what each model says, one frame in ``every``.
+    """One horizon from the middle of a motion: the truth, and each model's prediction, one frame in ``every``.
 
     Places (K, J, 3) as :func:`motet_train.evaluate.predict.plots.strips_drawing` takes them: the root moves up and down
     only. Models are as above.

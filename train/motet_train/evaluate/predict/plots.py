@@ -56,7 +56,7 @@ def _looks(names: Iterable[str]) -> dict[str, dict[str, Any]]:
 def strips_drawing(strips: Mapping[str, Array], skeleton: Skeleton, given: int = 0) -> Figure:
     """Places of joints (K, J, 3) in profile, a strip below the other.
 
-    The first strip is the truth, which is drawn in grey behind the others too. given: so many poses of each are seed
+    The first strip is the truth, which is drawn in grey behind the others too. given: how many poses of each are seed
     frames, and blue.
     """
     truth, bones = next(iter(strips.values())), bones_of(skeleton)

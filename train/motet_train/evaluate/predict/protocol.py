@@ -21,7 +21,7 @@ REPORTED = (1, 3, 7, 9, 13, 24)
 """Output frames, from 0."""
 
 LABELS = (80, 160, 320, 400, 560, 1000)
-"""The milliseconds that tables customarily say; files of 120 Hz give other ones, see :func:`true_times`."""
+"""The milliseconds customary in tables; files of 120 Hz have others, see :func:`true_times`."""
 
 Predictor = Callable[[Array], Array]
 """Seed frames (W, 50, C) in a file's own columns to predicted ones (W, 25, C)."""

@@ -15,7 +15,7 @@ from motet.motion.rotations import Array
 from motet_train.evaluate.tables import short_names
 
 SEED = re.compile(r"[-_. ]?(seed)?\d+$")
-"""How the name of a run ends that says its seed."""
+"""The end of a run's name that gives its seed."""
 
 Errors = Mapping[str, Mapping[str, Array]]
 """Run or group, or the baseline -> action or measure -> error at each predicted frame (N,)."""
@@ -30,7 +30,7 @@ class SeedGroup:
 
     @property
     def count(self) -> str:
-        """What is said of several runs behind a name."""
+        """What follows a name that stands for several runs."""
         return _count(self.runs)
 
 
@@ -94,7 +94,7 @@ def spread(errors: Sequence[Array]) -> Array:
 def pooled(
     errors: Errors, groups: Sequence[SeedGroup], how: Callable[[Sequence[Array]], Array] = mean
 ) -> dict[str, dict[str, Array]]:
-    """The errors with groups, by their titles, in place of runs; what is no run stays in front."""
+    """The errors with groups, by their titles, in place of runs; what is not a run stays first."""
     runs = {name for group in groups for name in group.runs}
     found = {name: dict(parts) for name, parts in errors.items() if name not in runs}
     for group in groups:

@@ -51,7 +51,7 @@ def _facing(turns: Array) -> Array:
 def strips(
     models: Mapping[str, PredictModel], corpus: ExpmapCorpus, action: str, skeleton: Skeleton
 ) -> dict[str, Array]:
-    """The first test window of an action: what was, and what each model says; places (K, J, 3) of every second frame.
+    """The first test window of an action: the truth, and each prediction; places (K, J, 3) of every second frame.
 
     The first :data:`GIVEN` poses are seed frames. The root's rotation is drawn as predicted, though not measured.
     """

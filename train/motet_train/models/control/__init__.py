@@ -1,1 +1,1 @@
-"""Nets that control figures live."""
+"""Nets for live control."""

@@ -15,12 +15,12 @@ from motet.errors import MotetError
 
 
 class DivergedError(MotetError, ArithmeticError):
-    """Learning whose weights left all bounds."""
+    """Training that diverged."""
 
 
 @dataclass(frozen=True)
 class Learning:
-    """How one layer learns."""
+    """How one layer is trained."""
 
     epochs: int
     rate: float = 1e-3

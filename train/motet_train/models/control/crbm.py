@@ -20,7 +20,7 @@ from motet_train.models.control.contrastive import (
 )
 
 LARGEST = 1e3
-"""A weight beyond this is a sign that learning blew up; where it works, weights stay near 1."""
+"""A weight beyond this shows that training diverged; normally weights stay near 1."""
 
 
 class CRBM(nn.Module):
@@ -123,7 +123,7 @@ class CRBMLayer(Layer):
         for rows in epoch.batches:
             error = self._update(self.data.past[rows], self.data.visible[rows], self.data.control[rows], epoch)
         if not self.crbm.past_weight.abs().max() <= LARGEST:
-            raise DivergedError(f"learning blew up: the CRBM has weights beyond {LARGEST:g}")
+            raise DivergedError(f"training diverged: the CRBM has weights beyond {LARGEST:g}")
         return float(error.square().mean())
 
     def _update(self, past: Tensor, visible: Tensor, control: Tensor, epoch: Epoch) -> Tensor:

@@ -1,6 +1,6 @@
 """What a context tells of a whole motion: a loss that exists in training only, for both directions.
 
-A decoder that sees every frame before the next one learns to follow the frames and to pass over the sentence: its
+A decoder that sees every frame before the next one learns to follow the frames and to ignore the sentence: its
 contexts then hold no action. This head asks the context itself for the mean and the deviation of each channel and for
 the length of the motion, so that the encoder of a sentence has to tell walking from running, and left from right, and
 the encoder of a motion has to keep what is only seen over the whole of it, such as a slow turn.

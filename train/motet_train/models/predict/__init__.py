@@ -1,1 +1,1 @@
-"""Nets that predict."""
+"""Predictors."""

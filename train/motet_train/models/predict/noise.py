@@ -25,7 +25,7 @@ def noise_at(share: float) -> float:
 
 
 def noisy(frames: Tensor, std: float) -> Tensor:
-    """Frames (..., D), half of them, drawn anew at each call, with Gaussian noise; as they are where ``std`` is 0."""
+    """Frames (..., D), half of them, drawn afresh at each call, with Gaussian noise; as they are where ``std`` is 0."""
     if std == 0:
         return frames
     chosen = torch.rand_like(frames[..., :1]) < NOISED

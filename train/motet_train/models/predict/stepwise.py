@@ -36,11 +36,11 @@ class System(nn.Module, ABC):
 
     @abstractmethod
     def predict(self, state: State) -> tuple[Tensor, State]:
-        """The next frame (B, D), and what is carried on, before that frame is pushed."""
+        """The next frame (B, D), and what is carried over, before that frame is pushed."""
 
     @abstractmethod
     def push(self, state: State, frame: Tensor) -> State:
-        """What is carried on after a frame (B, D), a predicted or a true one."""
+        """What is carried over after a frame (B, D), a predicted or a true one."""
 
     def progress(self, share: float) -> None:
         """Told before each step of training which share of it is done; for what changes on the way."""
@@ -117,7 +117,7 @@ class Stepwise(Net):
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """The encoder and the step, each with its contract.
 
-        What is carried on is one tensor, ``state``; what the seed alone decides another, ``context``, which begins with
+        What carries over is one tensor, ``state``; what the seed alone decides another, ``context``, which begins with
         the channels that do not vary.
         """
         carried, constant = (sum(map(math.prod, s.values())) for s in (self.system.carried, self.system.constant))
@@ -146,7 +146,7 @@ class EncoderGraph(nn.Module):
 
 
 class StepGraph(nn.Module):
-    """The step graph: one frame, and what is carried on after it."""
+    """The step graph: one frame, and what is carried over after it."""
 
     def __init__(self, net: Stepwise) -> None:
         super().__init__()
