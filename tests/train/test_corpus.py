@@ -139,11 +139,15 @@ def test_a_long_table_is_read_in_time(tmp_path: Path) -> None:
 def test_a_length_unit_can_be_given(tmp_path: Path) -> None:
     write_motion(tmp_path / "run.bvh", read_motion(CMU / "09_07.amc"))
     table(tmp_path / "texts.tsv", "run\tA person runs.")
-    metres = [
-        next(iter(of(read_corpus(tmp_path, metres_per_unit=unit))[0].values())).motion.skeleton.metres_per_unit
-        for unit in (None, 0.01)
-    ]
-    assert metres == [None, 0.01]
+    records = [of(read_corpus(tmp_path, unit=unit))[0] for unit in (None, "cm", 0.5)]
+    skeletons = [found["run"].motion.skeleton for found in records]
+    assert [skeleton and skeleton.metres_per_unit for skeleton in skeletons] == [None, 0.01, 0.5]
+
+
+def test_a_length_unit_that_contradicts_the_file_is_refused(own: Path) -> None:
+    records, skipped = of(read_corpus(own, unit="m"))
+    assert not records
+    assert all("m according to the file, not 1 m as given" in skipped[name] for name in ("02_06", "09_07", "stroll"))
 
 
 @pytest.mark.parametrize(

@@ -275,7 +275,7 @@ def test_trimming_never_moves_a_joint() -> None:
 
 def test_the_command_prepares_and_names_what_it_skips(tmp_path: Path) -> None:
     path = write_kit_zip(tmp_path / "kit.zip", 3)
-    out = tmp_path / "store"
+    out = tmp_path / "stores" / "store"
     result = CliRunner().invoke(main, ["prepare", str(path), "--out", str(out)])
     assert result.exit_code == 0, result.output
     assert "3 motions of" in result.output
@@ -285,6 +285,7 @@ def test_the_command_prepares_and_names_what_it_skips(tmp_path: Path) -> None:
     assert again.exit_code == 2
     assert "it exists" in again.output
     assert json.loads((out / "store.json").read_text())["channels"] == list(JOINTS)
+    assert [path.name for path in out.parent.iterdir()] == ["store"]
 
 
 def test_the_named_preparations() -> None:

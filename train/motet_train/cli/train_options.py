@@ -55,11 +55,6 @@ OPTIONS = (
 )
 
 
-def metres(unit: str | None) -> float | None:
-    """Of one unit that ``--unit-in`` names."""
-    return None if unit is None else METRES[unit]
-
-
 unit_in = click.option("--unit-in", type=click.Choice(list(METRES)), help="Length unit of files that do not state it.")
 
 SHARED = ("out", "seed", "device", "precision", "threads", "resume", "tensorboard", "name", "licence", "data_licence")

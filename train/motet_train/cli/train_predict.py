@@ -6,7 +6,7 @@ import click
 from tqdm import tqdm
 
 from motet_train import distributed
-from motet_train.cli.train_options import metres, train_command, unit_in
+from motet_train.cli.train_options import train_command, unit_in
 from motet_train.data.expmap_files import ExpmapCorpus, is_expmap, read_expmap
 from motet_train.data.predict_data import Material, expmap_material, mocap_material, read_trials
 from motet_train.recipes.predict import RECIPES, train_predict
@@ -39,7 +39,7 @@ def _material(data: Path, unit_in: str | None) -> Material:
     if is_expmap(data):
         return expmap_material(read_expmap_files(data))
     with tqdm(unit=" files", disable=None, leave=False) as bar:
-        trials, skipped = read_trials(data, lambda clip: bar.update(), metres(unit_in))
+        trials, skipped = read_trials(data, lambda clip: bar.update(), unit_in)
     material = mocap_material(trials, skipped, data.name, None)
     if (names := material.about["skipped"]) and distributed.rank() == 0:
         click.echo(f"motet: {len(names)} files cannot be used: {', '.join(names)}", err=True)

@@ -140,15 +140,15 @@ def _mirrored_columns(layout: Layout) -> tuple[tuple[int, ...], tuple[float, ...
 
 
 def read_trials(
-    path: Path, progress: Callable[[str], object] = lambda name: None, metres_per_unit: float | None = None
+    path: Path, progress: Callable[[str], object] = lambda name: None, unit: str | float | None = None
 ) -> tuple[list[Record], list[Skipped]]:
     """The motion files of a folder or zip, one of each name, idle ends cut off, and those that cannot be used.
 
-    metres_per_unit: the length unit of files that do not say it.
+    unit: the length unit of files that do not state theirs, as in :func:`motet.read`.
     """
     items = []
     with Archive(path) as archive:
-        for item in recordings(archive, metres_per_unit):
+        for item in recordings(archive, unit):
             progress(item.name)
             items.append(_trimmed(item))
     trials = [item for item in items if isinstance(item, Record)]
