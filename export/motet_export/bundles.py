@@ -9,6 +9,7 @@ from typing import Any
 from motet.bundle.bundle import Bundle, write_bundle
 from motet.bundle.graph import Graph, OnnxGraph
 from motet.bundle.manifest import Manifest
+from motet.bundle.session import SessionOptions
 from motet.files import check_place
 from motet_export.decoded import whole_runs
 from motet_export.examples import examples
@@ -47,11 +48,15 @@ def _sessions(files: Mapping[str, bytes], torch: Mapping[str, Graph]) -> dict[st
     return {role: OnnxGraph(files[f"{role}.onnx"], graph.spec) for role, graph in torch.items()}
 
 
-def parity_of(run: Run, bundle: Bundle) -> dict[str, Any]:
-    """The parity report of an existing bundle against a run; ExportError at the first rung that fails."""
+def parity_of(run: Run, bundle: Bundle, options: SessionOptions | None = None) -> dict[str, Any]:
+    """The parity report of an existing bundle, its graphs run as ``options`` say, against a run.
+
+    ExportError at the first rung that fails.
+    """
     if "int8" in bundle.manifest.parity:
         raise ExportError(f"bundle {bundle.path} has 8-bit weights, which torch cannot check; export without --int8")
-    return parity(bundle.manifest, {role: bundle.graph(role) for role in run.graphs()}, run.torch_graphs())
+    onnx = {role: bundle.graph(role, options or SessionOptions()) for role in run.graphs()}
+    return parity(bundle.manifest, onnx, run.torch_graphs())
 
 
 def parity(manifest: Manifest, onnx: Mapping[str, Graph], torch: Mapping[str, Graph]) -> dict[str, Any]:

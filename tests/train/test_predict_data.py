@@ -17,10 +17,10 @@ from motet_train.data.errors import DataError
 from motet_train.data.expmap_files import CMU, H36M, Scaling, is_expmap, parse, read_expmap, scaling_of
 from motet_train.data.predict_data import (
     expmap_material,
+    held_out_names,
     mocap_material,
     read_trials,
 )
-from motet_train.data.predict_data import test_names as names_held_out
 from motet_train.data.records import Record
 from motet_train.data.windows import Windows
 from motet_train.evaluate.predict.protocol import (
@@ -195,14 +195,25 @@ def test_the_mirror_of_the_text_files_is_its_own_inverse(tmp_path: Path) -> None
     np.testing.assert_array_equal((frame[columns] * signs)[columns] * signs, frame)
 
 
+def test_trials_are_held_out_by_person_or_by_chance() -> None:
+    walk = read_motion(CLIPS / "39_14.amc")[:120]
+    trials = [Record(f"{n:02}_01", "one" if n < 9 else f"{n}", walk, ()) for n in range(12)]
+    assert set(held_out_names(trials)) <= {"09_01", "10_01", "11_01"}
+    with pytest.raises(DataError, match="12 motions of 1 subjects are too few"):
+        mocap_material([replace(trial, subject="one") for trial in trials], [], "x", None)
+    material = mocap_material([replace(trial, subject="one") for trial in trials], [], "x", None, "trial")
+    assert (material.about["split"], material.about["files"], len(material.about["test"])) == ("trial", 11, 1)
+
+
 def test_motion_files_become_sequences_at_30_fps() -> None:
     walk = read_motion(CLIPS / "39_14.amc")[:120]
     trials = [Record(f"{n:02}_01", f"{n:02}", walk, ()) for n in range(12)]
     material = mocap_material(trials, [], "x", "free")
-    assert (material.contract.fps, len(names_held_out(trials))) == (30.0, 1)
+    assert (material.contract.fps, len(held_out_names(trials))) == (30.0, 1)
     assert material.about["files"] == 11
     assert sum(map(len, material.sequences)) == 11 * len(walk)
-    assert set(material.about["test"]) == set(names_held_out(trials))
+    assert set(material.about["test"]) == set(held_out_names(trials))
+    assert material.about["split"] == "subject"
     mirror_of = material.contract.mirror
     np.testing.assert_array_equal(mirror_of.columns, material.mirrored)
     np.testing.assert_array_equal(mirror_of.signs, material.signs)

@@ -36,14 +36,14 @@ Result = tuple[Ready, str]
 """The figures of each model, ready for JSON, see :func:`_ready`, and the table."""
 
 
-def predict_reports(models: Models, data: Path | None, plots: Path | None) -> Result:
+def predict_reports(models: Models, data: Path | None, plots: Path | None, unit: str | None) -> Result:
     """By the protocol where ``data`` has its text files, else the joints' distances in trials that were held out.
 
-    Runs that differ in their seed alone are one row of the table.
+    Runs that differ in their seed alone are one row of the table. unit: of motion files that do not state theirs.
     """
     if data is None:
         raise click.UsageError("predictors need --data: text files of the protocol, or motion files")
-    return _protocol(models, data, plots) if is_expmap(data) else _mocap(models, data, plots)
+    return _protocol(models, data, plots) if is_expmap(data) else _mocap(models, data, plots, unit)
 
 
 def _protocol(models: Models, data: Path, plots: Path | None) -> Result:
@@ -77,10 +77,10 @@ def _draw_protocol(models: Models, corpus: ExpmapCorpus, shown: curves.Curves, p
     save(drawings, plots)
 
 
-def _mocap(models: Models, data: Path, plots: Path | None) -> Result:
+def _mocap(models: Models, data: Path, plots: Path | None, unit: str | None) -> Result:
     first, groups = next(iter(models.values())), seed_groups(models)
     with tqdm(unit=" files", disable=None, leave=False) as bar:
-        trials = mocap.held_out(first, read_trials(data, lambda clip: bar.update())[0])
+        trials = mocap.held_out(first, read_trials(data, lambda clip: bar.update(), unit)[0])
     found = mocap.distances(models, trials)
     shown, apart = pooled(found, groups), pooled(found, groups, spread)
     if plots is not None:

@@ -16,7 +16,7 @@ from motet_train.data.store import prepare as prepare_store
 
 @click.command()
 @click.argument("data", type=Path)
-@click.option("--out", type=Path, required=True, help="Folder of the store to write; must not exist.")
+@click.option("-o", "--out", type=Path, required=True, help="Folder of the store to write; must not exist.")
 @click.option("--sentences", type=Path, help="Table of sentences. [default: the only .tsv in or beside DATA]")
 @unit_in
 def prepare(data: Path, out: Path, sentences: Path | None, unit_in: str | None) -> None:
