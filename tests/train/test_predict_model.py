@@ -14,7 +14,7 @@ from motet.bundle.manifest import Manifest
 from motet.cli import main
 from motet.formats import read_motion, write_motion
 from motet.models.predict import PredictModel
-from motet_train.data.clips import CMU as CLIPS
+from motet_train.data.clips import CMU_FOLDER
 from motet_train.data.expmap_files import CMU_ACTIONS, read_expmap
 from motet_train.data.predict_data import expmap_material
 from motet_train.evaluate.predict.curves import FEW, MEAN, ZERO, complete, curves
@@ -120,7 +120,7 @@ def test_motion_files_are_trained_on_and_measured_in_centimetres(
 ) -> None:
     data, out = tmp_path / "data", tmp_path / "run"
     data.mkdir()
-    walk = read_motion(CLIPS / "39_14.amc").scaled(0.01)
+    walk = read_motion(CMU_FOLDER / "39_14.amc").scaled(0.01)
     for n in range(10):
         write_motion(data / file.format(n), walk[10 * n : 10 * n + 160])
     given = ("--data", data, *unit)

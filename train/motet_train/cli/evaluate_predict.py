@@ -11,8 +11,8 @@ from tqdm import tqdm
 from motet.formats import read_motion
 from motet.models.predict import PredictModel
 from motet.motion.kinematics import skeleton_of
-from motet_train.data.clips import CMU as CLIPS
-from motet_train.data.expmap_files import CMU, ExpmapCorpus, is_expmap, read_expmap
+from motet_train.data.clips import CMU_FOLDER
+from motet_train.data.expmap_files import CMU_LAYOUT, ExpmapCorpus, is_expmap, read_expmap
 from motet_train.data.predict_data import STRIDE, read_trials
 from motet_train.data.records import Record
 from motet_train.evaluate.predict import curves, mocap, strips
@@ -69,8 +69,8 @@ def _draw_protocol(models: Models, corpus: ExpmapCorpus, shown: curves.Curves, p
     many = shown[curves.MANY]
     errors = {action: {name: many[name][action] for name in many} for action in many[curves.ZERO]}
     drawings = {"predict-error": partial(error_over_time, errors, corpus.layout.fps / STRIDE, "Euler error")}
-    if corpus.layout is CMU:  # of Human3.6M's figure there are no bones
-        skeleton = skeleton_of(read_motion(CLIPS / BONES))
+    if corpus.layout is CMU_LAYOUT:  # of Human3.6M's figure there are no bones
+        skeleton = skeleton_of(read_motion(CMU_FOLDER / BONES))
         for action in (action for action in DRAWN if action in corpus.test):
             drawn = strips.strips(models, corpus, action, skeleton)
             drawings[f"predict-{action}"] = partial(strips_drawing, drawn, skeleton, strips.GIVEN)

@@ -19,7 +19,7 @@ from motet_train.data.errors import DataError
 CONSTANT = FLOORS["deg"]
 """Degrees: a channel with a smaller standard deviation is as good as constant."""
 
-CMU = Path(__file__).parent / "cmu"
+CMU_FOLDER = Path(__file__).parent / "cmu"
 CMU_CLIPS = {"walk": "39_14.amc", "run": "09_07.amc", "bend": "02_06.amc"}
 """The default clips (thesis 5.1): CMU trials 39_14 and 09_07, and the first bend of 02_06."""
 
@@ -62,7 +62,7 @@ def read_clips(folder: Path | None = None, root_rotation: bool = True, unit: str
     degrees, and with ``root_rotation`` the root's rotation with its heading taken out. unit: the length unit of
     files that do not state theirs, as in :func:`motet.read`. DataError or MotionError name the file that does not fit.
     """
-    paths = {label: [CMU / name] for label, name in CMU_CLIPS.items()} if folder is None else _find(folder)
+    paths = {label: [CMU_FOLDER / name] for label, name in CMU_CLIPS.items()} if folder is None else _find(folder)
     read = {
         label: [(path, _angles(read_motion(path, unit=unit), root_rotation)) for path in found]
         for label, found in paths.items()
