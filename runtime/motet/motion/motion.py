@@ -1,5 +1,6 @@
 """The motion: frames of named channels with units and a frame rate. Immutable, finite, never guessed."""
 
+import logging
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -12,6 +13,8 @@ from motet.errors import MotionError
 from motet.motion.resample import resampled
 from motet.motion.rotations import Array, continuous_euler, continuous_rotvec, without_turns
 from motet.motion.skeleton import Skeleton
+
+log = logging.getLogger(__name__)
 
 UNITS = ("deg", "rad", "length", "m", "deg/s", "rad/s", "m/s", "1")
 """Units a channel can have; "length" is the length unit of the skeleton, "1" a number without unit."""
@@ -157,6 +160,7 @@ class Motion:
         ratio = self.fps / fps
         if self.values.size / ratio > MAX_VALUES:
             raise MotionError(f"{self.duration:g} s at {fps:g} fps are too many frames")
+        log.debug("resampling %r to %g fps", self, fps)
         picked = abs(ratio - round(ratio)) < 1e-9 and ratio > 0.5
         values = (self if picked else self.continuous()).values
         return replace(self, values=resampled(values, ratio, to_end), fps=fps)

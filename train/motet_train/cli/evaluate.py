@@ -112,7 +112,7 @@ def _control(
     return reports
 
 
-def _clips(name: str, model: ControlModel, data: Path | None, unit: str | None) -> Clips:
+def _clips(name: str, model: ControlModel, data: Path | None, unit: str | None = None) -> Clips:
     """The clips in ``data``, else those that training was given, else CMU's; DataError where they are gone."""
     if data is None:
         words = shlex.split(str(model.manifest.training.get("command", "")))

@@ -180,9 +180,8 @@ def _row(line: str, path: str | Path, number: int, columns: int) -> list[float]:
 
 
 def _layout(archive: Archive) -> Layout | None:
-    return next(
-        (layout for layout in (CMU_LAYOUT, H36M_LAYOUT) if any(_found(archive, name) for name in _names(layout))), None
-    )
+    layouts = (CMU_LAYOUT, H36M_LAYOUT)
+    return next((layout for layout in layouts if any(_found(archive, name) for name in _names(layout))), None)
 
 
 def _names(layout: Layout) -> list[str]:
