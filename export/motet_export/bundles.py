@@ -1,5 +1,6 @@
 """From a training run to a bundle: graphs exported, parity checked, golden vectors, figures and licences."""
 
+import logging
 import platform
 from collections.abc import Mapping
 from importlib.metadata import version
@@ -19,6 +20,8 @@ from motet_export.parity import check_carried, check_one_step, check_runs
 from motet_export.quantise import difference, quantised
 from motet_train.runs import Run
 
+log = logging.getLogger("motet.export")
+
 
 def export_run(run: Run, out: str | Path, int8: bool = False) -> dict[str, Any]:
     """Export a training run as the bundle ``out`` (a .zip or a new folder) and return the parity report.
@@ -29,9 +32,11 @@ def export_run(run: Run, out: str | Path, int8: bool = False) -> dict[str, Any]:
     check_place(out)
     manifest, modules, torch = Manifest.from_json(run.manifest), run.graphs(), run.torch_graphs()
     label = {"motet": version("motet"), "bundle": manifest.name, "model": manifest.model}
-    files = {
-        f"{role}.onnx": export_graph(module, spec, {**label, "role": role}) for role, (module, spec) in modules.items()
-    }
+    files = {}
+    for role, (module, spec) in modules.items():
+        log.info("exporting the graph %s", role)
+        files[f"{role}.onnx"] = export_graph(module, spec, {**label, "role": role})
+    log.info("comparing it with torch")
     onnx = _sessions(files, torch)
     report = parity(manifest, onnx, torch)
     if int8:

@@ -192,4 +192,8 @@ def _summary(out: Path, training: Mapping[str, Any]) -> str:
     unit = "step" if "steps" in training else "epoch"
     said = [f"{training['parameters']:,} parameters", f"{training[f'{unit}s']} {unit}s in {training['seconds']:g} s"]
     said += [f"{key} {training[key]:.4f}" for key in ("loss", "validation", "reconstruction") if key in training]
-    return f"{out}: {', '.join(said)}, after {unit} {training[f'kept_{unit}']}"
+    summary = f"{out}: {', '.join(said)}, after {unit} {training[f'kept_{unit}']}"
+    if "missed" not in training:
+        return summary
+    missed = f"misses {', '.join(training['missed'])}" if training["missed"] else "reaches all goals"
+    return f"{summary}; the best of {training['candidates']} nets {missed}"
