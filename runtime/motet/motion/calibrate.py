@@ -6,9 +6,11 @@ in the frame of each joint over all frames, and as the axes of joints lie along 
 comes near those is taken to be just these, so that every take of a skeleton gets the same alignment.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from motet.motion.humanoid import LEFT_RIGHT, sided
+from motet.motion.humanoid import ARM, LEFT_RIGHT, LEG, sided
 from motet.motion.joint_map import JointMap
 from motet.motion.rest_pose import (
     Aims,
@@ -34,20 +36,54 @@ SMALL = 0.05
 """The weight of a limb's shortest turn beside its hinge, which counts by the sine of its bend."""
 
 
+@dataclass(frozen=True)
+class _Frames:
+    """Rotations (T, J, 3, 3) and positions (T, J, 3) of joints, which are bones, and what is found: A (J, 3, 3)."""
+
+    rotations: Array
+    positions: Array
+    joint_map: JointMap
+    aims: Aims
+    aligned: Array
+
+    def turns(self, joint: int) -> Array:
+        """Rotations (T, 3, 3) of the humanoid's bone for a joint whose A is found."""
+        turned: Array = self.rotations[:, joint] @ self.aligned[joint]
+        return turned
+
+    def toward(self, bone: str) -> Array:
+        """Directions (T, 3) in which a bone points."""
+        return unit(direction(self.positions, self.joint_map.joints[bone], self.aims[bone]))
+
+    def settle(self, joint: int, turns: Array) -> None:
+        """A of a joint from estimates (T, 3, 3) of its bone's rotation: what the convention says, or near the axes."""
+        known = self.joint_map.axes.get(joint)
+        self.aligned[joint] = _known(known) if known else _near_axes(_mean(self.rotations[:, joint], turns))
+
+    def settle_limb(self, bone: str, along: Array, turns: Array) -> None:
+        """The same for a bone of a limb, which then also points where it really does, along (T, 3)."""
+        joint = self.joint_map.joints[bone]
+        self.settle(joint, turns)
+        inverse = np.swapaxes(self.rotations[:, joint], -1, -2)
+        local = unit(np.mean(inverse @ unit(along)[..., None], axis=0)[:, 0])
+        if not bone.endswith(("Foot", "Toes")) or np.abs(local).max() > ALONG_AXIS:
+            start = self.aligned[joint] @ humanoid_direction(bone)
+            self.aligned[joint] = swing(start, local) @ self.aligned[joint]
+
+
 def alignments_of_frames(rotations: Array, positions: Array, joint_map: JointMap, aims: Aims) -> Array:
     """A (J, 3, 3) for all joints that are bones, from rotations (T, J, 3, 3) and positions (T, J, 3) of frames."""
-    aligned = np.tile(np.eye(3), (rotations.shape[1], 1, 1))
-    _trunk(aligned, rotations, positions, joint_map)
-    pelvis = rotations[:, joint_map.joints["hips"]] @ aligned[joint_map.joints["hips"]]
-    chest = rotations[:, joint_map.spine[-1]] @ aligned[joint_map.spine[-1]]
+    frames = _Frames(rotations, positions, joint_map, aims, np.tile(np.eye(3), (rotations.shape[1], 1, 1)))
+    _trunk(frames)
     for side in LEFT_RIGHT:
-        _leg(aligned, rotations, positions, (joint_map, aims, side, pelvis))
-        _arm(aligned, rotations, positions, (joint_map, aims, side, chest))
-    return aligned
+        _leg(frames, side)
+        _arm(frames, side)
+    return frames.aligned
 
 
-def _trunk(aligned: Array, rotations: Array, positions: Array, joint_map: JointMap) -> None:
+def _trunk(frames: _Frames) -> None:
     """Hips and back: up towards the arms, the joint that carries the arms and those above: up towards the head."""
+    positions, joint_map = frames.positions, frames.joint_map
     legs, arms = (unit(to_left(positions, joint_map, part)) for part in ("UpperLeg", "UpperArm"))
     above = [*joint_map.neck, *([joint_map.joints["head"]] if "head" in joint_map.joints else [])]
     back = [joint_map.joints["hips"], *joint_map.spine, *above]
@@ -58,46 +94,47 @@ def _trunk(aligned: Array, rotations: Array, positions: Array, joint_map: JointM
         end = shoulders if i < chest else positions[:, back[-1]]
         if i == len(back) - 1:
             start, end = positions[:, back[max(i - 1, chest - 1)]], positions[:, joint]
-        aligned[joint] = _near_axes(_mean(rotations[:, joint], frame(left, end - start)))
+        frames.settle(joint, frame(left, end - start))
 
 
-def _leg(aligned: Array, rotations: Array, positions: Array, about: tuple[JointMap, Aims, str, Array]) -> None:
-    joint_map, aims, side, pelvis = about
-    bones = [sided(side, part) for part in ("UpperLeg", "LowerLeg", "Foot", "Toes")]
-    thigh, shin = (unit(direction(positions, joint_map.joints[bone], aims[bone])) for bone in bones[:2])
-    hinge = np.cross(thigh, shin) + SMALL * pelvis[:, :, 0]
-    for bone, along in zip(bones[:2], (thigh, shin), strict=True):
-        _limb(aligned, rotations, joint_map.joints[bone], (bone, along, frame(hinge, -along)))
-    shins = rotations[:, joint_map.joints[bones[1]]] @ aligned[joint_map.joints[bones[1]]]
-    for bone in bones[2:]:
-        if bone in joint_map.joints:
-            joint = joint_map.joints[bone]
-            toward = direction(positions, joint, aims[bone]) if aims[bone] else shins[:, :, 2]
-            left = shins[:, :, 0]
-            level = frame(left, np.cross(toward, left))
-            slope = np.arctan2(-humanoid_direction(bone)[1], humanoid_direction(bone)[2])
-            down = np.array([[1, 0, 0], [0, np.cos(slope), -np.sin(slope)], [0, np.sin(slope), np.cos(slope)]])
-            _limb(aligned, rotations, joint, (bone, toward, level @ down.T))
+def _leg(frames: _Frames, side: str) -> None:
+    """Knees are hinges that bend backwards; feet and toes have the hinge's axis."""
+    joints, bones = frames.joint_map.joints, [sided(side, part) for part in LEG]
+    thigh, shin = (frames.toward(bone) for bone in bones[:2])
+    hinge = np.cross(thigh, shin) + SMALL * frames.turns(joints["hips"])[:, :, 0]
+    frames.settle_limb(bones[0], thigh, frame(hinge, -thigh))
+    frames.settle_limb(bones[1], shin, frame(hinge, -shin))
+    shins = frames.turns(joints[bones[1]])
+    for bone in (bone for bone in bones[2:] if bone in joints):
+        if not frames.aims[bone]:
+            frames.settle(joints[bone], shins)
+            continue
+        along = frames.toward(bone)
+        level = frame(shins[:, :, 0], np.cross(along, shins[:, :, 0]))
+        slope = swing(np.array([0.0, 0.0, 1.0]), humanoid_direction(bone))
+        frames.settle_limb(bone, along, level @ slope.T)
 
 
-def _arm(aligned: Array, rotations: Array, positions: Array, about: tuple[JointMap, Aims, str, Array]) -> None:
-    joint_map, aims, side, chest = about
+def _arm(frames: _Frames, side: str) -> None:
+    """Elbows are hinges that bend forwards with the arms out to the sides; hands are in line with the forearms."""
+    joints, bones = frames.joint_map.joints, [sided(side, part) for part in ARM]
+    chest = frames.turns(frames.joint_map.spine[-1])
+    if bones[0] in joints:
+        frames.settle(joints[bones[0]], chest)
     sign = 1.0 if side == "left" else -1.0
-    bones = [sided(side, part) for part in ("UpperArm", "LowerArm", "Hand")]
-    upper = unit(direction(positions, joint_map.joints[bones[0]], aims[bones[0]]))
-    lower = unit(direction(positions, joint_map.joints[bones[1]], aims[bones[1]])) if aims[bones[1]] else upper
-    plain = swing(chest @ humanoid_direction(bones[0]), upper) @ chest
+    upper = frames.toward(bones[1])
+    lower = frames.toward(bones[2]) if frames.aims[bones[2]] else upper
+    plain = swing(chest @ humanoid_direction(bones[1]), upper) @ chest
     up = -sign * np.cross(upper, lower) + SMALL * plain[:, :, 1]
-    for bone, along in zip(bones[:2], (upper, lower), strict=True):
-        _limb(aligned, rotations, joint_map.joints[bone], (bone, along, _arm_frame(sign * along, up)))
-    forearm = rotations[:, joint_map.joints[bones[1]]] @ aligned[joint_map.joints[bones[1]]]
-    if bones[2] in joint_map.joints:
-        joint = joint_map.joints[bones[2]]
-        along = direction(positions, joint, aims[bones[2]]) if aims[bones[2]] else sign * forearm[:, :, 0]
-        _limb(aligned, rotations, joint, (bones[2], along, _arm_frame(sign * along, forearm[:, :, 1])))
-    shoulder = joint_map.joints.get(sided(side, "Shoulder"))
-    if shoulder is not None:
-        aligned[shoulder] = _near_axes(_mean(rotations[:, shoulder], chest))
+    frames.settle_limb(bones[1], upper, _arm_frame(sign * upper, up))
+    frames.settle_limb(bones[2], lower, _arm_frame(sign * lower, up))
+    if bones[3] in joints:
+        forearm = frames.turns(joints[bones[2]])
+        if frames.aims[bones[3]]:
+            along = frames.toward(bones[3])
+            frames.settle_limb(bones[3], along, _arm_frame(sign * along, forearm[:, :, 1]))
+        else:
+            frames.settle(joints[bones[3]], forearm)
 
 
 def _arm_frame(left: Array, up: Array) -> Array:
@@ -106,16 +143,10 @@ def _arm_frame(left: Array, up: Array) -> Array:
     return np.stack([left, up, np.cross(left, up)], axis=-1)
 
 
-def _limb(aligned: Array, rotations: Array, joint: int, about: tuple[str, Array, Array]) -> None:
-    """A of a bone of a limb: near the joint's axes, and the bone where it really points."""
-    bone, along, turns = about
-    mean = _mean(rotations[:, joint], turns)
-    local = unit(np.mean(np.swapaxes(rotations[:, joint], -1, -2) @ unit(along)[..., None], axis=0)[:, 0])
-    axes = _near_axes(mean)
-    if bone.endswith(("Foot", "Toes")) and np.abs(local).max() < ALONG_AXIS:
-        aligned[joint] = axes
-        return
-    aligned[joint] = swing(axes @ humanoid_direction(bone), local) @ axes
+def _known(axes: str) -> Array:
+    """The rotation (3, 3) with columns such as "-z x -y": the joint's axes that are left, up and forward."""
+    words = axes.split()
+    return np.stack([np.eye(3)["xyz".index(word[-1])] * (-1 if word[0] == "-" else 1) for word in words], axis=1)
 
 
 def _near_axes(rotation: Array) -> Array:

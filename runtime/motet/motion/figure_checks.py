@@ -11,7 +11,14 @@ from motet.motion.rest_pose import Aims, direction, legs_up, to_left, trunk_up, 
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
 
-UNITS = {"metres": 1.0, "centimetres": 0.01, "CMU's unit": 0.0254 / 0.45, "inches": 0.0254, "millimetres": 0.001}
+UNITS = {
+    "metres": 1.0,
+    "decimetres": 0.1,
+    "CMU's unit": 0.0254 / 0.45,
+    "inches": 0.0254,
+    "centimetres": 0.01,
+    "millimetres": 0.001,
+}
 """Units that skeletons are written in, with their length in metres."""
 
 ADULT_LEG, LIKELY_LEG, POSSIBLE_LEG = 0.82, (0.55, 1.1), (0.2, 1.6)
@@ -86,7 +93,7 @@ def check_frames(positions: Array, joint_map: JointMap, aims: Aims) -> None:
         raise MotionError("the feet point backwards: left and right are swapped, or the frames turn inside out")
     if _wrong_knees(positions, joint_map, aims, left) > 0.6:
         raise MotionError(
-            "the knees bend forwards: the frames turn inside out, as with a wrong order of rotations, or this is no human"
+            "the knees bend forwards: the frames turn inside out (a wrong order of rotations?), or this is no human"
         )
 
 

@@ -10,20 +10,22 @@ from motet.motion.figure_checks import leg_of
 from motet.motion.humanoid import LEFT_RIGHT, SOLE, leg_length, sided
 from motet.motion.joint_map import JointMap
 from motet.motion.rest_pose import (
+    LIMBS,
     Aims,
     aims_of,
     alignments_of_pose,
     body_frame,
+    direction,
+    humanoid_direction,
     swing,
-    to_left,
     trunk_up,
     unit,
 )
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
 
-ALONG = 0.9
-"""Cosine above which an arm counts as held out to the side."""
+ALONG = 0.96
+"""Cosine above which a bone counts as standing as in a T-pose."""
 
 
 @dataclass(frozen=True)
@@ -59,28 +61,34 @@ def fit(skeleton: Skeleton, joint_map: JointMap, rotations: Array, places: Array
     still = np.tile(np.eye(3), (len(skeleton.joints), 1, 1))
     body = body_frame(skeleton.rest_positions, joint_map, aims)
     if body is not None:
-        aligned = alignments_of_pose(still, skeleton.rest_positions, body, joint_map, aims)
+        aligned = alignments_of_pose(skeleton, (still, skeleton.rest_positions), body, joint_map, aims)
         heights = _heights(skeleton, joint_map, leg, skeleton.rest_positions @ body[:, 1])
         return Fitted(joint_map, aims, aligned, leg, heights, body[:, 1], 1.0, None)
-    first = body_frame(places[0], joint_map, aims, exact=True) if len(places) else None
-    if first is not None and (len(places) == 1 or _is_t_pose(places[0], first, joint_map)):
-        aligned = alignments_of_pose(rotations[0], places[0], first, joint_map, aims)
+    first = body_frame(places[0], joint_map, aims, exact=True) if len(places) and not joint_map.axes else None
+    if first is not None and (len(places) == 1 or _is_t_pose(places[0], first, joint_map, aims)):
+        aligned = alignments_of_pose(skeleton, (rotations[0], places[0]), first, joint_map, aims)
         heights = _heights(skeleton, joint_map, leg, places[0] @ first[:, 1])
         note = "the rest pose is not a standing body: the first frame's pose was used in its place"
         return Fitted(joint_map, aims, aligned, leg, heights, None, 0.95, note)
     if len(places) < 2:
         raise MotionError("the rest pose is not a standing body: give a motion of this skeleton, whose frames show how")
     aligned = alignments_of_frames(rotations, places, joint_map, aims)
-    note = "the rest pose is not a standing body: how the joints stand was found from the frames"
-    return Fitted(joint_map, aims, aligned, leg, _heights(skeleton, joint_map, leg, None), None, 0.85, note)
+    hips, carrier = joint_map.joints["hips"], joint_map.carrier(skeleton)
+    aligned[carrier] = rotations[0, carrier].T @ rotations[0, hips] @ aligned[hips]
+    known, heights = bool(joint_map.axes), _heights(skeleton, joint_map, leg, None)
+    how = "known by the convention" if known else "found from the frames"
+    note = f"the rest pose is not a standing body: how the joints stand was {how}"
+    return Fitted(joint_map, aims, aligned, leg, heights, None, 0.95 if known else 0.85, note)
 
 
-def _is_t_pose(pose: Array, body: Array, joint_map: JointMap) -> bool:
-    arms = [unit(to_left(pose, joint_map, part)) @ body[:, 0] for part in ("UpperArm", "LowerArm")]
-    wide = np.linalg.norm(to_left(pose, joint_map, "LowerArm")) > 1.8 * np.linalg.norm(
-        to_left(pose, joint_map, "UpperArm")
-    )
-    return min(arms) > ALONG and bool(wide)
+def _is_t_pose(pose: Array, body: Array, joint_map: JointMap, aims: Aims) -> bool:
+    """Whether the bones of arms and legs point where the humanoid's do in its T-pose."""
+    bones = [bone for limb in LIMBS for bone in limb[:2] if aims[bone]]
+    along = [
+        float(unit(direction(pose, joint_map.joints[bone], aims[bone])) @ body @ humanoid_direction(bone))
+        for bone in bones
+    ]
+    return min(along) > ALONG and float(body[1, 1]) > ALONG
 
 
 def _heights(skeleton: Skeleton, joint_map: JointMap, leg: float, rise: Array | None) -> dict[str, float]:
@@ -117,4 +125,3 @@ def upright(fitted: Fitted, places: Array) -> Array:
         return np.eye(3)
     stands = float(np.median(trunk_up(places, fitted.joint_map) @ fitted.up)) > 0.7
     return swing(fitted.up, np.array([0.0, 1.0, 0.0])) if stands else np.eye(3)
-

@@ -57,8 +57,8 @@ def _joints() -> list[Joint]:
     places = dict(TRUNK_PLACES)
     for side, sign in zip(LEFT_RIGHT, (1.0, -1.0), strict=True):
         for part, (parent, (x, y, z), order) in SIDE_PLACES.items():
-            parent = sided(side, parent) if parent in SIDE_PLACES else parent
-            places[sided(side, part)] = (parent, (sign * x, y, z), order)
+            carrier = sided(side, parent) if parent in SIDE_PLACES else parent
+            places[sided(side, part)] = (carrier, (sign * x, y, z), order)
     names = list(places)
     return [
         Joint(name, names.index(parent) if parent else -1, offset, order)

@@ -2,7 +2,8 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -30,8 +31,10 @@ class JointMap:
     spine, neck: the joints between the hips and the arms, and between the arms and the head, upwards; any number.
     convention: the name of the convention, "by the tree" or the name of the user's file.
     confidence: from 0 to 1, how sure it is that each joint is what it is taken for.
-    rest: where the convention is known to rest in a pose of its own: bone -> the rotation vector in degrees by which the
-        humanoid's bone is turned in that pose, none for a bone that is not turned.
+    rest: where the convention is known to rest in a pose of its own: bone -> the rotation vector in degrees by which
+        the humanoid's bone is turned in that pose; a bone that is not named is not turned.
+    axes: where the convention is known to rest in no body's pose: joint -> its axes that point to the humanoid's left,
+        up and forward in a T-pose, such as "-z x -y".
     """
 
     joints: Mapping[str, int]
@@ -40,6 +43,14 @@ class JointMap:
     convention: str
     confidence: float
     rest: Mapping[str, Triple] | None = None
+    axes: Mapping[int, str] = field(default_factory=dict)
+
+    def carrier(self, skeleton: Skeleton) -> int:
+        """The joint that carries legs and back: the hips, or what they hang on where the back is not theirs."""
+        joint = self.joints["hips"]
+        while self.spine[0] not in skeleton.subtree(skeleton.names[joint]):
+            joint = skeleton.joints[joint].parent
+        return joint
 
     def names(self, skeleton: Skeleton) -> dict[str, tuple[str, ...]]:
         """For each bone ("spine" and "neck" for all of the back and of the neck) the names of its joints."""
@@ -60,14 +71,15 @@ def check_map(skeleton: Skeleton, joint_map: JointMap) -> JointMap:
     missing = missing_bones(joint_map.joints, joint_map.spine)
     if missing:
         raise MotionError(missing_reason(missing, joint_map.joints))
-    chains = {"back": ("hips", *joint_map.spine), "neck": (joint_map.spine[-1], *joint_map.neck)}
+    hips = joint_map.joints["hips"]
+    # the joint that carries the legs may hang beside the back, below what carries both
+    limbs = {"back": joint_map.spine, "neck": (joint_map.spine[-1], *joint_map.neck)}
     for side in LEFT_RIGHT:
-        chains |= {f"{side} leg": ("hips", *(sided(side, part) for part in LEG))}
-        chains |= {f"{side} arm": (joint_map.spine[0], *(sided(side, part) for part in ARM))}
-    for limb, chain in chains.items():
-        known = [joint_map.joints.get(bone) if isinstance(bone, str) else bone for bone in chain]
-        joints = [joint for joint in known if joint is not None]
-        for upper, lower in zip(joints, joints[1:], strict=False):
+        for limb, first, parts in (("leg", hips, LEG), ("arm", joint_map.spine[0], ARM)):
+            bones = [sided(side, part) for part in parts]
+            limbs[f"{side} {limb}"] = (first, *(joint_map.joints[bone] for bone in bones if bone in joint_map.joints))
+    for limb, joints in limbs.items():
+        for upper, lower in pairwise(joints):
             if lower not in skeleton.subtree(skeleton.names[upper]) or lower == upper:
                 names = f"{skeleton.names[lower]!r} does not hang on {skeleton.names[upper]!r}"
                 raise MotionError(f"the joints of the {limb} are out of order: {names}")

@@ -4,7 +4,8 @@ A table is a JSON object: "title"; "sides", pairs of what stands for left and ri
 have, with ``{s}`` in the place of the side (of "spine" and "neck" all that are there count, upwards, of others the
 first); "aside", other joints that files of this convention have and that tell it from its neighbours; "prefixes",
 regular expressions of what can stand before every name; "rest", for files that are known to rest in a T-pose of their
-own, what that pose is on the humanoid: bone -> rotation vector in degrees, of the left side. Upper and lower case and
+own, what that pose is on the humanoid: bone -> rotation vector in degrees, of the left side; "axes", for files that
+rest in no body's pose: name -> the joint's axes that point left, up and forward in a T-pose. Upper and lower case and
 separators do not count.
 """
 
@@ -34,6 +35,7 @@ class Convention:
     aside: frozenset[str]
     prefixes: tuple[str, ...]
     rest: dict[str, Triple] | None
+    axes: dict[str, str]
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,7 @@ class Match:
     known: int
     absent: int
     rest: dict[str, Triple] | None
+    axes: dict[int, str]
 
     @property
     def missing(self) -> list[str]:
@@ -76,8 +79,9 @@ def _convention(content: dict[str, Any], sides: Sequence[str]) -> Convention:
             for side, word in zip(LEFT_RIGHT, sides, strict=True):
                 names[sided(side, bone)] = tuple(plain(name.replace("{s}", word)) for name in known)
     aside = {plain(name.replace("{s}", word)) for name in content.get("aside", []) for word in sides}
+    axes = {plain(name): known for name, known in content.get("axes", {}).items()}
     prefixes = tuple(content.get("prefixes", ()))
-    return Convention(content["title"], names, frozenset(aside), prefixes, _rest(content.get("rest")))
+    return Convention(content["title"], names, frozenset(aside), prefixes, _rest(content.get("rest")), axes)
 
 
 def _rest(turns: dict[str, list[float]] | None) -> dict[str, Triple] | None:
@@ -86,13 +90,15 @@ def _rest(turns: dict[str, list[float]] | None) -> dict[str, Triple] | None:
         return None
     rest: dict[str, Triple] = {}
     for bone, (x, y, z) in turns.items():
-        rest |= {bone: (x, y, z)} if bone in TRUNK else {sided("left", bone): (x, y, z), sided("right", bone): (x, -y, -z)}
+        rest |= (
+            {bone: (x, y, z)} if bone in TRUNK else {sided("left", bone): (x, y, z), sided("right", bone): (x, -y, -z)}
+        )
     return rest
 
 
 def plain(name: str) -> str:
     """A name without what differs between files: case, separators, and the namespace before a colon."""
-    return re.sub(r"[^a-z0-9]", "", name.split(":")[-1].lower())
+    return re.sub(r"[^a-z0-9]", "", name.rsplit(":", maxsplit=1)[-1].lower())
 
 
 def plain_names(names: Sequence[str], prefixes: Sequence[str] = ()) -> list[str]:
@@ -119,7 +125,9 @@ def map_by_names(skeleton: Skeleton) -> JointMap | None:
             raise MotionError(missing_reason(best.missing, best.joints))
         return None
     confidence = round(1.0 - 0.3 * best.absent / (best.absent + best.known), 2)
-    found = JointMap(best.joints, best.chains["spine"], best.chains["neck"], best.title, confidence, best.rest)
+    found = JointMap(
+        best.joints, best.chains["spine"], best.chains["neck"], best.title, confidence, best.rest, best.axes
+    )
     return check_map(skeleton, found)
 
 
@@ -137,7 +145,9 @@ def _match(convention: Convention, skeleton: Skeleton) -> Match:
     known = {name for bone in convention.names.values() for name in bone} | convention.aside
     absent = [bone for bone in convention.names if bone not in joints and not chains.get(bone)]
     absent += [name for chain in CHAINS for name in convention.names[chain] if name not in names]
-    return Match(convention.title, joints, chains, sum(name in known for name in names), len(absent), convention.rest)
+    axes = {i: convention.axes[name] for i, name in enumerate(names) if name in convention.axes}
+    count = sum(name in known for name in names)
+    return Match(convention.title, joints, chains, count, len(absent), convention.rest, axes)
 
 
 def _refuse_two_hips(skeleton: Skeleton, names: list[str], hips: tuple[str, ...]) -> None:

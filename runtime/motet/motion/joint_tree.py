@@ -26,6 +26,9 @@ ALIKE = 0.15
 FOOT = (0.08, 0.35)
 """Within these parts of a leg lies what comes after the ankle."""
 
+FINGERS = 0.35
+"""Within this part of an arm lies what comes after the wrist."""
+
 PIECE = 0.15
 """A bone begins with at least this part of its limb: hips and buttocks often have a short one before the thigh."""
 
@@ -78,7 +81,7 @@ def map_by_tree(motion: Motion) -> JointMap:
     legs, arms = _legs_and_arms(tree)
     shared = [joint for joint in tree.above(arms.joint) if joint not in tree.above(legs.joint)]
     if not shared:
-        raise MotionError(f"{NO_HUMAN}; here legs and arms hang on the same joint {skeleton.names[legs.joint]!r}")
+        raise MotionError(f"{NO_HUMAN}; there is no back between {skeleton.names[legs.joint]!r} and the arms")
     joints = {"hips": legs.joint}
     frames = positions(motion) if len(motion) else skeleton.rest_positions[None]
     leg_pair, arm_pair = _legs(tree, legs), _arms(tree, arms)
@@ -162,11 +165,13 @@ def _legs(tree: _Tree, fork: _Fork) -> list[dict[str, int]]:
 
 
 def _arms(tree: _Tree, fork: _Fork) -> list[dict[str, int]]:
-    """Clavicles, upper arms, forearms and hands: the hand is where fingers fork, else the last; the elbow halves."""
+    """Clavicles, upper arms, forearms and hands: the hand is where fingers fork or begins them; the elbow halves."""
     paths, places = _pair(tree, fork)
     forks = [k for k, joint in enumerate(paths[0]) if k >= 2 and len(tree.skeleton.children[joint]) >= 2]
-    hand = forks[0] if forks else len(paths[0]) - 1
-    start, elbow = min(combinations(range(hand), 2), key=lambda choice: _unlike(places, *choice, hand))
+    count = len(places) - 1
+    hands = forks[:1] or [k for k in range(2, count) if 1 - places[k] / places[-1] <= FINGERS]
+    choices = [(start, elbow, hand) for hand in hands for start, elbow in combinations(range(hand), 2)]
+    start, elbow, hand = min(choices, key=lambda choice: _unlike(places, *choice))
     parts = {"UpperArm": start, "LowerArm": elbow, "Hand": hand} | ({"Shoulder": 0} if start else {})
     return [{part: path[k] for part, k in parts.items()} for path in paths]
 
@@ -175,7 +180,7 @@ def _unlike(places: list[float], start: int, middle: int, end: int) -> float:
     """How far two bones are from being of one length and most of the limb; a short piece does not begin a bone."""
     upper, lower = places[middle] - places[start], places[end] - places[middle]
     whole, first = upper + lower, places[start + 1] - places[start]
-    return abs(upper - lower) / whole - 0.25 * whole / places[-1] if first > PIECE * whole else np.inf
+    return abs(upper - lower) / whole - 0.1 * whole / places[-1] if first > PIECE * whole else np.inf
 
 
 def _neck(tree: _Tree, arms: _Fork) -> tuple[tuple[int, ...], int | None]:

@@ -157,15 +157,19 @@ def _axes_rotations() -> Array:
 AXES_ROTATIONS = _axes_rotations()
 
 
-def alignments_of_pose(rotations: Array, rest: Array, body: Array, joint_map: JointMap, aims: Aims) -> Array:
+def alignments_of_pose(
+    skeleton: Skeleton, pose: tuple[Array, Array], body: Array, joint_map: JointMap, aims: Aims
+) -> Array:
     """A (J, 3, 3) for all joints that are bones, the identity for others, from a pose that is a standing body.
 
-    rotations, rest: rotations (J, 3, 3) and positions (J, 3) of the joints in that pose; body: its frame.
+    pose: rotations (J, 3, 3) and positions (J, 3) of the joints in that pose; body: its frame.
     """
+    rotations, rest = pose
     turns = _known_turns(body, joint_map) if joint_map.rest is not None else _found_turns(rest, body, joint_map, aims)
     aligned = np.tile(np.eye(3), (len(rest), 1, 1))
     for bone, joint in joint_map.joints.items():
         aligned[joint] = rotations[joint].T @ turns[bone]
+    aligned[joint_map.carrier(skeleton)] = rotations[joint_map.carrier(skeleton)].T @ turns["hips"]
     for chain, joints in (("spine", joint_map.spine), ("neck", joint_map.neck)):
         for joint in joints:
             aligned[joint] = rotations[joint].T @ turns.get(chain, body)

@@ -13,7 +13,7 @@ from motet.errors import MotionError
 from motet.motion import fitting, humanoid
 from motet.motion.figure_checks import check_frames, unit_of
 from motet.motion.fitting import Fitted, fit, upright
-from motet.motion.humanoid import BONES, HUMANOID, LEFT_RIGHT, NECK, PARENTS, SPINE, leg_length, sided
+from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, NECK, PARENTS, SPINE, leg_length, sided
 from motet.motion.joint_map import JointMap
 from motet.motion.joint_names import map_by_names
 from motet.motion.joint_tree import map_by_tree
@@ -142,16 +142,16 @@ def from_humanoid(motion: Motion, like: Motion | Skeleton, joint_map: JointMap |
     bones = {bone: source[:, HUMANOID.index(bone)] for bone in fitted.heights}
     soles = fitting.sole_points(fitted, bones, figure + moved[:, None])
     moved[:, 1] += scale * _ground(humanoid.sole_points(source, places)) - _ground(soles)
-    hips = joint_map.joints["hips"]
-    if hips:
-        above = skeleton.joints[hips].parent
-        from_above = figure[:, hips] + moved - figure[:, above] - skeleton.offsets[0]
+    carrier = joint_map.carrier(skeleton)
+    if carrier:
+        above = skeleton.joints[carrier].parent
+        from_above = figure[:, carrier] + moved - figure[:, above] - skeleton.offsets[0]
         moved = (np.swapaxes(turned[:, above], -1, -2) @ from_above[..., None])[..., 0]
-    return motion_of(skeleton, turned, {hips: moved}, motion.fps)
+    return motion_of(skeleton, turned, {carrier: moved}, motion.fps)
 
 
 def _still(example: Motion, fitted: Fitted) -> tuple[Skeleton, Array]:
-    """The skeleton and rotations (J, 3, 3) of joints that are no bones: of the rest pose, or else of the first frame."""
+    """The skeleton and local rotations (J, 3, 3) of joints that are no bones: at rest, or as in the first frame."""
     skeleton = skeleton_of(example)
     if fitted.at_rest:
         return skeleton, np.tile(np.eye(3), (len(skeleton.joints), 1, 1))
@@ -171,6 +171,7 @@ def _figure_rotations(source: Array, fitted: Fitted, skeleton: Skeleton, still: 
     # the head is the last of the chain, whether the figure has a joint for it or not
     shared = _chain(neck, len(joint_map.neck) + ("head" in joint_map.joints))
     wanted |= dict(zip(joint_map.neck, shared, strict=False))
+    wanted.setdefault(joint_map.carrier(skeleton), wanted[joint_map.joints["hips"]])
     turned = np.empty((len(source), len(skeleton.joints), 3, 3))
     for i, joint in enumerate(skeleton.joints):
         if i in wanted:
