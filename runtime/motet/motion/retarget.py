@@ -126,7 +126,8 @@ def from_humanoid(motion: Motion, like: Motion | Skeleton, joint_map: JointMap |
         joints stand.
     joint_map: as for :func:`to_humanoid`. Joints that are no bones keep their rest. The path is scaled by the ratio of
     the legs' lengths and the feet stay on the ground. Returns the translation of the hips in "length" and three angles
-    in "deg" for each joint. MotionError for a motion that is not the humanoid's, or a skeleton that is no human's.
+    in "deg" for each joint; the skeleton knows its unit where the legs' length tells it.
+    MotionError for a motion that is not the humanoid's, or a skeleton that is no human's.
     """
     if motion.skeleton != HUMANOID:
         raise MotionError("this motion is not on the humanoid: bring it there by to_humanoid first")
@@ -134,6 +135,7 @@ def from_humanoid(motion: Motion, like: Motion | Skeleton, joint_map: JointMap |
     joint_map = joint_map or map_of(example)
     fitted = fit(skeleton_of(example), joint_map, *global_transforms(example))
     skeleton, still = _still(example, fitted)
+    skeleton = replace(skeleton, metres_per_unit=unit_of(skeleton, fitted.leg).metres)
     source, places = global_transforms(motion)
     turned = _figure_rotations(source, fitted, skeleton, still)
     figure = places_of(skeleton, turned)
