@@ -8,6 +8,7 @@ taken out: every angle 0 is that pose, whatever the nodes' own axes. Scales of n
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,6 @@ import numpy as np
 
 from motet.errors import FormatError, MotionError
 from motet.formats.gltf_data import Gltf, parse
-from motet.formats.lines import unique_name
 from motet.motion.humanoid import BONES, REQUIRED
 from motet.motion.joint_map import JointMap, check_map
 from motet.motion.motion import Motion
@@ -130,8 +130,14 @@ def _named(gltf: Gltf, joints: _Nodes) -> list[str]:
     taken = list(bones.values())
     names: list[str] = []
     for node, name in zip(joints.nodes, joints.names, strict=True):
-        names.append(bones[node] if node in bones else unique_name(name, [*taken, *names]))
+        names.append(bones[node] if node in bones else _free(name, [*taken, *names]))
     return names
+
+
+def _free(name: str, taken: list[str]) -> str:
+    """A name, with a number behind it where it is taken."""
+    numbered = (f"{name}_{number}" for number in count(2))
+    return next(candidate for candidate in chain([name], numbered) if candidate not in taken)
 
 
 def _skeleton(path: Path, joints: _Nodes, names: list[str], offsets: list[Array]) -> Skeleton:
@@ -161,7 +167,7 @@ def _joints(path: Path, gltf: Gltf) -> _Nodes:
     order = tuple(node for node in order if node in kept | ends)
     names: list[str] = []
     for node in order:
-        names.append(unique_name(gltf.objects("nodes")[node].get("name") or f"node{node}", names))
+        names.append(_free(gltf.objects("nodes")[node].get("name") or f"node{node}", names))
     return _Nodes(
         order,
         tuple(order.index(parents[node]) if node != shared[0] else -1 for node in order),

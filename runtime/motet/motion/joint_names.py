@@ -13,7 +13,7 @@ import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from importlib.resources import files
 from typing import Any
 
@@ -112,6 +112,7 @@ def plain_names(names: Sequence[str], prefixes: Sequence[str] = ()) -> list[str]
     return [plain(name) for name in stripped]
 
 
+@lru_cache(maxsize=256)
 def map_by_names(skeleton: Skeleton) -> JointMap | None:
     """The map by the convention that fits best, None where none does.
 

@@ -15,9 +15,10 @@ def spread(chain: Array, count: int) -> Array:
     places = np.arange(1, count + 1) * last / count
     below = np.minimum(places.astype(int), last - 1)
     part = places - below
-    if np.all(part == 1) and last == count:
-        return chain[:, 1:]
-    lower, upper = chain[:, below], chain[:, below + 1]
-    turn = rotmat_to_rotvec(np.swapaxes(lower, -1, -2) @ upper)
-    between: Array = lower @ rotvec_to_rotmat(turn * part[:, None])
-    return np.where((part == 1)[:, None, None], upper, between)
+    shared: Array = chain[:, below + 1]
+    inner = np.flatnonzero(part < 1)
+    if len(inner):
+        lower = chain[:, below[inner]]
+        turn = rotmat_to_rotvec(np.swapaxes(lower, -1, -2) @ shared[:, inner])
+        shared[:, inner] = lower @ rotvec_to_rotmat(turn * part[inner, None])
+    return shared
