@@ -25,21 +25,19 @@ from motet.motion.retarget import from_humanoid, to_humanoid
 
 ARCHIVES = ("cmu-asfamc.zip", "cmu-asfamc-more.zip", "cmu-bvh.zip", "cmu-bvh-more.zip", "accad-bvh.zip")
 
-LEFT_OUT = {("cmu-asfamc.zip", name) for name in ("07_02", "07_12", "14_36")}
-"""Files that a later archive replaces or that are to be left out, as the data's README says."""
+LEFT_OUT = ("14_36",)
+"""A file that is another one's copy, as the data's README says."""
 
 LIMBS = tuple(bone for bone in BONES if bone.endswith(("UpperLeg", "LowerLeg", "Foot", "UpperArm", "LowerArm")))
 
 
 def unpacked(data: Path, folder: Path, names: tuple[str, ...] = ARCHIVES) -> list[Path]:
-    """The motion files of the archives, unpacked side by side with their skeletons."""
-    found = []
+    """The motion files of the archives, unpacked; those called "NAME-more" over those called "NAME"."""
     for name in names:
         with zipfile.ZipFile(data / name) as archive:
-            archive.extractall(folder / name)
-        files = sorted(path for path in (folder / name).rglob("*") if path.suffix in (".amc", ".bvh"))
-        found += [path for path in files if (name, path.stem) not in LEFT_OUT]
-    return found
+            archive.extractall(folder / name.removesuffix(".zip").removesuffix("-more"))
+    files = sorted(path for path in folder.rglob("*") if path.suffix in (".amc", ".bvh"))
+    return [path for path in files if path.stem not in LEFT_OUT]
 
 
 def agreement(bvh: Motion, amc: Motion, added: int) -> tuple[float, dict[str, float]]:
@@ -62,10 +60,9 @@ def agreement(bvh: Motion, amc: Motion, added: int) -> tuple[float, dict[str, fl
 
 def both_forms(folder: Path) -> Iterator[tuple[str, Motion, Motion, int]]:
     """Trials that exist as BVH and as AMC: name, both motions, and the frames that the BVH adds in front."""
-    for path in sorted((folder / "cmu-bvh.zip").glob("*.bvh")):
-        places = [folder / name / "amc" / f"{path.stem}.amc" for name in ("cmu-asfamc-more.zip", "cmu-asfamc.zip")]
-        amc = next((place for place in places if place.is_file()), None)
-        if amc is not None:
+    for path in sorted((folder / "cmu-bvh").glob("*.bvh")):
+        amc = folder / "cmu-asfamc" / "amc" / f"{path.stem}.amc"
+        if amc.is_file():
             yield path.stem, read_motion(path), read_motion(amc), 1
 
 
@@ -95,7 +92,7 @@ def main(data: Path) -> None:
     """Print all figures."""
     with TemporaryDirectory() as temporary:
         folder = Path(temporary)
-        files = unpacked(data, folder)
+        files = [*unpacked(data, folder), *sorted((data / "kit").glob("0*.xml"))]
         print("files  confidence  convention: notes")
         _print_files(files)
         print("trial  frames  joints apart, cm  limbs apart, degrees: mean, worst bone")

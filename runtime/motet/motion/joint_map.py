@@ -142,6 +142,8 @@ def _entries(path: Path) -> dict[str, list[str]]:
         raise FormatError(path, f"cannot be read: {error.strerror}") from error
     except ValueError as error:
         raise FormatError(path, f"this is not a map of joints in JSON: {error}") from error
+    if not isinstance(content, dict):
+        raise FormatError(path, "this is not a map of joints: expected an object of bones and joints")
     entries = {bone: [names] if isinstance(names, str) else names for bone, names in content.items()}
     for bone, names in entries.items():
         if not isinstance(names, list) or not all(isinstance(name, str) for name in names):

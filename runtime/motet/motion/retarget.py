@@ -18,6 +18,7 @@ from motet.motion.joint_map import JointMap
 from motet.motion.joint_names import map_by_names
 from motet.motion.joint_tree import map_by_tree
 from motet.motion.kinematics import global_transforms, local_rotations, local_translations, skeleton_of
+from motet.motion.mmm_figure import is_mmm, with_figure
 from motet.motion.motion import Motion
 from motet.motion.rest_pose import middle
 from motet.motion.rotations import Array
@@ -63,6 +64,7 @@ def to_humanoid(motion: Motion, joint_map: JointMap | None = None) -> Humanoid:
     The path is scaled by the ratio of the legs' lengths, and the soles' lowest points are laid on y = 0 at their 5th
     percentile. A file with z up is turned upright. MotionError, with the reason, for a figure that is no human's.
     """
+    motion = with_figure(motion) if is_mmm(motion) else motion
     skeleton = skeleton_of(motion)
     if not len(motion):
         raise MotionError("this motion has no frames: there is nothing to bring to the humanoid")
