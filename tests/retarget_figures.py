@@ -28,6 +28,9 @@ ARCHIVES = ("cmu-asfamc.zip", "cmu-asfamc-more.zip", "cmu-bvh.zip", "cmu-bvh-mor
 LEFT_OUT = ("14_36",)
 """A file that is another one's copy, as the data's README says."""
 
+ADDED = {"07_12": 2}
+"""Frames that a BVH has before the AMC's where it is not the added T-pose alone: this AMC lacks its first frame."""
+
 LIMBS = tuple(bone for bone in BONES if bone.endswith(("UpperLeg", "LowerLeg", "Foot", "UpperArm", "LowerArm")))
 
 
@@ -63,7 +66,7 @@ def both_forms(folder: Path) -> Iterator[tuple[str, Motion, Motion, int]]:
     for path in sorted((folder / "cmu-bvh").glob("*.bvh")):
         amc = folder / "cmu-asfamc" / "amc" / f"{path.stem}.amc"
         if amc.is_file():
-            yield path.stem, read_motion(path), read_motion(amc), 1
+            yield path.stem, read_motion(path), read_motion(amc), ADDED.get(path.stem, 1)
 
 
 def _milliseconds(what: Callable[[], object]) -> float:
@@ -79,7 +82,7 @@ def _print_files(files: list[Path]) -> None:
     found: dict[tuple[str, float, tuple[str, ...]], int] = defaultdict(int)
     for path in files:
         try:
-            humanoid = to_humanoid(read_motion(path, partial=True))
+            humanoid = to_humanoid(read_motion(path))
             notes = tuple(note.rpartition(",")[0] if note.endswith(" m") else note for note in humanoid.notes)
             found[humanoid.convention, humanoid.confidence, notes] += 1
         except MotetError as error:

@@ -141,7 +141,8 @@ def _snapped(body: Array) -> Array:
 
 def nearest_axes(rotation: Array) -> Array:
     """The rotation (3, 3) nearest to one given among the 24 that turn coordinate axes into coordinate axes."""
-    return AXES_ROTATIONS[int(np.argmax(np.sum(AXES_ROTATIONS * rotation, axis=(1, 2))))]
+    nearest: Array = AXES_ROTATIONS[int(np.argmax(np.sum(AXES_ROTATIONS * rotation, axis=(1, 2))))]
+    return nearest
 
 
 def angle_between(one: Array, other: Array) -> float:
