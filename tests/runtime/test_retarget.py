@@ -9,11 +9,12 @@ from motet.formats import read_motion, write_motion
 from motet.formats.writable import with_names
 from motet.motion.humanoid import BONES, HUMANOID, REST, sole_points
 from motet.motion.joint_tree import map_by_tree
-from motet.motion.kinematics import global_transforms
+from motet.motion.kinematics import global_transforms, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.retarget import Humanoid, from_humanoid, to_humanoid
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Joint, Skeleton
+from motet.motion.world_rotations import motion_of
 
 SKELETONS = Path(__file__).parent / "skeletons"
 
@@ -288,3 +289,26 @@ def test_the_tree_finds_joints_with_and_without_sides_in_their_names() -> None:
     assert found.names(skeleton)["spine"] == ("mixamorig:Spine", "mixamorig:Spine1", "mixamorig:Spine2")
     nameless = with_names(mixamo, [f"b{i}{'_end' * n.endswith('_end')}" for i, n in enumerate(skeleton.names)])
     assert dict(map_by_tree(nameless).joints) == dict(found.joints)
+
+
+@pytest.mark.parametrize("name", ["lafan1", "bandai-namco"])
+def test_axes_of_a_convention_are_not_forced_on_another_skeleton_of_the_same_names(name: str) -> None:
+    """The same figure with the axes of every joint turned about: what the table says does not hold any more."""
+    like = skeleton_file(name)
+    skeleton = skeleton_of(like)
+    walked = from_humanoid(dancing(), like)
+    rotations, places = global_transforms(walked)
+    turn = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    offsets = [tuple(joint.offset if i == 0 else turn.T @ joint.offset) for i, joint in enumerate(skeleton.joints)]
+    joints = [replace(joint, offset=offset) for joint, offset in zip(skeleton.joints, offsets, strict=True)]
+    hips = skeleton.index("Hips")
+    above = places[:, hips] - places[:, skeleton.joints[hips].parent] if hips else places[:, 0]
+    moved = {hips: above @ turn if hips else above}
+    other = motion_of(Skeleton(tuple(joints)), rotations @ turn, moved, 30.0)
+    humanoid = to_humanoid(other)
+    assert humanoid.confidence < 0.9
+    assert "found from the frames" in humanoid.notes[0]
+    known = to_humanoid(walked)
+    apart = np.linalg.norm(global_transforms(humanoid.motion)[1] - global_transforms(known.motion)[1], axis=-1)
+    limbs = [HUMANOID.index(bone) for bone in ("leftFoot", "rightLowerLeg", "leftHand", "rightLowerArm")]
+    assert apart[:, limbs].mean() < 0.1

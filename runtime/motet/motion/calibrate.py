@@ -32,6 +32,9 @@ NEAR_AXES = 30.0
 ALONG_AXIS = 0.995
 """Cosine above which a bone lies along an axis of its joint."""
 
+AGREES = 0.7
+"""Cosine from which on a direction is that of an axis that a convention says; feet slope away from theirs."""
+
 SMALL = 0.05
 """The weight of a limb's shortest turn beside its hinge, which counts by the sine of its bend."""
 
@@ -64,11 +67,27 @@ class _Frames:
         """The same for a bone of a limb, which then also points where it really does, along (T, 3)."""
         joint = self.joint_map.joints[bone]
         self.settle(joint, turns)
-        inverse = np.swapaxes(self.rotations[:, joint], -1, -2)
-        local = unit(np.mean(inverse @ unit(along)[..., None], axis=0)[:, 0])
+        local = _mean_direction(self.rotations[:, joint], along)
         if not bone.endswith(("Foot", "Toes")) or np.abs(local).max() > ALONG_AXIS:
             start = self.aligned[joint] @ humanoid_direction(bone)
             self.aligned[joint] = swing(start, local) @ self.aligned[joint]
+
+
+def axes_agree(rotations: Array, positions: Array, joint_map: JointMap, aims: Aims) -> bool:
+    """Whether the axes that a convention says fit a skeleton: bones of limbs point along them, and left is left.
+
+    Other skeletons can have the same names. rotations (T, J, 3, 3) and positions (T, J, 3) are those of frames.
+    """
+    bones = {bone: joint_map.joints[bone] for bone, ends in aims.items() if ends}
+    expected = {joint: humanoid_direction(bone) for bone, joint in bones.items()}
+    seen = {joint: direction(positions, joint, aims[bone]) for bone, joint in bones.items()}
+    for joint, part in ((joint_map.joints["hips"], "UpperLeg"), (joint_map.spine[-1], "UpperArm")):
+        expected[joint], seen[joint] = np.array([1.0, 0.0, 0.0]), to_left(positions, joint_map, part)
+    known = [joint for joint in seen if joint in joint_map.axes]
+    return bool(known) and all(
+        _mean_direction(rotations[:, joint], seen[joint]) @ _known(joint_map.axes[joint]) @ expected[joint] > AGREES
+        for joint in known
+    )
 
 
 def alignments_of_frames(rotations: Array, positions: Array, joint_map: JointMap, aims: Aims) -> Array:
@@ -141,6 +160,11 @@ def _arm_frame(left: Array, up: Array) -> Array:
     left = unit(left)
     up = unit(up - np.sum(up * left, axis=-1, keepdims=True) * left)
     return np.stack([left, up, np.cross(left, up)], axis=-1)
+
+
+def _mean_direction(rotations: Array, along: Array) -> Array:
+    """The mean direction (3,) in a joint's frame of vectors (T, 3), with the joint's rotations (T, 3, 3)."""
+    return unit(np.mean(np.swapaxes(rotations, -1, -2) @ unit(along)[..., None], axis=0)[:, 0])
 
 
 def _known(axes: str) -> Array:

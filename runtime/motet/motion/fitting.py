@@ -1,11 +1,11 @@
 """How a figure's joints stand against the humanoid, from its rest pose, from a T-pose in front, or from its frames."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from motet.errors import MotionError
-from motet.motion.calibrate import alignments_of_frames
+from motet.motion.calibrate import alignments_of_frames, axes_agree
 from motet.motion.figure_checks import leg_of
 from motet.motion.humanoid import LEFT_RIGHT, SOLE, leg_length, sided
 from motet.motion.joint_map import JointMap
@@ -64,18 +64,20 @@ def fit(skeleton: Skeleton, joint_map: JointMap, rotations: Array, places: Array
         aligned = alignments_of_pose(skeleton, (still, skeleton.rest_positions), body, joint_map, aims)
         heights = _heights(skeleton, joint_map, leg, skeleton.rest_positions @ body[:, 1])
         return Fitted(joint_map, aims, aligned, leg, heights, body[:, 1], 1.0, None)
-    first = body_frame(places[0], joint_map, aims, exact=True) if len(places) and not joint_map.axes else None
+    known = bool(len(places)) and axes_agree(rotations, places, joint_map, aims)
+    joint_map = joint_map if known else replace(joint_map, axes={})
+    first = body_frame(places[0], joint_map, aims, exact=True) if len(places) and not known else None
     if first is not None and (len(places) == 1 or _is_t_pose(places[0], first, joint_map, aims)):
         aligned = alignments_of_pose(skeleton, (rotations[0], places[0]), first, joint_map, aims)
         heights = _heights(skeleton, joint_map, leg, places[0] @ first[:, 1])
         note = "the rest pose is not a standing body: the first frame's pose was used in its place"
         return Fitted(joint_map, aims, aligned, leg, heights, None, 0.95, note)
-    if len(places) < 2:
+    if len(places) < 2 and not known:
         raise MotionError("the rest pose is not a standing body: give a motion of this skeleton, whose frames show how")
     aligned = alignments_of_frames(rotations, places, joint_map, aims)
     hips, carrier = joint_map.joints["hips"], joint_map.carrier(skeleton)
     aligned[carrier] = rotations[0, carrier].T @ rotations[0, hips] @ aligned[hips]
-    known, heights = bool(joint_map.axes), _heights(skeleton, joint_map, leg, None)
+    heights = _heights(skeleton, joint_map, leg, None)
     how = "known by the convention" if known else "found from the frames"
     note = f"the rest pose is not a standing body: how the joints stand was {how}"
     return Fitted(joint_map, aims, aligned, leg, heights, None, 0.95 if known else 0.85, note)
