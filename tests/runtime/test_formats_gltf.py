@@ -1,5 +1,6 @@
 import json
 import struct
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -198,3 +199,25 @@ def test_mixamo_has_the_humanoids_proportions() -> None:
     assert out.skeleton.names[:2] == ("mixamorig:Hips", "mixamorig:Spine")
     np.testing.assert_allclose(positions(out) * 0.01, positions(motion), atol=1e-9)
     assert to_humanoid(out).convention == "Mixamo"
+
+
+def test_a_file_object_is_read_and_its_buffer_must_be_in_it(tmp_path: Path) -> None:
+    motion = moving()
+    glb.write(tmp_path / "a.glb", motion)
+    content = (tmp_path / "a.glb").read_bytes()
+    np.testing.assert_array_equal(gltf.read(BytesIO(content)).values, gltf.read(tmp_path / "a.glb").values)
+    beside = write_gltf(tmp_path / "b.gltf", *parts(tmp_path / "a.glb"))
+    with pytest.raises(FormatError, match=r"its buffer 'b.bin' is another file: give the path"):
+        gltf.read(BytesIO(beside.read_bytes()))
+    beside.with_suffix(".bin").unlink()
+    with pytest.raises(FormatError, match=r"b.gltf: its buffer 'b.bin' beside it: no such file"):
+        gltf.read(beside)
+
+
+def test_an_animation_without_end_is_refused(tmp_path: Path) -> None:
+    document, binary = parts(twisted_glb(tmp_path))
+    times = document["accessors"][document["animations"][0]["samplers"][0]["input"]]
+    start = document["bufferViews"][times["bufferView"]]["byteOffset"] + 4 * (times["count"] - 1)
+    binary = binary[:start] + struct.pack("<f", 1e9) + binary[start + 4 :]
+    with pytest.raises(FormatError, match=r"1e\+09 s at 24 fps are too many frames"):
+        gltf.read(write_gltf(tmp_path / "long.gltf", document, binary))

@@ -5,13 +5,16 @@ rotation vectors of the joints in SMPL's order; fingers, jaw and eyes behind the
 shape needs the body model, which is not read: the skeleton is a plain one of an adult's proportions.
 """
 
+import io
 import zipfile
-import zlib
 from pathlib import Path
 
 import numpy as np
 
 from motet.errors import FormatError
+from motet.files import File, place_of
+from motet.formats.lines import frame_rate, read_bytes
+from motet.formats.npy import array
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, rotvec_to_rotmat
 from motet.motion.skeleton import Joint, Skeleton
@@ -51,29 +54,37 @@ UPRIGHT = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 RATES = ("mocap_framerate", "mocap_frame_rate")
 
 
-def is_amass(path: str | Path) -> bool:
-    """Whether a file holds SMPL's poses and a path; False for any other or broken file."""
+def is_amass(content: bytes) -> bool:
+    """Whether a file's bytes hold SMPL's poses and a path; False for any other or broken file."""
     try:
-        with zipfile.ZipFile(path) as archive:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
             names = {name.removesuffix(".npy") for name in archive.namelist()}
-    except (OSError, zipfile.BadZipFile):
+    except (OSError, ValueError, EOFError, NotImplementedError, zipfile.BadZipFile):
         return False
     return "trans" in names and bool(names & {"poses", "pose_body"})
 
 
-def read(path: str | Path) -> Motion:
+def read(file: File) -> Motion:
     """Read the 22 body joints of a file: the root's translation in "length" (metres), angles in "deg", y up.
 
     FormatError where arrays are missing, do not fit or hold anything but numbers.
     """
-    path = Path(path)
+    return parse(place_of(file), read_bytes(file))
+
+
+def parse(path: Path, content: bytes) -> Motion:
+    """:func:`read` of a file's bytes."""
     try:
-        with np.load(path, allow_pickle=False) as arrays:
-            vectors, trans, fps = _vectors(path, arrays), np.asarray(arrays["trans"], np.float64), _rate(path, arrays)
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            vectors, trans = _vectors(path, archive), _array(archive, "trans")
+            fps = _rate(path, archive)
+    except FormatError:
+        raise
     except KeyError as error:
-        raise FormatError(path, f"this is not an AMASS file: {error.args[0]}") from error
-    except (OSError, EOFError, TypeError, ValueError, zipfile.BadZipFile, zlib.error) as error:
-        raise FormatError(path, f"this is not an AMASS file: {error}") from error
+        raise FormatError(path, f"not an AMASS file: {error.args[0]}") from error
+    # a damaged archive makes zipfile, its unpackers and numpy raise errors of a dozen types
+    except Exception as error:
+        raise FormatError(path, f"not an AMASS file: {str(error)[:200]}") from error
     if trans.shape != (len(vectors), 3) or not (np.isfinite(vectors).all() and np.isfinite(trans).all()):
         raise FormatError(path, f"trans must be ({len(vectors)}, 3) finite numbers, here it is {trans.shape}")
     turned = rotvec_to_rotmat(vectors)
@@ -83,17 +94,21 @@ def read(path: str | Path) -> Motion:
     return motion_of(SKELETON, turned, {0: trans @ UPRIGHT.T}, fps)
 
 
-def _vectors(path: Path, arrays: np.lib.npyio.NpzFile) -> Array:
+def _array(archive: zipfile.ZipFile, name: str) -> Array:
+    return np.asarray(array(archive, name, "fiu"), np.float64)
+
+
+def _vectors(path: Path, archive: zipfile.ZipFile) -> Array:
     """Rotation vectors (T, 22, 3)."""
-    parts = [arrays["poses"]] if "poses" in arrays else [arrays["root_orient"], arrays["pose_body"]]
-    poses = np.concatenate([np.asarray(part, np.float64) for part in parts], axis=-1)
+    parts = ("poses",) if "poses.npy" in archive.namelist() else ("root_orient", "pose_body")
+    poses = np.concatenate([_array(archive, part) for part in parts], axis=-1)
     if poses.ndim != 2 or poses.shape[1] < 3 * len(JOINTS):
         raise FormatError(path, f"poses of shape {poses.shape}: expected (frames, {3 * len(JOINTS)} or more)")
     return poses[:, : 3 * len(JOINTS)].reshape(len(poses), len(JOINTS), 3)
 
 
-def _rate(path: Path, arrays: np.lib.npyio.NpzFile) -> float:
-    rates = [float(arrays[name]) for name in RATES if name in arrays]
-    if not rates or not 0 < rates[0] < np.inf:
+def _rate(path: Path, archive: zipfile.ZipFile) -> float:
+    names = [name for name in RATES if f"{name}.npy" in archive.namelist()]
+    if not names:
         raise FormatError(path, f"the frame rate is missing: expected an array {' or '.join(RATES)}")
-    return rates[0]
+    return frame_rate(float(_array(archive, names[0])), path)

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from motet.errors import FormatError, MotionError
+from motet.files import File, place_of
 from motet.formats.gltf_data import Gltf, parse
 from motet.motion.humanoid import BONES, REQUIRED
 from motet.motion.joint_map import JointMap, check_map
@@ -25,6 +26,9 @@ from motet.motion.world_rotations import motion_of
 
 FPS = 30.0
 """The frame rate of a file that has no animation or keys too sparse to tell one."""
+
+MAX_VALUES = 10**7
+"""Frames times nodes: an hour at 30 frames a second of a figure of 90 nodes."""
 
 SPARSE = 0.1
 """Keys further apart than this many seconds do not tell a frame rate."""
@@ -55,15 +59,15 @@ class _Nodes:
     names: tuple[str, ...]
 
 
-def read(path: str | Path) -> Motion:
+def read(file: File) -> Motion:
     """Read the first animation, or the rest pose as one frame where there is none; lengths are metres.
 
     Bones of a VRM humanoid get VRM's names, other joints keep theirs. Channels: three angles in "deg" for each joint,
     the translation of the root and of joints that move in "length". FormatError names what the file lacks.
     """
-    path = Path(path)
+    path = place_of(file)
     with _broken(path):
-        return _read(path, parse(path))
+        return _read(path, parse(file))
 
 
 @contextmanager
@@ -71,8 +75,10 @@ def _broken(path: Path) -> Iterator[None]:
     """What a file holds in the wrong place or type, as a FormatError."""
     try:
         yield
-    except (KeyError, IndexError, TypeError, AttributeError) as error:
-        raise FormatError(path, f"broken glTF file: {type(error).__name__}: {error}") from error
+    except MotionError as error:
+        raise error if isinstance(error, FormatError) else FormatError(path, str(error)) from error
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        raise FormatError(path, f"broken glTF file: {type(error).__name__}: {str(error)[:200]}") from error
 
 
 def _read(path: Path, gltf: Gltf) -> Motion:
@@ -90,11 +96,11 @@ def _read(path: Path, gltf: Gltf) -> Motion:
     return motion_of(skeleton, turned, moved, fps)
 
 
-def read_character(path: str | Path) -> Character:
+def read_character(file: File) -> Character:
     """Read a character's skeleton for :func:`motet.motion.retarget.from_humanoid`; FormatError as :func:`read`."""
-    path = Path(path)
+    path = place_of(file)
     with _broken(path):
-        return _character(path, parse(path))
+        return _character(path, parse(file))
 
 
 def _character(path: Path, gltf: Gltf) -> Character:
@@ -231,7 +237,10 @@ def _tracks(path: Path, gltf: Gltf) -> tuple[dict[tuple[int, str], Array], float
     steps = min((float(np.median(np.diff(times))) for _, times, _, _ in keys if len(times) > 1), default=0.0)
     rate = 1 / steps if 0 < steps < SPARSE else FPS
     fps = float(round(rate)) if abs(rate - round(rate)) < 0.01 * rate else rate
-    frames = start + np.arange(round((end - start) * fps) + 1) / fps
+    count = (end - start) * fps + 1
+    if not count * len(gltf.objects("nodes")) < MAX_VALUES:
+        raise FormatError(path, f"{end - start:g} s at {fps:g} fps are too many frames")
+    frames = start + np.arange(round(count)) / fps
     return {place: _sampled(times, values, kind, frames, place[1]) for place, times, values, kind in keys}, fps
 
 

@@ -11,7 +11,9 @@ from urllib.parse import unquote
 
 import numpy as np
 
-from motet.errors import FormatError
+from motet.errors import FormatError, quoted
+from motet.files import File, place_of
+from motet.formats.lines import read_bytes
 from motet.motion.rotations import Array, rotmat_to_quat
 
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -113,8 +115,10 @@ class Gltf:
                 np.frombuffer(content, np.uint8, offset=start), (count, size), (stride, 1), writeable=False
             )
             values = np.ascontiguousarray(rows).view(kind).astype(np.float64)
+        except FormatError:
+            raise
         except (KeyError, IndexError, TypeError, ValueError) as error:
-            raise FormatError(self.path, f"accessor {index} is broken: {error}") from error
+            raise FormatError(self.path, f"accessor {index} is broken: {str(error)[:200]}") from error
         if accessor.get("normalized"):
             values = np.maximum(values / np.iinfo(np.dtype(kind)).max, -1.0)
         if not np.isfinite(values).all():
@@ -122,21 +126,17 @@ class Gltf:
         return values
 
 
-def parse(path: str | Path) -> Gltf:
+def parse(file: File) -> Gltf:
     """Read a file's parts; FormatError for one that is not glTF 2.0, is truncated, or lacks its buffers."""
-    path = Path(path)
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise FormatError(path, f"cannot be read: {error.strerror}") from error
+    path, content = place_of(file), read_bytes(file)
     text, binary = _chunks(path, content) if content[:4] == b"glTF" else (content, b"")
     try:
         document = json.loads(text)
         version = document["asset"]["version"]
-    except (ValueError, KeyError, TypeError) as error:
-        raise FormatError(path, f"this is not a glTF file: {error}") from error
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        raise FormatError(path, f"not a glTF file: {str(error)[:200]}") from error
     if not str(version).startswith("2."):
-        raise FormatError(path, f"glTF of version {version}: expected 2.0")
+        raise FormatError(path, f"glTF of version {str(version)[:20]}: expected 2.0")
     packed = [name for name in UNREADABLE if name in document.get("extensionsRequired", [])]
     if packed:
         raise FormatError(path, f"its arrays are packed by {packed[0]}: export without compression")
@@ -166,6 +166,9 @@ def _buffer(path: Path, buffer: dict[str, Any], binary: bytes) -> bytes:
     if uri.startswith("data:"):
         return base64.b64decode(uri.partition(",")[2])
     place = path.parent / unquote(uri)
-    if not place.is_file():
-        raise FormatError(path, f"its buffer {uri} is missing beside it")
-    return place.read_bytes()
+    if not path.is_file():
+        raise FormatError(path, f"its buffer {quoted(uri)} is another file: give the path, or save it as .glb")
+    try:
+        return read_bytes(place)
+    except FormatError as error:
+        raise FormatError(path, f"its buffer {quoted(uri)} beside it: {error.reason}") from error

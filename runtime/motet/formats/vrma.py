@@ -4,12 +4,11 @@ Every bone has its rotation, the hips alone their translation; players turn both
 the path by the height of its hips.
 """
 
-from pathlib import Path
 from typing import Any
 
 from motet.errors import MotionError
-from motet.files import write_whole
-from motet.formats.glb import _animation, _Buffer, _container, _joint_nodes
+from motet.files import File, write_whole
+from motet.formats.glb import Buffer, animation, container, joint_nodes
 from motet.motion.humanoid import BONES, HUMANOID
 from motet.motion.motion import Motion
 from motet.motion.retarget import to_humanoid
@@ -17,7 +16,7 @@ from motet.motion.retarget import to_humanoid
 EXTENSION = "VRMC_vrm_animation"
 
 
-def write(path: str | Path, motion: Motion) -> None:
+def write(file: File, motion: Motion) -> None:
     """Write a motion; one of another skeleton is brought to the humanoid first.
 
     MotionError for a motion without frames or of a figure that is no human's, OutputError if it cannot be written.
@@ -26,20 +25,20 @@ def write(path: str | Path, motion: Motion) -> None:
         raise MotionError("this motion has no frames: a VRM animation cannot be without any")
     if motion.skeleton != HUMANOID:
         motion = to_humanoid(motion).motion
-    buffer = _Buffer()
+    buffer = Buffer()
     document: dict[str, Any] = {
         "asset": {"version": "2.0", "generator": "motet"},
         "extensionsUsed": [EXTENSION],
         "extensions": {EXTENSION: {"specVersion": "1.0", "humanoid": {"humanBones": _bones()}}},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
-        "nodes": _joint_nodes(HUMANOID),
-        "animations": [_animation(buffer, motion, HUMANOID)],
+        "nodes": joint_nodes(HUMANOID),
+        "animations": [animation(buffer, motion, HUMANOID)],
         "bufferViews": buffer.views,
         "accessors": buffer.accessors,
         "buffers": [{"byteLength": len(buffer.content)}],
     }
-    write_whole(path, _container(document, bytes(buffer.content)))
+    write_whole(file, container(document, bytes(buffer.content)))
 
 
 def _bones() -> dict[str, dict[str, int]]:
