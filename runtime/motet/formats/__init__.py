@@ -16,7 +16,9 @@ import numpy as np
 
 from motet.errors import FormatError, MotionError, OutputError
 from motet.files import File, check_place, place_of
+from motet.formats.character import Character, put_onto
 from motet.motion.motion import Motion
+from motet.motion.skeleton import Skeleton
 from motet.motion.units import metres
 
 
@@ -116,12 +118,29 @@ def read_motion(
         raise FormatError(path, str(error)) from error
 
 
-def write_motion(file: File, motion: Motion, *, format: str | None = None) -> None:
+def read_character(file: File) -> Character:
+    """Read a skeleton to put motions onto: of glTF and VRM files as their nodes have it, of others that of the motion.
+
+    FormatError as :func:`read_motion`.
+    """
+    if _format(file, None, READABLE, "read").reader != "gltf":
+        return Character(read_motion(file))
+    from motet.formats import gltf
+
+    return gltf.read_character(file)
+
+
+def write_motion(
+    file: File, motion: Motion, *, format: str | None = None, like: File | Character | Motion | Skeleton | None = None
+) -> None:
     """Write a motion in the format of the path's extension, or in ``format``, which a file object needs.
 
+    like: a character whose skeleton the motion is put onto: a file of it (.bvh, .glb, .vrm, ...), a motion of it, or
+        its skeleton.
     FormatError, MotionError or OutputError if that is not possible; nothing is written then.
     """
     check_writable(file, format)
+    motion = motion if like is None else put_onto(motion, _character(like))
     with np.errstate(over="ignore", invalid="ignore"):  # writers refuse what is too large by themselves
         _format(file, format, WRITABLE, "write").write()(file, motion)
 
@@ -144,6 +163,14 @@ def _format(file: File, format: str | None, allowed: tuple[str, ...], verb: str)
         return next(kind for kind in FORMATS if kind.extension == extension)
     what = f"files of type {extension!r}" if extension else "a file without an extension"
     raise FormatError(place_of(file), f"cannot {verb} {what}; expected one of {' '.join(allowed)}")
+
+
+def _character(like: File | Character | Motion | Skeleton) -> Character:
+    if isinstance(like, Skeleton):
+        return Character(Motion(np.zeros((1, 0)), (), (), 1.0, like))
+    if isinstance(like, Motion):
+        return Character(like)
+    return like if isinstance(like, Character) else read_character(like)
 
 
 def _in_unit(path: Path, motion: Motion, unit: float) -> Motion:

@@ -16,6 +16,7 @@ import numpy as np
 
 from motet.errors import FormatError, MotionError
 from motet.files import File, place_of
+from motet.formats.character import Character
 from motet.formats.gltf_data import Gltf, parse
 from motet.motion.humanoid import BONES, REQUIRED
 from motet.motion.joint_map import JointMap, check_map
@@ -35,19 +36,6 @@ SPARSE = 0.1
 
 PATHS = {"rotation": 4, "translation": 3, "scale": 3}
 """What of a node is animated here, with the numbers it has; weights of meshes are left out."""
-
-
-@dataclass(frozen=True)
-class Character:
-    """A character's skeleton as its file has it, to put motions onto.
-
-    rest: a motion of one frame, the pose that the nodes rest in; angles and offsets are those of the nodes themselves,
-        so that a motion on this skeleton fits the file by the nodes' names.
-    joint_map: its bones where the file names them, as VRM does, else None.
-    """
-
-    rest: Motion
-    joint_map: JointMap | None
 
 
 @dataclass(frozen=True)

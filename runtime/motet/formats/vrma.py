@@ -11,7 +11,7 @@ from motet.files import File, write_whole
 from motet.formats.glb import Buffer, animation, container, joint_nodes
 from motet.motion.humanoid import BONES, HUMANOID
 from motet.motion.motion import Motion
-from motet.motion.retarget import to_humanoid
+from motet.motion.retarget import on_humanoid
 
 EXTENSION = "VRMC_vrm_animation"
 
@@ -23,8 +23,7 @@ def write(file: File, motion: Motion) -> None:
     """
     if not len(motion):
         raise MotionError("this motion has no frames: a VRM animation cannot be without any")
-    if motion.skeleton != HUMANOID:
-        motion = to_humanoid(motion).motion
+    motion = on_humanoid(motion)
     buffer = Buffer()
     document: dict[str, Any] = {
         "asset": {"version": "2.0", "generator": "motet"},

@@ -5,6 +5,7 @@ A bone of the humanoid has the rotation of its joint in the world, times a const
 lacks stays at rest. Paths are scaled by the lengths of the legs and laid so that the feet are on the ground.
 """
 
+import logging
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,6 +26,8 @@ from motet.motion.rotations import Array
 from motet.motion.skeleton import END_SUFFIX, Skeleton
 from motet.motion.spread import spread
 from motet.motion.world_rotations import motion_of, places_of
+
+log = logging.getLogger(__name__)
 
 GROUND = 5.0
 """The percentile of the lowest points of the soles that stands on the ground."""
@@ -50,6 +53,11 @@ class Humanoid:
     confidence: float
     leg: float | None
     notes: tuple[str, ...]
+
+    @property
+    def summary(self) -> str:
+        """What was found in one line: convention, confidence and notes."""
+        return "; ".join((f"joints of {self.convention}, confidence {self.confidence:.2f}", *self.notes))
 
 
 def map_of(motion: Motion) -> JointMap:
@@ -88,6 +96,15 @@ def to_humanoid(motion: Motion, joint_map: JointMap | None = None) -> Humanoid:
         None if unit.metres is None else fitted.leg * unit.metres,
         tuple(notes),
     )
+
+
+def on_humanoid(motion: Motion) -> Motion:
+    """The motion of :func:`to_humanoid`, or the motion itself if it is the humanoid's; what is found is logged."""
+    if motion.skeleton == HUMANOID:
+        return motion
+    found = to_humanoid(motion)
+    log.info("brought to the humanoid: %s", found.summary)
+    return found.motion
 
 
 def _humanoid_rotations(rotations: Array, fitted: Fitted) -> Array:

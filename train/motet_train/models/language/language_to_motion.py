@@ -87,7 +87,8 @@ class LanguageToMotion(LanguageNet):
 
     def mixture(self, outputs: Tensor) -> Mixture:
         """The distributions of frames from outputs (..., S) of the decoder; dead channels stay at 0."""
-        found, living = self.head(outputs), self.scale > 0
+        found: Mixture = self.head(outputs)
+        living = self.scale > 0
         means, variances = (torch.where(living, values, 0.0) for values in (found.means, found.variances))
         return replace(found, means=means, variances=variances)
 
