@@ -65,7 +65,7 @@ def test_what_is_no_character_is_refused_and_nothing_written(tmp_path: Path) -> 
         (
             motet.Motion([[0.0]], ("wrist.rx",), ("deg",), 30),
             MotionError,
-            "the character cannot take a motion: .* no skeleton",
+            "cannot take a motion: .* no skeleton",
         ),
     ):
         with pytest.raises(error, match=said):

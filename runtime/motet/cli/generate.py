@@ -10,10 +10,12 @@ import click
 from motet.bundle.session import SessionOptions
 from motet.cli.notes import text_notes
 from motet.cli.options import session_options
-from motet.cli.reading import FPS, bar, out_option, places
+from motet.cli.reading import FPS, bar, like_option, out_option, places
 from motet.formats import check_writable, write_motion
+from motet.formats.character import Character
 from motet.models.generate import PLAYED, Generated, GenerateModel
 from motet.models.load import load_as
+from motet.motion.motion import Motion
 
 
 @click.command()
@@ -36,6 +38,7 @@ from motet.models.load import load_as
 @click.option("--fps", type=FPS, default=PLAYED, show_default=True, help="Frame rate to write.")
 @click.option("--no-plant", is_flag=True, help="Skip foot planting: the figure moves as drawn.")
 @click.option("--all", "every", is_flag=True, help="Write all hypotheses, not only the best.")
+@like_option
 @session_options
 @click.option("--json", "as_json", is_flag=True, help="Print a list with input and hypotheses of each text.")
 def generate(
@@ -45,6 +48,7 @@ def generate(
     fps: float,
     no_plant: bool,
     every: bool,
+    like: Character | None,
     as_json: bool,
     session: SessionOptions,
     **settings: Any,
@@ -61,15 +65,13 @@ def generate(
     outs = iter(places(out, [str(n + 1) for n in range(sum(map(len, kept)))]))
     rows = []
     for text, results in zip(texts, kept, strict=True):
-        rows.append(
-            {"input": text, "hypotheses": [_write(result, next(outs), fps, not no_plant) for result in results]}
-        )
+        written = [_write(result.playable(fps, not no_plant), result, next(outs), like) for result in results]
+        rows.append({"input": text, "hypotheses": written})
     click.echo(json.dumps(rows) if as_json else "\n".join(_lines(rows)))
 
 
-def _write(result: Generated, place: Path, fps: float, plant: bool) -> dict[str, Any]:
-    motion = result.playable(fps, plant)
-    write_motion(place, motion)
+def _write(motion: Motion, result: Generated, place: Path, like: Character | None) -> dict[str, Any]:
+    write_motion(place, motion, like=like)
     size = {"frames": len(motion), "fps": motion.fps, "seconds": motion.duration}
     return {"output": str(place), "log_likelihood": result.log_likelihood, **size}
 
