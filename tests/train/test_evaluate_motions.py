@@ -271,7 +271,7 @@ def test_evaluate_says_what_it_lacks(runs: Path) -> None:
     result = CliRunner().invoke(main, ["evaluate", str(runs / "describe")])
     assert (result.exit_code, "need --data" in result.output) == (2, True)
     result = CliRunner().invoke(main, ["evaluate", str(runs / "describe"), "cmu-control"])
-    assert (result.exit_code, "apart" in result.output) == (2, True)
+    assert (result.exit_code, "separately" in result.output) == (2, True)
 
 
 def _save(run: Run, folder: Path) -> None:
