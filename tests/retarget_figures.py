@@ -1,7 +1,7 @@
 """Figures of retargeting on the motion beside the project: ``python tests/retarget_figures.py ../shared/data``.
 
-Prints a table of all files by convention, how far trials that exist as AMC and as BVH agree on the humanoid, and what
-retargeting ten seconds takes.
+Prints a table of all files by convention, how far trials that exist as AMC and as BVH agree on the humanoid, how
+cmu-describe describes both forms and takes of ACCAD, and what retargeting ten seconds takes.
 """
 
 import sys
@@ -10,13 +10,16 @@ import zipfile
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 
+import motet
 from motet.errors import MotetError
 from motet.formats import read_motion
+from motet.models.describe import DescribeModel
 from motet.motion.humanoid import BONES, HUMANOID
 from motet.motion.kinematics import global_transforms
 from motet.motion.mixamo import MIXAMO
@@ -69,6 +72,30 @@ def both_forms(folder: Path) -> Iterator[tuple[str, Motion, Motion, int]]:
             yield path.stem, read_motion(path), read_motion(amc), ADDED.get(path.stem, 1)
 
 
+def _print_descriptions(folder: Path) -> None:
+    """Best sentences of trials in both forms, the T-pose in front of the BVH left out; and of every sixteenth take."""
+    model = motet.load_as(DescribeModel, "cmu-describe")
+
+    def best(motion: Motion) -> str:
+        return model.describe(model.windows(motion)[0][1])[0].text
+
+    print("trial  from AMC | from BVH")
+    for name, bvh, amc, added in both_forms(folder):
+        print(f"{name}  {best(amc)} | {best(bvh[added:])}")
+    for path in sorted((folder / "accad-bvh").rglob("*.bvh"))[::16]:
+        print(f"{path.stem}: {best(read_motion(path))}")
+
+
+def _print_times(motion: Motion) -> None:
+    """Milliseconds of one core for ten seconds of a motion of CMU's, there and on."""
+    for fps in (30, 120):
+        few = motion.resample(fps)
+        ten = replace(few, values=np.concatenate([few.values] * 20)[: 10 * fps])
+        humanoid = to_humanoid(ten).motion
+        there, on = _milliseconds(partial(to_humanoid, ten)), _milliseconds(partial(from_humanoid, humanoid, MIXAMO))
+        print(f"10 s at {fps} fps: {there:.1f} ms onto the humanoid, {on:.1f} ms from there onto Mixamo's names")
+
+
 def _milliseconds(what: Callable[[], object]) -> float:
     times = []
     for _ in range(7):
@@ -104,11 +131,8 @@ def main(data: Path) -> None:
             worst = max(limbs, key=lambda bone: limbs[bone])
             mean = np.mean(list(limbs.values()))
             print(f"{name}  {len(amc):5d}  {apart:6.2f}  {mean:6.2f}  {worst} {limbs[worst]:.2f}")
-        walk = next(amc for _, _, amc, _ in both_forms(folder)).resample(30)
-        ten = replace(walk, values=np.concatenate([walk.values] * 20)[:300])
-        humanoid = to_humanoid(ten).motion
-        print(f"10 s at 30 fps onto the humanoid: {_milliseconds(lambda: to_humanoid(ten)):.1f} ms of one core")
-        print(f"and onto Mixamo's names: {_milliseconds(lambda: from_humanoid(humanoid, MIXAMO)):.1f} ms")
+        _print_descriptions(folder)
+        _print_times(next(amc for _, _, amc, _ in both_forms(folder)))
 
 
 if __name__ == "__main__":

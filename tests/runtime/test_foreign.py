@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from command_line import run
 from figures import walker
+from test_mmm_figure import mmm
 from test_retarget import SKELETONS, angles_between
 
 import motet
@@ -124,6 +125,12 @@ def test_a_figure_whose_z_is_up_goes_on_on_the_models_own(
     assert found.skeleton == predictor.contract.skeleton
     assert "the prediction stays on the model's figure" in caplog.text
     assert len(predictor.predict(lying, frames=5, append=True)) > 5
+
+
+def test_a_motion_of_kit_goes_on_on_the_models_figure(predictor: PredictModel) -> None:
+    two = mmm(LHx=20)
+    motion = replace(two, values=np.repeat(two.values, 40, axis=0))
+    assert predictor.predict(motion, frames=5).skeleton == predictor.contract.skeleton
 
 
 def turned(motion: Motion, turn: np.ndarray) -> Motion:

@@ -66,10 +66,13 @@ def carried_back(following: Motion, figure: Motion, own: Motion) -> Motion | Non
 
     following: on the model's figure, from the end of ``figure`` on; figure: ``own``, brought there; all at one frame
     rate. It begins where ``own`` ends: each joint keeps the turn by which it differs there from what comes back, and
-    joints of which the humanoid says nothing stay as they are. None where the figure's own world is another than the
-    model's, or its file has no channels for the path.
+    joints of which the humanoid says nothing stay as they are. None, which is logged, where the file has no skeleton or
+    no channels for the path, or the figure's own world is another than the model's.
     """
-    last, skeleton = own[-1:], skeleton_of(own)
+    if own.skeleton is None:
+        log.info("the prediction stays on the model's figure: the file has no skeleton")
+        return None
+    last, skeleton = own[-1:], own.skeleton
     both = np.concatenate([figure.values[-1:], following.select(figure.channels, figure.units).values])
     back = from_humanoid(to_humanoid(replace(figure, values=both)).motion, own)
     turned, then = local_rotations(back), local_rotations(last)[0]
