@@ -102,8 +102,9 @@ def _manifest(
     defaults = {"temperature": net.config.temperature}
     if isinstance(net, AngleCRBM):
         defaults["iterations"] = net.config.iterations
-    config = angle_crbm.to_config(net) if isinstance(net, AngleCRBM) else tdbn.to_config(net)
-    return job.manifest(contract, config, defaults, clips.licence, control={"labels": list(found), "starts": starts})
+    return job.manifest(
+        contract, net.to_config(), defaults, clips.licence, control={"labels": list(found), "starts": starts}
+    )
 
 
 def reconstruction(net: Net, found: Mapping[str, Sequence[Array]], std: Array) -> float:

@@ -5,7 +5,7 @@ is normalised and has the active flag at its end: 1 on every frame of a motion a
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import torch
@@ -21,6 +21,7 @@ from motet_train.models.language.mixture import Mixture, MixtureHead
 from motet_train.models.language.net import LanguageNet
 from motet_train.models.language.sequence import Decoder, Encoder
 from motet_train.models.language.summary import SummaryHead
+from motet_train.models.net import Part, tuples
 from motet_train.models.normalised import normalised
 
 LOSSES = {"surrogate": Mixture.surrogate_loss, "likelihood": lambda *given: -Mixture.log_likelihood(*given)}
@@ -87,7 +88,8 @@ class LanguageToMotion(LanguageNet):
 
     def mixture(self, outputs: Tensor) -> Mixture:
         """The distributions of frames from outputs (..., S) of the decoder; dead channels stay at 0."""
-        found, living = self.head(outputs), self.scale > 0
+        found: Mixture = self.head(outputs)
+        living = self.scale > 0
         means, variances = (torch.where(living, values, 0.0) for values in (found.means, found.variances))
         return replace(found, means=means, variances=variances)
 
@@ -128,6 +130,20 @@ class LanguageToMotion(LanguageNet):
             normal = normal * (torch.rand_like(normal[..., :1]) >= share)
         return normal
 
+    def step(self, frame: Tensor, context: Tensor, state: Tensor) -> tuple[Tensor, ...]:
+        """Frame (B, D + 1), context (B, C), state (B, S) to the next frame's mixture and the next state.
+
+        log_weights (B, K), means and standard deviations (B, K, D) in normalised units, probability of the flag (B,).
+        """
+        following = self.decoder.step(frame.clamp(-LIMIT, LIMIT), context, state)
+        mixture = self.mixture(following)
+        stds = mixture.variances.sqrt()
+        return mixture.log_weights, mixture.means, stds, mixture.active.sigmoid(), following
+
+    def score(self, context: Tensor, frames: Tensor) -> Tensor:
+        """Context (B, C), frames (B, T, D + 1) to log-likelihoods given all frames before (B, T)."""
+        return self.mixture(self.outputs(frames, context)).log_likelihood(frames[..., :-1], frames[..., -1])
+
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """The encoder, the step and the score, each with its contract."""
         channels, components = self.config.channels, self.config.components
@@ -144,58 +160,13 @@ class LanguageToMotion(LanguageNet):
         frames = TensorSpec("frames", ("batch", "time", channels + 1))
         score = GraphSpec((context, frames), (TensorSpec("log_likelihood", ("batch", "time")),))
         encoder = GraphSpec((words, lengths), (context,))
-        return {"encoder": (Encode(self), encoder), "step": (Step(self), step), "score": (Score(self), score)}
-
-
-class Encode(nn.Module):
-    """The encoder graph: words (B, W), lengths (B,) -> context (B, C)."""
-
-    def __init__(self, net: LanguageToMotion) -> None:
-        super().__init__()
-        self.net = net
-
-    def forward(self, words: Tensor, lengths: Tensor) -> Tensor:
-        """Encode."""
-        return self.net.encode(words, lengths)
-
-
-class Step(nn.Module):
-    """The step graph: frame (B, D + 1), context (B, C), state (B, S) -> the next frame's mixture and the next state.
-
-    log_weights (B, K), means and standard deviations (B, K, D) in normalised units, probability of the flag (B,).
-    """
-
-    def __init__(self, net: LanguageToMotion) -> None:
-        super().__init__()
-        self.net = net
-
-    def forward(self, frame: Tensor, context: Tensor, state: Tensor) -> tuple[Tensor, ...]:
-        """One frame."""
-        following = self.net.decoder.step(frame.clamp(-LIMIT, LIMIT), context, state)
-        mixture = self.net.mixture(following)
-        stds = mixture.variances.sqrt()
-        return mixture.log_weights, mixture.means, stds, mixture.active.sigmoid(), following
-
-
-class Score(nn.Module):
-    """The score graph: context (B, C), frames (B, T, D + 1) -> log-likelihoods given all frames before (B, T)."""
-
-    def __init__(self, net: LanguageToMotion) -> None:
-        super().__init__()
-        self.net = net
-
-    def forward(self, context: Tensor, frames: Tensor) -> Tensor:
-        """Score known motions."""
-        mixture = self.net.mixture(self.net.outputs(frames, context))
-        return mixture.log_likelihood(frames[..., :-1], frames[..., -1])
+        return {
+            "encoder": (Part(self, self.encode), encoder),
+            "step": (Part(self, self.step), step),
+            "score": (Part(self, self.score), score),
+        }
 
 
 def from_config(config: Mapping[str, Any]) -> LanguageToMotion:
-    """An untrained net of the sizes that :func:`to_config` wrote."""
-    tuples = {key: tuple(config[key]) for key in ("encoder_units", "decoder_units")}
-    return LanguageToMotion(LanguageToMotionConfig(**{**config, **tuples}))
-
-
-def to_config(net: LanguageToMotion) -> dict[str, Any]:
-    """Everything that :func:`from_config` needs, ready for JSON."""
-    return {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(net.config).items()}
+    """An untrained net of a configuration as it stands in a manifest."""
+    return LanguageToMotion(LanguageToMotionConfig(**tuples(config)))

@@ -18,7 +18,7 @@ from torch import Tensor, nn
 from torch.nn.functional import gelu
 
 from motet.bundle.graph import GraphSpec, TensorSpec
-from motet_train.models.net import Net
+from motet_train.models.net import Net, tuples
 from motet_train.models.normalised import normalised
 
 GAIN = 3.0
@@ -50,8 +50,7 @@ class PredictorConfig:
 
 def from_config(data: Mapping[str, Any]) -> "Predictor":
     """The net of a configuration as it stands in a manifest."""
-    lists = {key: tuple(data[key]) for key in ("kept", "mirrored", "signs")}
-    return Predictor(PredictorConfig(**{**data, **lists}))
+    return Predictor(PredictorConfig(**tuples(data)))
 
 
 def _polynomials(points: Tensor, count: int) -> Tensor:
