@@ -4,9 +4,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import torch
 from torch import Tensor, nn
 
 from motet.bundle.graph import GraphSpec
+from motet.motion.rotations import Array
 
 
 class Net(nn.Module, ABC):
@@ -14,6 +16,16 @@ class Net(nn.Module, ABC):
 
     mean: Tensor
     scale: Tensor
+
+    def __init__(self, channels: int) -> None:
+        super().__init__()
+        self.register_buffer("mean", torch.zeros(channels))
+        self.register_buffer("scale", torch.ones(channels))
+
+    def measure_by(self, mean: Array, scale: Array) -> None:
+        """Set mean and scale (D,)."""
+        self.mean.copy_(torch.from_numpy(mean))
+        self.scale.copy_(torch.from_numpy(scale))
 
     @abstractmethod
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:

@@ -43,10 +43,7 @@ def train_control(clips: Clips, job: Job) -> Run:
     net = _untrained(clips, config)
     units = ("deg",) * len(clips.channels)
     mean, std = _statistics(found, units)
-    net.mean, net.scale = (
-        torch.tensor(mean).float(),
-        torch.tensor(std * config.sigma).float(),
-    )
+    net.measure_by(mean, std * config.sigma)
     onsets = [1.0 if is_periodic(frames) else config.onset for frames in found.values()]
     contract = MotionContract("angles", clips.channels, units, config.fps, mean, std, clips.skeleton)
     manifest = _manifest(job, clips, contract, net, found)

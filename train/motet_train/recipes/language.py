@@ -82,8 +82,7 @@ def train_language(store: Store, job: Job, data: str = "", by: str = "trial") ->
     torch.manual_seed(job.about.seed)
     net = MODELS[recipe.model](config)
     assert isinstance(net, LanguageNet)
-    net.mean.copy_(torch.tensor(found.contract.mean).float())
-    net.scale.copy_(torch.tensor(found.contract.std).float())
+    net.measure_by(found.contract.mean, found.contract.std)
     training = {"data": _data(store, data), "split": _split(found, by)}
     known = {"text": RULES.to_json(), "vocabulary": found.vocabulary.words}
     manifest = job.manifest(found.contract, config, recipe.defaults, None, training, **known)

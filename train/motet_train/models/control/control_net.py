@@ -17,17 +17,15 @@ from motet_train.models.net import Net, Part
 class ControlNet(Net):
     """A CRBM over codes of frames; subclasses say how frames become codes, and codes frames.
 
-    mean, scale: (D,) of the channels, set before training. noise_units: N, numbers of noise for the codes of a frame.
+    noise_units: N, numbers of noise for the codes of a frame.
     """
 
     expansion: Tensor
 
     def __init__(self, crbm: CRBM, labels: int, channels: int, taps: int) -> None:
-        super().__init__()
+        super().__init__(channels)
         self.crbm, self.taps = crbm, taps
         self.noise_units = len(crbm.visible_bias)
-        self.register_buffer("mean", torch.zeros(channels))
-        self.register_buffer("scale", torch.ones(channels))
         # each label has its own control units, which are all 1 or all 0 (thesis 5.4)
         self.register_buffer("expansion", torch.eye(labels).repeat_interleave(crbm.control_units // labels, dim=1))
 

@@ -59,14 +59,12 @@ class LanguageToMotionConfig:
 
 
 class LanguageToMotion(LanguageNet):
-    """The net with its normalisation. mean, scale: (D,) of the channels, set before training."""
+    """The net with its normalisation."""
 
     def __init__(self, config: LanguageToMotionConfig) -> None:
-        super().__init__()
+        super().__init__(config.channels)
         self.config = config
         context, shared = 2 * config.encoder_units[-1], (config.gates, config.dropout)
-        self.register_buffer("mean", torch.zeros(config.channels))
-        self.register_buffer("scale", torch.ones(config.channels))
         self.embedding = WordEmbedding(config.words, config.embedding, config.dropout)
         self.encoder = Encoder(LayerNormGRU, config.embedding, config.encoder_units, *shared)
         self.decoder = Decoder(LayerNormGRU, config.channels + 1, context, config.decoder_units, True, *shared)
@@ -96,10 +94,7 @@ class LanguageToMotion(LanguageNet):
     def terms(self, batch: Batch) -> tuple[Tensor, Tensor | None]:
         """The loss of every frame and of the one after it where a motion ends (N,), eq. 12 or 11; and the summary's."""
         context = self.encode(batch.words, (batch.words != 0).sum(dim=1))
-        losses = LOSSES[self.config.loss](*self._predictions(batch, context))
-        if self.summary is None or not self.training:
-            return losses, None
-        return losses, self.config.summary * self.summary.loss(context, self.normal(batch), batch.lengths)
+        return LOSSES[self.config.loss](*self._predictions(batch, context)), self.summary_loss(batch, context)
 
     def likelihoods(self, batch: Batch) -> Tensor:
         """The log-likelihood (eq. 8) of the same frames as in :meth:`losses`, whichever loss is trained (N,)."""
@@ -108,17 +103,13 @@ class LanguageToMotion(LanguageNet):
 
     def _predictions(self, batch: Batch, context: Tensor) -> tuple[Mixture, Tensor, Tensor]:
         """Mixtures, frames (N, D) and flags (N,) of all active steps, in one row."""
-        normal = functional.pad(self.normal(batch), (0, 0, 0, 1))
+        normal = functional.pad(normalised(batch.frames, self.mean, self.scale), (0, 0, 0, 1))
         flags = before(batch.lengths, normal.shape[1]).to(normal.dtype)
         active = before(batch.lengths + (1 if batch.ended is None else batch.ended), normal.shape[1])
         fed = self._blurred(normal) if self.training else normal
         outputs = self.outputs(torch.cat([fed, flags[..., None]], dim=-1), context)
         # padded steps are left out before the output layer, which is the largest product of all
         return self.mixture(outputs[active]), normal[active], flags[active]
-
-    def normal(self, batch: Batch) -> Tensor:
-        """The normalised frames (B, T, D) of a batch."""
-        return normalised(batch.frames, self.mean, self.scale)
 
     def _blurred(self, normal: Tensor) -> Tensor:
         """Frames (B, T, D) as training feeds them back: with noise, and some of them left out."""

@@ -48,14 +48,12 @@ class MotionToLanguageConfig:
 
 
 class MotionToLanguage(LanguageNet):
-    """The net with its normalisation. mean, scale: (D,) of the channels, set before training."""
+    """The net with its normalisation."""
 
     def __init__(self, config: MotionToLanguageConfig) -> None:
-        super().__init__()
+        super().__init__(config.channels)
         self.config = config
         context, shared = 2 * config.encoder_units[-1], (config.gates, config.dropout)
-        self.register_buffer("mean", torch.zeros(config.channels))
-        self.register_buffer("scale", torch.ones(config.channels))
         self.encoder = Encoder(GRU, config.channels + 1, config.encoder_units, *shared)
         self.embedding = WordEmbedding(config.words, config.embedding, config.dropout)
         self.decoder = Decoder(GRU, config.embedding, context, config.decoder_units, False, *shared)
@@ -92,10 +90,7 @@ class MotionToLanguage(LanguageNet):
         outputs = self.outputs(words, context)
         # padded steps are left out before the output layer, which is the largest product of all
         losses = functional.nll_loss(self.log_probabilities(outputs[active]), targets[active], reduction="none")
-        if self.summary is None or not self.training:
-            return losses, None
-        normal = normalised(batch.frames, self.mean, self.scale)
-        return losses, self.config.summary * self.summary.loss(context, normal, batch.lengths)
+        return losses, self.summary_loss(batch, context)
 
     def step(self, word: Tensor, context: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
         """Word (B,), context (B, C), state (B, S) to log-probabilities (B, V) and the next state (B, S)."""

@@ -119,7 +119,7 @@ class Trajectory(nn.Module):
 class Predictor(Net):
     """Seed frames (B, L, C) to the next frames (B, N, C), both in the contract's units.
 
-    mean, scale: (D,) of the kept channels, set before training; a held channel is seen as its difference to the last
+    mean, scale: (D,) of the kept channels; a held channel is seen as its difference to the last
     frame over its scale. Channels that are held or do not vary stay as they are in the last frame.
     """
 
@@ -130,12 +130,10 @@ class Predictor(Net):
     signs: Tensor
 
     def __init__(self, config: PredictorConfig) -> None:
-        super().__init__()
+        super().__init__(len(config.kept))
         self.config = config
         self.trajectory = Trajectory(config)
         kept, channels = list(config.kept), config.channels
-        self.register_buffer("mean", torch.zeros(len(kept)))
-        self.register_buffer("scale", torch.ones(len(kept)))
         self.register_buffer("kept", torch.tensor(kept), persistent=False)
         self.register_buffer("relative", (torch.arange(len(kept)) < config.held).float(), persistent=False)
         self.register_buffer("placing", torch.eye(channels)[kept[config.held :]], persistent=False)

@@ -82,18 +82,15 @@ def free_run(system: System, seed: Tensor, count: int, truth: Tensor | None = No
 class Stepwise(Net):
     """A system with its units: frames of all channels, in those of the contract.
 
-    kept: the channels that vary; others stay as they are in the last seed frame. mean, scale: (D,) of the kept ones,
-    set before training.
+    kept: the channels that vary; others stay as they are in the last seed frame. mean, scale: (D,) of the kept ones.
     """
 
     kept: Tensor
     placing: Tensor
 
     def __init__(self, system: System, channels: int, kept: Sequence[int], seed_frames: int) -> None:
-        super().__init__()
+        super().__init__(len(kept))
         self.system, self.channels, self.seed_frames = system, channels, seed_frames
-        self.register_buffer("mean", torch.zeros(len(kept)))
-        self.register_buffer("scale", torch.ones(len(kept)))
         self.register_buffer("kept", torch.tensor(kept), persistent=False)
         self.register_buffer("placing", torch.eye(channels)[list(kept)], persistent=False)
 
