@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from motet.bundle.graph import Arrays, Graph
+from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
 from motet.decode.noise import RowNoise, RowsOfNoise
 from motet.decode.session import tick
@@ -17,8 +17,6 @@ from motet.models.script import control_track, parse_script
 from motet.models.seeds import Seed, seeds_of
 from motet.motion.heading import without_heading
 from motet.motion.motion import Motion
-
-Floats = NDArray[np.float32]
 
 MAX_CHARACTERS = 100_000
 """Of one session, whose state is in memory."""

@@ -8,6 +8,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from motet.bundle.graph import Floats
 from motet.errors import MotionError
 from motet.models.language import padded
 from motet.models.text import MAX_WORDS, RULES, Vocabulary
@@ -19,7 +20,6 @@ from motet_train.data.mirror_text import mirror_text
 from motet_train.data.store import Store
 
 Ids = NDArray[np.int64]
-Floats = NDArray[np.float32]
 Row = tuple[Floats, bool, Ids]
 """Frames (T, D), whether the motion ends with them, and the ids of a sentence."""
 
