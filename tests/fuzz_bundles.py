@@ -15,6 +15,7 @@ import io
 import json
 import multiprocessing
 import os
+import re
 import resource
 import sys
 import tempfile
@@ -213,7 +214,13 @@ def try_bundle(path: Path) -> Found:
     except BaseException:
         outcome, detail = "FOREIGN", traceback.format_exc()
     seconds = time.perf_counter() - started
-    return Found(outcome, seconds, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, detail)
+    return Found(outcome, seconds, peak_megabytes(), detail)
+
+
+def peak_megabytes() -> float:
+    """The most memory that this process has held: not ``ru_maxrss``, which starts with that of the parent."""
+    status = Path("/proc/self/status").read_text()
+    return int(re.search(r"VmHWM:\s+(\d+) kB", status)[1]) / 1024  # type: ignore[index]
 
 
 def _work(pipe: Connection, limit: int) -> None:

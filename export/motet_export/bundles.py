@@ -1,5 +1,6 @@
 """From a training run to a bundle: graphs exported, parity checked, golden vectors, figures and licences."""
 
+import logging
 import platform
 from collections.abc import Mapping
 from importlib.metadata import version
@@ -9,6 +10,7 @@ from typing import Any
 from motet.bundle.bundle import Bundle, write_bundle
 from motet.bundle.graph import Graph, OnnxGraph
 from motet.bundle.manifest import Manifest
+from motet.bundle.session import SessionOptions
 from motet.files import check_place
 from motet_export.decoded import whole_runs
 from motet_export.examples import examples
@@ -17,6 +19,8 @@ from motet_export.golden import FILE, golden_vectors
 from motet_export.parity import check_carried, check_one_step, check_runs
 from motet_export.quantise import difference, quantised
 from motet_train.runs import Run
+
+log = logging.getLogger("motet.export")
 
 
 def export_run(run: Run, out: str | Path, int8: bool = False) -> dict[str, Any]:
@@ -28,9 +32,11 @@ def export_run(run: Run, out: str | Path, int8: bool = False) -> dict[str, Any]:
     check_place(out)
     manifest, modules, torch = Manifest.from_json(run.manifest), run.graphs(), run.torch_graphs()
     label = {"motet": version("motet"), "bundle": manifest.name, "model": manifest.model}
-    files = {
-        f"{role}.onnx": export_graph(module, spec, {**label, "role": role}) for role, (module, spec) in modules.items()
-    }
+    files = {}
+    for role, (module, spec) in modules.items():
+        log.info("exporting the graph %s", role)
+        files[f"{role}.onnx"] = export_graph(module, spec, {**label, "role": role})
+    log.info("comparing it with torch")
     onnx = _sessions(files, torch)
     report = parity(manifest, onnx, torch)
     if int8:
@@ -47,11 +53,15 @@ def _sessions(files: Mapping[str, bytes], torch: Mapping[str, Graph]) -> dict[st
     return {role: OnnxGraph(files[f"{role}.onnx"], graph.spec) for role, graph in torch.items()}
 
 
-def parity_of(run: Run, bundle: Bundle) -> dict[str, Any]:
-    """The parity report of an existing bundle against a run; ExportError at the first rung that fails."""
+def parity_of(run: Run, bundle: Bundle, options: SessionOptions | None = None) -> dict[str, Any]:
+    """The parity report of an existing bundle, its graphs run as ``options`` say, against a run.
+
+    ExportError at the first rung that fails.
+    """
     if "int8" in bundle.manifest.parity:
         raise ExportError(f"bundle {bundle.path} has 8-bit weights, which torch cannot check; export without --int8")
-    return parity(bundle.manifest, {role: bundle.graph(role) for role in run.graphs()}, run.torch_graphs())
+    onnx = {role: bundle.graph(role, options or SessionOptions()) for role in run.graphs()}
+    return parity(bundle.manifest, onnx, run.torch_graphs())
 
 
 def parity(manifest: Manifest, onnx: Mapping[str, Graph], torch: Mapping[str, Graph]) -> dict[str, Any]:

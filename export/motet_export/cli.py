@@ -6,13 +6,15 @@ from pathlib import Path
 import click
 
 from motet.bundle.bundle import Bundle
+from motet.bundle.session import SessionOptions
+from motet.cli.options import session_options
 from motet_export.bundles import export_run, parity_of
 from motet_train.runs import Run
 
 
 @click.command()
 @click.argument("run", type=Path)
-@click.option("--out", required=True, type=Path, help="Bundle to write: a .zip, or a new folder.")
+@click.option("-o", "--out", required=True, type=Path, help="Bundle to write: a .zip, or a new folder.")
 @click.option("--int8", is_flag=True, help="8-bit weights: a quarter of the size; reports changes.")
 def export(run: Path, out: Path, int8: bool) -> None:
     """Export the training run RUN to ONNX as a bundle, if ONNX Runtime computes what torch does."""
@@ -26,10 +28,11 @@ def export(run: Path, out: Path, int8: bool) -> None:
 @click.command()
 @click.argument("run", type=Path)
 @click.argument("bundle")
+@session_options
 @click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
-def parity(run: Path, bundle: str, as_json: bool) -> None:
+def parity(run: Path, bundle: str, session: SessionOptions, as_json: bool) -> None:
     """Check that BUNDLE computes what the training run RUN computes in torch."""
-    report = parity_of(Run.load(run), Bundle.open(bundle))
+    report = parity_of(Run.load(run), Bundle.open(bundle), session)
     click.echo(json.dumps(report) if as_json else _lines(report))
 
 

@@ -52,7 +52,7 @@ class Row:
 
 
 def durations(
-    call: Callable[[], object], seconds: float, least: int = 10
+    call: Callable[[], object], seconds: float, least: int = 3
 ) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     """Seconds of each call, over about ``seconds`` (at least ``least`` calls) after a warm-up of a tenth of that."""
     _until(call, seconds / 10, 1)

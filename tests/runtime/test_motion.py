@@ -94,6 +94,8 @@ def test_select_converts_units_and_names_what_lacks():
     np.testing.assert_allclose(back.values, motion.select(picked.channels).values)
     with pytest.raises(MotionError, match=r"lacks 1 of 2 channels: tail\.rx"):
         motion.select(("hips.rx", "tail.rx"))
+    with pytest.raises(MotionError, match=r"lacks 9 of 10 channels: 0, 1, 2, 3, 4, 5 and 3 more$"):
+        motion.select(("hips.rx", *map(str, range(9))))
     with pytest.raises(MotionError, match="does not convert"):
         motion.select(("hips.rx",), ("m",))
 

@@ -52,9 +52,10 @@ def test_a_bvh_is_carried_on_as_the_amc_it_was_made_from(tmp_path: Path, clips: 
 
 def test_append_writes_the_motion_before_what_follows(tmp_path: Path, clips: Path) -> None:
     out = tmp_path / "out.npz"
-    assert run("predict", clips / WALK, "-o", out, "--frames", 40, "--append").exit_code == 0
+    result = run("predict", clips / WALK, "-o", out, "--frames", 40, "--append")
     motion, walk = read_motion(out), read_motion(clips / WALK).resample(30.0, to_end=True)
-    assert len(motion) == len(walk) + 40
+    assert (result.exit_code, len(motion)) == (0, len(walk) + 40)
+    assert result.stdout.endswith(f"predicted from {walk.duration:.3g} s on (frame {len(walk)}, counted from 0)\n")
     np.testing.assert_allclose(positions(motion)[: len(walk)], positions(walk), atol=1e-5)
     steps = np.linalg.norm(np.diff(positions(motion)[:, 0], axis=0), axis=1)
     assert np.abs(np.diff(steps))[len(walk) - 3 : len(walk) + 3].max() < 0.3 * steps.mean()  # no jolt at the seam

@@ -16,4 +16,5 @@ def control_run(clips: Clips, config: Any, seed: int = 0) -> Run:
     """A run of the net of a configuration."""
     model = "tdbn" if isinstance(config, TDBNConfig) else "angle-crbm"
     with tempfile.TemporaryDirectory() as folder:
-        return train_control(clips, Job(Recipe("control", model, config), About("small", "a test", seed), Path(folder)))
+        recipe = Recipe("control", model, "session", config)
+        return train_control(clips, Job(recipe, About("small", "a test", seed), Path(folder)))

@@ -8,7 +8,7 @@ from control_runs import control_run
 from motet.errors import FormatError
 from motet.formats import read_motion, write_motion
 from motet_train.data.body import body_parts
-from motet_train.data.clips import CMU, read_clips, sequences
+from motet_train.data.clips import CMU_FOLDER, read_clips, sequences
 from motet_train.data.errors import DataError
 from motet_train.models.control.contrastive import Learning
 from motet_train.models.control.tdbn import TDBNConfig
@@ -43,8 +43,8 @@ def test_the_body_has_five_parts() -> None:
 def own_clips(folder: Path) -> Path:
     """Clips of one's own: BVH files, one by its name and one by its folder's."""
     (folder / "jog").mkdir(parents=True)
-    write_motion(folder / "stroll.bvh", read_motion(CMU / "39_14.amc"))
-    write_motion(folder / "jog" / "first.bvh", read_motion(CMU / "09_07.amc"))
+    write_motion(folder / "stroll.bvh", read_motion(CMU_FOLDER / "39_14.amc"))
+    write_motion(folder / "jog" / "first.bvh", read_motion(CMU_FOLDER / "09_07.amc"))
     return folder
 
 
@@ -60,9 +60,16 @@ def test_a_folder_of_bvh_is_trained_on(tmp_path: Path) -> None:
     assert run.manifest["loop"] == "session"
 
 
+def test_a_length_unit_is_for_clips_that_do_not_state_theirs(tmp_path: Path) -> None:
+    assert read_clips(own_clips(tmp_path)).skeleton.metres_per_unit is None
+    assert read_clips(tmp_path, unit="cm").skeleton.metres_per_unit == 1.0
+    with pytest.raises(FormatError, match=r"39_14\.amc: .* m according to the file, not 0\.01 m as given"):
+        read_clips(unit="cm")
+
+
 def test_clips_that_do_not_go_together_are_named(tmp_path: Path) -> None:
     own_clips(tmp_path)
-    walk = read_motion(CMU / "39_14.amc")
+    walk = read_motion(CMU_FOLDER / "39_14.amc")
     write_motion(tmp_path / "half.npz", walk.select(walk.channels[:30]))
     with pytest.raises(DataError, match=r"first\.bvh does not match .*half\.npz: only one of them has"):
         read_clips(tmp_path)
@@ -77,12 +84,12 @@ def test_a_folder_without_clips_is_refused(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match=r"walk\.bvh"):
         read_clips(tmp_path)
     (tmp_path / "walk.bvh").unlink()
-    shutil.copy(CMU / "39_14.amc", tmp_path / "my-walk.amc")
+    shutil.copy(CMU_FOLDER / "39_14.amc", tmp_path / "my-walk.amc")
     with pytest.raises(DataError, match="'my-walk'"):
         read_clips(tmp_path)
 
 
 def test_a_clip_that_is_too_short_is_refused(tmp_path: Path) -> None:
-    write_motion(tmp_path / "walk.bvh", read_motion(CMU / "39_14.amc")[:12])
+    write_motion(tmp_path / "walk.bvh", read_motion(CMU_FOLDER / "39_14.amc")[:12])
     with pytest.raises(DataError, match="4 frames"):
         control_run(read_clips(tmp_path), TDBNConfig())

@@ -11,7 +11,7 @@ from kit_zip import JOINTS, mmm_xml, write_kit_zip
 from motet.formats import read_motion, write_motion
 from motet.formats.mmm import read
 from motet_train.data.archive import Archive
-from motet_train.data.clips import CMU
+from motet_train.data.clips import CMU_FOLDER
 from motet_train.data.corpus import read_corpus, read_table, recordings
 from motet_train.data.errors import DataError
 from motet_train.data.preparation import ANGLES, FULL
@@ -37,9 +37,9 @@ def own(tmp_path: Path) -> Path:
     (folder / "amc").mkdir(parents=True)
     (folder / "asf").mkdir()
     for clip in ("02_06", "09_07"):
-        shutil.copy(CMU / f"{clip}.amc", folder / "amc" / f"{clip}.amc")
-        shutil.copy(CMU / f"{clip}.asf", folder / "asf" / f"{clip[:2]}.asf")
-    write_motion(folder / "stroll.npz", read_motion(CMU / "39_14.amc"))
+        shutil.copy(CMU_FOLDER / f"{clip}.amc", folder / "amc" / f"{clip}.amc")
+        shutil.copy(CMU_FOLDER / f"{clip}.asf", folder / "asf" / f"{clip[:2]}.asf")
+    write_motion(folder / "stroll.npz", read_motion(CMU_FOLDER / "39_14.amc"))
     rows = ("02_06\tbend\tSomeone bends.", "09_07\trun\tA person runs.", "09_07\trun\tSomebody runs fast.")
     table(folder / "texts.tsv", *rows, "stroll\twalk\tA man walks.", header="clip\tdescription\tsentence")
     return folder
@@ -65,7 +65,7 @@ def test_a_folder_and_a_zip_give_the_same_records(own: Path, pack: object) -> No
     assert records["09_07"].sentences == ("A person runs.", "Somebody runs fast.")
     assert [record.subject for record in records.values()] == ["02", "09", "stroll"]
     for clip in ("02_06", "09_07"):
-        np.testing.assert_array_equal(records[clip].motion.values, read_motion(CMU / f"{clip}.amc").values)
+        np.testing.assert_array_equal(records[clip].motion.values, read_motion(CMU_FOLDER / f"{clip}.amc").values)
     assert [len(list(corpus)) for _ in range(2)] == [3, 3]
 
 
@@ -89,8 +89,8 @@ def test_what_cannot_be_used_is_named_and_skipped(own: Path) -> None:
 def test_clips_of_one_name_in_two_folders_are_told_apart_by_their_path(tmp_path: Path) -> None:
     for folder in ("ann", "bob"):
         (tmp_path / folder).mkdir()
-        shutil.copy(CMU / "09_07.amc", tmp_path / folder / "run.amc")
-        shutil.copy(CMU / "09_07.asf", tmp_path / folder / "run.asf")
+        shutil.copy(CMU_FOLDER / "09_07.amc", tmp_path / folder / "run.amc")
+        shutil.copy(CMU_FOLDER / "09_07.asf", tmp_path / folder / "run.asf")
     table(tmp_path / "texts.tsv", "ann/run\tAnn runs.", "bob/run\tBob runs.")
     records, _ = of(read_corpus(tmp_path))
     assert {name: record.sentences for name, record in records.items()} == {
@@ -137,13 +137,17 @@ def test_a_long_table_is_read_in_time(tmp_path: Path) -> None:
 
 
 def test_a_length_unit_can_be_given(tmp_path: Path) -> None:
-    write_motion(tmp_path / "run.bvh", read_motion(CMU / "09_07.amc"))
+    write_motion(tmp_path / "run.bvh", read_motion(CMU_FOLDER / "09_07.amc"))
     table(tmp_path / "texts.tsv", "run\tA person runs.")
-    metres = [
-        next(iter(of(read_corpus(tmp_path, metres_per_unit=unit))[0].values())).motion.skeleton.metres_per_unit
-        for unit in (None, 0.01)
-    ]
-    assert metres == [None, 0.01]
+    records = [of(read_corpus(tmp_path, unit=unit))[0] for unit in (None, "cm", 0.5)]
+    skeletons = [found["run"].motion.skeleton for found in records]
+    assert [skeleton and skeleton.metres_per_unit for skeleton in skeletons] == [None, 0.01, 0.5]
+
+
+def test_a_length_unit_that_contradicts_the_file_is_refused(own: Path) -> None:
+    records, skipped = of(read_corpus(own, unit="m"))
+    assert not records
+    assert all("m according to the file, not 1 m as given" in skipped[name] for name in ("02_06", "09_07", "stroll"))
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from motet.models.control import ControlModel
 from motet.models.load import load
 from motet.representation.contract import MotionContract
 from motet_train.cli.evaluate import _clips
-from motet_train.data.clips import CMU, Clips, read_clips
+from motet_train.data.clips import CMU_FOLDER, Clips, read_clips
 from motet_train.data.errors import DataError
 from motet_train.evaluate.control.experiments import GOALS, by_label, control_report, study_of
 from motet_train.evaluate.control.gaits import gait_transitions, limit_cycle
@@ -95,7 +95,7 @@ def test_a_run_is_evaluated_on_the_clips_that_it_was_trained_on(tmp_path: Path) 
         model: Any = SimpleNamespace(manifest=SimpleNamespace(training={"command": command}))
         return _clips("runs/x", model, data).labels
 
-    write_motion(tmp_path / "stroll.bvh", read_motion(CMU / "39_14.amc")[:50])
+    write_motion(tmp_path / "stroll.bvh", read_motion(CMU_FOLDER / "39_14.amc")[:50])
     assert clips_of(f"motet train tdbn --data {tmp_path} --out x") == ("stroll",)
     assert clips_of(f"motet train tdbn --data={tmp_path} --out x") == ("stroll",)
     assert clips_of("motet train tdbn --out x") == ("walk", "run", "bend")

@@ -12,15 +12,15 @@ from motet.formats import read_motion
 from motet.motion.mirror import mirror
 from motet.motion.motion import Motion
 from motet.motion.rotations import continuous_rotvec, rotmat_to_euler, rotmat_to_rotvec, rotvec_to_rotmat
-from motet_train.data.clips import CMU as CLIPS
+from motet_train.data.clips import CMU_FOLDER
 from motet_train.data.errors import DataError
-from motet_train.data.expmap_files import CMU, H36M, Scaling, is_expmap, parse, read_expmap, scaling_of
+from motet_train.data.expmap_files import CMU_LAYOUT, H36M_LAYOUT, Scaling, is_expmap, parse, read_expmap, scaling_of
 from motet_train.data.predict_data import (
     expmap_material,
+    held_out_names,
     mocap_material,
     read_trials,
 )
-from motet_train.data.predict_data import test_names as names_held_out
 from motet_train.data.records import Record
 from motet_train.data.windows import Windows
 from motet_train.evaluate.predict.protocol import (
@@ -86,8 +86,8 @@ def test_windows_begin_where_the_protocol_says(length: int, starts: list[int]) -
 
 
 def test_times_are_those_of_the_files() -> None:
-    assert [round(time) for time in true_times(CMU.fps)] == [33, 67, 133, 167, 233, 417]
-    assert true_times(H36M.fps)[-1] == 1000.0
+    assert [round(time) for time in true_times(CMU_LAYOUT.fps)] == [33, 67, 133, 167, 233, 417]
+    assert true_times(H36M_LAYOUT.fps)[-1] == 1000.0
 
 
 def test_the_error_is_the_literal_one() -> None:
@@ -137,7 +137,7 @@ def test_a_perfect_prediction_has_no_error_and_zero_velocity_grows() -> None:
 
 def test_files_are_read_and_missing_ones_named(tmp_path: Path) -> None:
     corpus = read_expmap(write_files(tmp_path / "corpus"))
-    assert corpus.layout is CMU
+    assert corpus.layout is CMU_LAYOUT
     assert (list(corpus.train), list(corpus.test)) == (["running", "walking"], ["running", "walking"])
     assert len(corpus.missing) == 48 - 6
     assert "train/walking/walking_3.txt" in corpus.missing
@@ -195,14 +195,25 @@ def test_the_mirror_of_the_text_files_is_its_own_inverse(tmp_path: Path) -> None
     np.testing.assert_array_equal((frame[columns] * signs)[columns] * signs, frame)
 
 
+def test_trials_are_held_out_by_person_or_by_chance() -> None:
+    walk = read_motion(CMU_FOLDER / "39_14.amc")[:120]
+    trials = [Record(f"{n:02}_01", "one" if n < 9 else f"{n}", walk, ()) for n in range(12)]
+    assert set(held_out_names(trials)) <= {"09_01", "10_01", "11_01"}
+    with pytest.raises(DataError, match="12 motions of 1 subjects are too few"):
+        mocap_material([replace(trial, subject="one") for trial in trials], [], "x", None)
+    material = mocap_material([replace(trial, subject="one") for trial in trials], [], "x", None, "trial")
+    assert (material.about["split"], material.about["files"], len(material.about["test"])) == ("trial", 11, 1)
+
+
 def test_motion_files_become_sequences_at_30_fps() -> None:
-    walk = read_motion(CLIPS / "39_14.amc")[:120]
+    walk = read_motion(CMU_FOLDER / "39_14.amc")[:120]
     trials = [Record(f"{n:02}_01", f"{n:02}", walk, ()) for n in range(12)]
     material = mocap_material(trials, [], "x", "free")
-    assert (material.contract.fps, len(names_held_out(trials))) == (30.0, 1)
+    assert (material.contract.fps, len(held_out_names(trials))) == (30.0, 1)
     assert material.about["files"] == 11
     assert sum(map(len, material.sequences)) == 11 * len(walk)
-    assert set(material.about["test"]) == set(names_held_out(trials))
+    assert set(material.about["test"]) == set(held_out_names(trials))
+    assert material.about["split"] == "subject"
     mirror_of = material.contract.mirror
     np.testing.assert_array_equal(mirror_of.columns, material.mirrored)
     np.testing.assert_array_equal(mirror_of.signs, material.signs)
@@ -216,7 +227,7 @@ def test_motion_files_become_sequences_at_30_fps() -> None:
 
 def spun(frames: int = 240) -> Motion:
     """A walk whose left hand turns slowly past half a turn."""
-    walk = read_motion(CLIPS / "39_14.amc")[:frames]
+    walk = read_motion(CMU_FOLDER / "39_14.amc")[:frames]
     values = np.array(walk.values)
     values[:, walk.channels.index("lhand.rx")] = 0
     values[:, walk.channels.index("lhand.rz")] = np.linspace(100, 300, frames)
@@ -240,7 +251,7 @@ def test_what_is_trained_does_not_leap_and_is_what_inference_sees() -> None:
 
 
 def test_motion_files_that_cannot_be_used_are_named(tmp_path: Path) -> None:
-    for source in CLIPS.glob("39_14.*"):
+    for source in CMU_FOLDER.glob("39_14.*"):
         (tmp_path / source.name).write_bytes(source.read_bytes())
     (tmp_path / "01_01.amc").write_text("nonsense")
     trials, skipped = read_trials(tmp_path)

@@ -14,7 +14,7 @@ from motet.bundle.manifest import Manifest
 from motet.cli import main
 from motet.formats import read_motion, write_motion
 from motet.models.predict import PredictModel
-from motet_train.data.clips import CMU as CLIPS
+from motet_train.data.clips import CMU_FOLDER
 from motet_train.data.expmap_files import CMU_ACTIONS, read_expmap
 from motet_train.data.predict_data import expmap_material
 from motet_train.evaluate.predict.curves import FEW, MEAN, ZERO, complete, curves
@@ -93,6 +93,8 @@ def test_training_learns_and_repeats_itself(tmp_path: Path) -> None:
 
 def test_train_and_evaluate_from_the_command_line(tmp_path: Path) -> None:
     data, out = write_files(tmp_path / "data"), tmp_path / "run"
+    split = run("train", "predict", "--data", data, "--out", out, "--split", "trial")
+    assert "has test files of its own" in split.stderr
     trained = run("train", "predict", "--data", data, "--out", out, "--steps", 3, "--seed", 1)
     assert trained.exit_code == 0, trained.output
     assert "lacks 42 files: train/basketball/basketball_1.txt" in trained.stderr
@@ -108,24 +110,33 @@ def test_train_and_evaluate_from_the_command_line(tmp_path: Path) -> None:
     assert Run.load(out).manifest["quality"] == found
 
 
-def test_motion_files_are_trained_on_and_measured_in_centimetres(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("file", "options", "unit"),
+    [("{:02}_01.npz", (), ()), ("set-2_{:02}.bvh", ("--split", "trial"), ("--unit-in", "cm"))],
+    ids=["people", "trials of one person in BVH"],
+)
+def test_motion_files_are_trained_on_and_measured_in_centimetres(
+    tmp_path: Path, file: str, options: tuple[str, ...], unit: tuple[str, ...]
+) -> None:
     data, out = tmp_path / "data", tmp_path / "run"
     data.mkdir()
-    for subject in range(10):
-        write_motion(data / f"{subject:02}_01.npz", read_motion(CLIPS / "39_14.amc")[10 * subject : 10 * subject + 160])
-    trained = run("train", "predict", "--data", data, "--out", out, "--steps", 3, "--data-licence", "free")
+    walk = read_motion(CMU_FOLDER / "39_14.amc").scaled(0.01)
+    for n in range(10):
+        write_motion(data / file.format(n), walk[10 * n : 10 * n + 160])
+    given = ("--data", data, *unit)
+    trained = run("train", "predict", *given, *options, "-o", out, "--steps", 3, "--data-licence", "free")
     assert trained.exit_code == 0, trained.output
     manifest = Run.load(out).manifest
     assert (manifest["licence"]["data"], len(manifest["training"]["data"]["test"])) == ("free", 1)
     assert (manifest["training"]["recipe"]["warp"], manifest["training"]["recipe"]["mirror"]) == (0.0, 0.5)
-    found = json.loads(run("evaluate", out, "--data", data, "--json", "--plots", tmp_path / "plots").stdout)
+    found = json.loads(run("evaluate", out, *given, "--json", "--plots", tmp_path / "plots").stdout)
     still = found["zero_velocity"]["place_cm"]
     assert 60 < still["frame_24"] < 130  # a walk at 1.4 m/s, after .83 s
     assert still["frame_1"] < still["frame_24"]
     assert found["zero_velocity"]["pose_cm"]["frame_24"] < still["frame_24"]
     names = sorted(path.name for path in (tmp_path / "plots").iterdir())
     assert names == sorted(["predict-distance.png", f"predict-{manifest['training']['data']['test'][0]}.png"])
-    shown = run("evaluate", out, "--data", data).stdout
+    shown = run("evaluate", out, *given).stdout
     assert "milliseconds 67 133 267 333 467 833" in " ".join(shown.split())
 
 

@@ -20,8 +20,8 @@ from motet.motion.heading import heading
 from motet.motion.kinematics import local_rotations, positions
 from motet.motion.rotations import axis_to_rotmat, rotmat_to_rotvec, rotvec_to_rotmat
 from motet_train.cli.evaluate_predict import predict_reports
-from motet_train.data.clips import CMU as CLIPS
-from motet_train.data.expmap_files import CMU, H36M, ExpmapCorpus, Layout, parse, read_expmap
+from motet_train.data.clips import CMU_FOLDER
+from motet_train.data.expmap_files import CMU_LAYOUT, H36M_LAYOUT, ExpmapCorpus, Layout, parse, read_expmap
 from motet_train.data.predict_data import expmap_material
 from motet_train.evaluate.predict import published
 from motet_train.evaluate.predict.ablations import ablated, ablation_table
@@ -38,7 +38,7 @@ from motet_train.models.predict.systems import stepwise
 from motet_train.runs import Run
 
 FIVE = ("basketball", "jumping", "running", "soccer", "walking")
-SKELETON = read_motion(CLIPS / "39_14.amc").skeleton
+SKELETON = read_motion(CMU_FOLDER / "39_14.amc").skeleton
 assert SKELETON is not None
 
 
@@ -73,12 +73,12 @@ def test_the_published_actions_have_the_published_averages(layout: str) -> None:
 
 
 def test_the_published_mean_of_the_complete_actions() -> None:
-    found = published.mean_over(published.CMU, FIVE)
+    found = published.mean_over(published.CMU_ERRORS, FIVE)
     assert [f"{value:.2f}" for value in found[CONV]] == ["0.33", "0.50", "0.83", "0.94", "1.39"]
     assert [f"{value:.3f}" for value in found[RRNN]] == ["0.406", "0.632", "1.036", "1.172", "1.556"]
-    assert published.mean_over(published.CMU, ("walking", "unheard of")) == {}
-    assert set(published.by_action(H36M.name)) == set(H36M.test)
-    assert set(published.by_action(CMU.name)) == set(CMU.test)
+    assert published.mean_over(published.CMU_ERRORS, ("walking", "unheard of")) == {}
+    assert set(published.by_action(H36M_LAYOUT.name)) == set(H36M_LAYOUT.test)
+    assert set(published.by_action(CMU_LAYOUT.name)) == set(CMU_LAYOUT.test)
 
 
 def test_runs_that_differ_in_the_seed_alone_are_one_row() -> None:
@@ -132,7 +132,7 @@ def shown(layout: Layout, actions: tuple[str, ...]) -> str:
 
 
 def test_published_rows_stand_under_ours() -> None:
-    few, many = shown(CMU, FIVE).split("256 windows of each action")
+    few, many = shown(CMU_LAYOUT, FIVE).split("256 windows of each action")
     blocks = few.split("mean of basketball, jumping, running, soccer, walking")
     jumping = blocks[0].split("jumping\n")[1].split("running\n")[0].splitlines()
     assert [one.split() for one in jumping[0:2]] == [
@@ -149,7 +149,7 @@ def test_published_rows_stand_under_ours() -> None:
 
 
 def test_published_rows_of_human36m() -> None:
-    text = shown(H36M, ("walking", "posing"))
+    text = shown(H36M_LAYOUT, ("walking", "posing"))
     assert line(text, f"published: {ERD}").endswith("   0.93   1.18   1.59   1.78")
     ours, *papers = text.split("mean of walking, posing\n")[1].splitlines()[:3]
     assert (ours.split()[:2], papers[0].split()[1], papers[1].split()[1]) == (
@@ -206,7 +206,7 @@ def test_twenty_systems_look_different() -> None:
 
 
 def test_places_are_those_of_the_motion() -> None:
-    motion = read_motion(CLIPS / "39_14.amc")[:60]
+    motion = read_motion(CMU_FOLDER / "39_14.amc")[:60]
     vectors = rotmat_to_rotvec(local_rotations(motion).swapaxes(-1, -2))
     frames = np.concatenate([np.full((60, 3), 7.0), vectors.reshape(60, -1)], axis=1)
     points = positions(motion)
@@ -257,7 +257,7 @@ def test_all_runs_are_evaluated_at_once(tmp_path: Path) -> None:
     data = write_files(tmp_path / "data", actions=("running",))
     runs = [saved(tmp_path / f"conv-{n}", data, n) for n in range(2)]
     runs.append(saved(tmp_path / "none-0", data, 0, long_term="none"))
-    found, text = predict_reports({str(run): loaded(run) for run in runs}, data, tmp_path / "plots")
+    found, text = predict_reports({str(run): loaded(run) for run in runs}, data, tmp_path / "plots", None)
     assert {path.name for path in (tmp_path / "plots").iterdir()} == {"predict-error.png", "predict-running.png"}
     assert "  without long-term encoder  " in text
     assert line(text, "none-0")

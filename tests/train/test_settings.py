@@ -13,7 +13,7 @@ from test_predict_data import write_files
 
 from motet.cli import main
 from motet.formats import read_motion, write_motion
-from motet_train.data.clips import CMU
+from motet_train.data.clips import CMU_FOLDER
 from motet_train.recipes import describe, predict
 from motet_train.recipes.control import RECIPES as CONTROL
 from motet_train.recipes.systems import RECIPES as SYSTEMS
@@ -159,7 +159,7 @@ def test_these_resume_from_the_command_line_too(
         steps = iter([None] * 3)
         patched.setattr("motet_train.progress.Shown.step", lambda *_: next(steps, KeyboardInterrupt) and stop())
         stopped = motet(*command, tmp_path / "parts")
-    assert (stopped.exit_code, "--resume goes on" in stopped.output) == (1, True)
+    assert (stopped.exit_code, "--resume continues" in stopped.output) == (1, True)
     assert "it exists" in motet(*command, tmp_path / "parts").output
     resumed = motet(*command, tmp_path / "parts", "--resume")
     assert resumed.exit_code == 0, resumed.output
@@ -174,7 +174,7 @@ def stop() -> None:
 def test_a_unit_that_files_do_not_say_is_asked_for_and_taken(tmp_path: Path) -> None:
     folder = tmp_path / "data"
     folder.mkdir()
-    walk = read_motion(CMU / "39_14.amc")
+    walk = read_motion(CMU_FOLDER / "39_14.amc")
     for subject in range(10):
         write_motion(folder / f"{subject:02}_01.bvh", walk[10 * subject : 10 * subject + 160])
     (tmp_path / "said.tsv").write_text("clip\tsentence\n" + "".join(f"{n:02}_01\ta person walks\n" for n in range(10)))

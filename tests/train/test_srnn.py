@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from motet_train.data.errors import DataError
-from motet_train.data.expmap_files import CMU, H36M
+from motet_train.data.expmap_files import CMU_LAYOUT, H36M_LAYOUT
 from motet_train.models.predict.noise import noise_at, noisy
 from motet_train.models.predict.srnn import SRNN, Config, parts_of
 
@@ -106,7 +106,7 @@ def test_mirrored_parts_share_their_weights() -> None:
 
 
 def test_the_published_net_has_the_layers_of_the_paper() -> None:
-    net = SRNN(Config(70, parts_of(CMU, KEPT)))
+    net = SRNN(Config(70, parts_of(CMU_LAYOUT, KEPT)))
     widths = {"spine": 48, "arm": 26, "leg": 20, "spine_arm": 37, "spine_leg": 34, "arm_arm": 26, "leg_leg": 20}
     for name, edge in net.edges.items():
         assert [tuple(p.shape) for p in edge.parameters()][:5:2] == [(256, widths[name]), (256, 256), (2048, 256)]
@@ -121,7 +121,7 @@ def test_the_published_net_has_the_layers_of_the_paper() -> None:
 
 
 def test_the_parts_cover_the_columns_of_the_cmu_files_once() -> None:
-    parts = parts_of(CMU, KEPT)
+    parts = parts_of(CMU_LAYOUT, KEPT)
     assert [len(part) for part in parts] == [24, 13, 13, 10, 10]
     assert sorted(n for part in parts for n in part) == list(range(70))
     spine, *limbs = ([KEPT[n] for n in part] for part in parts)
@@ -133,9 +133,9 @@ def test_the_parts_cover_the_columns_of_the_cmu_files_once() -> None:
 
 def test_layouts_and_parts_that_do_not_fit_are_refused() -> None:
     with pytest.raises(DataError, match="h36m-expmap does not say which columns"):
-        parts_of(H36M, range(54))
+        parts_of(H36M_LAYOUT, range(54))
     with pytest.raises(DataError, match="from 63 and from 90 on are not the same"):
-        parts_of(CMU, KEPT[:-1])
+        parts_of(CMU_LAYOUT, KEPT[:-1])
     with pytest.raises(ValueError, match="left as wide as right"):
         SRNN(replace(TINY, parts=((8, 0, 4), (1, 2), (5, 6, 3), (), (7,))))
     with pytest.raises(ValueError, match="each of the 9 channels"):

@@ -16,7 +16,7 @@ from motet.motion.kinematics import euler_of, local_rotations, positions, with_c
 from motet.motion.motion import Motion
 from motet.representation.contract import FLOORS
 from motet.representation.root_block import ROOT_BLOCK, from_root_block
-from motet_train.data.clips import CMU
+from motet_train.data.clips import CMU_FOLDER
 from motet_train.data.corpus import read_corpus
 from motet_train.data.errors import DataError
 from motet_train.data.preparation import ANGLES, FULL, Preparation
@@ -29,7 +29,7 @@ PLAIN = Preparation("root_angles", trim=False)
 
 
 def cmu(clip: str = "09_07", name: str = "") -> Record:
-    return Record(name or clip, clip[:2], read_motion(CMU / f"{clip}.amc"), ("A person moves.",))
+    return Record(name or clip, clip[:2], read_motion(CMU_FOLDER / f"{clip}.amc"), ("A person moves.",))
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +42,7 @@ def test_each_offset_is_a_sequence_of_the_contracts_frames(store: Store) -> None
     assert contract.channels[:6] == ROOT_BLOCK
     assert (len(contract.channels), contract.fps, contract.skeleton.metres_per_unit) == (62, 10, 1)
     for number, entry in enumerate(store.records):
-        motion = read_motion(CMU / f"{entry.name}.amc")
+        motion = read_motion(CMU_FOLDER / f"{entry.name}.amc")
         assert len(entry.spans) == 12
         for offset in (0, 5, 11):
             expected = contract.frames(motion[offset:])
@@ -275,7 +275,7 @@ def test_trimming_never_moves_a_joint() -> None:
 
 def test_the_command_prepares_and_names_what_it_skips(tmp_path: Path) -> None:
     path = write_kit_zip(tmp_path / "kit.zip", 3)
-    out = tmp_path / "store"
+    out = tmp_path / "stores" / "store"
     result = CliRunner().invoke(main, ["prepare", str(path), "--out", str(out)])
     assert result.exit_code == 0, result.output
     assert "3 motions of" in result.output
@@ -285,6 +285,7 @@ def test_the_command_prepares_and_names_what_it_skips(tmp_path: Path) -> None:
     assert again.exit_code == 2
     assert "it exists" in again.output
     assert json.loads((out / "store.json").read_text())["channels"] == list(JOINTS)
+    assert [path.name for path in out.parent.iterdir()] == ["store"]
 
 
 def test_the_named_preparations() -> None:

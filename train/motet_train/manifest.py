@@ -28,12 +28,6 @@ class About:
     data_licence: str | None = None
 
 
-def loop_of(verb: str, defaults: Mapping[str, Any]) -> str:
-    """How the verb is decoded."""
-    describe = "consensus" if defaults.get("draws") else "beam"
-    return {"describe": describe, "generate": "mixture", "predict": "free_run", "control": "session"}[verb]
-
-
 def surroundings(device: str) -> dict[str, Any]:
     """Where a training ran."""
     processes = {"processes": distributed.count()} if distributed.count() > 1 else {}

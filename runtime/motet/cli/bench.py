@@ -17,14 +17,17 @@ from motet.models.load import load
 @click.option("--bundle", default="cmu-control", show_default=True, help="Name or path of a bundle.")
 @click.option("--motion", type=Path, help="Motion file to describe.  [default: a generated one of 2.8 s]")
 @click.option("--seconds", default=1.0, show_default=True, help="How long to measure each figure.")
+@click.option("--torch/--no-torch", default=True, help="Measure torch too, if it is installed.  [default: --torch]")
 @session_options
 @click.option("--json", "as_json", is_flag=True, help="Print a list of rows.")
-def bench(bundle: str, motion: Path | None, seconds: float, as_json: bool, session: SessionOptions) -> None:
+def bench(
+    bundle: str, motion: Path | None, seconds: float, torch: bool, as_json: bool, session: SessionOptions
+) -> None:
     """Measure a bundle's speed, and torch's where it is installed."""
     model = load(bundle, session)
     found = figures(model, seconds, motion)
     baseline = None
-    if importlib.util.find_spec("torch"):
+    if torch and importlib.util.find_spec("torch"):
         # by name: the runtime does not depend on the training package
         eager = importlib.import_module("motet_train.eager").eager_model(model.manifest, session.threads)
         baseline = figures(eager, seconds, motion)

@@ -35,7 +35,7 @@ def embed(
     """Write context vectors of motion files, or of sentences, one row each, to compare and cluster.
 
     Motions have those of a bundle that describes, sentences those of one that generates; the two are not comparable.
-    A file that fails has no row.
+    A file or sentence that fails has no row.
     """
     if bool(motions) == bool(texts):
         raise click.UsageError("give either motion files or --text")
@@ -46,8 +46,9 @@ def embed(
     if motions:
         vectors = _of_motions(load_as(DescribeModel, bundle or "cmu-describe", session), motions, read, tries)
     else:
+        model = load_as(GenerateModel, bundle or "cmu-generate", session)
         with text_notes():
-            vectors = load_as(GenerateModel, bundle or "cmu-generate", session).embed(texts)
+            vectors = model.embed([texts[index] for index in tries.usable(model, texts)])
     if len(vectors):
         buffer = io.BytesIO()
         np.save(buffer, vectors, allow_pickle=False)

@@ -10,7 +10,7 @@ import click
 from motet.bundle.session import SessionOptions
 from motet.cli.notes import text_notes
 from motet.cli.options import session_options
-from motet.cli.reading import FPS, bar, out_option, places
+from motet.cli.reading import FPS, Tries, bar, out_option, places
 from motet.formats import check_writable, write_motion
 from motet.models.generate import PLAYED, Generated, GenerateModel
 from motet.models.load import load_as
@@ -45,26 +45,31 @@ def generate(
     fps: float,
     no_plant: bool,
     every: bool,
+    seed: int,
     as_json: bool,
     session: SessionOptions,
     **settings: Any,
 ) -> None:
     """Generate a motion for each TEXT, such as "a person walks and turns left", and write it to OUT.
 
-    With several texts, or --all, the files are numbered: out-1.bvh, out-2.bvh, ...
+    With several texts, or --all, the files are numbered: out-1.bvh, out-2.bvh, ... A text that cannot be used has none.
     """
     check_writable(out)
     model = load_as(GenerateModel, bundle, session)
+    tries = Tries()
+    asked = tries.usable(model, texts)
     with text_notes(), bar("generating") as progress:
-        found = model.generate(texts, progress=progress, **settings)
-    kept = [row if every else row[:1] for row in found]
-    outs = iter(places(out, [str(n + 1) for n in range(sum(map(len, kept)))]))
+        seeds = [seed + index for index in asked]
+        found = model.generate([texts[index] for index in asked], seed=seeds, progress=progress, **settings)
+    count = max(map(len, found), default=1) if every else 1
+    outs = places(out, [str(number) for number in range(count * len(texts))])
     rows = []
-    for text, results in zip(texts, kept, strict=True):
-        rows.append(
-            {"input": text, "hypotheses": [_write(result, next(outs), fps, not no_plant) for result in results]}
-        )
-    click.echo(json.dumps(rows) if as_json else "\n".join(_lines(rows)))
+    for index, results in zip(asked, found, strict=True):
+        pairs = zip(results[:count], outs[count * index :], strict=False)
+        rows.append({"input": texts[index], "hypotheses": [_write(*pair, fps, not no_plant) for pair in pairs]})
+    if rows:
+        click.echo(json.dumps(rows) if as_json else "\n".join(_lines(rows)))
+    tries.finish()
 
 
 def _write(result: Generated, place: Path, fps: float, plant: bool) -> dict[str, Any]:

@@ -42,6 +42,8 @@ def predict(
             found = model.predict(motion, frames=frames, append=append)
             write_motion(place, found)
             rates.append(motion.fps)
-            click.echo(f"{place}: {len(found)} frames at {found.fps:g} fps, {found.duration:g} s")
+            start = len(found) - (frames or model.horizon)
+            said = f", predicted from {start / found.fps:.3g} s on (frame {start}, counted from 0)" if append else ""
+            click.echo(f"{place}: {len(found)} frames at {found.fps:g} fps, {found.duration:g} s{said}")
     say_resampled(rates, model.fps)
     tries.finish()

@@ -10,8 +10,9 @@ from typing import Any
 
 import click
 
-from motet.errors import MotetError, MotionError, UnitError
+from motet.errors import MotetError, MotionError, UnitError, quoted
 from motet.formats import FORMATS, WRITABLE, check_writable, read_motion
+from motet.models.language import LanguageModel
 from motet.models.progress import Progress, silent
 from motet.motion.motion import Motion
 from motet.motion.units import METRES
@@ -58,13 +59,22 @@ class Tries:
         self.failed = 0
 
     @contextmanager
-    def of(self, path: Path) -> Iterator[None]:
-        """What is done for one file; motet's own errors end only this."""
+    def of(self, given: Path | str) -> Iterator[None]:
+        """What is done for one file or text; motet's own errors end only this."""
         try:
             yield
         except MotetError as error:
             self.failed += 1
-            click.echo(f"motet: {_named(path, error)}", err=True)
+            click.echo(f"motet: {_named(given, error)}", err=True)
+
+    def usable(self, model: LanguageModel, texts: Sequence[str]) -> list[int]:
+        """The indices of the texts that the model takes."""
+        found = []
+        for index, text in enumerate(texts):
+            with self.of(quoted(text)):
+                model.unknown(text)
+                found.append(index)
+        return found
 
     def finish(self) -> None:
         """Exit code 1 if anything failed."""

@@ -5,6 +5,7 @@ file object of bytes; both raise motet's errors and leave nothing half-written. 
 add its record to :data:`FORMATS`: help texts, the table of docs/formats.md and the lists of corpora are made from it.
 """
 
+import logging
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,6 +20,8 @@ from motet.errors import FormatError, MotionError, OutputError
 from motet.files import File, check_place, place_of
 from motet.motion.motion import Motion
 from motet.motion.units import metres
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -99,6 +102,7 @@ def read_motion(
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # what gets infinite is refused by Motion
             motion: Motion = kind.function("read")(file, **options)
+        log.debug("read %s: %r", path, motion)
         return motion if unit is None else _in_unit(path, motion, metres(unit))
     except FormatError:
         raise

@@ -1,5 +1,6 @@
 """AMC motion with its ASF skeleton (Acclaim), the format of the CMU motion capture database."""
 
+import logging
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
@@ -17,6 +18,8 @@ from motet.motion.kinematics import skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Joint
+
+log = logging.getLogger(__name__)
 
 CMU_FPS = 120.0
 FPS_COMMENT = "# fps "
@@ -132,6 +135,7 @@ def _values(path: Path, text: str, header: int, layout: Layout, partial: bool) -
         frames = [match.start() for match in re.finditer(r"^\d+\s*$", text, re.MULTILINE)]
         if not (partial and frames):
             raise
+    log.info("%s: took the frames before its last one, which is truncated", path)
     return _values_by_line(path, _frame_lines(text[: frames[-1]], header), layout)
 
 

@@ -6,6 +6,7 @@ or colons, equal names (the second "Hand" becomes "Hand_2"), braces anywhere, ev
 becomes a joint ``PARENT_end``. The writer writes what every reader takes.
 """
 
+import logging
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -22,6 +23,8 @@ from motet.motion.kinematics import local_rotations, local_translations, skeleto
 from motet.motion.motion import TURN, Motion
 from motet.motion.rotations import Array, rotmats_to_euler
 from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
+
+log = logging.getLogger(__name__)
 
 ORDER = "zyx"
 POSITION, ROTATION = "Xposition Yposition Zposition", "Zrotation Yrotation Xrotation"
@@ -55,6 +58,8 @@ def read(file: File, partial: bool = False) -> Motion:
     if len(values) != declared and not partial:
         reason = f"the file declares {declared} frames but holds {len(values)}: correct the line 'Frames:'"
         raise FormatError(path, f"{reason}, or read it with partial=True (--partial)", start)
+    if len(values) != declared:
+        log.info("%s: took %d frames of the %d that it declares", path, len(values), declared)
     units = tuple("deg" if name[-2] == "r" else "length" for name in channels)
     return Motion(values, tuple(channels), units, fps, Skeleton(tuple(_joint(path, node) for node in nodes)))
 

@@ -1,5 +1,6 @@
 """What the models of all verbs share: a manifest, a motion contract, graphs, and the bundle that they came from."""
 
+import logging
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar, Self
@@ -11,6 +12,8 @@ from motet.bundle.session import SessionOptions
 from motet.bundle.signature import Sizes, bind
 from motet.decode.loops import loop_of
 from motet.errors import BundleError
+
+log = logging.getLogger(__name__)
 
 
 class BundleModel:
@@ -50,6 +53,7 @@ class BundleModel:
         with bundle.named():
             model = cls(bundle.manifest, graphs)
         model._source = (bundle.path, options)
+        log.info("loaded %s for %s on %s", bundle.path, model.VERB, ", ".join(model.providers))
         return model
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -250,11 +250,14 @@ class ControlSession:
         return np.stack(result, axis=1)
 
     def snapshot(self) -> Snapshot:
-        """The whole state; restoring it continues with the same frames."""
+        """Frames, control and tick, without the noise: the session that goes on from it goes on with its own seeds."""
         return Snapshot(self._history.copy(), self._inputs["control"].copy(), self._tick)
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Go back to a snapshot, of this session or of one with as many characters of the same model."""
+        """Go back to a snapshot, of this session or of one with as many characters of the same model.
+
+        The same frames follow as then, but for what is drawn in a session of other seeds.
+        """
         if snapshot.history.shape != self._history.shape:
             raise ControlError(f"a snapshot of history {snapshot.history.shape} does not fit {self._history.shape}")
         self.set_control(snapshot.control)

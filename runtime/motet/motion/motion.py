@@ -1,5 +1,6 @@
 """The motion: frames of named channels with units and a frame rate. Immutable, finite, never guessed."""
 
+import logging
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -13,6 +14,8 @@ from motet.motion.resample import resampled
 from motet.motion.rotations import Array, continuous_euler, continuous_rotvec, without_turns
 from motet.motion.skeleton import Skeleton
 
+log = logging.getLogger(__name__)
+
 UNITS = ("deg", "rad", "length", "m", "deg/s", "rad/s", "m/s", "1")
 """Units a channel can have; "length" is the length unit of the skeleton, "1" a number without unit."""
 
@@ -21,6 +24,9 @@ TURN = {"deg": 360.0, "rad": 2 * np.pi}
 
 MAX_VALUES = 2**28
 """Numbers that a motion is resampled to at most: 2 GiB, of a hundred channels six hours at 120 frames a second."""
+
+LISTED = 6
+"""Channels that an error names."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -112,7 +118,9 @@ class Motion:
         places = {name: column for column, name in enumerate(self.channels)}
         missing = [name for name in channels if name not in places]
         if missing:
-            raise MotionError(f"the motion lacks {len(missing)} of {len(channels)} channels: {', '.join(missing)}")
+            more = f" and {len(missing) - LISTED} more" if len(missing) > LISTED else ""
+            said = f"{', '.join(missing[:LISTED])}{more}"
+            raise MotionError(f"the motion lacks {len(missing)} of {len(channels)} channels: {said}")
         columns = [places[name] for name in channels]
         units = units or tuple(self.units[column] for column in columns)
         factors = [self._factor(column, unit) for column, unit in zip(columns, units, strict=True)]
@@ -157,6 +165,7 @@ class Motion:
         ratio = self.fps / fps
         if self.values.size / ratio > MAX_VALUES:
             raise MotionError(f"{self.duration:g} s at {fps:g} fps are too many frames")
+        log.debug("resampling %r to %g fps", self, fps)
         picked = abs(ratio - round(ratio)) < 1e-9 and ratio > 0.5
         values = (self if picked else self.continuous()).values
         return replace(self, values=resampled(values, ratio, to_end), fps=fps)

@@ -21,6 +21,7 @@ from motet.models.load import Model, build, load
 from motet.models.predict import PredictModel
 from motet_train.cli.evaluate_language import by_subject, language_reports
 from motet_train.cli.evaluate_predict import predict_reports
+from motet_train.cli.train_options import unit_in
 from motet_train.data.clips import Clips, read_clips
 from motet_train.data.errors import DataError
 from motet_train.evaluate.control.experiments import GOALS, control_report, study_of
@@ -39,10 +40,17 @@ from motet_train.runs import Run
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one nested object with stable keys.")
 @click.option("--plots", type=Path, help="Folder for the figures of the papers.")
+@unit_in
 @session_options
 @click.option("--save", is_flag=True, help="Save the figures in each run, to be exported with it.")
 def evaluate(
-    models: tuple[str, ...], data: Path | None, as_json: bool, plots: Path | None, save: bool, session: SessionOptions
+    models: tuple[str, ...],
+    data: Path | None,
+    as_json: bool,
+    plots: Path | None,
+    unit_in: str | None,
+    save: bool,
+    session: SessionOptions,
 ) -> None:
     """Run the papers' experiments on MODELS: run folders, or names and paths of bundles.
 
@@ -55,7 +63,7 @@ def evaluate(
     if save and (bundles := [name for name in models if name not in runs]):
         raise click.UsageError(f"--save keeps figures in training runs; {', '.join(bundles)} is a bundle")
     loaded = {name: _model(runs[name]) if name in runs else load(name, session) for name in models}
-    ready, text = _measured(loaded, data, plots)
+    ready, text = _measured(loaded, data, plots, unit_in)
     for name in runs if save else ():
         Run({**runs[name].manifest, "quality": ready[name]}, runs[name].model).save(Path(name))
     click.echo(json.dumps(ready[models[0]] if len(models) == 1 else ready) if as_json else text)
@@ -65,7 +73,9 @@ def _model(run: Run) -> Model:
     return build(Manifest.from_json(run.manifest), run.torch_graphs())
 
 
-def _measured(models: Mapping[str, Model], data: Path | None, plots: Path | None) -> tuple[dict[str, Any], str]:
+def _measured(
+    models: Mapping[str, Model], data: Path | None, plots: Path | None, unit: str | None
+) -> tuple[dict[str, Any], str]:
     """The figures of each model, ready for JSON, and all of them as text."""
     controls = {name: model for name, model in models.items() if isinstance(model, ControlModel)}
     others = {name: model for name, model in models.items() if isinstance(model, DescribeModel | GenerateModel)}
@@ -77,8 +87,8 @@ def _measured(models: Mapping[str, Model], data: Path | None, plots: Path | None
 
         make_folder(plots)  # what cannot be written is said before hours of measuring
     if predicts:
-        return predict_reports(predicts, data, plots)
-    reports = _control(controls, data, plots) if controls else language_reports(others, data, plots)
+        return predict_reports(predicts, data, plots, unit)
+    reports = _control(controls, data, plots, unit) if controls else language_reports(others, data, plots)
     ready: dict[str, Any] = {name: json_ready(report) for name, report in reports.items()}
     for name in others:
         if (other := by_subject(others, name)) is not None:
@@ -86,10 +96,12 @@ def _measured(models: Mapping[str, Model], data: Path | None, plots: Path | None
     return ready, report_table(reports, GOALS if controls else LANGUAGE_GOALS)
 
 
-def _control(models: Mapping[str, ControlModel], data: Path | None, plots: Path | None) -> dict[str, Report]:
+def _control(
+    models: Mapping[str, ControlModel], data: Path | None, plots: Path | None, unit: str | None
+) -> dict[str, Report]:
     reports: dict[str, Report] = {}
     for name, model in models.items():
-        study = study_of(model, _clips(name, model, data))
+        study = study_of(model, _clips(name, model, data, unit))
         with tqdm(desc=name, unit=" experiments", disable=None, leave=False) as bar:
             reports[name] = control_report(study, lambda key, bar=bar: bar.update())  # type: ignore[misc]
         if plots is not None:
@@ -100,7 +112,7 @@ def _control(models: Mapping[str, ControlModel], data: Path | None, plots: Path 
     return reports
 
 
-def _clips(name: str, model: ControlModel, data: Path | None) -> Clips:
+def _clips(name: str, model: ControlModel, data: Path | None, unit: str | None = None) -> Clips:
     """The clips in ``data``, else those that training was given, else CMU's; DataError where they are gone."""
     if data is None:
         words = shlex.split(str(model.manifest.training.get("command", "")))
@@ -109,4 +121,4 @@ def _clips(name: str, model: ControlModel, data: Path | None) -> Clips:
         data = Path(given[-1]) if given else None
         if data is not None and not data.exists():
             raise DataError(f"the clips that {name} was trained on, {data}, are missing: give --data")
-    return read_clips(data)
+    return read_clips(data, unit=unit)

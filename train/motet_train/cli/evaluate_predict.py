@@ -11,8 +11,8 @@ from tqdm import tqdm
 from motet.formats import read_motion
 from motet.models.predict import PredictModel
 from motet.motion.kinematics import skeleton_of
-from motet_train.data.clips import CMU as CLIPS
-from motet_train.data.expmap_files import CMU, ExpmapCorpus, is_expmap, read_expmap
+from motet_train.data.clips import CMU_FOLDER
+from motet_train.data.expmap_files import CMU_LAYOUT, ExpmapCorpus, is_expmap, read_expmap
 from motet_train.data.predict_data import STRIDE, read_trials
 from motet_train.data.records import Record
 from motet_train.evaluate.predict import curves, mocap, strips
@@ -36,14 +36,14 @@ Result = tuple[Ready, str]
 """The figures of each model, ready for JSON, see :func:`_ready`, and the table."""
 
 
-def predict_reports(models: Models, data: Path | None, plots: Path | None) -> Result:
+def predict_reports(models: Models, data: Path | None, plots: Path | None, unit: str | None) -> Result:
     """By the protocol where ``data`` has its text files, else the joints' distances in trials that were held out.
 
-    Runs that differ in their seed alone are one row of the table.
+    Runs that differ in their seed alone are one row of the table. unit: of motion files that do not state theirs.
     """
     if data is None:
         raise click.UsageError("predictors need --data: text files of the protocol, or motion files")
-    return _protocol(models, data, plots) if is_expmap(data) else _mocap(models, data, plots)
+    return _protocol(models, data, plots) if is_expmap(data) else _mocap(models, data, plots, unit)
 
 
 def _protocol(models: Models, data: Path, plots: Path | None) -> Result:
@@ -69,18 +69,18 @@ def _draw_protocol(models: Models, corpus: ExpmapCorpus, shown: curves.Curves, p
     many = shown[curves.MANY]
     errors = {action: {name: many[name][action] for name in many} for action in many[curves.ZERO]}
     drawings = {"predict-error": partial(error_over_time, errors, corpus.layout.fps / STRIDE, "Euler error")}
-    if corpus.layout is CMU:  # of Human3.6M's figure there are no bones
-        skeleton = skeleton_of(read_motion(CLIPS / BONES))
+    if corpus.layout is CMU_LAYOUT:  # of Human3.6M's figure there are no bones
+        skeleton = skeleton_of(read_motion(CMU_FOLDER / BONES))
         for action in (action for action in DRAWN if action in corpus.test):
             drawn = strips.strips(models, corpus, action, skeleton)
             drawings[f"predict-{action}"] = partial(strips_drawing, drawn, skeleton, strips.GIVEN)
     save(drawings, plots)
 
 
-def _mocap(models: Models, data: Path, plots: Path | None) -> Result:
+def _mocap(models: Models, data: Path, plots: Path | None, unit: str | None) -> Result:
     first, groups = next(iter(models.values())), seed_groups(models)
     with tqdm(unit=" files", disable=None, leave=False) as bar:
-        trials = mocap.held_out(first, read_trials(data, lambda clip: bar.update())[0])
+        trials = mocap.held_out(first, read_trials(data, lambda clip: bar.update(), unit)[0])
     found = mocap.distances(models, trials)
     shown, apart = pooled(found, groups), pooled(found, groups, spread)
     if plots is not None:

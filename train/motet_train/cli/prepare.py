@@ -6,7 +6,7 @@ import click
 from tqdm import tqdm
 
 from motet.representation import named
-from motet_train.cli.train_options import metres, unit_in
+from motet_train.cli.train_options import unit_in
 from motet_train.data.corpus import Corpus, read_corpus
 from motet_train.data.errors import DataError
 from motet_train.data.records import Record, Skipped
@@ -16,7 +16,7 @@ from motet_train.data.store import prepare as prepare_store
 
 @click.command()
 @click.argument("data", type=Path)
-@click.option("--out", type=Path, required=True, help="Folder of the store to write; must not exist.")
+@click.option("-o", "--out", type=Path, required=True, help="Folder of the store to write; must not exist.")
 @click.option("--sentences", type=Path, help="Table of sentences. [default: the only .tsv in or beside DATA]")
 @unit_in
 def prepare(data: Path, out: Path, sentences: Path | None, unit_in: str | None) -> None:
@@ -25,9 +25,8 @@ def prepare(data: Path, out: Path, sentences: Path | None, unit_in: str | None) 
     DATA is the KIT Motion-Language data, or motion files .amc (with .asf) .bvh .npz with a tab-separated table
     of the columns clip and sentence. A motion that cannot be used is named and skipped.
     """
-    corpus = read_corpus(data, sentences, metres(unit_in))
+    corpus = read_corpus(data, sentences, unit_in)
     _check_unit(corpus)
-    out.absolute().parent.mkdir(parents=True, exist_ok=True)
     with tqdm(total=len(corpus), unit="motion", disable=None) as bar:
 
         def progress(item: Item) -> None:

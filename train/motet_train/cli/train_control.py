@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from motet_train.cli.train_options import metres, train_command, unit_in
+from motet_train.cli.train_options import train_command, unit_in
 from motet_train.data.clips import read_clips
 from motet_train.recipes.control import BASELINES, RECIPES, train_control
 from motet_train.recipes.recipe import Job
@@ -24,7 +24,7 @@ SHIPPED = {"seed": 6, "out": "runs/tdbn", "name": "cmu-control"}
 @train_command("tdbn", RECIPES, DATA, unit_in, defaults=SHIPPED)
 def tdbn(job: Job, data: Path | None, unit_in: str | None) -> Run:
     """Train a temporal deep belief net for live control, on short labelled clips."""
-    return train_control(read_clips(data, job.recipe.config.root_rotation, metres(unit_in)), job)
+    return train_control(read_clips(data, job.recipe.config.root_rotation, unit_in), job)
 
 
 @train_command(
@@ -44,5 +44,5 @@ def crbm(job: Job, data: Path | None, unit_in: str | None, labels: str | None, e
     if epochs is not None:
         config = replace(config, crbm=replace(config.crbm, epochs=epochs))
         job = replace(job, recipe=replace(job.recipe, config=config))
-    clips = read_clips(data, config.root_rotation, metres(unit_in))
+    clips = read_clips(data, config.root_rotation, unit_in)
     return train_control(clips.only([label.strip() for label in labels.split(",")]) if labels else clips, job)

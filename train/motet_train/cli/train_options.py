@@ -32,17 +32,22 @@ def _configure(context: click.Context, option: click.Parameter, path: Path | Non
     if path is None:
         return
     options, context.meta[TABLES] = read_settings(path)
-    names = {parameter.opts[0].lstrip("-").replace("-", "_"): parameter.name for parameter in context.command.params}
+    names = {_long(option).replace("-", "_"): option.name for option in context.command.params}
     if unknown := sorted(options.keys() - names.keys()):
         raise SettingsError(f"{path}: unknown setting {unknown[0]}: expected one of {', '.join(sorted(names))}")
     context.default_map = {**(context.default_map or {}), **{str(names[key]): options[key] for key in options}}
+
+
+def _long(option: click.Parameter) -> str:
+    """How an option is called where it is written out, without its hyphens."""
+    return max(option.opts, key=len).lstrip("-")
 
 
 OPTIONS = (
     click.option(
         "--config", type=Path, is_eager=True, expose_value=False, callback=_configure, help="TOML file of settings."
     ),
-    click.option("--out", type=Path, required=True, help="Folder to write; must not exist."),
+    click.option("-o", "--out", type=Path, required=True, help="Folder to write; must not exist."),
     click.option("--seed", type=click.IntRange(0), default=0, show_default=True),
     click.option("--device", type=click.Choice(["cpu", "cuda"]), default="cpu", show_default=True),
     click.option("--precision", type=click.Choice(["float32", "bfloat16"]), help="Precision of matrix products."),
@@ -53,11 +58,6 @@ OPTIONS = (
     click.option("--licence", help="Licence of the weights. [default: not stated]"),
     click.option("--data-licence", help="Licence of the data. [default: as the data states, or not stated]"),
 )
-
-
-def metres(unit: str | None) -> float | None:
-    """Of one unit that ``--unit-in`` names."""
-    return None if unit is None else METRES[unit]
 
 
 unit_in = click.option("--unit-in", type=click.Choice(list(METRES)), help="Length unit of files that do not state it.")
@@ -124,7 +124,7 @@ def _is_of(name: str, recipe: Recipe) -> bool:
 
 def _kept(context: click.Context, given: Mapping[str, Any]) -> dict[str, Any]:
     """The options that repeat the run, by the names they have on the command line."""
-    names = {parameter.name: parameter.opts[0].lstrip("-") for parameter in context.command.params}
+    names = {option.name: _long(option) for option in context.command.params}
     left_out = ("out", "resume", "tensorboard", "precision")  # the recipe has the last
     return {names[name]: value for name, value in given.items() if name not in left_out}
 
@@ -192,4 +192,8 @@ def _summary(out: Path, training: Mapping[str, Any]) -> str:
     unit = "step" if "steps" in training else "epoch"
     said = [f"{training['parameters']:,} parameters", f"{training[f'{unit}s']} {unit}s in {training['seconds']:g} s"]
     said += [f"{key} {training[key]:.4f}" for key in ("loss", "validation", "reconstruction") if key in training]
-    return f"{out}: {', '.join(said)}, after {unit} {training[f'kept_{unit}']}"
+    summary = f"{out}: {', '.join(said)}, after {unit} {training[f'kept_{unit}']}"
+    if "missed" not in training:
+        return summary
+    missed = f"misses {', '.join(training['missed'])}" if training["missed"] else "reaches all goals"
+    return f"{summary}; the best of {training['candidates']} nets {missed}"

@@ -19,7 +19,7 @@ from motet_train.data.errors import DataError
 CONSTANT = FLOORS["deg"]
 """Degrees: a channel with a smaller standard deviation is as good as constant."""
 
-CMU = Path(__file__).parent / "cmu"
+CMU_FOLDER = Path(__file__).parent / "cmu"
 CMU_CLIPS = {"walk": "39_14.amc", "run": "09_07.amc", "bend": "02_06.amc"}
 """The default clips (thesis 5.1): CMU trials 39_14 and 09_07, and the first bend of 02_06."""
 
@@ -55,16 +55,16 @@ class Clips:
         return replace(self, motions={label: self.motions[label] for label in labels})
 
 
-def read_clips(folder: Path | None = None, root_rotation: bool = True, metres_per_unit: float | None = None) -> Clips:
+def read_clips(folder: Path | None = None, root_rotation: bool = True, unit: str | float | None = None) -> Clips:
     """Read labelled clips: from ``folder``, or the three CMU trials that come with motet.
 
     ``folder`` holds motion files, LABEL.bvh, and folders of them, LABEL/anything.bvh. Only joint angles are kept, in
-    degrees, and with ``root_rotation`` the root's rotation with its heading taken out. metres_per_unit: the length unit
-    of files that do not say it. DataError or MotionError name the file that does not fit.
+    degrees, and with ``root_rotation`` the root's rotation with its heading taken out. unit: the length unit of
+    files that do not state theirs, as in :func:`motet.read`. DataError or MotionError name the file that does not fit.
     """
-    paths = {label: [CMU / name] for label, name in CMU_CLIPS.items()} if folder is None else _find(folder)
+    paths = {label: [CMU_FOLDER / name] for label, name in CMU_CLIPS.items()} if folder is None else _find(folder)
     read = {
-        label: [(path, _angles(read_with_unit(path, metres_per_unit), root_rotation)) for path in found]
+        label: [(path, _angles(read_motion(path, unit=unit), root_rotation)) for path in found]
         for label, found in paths.items()
     }
     first_path, first = next(iter(read.values()))[0]
@@ -73,13 +73,6 @@ def read_clips(folder: Path | None = None, root_rotation: bool = True, metres_pe
     }
     licence = CMU_LICENCE if folder is None else None
     return Clips(motions, _metric(skeleton_of(first)), licence)
-
-
-def read_with_unit(path: Path, metres_per_unit: float | None) -> Motion:
-    """A motion file, with the length unit given where it does not say one."""
-    motion = read_motion(path)
-    said = motion.skeleton is None or motion.skeleton.metres_per_unit is not None
-    return motion if said or metres_per_unit is None else motion.with_unit(metres_per_unit)
 
 
 def sequences(motion: Motion, fps: float) -> list[Array]:

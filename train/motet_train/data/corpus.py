@@ -32,7 +32,7 @@ class Corpus:
     names: tuple[str, ...]
     preparation: Preparation
     table: Path | None = None
-    metres_per_unit: float | None = None
+    unit: str | float | None = None
 
     def __len__(self) -> int:
         """The number of motion files: each gives one Record or Skipped."""
@@ -43,15 +43,15 @@ class Corpus:
             if self.table is None:
                 yield from kit.records(archive)
             else:
-                yield from recordings(archive, self.metres_per_unit, read_table(self.table))
+                yield from recordings(archive, self.unit, read_table(self.table))
 
 
-def read_corpus(path: Path, table: Path | None = None, metres_per_unit: float | None = None) -> Corpus:
+def read_corpus(path: Path, table: Path | None = None, unit: str | float | None = None) -> Corpus:
     """The corpus at ``path``, a folder or a zip; DataError where it is none.
 
     With files ``*_annotations.json`` it is KIT's. Else it has motion files of the types .amc (with .asf) .bvh .npz
     and a table of sentences: ``table``, or the only .tsv in the folder, or the only one beside the folder or zip.
-    metres_per_unit: the length unit of mocap files, where they do not state it.
+    unit: the length unit of mocap files that do not state theirs, as in :func:`motet.read`.
     """
     with Archive(path) as archive:
         names, motions = archive.names, motion_files(archive)
@@ -61,7 +61,7 @@ def read_corpus(path: Path, table: Path | None = None, metres_per_unit: float | 
         raise DataError(
             f"no corpus in {path}: it has neither KIT's NNNNN{kit.ANNOTATIONS} nor motion files ({' '.join(MOCAP)})"
         )
-    return Corpus(path, motions, FULL, table or _only_table(path), metres_per_unit)
+    return Corpus(path, motions, FULL, table or _only_table(path), unit)
 
 
 def motion_files(archive: Archive) -> tuple[str, ...]:
@@ -70,13 +70,13 @@ def motion_files(archive: Archive) -> tuple[str, ...]:
 
 
 def recordings(
-    archive: Archive, metres_per_unit: float | None = None, table: Mapping[str, Described] | None = None
+    archive: Archive, unit: str | float | None = None, table: Mapping[str, Described] | None = None
 ) -> Iterator[Record | Skipped]:
     """The motion of each file of an archive, one of each clip's name; Skipped where it cannot be read or used.
 
-    metres_per_unit: the length unit of files that do not say it. table: what is said of each clip, without which a
-    motion is skipped, as is a clip without a motion; by default all motions are given, without sentences. A clip's
-    subject is what the table says, or else its name up to the first "_".
+    unit: the length unit of files that do not state theirs, as in :func:`motet.read`. table: what is said of each clip,
+    without which a motion is skipped, as is a clip without a motion; by default all motions are given, without
+    sentences. A clip's subject is what the table says, or else its name up to the first "_".
     """
     for name in archive.names:
         if name.lower().endswith(".asf"):
@@ -90,7 +90,7 @@ def recordings(
         elif clip in seen:
             yield Skipped(clip, f"a second motion of this name: {file}")
         else:
-            yield _record(archive, file, clip, said, metres_per_unit)
+            yield _record(archive, file, clip, said, unit)
         seen.add(clip)
     yield from (Skipped(clip, "no motion file of this name") for clip in table or () if clip not in seen)
 
@@ -126,12 +126,10 @@ def read_table(path: Path) -> dict[str, Described]:
     return {clip: Described(tuple(said), subjects.get(clip, "")) for clip, said in sentences.items()}
 
 
-def _record(archive: Archive, file: str, clip: str, said: Described, metres_per_unit: float | None) -> Record | Skipped:
+def _record(archive: Archive, file: str, clip: str, said: Described, unit: str | float | None) -> Record | Skipped:
     try:
         with archive.opened(file) as place:
-            motion = read_motion(place)
-        if metres_per_unit is not None:
-            motion = motion.with_unit(metres_per_unit)
+            motion = read_motion(place, unit=unit)
         return Record(clip, said.subject or clip.rpartition("/")[2].split("_")[0], motion, said.sentences)
     except BROKEN as error:
         return Skipped(clip, archive.reason(error))

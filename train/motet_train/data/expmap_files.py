@@ -74,7 +74,7 @@ H36M_ACTIONS = (
     "walkingdog",
     "walkingtogether",
 )
-CMU = Layout(
+CMU_LAYOUT = Layout(
     "cmu-expmap",
     117,
     _numbered("train", CMU_ACTIONS, 5),
@@ -85,7 +85,7 @@ CMU = Layout(
 )
 """Li et al. 2018: five training trials and one test trial of eight actions."""
 
-H36M = Layout(
+H36M_LAYOUT = Layout(
     "h36m-expmap",
     99,
     {f"S{s}": [f"S{s}/{action}_{n}.txt" for action in H36M_ACTIONS for n in (1, 2)] for s in (1, 6, 7, 8, 9, 11)},
@@ -180,7 +180,8 @@ def _row(line: str, path: str | Path, number: int, columns: int) -> list[float]:
 
 
 def _layout(archive: Archive) -> Layout | None:
-    return next((layout for layout in (CMU, H36M) if any(_found(archive, name) for name in _names(layout))), None)
+    layouts = (CMU_LAYOUT, H36M_LAYOUT)
+    return next((layout for layout in layouts if any(_found(archive, name) for name in _names(layout))), None)
 
 
 def _names(layout: Layout) -> list[str]:

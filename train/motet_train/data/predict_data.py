@@ -140,15 +140,15 @@ def _mirrored_columns(layout: Layout) -> tuple[tuple[int, ...], tuple[float, ...
 
 
 def read_trials(
-    path: Path, progress: Callable[[str], object] = lambda name: None, metres_per_unit: float | None = None
+    path: Path, progress: Callable[[str], object] = lambda name: None, unit: str | float | None = None
 ) -> tuple[list[Record], list[Skipped]]:
     """The motion files of a folder or zip, one of each name, idle ends cut off, and those that cannot be used.
 
-    metres_per_unit: the length unit of files that do not say it.
+    unit: the length unit of files that do not state theirs, as in :func:`motet.read`.
     """
     items = []
     with Archive(path) as archive:
-        for item in recordings(archive, metres_per_unit):
+        for item in recordings(archive, unit):
             progress(item.name)
             items.append(_trimmed(item))
     trials = [item for item in items if isinstance(item, Record)]
@@ -164,15 +164,20 @@ def _trimmed(item: Record | Skipped) -> Record | Skipped:
         return Skipped(item.name, str(error))
 
 
-def test_names(trials: Sequence[Record]) -> tuple[str, ...]:
-    """The trials that are held out: all those of some people, a tenth at most."""
+def held_out_names(trials: Sequence[Record], by: str = "subject") -> tuple[str, ...]:
+    """The trials that are held out: all those of some people, a tenth at most; or a tenth by chance, ``by`` "trial"."""
     entries = [Entry(trial.name, trial.subject, (), ()) for trial in trials]
-    return tuple(trials[index].name for index in split(entries, 0, "subject").test)
+    return tuple(trials[index].name for index in split(entries, 0, by).test)
 
 
-def mocap_material(trials: Sequence[Record], skipped: Sequence[Skipped], name: str, licence: str | None) -> Material:
-    """Motions of one figure as root block and exponential maps at :data:`FPS`, all phases, without the test trials."""
-    test = set(test_names(trials))
+def mocap_material(
+    trials: Sequence[Record], skipped: Sequence[Skipped], name: str, licence: str | None, by: str = "subject"
+) -> Material:
+    """Motions of one figure as root block and exponential maps at :data:`FPS`, all phases, without the test trials.
+
+    by: which those are, see :func:`held_out_names`.
+    """
+    test = set(held_out_names(trials, by))
     found, left_out = _figures([trial for trial in trials if trial.name not in test])
     if not found:
         raise DataError(f"no motion can be used: {'; '.join(item.reason for item in left_out[:3])}")
@@ -184,7 +189,7 @@ def mocap_material(trials: Sequence[Record], skipped: Sequence[Skipped], name: s
     contract = MotionContract("root_vectors", first.channels, first.units, FPS, mean, std, skeleton)
     mirrored, signs = _mirrored(contract)
     names = [item.name for item in (*skipped, *left_out)]
-    about = {"name": name, "files": len(found), "skipped": names, "test": sorted(test)}
+    about = {"name": name, "files": len(found), "skipped": names, "split": by, "test": sorted(test)}
     lengths = np.array([len(sequence) for sequence in sequences], dtype=np.float64)
     return Material(
         contract,

@@ -5,8 +5,6 @@ are, where each record's sequences lie, and what was skipped.
 """
 
 import json
-import shutil
-import uuid
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -15,7 +13,8 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.errors import MotetError, MotionError, OutputError
+from motet.errors import MotetError, MotionError
+from motet.files import new_folder
 from motet.motion.motion import Motion
 from motet.motion.skeleton import Skeleton
 from motet.representation.contract import MotionContract, living
@@ -124,21 +123,13 @@ def prepare(
     progress: called with each item when it is done; what could not be used comes as Skipped.
     OutputError if there is something at ``path``, DataError if no motion can be used.
     """
-    if path.exists() or not path.absolute().parent.is_dir():
-        raise OutputError(f"cannot write the store {path}: it exists, or its parent folder does not")
-    partial = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
-    partial.mkdir()
-    try:
-        with (partial / FRAMES).open("wb") as file:
+    with new_folder(path) as folder:
+        with (folder / FRAMES).open("wb") as file:
             writer = _Writer(file, preparation)
             for item in items:
                 progress(writer.add(item))
             index = writer.finish()
-        (partial / INDEX).write_text(json.dumps(index), encoding="utf-8")
-        partial.rename(path)
-    except BaseException:
-        shutil.rmtree(partial, ignore_errors=True)
-        raise
+        (folder / INDEX).write_text(json.dumps(index), encoding="utf-8")
     return Store.open(path)
 
 

@@ -26,11 +26,11 @@ from motet_train.runs import Run
 from motet_train.trainer import Line, kept
 
 RECIPES = {
-    "default": Recipe("control", "tdbn", TDBNConfig()),
-    "unclamped": Recipe("control", "tdbn", TDBNConfig().unclamped()),
-    "thesis": Recipe("control", "tdbn", TDBNConfig.thesis()),
+    "default": Recipe("control", "tdbn", "session", TDBNConfig()),
+    "unclamped": Recipe("control", "tdbn", "session", TDBNConfig().unclamped()),
+    "thesis": Recipe("control", "tdbn", "session", TDBNConfig.thesis()),
 }
-BASELINES = {"default": Recipe("control", "angle-crbm", AngleCRBMConfig())}
+BASELINES = {"default": Recipe("control", "angle-crbm", "session", AngleCRBMConfig())}
 
 Net = TDBN | AngleCRBM
 

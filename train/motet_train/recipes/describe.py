@@ -12,6 +12,7 @@ DEFAULTS = {"beams": 5, "max_words": 40}
 PAPER = Recipe(
     "describe",
     "motion-to-language",
+    "beam",
     MotionToLanguageConfig(0, 0),
     SIZES,
     Training(epochs=100, batch=128, optimiser="nadam", clip=8.0),
@@ -22,6 +23,7 @@ PAPER = Recipe(
 
 DEFAULT = replace(
     PAPER,
+    loop="consensus",
     config=MotionToLanguageConfig(0, 0, dropout=0.2, frame_noise=0.3, summary=5.0),
     training=Training(epochs=40, batch=32, optimiser="nadam", learning_rate=2e-3, falling=0.5, clip=8.0, keep="last"),
     visits=LanguageVisits(mirror=True),

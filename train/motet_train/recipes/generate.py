@@ -13,6 +13,7 @@ BEAM = {"hypotheses": 5, "candidates": 4, "temperature": 1.0, "max_seconds": 15}
 PAPER = Recipe(
     "generate",
     "language-to-motion",
+    "mixture",
     LanguageToMotionConfig(0, 0),
     SIZES,
     Training(epochs=100, batch=128, optimiser="nadam", clip=25.0),

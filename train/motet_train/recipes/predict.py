@@ -21,6 +21,7 @@ HELD_SCALES = (5.0,) * 3 + (0.5,) * 3
 DEFAULT = Recipe(
     "predict",
     "trajectory",
+    "free_run",
     PredictorConfig(0, ()),
     ("channels", "kept", "held", "mirrored", "signs"),
     Training(

@@ -10,7 +10,7 @@ from motet.files import write_whole
 from motet.representation.contract import MotionContract
 from motet_train import distributed
 from motet_train.descent import Training
-from motet_train.manifest import About, loop_of, refuse_other, surroundings
+from motet_train.manifest import About, refuse_other, surroundings
 from motet_train.models.net import Net
 from motet_train.progress import SILENT, Progress
 from motet_train.runs import MANIFEST, Run
@@ -32,12 +32,13 @@ class Visits:
 class Recipe:
     """What is trained, and how.
 
-    verb, model: as in the manifest. config: the model's sizes, a dataclass, of which ``derived`` are found in the data.
-    training: None where the config says it. visits: how the data is visited, a dataclass. defaults: the verb's.
+    verb, model, loop: as in the manifest. config: the model's sizes, a dataclass, of which ``derived`` are found in the
+    data. training: None where the config says it. visits: how the data is visited, a dataclass. defaults: the verb's.
     """
 
     verb: str
     model: str
+    loop: str
     config: Any
     derived: tuple[str, ...] = ()
     training: Training | None = None
@@ -87,7 +88,7 @@ class Job:
             "version": "1",
             "verb": recipe.verb,
             "model": recipe.model,
-            "loop": loop_of(recipe.verb, defaults),
+            "loop": recipe.loop,
             "motion": contract.to_json(),
             **more,
             "defaults": dict(defaults),

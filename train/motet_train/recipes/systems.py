@@ -44,7 +44,7 @@ TAUGHT = Training(steps=1000, every=100, falling=0.5, clip=25.0)
 
 def _recipe(model: str, config: Any, training: Training) -> Recipe:
     derived = ("dimensions", "parts") if model == "srnn" else ("dimensions",)
-    return Recipe("predict", model, config, derived, training, Visits(), {"horizon": OUTPUT_FRAMES})
+    return Recipe("predict", model, "free_run", config, derived, training, Visits(), {"horizon": OUTPUT_FRAMES})
 
 
 RECIPES: Mapping[str, Mapping[str, Recipe]] = {

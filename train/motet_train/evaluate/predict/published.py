@@ -7,11 +7,11 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from motet_train.evaluate.predict.published_h36m import CONV, H36M, RRNN, Actions, Rows
+from motet_train.evaluate.predict.published_h36m import CONV, H36M_ERRORS, RRNN, Actions, Rows
 
 FRAMES = (1, 3, 7, 9, 24)
 
-CMU: Actions = {
+CMU_ERRORS: Actions = {
     "basketball": {RRNN: (0.50, 0.80, 1.27, 1.45, 1.78), CONV: (0.37, 0.62, 1.07, 1.18, 1.95)},
     "basketball_signal": {RRNN: (0.41, 0.76, 1.32, 1.54, 2.15), CONV: (0.32, 0.59, 1.04, 1.24, 1.96)},
     "directing_traffic": {RRNN: (0.33, 0.59, 0.93, 1.10, 2.05), CONV: (0.25, 0.56, 0.89, 1.00, 2.04)},
@@ -43,7 +43,7 @@ GOAL = (0.26, 0.40, 0.68, 0.78, 1.25)
 
 def by_action(layout: str) -> Actions:
     """The published rows of a layout's corpus."""
-    return H36M if layout.startswith("h36m") else CMU
+    return H36M_ERRORS if layout.startswith("h36m") else CMU_ERRORS
 
 
 def averages(layout: str) -> Rows:

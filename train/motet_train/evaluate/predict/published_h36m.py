@@ -12,7 +12,7 @@ Actions = Mapping[str, Rows]
 ERD, LSTM_3LR, SRNN = "ERD (Fragkiadaki 2015)", "LSTM-3LR (Fragkiadaki 2015)", "SRNN (Jain 2016)"
 RRNN, LSTM_AE, CONV = "RRNN (Martinez 2017)", "LSTM-AE (Ghosh 2017)", "ConvSeq2Seq (Li 2018)"
 
-H36M: Actions = {
+H36M_ERRORS: Actions = {
     "walking": {
         ERD: (0.93, 1.18, 1.59, 1.78, nan),
         LSTM_3LR: (0.77, 1.00, 1.29, 1.47, nan),
