@@ -12,7 +12,7 @@ from motet_train import distributed
 from motet_train.runs import RunError
 
 
-class Progress(Protocol):
+class Watcher(Protocol):
     """What is told about a training as it runs; of its units, epochs or steps, ``done`` of ``total`` are done."""
 
     def step(self, done: int, total: int, unit: str, loss: float) -> None:

@@ -13,7 +13,7 @@ from motet.models.control import ControlModel
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract, living
 from motet_train.data.body import body_parts
-from motet_train.data.clips import Clips, sequences
+from motet_train.data.clips import Clips
 from motet_train.data.errors import DataError
 from motet_train.data.period import is_periodic
 from motet_train.divergence import DivergenceLearner
@@ -38,7 +38,7 @@ Net = TDBN | AngleCRBM
 def train_control(clips: Clips, job: Job) -> Run:
     """Train on labelled clips, see :meth:`motet_train.recipes.recipe.Job.run`; DataError where one is too short."""
     config = job.recipe.config
-    found = _sequences(clips, config.fps)
+    found = clips.frames(config.fps)
     _check_lengths(found, config.taps)
     net = _untrained(clips, config)
     units = ("deg",) * len(clips.channels)
@@ -62,11 +62,6 @@ def train_control(clips: Clips, job: Job) -> Run:
         return {"reconstruction": round(reconstruction(net.cpu(), found, std), 6), **chosen}
 
     return job.run(net, learner, manifest, more)
-
-
-def _sequences(clips: Clips, fps: float) -> dict[str, list[Array]]:
-    """For each label its sequences (T, D)."""
-    return {label: [s for motion in group for s in sequences(motion, fps)] for label, group in clips.motions.items()}
 
 
 def _untrained(clips: Clips, config: TDBNConfig | AngleCRBMConfig) -> Net:
