@@ -89,7 +89,8 @@ class DescribeModel(LanguageModel):
 
     def windows(self, motion: Motion) -> list[tuple[float, Motion]]:
         """A motion of any length in as few equal parts as the model takes, each with the second at which it starts."""
-        count = max(1, math.ceil(motion.duration / MAX_SECONDS - 1e-9))
+        most = max(1, math.floor(MAX_SECONDS * motion.fps + 1e-9))  # parts are of whole frames
+        count = max(1, math.ceil(len(motion) / most))
         edges = np.linspace(0, len(motion), count + 1).round().astype(int).tolist()
         return [(start / motion.fps, motion[start:stop]) for start, stop in pairwise(edges)]
 
