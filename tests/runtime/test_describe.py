@@ -245,5 +245,5 @@ def test_the_benchmark_measures_sentences_of_one_length(tmp_path: Path) -> None:
     assert isinstance(step, FakeGraph)
     step.calls = 0
     describe_figures(model, 0.0)
-    whole = 1 + 2 + 2 * (1 + 10)  # searches: warm-up and two of a batch, warm-up and ten of one motion, both ways
-    assert step.calls == whole * (WORDS + 1) + 11
+    whole = 1 + 2 + 2 * (1 + 3)  # searches: warm-up and two of a batch, warm-up and three of one motion, both ways
+    assert step.calls == whole * (WORDS + 1) + 4
