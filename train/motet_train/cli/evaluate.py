@@ -27,7 +27,7 @@ from motet_train.data.errors import DataError
 from motet_train.evaluate.control.experiments import GOALS, control_report, study_of
 from motet_train.evaluate.language.report import GOALS as LANGUAGE_GOALS
 from motet_train.evaluate.tables import Report, json_ready, report_table
-from motet_train.runs import Run
+from motet_train.runs import MANIFEST, Run
 
 
 @click.command()
@@ -59,7 +59,7 @@ def evaluate(
     beside zero velocity and published rows, or distances in held out motion files.
     """
     torch.set_num_threads(1)
-    runs = {name: Run.load(Path(name)) for name in models if (Path(name) / "run.json").is_file()}
+    runs = {name: Run.load(Path(name)) for name in models if (Path(name) / MANIFEST).is_file()}
     if save and (bundles := [name for name in models if name not in runs]):
         raise click.UsageError(f"--save keeps figures in training runs; {', '.join(bundles)} is a bundle")
     loaded = {name: _model(runs[name]) if name in runs else load(name, session) for name in models}

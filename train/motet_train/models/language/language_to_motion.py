@@ -52,11 +52,6 @@ class LanguageToMotionConfig:
     summary: float = 0.0
     """Weight of the training-only loss of :mod:`motet_train.models.language.summary`; 0 leaves its head out."""
 
-    @staticmethod
-    def paper() -> "LanguageToMotionConfig":
-        """The net of the paper: 44 joints, 1,344 words, 5,446,517 parameters."""
-        return LanguageToMotionConfig(channels=44, words=1344)
-
 
 class LanguageToMotion(LanguageNet):
     """The net with its normalisation."""
@@ -95,11 +90,6 @@ class LanguageToMotion(LanguageNet):
         """The loss of every frame and of the one after it where a motion ends (N,), eq. 12 or 11; and the summary's."""
         context = self.encode(batch.words, (batch.words != 0).sum(dim=1))
         return LOSSES[self.config.loss](*self._predictions(batch, context)), self.summary_loss(batch, context)
-
-    def likelihoods(self, batch: Batch) -> Tensor:
-        """The log-likelihood (eq. 8) of the same frames as in :meth:`losses`, whichever loss is trained (N,)."""
-        context = self.encode(batch.words, (batch.words != 0).sum(dim=1))
-        return Mixture.log_likelihood(*self._predictions(batch, context))
 
     def _predictions(self, batch: Batch, context: Tensor) -> tuple[Mixture, Tensor, Tensor]:
         """Mixtures, frames (N, D) and flags (N,) of all active steps, in one row."""

@@ -41,11 +41,6 @@ class MotionToLanguageConfig:
     summary: float = 0.0
     """Weight of the training-only loss of :mod:`motet_train.models.language.summary`; 0 leaves its head out."""
 
-    @staticmethod
-    def paper() -> "MotionToLanguageConfig":
-        """The net of the paper: 44 joints, 1,344 words, 843,456 parameters."""
-        return MotionToLanguageConfig(channels=44, words=1344)
-
 
 class MotionToLanguage(LanguageNet):
     """The net with its normalisation."""
