@@ -348,3 +348,14 @@ def test_other_peoples_files_come_through_bvh_and_amc(cmu, tmp_path):
         write_motion(tmp_path / "a.amc", motion)
         names = ("root", *motion.skeleton.names[1:])
         assert same_positions(motion, read_motion(tmp_path / "a.amc"), names) < 1e-6
+
+
+def test_numbers_in_any_notation_and_between_any_blanks(tmp_path):
+    path, values = tmp_path / "a.bvh", ["1.5", "-2e-1", "3" + "0" * 40, "0." + "1" * 50]
+    for blank in (" ", "\t", "\u00a0"):
+        write_motion(path, walker(frames=1))
+        head = path.read_text().partition("MOTION")[0]
+        width = head.count("position") + head.count("rotation")
+        row = [values[n % 4] for n in range(width)]
+        path.write_text(f"{head}MOTION\nFrames: 2\nFrame Time: 0.1\n{blank.join(row)}\n{blank.join(row)}\n")
+        np.testing.assert_array_equal(read_motion(path).values, [[float(word) for word in row]] * 2)

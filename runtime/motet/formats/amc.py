@@ -3,8 +3,7 @@
 import logging
 import re
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
-from itertools import compress, cycle, islice
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +12,7 @@ from motet.errors import FormatError, quoted
 from motet.files import File, check_place, place_of, write_whole
 from motet.formats.asf import CMU_METRES, ROOT, Asf, read_skeleton, write_skeleton
 from motet.formats.lines import frame_rate, number, numbers, plain_names, read_text
+from motet.formats.words import Words
 from motet.formats.writable import ANGLES, TRANSLATIONS, with_names, with_still_offsets
 from motet.motion.kinematics import skeleton_of
 from motet.motion.motion import Motion
@@ -141,26 +141,22 @@ def _values(path: Path, text: str, header: int, layout: Layout, partial: bool) -
 
 def _values_at_once(text: str, header: int, layout: Layout) -> Array | None:
     """All values (T, D) of a file whose frames are all alike, else None: several times as fast as by line."""
-    words = "".join(text.split("\n", header)[header:]).split()
+    try:
+        words = Words("".join(text.split("\n", header)[header:]))
+    except UnicodeEncodeError:
+        return None
     width = 1 + sum(1 + count for _, count in layout)
     frames, rest = divmod(len(words), width)
-    if rest or not all(map(str.isdigit, words[::width])):
+    if rest or not words.are_digits(slice(0, None, width)):
         return None
-    is_value, here = [False] * width, 1
+    is_value, here = np.zeros(width, dtype=bool), 1
     for bone, count in layout:
-        if words[here::width] != [bone] * frames:
+        if not words.are(slice(here, None, width), bone):
             return None
-        is_value[here + 1 : here + 1 + count] = [True] * count
+        is_value[here + 1 : here + 1 + count] = True
         here += 1 + count
-    found = list(compress(words, cycle(is_value)))
-    # Python would read 1_000, which no other program does
-    if "_" in text and "_" in "".join(found):
-        return None
-    with suppress(ValueError):
-        values = np.fromiter(map(float, found), np.float64, len(found))
-        if np.isfinite(values).all():
-            return values.reshape(frames, sum(is_value))
-    return None
+    values = words.numbers(np.tile(is_value, frames))
+    return None if values is None else values.reshape(frames, -1)
 
 
 def _values_by_line(path: Path, lines: Iterator[tuple[int, list[str]]], layout: Layout) -> Array:

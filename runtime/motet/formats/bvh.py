@@ -9,6 +9,7 @@ becomes a joint ``PARENT_end``. The writer writes what every reader takes.
 import logging
 import re
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
@@ -18,6 +19,7 @@ import numpy as np
 from motet.errors import FormatError, MotionError, quoted
 from motet.files import File, place_of, write_whole
 from motet.formats.lines import Names, complete_order, frame_rate, number, numbers, plain_names, read_text
+from motet.formats.words import Words
 from motet.formats.writable import with_names, with_still_offsets
 from motet.motion.kinematics import local_rotations, local_translations, skeleton_of
 from motet.motion.motion import TURN, Motion
@@ -179,19 +181,26 @@ def _without_broken_end(lines: list[str], start: int, width: int) -> list[str]:
 def _values(path: Path, lines: list[str], start: int, width: int) -> Array:
     """The frames (T, width) behind the header, one to a line or not; FormatError where one is truncated."""
     text = "\n".join(lines[start:])
-    words = text.split()
-    try:
-        values = np.fromiter(map(float, words), np.float64, len(words))
-        if len(words) % width == 0 and "_" not in text and np.isfinite(values).all():
+    with suppress(UnicodeEncodeError):
+        words = Words(text)
+        values = words.numbers(np.ones(len(words), dtype=bool))
+        if values is not None and len(words) % width == 0:
             return values.reshape(-1, width)
-    except ValueError:
-        pass
+    return _values_by_line(path, lines, start, width, len(text.split()))
+
+
+def _values_by_line(path: Path, lines: list[str], start: int, width: int, count: int) -> Array:
+    """The same of ``count`` words, each of which is checked."""
+    found: list[float] = []
     for line, content in enumerate(lines[start:], start=start + 1):
         row = numbers(content.split(), path, line)
-        if len(words) % width and len(row) not in (0, width):
+        if count % width and len(row) not in (0, width):
             reason = f"truncated frame: a frame has {width} values, this line has {len(row)}"
             raise FormatError(path, reason, line)
-    raise FormatError(path, f"{len(words)} values do not make complete frames of {width}")
+        found += row
+    if count % width:
+        raise FormatError(path, f"{count} values do not make complete frames of {width}")
+    return np.array(found).reshape(-1, width)
 
 
 def write(file: File, motion: Motion) -> None:
