@@ -64,15 +64,15 @@ class Examples:
             limit = round(float(np.exp(rng.uniform(*np.log(windows))))) if windows else MAX
             yield _padded([self._visit(rng, i, offset, limit) for i, offset in found[place]])
 
-    def everything(self, batch: int, longest: int | None = None, offset: int = 0) -> Iterator[Batch]:
-        """The first ``longest`` frames of every motion at one offset with each of its sentences: to validate.
+    def everything(self, batch: int, longest: int | None = None) -> Iterator[Batch]:
+        """The first ``longest`` frames of every motion, at its first offset, with each of its sentences: to validate.
 
         Sorted by length, never mirrored.
         """
         pairs = [(i, sentence) for i, found in enumerate(self.sentences) for sentence in found]
-        pairs.sort(key=lambda pair: self._length(pair[0], offset))
+        pairs.sort(key=lambda pair: self._length(pair[0], 0))
         for start in range(0, len(pairs), batch):
-            cut = [(*self._part(i, offset, 0, longest or MAX), s) for i, s in pairs[start : start + batch]]
+            cut = [(*self._part(i, 0, 0, longest or MAX), s) for i, s in pairs[start : start + batch]]
             yield _padded(cut)
 
     def _drawn(self, rng: np.random.Generator, i: int, offsets: int | None) -> Ids:
