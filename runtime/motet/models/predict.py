@@ -6,9 +6,9 @@ from dataclasses import replace
 from typing import Any, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from motet.bundle.graph import Arrays, Graph
+from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
 from motet.bundle.signature import bind
 from motet.decode.rollout import two_rows
@@ -18,8 +18,6 @@ from motet.models.progress import Progress, silent
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.representation.foreign import carried_back
-
-Floats = NDArray[np.float32]
 
 MAX_FRAMES, MAX_GOLDEN = 100_000, 1000
 """Of one prediction, which is in memory as a whole; and of one among the golden vectors."""
