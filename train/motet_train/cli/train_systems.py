@@ -44,4 +44,4 @@ def _command(name: str, title: str, *switches: Callable[..., Any]) -> click.Comm
     return train_command(name, RECIPES[name], *OPTIONS, *switches)(run)
 
 
-COMMANDS = (*(_command(name, title, *(SWITCHES if name == "convseq2seq" else ())) for name, title in TITLES.items()),)
+COMMANDS = tuple(_command(name, title, *(SWITCHES if name == "convseq2seq" else ())) for name, title in TITLES.items())
