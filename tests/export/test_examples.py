@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from motet.bundle.fields import Fields
 from motet.bundle.graph import Arrays, Graph, GraphSpec, TensorSpec
-from motet.bundle.manifest import Manifest
-from motet.representation.contract import MotionContract
+from motet.bundle.manifest import Manifest, read_contract
 from motet_export.examples import examples, walks
 from motet_export.exporter import ExportError
 from motet_export.parity import check_carried
@@ -100,7 +100,7 @@ def test_frames_of_other_graphs_are_like_the_datas_and_the_rest_is_what_their_co
 
 
 def test_walks_go_on_from_frame_to_frame() -> None:
-    contract = MotionContract.from_json(MOTION)
+    contract = read_contract(Fields(MOTION, "motion"))
     pace = np.diff(walks(contract, np.random.default_rng(0), 200, 20), axis=1).std(axis=(0, 1))
     np.testing.assert_allclose(pace, 0.1 * contract.std, rtol=0.05)
 

@@ -1,6 +1,7 @@
 """Both directions between motion and language as ONNX bundles: what torch computes, for sequences of any length."""
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,6 @@ from motet.representation.contract import LIMIT
 from motet_export.bundles import export_run, parity_of
 from motet_export.examples import example
 from motet_export.exporter import ExportError
-from motet_train.models.language import language_to_motion, motion_to_language
 from motet_train.models.language.language_to_motion import LanguageToMotion, LanguageToMotionConfig
 from motet_train.models.language.motion_to_language import MotionToLanguage, MotionToLanguageConfig
 from motet_train.runs import Run
@@ -47,11 +47,11 @@ def run(verb: str) -> Run:
     net: MotionToLanguage | LanguageToMotion
     if verb == "describe":
         net = MotionToLanguage(MotionToLanguageConfig(**SMALL))
-        model, config = "motion-to-language", motion_to_language.to_config(net)
+        model, config = "motion-to-language", asdict(net.config)
         defaults: Mapping[str, float] = {"beams": 5, "max_words": 40}
     else:
         net = LanguageToMotion(LanguageToMotionConfig(**SMALL, components=2))
-        model, config = "language-to-motion", language_to_motion.to_config(net)
+        model, config = "language-to-motion", asdict(net.config)
         defaults = {"hypotheses": 5, "candidates": 4, "temperature": 1.0, "max_seconds": 15}
     net.mean.copy_(torch.tensor(MOTION["mean"]))
     net.scale.copy_(torch.tensor(motion["std"]))

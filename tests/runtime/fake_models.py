@@ -30,7 +30,7 @@ def manifest(
     verb: str, loop: str, contract: MotionContract, defaults: dict[str, Any], vocabulary: Vocabulary | None = None
 ) -> Manifest:
     """The manifest of a fake model."""
-    words = {} if vocabulary is None else {"text": vocabulary.rules.to_json(), "vocabulary": vocabulary.to_json()}
+    words = {} if vocabulary is None else {"text": vocabulary.rules.to_json(), "vocabulary": list(vocabulary.words)}
     named = {"name": f"fake-{verb}", "verb": verb, "model": "fake", "loop": loop}
     return Manifest.from_json({**named, "motion": contract.to_json(), **words, "defaults": defaults})
 

@@ -70,6 +70,11 @@ def test_each_character_has_its_own_control(model: ControlModel) -> None:
         np.testing.assert_allclose(mixed[row], np.concatenate([alone.step() for _ in range(60)]), atol=1e-3)
 
 
+def test_seeds_of_characters_can_be_an_array(model: ControlModel) -> None:
+    listed, array = (model.start(characters=3, seed=s, variety=1.0).step() for s in ([7, 1, 4], np.array([7, 1, 4])))
+    np.testing.assert_array_equal(array, listed)
+
+
 def test_seeds_repeat_and_differ(model: ControlModel) -> None:
     first, again, other = (model.start(seed=seed, variety=1.0).frames(_track(model)) for seed in (1, 1, 2))
     np.testing.assert_array_equal(first, again)
@@ -165,6 +170,7 @@ def test_a_model_from_a_bundle_pickles(model: ControlModel) -> None:
         ({"variety": 1.5}, "between 0 and 1"),
         ({"variety": float("nan")}, "between 0 and 1"),
         ({"temperature": 0}, "between 0.01 and 100"),
+        ({"iterations": 1.5}, "iterations must be a whole number"),
         ({"iterations": 2}, "without free hidden units"),
         ({"start": "swim"}, "expected one of walk, run, bend"),
     ],

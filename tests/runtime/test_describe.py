@@ -100,6 +100,16 @@ def test_a_long_motion_goes_in_windows(model: DescribeModel) -> None:
     assert len(model.windows(moving(0))) == 1
 
 
+@pytest.mark.parametrize(("frames", "fps"), [(2877, 23.976), (8991, 29.97)])
+def test_windows_hold_whole_frames_of_no_more_than_the_model_takes(
+    model: DescribeModel, frames: int, fps: float
+) -> None:
+    windows = model.windows(moving(frames, fps=fps))
+    assert sum(len(part) for _, part in windows) == frames
+    for _, part in windows:
+        model.frames(part)
+
+
 def test_what_the_model_sees_is_prepared_once(model: DescribeModel) -> None:
     motion = moving(47, fps=25.0)
     np.testing.assert_array_equal(model.frames(model.prepared(motion)), model.frames(motion))

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from figures import walker
 
+from motet.bundle.fields import Fields
+from motet.bundle.manifest import read_contract
 from motet.errors import BundleError, MotionError
 from motet.formats import read_motion, write_motion
 from motet.motion import Joint, Motion, Skeleton, heading, mirror, positions
@@ -168,7 +170,7 @@ def test_the_floor_depends_on_the_unit() -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_a_contract_comes_back_from_json(name: str) -> None:
     contract = contract_of(name, walker(80))
-    again = MotionContract.from_json(contract.to_json())
+    again = read_contract(Fields(contract.to_json(), "motion"))
     assert (again.representation, again.channels, again.units, again.fps, again.skeleton) == (
         contract.representation,
         contract.channels,
@@ -184,31 +186,32 @@ def test_a_contract_comes_back_from_json(name: str) -> None:
 @pytest.mark.parametrize(
     ("key", "value", "reason"),
     [
-        ("representation", "smpl", "must be one of angles"),
-        ("channels", ["a", 1], "motion.channels: expected a list of names"),
-        ("channels", "abc", "motion.channels: expected a list of names"),
-        ("channels", ["a"] * 24, "root_angles needs root.forward"),
-        ("units", ["deg"], r"motion.units: 24 are needed, one for each channel, not 1"),
-        ("units", ["feet"] * 24, "motion.units: each must be one of"),
-        ("fps", float("nan"), "motion.fps: expected finite numbers"),
-        ("fps", 1e9, "motion.fps: expected a number over 0 and up to 1000"),
-        ("fps", True, "motion.fps: expected numbers"),
-        ("fps", "25", "motion.fps: expected numbers"),
-        ("mean", None, "motion.mean: expected numbers"),
-        ("mean", [0.0, 1.0], "motion.mean: 24 are needed"),
-        ("mean", [10**400] * 24, "motion.mean"),
-        ("std", [-1.0] * 24, "motion.std: a standard deviation cannot be negative"),
-        ("skeleton", {"joints": []}, "motion.skeleton"),
-        ("skeleton", [], "motion.skeleton"),
+        ("representation", "smpl", "motion.representation: must be one of angles"),
+        ("representation", ["angles"], "motion.representation: must be a string"),
+        ("channels", ["a", 1], "motion.channels: must be a list of strings"),
+        ("channels", "abc", "motion.channels: must be a list"),
+        ("channels", ["a", "b"], "motion.channels: root_angles needs root.forward"),
+        ("channels", ["a"] * 24, "motion.channels: holds a string twice"),
+        ("units", ["deg"], "motion.units: must be one of deg, .* for each of 24 channels"),
+        ("units", ["feet"] * 24, "motion.units: must be one of deg"),
+        ("units", [["deg"]] * 24, "motion.units: must be one of deg"),
+        ("fps", float("nan"), "motion.fps: must be a number between 1 and 1000"),
+        ("fps", 1e9, "motion.fps: must be a number between 1 and 1000"),
+        ("fps", True, "motion.fps: must be a number"),
+        ("fps", "25", "motion.fps: must be a number"),
+        ("mean", None, "motion.mean: must be a list"),
+        ("mean", [0.0, 1.0], "motion.mean: must hold 24 numbers, not 2"),
+        ("mean", [10**400] * 24, "motion.mean: must be numbers between"),
+        ("std", [-1.0] * 24, "motion.std: must be numbers between 0"),
+        ("skeleton", {"joints": []}, "motion.skeleton.joints: must be a skeleton with the joints of all channels"),
+        ("skeleton", [], "motion.skeleton: must be an object"),
     ],
 )
 def test_a_contract_that_is_none_names_the_key(key: str, value: Any, reason: str) -> None:
     data = contract_of("root_angles", walker(80)).to_json()
     assert len(data["channels"]) == 24
     with pytest.raises(BundleError, match=reason):
-        MotionContract.from_json({**data, key: value})
-    with pytest.raises(BundleError, match="a JSON object"):
-        MotionContract.from_json([])
+        read_contract(Fields({**data, key: value}, "motion"))
 
 
 @pytest.mark.parametrize(
@@ -218,7 +221,7 @@ def test_a_contract_that_is_none_names_the_key(key: str, value: Any, reason: str
 def test_a_skeleton_that_is_none_is_refused(change: dict[str, Any]) -> None:
     data = contract_of("angles", walker(80)).to_json()
     data["skeleton"]["joints"][2] |= change
-    with pytest.raises(BundleError, match=r"motion\.skeleton: not a skeleton"):
-        MotionContract.from_json(data)
+    with pytest.raises(BundleError, match=r"manifest, motion\.skeleton"):
+        read_contract(Fields(data, "motion"))
     with pytest.raises(MotionError, match="positive number of metres, not -1"):
         Skeleton((Joint("a", -1, (0, 0, 0)),), -1.0)

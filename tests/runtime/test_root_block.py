@@ -5,6 +5,8 @@ import numpy as np
 import pytest
 from figures import walker
 
+from motet.bundle.fields import Fields
+from motet.bundle.manifest import read_contract
 from motet.errors import MotionError
 from motet.formats import read_motion
 from motet.motion.heading import heading
@@ -113,7 +115,7 @@ def test_a_contract_takes_motions_with_and_without_the_block() -> None:
 
 def test_a_contract_needs_no_skeleton() -> None:
     contract = contract_of(replace(walker(3), skeleton=None))
-    again = MotionContract.from_json(contract.to_json())
+    again = read_contract(Fields(contract.to_json(), "motion"))
     assert again.skeleton is None
     assert again.features(np.zeros((2, len(again.channels)))).skeleton is None
 

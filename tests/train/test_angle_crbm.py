@@ -15,9 +15,10 @@ from motet_export.bundles import export_run
 from motet_train.data.clips import read_clips
 from motet_train.evaluate.control.experiments import experiments, study_of
 from motet_train.evaluate.control.gaits import limit_cycle, switch
-from motet_train.models.control.angle_crbm import AngleCRBM, AngleCRBMConfig, from_config, to_config
+from motet_train.models.control.angle_crbm import AngleCRBM, AngleCRBMConfig, from_config
 from motet_train.models.control.contrastive import DivergedError, Learning
 from motet_train.models.control.crbm import CRBM
+from motet_train.models.net import tuples
 from motet_train.runs import Run
 
 SHORT = replace(AngleCRBMConfig(), iterations=3, crbm=Learning(3, 3e-2, temperature=(1.0, 1.0)))
@@ -93,7 +94,7 @@ def test_a_run_reads_back_exports_and_iterates_as_its_manifest_says(tmp_path: Pa
     run = train("walk", "run")
     run.save(tmp_path)
     again = Run.load(tmp_path)
-    assert to_config(from_config(again.manifest["config"])) == run.manifest["config"]
+    assert from_config(again.manifest["config"]).to_config() == tuples(run.manifest["config"])
     export_run(again, tmp_path / "bundle.zip")
     model = ControlModel(Manifest.from_json(run.manifest), run.torch_graphs())
     found, three, one = (model.start(iterations=n).frames(np.eye(2)) for n in (None, 3, 1))

@@ -8,7 +8,7 @@ from control_runs import control_run
 from motet.errors import FormatError
 from motet.formats import read_motion, write_motion
 from motet_train.data.body import body_parts
-from motet_train.data.clips import CMU_FOLDER, read_clips, sequences
+from motet_train.data.clips import CMU_FOLDER, read_clips
 from motet_train.data.errors import DataError
 from motet_train.models.control.contrastive import Learning
 from motet_train.models.control.tdbn import TDBNConfig
@@ -24,11 +24,11 @@ def test_the_default_clips_are_the_thesis_trials() -> None:
 
 
 def test_all_phases_of_a_faster_clip_are_data() -> None:
-    walk = read_clips().motions["walk"][0]
-    found = sequences(walk, 40.0)
+    clips = read_clips()
+    walk, found = clips.motions["walk"][0], clips.frames(40.0)["walk"]
     assert [len(sequence) for sequence in found] == [133, 133, 133]
     np.testing.assert_array_equal(np.stack(found, axis=1).reshape(399, -1), walk.values)
-    (slower,) = sequences(walk, 50.0)
+    (slower,) = clips.frames(50.0)["walk"]
     assert len(slower) == round(399 / 120 * 50)
 
 

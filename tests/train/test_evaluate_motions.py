@@ -205,7 +205,7 @@ def runs(tmp_path: Path) -> Path:
     torch.manual_seed(0)
     (tmp_path / "store").mkdir()
     _write(STORE, tmp_path / "store")
-    vocabulary = Vocabulary.of(s for entry in STORE.records for s in entry.sentences).to_json()
+    vocabulary = list(Vocabulary.of(s for entry in STORE.records for s in entry.sentences).words)
     shared = {"channels": len(CHANNELS), "words": len(vocabulary), **SIZES}
     more = {"motion": STORE.contract(range(20)).to_json(), "text": RULES.to_json(), "vocabulary": vocabulary}
     for name, verb, by in (("describe", "describe", "trial"), ("unseen", "describe", "subject")):

@@ -91,14 +91,16 @@ def test_figures_that_the_clips_allow_are_drawn(clips: Clips, tmp_path: Path) ->
 
 
 def test_a_run_is_evaluated_on_the_clips_that_it_was_trained_on(tmp_path: Path) -> None:
-    def clips_of(command: str, data: Path | None = None) -> tuple[str, ...]:
+    def clips_of(command: str, data: Path | None = None, run: Path = Path("runs/x")) -> tuple[str, ...]:
         model: Any = SimpleNamespace(manifest=SimpleNamespace(training={"command": command}))
-        return _clips("runs/x", model, data).labels
+        return _clips(str(run), model, data).labels
 
     write_motion(tmp_path / "stroll.bvh", read_motion(CMU_FOLDER / "39_14.amc")[:50])
     assert clips_of(f"motet train tdbn --data {tmp_path} --out x") == ("stroll",)
     assert clips_of(f"motet train tdbn --data={tmp_path} --out x") == ("stroll",)
     assert clips_of("motet train tdbn --out x") == ("walk", "run", "bend")
+    (tmp_path / "run.toml").write_text(f"data = '{tmp_path}'\n")
+    assert clips_of("motet train tdbn --config own.toml --out x", run=tmp_path) == ("stroll",)
     assert clips_of("motet train tdbn --data gone --out x", tmp_path) == ("stroll",)
     with pytest.raises(DataError, match=r"runs/x was trained on, gone, are missing: give --data"):
         clips_of("motet train tdbn --data gone")

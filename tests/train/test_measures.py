@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from motet_train.data.body import body_parts
-from motet_train.data.clips import read_clips, sequences
+from motet_train.data.clips import read_clips
 from motet_train.data.period import is_periodic, period
 from motet_train.evaluate.control.measures import ARRIVED, Reference, arrival, upsample
 
@@ -66,7 +66,7 @@ def test_arrival_counts_only_what_stays() -> None:
 
 def test_a_pose_has_arrived_when_it_is_as_near_as_the_recorded_cycles_are_to_each_other() -> None:
     clips = read_clips()
-    motions = {label: [s for motion in found for s in sequences(motion, 40)] for label, found in clips.motions.items()}
+    motions = clips.frames(40)
     parts = body_parts(clips.skeleton, clips.channels)
     reference = Reference(motions, 40, np.flatnonzero(np.isin(parts.of_channel, parts.legs)))
     walk, half = motions["walk"][0], reference.period("walk") / 2

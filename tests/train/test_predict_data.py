@@ -200,15 +200,15 @@ def test_trials_are_held_out_by_person_or_by_chance() -> None:
     trials = [Record(f"{n:02}_01", "one" if n < 9 else f"{n}", walk, ()) for n in range(12)]
     assert set(held_out_names(trials)) <= {"09_01", "10_01", "11_01"}
     with pytest.raises(DataError, match="12 motions of 1 subjects are too few"):
-        mocap_material([replace(trial, subject="one") for trial in trials], [], "x", None)
-    material = mocap_material([replace(trial, subject="one") for trial in trials], [], "x", None, "trial")
+        mocap_material([replace(trial, subject="one") for trial in trials], [], "x")
+    material = mocap_material([replace(trial, subject="one") for trial in trials], [], "x", "trial")
     assert (material.about["split"], material.about["files"], len(material.about["test"])) == ("trial", 11, 1)
 
 
 def test_motion_files_become_sequences_at_30_fps() -> None:
     walk = read_motion(CMU_FOLDER / "39_14.amc")[:120]
     trials = [Record(f"{n:02}_01", f"{n:02}", walk, ()) for n in range(12)]
-    material = mocap_material(trials, [], "x", "free")
+    material = mocap_material(trials, [], "x")
     assert (material.contract.fps, len(held_out_names(trials))) == (30.0, 1)
     assert material.about["files"] == 11
     assert sum(map(len, material.sequences)) == 11 * len(walk)
@@ -218,7 +218,7 @@ def test_motion_files_become_sequences_at_30_fps() -> None:
     np.testing.assert_array_equal(mirror_of.columns, material.mirrored)
     np.testing.assert_array_equal(mirror_of.signs, material.signs)
     one, other = (
-        mocap_material([Record(str(n), str(n), m, ()) for n in range(12)], [], "x", "free").sequences[0]
+        mocap_material([Record(str(n), str(n), m, ()) for n in range(12)], [], "x").sequences[0]
         for m in (walk, mirror(walk))
     )
     np.testing.assert_allclose(mirror_of(one), other, atol=1e-4)
@@ -236,7 +236,7 @@ def spun(frames: int = 240) -> Motion:
 
 def test_what_is_trained_does_not_leap_and_is_what_inference_sees() -> None:
     motion = spun()
-    material = mocap_material([Record(f"{n:02}_01", f"{n:02}", motion, ()) for n in range(12)], [], "x", "free")
+    material = mocap_material([Record(f"{n:02}_01", f"{n:02}", motion, ()) for n in range(12)], [], "x")
     hand = material.contract.channels.index("lhand.ez")
     sequence = material.sequences[0]
     assert np.abs(np.diff(sequence[:, hand - 2 : hand + 1], axis=0)).max() < 0.3

@@ -118,6 +118,14 @@ def test_the_file_of_a_run_repeats_it(model: str, data: dict[str, tuple[object, 
     assert files[0] == files[1]
 
 
+def test_each_chunk_is_told_once_unless_asked_to_be_quiet(tmp_path: Path) -> None:
+    (tmp_path / "small.toml").write_text(SMALL["crbm"])
+    command = ("train", "crbm", "--config", tmp_path / "small.toml", "--out")
+    loud, quiet = motet(*command, tmp_path / "a"), motet("--quiet", *command, tmp_path / "b")
+    assert (loud.exit_code, quiet.exit_code) == (0, 0)
+    assert [line.count("epoch 3 of 3: loss") for line in (loud.output, quiet.output)] == [1, 0]
+
+
 def test_the_command_line_wins_over_the_file(data: dict[str, tuple[object, ...]], tmp_path: Path) -> None:
     (tmp_path / "small.toml").write_text(SMALL["predict"] + "batch = 3\n")
     out = tmp_path / "a"

@@ -11,7 +11,8 @@ from motet.models.control import ControlModel
 from motet_train.data.body import body_parts
 from motet_train.data.clips import read_clips
 from motet_train.models.control.contrastive import Learning
-from motet_train.models.control.tdbn import TDBN, TDBNConfig, from_config, to_config
+from motet_train.models.control.tdbn import TDBN, TDBNConfig, from_config
+from motet_train.models.net import tuples
 from motet_train.runs import Run, RunError
 
 SHORT = replace(TDBNConfig(), restarts=1, tries=1, rbm=Learning(epochs=2), crbm=Learning(epochs=2))
@@ -46,7 +47,7 @@ def test_a_run_reads_back_as_it_was(config: TDBNConfig, tmp_path: Path) -> None:
     run.save(tmp_path)
     other = Run.load(tmp_path)
     assert other.manifest == run.manifest
-    assert to_config(from_config(other.manifest["config"])) == run.manifest["config"]
+    assert tuples(from_config(other.manifest["config"]).to_config()) == tuples(run.manifest["config"])
     frames = [
         ControlModel(Manifest.from_json(r.manifest), r.torch_graphs()).start(seed=1, variety=0.5).frames(np.eye(3))
         for r in (run, other)

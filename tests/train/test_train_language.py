@@ -9,9 +9,10 @@ import torch
 from click.testing import CliRunner, Result
 from language_data import records, small_store
 
+from motet.bundle.fields import Fields
+from motet.bundle.manifest import read_contract
 from motet.cli import main
 from motet.formats import write_motion
-from motet.representation.contract import MotionContract
 from motet_train.data.store import Store
 from motet_train.descent import Training
 from motet_train.models.language.language_to_motion import LanguageToMotionConfig
@@ -65,7 +66,7 @@ def test_the_manifest_says_all(verb: str, store: Path, tmp_path: Path) -> None:
     assert manifest["licence"] == {"weights": None, "data": "free"}
     assert manifest["loop"] == {"describe": "consensus", "generate": "mixture"}[verb]
     assert manifest["vocabulary"] == list(found.vocabulary.words)
-    contract = MotionContract.from_json(manifest["motion"])
+    contract = read_contract(Fields(manifest["motion"], "motion"))
     np.testing.assert_allclose(contract.mean, found.contract.mean, atol=1e-9)
     np.testing.assert_allclose(run.model.scale.numpy(), contract.std, rtol=1e-6)
     assert training["split"]["test"] == [f"{i:02}" for i in found.parts.test]

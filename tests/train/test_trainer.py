@@ -1,7 +1,9 @@
 """The training loop: what is kept, and going on after any stop, for every kind of learner."""
 
 import json
+import logging
 import math
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +25,7 @@ from motet_train.models.control.contrastive import Learning
 from motet_train.models.control.tdbn import TDBN, TDBNConfig
 from motet_train.models.predict.convseq2seq import Config, ConvSeq2Seq, Discriminator
 from motet_train.models.predict.stepwise import Stepwise
+from motet_train.progress import Shown
 from motet_train.recipes.systems import Adversary
 from motet_train.runs import WEIGHTS, RunError
 from motet_train.trainer import CHECKPOINT, LOG, Learner, kept, train
@@ -281,6 +284,19 @@ def test_it_learns_and_is_told_how_far_it_is(tmp_path: Path) -> None:
     log = lines(tmp_path)
     assert log[-1]["validation"] < 0.4 * log[0]["validation"]
     np.testing.assert_allclose(shares, np.arange(300) / 300)
+
+
+def test_the_bar_is_full_in_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    logging.getLogger("motet.train").setLevel(logging.INFO)
+    shown = Shown()
+    for epoch in (1, 2):
+        shown.step(epoch, 2, "epoch", 0.5)
+        assert shown.bar is not None
+        assert shown.bar.n == epoch - 1
+        shown.chunk({"epoch": epoch, "seconds": 1.0}, 2, "epoch")
+    assert shown.bar.n == 2
+    shown.close()
 
 
 def test_learning_rates() -> None:

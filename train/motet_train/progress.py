@@ -11,8 +11,10 @@ from tqdm import tqdm
 from motet_train import distributed
 from motet_train.runs import RunError
 
+log = logging.getLogger("motet.train")
 
-class Progress(Protocol):
+
+class Watcher(Protocol):
     """What is told about a training as it runs; of its units, epochs or steps, ``done`` of ``total`` are done."""
 
     def step(self, done: int, total: int, unit: str, loss: float) -> None:
@@ -36,13 +38,14 @@ SILENT = Silent()
 
 
 class Shown:
-    """A bar with loss, speed and remaining time; where nobody watches, a line for each chunk by the logger "motet".
+    """A bar with loss, speed and remaining time; where nobody watches, a line for each chunk.
 
+    The lines are logged by "motet.train"; with ``motet --quiet`` there are neither.
     boards: the folder for TensorBoard; RunError where that is not installed.
     """
 
     def __init__(self, boards: Path | None = None) -> None:
-        self.watched = sys.stderr.isatty() and distributed.rank() == 0
+        self.watched = sys.stderr.isatty() and distributed.rank() == 0 and log.isEnabledFor(logging.INFO)
         self.writer = _writer(boards) if boards is not None and distributed.rank() == 0 else None
         self.bar: tqdm[Any] | None = None
         self.done = 0
@@ -64,7 +67,9 @@ class Shown:
         if distributed.rank() == 0 and not self.watched:
             left = figures["seconds"] / (line[unit] - self.done) * (total - line[unit])
             said = ", ".join(f"{key.replace('_', ' ')} {value:.5g}" for key, value in figures.items())
-            logging.getLogger("motet").info("%s %d of %d: %s, %.0f s left", unit, line[unit], total, said, left)
+            log.info("%s %d of %d: %s, %.0f s left", unit, line[unit], total, said, left)
+        if self.bar is not None:
+            self.bar.update(line[unit] - self.bar.n)
         self.done = line[unit]
 
     def close(self) -> None:

@@ -16,7 +16,7 @@ from torch import nn
 
 from motet.files import write_whole
 from motet_train import distributed
-from motet_train.progress import SILENT, Progress
+from motet_train.progress import SILENT, Watcher
 from motet_train.runs import WEIGHTS, RunError, read_state, to_bytes
 
 CHECKPOINT, LOG = "checkpoint.pt", "log.jsonl"
@@ -60,7 +60,7 @@ class Learner(Protocol):
         """What the log says of the chunk: under "validation" what has to become small, if there is such a thing."""
 
 
-def train(learner: Learner, seed: int, folder: Path, progress: Progress = SILENT) -> list[Line]:
+def train(learner: Learner, seed: int, folder: Path, progress: Watcher = SILENT) -> list[Line]:
     """Train to the end; ``learner.kept`` comes back with the weights to keep. Returns the log.
 
     After each chunk the existing ``folder`` holds ``log.jsonl``, the weights to keep and a checkpoint, each written

@@ -40,7 +40,7 @@ class Bundle:
         self._members = members
         if MANIFEST not in members.names:
             raise BundleError(f"{path} is not a bundle: it holds no {MANIFEST}")
-        with self._named():
+        with self.named():
             self.manifest = Manifest.of_bundle(self._read(MANIFEST, MAX_MANIFEST))
             extra = sorted(members.names - self.manifest.files.keys() - {MANIFEST})
             if extra:
@@ -62,7 +62,7 @@ class Bundle:
 
     def read(self, name: str) -> bytes:
         """One file's bytes, after size and sha256 were found to be those of the manifest."""
-        with self._named():
+        with self.named():
             declared = self.manifest.files.get(name)
             if declared is None:
                 raise BundleError(f"{name!r} is not in its manifest")
@@ -74,7 +74,7 @@ class Bundle:
     def graph(self, role: str, options: SessionOptions | None = None) -> OnnxGraph:
         """The graph of a role ("encoder", "step"), checked against its contract."""
         found = self.manifest.graphs.get(role)
-        with self._named(f", {role} graph"):
+        with self.named(f", {role} graph"):
             if found is None:
                 raise BundleError("there is none")
             return OnnxGraph(self.read(found.file), found.spec, options)
@@ -90,6 +90,15 @@ class Bundle:
         files = {name: self.read(name) for name in self.manifest.files}
         write_whole(path, zip_bytes(files, self._read(MANIFEST, MAX_MANIFEST)))
 
+    @contextmanager
+    def named(self, where: str = "") -> Iterator[None]:
+        """Faults within say which bundle they are of."""
+        try:
+            yield
+        except BundleError as error:
+            told = str(error).startswith(f"bundle {self.path}")
+            raise error if told else BundleError(f"bundle {self.path}{where}: {error}") from error
+
     def _read(self, name: str, limit: int) -> bytes:
         if name not in self._members.names:
             raise BundleError(f"the file {name!r} is missing")
@@ -97,15 +106,6 @@ class Bundle:
         if len(data) > limit:
             raise BundleError(f"the file {name!r} was altered: it has more than {limit} bytes")
         return data
-
-    @contextmanager
-    def _named(self, where: str = "") -> Iterator[None]:
-        """Faults within say which bundle they are of."""
-        try:
-            yield
-        except BundleError as error:
-            told = str(error).startswith(f"bundle {self.path}")
-            raise error if told else BundleError(f"bundle {self.path}{where}: {error}") from error
 
 
 def find_bundle(name_or_path: str | Path) -> Path:

@@ -3,7 +3,7 @@
 import json
 import math
 import reprlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -61,6 +61,13 @@ class Fields:
         found = self.value(key)
         if not isinstance(found, str):
             raise self.fault("a string", found, key)
+        return found
+
+    def one_of(self, key: str, allowed: Collection[str]) -> str:
+        """A string out of some."""
+        found = self.text(key)
+        if found not in allowed:
+            raise self.fault(f"one of {', '.join(allowed)}", found, key)
         return found
 
     def number(self, key: str, low: float = -LARGEST, high: float = LARGEST) -> float:

@@ -14,6 +14,7 @@ from motet.bundle.session import SessionOptions
 from motet.errors import BundleError
 
 Arrays = Mapping[str, NDArray[Any]]
+Floats = NDArray[np.float32]
 
 DTYPES = {"float32": "tensor(float)", "int64": "tensor(int64)", "bool": "tensor(bool)"}
 """dtype in a manifest -> type in ONNX Runtime."""
@@ -45,9 +46,7 @@ class TensorSpec:
             raise data.fault(f"names, and numbers between 1 and {MAX_AXIS}", shape, "shape")
         if len(shape) > 8 or np.prod(fixed, dtype=np.float64) > MAX_ROW:
             raise data.fault(f"at most 8 axes with at most {MAX_ROW} numbers a row", shape, "shape")
-        if data.text("dtype") not in DTYPES:
-            raise data.fault(f"one of {', '.join(DTYPES)}", data.text("dtype"), "dtype")
-        return TensorSpec(data.text("name"), tuple(shape), data.text("dtype"))
+        return TensorSpec(data.text("name"), tuple(shape), data.one_of("dtype", DTYPES))
 
     def size(self, axis: int) -> int:
         """The size of a fixed axis; BundleError if the axis is dynamic."""

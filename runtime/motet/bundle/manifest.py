@@ -10,15 +10,19 @@ from numpy.typing import NDArray
 from motet.bundle.fields import Fields, parse
 from motet.bundle.graph import GraphSpec
 from motet.bundle.members import MAX_SIZE, NAME
-from motet.errors import BundleError
-from motet.representation.contract import FASTEST, MotionContract
+from motet.errors import BundleError, MotionError
+from motet.motion.motion import UNITS
+from motet.motion.skeleton import Skeleton
+from motet.representation import REPRESENTATIONS
+from motet.representation.contract import MotionContract
 
 FORMAT = 2
 """Version of the bundle format that this motet writes and reads."""
 
 MANIFEST = "manifest.json"
 
-MAX_CHANNELS = 10_000
+MAX_CHANNELS, FASTEST = 10_000, 1000.0
+"""Channels of a model, and its frames per second."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +90,7 @@ class Manifest:
     def from_json(data: object) -> "Manifest":
         """Read the manifest of a bundle or of a training run; BundleError names the key that is wrong."""
         top = Fields(data)
-        motion = _motion(top.fields("motion"))
+        motion = read_contract(top.fields("motion"))
         return Manifest(
             name=top.text("name"),
             verb=top.text("verb"),
@@ -133,23 +137,22 @@ class Manifest:
         return found
 
 
-def _motion(data: Fields) -> MotionContract:
-    channels = data.texts("channels")
+def read_contract(data: Fields) -> MotionContract:
+    """The motion contract that :meth:`MotionContract.to_json` wrote; BundleError names the key that is wrong."""
+    name, channels, units = data.one_of("representation", REPRESENTATIONS), data.texts("channels"), data.items("units")
     if not 1 <= len(channels) <= MAX_CHANNELS:
         raise data.fault(f"1 to {MAX_CHANNELS} names", len(channels), "channels")
-    data.text("representation")
-    data.number("fps", 1, FASTEST)
-    data.numbers("mean", len(channels))
-    data.numbers("std", len(channels), low=0.0)
-    if "skeleton" in data:
-        _check_skeleton(data.fields("skeleton"), channels)
-    try:
-        return MotionContract.from_json(data.data)
-    except BundleError as error:
-        raise BundleError(f"manifest, {error}") from error
+    if lacking := [channel for channel in REPRESENTATIONS[name].required if channel not in channels]:
+        raise BundleError(f"manifest, {data.at('channels')}: {name} needs {', '.join(lacking)}")
+    if len(units) != len(channels) or any(unit not in UNITS for unit in units):
+        raise data.fault(f"one of {', '.join(UNITS)} for each of {len(channels)} channels", units, "units")
+    fps, mean = data.number("fps", 1, FASTEST), data.numbers("mean", len(channels))
+    std = data.numbers("std", len(channels), low=0.0)
+    skeleton = _skeleton(data.fields("skeleton"), channels) if "skeleton" in data else None
+    return MotionContract(name, channels, tuple(units), fps, mean, std, skeleton)
 
 
-def _check_skeleton(data: Fields, channels: tuple[str, ...]) -> None:
+def _skeleton(data: Fields, channels: tuple[str, ...]) -> Skeleton:
     if "metres_per_unit" in data:
         data.number("metres_per_unit", 1e-6, 1e6)
     joints = data.list_of_fields("joints")
@@ -164,6 +167,10 @@ def _check_skeleton(data: Fields, channels: tuple[str, ...]) -> None:
     unknown = [name for name in channels if name.rpartition(".")[0] not in known]
     if unknown:
         raise data.fault("a skeleton with the joints of all channels", f"one without {unknown[0]}", "joints")
+    try:
+        return Skeleton.from_json(data.data)
+    except MotionError as error:
+        raise BundleError(f"manifest, {data.path}: {error}") from error
 
 
 def _control(data: Fields, channels: int) -> Control:

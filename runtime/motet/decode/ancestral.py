@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from motet.bundle.graph import Graph
-from motet.decode.beam import Floats, Ids, Limits, Scores
-from motet.decode.rollout import advance, two_rows, zero_state
+from motet.bundle.graph import Floats, Graph
+from motet.decode.beam import Limits
+from motet.decode.rollout import Ids, Scores, advance, two_rows, zero_state
 
 SEED = 0
 """Every row draws by the noise of this seed: a row gets the same sequences each time, and in any batch."""

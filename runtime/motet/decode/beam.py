@@ -4,16 +4,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motet.bundle.graph import Arrays, Graph
+from motet.bundle.graph import Arrays, Floats, Graph
 from motet.decode.loop import Loop, Setting
-from motet.decode.rollout import advance, two_rows, zero_state
-
-Floats = NDArray[np.float32]
-Scores = NDArray[np.float64]
-Ids = NDArray[np.int64]
-
+from motet.decode.rollout import Ids, Scores, advance, two_rows, zero_state
 
 WORDS = Setting(1, 1000, whole=True)
 """How many words a sentence has at most."""

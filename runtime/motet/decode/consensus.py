@@ -7,12 +7,12 @@ from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motet.bundle.graph import Graph
+from motet.bundle.graph import Floats, Graph
 from motet.decode.ancestral import Drawn, draw_sequences
-from motet.decode.beam import INPUTS, OUTPUTS, WORDS, Floats, Hypothesis, Limits
+from motet.decode.beam import INPUTS, OUTPUTS, WORDS, Hypothesis, Limits
 from motet.decode.loop import Loop, Setting
+from motet.decode.rollout import Ids, Scores
 
 ORDERS = (1, 2)
 """Words, and pairs of words that follow each other."""
@@ -43,7 +43,7 @@ def by_consensus(drawn: Sequence[Drawn]) -> list[Hypothesis]:
     return [Hypothesis(drawn[i].ids, drawn[i].log_probability, float(scores[i])) for i in order]
 
 
-def agreement(sequences: Sequence[tuple[int, ...]], times: NDArray[np.int64]) -> NDArray[np.float64]:
+def agreement(sequences: Sequence[tuple[int, ...]], times: Ids) -> Scores:
     """What each of S sequences has in common with the others and itself, each as often as it came: means (S,), 0 to 1.
 
     In common: the mean of two F1, of the words and of the pairs that both have.
@@ -57,7 +57,7 @@ def agreement(sequences: Sequence[tuple[int, ...]], times: NDArray[np.int64]) ->
     return found
 
 
-def _marks(sequences: Sequence[tuple[int, ...]], order: int) -> NDArray[np.float64]:
+def _marks(sequences: Sequence[tuple[int, ...]], order: int) -> Scores:
     """(S, G) of 0 and 1: whether a sequence has an n-gram for the first, second, ... time.
 
     The product of two rows is the number of n-grams that both have.

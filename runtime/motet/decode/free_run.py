@@ -1,16 +1,15 @@
 """The loop of predictors: a step graph whose frames go on from seed frames."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motet.bundle.graph import Graph
+from motet.bundle.graph import Floats, Graph
 from motet.decode.loop import Loop, Setting
 from motet.decode.rollout import advance, zero_state
 
 MAX_HORIZON = 10_000
 
 
-def free_run(encoder: Graph, step: Graph, seed: NDArray[np.float32], count: int, horizon: int) -> NDArray[np.float32]:
+def free_run(encoder: Graph, step: Graph, seed: Floats, count: int, horizon: int) -> Floats:
     """The ``count`` frames (B, count, C) float32 that follow the seed frames (B, L, C) float32.
 
     What the encoder gives are the step's inputs, by name: those that are fed back begin there, others stay; a fed back

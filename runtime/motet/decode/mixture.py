@@ -6,13 +6,9 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.bundle.graph import Arrays, Graph
+from motet.bundle.graph import Arrays, Floats, Graph
 from motet.decode.loop import Loop, Setting
-from motet.decode.rollout import advance, two_rows, zero_state
-
-Floats = NDArray[np.float32]
-Scores = NDArray[np.float64]
-Ids = NDArray[np.int64]
+from motet.decode.rollout import Ids, Scores, advance, two_rows, zero_state
 
 SMALLEST = 2.0**-24
 """A probability of the flag below this counts as this, where a logarithm is taken."""

@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from motet.bundle.graph import Floats
 from motet.errors import BundleError
-
-Floats = NDArray[np.float32]
 
 BLOCK = 16
 """Ticks drawn at once."""
@@ -25,16 +24,16 @@ class RowNoise:
         self._index = -1
         self._block = np.empty((0, 0, 0), dtype=np.float32)
 
-    def at(self, tick: int) -> NDArray[np.float32]:
+    def at(self, tick: int) -> Floats:
         """The noise (rows, width) float32 of one tick."""
         index, place = divmod(tick, BLOCK)
         if index != self._index:
             self._block = np.stack([self._draw(seed, index) for seed in self.seeds], axis=1)
             self._index = index
-        noise: NDArray[np.float32] = self._block[place]
+        noise: Floats = self._block[place]
         return noise
 
-    def _draw(self, seed: int, index: int) -> NDArray[np.float32]:
+    def _draw(self, seed: int, index: int) -> Floats:
         generator = np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, index])))
         return generator.random((BLOCK, self.width), dtype=np.float32)
 

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from motet.bundle.graph import Arrays, Graph
 
 State = dict[str, NDArray[Any]]
+Scores = NDArray[np.float64]
+Ids = NDArray[np.int64]
 
 
 def advance(step: Graph, state: State, inputs: Arrays) -> tuple[dict[str, NDArray[Any]], State]:
@@ -29,7 +31,7 @@ def zero_state(step: Graph, rows: int, given: Collection[str] = ()) -> State:
     return {name: np.zeros((rows, *step.spec.start_shape(name)), dtype=step.spec.input(name).dtype) for name in names}
 
 
-def two_rows(indices: NDArray[np.int64]) -> NDArray[np.int64]:
+def two_rows(indices: Ids) -> Ids:
     """Indices of the rows to run, a single one twice.
 
     A matrix product rounds a single row differently from a row among others; so a row gives, to the bit and with one

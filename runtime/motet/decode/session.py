@@ -2,13 +2,8 @@
 
 from collections.abc import Callable
 
-import numpy as np
-from numpy.typing import NDArray
-
-from motet.bundle.graph import Arrays, Graph
+from motet.bundle.graph import Arrays, Floats, Graph
 from motet.decode.loop import Loop, Setting
-
-Floats = NDArray[np.float32]
 
 
 def tick(step: Graph, history: Floats, inputs: Callable[[], Arrays], iterations: int) -> tuple[Floats, Floats]:

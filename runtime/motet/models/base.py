@@ -50,10 +50,8 @@ class BundleModel:
         """The model of an opened bundle."""
         options = options or SessionOptions()
         graphs = {role: bundle.graph(role, options) for role in bundle.manifest.graphs}
-        try:
+        with bundle.named():
             model = cls(bundle.manifest, graphs)
-        except BundleError as error:
-            raise BundleError(f"bundle {bundle.path}: {error}") from error
         model._source = (bundle.path, options)
         log.info("loaded %s for %s on %s", bundle.path, model.VERB, ", ".join(model.providers))
         return model

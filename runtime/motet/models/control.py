@@ -5,20 +5,18 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from motet.bundle.graph import Arrays, Graph
+from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
 from motet.decode.noise import RowNoise, RowsOfNoise
 from motet.decode.session import tick
-from motet.errors import BundleError, ControlError, MotionError
+from motet.errors import BundleError, ControlError, DecodingError, MotionError
 from motet.models.base import BundleModel
 from motet.models.script import control_track, parse_script
 from motet.models.seeds import Seed, seeds_of
 from motet.motion.heading import without_heading
 from motet.motion.motion import Motion
-
-Floats = NDArray[np.float32]
 
 MAX_CHARACTERS = 100_000
 """Of one session, whose state is in memory."""
@@ -86,8 +84,6 @@ class ControlModel(BundleModel):
         else:
             label = self.labels[0] if start is None else start
             history = self._history_at(label)
-        temperature = self.defaults["temperature"] if temperature is None else temperature
-        iterations = int(self.defaults["iterations"]) if iterations is None else iterations
         settings = self._settings(variety, temperature, iterations)
         session = ControlSession(self, np.repeat(history[None], characters, axis=0), seeds, settings)
         if label is not None:
@@ -128,20 +124,22 @@ class ControlModel(BundleModel):
         return self.encode(self.starts[label])
 
     def _history_of(self, motion: Motion) -> Floats:
-        last = motion.continuous().resample(self.fps, to_end=True)[-self.taps :]
+        last = self.contract.on_figure(motion.continuous().resample(self.fps, to_end=True))[-self.taps :]
         if len(last) < self.taps:
             raise MotionError(f"a start needs {self.taps} frames at {self.fps:g} fps, this motion has {len(last)}")
         # levelled by themselves: where the figure faced long before says nothing about where it faces now
         return self.encode(self.contract.frames(without_heading(last)))
 
-    def _settings(self, variety: float, temperature: float, iterations: int) -> "_Settings":
+    def _settings(self, variety: float, temperature: float | None, iterations: int | None) -> "_Settings":
         if not 0 <= variety <= 1:
             raise ControlError(f"variety must be between 0 and 1, not {variety}")
-        if not 0.01 <= temperature <= 100:
-            raise ControlError(f"temperature must be between 0.01 and 100, not {temperature}")
-        if iterations < 1 or (iterations > 1 and not self.has_free_units):
-            raise ControlError("iterations must be 1 in a model without free hidden units, and at least 1 in others")
-        return _Settings(np.float32(variety), np.float32(temperature), iterations)
+        try:
+            chosen = self.loop.settled(self.defaults, {"temperature": temperature, "iterations": iterations})
+        except DecodingError as error:
+            raise ControlError(str(error)) from error
+        if chosen["iterations"] > 1 and not self.has_free_units:
+            raise ControlError("iterations must be 1 in a model without free hidden units")
+        return _Settings(np.float32(variety), np.float32(chosen["temperature"]), int(chosen["iterations"]))
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,10 @@ from itertools import pairwise
 from typing import Any, overload
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motet.bundle.graph import Arrays, Graph
+from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
-from motet.decode.beam import Floats, Hypothesis, Limits
+from motet.decode.beam import Hypothesis, Limits
 from motet.decode.loop import Loop
 from motet.decode.loops import LOOPS
 from motet.models.language import MAX_SECONDS, LanguageModel
@@ -89,8 +88,13 @@ class DescribeModel(LanguageModel):
         return rows[0] if isinstance(motions, Motion) else rows
 
     def windows(self, motion: Motion) -> list[tuple[float, Motion]]:
-        """A motion of any length in as few equal parts as the model takes, each with the second at which it starts."""
-        count = max(1, math.ceil(motion.duration / MAX_SECONDS - 1e-9))
+        """A motion of any length in as few equal parts as the model takes, each with the second at which it starts.
+
+        One of another human figure is brought onto the model's first, as :meth:`frames` does it, as a whole.
+        """
+        motion = self.contract.on_figure(motion)
+        most = max(1, math.floor(MAX_SECONDS * motion.fps + 1e-9))  # parts are of whole frames
+        count = max(1, math.ceil(len(motion) / most))
         edges = np.linspace(0, len(motion), count + 1).round().astype(int).tolist()
         return [(start / motion.fps, motion[start:stop]) for start, stop in pairwise(edges)]
 
@@ -99,10 +103,10 @@ class DescribeModel(LanguageModel):
         found: list[list[Hypothesis]] = loop.run(self.graphs["step"], contexts, self.limits(settings), **rest)
         return found
 
-    def embed(self, motions: Motion | Sequence[Motion]) -> NDArray[np.float32]:
+    def embed(self, motions: Motion | Sequence[Motion]) -> Floats:
         """The context vector (C,) float32 of a motion, or vectors (N, C) of several; MotionError as :meth:`frames`."""
         if isinstance(motions, Motion):
-            context: NDArray[np.float32] = self.contexts([self.frames(motions)])[0]
+            context: Floats = self.contexts([self.frames(motions)])[0]
             return context
         return self.contexts([self.frames(motion) for motion in motions])
 

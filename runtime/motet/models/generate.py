@@ -6,20 +6,21 @@ from functools import cached_property
 from typing import Any, overload
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motet.bundle.graph import Arrays, Graph
+from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
 from motet.decode.mixture import Noise, Sample
 from motet.decode.noise import Recorded
 from motet.errors import DecodingError
 from motet.files import File
 from motet.formats import write_motion
+from motet.formats.character import Character
 from motet.models.language import LanguageModel
 from motet.models.progress import Progress, silent
 from motet.models.seeds import Seed, seeds_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
+from motet.motion.skeleton import Skeleton
 from motet.representation.contract import MotionContract
 
 PLAYED = 30.0
@@ -54,9 +55,16 @@ class Generated:
         """The motion at another frame rate, or without its feet planted: moving as it was drawn, with sliding feet."""
         return self.contract.motion(self.frames, plant=plant).resample(fps)
 
-    def write(self, path: File, fps: float = PLAYED, plant: bool = True) -> None:
-        """Write :meth:`playable` as :func:`motet.write` does."""
-        write_motion(path, self.playable(fps, plant))
+    def write(
+        self,
+        path: File,
+        fps: float = PLAYED,
+        plant: bool = True,
+        *,
+        like: File | Character | Motion | Skeleton | None = None,
+    ) -> None:
+        """Write :meth:`playable` as :func:`motet.write` does, perhaps put onto a character."""
+        write_motion(path, self.playable(fps, plant), like=like)
 
     def __repr__(self) -> str:
         seconds = len(self.frames) / self.contract.fps
@@ -149,19 +157,17 @@ class GenerateModel(LanguageModel):
         rows = [[self._generated(s, text) for s in row] for text, row in zip(texts, found, strict=True)]
         return rows[0] if isinstance(sentences, str) else rows
 
-    def decode(
-        self, contexts: NDArray[np.float32], noise: Sequence[Noise], settings: Mapping[str, Any]
-    ) -> list[list[Sample]]:
+    def decode(self, contexts: Floats, noise: Sequence[Noise], settings: Mapping[str, Any]) -> list[list[Sample]]:
         """Samples for each context (B, C) by the model's loop, from the noise of each and all the loop's settings."""
         rest = {name: value for name, value in settings.items() if name != "max_seconds"}
         frames = max(1, round(settings["max_seconds"] * self.fps))
         found: list[list[Sample]] = self.loop.run(self.graphs["step"], contexts, noise, frames, **rest)
         return found
 
-    def embed(self, sentences: str | Sequence[str]) -> NDArray[np.float32]:
+    def embed(self, sentences: str | Sequence[str]) -> Floats:
         """The context vector (C,) float32 of a sentence, or vectors (N, C) of several; errors as :meth:`ids`."""
         if isinstance(sentences, str):
-            context: NDArray[np.float32] = self.contexts([self.ids(sentences)])[0]
+            context: Floats = self.contexts([self.ids(sentences)])[0]
             return context
         return self.contexts([self.ids(text) for text in sentences])
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.bundle.graph import Graph
+from motet.bundle.graph import Floats, Graph
 from motet.bundle.manifest import Manifest
 from motet.decode.rollout import two_rows
 from motet.errors import BundleError, MotionError, TextError, TextWarning
@@ -53,7 +53,8 @@ class LanguageModel(BundleModel):
     def frames(self, motion: Motion) -> Array:
         """The frames (T, D) float64 of a motion in the contract's channels and units, resampled to its frame rate.
 
-        MotionError names the channels that the motion lacks, and refuses less than two frames and more than 30 s.
+        A motion of any other human figure is brought onto the model's (docs/humanoid.md). MotionError names the
+        channels that the motion lacks, and refuses less than two frames and more than 30 s.
         """
         if motion.duration > MAX_SECONDS:
             limit = f"the model takes at most {MAX_SECONDS:g} s: cut it, or describe its windows"
@@ -67,7 +68,7 @@ class LanguageModel(BundleModel):
         """What the model sees of a motion, to be prepared once and asked about often; MotionError as :meth:`frames`."""
         return self.contract.features(self.frames(motion))
 
-    def contexts(self, sequences: Sequence[NDArray[Any]]) -> NDArray[np.float32]:
+    def contexts(self, sequences: Sequence[NDArray[Any]]) -> Floats:
         """Context vectors (N, C) float32 of the sequences (T_i, ...) that the encoder takes."""
         encoder = self.graphs["encoder"]
         given, context = encoder.spec.inputs[0], encoder.spec.outputs[0]

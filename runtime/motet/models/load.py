@@ -40,11 +40,8 @@ def load(name_or_path: str | Path, options: SessionOptions | None = None) -> Mod
     or if it is damaged.
     """
     bundle = Bundle.open(name_or_path)
-    try:
-        kind = kind_of(bundle.manifest)
-    except BundleError as error:
-        raise BundleError(f"bundle {bundle.path}: {error}") from error
-    return kind.load(bundle, options)
+    with bundle.named():
+        return kind_of(bundle.manifest).load(bundle, options)
 
 
 def load_as(kind: type[Kind], name_or_path: str | Path, options: SessionOptions | None = None) -> Kind:

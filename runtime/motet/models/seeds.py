@@ -1,7 +1,7 @@
 """Seeds: one for each row of a batch, so that it gets what it would get alone."""
 
 import operator
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import SupportsIndex
 
 from motet.errors import MotetError
@@ -13,10 +13,10 @@ Seed = SupportsIndex | Sequence[SupportsIndex]
 def seeds_of(seed: Seed, count: int, error: type[MotetError]) -> list[int]:
     """A seed for each of ``count`` rows; ``error`` for a negative one, another number of them, or another type."""
     try:
-        if isinstance(seed, SupportsIndex):
-            found = [operator.index(seed) + i for i in range(count)]
-        else:
+        if isinstance(seed, Iterable):  # asked first: arrays look like integers, too
             found = [operator.index(one) for one in seed]
+        else:
+            found = [operator.index(seed) + i for i in range(count)]
     except TypeError:
         found = []
     if len(found) != count or any(one < 0 for one in found):

@@ -182,16 +182,6 @@ RULES = TextRules()
 """Those that new models are trained with."""
 
 
-def normalise(sentence: str) -> str:
-    """:meth:`TextRules.normalise` of :data:`RULES`."""
-    return RULES.normalise(sentence)
-
-
-def words(sentence: str) -> list[str]:
-    """:meth:`TextRules.words` of :data:`RULES`."""
-    return RULES.words(sentence)
-
-
 @dataclass(frozen=True)
 class Vocabulary:
     """The words a model knows; a word's place is its id.
@@ -214,7 +204,7 @@ class Vocabulary:
     @staticmethod
     def of(sentences: Iterable[str]) -> "Vocabulary":
         """The vocabulary of sentences: their words by falling count, then by name."""
-        counts = Counter(word for sentence in sentences for word in words(sentence))
+        counts = Counter(word for sentence in sentences for word in RULES.words(sentence))
         return Vocabulary([*SPECIALS, *sorted(counts, key=lambda word: (-counts[word], word))])
 
     def __len__(self) -> int:
@@ -249,12 +239,3 @@ class Vocabulary:
     def decode(self, ids: Iterable[int]) -> str:
         """The sentence of ids (:meth:`TextRules.sentence`), without PAD, SOS, EOS and UNK."""
         return self.rules.sentence(self.words[i] if i >= len(SPECIALS) else "" for i in ids)
-
-    def to_json(self) -> list[str]:
-        """The whole list of words; :meth:`from_json` is the inverse."""
-        return list(self.words)
-
-    @staticmethod
-    def from_json(data: Sequence[str]) -> "Vocabulary":
-        """Read what :meth:`to_json` wrote; TextError where it is not a vocabulary."""
-        return Vocabulary(data)

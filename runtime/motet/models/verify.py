@@ -23,11 +23,9 @@ class Verified:
 def verify(bundle: Bundle, options: SessionOptions | None = None) -> Verified:
     """Read all files of a bundle, load its model, and replay its golden vectors; BundleError at the first fault."""
     files, golden = bundle.check_files(), bundle.manifest.golden
-    model = kind_of(bundle.manifest).load(bundle, options)
-    if golden is None:
-        raise BundleError(f"bundle {bundle.path}: it has no golden vectors")
-    try:
+    with bundle.named():
+        model = kind_of(bundle.manifest).load(bundle, options)
+        if golden is None:
+            raise BundleError("it has no golden vectors")
         errors = replay(model, bundle.read(golden.file), golden)
-    except BundleError as error:
-        raise BundleError(f"bundle {bundle.path}: {error}") from error
     return Verified(tuple(files), model.providers, errors, golden.tolerance)

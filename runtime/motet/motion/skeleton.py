@@ -1,7 +1,7 @@
 """The skeleton: a tree of joints with offsets, and how each joint turns its angles into a rotation."""
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from operator import index
@@ -161,17 +161,11 @@ class Skeleton:
         }
 
     @staticmethod
-    def from_json(data: dict[str, Any]) -> "Skeleton":
+    def from_json(data: Mapping[str, Any]) -> "Skeleton":
         """The inverse of :meth:`to_json`; MotionError where it is not a skeleton."""
         try:
             joints = tuple(
-                Joint(
-                    str(j["name"]),
-                    index(j["parent"]),
-                    _triple(j["offset"]),
-                    str(j["order"]),
-                    _triple(j["axis"]),
-                )
+                Joint(str(j["name"]), index(j["parent"]), _triple(j["offset"]), str(j["order"]), _triple(j["axis"]))
                 for j in data["joints"]
             )
             metres = data["metres_per_unit"]

@@ -1,6 +1,6 @@
 """The motion contract of a bundle: what the frames are that a model takes and gives."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from motet.errors import BundleError, MotionError
-from motet.motion.motion import UNITS, Motion
+from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
 from motet.representation import named
 from motet.representation.base import FrameMirror, phases
 from motet.representation.figure import in_joints_of
+from motet.representation.foreign import brought, foreign
 
 LIMIT = 50.0
 """Standard deviations: z is clipped to this, in the nets' graphs too. Of 256 of CMU's trials one frame in a thousand
@@ -33,9 +33,6 @@ FLOORS = {
 """Standard deviations, by unit, from which on a channel lives. CMU's fingers, which only single T-poses bend otherwise,
 have up to .12 degrees; the stillest channel that means something, the bend of the upper back in a single walk, has .41.
 "length" and "1" are in units of files, of which nothing is known: under 1e-4 there is rounding alone."""
-
-FASTEST = 1000.0
-"""Frames per second of the fastest contract."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,9 +73,32 @@ class MotionContract:
         """The frames (T, D) float64 of a motion, of any length, or of features.
 
         Angles are made continuous, in the order and axes of the contract's joints, and the motion brought to the
-        contract's frame rate, beginning with its first frame. MotionError names what the motion lacks.
+        contract's frame rate, beginning with its first frame. A motion of another human figure is brought onto the
+        contract's (:meth:`on_figure`). MotionError names what the motion lacks.
         """
-        return next(sequences(self.representation, motion, self.fps, self._like)).values
+        return next(sequences(self.representation, self.on_figure(motion), self.fps, self._like)).values
+
+    def on_figure(self, motion: Motion) -> Motion:
+        """A motion of any human figure on the contract's skeleton; as it is where it has the joints or channels.
+
+        One that is brought there comes at the contract's frame rate where its own is higher, beginning with its first
+        frame; joints of which the humanoid says nothing, such as thumbs, stand as they do on average. MotionError, with
+        the reason, where that cannot be done.
+        """
+        if self.skeleton is None or set(self.channels) <= set(motion.channels):
+            return motion
+        reason = foreign(motion, self.skeleton, self._joints)
+        if reason is None:
+            return motion
+        slower = motion.continuous().resample(self.fps) if motion.fps > self.fps else motion
+        return brought(slower, self.motion(self.mean[None], plant=False), reason)
+
+    @cached_property
+    def _joints(self) -> tuple[str, ...]:
+        """The joints that the channels speak of, but for the root where its block does."""
+        block = named(self.representation).required
+        names = (channel.rpartition(".")[0] for channel in self.channels if channel not in block)
+        return tuple(name for name in dict.fromkeys(names) if self.skeleton and name in self.skeleton.places)
 
     def motion(self, frames: ArrayLike, after: Motion | None = None, plant: bool = True) -> Motion:
         """Frames (T, D) as a motion that can be played and written, at the contract's frame rate.
@@ -101,7 +121,7 @@ class MotionContract:
         return frames
 
     def to_json(self) -> dict[str, Any]:
-        """A JSON object; :meth:`from_json` is the inverse."""
+        """A JSON object; :func:`motet.bundle.manifest.read_contract` is the inverse."""
         return {
             "representation": self.representation,
             "channels": list(self.channels),
@@ -111,23 +131,6 @@ class MotionContract:
             "std": [round(float(value), 9) for value in self.std],
             "skeleton": None if self.skeleton is None else self.skeleton.to_json(),
         }
-
-    @staticmethod
-    def from_json(data: Any) -> "MotionContract":
-        """Read what :meth:`to_json` wrote; BundleError names the key of a manifest that is not what it must be."""
-        if not isinstance(data, Mapping):
-            raise BundleError("motion: expected a JSON object")
-        channels, units = _texts(data, "channels"), _texts(data, "units", len(data["channels"]))
-        fps = float(_numbers([data.get("fps")], "fps", 1)[0])
-        mean, std = (_numbers(data.get(key), key, len(channels)) for key in ("mean", "std"))
-        name = str(data.get("representation"))
-        lacking = [channel for channel in named(name).required if channel not in channels]
-        _refuse(bool(lacking), "channels", f"{name} needs {', '.join(lacking)}")
-        _refuse(len(set(channels)) < len(channels), "channels", "names must differ")
-        _refuse(bool(set(units) - set(UNITS)), "units", f"each must be one of {', '.join(UNITS)}")
-        _refuse(not 0 < fps <= FASTEST, "fps", f"expected a number over 0 and up to {FASTEST:g}, not {fps:g}")
-        _refuse(bool((std < 0).any()), "std", "a standard deviation cannot be negative")
-        return MotionContract(name, channels, units, fps, mean, std, _skeleton(data))
 
 
 def sequences(representation: str, motion: Motion, fps: float, like: Motion | None = None) -> Iterator[Motion]:
@@ -146,35 +149,3 @@ def living(std: ArrayLike, units: Sequence[str]) -> Array:
     floors = np.array([FLOORS[unit] for unit in units])
     found: Array = np.where(np.asarray(std, dtype=np.float64) < floors, 0.0, std)
     return found
-
-
-def _refuse(wrong: bool, key: str, reason: str) -> None:
-    if wrong:
-        raise BundleError(f"motion.{key}: {reason}")
-
-
-def _texts(data: Mapping[str, Any], key: str, count: int | None = None) -> tuple[str, ...]:
-    values = data.get(key)
-    if not isinstance(values, list | tuple) or not all(isinstance(value, str) for value in values) or not values:
-        raise BundleError(f"motion.{key}: expected a list of names")
-    _refuse(count not in (None, len(values)), key, f"{count} are needed, one for each channel, not {len(values)}")
-    return tuple(values)
-
-
-def _numbers(values: Any, key: str, count: int) -> Array:
-    numbers = isinstance(values, list | tuple) and all(type(value) in (int, float) for value in values)
-    _refuse(not numbers, key, "expected numbers")
-    _refuse(len(values) != count, key, f"{count} are needed, one for each channel, not {len(values)}")
-    try:
-        found = np.array(values, dtype=np.float64)
-    except OverflowError as error:
-        raise BundleError(f"motion.{key}: {error}") from error
-    _refuse(not np.isfinite(found).all(), key, "expected finite numbers")
-    return found
-
-
-def _skeleton(data: Mapping[str, Any]) -> Skeleton | None:
-    try:
-        return None if data.get("skeleton") is None else Skeleton.from_json(data["skeleton"])
-    except MotionError as error:
-        raise BundleError(f"motion.skeleton: {error}") from error

@@ -27,7 +27,9 @@ from motet_train.data.errors import DataError
 from motet_train.evaluate.control.experiments import GOALS, control_report, study_of
 from motet_train.evaluate.language.report import GOALS as LANGUAGE_GOALS
 from motet_train.evaluate.tables import Report, json_ready, report_table
-from motet_train.runs import Run
+from motet_train.recipes.recipe import SETTINGS
+from motet_train.runs import MANIFEST, Run
+from motet_train.settings import read_settings
 
 
 @click.command()
@@ -59,7 +61,7 @@ def evaluate(
     beside zero velocity and published rows, or distances in held out motion files.
     """
     torch.set_num_threads(1)
-    runs = {name: Run.load(Path(name)) for name in models if (Path(name) / "run.json").is_file()}
+    runs = {name: Run.load(Path(name)) for name in models if (Path(name) / MANIFEST).is_file()}
     if save and (bundles := [name for name in models if name not in runs]):
         raise click.UsageError(f"--save keeps figures in training runs; {', '.join(bundles)} is a bundle")
     loaded = {name: _model(runs[name]) if name in runs else load(name, session) for name in models}
@@ -115,10 +117,18 @@ def _control(
 def _clips(name: str, model: ControlModel, data: Path | None, unit: str | None = None) -> Clips:
     """The clips in ``data``, else those that training was given, else CMU's; DataError where they are gone."""
     if data is None:
-        words = shlex.split(str(model.manifest.training.get("command", "")))
-        given = [word.removeprefix("--data=") for word in words if word.startswith("--data=")]
-        given += [after for word, after in pairwise(words) if word == "--data"]
-        data = Path(given[-1]) if given else None
+        data = _given(Path(name), str(model.manifest.training.get("command", "")))
         if data is not None and not data.exists():
             raise DataError(f"the clips that {name} was trained on, {data}, are missing: give --data")
     return read_clips(data, unit=unit)
+
+
+def _given(run: Path, command: str) -> Path | None:
+    """What training was given as --data: by the settings of a run, or the command of a bundle."""
+    if (run / SETTINGS).is_file():
+        given = [str(value) for key, value in read_settings(run / SETTINGS)[0].items() if key == "data"]
+    else:
+        words = shlex.split(command)
+        given = [word.removeprefix("--data=") for word in words if word.startswith("--data=")]
+        given += [after for word, after in pairwise(words) if word == "--data"]
+    return Path(given[-1]) if given else None

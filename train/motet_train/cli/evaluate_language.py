@@ -14,6 +14,7 @@ from motet_train.evaluate.language.prompts import ASKED
 from motet_train.evaluate.language.report import describe_report, generate_report
 from motet_train.evaluate.language.split_store import SplitStore, split_as
 from motet_train.evaluate.tables import Report
+from motet_train.trainer import LOG
 
 Models = Mapping[str, DescribeModel | GenerateModel]
 
@@ -68,7 +69,7 @@ def _draw(name: str, model: DescribeModel | GenerateModel, corpus: SplitStore, f
     from motet_train.evaluate.figures import save
     from motet_train.evaluate.language.pictures import describe_drawings, generate_drawings
 
-    run = Path(name) if (Path(name) / "log.jsonl").is_file() else None
+    run = Path(name) if (Path(name) / LOG).is_file() else None
     if isinstance(model, DescribeModel):
         save(describe_drawings(model, corpus, run), folder)
     else:

@@ -18,7 +18,7 @@ from motet.motion.units import METRES
 from motet_train import distributed
 from motet_train.data.errors import DataError
 from motet_train.manifest import About
-from motet_train.progress import Shown
+from motet_train.progress import Shown, log
 from motet_train.recipes.recipe import SETTINGS, Job, Recipe
 from motet_train.runs import MANIFEST, WEIGHTS, Run
 from motet_train.settings import SettingsError, changed, read_settings, to_toml
@@ -109,10 +109,11 @@ def _train(
     licences = shared["licence"], shared["data_licence"]
     about = About(shared["name"] or out.name, shlex.join(["motet", *sys.argv[1:]]), shared["seed"], *licences)
     settings = to_toml(_kept(context, {**shared, **own}), recipe)
+    # a line for each chunk without --verbose, too; none with --quiet
+    log.setLevel(logging.INFO if logging.getLogger("motet").isEnabledFor(logging.WARNING) else logging.NOTSET)
     with (
         distributed.processes(shared["device"]) as device,
         _folder(out, shared["resume"]),
-        _logging(),
         closing(Shown(out / BOARDS if shared["tensorboard"] else None)) as progress,
     ):
         run = function(Job(recipe, about, out, device, progress, settings), **own)
@@ -174,20 +175,6 @@ def _training(path: Path) -> Mapping[str, Any]:
     except (OSError, ValueError, KeyError, TypeError):
         return {}
     return training
-
-
-@contextmanager
-def _logging() -> Iterator[None]:
-    """Let the logger's lines of progress be seen on stderr."""
-    logger, handler = logging.getLogger("motet"), logging.StreamHandler()
-    level = logger.level
-    logger.addHandler(handler)
-    logger.setLevel(logging.INFO)
-    try:
-        yield
-    finally:
-        logger.removeHandler(handler)
-        logger.setLevel(level)
 
 
 def _summary(out: Path, training: Mapping[str, Any]) -> str:

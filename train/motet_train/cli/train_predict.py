@@ -49,7 +49,7 @@ def _material(data: Path, unit_in: str | None, by: str | None) -> Material:
         return expmap_material(read_expmap_files(data))
     with tqdm(unit=" files", disable=None, leave=False) as bar:
         trials, skipped = read_trials(data, lambda clip: bar.update(), unit_in)
-    material = mocap_material(trials, skipped, data.name, None, by or "subject")
+    material = mocap_material(trials, skipped, data.name, by or "subject")
     if (names := material.about["skipped"]) and distributed.rank() == 0:
         click.echo(f"motet: {len(names)} files cannot be used: {', '.join(names)}", err=True)
     return material

@@ -8,8 +8,10 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from motet.bundle.graph import Floats
 from motet.errors import MotionError
-from motet.models.text import MAX_WORDS, PAD, SPECIALS, Vocabulary, words
+from motet.models.language import padded
+from motet.models.text import MAX_WORDS, RULES, Vocabulary
 from motet.representation.base import FrameMirror
 from motet.representation.contract import MotionContract
 from motet_train.data.batch import Batch
@@ -18,7 +20,6 @@ from motet_train.data.mirror_text import mirror_text
 from motet_train.data.store import Store
 
 Ids = NDArray[np.int64]
-Floats = NDArray[np.float32]
 Row = tuple[Floats, bool, Ids]
 """Frames (T, D), whether the motion ends with them, and the ids of a sentence."""
 
@@ -63,15 +64,15 @@ class Examples:
             limit = round(float(np.exp(rng.uniform(*np.log(windows))))) if windows else MAX
             yield _padded([self._visit(rng, i, offset, limit) for i, offset in found[place]])
 
-    def everything(self, batch: int, longest: int | None = None, offset: int = 0) -> Iterator[Batch]:
-        """The first ``longest`` frames of every motion at one offset with each of its sentences: to validate.
+    def everything(self, batch: int, longest: int | None = None) -> Iterator[Batch]:
+        """The first ``longest`` frames of every motion, at its first offset, with each of its sentences: to validate.
 
         Sorted by length, never mirrored.
         """
         pairs = [(i, sentence) for i, found in enumerate(self.sentences) for sentence in found]
-        pairs.sort(key=lambda pair: self._length(pair[0], offset))
+        pairs.sort(key=lambda pair: self._length(pair[0], 0))
         for start in range(0, len(pairs), batch):
-            cut = [(*self._part(i, offset, 0, longest or MAX), s) for i, s in pairs[start : start + batch]]
+            cut = [(*self._part(i, 0, 0, longest or MAX), s) for i, s in pairs[start : start + batch]]
             yield _padded(cut)
 
     def _drawn(self, rng: np.random.Generator, i: int, offsets: int | None) -> Ids:
@@ -103,7 +104,8 @@ def examples(store: Store, records: Sequence[int], vocabulary: Vocabulary, mirro
     """
     kept, sentences, mirrored = [], [], []
     for record in records:
-        found = [s for s in store.records[record].sentences if usable(s) and set(words(s)) & vocabulary.ids.keys()]
+        said = (s for s in store.records[record].sentences if usable(s))
+        found = [s for s in said if not vocabulary.ids.keys().isdisjoint(RULES.words(s))]
         if found:
             kept.append(record)
             sentences.append(tuple(vocabulary.encode(s)[0] for s in found))
@@ -123,16 +125,12 @@ def frame_mirror(contract: MotionContract) -> FrameMirror:
 
 def usable(sentence: str) -> bool:
     """Whether a sentence has 1 to MAX_WORDS words."""
-    return 1 <= len(words(sentence)) <= MAX_WORDS
+    return 1 <= len(RULES.words(sentence)) <= MAX_WORDS
 
 
 def _padded(rows: Sequence[Row]) -> Batch:
-    """The rows as one batch, padded on the right."""
-    lengths = np.array([len(frames) for frames, _, _ in rows])
-    frames = np.zeros((len(rows), lengths.max(), rows[0][0].shape[1]), np.float32)
-    sentences = np.full((len(rows), max(len(s) for _, _, s in rows)), SPECIALS.index(PAD), np.int64)
-    for row, (motion, _, sentence) in enumerate(rows):
-        frames[row, : len(motion)] = motion
-        sentences[row, : len(sentence)] = sentence
+    """The rows as one batch, padded on the right, sentences with PAD, whose id is 0."""
+    frames, lengths = padded([frames for frames, _, _ in rows], "float32")
+    sentences, _ = padded([sentence for _, _, sentence in rows], "int64")
     ended = torch.tensor([end for _, end, _ in rows])
     return Batch(torch.from_numpy(frames), torch.from_numpy(lengths), torch.from_numpy(sentences), ended)

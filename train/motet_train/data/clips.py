@@ -54,6 +54,16 @@ class Clips:
             raise DataError(f"the clips show {', '.join(self.labels)}, not {', '.join(missing) or 'nothing'}")
         return replace(self, motions={label: self.motions[label] for label in labels})
 
+    def frames(self, fps: float, channels: tuple[str, ...] | None = None) -> dict[str, list[Array]]:
+        """For each label its sequences (T, D) of all or some channels at a model's frame rate, in all phases.
+
+        A 120 Hz clip gives three sequences at 40 fps (thesis 5.1 takes every third frame; the others are data too).
+        """
+        return {
+            label: [phase.values for one in found for phase in phases(one.select(channels or self.channels), fps)]
+            for label, found in self.motions.items()
+        }
+
 
 def read_clips(folder: Path | None = None, root_rotation: bool = True, unit: str | float | None = None) -> Clips:
     """Read labelled clips: from ``folder``, or the three CMU trials that come with motet.
@@ -73,14 +83,6 @@ def read_clips(folder: Path | None = None, root_rotation: bool = True, unit: str
     }
     licence = CMU_LICENCE if folder is None else None
     return Clips(motions, _metric(skeleton_of(first)), licence)
-
-
-def sequences(motion: Motion, fps: float) -> list[Array]:
-    """A motion at the model's frame rate, as arrays (T, D): every phase of it where its rate is a multiple.
-
-    A 120 Hz clip gives three sequences at 40 fps (thesis 5.1 takes every third frame; the others are data too).
-    """
-    return [phase.values for phase in phases(motion, fps)]
 
 
 def _find(folder: Path) -> dict[str, list[Path]]:

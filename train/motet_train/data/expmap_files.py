@@ -47,33 +47,15 @@ def _numbered(part: str, actions: Sequence[str], count: int) -> dict[str, list[s
     return {action: [f"{part}/{action}/{action}_{n}.txt" for n in range(1, count + 1)] for action in actions}
 
 
+# fmt: off
 CMU_ACTIONS = (
-    "basketball",
-    "basketball_signal",
-    "directing_traffic",
-    "jumping",
-    "running",
-    "soccer",
-    "walking",
-    "washwindow",
+    "basketball", "basketball_signal", "directing_traffic", "jumping", "running", "soccer", "walking", "washwindow",
 )
 H36M_ACTIONS = (
-    "directions",
-    "discussion",
-    "eating",
-    "greeting",
-    "phoning",
-    "posing",
-    "purchases",
-    "sitting",
-    "sittingdown",
-    "smoking",
-    "takingphoto",
-    "waiting",
-    "walking",
-    "walkingdog",
-    "walkingtogether",
+    "directions", "discussion", "eating", "greeting", "phoning", "posing", "purchases", "sitting", "sittingdown",
+    "smoking", "takingphoto", "waiting", "walking", "walkingdog", "walkingtogether",
 )
+# fmt: on
 CMU_LAYOUT = Layout(
     "cmu-expmap",
     117,

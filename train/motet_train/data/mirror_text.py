@@ -2,7 +2,7 @@
 
 import re
 
-from motet.models.text import normalise
+from motet.models.text import RULES
 
 PAIRS = {
     "left": "right",
@@ -24,4 +24,4 @@ def mirror_text(sentence: str) -> str:
 
     A right angle stays one. Twice mirrored gives the normalised sentence, but for "anticlockwise".
     """
-    return _WORDS.sub(lambda match: OTHER[match[0]], normalise(sentence))
+    return _WORDS.sub(lambda match: OTHER[match[0]], RULES.normalise(sentence))

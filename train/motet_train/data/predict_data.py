@@ -170,9 +170,7 @@ def held_out_names(trials: Sequence[Record], by: str = "subject") -> tuple[str, 
     return tuple(trials[index].name for index in split(entries, 0, by).test)
 
 
-def mocap_material(
-    trials: Sequence[Record], skipped: Sequence[Skipped], name: str, licence: str | None, by: str = "subject"
-) -> Material:
+def mocap_material(trials: Sequence[Record], skipped: Sequence[Skipped], name: str, by: str = "subject") -> Material:
     """Motions of one figure as root block and exponential maps at :data:`FPS`, all phases, without the test trials.
 
     by: which those are, see :func:`held_out_names`.
@@ -200,7 +198,6 @@ def mocap_material(
         poses=False,
         mirrored=mirrored,
         signs=signs,
-        licence=licence,
         about=about,
     )
 

@@ -13,7 +13,7 @@ from motet.models.control import ControlModel
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract, living
 from motet_train.data.body import body_parts
-from motet_train.data.clips import Clips, sequences
+from motet_train.data.clips import Clips
 from motet_train.data.errors import DataError
 from motet_train.data.period import is_periodic
 from motet_train.divergence import DivergenceLearner
@@ -38,15 +38,12 @@ Net = TDBN | AngleCRBM
 def train_control(clips: Clips, job: Job) -> Run:
     """Train on labelled clips, see :meth:`motet_train.recipes.recipe.Job.run`; DataError where one is too short."""
     config = job.recipe.config
-    found = _sequences(clips, config.fps)
+    found = clips.frames(config.fps)
     _check_lengths(found, config.taps)
     net = _untrained(clips, config)
     units = ("deg",) * len(clips.channels)
     mean, std = _statistics(found, units)
-    net.mean, net.scale = (
-        torch.tensor(mean).float(),
-        torch.tensor(std * config.sigma).float(),
-    )
+    net.measure_by(mean, std * config.sigma)
     onsets = [1.0 if is_periodic(frames) else config.onset for frames in found.values()]
     contract = MotionContract("angles", clips.channels, units, config.fps, mean, std, clips.skeleton)
     manifest = _manifest(job, clips, contract, net, found)
@@ -65,11 +62,6 @@ def train_control(clips: Clips, job: Job) -> Run:
         return {"reconstruction": round(reconstruction(net.cpu(), found, std), 6), **chosen}
 
     return job.run(net, learner, manifest, more)
-
-
-def _sequences(clips: Clips, fps: float) -> dict[str, list[Array]]:
-    """For each label its sequences (T, D)."""
-    return {label: [s for motion in group for s in sequences(motion, fps)] for label, group in clips.motions.items()}
 
 
 def _untrained(clips: Clips, config: TDBNConfig | AngleCRBMConfig) -> Net:
@@ -102,8 +94,9 @@ def _manifest(
     defaults = {"temperature": net.config.temperature}
     if isinstance(net, AngleCRBM):
         defaults["iterations"] = net.config.iterations
-    config = angle_crbm.to_config(net) if isinstance(net, AngleCRBM) else tdbn.to_config(net)
-    return job.manifest(contract, config, defaults, clips.licence, control={"labels": list(found), "starts": starts})
+    return job.manifest(
+        contract, net.to_config(), defaults, clips.licence, control={"labels": list(found), "starts": starts}
+    )
 
 
 def reconstruction(net: Net, found: Mapping[str, Sequence[Array]], std: Array) -> float:

@@ -82,13 +82,10 @@ def train_language(store: Store, job: Job, data: str = "", by: str = "trial") ->
     torch.manual_seed(job.about.seed)
     net = MODELS[recipe.model](config)
     assert isinstance(net, LanguageNet)
-    net.mean.copy_(torch.tensor(found.contract.mean).float())
-    net.scale.copy_(torch.tensor(found.contract.std).float())
+    net.measure_by(found.contract.mean, found.contract.std)
     training = {"data": _data(store, data), "split": _split(found, by)}
-    words = found.vocabulary.to_json()
-    manifest = job.manifest(
-        found.contract, config, recipe.defaults, None, training, text=RULES.to_json(), vocabulary=words
-    )
+    known = {"text": RULES.to_json(), "vocabulary": found.vocabulary.words}
+    manifest = job.manifest(found.contract, config, recipe.defaults, None, training, **known)
     return job.run(net, _learner(net.to(job.device), found, job), manifest)
 
 

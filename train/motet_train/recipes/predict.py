@@ -78,8 +78,7 @@ def _untrained(material: Material, recipe: Recipe) -> Predictor:
     net = Predictor(recipe.sized(channels=len(material.contract.channels), kept=material.kept, held=held, **sides))
     if held not in (0, len(HELD_SCALES)):
         raise DataError(f"the root's translation and rotation must vary in the data, but only {held} of 6 columns do")
-    net.mean.copy_(torch.tensor(material.contract.mean[kept]))
-    net.scale.copy_(torch.tensor(material.contract.std[kept]))
+    net.measure_by(material.contract.mean[kept], material.contract.std[kept])
     net.mean[:held] = 0.0
     net.scale[:held] = torch.tensor(HELD_SCALES[:held])
     return net

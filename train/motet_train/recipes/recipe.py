@@ -12,7 +12,7 @@ from motet_train import distributed
 from motet_train.descent import Training
 from motet_train.manifest import About, refuse_other, surroundings
 from motet_train.models.net import Net
-from motet_train.progress import SILENT, Progress
+from motet_train.progress import SILENT, Watcher
 from motet_train.runs import MANIFEST, Run
 from motet_train.trainer import Learner, Line, kept, train
 
@@ -64,7 +64,7 @@ class Job:
     about: About
     folder: Path
     device: str = "cpu"
-    progress: Progress = SILENT
+    progress: Watcher = SILENT
     settings: str | None = None
 
     def manifest(

@@ -100,8 +100,7 @@ def train_system(material: Material, job: Job) -> Run:
         {"data": material.about},
     )
     net, kept = stepwise(job.recipe.model, manifest["config"]), list(material.kept)
-    net.mean.copy_(torch.tensor(material.contract.mean[kept]))
-    net.scale.copy_(torch.tensor(material.contract.std[kept]))
+    net.measure_by(material.contract.mean[kept], material.contract.std[kept])
     return job.run(
         net, _learner(net.to(job.device), config, Windows(material, WINDOW, **asdict(visits)), job), manifest
     )

@@ -8,7 +8,7 @@ import numpy as np
 
 from motet.models.control import ControlModel
 from motet_train.data.body import BodyParts, body_parts
-from motet_train.data.clips import Clips, sequences
+from motet_train.data.clips import Clips
 from motet_train.data.errors import DataError
 from motet_train.data.period import is_periodic
 from motet_train.evaluate.control.bend import bends, interruptions
@@ -57,12 +57,8 @@ def study_of(model: ControlModel, clips: Clips) -> ControlStudy:
     The first two periodic labels are taken for walk and run (those of these names first), the first other for bend.
     Clips of labels that the model does not know are left out.
     """
-    clips, contract = clips.only(model.labels), model.contract
-    motions = {
-        label: [s for motion in found for s in sequences(motion.select(contract.channels, contract.units), model.fps)]
-        for label, found in clips.motions.items()
-    }
-    parts = body_parts(clips.skeleton, contract.channels)
+    channels = model.contract.channels
+    motions, parts = clips.only(model.labels).frames(model.fps, channels), body_parts(clips.skeleton, channels)
     reference = Reference(motions, model.fps, np.flatnonzero(np.isin(parts.of_channel, parts.legs)))
     by_name = sorted(motions, key=lambda label: ("walk", "run").index(label) if label in ("walk", "run") else 2)
     gaits = [label for label in by_name if is_periodic(motions[label])]

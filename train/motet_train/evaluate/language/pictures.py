@@ -23,6 +23,7 @@ from motet_train.evaluate.language.chain import known_sentences, knows
 from motet_train.evaluate.language.motions import moves
 from motet_train.evaluate.language.prompts import ASKED
 from motet_train.evaluate.language.split_store import SplitStore, unknown_words_allowed
+from motet_train.trainer import LOG
 
 FIGURES, STRIPS = 9, 6
 """Stick figures of a strip, and strips of a picture of test motions."""
@@ -66,7 +67,7 @@ def generate_drawings(model: GenerateModel, corpus: SplitStore, run: Path | None
 def losses(run: Path) -> Figure:
     """Figures 5 and 7: the loss over training epochs; DataError where the run has no log."""
     try:
-        lines = [json.loads(line) for line in (run / "log.jsonl").read_text().splitlines()]
+        lines = [json.loads(line) for line in (run / LOG).read_text().splitlines()]
     except (OSError, ValueError) as error:
         raise DataError(f"{run} has no readable training log: {error}") from error
     picture, (axes,) = panels(1, 1, (7, 4), f"Loss of {run.name}")

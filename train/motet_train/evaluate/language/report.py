@@ -9,7 +9,7 @@ from motet.bundle.manifest import Manifest
 from motet.errors import TextError
 from motet.models.describe import DescribeModel
 from motet.models.generate import GenerateModel
-from motet.models.text import words
+from motet.models.text import RULES
 from motet_train.evaluate.language.attributes import Score, sides_right, turns_right, verbs_right
 from motet_train.evaluate.language.bleu import RANKS, References, agreement, bleu, ranks
 from motet_train.evaluate.language.chain import Answers, answers, best_descriptions, bounds_chained, chained, likelihood
@@ -19,7 +19,8 @@ from motet_train.evaluate.language.prompts import kinds, measurable, prompted, r
 from motet_train.evaluate.language.split_store import SplitStore, unknown_words_allowed
 from motet_train.evaluate.tables import Goals, Report
 
-Progress = Callable[[str], object]
+Told = Callable[[str], object]
+"""What is told the name of each part before it starts."""
 
 GOALS: Goals = {
     "gain.nearest": (0.10, None),
@@ -42,12 +43,12 @@ SAMPLE, CHAIN_SAMPLE = 200, 40
 TRAINING = ("seconds", "epochs", "kept_epoch", "loss", "validation", "steps_per_second")
 
 
-def describe_report(model: DescribeModel, corpus: SplitStore, progress: Progress = lambda group: None) -> Report:
+def describe_report(model: DescribeModel, corpus: SplitStore, progress: Told = lambda group: None) -> Report:
     """Table 2, with and without SOS and EOS; floors and ceiling; what the best description of test motions gets right.
 
     "bleu_unseen" is of those references alone that nobody said, word for word, about a training motion: where people
     describe from a pool of phrases, BLEU rewards knowing the pool. Motions without such a reference are left out.
-    A figure that does not exist is NaN. ``progress`` is called with the name of each part before it starts.
+    A figure that does not exist is NaN.
     """
     report = _origin(model.manifest, corpus)
     test = corpus.described(corpus.parts.test)
@@ -74,7 +75,7 @@ def generate_report(
     model: GenerateModel,
     corpus: SplitStore,
     describe: DescribeModel | None = None,
-    progress: Progress = lambda group: None,
+    progress: Told = lambda group: None,
 ) -> Report:
     """Tables 3 and 4 between their bounds; prompts; measures of generated motions beside the data's.
 
@@ -172,13 +173,11 @@ def _log_probability(model: DescribeModel, corpus: SplitStore, records: tuple[in
                     total += model.score(motion, sentence)
                 except TextError:  # of unknown words only
                     continue
-                count += len(words(sentence)) + 1
+                count += len(RULES.words(sentence)) + 1
     return total / count if count else np.nan
 
 
-def _chain(
-    model: GenerateModel, describe: DescribeModel, corpus: SplitStore, found: Answers, progress: Progress
-) -> Report:
+def _chain(model: GenerateModel, describe: DescribeModel, corpus: SplitStore, found: Answers, progress: Told) -> Report:
     progress("describe train")
     train = corpus.described(corpus.parts.train, SAMPLE)
     base = bleu(best_descriptions(describe, corpus.motions(train)), corpus.references(train))

@@ -10,7 +10,7 @@ import numpy as np
 
 from motet.bundle.manifest import Manifest
 from motet.errors import TextWarning
-from motet.models.text import words
+from motet.models.text import RULES
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
@@ -96,7 +96,7 @@ def _vocabulary(rows: Iterable[Iterable[str]]) -> set[str]:
 
 def plain(sentence: str) -> str:
     """A sentence as BLEU sees it: normalised, every digit a word."""
-    return " ".join(words(sentence))
+    return " ".join(RULES.words(sentence))
 
 
 @contextmanager

@@ -11,7 +11,7 @@ from motet_train.data.expmap_files import ExpmapCorpus, scaling_of
 from motet_train.evaluate.predict.protocol import (
     OUTPUT_FRAMES,
     REPORTED,
-    Predictor,
+    Continuation,
     errors,
     predictions,
     rotation_errors,
@@ -45,7 +45,7 @@ def curves(
         raise DataError("none of the test files was found")
     scaling = scaling_of(corpus.train)
     test = {action: list(files.values()) for action, files in corpus.test.items()}
-    systems: dict[str, Predictor] = {ZERO: zero_velocity}
+    systems: dict[str, Continuation] = {ZERO: zero_velocity}
     systems |= {name: predictor(name, model, corpus) for name, model in models.items()}
     found: Curves = {FEW: {}, MANY: {}, ROTATION: {}}
     for name, system in systems.items():
@@ -68,7 +68,7 @@ def complete(corpus: ExpmapCorpus) -> list[str]:
     return [action for action in corpus.test if action not in gaps] or list(corpus.test)
 
 
-def predictor(name: str, model: PredictModel, corpus: ExpmapCorpus) -> Predictor:
+def predictor(name: str, model: PredictModel, corpus: ExpmapCorpus) -> Continuation:
     """A model's predictions for windows of a corpus; DataError where it is not one of that corpus."""
     if len(model.contract.channels) != corpus.layout.columns or model.contract.skeleton is not None:
         raise DataError(f"{name} is not a model of these files: it has {len(model.contract.channels)} channels")

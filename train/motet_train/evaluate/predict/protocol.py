@@ -23,7 +23,7 @@ REPORTED = (1, 3, 7, 9, 13, 24)
 LABELS = (80, 160, 320, 400, 560, 1000)
 """The milliseconds customary in tables; files of 120 Hz have others, see :func:`true_times`."""
 
-Predictor = Callable[[Array], Array]
+Continuation = Callable[[Array], Array]
 """Seed frames (W, 50, C) in a file's own columns to predicted ones (W, 25, C)."""
 
 
@@ -100,13 +100,13 @@ Predictions = Mapping[str, tuple[Array, Array]]
 
 
 def predictions(
-    predictor: Predictor, test: Mapping[str, Sequence[Array]], scaling: Scaling, count: int = 8
+    system: Continuation, test: Mapping[str, Sequence[Array]], scaling: Scaling, count: int = 8
 ) -> Predictions:
     """What is predicted of ``count`` windows of each motion (T, C) of each action."""
     found = {}
     for action, motions in test.items():
         truth = scaling.with_constants(np.concatenate([windows(motion, count) for motion in motions]))
-        found[action] = predictor(truth[:, :SEED_FRAMES]), truth
+        found[action] = system(truth[:, :SEED_FRAMES]), truth
     return found
 
 

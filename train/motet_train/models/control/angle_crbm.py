@@ -7,7 +7,6 @@ here: 2e-2 and 2e-4.
 Letters in shapes: B rows, T frames, D channels, K taps, L labels, C control units, F free hidden units.
 """
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -20,6 +19,7 @@ from motet.representation.contract import LIMIT
 from motet_train.models.control.contrastive import Learning, Stage
 from motet_train.models.control.control_net import ControlNet
 from motet_train.models.control.crbm import CRBM, CRBMLayer, Past, transitions
+from motet_train.models.net import tuples
 from motet_train.models.normalised import normalised
 
 
@@ -75,18 +75,16 @@ class AngleCRBM(ControlNet):
         first, second = noise.chunk(2, dim=1)
         return mean + variety * torch.sqrt(-2 * torch.log(1 - first)) * torch.cos(2 * math.pi * second)
 
+    def to_config(self) -> dict[str, Any]:
+        """As :meth:`motet_train.models.control.control_net.ControlNet.to_config`."""
+        return {**asdict(self.config), "channels": len(self.mean), "labels": len(self.expansion)}
+
 
 def from_config(config: Mapping[str, Any]) -> AngleCRBM:
-    """An untrained net of the sizes that :func:`to_config` wrote."""
-    values = dict(config)
+    """An untrained net of the sizes that :meth:`AngleCRBM.to_config` wrote."""
+    values = tuples(config)
     channels, labels = values.pop("channels"), values.pop("labels")
-    return AngleCRBM(AngleCRBMConfig(**{**values, "crbm": Learning.from_json(values["crbm"])}), channels, labels)
-
-
-def to_config(net: AngleCRBM) -> dict[str, Any]:
-    """Everything that :func:`from_config` needs, ready for JSON."""
-    config: dict[str, Any] = json.loads(json.dumps(asdict(net.config)))
-    return {**config, "channels": len(net.mean), "labels": len(net.expansion)}
+    return AngleCRBM(AngleCRBMConfig(**{**values, "crbm": Learning(**values["crbm"])}), channels, labels)
 
 
 def stages(

@@ -6,7 +6,7 @@ Letters in shapes: B rows of a mini-batch, N all rows, D visible units, H hidden
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import torch
 from torch import Tensor
@@ -35,11 +35,6 @@ class Learning:
     """k of CD-k: Gibbs steps of the reconstruction."""
     temperature: tuple[float, float] = (1.0, 0.6)
     """Of the sigmoids in the first and the last epoch, geometric between."""
-
-    @staticmethod
-    def from_json(data: Mapping[str, Any]) -> "Learning":
-        """What asdict and JSON made of it."""
-        return Learning(**{**data, "temperature": tuple(data["temperature"])})
 
 
 @dataclass(frozen=True)

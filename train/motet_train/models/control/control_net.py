@@ -4,29 +4,28 @@ Letters in shapes: B rows, D channels, H codes, K taps, L labels, C control unit
 """
 
 from abc import abstractmethod
+from typing import Any
 
 import torch
 from torch import Tensor, nn
 
 from motet.bundle.graph import GraphSpec, TensorSpec
 from motet_train.models.control.crbm import CRBM
-from motet_train.models.net import Net
+from motet_train.models.net import Net, Part
 
 
 class ControlNet(Net):
     """A CRBM over codes of frames; subclasses say how frames become codes, and codes frames.
 
-    mean, scale: (D,) of the channels, set before training. noise_units: N, numbers of noise for the codes of a frame.
+    noise_units: N, numbers of noise for the codes of a frame.
     """
 
     expansion: Tensor
 
     def __init__(self, crbm: CRBM, labels: int, channels: int, taps: int) -> None:
-        super().__init__()
+        super().__init__(channels)
         self.crbm, self.taps = crbm, taps
         self.noise_units = len(crbm.visible_bias)
-        self.register_buffer("mean", torch.zeros(channels))
-        self.register_buffer("scale", torch.ones(channels))
         # each label has its own control units, which are all 1 or all 0 (thesis 5.4)
         self.register_buffer("expansion", torch.eye(labels).repeat_interleave(crbm.control_units // labels, dim=1))
 
@@ -42,9 +41,37 @@ class ControlNet(Net):
     def vary(self, mean: Tensor, noise: Tensor, variety: Tensor) -> Tensor:
         """Codes (B, H) between their means (variety 0) and samples (variety 1), from uniform noise (B, N)."""
 
+    @abstractmethod
+    def to_config(self) -> dict[str, Any]:
+        """Everything that the model's ``from_config`` needs, but for tuples ready for JSON."""
+
+    def step(
+        self,
+        history: Tensor,
+        control: Tensor,
+        noise: Tensor,
+        variety: Tensor,
+        temperature: Tensor,
+        codes: Tensor | None = None,
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """One Gibbs iteration of the CRBM, and its codes decoded (thesis 4.1, 5.2).
+
+        history (B, K, H) oldest first, control (B, L), noise (B, N+F) uniform in [0, 1), variety (B, 1), temperature
+        (B, 1), and where there are free units codes (B, H) to infer them from -> codes (B, H), frame (B, D), the
+        history with the codes at its end (B, K, H).
+        """
+        crbm, units, past = self.crbm, self.noise_units, history.flatten(1)
+        drive = crbm.drive(past, control @ self.expansion)
+        free = drive[:, :0] if codes is None else binary(crbm.free(codes, past, temperature), noise[:, units:], variety)
+        new = self.vary(crbm.visible(drive, free, temperature), noise[:, :units], variety)
+        return new, self.decode(new), torch.cat([history[:, 1:], new[:, None]], dim=1)
+
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """The encoder and the step, each with its contract."""
-        return {"encoder": (Encoder(self), self._encoder_spec()), "step": (Step(self), self._step_spec())}
+        return {
+            "encoder": (Part(self, self.encode), self._encoder_spec()),
+            "step": (Part(self, self.step), self._step_spec()),
+        }
 
     def _encoder_spec(self) -> GraphSpec:
         frames, codes = ("batch", len(self.mean)), ("batch", len(self.crbm.visible_bias))
@@ -64,48 +91,6 @@ class ControlNet(Net):
         outputs = {"next_codes": (codes,), "frame": (len(self.mean),), "next_history": (self.taps, codes)}
         both = [tuple(TensorSpec(n, ("batch", *size)) for n, size in part.items()) for part in (inputs, outputs)]
         return GraphSpec(both[0], both[1], {"history": "next_history"})
-
-
-class Encoder(nn.Module):
-    """The encoder graph: frames (B, D) -> codes (B, H)."""
-
-    def __init__(self, net: ControlNet) -> None:
-        super().__init__()
-        self.net = net
-
-    def forward(self, frames: Tensor) -> Tensor:
-        """Encode."""
-        return self.net.encode(frames)
-
-
-class Step(nn.Module):
-    """The step graph: one Gibbs iteration of the CRBM, and its codes decoded (thesis 4.1, 5.2).
-
-    history (B, K, H) oldest first, control (B, L), noise (B, N+F) uniform in [0, 1), variety (B, 1), temperature
-    (B, 1), and where there are free units codes (B, H) to infer them from -> codes (B, H), frame (B, D), the
-    history with the codes at its end (B, K, H).
-    """
-
-    def __init__(self, net: ControlNet) -> None:
-        super().__init__()
-        self.net = net
-
-    def forward(
-        self,
-        history: Tensor,
-        control: Tensor,
-        noise: Tensor,
-        variety: Tensor,
-        temperature: Tensor,
-        codes: Tensor | None = None,
-    ) -> tuple[Tensor, Tensor, Tensor]:
-        """One frame."""
-        crbm, units = self.net.crbm, self.net.noise_units
-        past = history.flatten(1)
-        drive = crbm.drive(past, control @ self.net.expansion)
-        free = drive[:, :0] if codes is None else binary(crbm.free(codes, past, temperature), noise[:, units:], variety)
-        new = self.net.vary(crbm.visible(drive, free, temperature), noise[:, :units], variety)
-        return new, self.net.decode(new), torch.cat([history[:, 1:], new[:, None]], dim=1)
 
 
 def binary(mean: Tensor, noise: Tensor, variety: Tensor) -> Tensor:

@@ -7,7 +7,6 @@ channels; :meth:`TDBNConfig.thesis` is the text.
 Letters in shapes: B rows, T frames, D channels, H codes, K taps, L labels, C control units, F free hidden units.
 """
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
@@ -21,6 +20,7 @@ from motet_train.models.control.contrastive import Learning, Stage, balanced
 from motet_train.models.control.control_net import ControlNet, binary
 from motet_train.models.control.crbm import CRBM, CRBMLayer, Past, transitions
 from motet_train.models.control.rbm import RBM, RBMLayer, block_mask
+from motet_train.models.net import tuples
 from motet_train.models.normalised import normalised
 
 Sequences = Sequence[Sequence[Tensor]]
@@ -109,21 +109,17 @@ class TDBN(ControlNet):
         """Between the probabilities (variety 0) and binary samples of them (variety 1)."""
         return binary(mean, noise, variety)
 
+    def to_config(self) -> dict[str, Any]:
+        """As :meth:`motet_train.models.control.control_net.ControlNet.to_config`."""
+        parts = self.rbm.mask[:, :: self.config.hidden_per_part].argmax(dim=1).tolist()
+        return {**asdict(self.config), "parts": parts, "labels": len(self.expansion)}
+
 
 def from_config(config: Mapping[str, Any]) -> TDBN:
-    """An untrained net of the sizes that :func:`to_config` wrote."""
-    values = dict(config)
+    """An untrained net of the sizes that :meth:`TDBN.to_config` wrote."""
+    values = tuples(config)
     parts, labels = values.pop("parts"), values.pop("labels")
-    for layer in ("rbm", "crbm"):
-        values[layer] = Learning.from_json(values[layer])
-    return TDBN(TDBNConfig(**values), parts, labels)
-
-
-def to_config(net: TDBN) -> dict[str, Any]:
-    """Everything that :func:`from_config` needs, ready for JSON."""
-    parts = net.rbm.mask[:, :: net.config.hidden_per_part].argmax(dim=1).tolist()
-    config: dict[str, Any] = json.loads(json.dumps(asdict(net.config)))
-    return {**config, "parts": parts, "labels": len(net.expansion)}
+    return TDBN(TDBNConfig(**{**values, **{key: Learning(**values[key]) for key in ("rbm", "crbm")}}), parts, labels)
 
 
 def stages(

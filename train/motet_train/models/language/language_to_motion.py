@@ -5,7 +5,7 @@ is normalised and has the active flag at its end: 1 on every frame of a motion a
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import torch
@@ -21,6 +21,7 @@ from motet_train.models.language.mixture import Mixture, MixtureHead
 from motet_train.models.language.net import LanguageNet
 from motet_train.models.language.sequence import Decoder, Encoder
 from motet_train.models.language.summary import SummaryHead
+from motet_train.models.net import Part, tuples
 from motet_train.models.normalised import normalised
 
 LOSSES = {"surrogate": Mixture.surrogate_loss, "likelihood": lambda *given: -Mixture.log_likelihood(*given)}
@@ -51,21 +52,14 @@ class LanguageToMotionConfig:
     summary: float = 0.0
     """Weight of the training-only loss of :mod:`motet_train.models.language.summary`; 0 leaves its head out."""
 
-    @staticmethod
-    def paper() -> "LanguageToMotionConfig":
-        """The net of the paper: 44 joints, 1,344 words, 5,446,517 parameters."""
-        return LanguageToMotionConfig(channels=44, words=1344)
-
 
 class LanguageToMotion(LanguageNet):
-    """The net with its normalisation. mean, scale: (D,) of the channels, set before training."""
+    """The net with its normalisation."""
 
     def __init__(self, config: LanguageToMotionConfig) -> None:
-        super().__init__()
+        super().__init__(config.channels)
         self.config = config
         context, shared = 2 * config.encoder_units[-1], (config.gates, config.dropout)
-        self.register_buffer("mean", torch.zeros(config.channels))
-        self.register_buffer("scale", torch.ones(config.channels))
         self.embedding = WordEmbedding(config.words, config.embedding, config.dropout)
         self.encoder = Encoder(LayerNormGRU, config.embedding, config.encoder_units, *shared)
         self.decoder = Decoder(LayerNormGRU, config.channels + 1, context, config.decoder_units, True, *shared)
@@ -95,29 +89,17 @@ class LanguageToMotion(LanguageNet):
     def terms(self, batch: Batch) -> tuple[Tensor, Tensor | None]:
         """The loss of every frame and of the one after it where a motion ends (N,), eq. 12 or 11; and the summary's."""
         context = self.encode(batch.words, (batch.words != 0).sum(dim=1))
-        losses = LOSSES[self.config.loss](*self._predictions(batch, context))
-        if self.summary is None or not self.training:
-            return losses, None
-        return losses, self.config.summary * self.summary.loss(context, self.normal(batch), batch.lengths)
-
-    def likelihoods(self, batch: Batch) -> Tensor:
-        """The log-likelihood (eq. 8) of the same frames as in :meth:`losses`, whichever loss is trained (N,)."""
-        context = self.encode(batch.words, (batch.words != 0).sum(dim=1))
-        return Mixture.log_likelihood(*self._predictions(batch, context))
+        return LOSSES[self.config.loss](*self._predictions(batch, context)), self.summary_loss(batch, context)
 
     def _predictions(self, batch: Batch, context: Tensor) -> tuple[Mixture, Tensor, Tensor]:
         """Mixtures, frames (N, D) and flags (N,) of all active steps, in one row."""
-        normal = functional.pad(self.normal(batch), (0, 0, 0, 1))
+        normal = functional.pad(normalised(batch.frames, self.mean, self.scale), (0, 0, 0, 1))
         flags = before(batch.lengths, normal.shape[1]).to(normal.dtype)
         active = before(batch.lengths + (1 if batch.ended is None else batch.ended), normal.shape[1])
         fed = self._blurred(normal) if self.training else normal
         outputs = self.outputs(torch.cat([fed, flags[..., None]], dim=-1), context)
         # padded steps are left out before the output layer, which is the largest product of all
         return self.mixture(outputs[active]), normal[active], flags[active]
-
-    def normal(self, batch: Batch) -> Tensor:
-        """The normalised frames (B, T, D) of a batch."""
-        return normalised(batch.frames, self.mean, self.scale)
 
     def _blurred(self, normal: Tensor) -> Tensor:
         """Frames (B, T, D) as training feeds them back: with noise, and some of them left out."""
@@ -128,6 +110,20 @@ class LanguageToMotion(LanguageNet):
             share = 2 * config.frame_dropout * torch.rand_like(normal[:, :1, :1])
             normal = normal * (torch.rand_like(normal[..., :1]) >= share)
         return normal
+
+    def step(self, frame: Tensor, context: Tensor, state: Tensor) -> tuple[Tensor, ...]:
+        """Frame (B, D + 1), context (B, C), state (B, S) to the next frame's mixture and the next state.
+
+        log_weights (B, K), means and standard deviations (B, K, D) in normalised units, probability of the flag (B,).
+        """
+        following = self.decoder.step(frame.clamp(-LIMIT, LIMIT), context, state)
+        mixture = self.mixture(following)
+        stds = mixture.variances.sqrt()
+        return mixture.log_weights, mixture.means, stds, mixture.active.sigmoid(), following
+
+    def score(self, context: Tensor, frames: Tensor) -> Tensor:
+        """Context (B, C), frames (B, T, D + 1) to log-likelihoods given all frames before (B, T)."""
+        return self.mixture(self.outputs(frames, context)).log_likelihood(frames[..., :-1], frames[..., -1])
 
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """The encoder, the step and the score, each with its contract."""
@@ -145,58 +141,13 @@ class LanguageToMotion(LanguageNet):
         frames = TensorSpec("frames", ("batch", "time", channels + 1))
         score = GraphSpec((context, frames), (TensorSpec("log_likelihood", ("batch", "time")),))
         encoder = GraphSpec((words, lengths), (context,))
-        return {"encoder": (Encode(self), encoder), "step": (Step(self), step), "score": (Score(self), score)}
-
-
-class Encode(nn.Module):
-    """The encoder graph: words (B, W), lengths (B,) -> context (B, C)."""
-
-    def __init__(self, net: LanguageToMotion) -> None:
-        super().__init__()
-        self.net = net
-
-    def forward(self, words: Tensor, lengths: Tensor) -> Tensor:
-        """Encode."""
-        return self.net.encode(words, lengths)
-
-
-class Step(nn.Module):
-    """The step graph: frame (B, D + 1), context (B, C), state (B, S) -> the next frame's mixture and the next state.
-
-    log_weights (B, K), means and standard deviations (B, K, D) in normalised units, probability of the flag (B,).
-    """
-
-    def __init__(self, net: LanguageToMotion) -> None:
-        super().__init__()
-        self.net = net
-
-    def forward(self, frame: Tensor, context: Tensor, state: Tensor) -> tuple[Tensor, ...]:
-        """One frame."""
-        following = self.net.decoder.step(frame.clamp(-LIMIT, LIMIT), context, state)
-        mixture = self.net.mixture(following)
-        stds = mixture.variances.sqrt()
-        return mixture.log_weights, mixture.means, stds, mixture.active.sigmoid(), following
-
-
-class Score(nn.Module):
-    """The score graph: context (B, C), frames (B, T, D + 1) -> log-likelihoods given all frames before (B, T)."""
-
-    def __init__(self, net: LanguageToMotion) -> None:
-        super().__init__()
-        self.net = net
-
-    def forward(self, context: Tensor, frames: Tensor) -> Tensor:
-        """Score known motions."""
-        mixture = self.net.mixture(self.net.outputs(frames, context))
-        return mixture.log_likelihood(frames[..., :-1], frames[..., -1])
+        return {
+            "encoder": (Part(self, self.encode), encoder),
+            "step": (Part(self, self.step), step),
+            "score": (Part(self, self.score), score),
+        }
 
 
 def from_config(config: Mapping[str, Any]) -> LanguageToMotion:
-    """An untrained net of the sizes that :func:`to_config` wrote."""
-    tuples = {key: tuple(config[key]) for key in ("encoder_units", "decoder_units")}
-    return LanguageToMotion(LanguageToMotionConfig(**{**config, **tuples}))
-
-
-def to_config(net: LanguageToMotion) -> dict[str, Any]:
-    """Everything that :func:`from_config` needs, ready for JSON."""
-    return {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(net.config).items()}
+    """An untrained net of a configuration as it stands in a manifest."""
+    return LanguageToMotion(LanguageToMotionConfig(**tuples(config)))

@@ -4,7 +4,7 @@ Letters in shapes: B rows, T frames, D channels, W words, V words of the vocabul
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import torch
@@ -18,6 +18,7 @@ from motet_train.models.language.gru import GRU
 from motet_train.models.language.net import LanguageNet
 from motet_train.models.language.sequence import Decoder, Encoder
 from motet_train.models.language.summary import SummaryHead
+from motet_train.models.net import Part, tuples
 from motet_train.models.normalised import normalised
 
 PAD, SOS, EOS = 0, 1, 2
@@ -40,21 +41,14 @@ class MotionToLanguageConfig:
     summary: float = 0.0
     """Weight of the training-only loss of :mod:`motet_train.models.language.summary`; 0 leaves its head out."""
 
-    @staticmethod
-    def paper() -> "MotionToLanguageConfig":
-        """The net of the paper: 44 joints, 1,344 words, 843,456 parameters."""
-        return MotionToLanguageConfig(channels=44, words=1344)
-
 
 class MotionToLanguage(LanguageNet):
-    """The net with its normalisation. mean, scale: (D,) of the channels, set before training."""
+    """The net with its normalisation."""
 
     def __init__(self, config: MotionToLanguageConfig) -> None:
-        super().__init__()
+        super().__init__(config.channels)
         self.config = config
         context, shared = 2 * config.encoder_units[-1], (config.gates, config.dropout)
-        self.register_buffer("mean", torch.zeros(config.channels))
-        self.register_buffer("scale", torch.ones(config.channels))
         self.encoder = Encoder(GRU, config.channels + 1, config.encoder_units, *shared)
         self.embedding = WordEmbedding(config.words, config.embedding, config.dropout)
         self.decoder = Decoder(GRU, config.embedding, context, config.decoder_units, False, *shared)
@@ -91,10 +85,21 @@ class MotionToLanguage(LanguageNet):
         outputs = self.outputs(words, context)
         # padded steps are left out before the output layer, which is the largest product of all
         losses = functional.nll_loss(self.log_probabilities(outputs[active]), targets[active], reduction="none")
-        if self.summary is None or not self.training:
-            return losses, None
-        normal = normalised(batch.frames, self.mean, self.scale)
-        return losses, self.config.summary * self.summary.loss(context, normal, batch.lengths)
+        return losses, self.summary_loss(batch, context)
+
+    def step(self, word: Tensor, context: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
+        """Word (B,), context (B, C), state (B, S) to log-probabilities (B, V) and the next state (B, S)."""
+        following = self.decoder.step(self.embedding(word[:, None])[:, 0], context, state)
+        return self.log_probabilities(following), following
+
+    def score(self, context: Tensor, words: Tensor) -> Tensor:
+        """Context (B, C), words (B, W) = SOS w1.. EOS PAD.. to log p of each given those before (B, W).
+
+        0 for the first word, which is given, and for PAD.
+        """
+        log_probabilities = self.log_probabilities(self.outputs(words, context))[:, :-1]
+        found = log_probabilities.gather(2, words[:, 1:, None])[..., 0]
+        return functional.pad(torch.where(words[:, 1:] == PAD, 0.0, found), (1, 0))
 
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """The encoder, the step and the score, each with its contract."""
@@ -107,58 +112,13 @@ class MotionToLanguage(LanguageNet):
         words = TensorSpec("words", ("batch", "words"), "int64")
         score = GraphSpec((context, words), (TensorSpec("log_probabilities", ("batch", "words")),))
         encoder = GraphSpec((frames, lengths), (context,))
-        return {"encoder": (Encode(self), encoder), "step": (Step(self), step), "score": (Score(self), score)}
-
-
-class Encode(nn.Module):
-    """The encoder graph: frames (B, T, D), lengths (B,) -> context (B, C)."""
-
-    def __init__(self, net: MotionToLanguage) -> None:
-        super().__init__()
-        self.net = net
-
-    def forward(self, frames: Tensor, lengths: Tensor) -> Tensor:
-        """Encode."""
-        return self.net.encode(frames, lengths)
-
-
-class Step(nn.Module):
-    """The step graph: word (B,), context (B, C), state (B, S) -> log-probabilities (B, V), next state (B, S)."""
-
-    def __init__(self, net: MotionToLanguage) -> None:
-        super().__init__()
-        self.net = net
-
-    def forward(self, word: Tensor, context: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
-        """One word."""
-        token = self.net.embedding(word[:, None])[:, 0]
-        following = self.net.decoder.step(token, context, state)
-        return self.net.log_probabilities(following), following
-
-
-class Score(nn.Module):
-    """The score graph: context (B, C), words (B, W) = SOS w1.. EOS PAD.. -> log p of each given those before (B, W).
-
-    0 for the first word, which is given, and for PAD.
-    """
-
-    def __init__(self, net: MotionToLanguage) -> None:
-        super().__init__()
-        self.net = net
-
-    def forward(self, context: Tensor, words: Tensor) -> Tensor:
-        """Score known sentences."""
-        log_probabilities = self.net.log_probabilities(self.net.outputs(words, context))[:, :-1]
-        found = log_probabilities.gather(2, words[:, 1:, None])[..., 0]
-        return functional.pad(torch.where(words[:, 1:] == PAD, 0.0, found), (1, 0))
+        return {
+            "encoder": (Part(self, self.encode), encoder),
+            "step": (Part(self, self.step), step),
+            "score": (Part(self, self.score), score),
+        }
 
 
 def from_config(config: Mapping[str, Any]) -> MotionToLanguage:
-    """An untrained net of the sizes that :func:`to_config` wrote."""
-    tuples = {key: tuple(config[key]) for key in ("encoder_units", "decoder_units")}
-    return MotionToLanguage(MotionToLanguageConfig(**{**config, **tuples}))
-
-
-def to_config(net: MotionToLanguage) -> dict[str, Any]:
-    """Everything that :func:`from_config` needs, ready for JSON."""
-    return {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(net.config).items()}
+    """An untrained net of a configuration as it stands in a manifest."""
+    return MotionToLanguage(MotionToLanguageConfig(**tuples(config)))

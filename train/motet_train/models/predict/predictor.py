@@ -18,7 +18,7 @@ from torch import Tensor, nn
 from torch.nn.functional import gelu
 
 from motet.bundle.graph import GraphSpec, TensorSpec
-from motet_train.models.net import Net
+from motet_train.models.net import Net, tuples
 from motet_train.models.normalised import normalised
 
 GAIN = 3.0
@@ -50,8 +50,7 @@ class PredictorConfig:
 
 def from_config(data: Mapping[str, Any]) -> "Predictor":
     """The net of a configuration as it stands in a manifest."""
-    lists = {key: tuple(data[key]) for key in ("kept", "mirrored", "signs")}
-    return Predictor(PredictorConfig(**{**data, **lists}))
+    return Predictor(PredictorConfig(**tuples(data)))
 
 
 def _polynomials(points: Tensor, count: int) -> Tensor:
@@ -120,7 +119,7 @@ class Trajectory(nn.Module):
 class Predictor(Net):
     """Seed frames (B, L, C) to the next frames (B, N, C), both in the contract's units.
 
-    mean, scale: (D,) of the kept channels, set before training; a held channel is seen as its difference to the last
+    mean, scale: (D,) of the kept channels; a held channel is seen as its difference to the last
     frame over its scale. Channels that are held or do not vary stay as they are in the last frame.
     """
 
@@ -131,12 +130,10 @@ class Predictor(Net):
     signs: Tensor
 
     def __init__(self, config: PredictorConfig) -> None:
-        super().__init__()
+        super().__init__(len(config.kept))
         self.config = config
         self.trajectory = Trajectory(config)
         kept, channels = list(config.kept), config.channels
-        self.register_buffer("mean", torch.zeros(len(kept)))
-        self.register_buffer("scale", torch.ones(len(kept)))
         self.register_buffer("kept", torch.tensor(kept), persistent=False)
         self.register_buffer("relative", (torch.arange(len(kept)) < config.held).float(), persistent=False)
         self.register_buffer("placing", torch.eye(channels)[kept[config.held :]], persistent=False)

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor, nn
 
 from motet.bundle.graph import GraphSpec, TensorSpec
-from motet_train.models.net import Net
+from motet_train.models.net import Net, Part
 from motet_train.models.normalised import normalised
 
 State = dict[str, Tensor]
@@ -82,18 +82,15 @@ def free_run(system: System, seed: Tensor, count: int, truth: Tensor | None = No
 class Stepwise(Net):
     """A system with its units: frames of all channels, in those of the contract.
 
-    kept: the channels that vary; others stay as they are in the last seed frame. mean, scale: (D,) of the kept ones,
-    set before training.
+    kept: the channels that vary; others stay as they are in the last seed frame. mean, scale: (D,) of the kept ones.
     """
 
     kept: Tensor
     placing: Tensor
 
     def __init__(self, system: System, channels: int, kept: Sequence[int], seed_frames: int) -> None:
-        super().__init__()
+        super().__init__(len(kept))
         self.system, self.channels, self.seed_frames = system, channels, seed_frames
-        self.register_buffer("mean", torch.zeros(len(kept)))
-        self.register_buffer("scale", torch.ones(len(kept)))
         self.register_buffer("kept", torch.tensor(kept), persistent=False)
         self.register_buffer("placing", torch.eye(channels)[list(kept)], persistent=False)
 
@@ -114,6 +111,20 @@ class Stepwise(Net):
         found = free_run(self.system, self.normalised(frames), count)
         return self.whole(found, self.still(frames)[:, None])
 
+    def encode(self, frames: Tensor) -> tuple[Tensor, Tensor]:
+        """Seed frames (B, L, C) to all that the step takes, context and state."""
+        state = self.system.begin(self.normalised(frames))
+        context = torch.cat([self.still(frames), *_rows(state, self.system.constant)], dim=1)
+        return context, torch.cat(_rows(state, self.system.carried), dim=1)
+
+    def step(self, context: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
+        """Context and state to the next frame (B, C) and the next state."""
+        system, channels = self.system, self.channels
+        known = {**_parts(state, system.carried), **_parts(context[:, channels:], system.constant)}
+        frame, carried = system.predict(known)
+        after = system.push({**known, **carried}, frame)
+        return self.whole(frame, context[:, :channels]), torch.cat(_rows(after, system.carried), dim=1)
+
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """The encoder and the step, each with its contract.
 
@@ -127,38 +138,7 @@ class Stepwise(Net):
         state, following = (TensorSpec(name, ("batch", carried)) for name in ("state", "next_state"))
         step = GraphSpec((context, state), (frame, following), {state.name: following.name})
         encoder = GraphSpec((frames,), (context, state))
-        return {"encoder": (EncoderGraph(self), encoder), "step": (StepGraph(self), step)}
-
-
-class EncoderGraph(nn.Module):
-    """The encoder graph: from seed frames to all that the step takes."""
-
-    def __init__(self, net: Stepwise) -> None:
-        super().__init__()
-        self.net = net
-
-    def forward(self, frames: Tensor) -> tuple[Tensor, Tensor]:
-        """Frames (B, L, C) to context and state."""
-        system = self.net.system
-        state = system.begin(self.net.normalised(frames))
-        context = torch.cat([self.net.still(frames), *_rows(state, system.constant)], dim=1)
-        return context, torch.cat(_rows(state, system.carried), dim=1)
-
-
-class StepGraph(nn.Module):
-    """The step graph: one frame, and what is carried over after it."""
-
-    def __init__(self, net: Stepwise) -> None:
-        super().__init__()
-        self.net = net
-
-    def forward(self, context: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
-        """Context and state to the next frame (B, C) and the next state."""
-        system, channels = self.net.system, self.net.channels
-        known = {**_parts(state, system.carried), **_parts(context[:, channels:], system.constant)}
-        frame, carried = system.predict(known)
-        after = system.push({**known, **carried}, frame)
-        return self.net.whole(frame, context[:, :channels]), torch.cat(_rows(after, system.carried), dim=1)
+        return {"encoder": (Part(self, self.encode), encoder), "step": (Part(self, self.step), step)}
 
 
 def _rows(state: State, shapes: Shapes) -> list[Tensor]:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from motet_train.models.net import tuples
 from motet_train.models.predict import convseq2seq, lstm_3lr, lstm_ae, rrnn, srnn
 from motet_train.models.predict.stepwise import Stepwise, System
 
@@ -20,10 +21,5 @@ SYSTEMS: Mapping[str, tuple[type[Any], type[Any]]] = {
 def stepwise(name: str, config: Mapping[str, Any]) -> Stepwise:
     """The net of a configuration as it stands in a manifest."""
     kind, sizes = SYSTEMS[name]
-    system: System = kind(sizes(**{key: _plain(value) for key, value in config["system"].items()}))
+    system: System = kind(sizes(**tuples(config["system"])))
     return Stepwise(system, config["channels"], config["kept"], config["seed_frames"])
-
-
-def _plain(value: Any) -> Any:
-    """Lists, which JSON makes of tuples, as tuples again."""
-    return tuple(_plain(item) for item in value) if isinstance(value, list) else value
