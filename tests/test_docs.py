@@ -31,6 +31,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         motion = read_motion(ROOT / f"train/motet_train/data/cmu/{trial}.amc")
         for extension in ("amc", "bvh", "npz"):
             write_motion(tmp_path / f"{name}.{extension}", motion)
+    (tmp_path / "character.bvh").symlink_to(ROOT / "tests/runtime/skeletons/mixamo.bvh")
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

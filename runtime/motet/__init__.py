@@ -30,7 +30,9 @@ from motet.models.describe import DescribeModel, Description
 from motet.models.generate import Generated, GenerateModel
 from motet.models.load import load, load_as
 from motet.models.predict import PredictModel, PredictSession
+from motet.motion.joint_map import read_map
 from motet.motion.motion import Motion
+from motet.motion.retarget import Humanoid, from_humanoid, to_humanoid
 
 __version__ = version("motet")
 
@@ -46,6 +48,7 @@ __all__ = [
     "FormatError",
     "GenerateModel",
     "Generated",
+    "Humanoid",
     "MotetError",
     "Motion",
     "MotionError",
@@ -58,11 +61,14 @@ __all__ = [
     "TextError",
     "TextWarning",
     "UnitError",
+    "from_humanoid",
     "list_bundles",
     "load",
     "load_as",
     "motion",
     "read",
+    "read_map",
+    "to_humanoid",
     "write",
 ]
 

@@ -6,8 +6,9 @@ import click
 
 from motet.bundle.session import SessionOptions
 from motet.cli.options import session_options
-from motet.cli.reading import Read, naming, out_option, read_options
+from motet.cli.reading import Read, like_option, naming, out_option, read_options
 from motet.formats import check_writable, write_motion
+from motet.formats.character import Character, put_onto
 from motet.formats.html import write as write_html
 from motet.models.control import ControlModel
 from motet.models.load import load_as
@@ -29,6 +30,7 @@ from motet.models.script import parse_script, starts_of
     help="Sampling temperature; lower is more deterministic. [default: the bundle's]",
 )
 @click.option("--in-place", is_flag=True, help="Leave the root in place, without a path.")
+@like_option
 @session_options
 @read_options
 def control(
@@ -40,6 +42,7 @@ def control(
     variety: float,
     temperature: float | None,
     in_place: bool,
+    like: Character | None,
     session: SessionOptions,
     read: Read,
 ) -> None:
@@ -53,6 +56,7 @@ def control(
     with naming(start):
         first = read(Path(start)) if start and Path(start).suffix else start
         motion = model.run(script, first, seed=seed, variety=variety, temperature=temperature, in_place=in_place)
+    motion = put_onto(motion, like) if like else motion
     if out.suffix.lower() == ".html":
         write_html(out, motion, captions=starts_of(segments), title=script)
     else:

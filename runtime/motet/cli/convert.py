@@ -1,16 +1,23 @@
 """``motet convert`` and ``motet view``: motion files from one format to another, or to a page that plays them."""
 
+import logging
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
 import click
 
-from motet.cli.reading import FPS, Read, Tries, places, read_options
+from motet.cli.reading import FPS, Read, Tries, like_option, places, read_options
 from motet.formats import READS, WRITES, write_motion
+from motet.formats.character import Character, put_onto
+from motet.motion.joint_map import read_map
+from motet.motion.kinematics import skeleton_of
 from motet.motion.mirror import mirror as mirrored
 from motet.motion.motion import Motion
+from motet.motion.retarget import to_humanoid
 from motet.motion.units import METRES
+
+log = logging.getLogger(__name__)
 
 
 @click.command(
@@ -28,6 +35,11 @@ from motet.motion.units import METRES
 @click.option("--to", "stop", type=click.FloatRange(0, min_open=True), help="Cut: seconds to stop at.")
 @click.option("--mirror", is_flag=True, help="Swap left and right.")
 @click.option("--unit", type=click.Choice(list(METRES)), help="Length unit to write.")
+@click.option("--humanoid", is_flag=True, help="Bring the motions to the humanoid (docs/humanoid.md).")
+@click.option(
+    "--map", "map_file", type=Path, metavar="FILE", help="Which joint of IN is which bone, as JSON; implies --humanoid."
+)
+@like_option
 @read_options
 def convert(
     files: Sequence[Path],
@@ -37,6 +49,9 @@ def convert(
     stop: float | None,
     mirror: bool,
     unit: str | None,
+    humanoid: bool,
+    map_file: Path | None,
+    like: Character | None,
     read: Read,
 ) -> None:
     """Convert motion files."""
@@ -48,6 +63,9 @@ def convert(
     for source, place in zip(files, outs, strict=True):
         with tries.of(source):
             motion = _cut(read(source), start, stop)
+            if humanoid or map_file:
+                motion = _to_humanoid(motion, map_file)
+            motion = put_onto(motion, like) if like else motion
             motion = motion.scaled(METRES[unit]) if unit else motion
             motion = motion.resample(fps) if fps else motion
             write_motion(place, mirrored(motion) if mirror else motion)
@@ -68,6 +86,12 @@ def view(sources: tuple[Path, ...], out: Path | None, read: Read) -> None:
             write_motion(page, read(source))
             click.echo(str(page))
     tries.finish()
+
+
+def _to_humanoid(motion: Motion, map_file: Path | None) -> Motion:
+    found = to_humanoid(motion, read_map(map_file, skeleton_of(motion)) if map_file else None)
+    log.info("brought to the humanoid: %s", found.summary)
+    return found.motion
 
 
 def _cut(motion: Motion, start: float, stop: float | None) -> Motion:

@@ -10,10 +10,12 @@ import click
 from motet.bundle.session import SessionOptions
 from motet.cli.notes import text_notes
 from motet.cli.options import session_options
-from motet.cli.reading import FPS, Tries, bar, out_option, places
+from motet.cli.reading import FPS, Tries, bar, like_option, out_option, places
 from motet.formats import check_writable, write_motion
+from motet.formats.character import Character
 from motet.models.generate import PLAYED, Generated, GenerateModel
 from motet.models.load import load_as
+from motet.motion.motion import Motion
 
 
 @click.command()
@@ -36,6 +38,7 @@ from motet.models.load import load_as
 @click.option("--fps", type=FPS, default=PLAYED, show_default=True, help="Frame rate to write.")
 @click.option("--no-plant", is_flag=True, help="Skip foot planting: the figure moves as drawn.")
 @click.option("--all", "every", is_flag=True, help="Write all hypotheses, not only the best.")
+@like_option
 @session_options
 @click.option("--json", "as_json", is_flag=True, help="Print a list with input and hypotheses of each text.")
 def generate(
@@ -46,6 +49,7 @@ def generate(
     no_plant: bool,
     every: bool,
     seed: int,
+    like: Character | None,
     as_json: bool,
     session: SessionOptions,
     **settings: Any,
@@ -66,15 +70,15 @@ def generate(
     rows = []
     for index, results in zip(asked, found, strict=True):
         pairs = zip(results[:count], outs[count * index :], strict=False)
-        rows.append({"input": texts[index], "hypotheses": [_write(*pair, fps, not no_plant) for pair in pairs]})
+        written = [_write(result.playable(fps, not no_plant), result, place, like) for result, place in pairs]
+        rows.append({"input": texts[index], "hypotheses": written})
     if rows:
         click.echo(json.dumps(rows) if as_json else "\n".join(_lines(rows)))
     tries.finish()
 
 
-def _write(result: Generated, place: Path, fps: float, plant: bool) -> dict[str, Any]:
-    motion = result.playable(fps, plant)
-    write_motion(place, motion)
+def _write(motion: Motion, result: Generated, place: Path, like: Character | None) -> dict[str, Any]:
+    write_motion(place, motion, like=like)
     size = {"frames": len(motion), "fps": motion.fps, "seconds": motion.duration}
     return {"output": str(place), "log_likelihood": result.log_likelihood, **size}
 
@@ -83,4 +87,6 @@ def _lines(rows: list[dict[str, Any]]) -> Iterator[str]:
     for row in rows:
         for found in row["hypotheses"]:
             size = f"{found['frames']} frames at {found['fps']:g} fps, {found['seconds']:.3g} s"
-            yield f"{found['output']}: {size}, log-likelihood {found['log_likelihood']:.1f}: {row['input']}"
+            likelihood = found["log_likelihood"]
+            score = "" if likelihood is None else f", log-likelihood {likelihood:.1f}"
+            yield f"{found['output']}: {size}{score}: {row['input']}"

@@ -6,8 +6,9 @@ import click
 
 from motet.bundle.session import SessionOptions
 from motet.cli.options import session_options
-from motet.cli.reading import Read, Tries, out_option, places, read_options, say_resampled
+from motet.cli.reading import Read, Tries, like_option, out_option, places, read_options, say_resampled
 from motet.formats import write_motion
+from motet.formats.character import Character
 from motet.models.load import load_as
 from motet.models.predict import PredictModel
 
@@ -18,6 +19,7 @@ from motet.models.predict import PredictModel
 @click.option("--bundle", default="cmu-predict", show_default=True, help="Name or path of a bundle.")
 @click.option("--frames", type=click.IntRange(1, 100_000), help="Frames to predict. [default: the bundle's horizon]")
 @click.option("--append", is_flag=True, help="Write the motion too, then the prediction.")
+@like_option
 @session_options
 @read_options
 def predict(
@@ -26,6 +28,7 @@ def predict(
     bundle: str,
     frames: int | None,
     append: bool,
+    like: Character | None,
     session: SessionOptions,
     read: Read,
 ) -> None:
@@ -40,7 +43,7 @@ def predict(
         with tries.of(source):
             motion = read(source)
             found = model.predict(motion, frames=frames, append=append)
-            write_motion(place, found)
+            write_motion(place, found, like=like)
             rates.append(motion.fps)
             start = len(found) - (frames or model.horizon)
             said = f", predicted from {start / found.fps:.3g} s on (frame {start}, counted from 0)" if append else ""

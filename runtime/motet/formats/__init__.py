@@ -12,13 +12,14 @@ from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from motet.errors import FormatError, MotionError, OutputError
 from motet.files import File, check_place, place_of
+from motet.formats.character import Character, put_onto
 from motet.motion.motion import Motion
+from motet.motion.skeleton import Skeleton
 from motet.motion.units import metres
 
 log = logging.getLogger(__name__)
@@ -28,9 +29,9 @@ log = logging.getLogger(__name__)
 class Format:
     """One format of motion files.
 
-    module: its module in this package, imported when it is used.
     keeps: what of a motion a file holds, for the docs.
-    reads, writes: whether the module has ``read`` and ``write``.
+    reader, writer: the modules in this package that have its ``read`` and ``write``, imported when they are used; empty
+        where it is not read or not written.
     options: the keyword arguments of its ``read``.
     mocap: whether a file holds motion and skeleton, which the files of a corpus must.
     needs: the package that writing takes, out of the extra "plot".
@@ -38,39 +39,50 @@ class Format:
 
     extension: str
     name: str
-    module: str
     keeps: str
-    reads: bool = True
-    writes: bool = True
+    reader: str = ""
+    writer: str = ""
     options: tuple[str, ...] = ()
     mocap: bool = False
     needs: str = ""
 
-    def function(self, verb: str) -> Callable[..., Any]:
-        """Its "read" or "write"."""
-        found: Callable[..., Any] = getattr(import_module(f"motet.formats.{self.module}"), verb)
+    def read(self) -> Callable[..., Motion]:
+        """The function that reads it."""
+        found: Callable[..., Motion] = import_module(f"motet.formats.{self.reader}").read
+        return found
+
+    def write(self) -> Callable[[File, Motion], None]:
+        """The function that writes it."""
+        found: Callable[[File, Motion], None] = import_module(f"motet.formats.{self.writer}").write
         return found
 
 
 _AMC = "everything; AMC has no frame rate: 120 unless motet wrote another into a comment, or `fps=` says it"
 _GIF = "a picture that moves; needs Pillow: `pip install 'motet[plot]'`"
+_NPZ = "everything, to the last bit; of AMASS the body's joints"
+_GLB = "a skeleton and the first animation; written with a body, for viewers and engines"
+_CHARACTER = "a skeleton and the first animation, or the pose that it rests in"
+_VRMA = "the humanoid: a motion of another human figure is brought to it ([humanoid.md](humanoid.md))"
 
 FORMATS = (
-    Format(".amc", "Acclaim, with its .asf", "amc", _AMC, options=("asf", "fps", "partial"), mocap=True),
-    Format(".bvh", "Biovision", "bvh", "everything but the unit of length", options=("partial",), mocap=True),
-    Format(".npz", "motet's own", "npz", "everything, to the last bit", mocap=True),
-    Format(".csv", "table", "csv", "values, units and frame rate, no skeleton"),
-    Format(".xml", "MMM of KIT", "mmm", "angles and root; the skeleton is not in the file", writes=False),
-    Format(".html", "web page", "html", "a page with a player: orbit, play, scrub, no network", reads=False),
-    Format(".gif", "picture", "gif", _GIF, reads=False, needs="PIL"),
-    Format(".glb", "glTF 2.0", "glb", "a skeleton with a body, for viewers and engines", reads=False),
+    Format(".amc", "Acclaim, with its .asf", _AMC, "amc", "amc", options=("asf", "fps", "partial"), mocap=True),
+    Format(".bvh", "Biovision", "everything but the unit of length", "bvh", "bvh", options=("partial",), mocap=True),
+    Format(".npz", "motet's own; AMASS", _NPZ, "npz", "npz", mocap=True),
+    Format(".csv", "table", "values, units and frame rate, no skeleton", "csv", "csv"),
+    Format(".xml", "MMM of KIT", "angles and root; the skeleton is not in the file", "mmm"),
+    Format(".glb", "glTF 2.0", _GLB, "gltf", "glb"),
+    Format(".gltf", "glTF 2.0, as text", _CHARACTER, "gltf"),
+    Format(".vrm", "VRM avatar", _CHARACTER, "gltf"),
+    Format(".vrma", "VRM Animation", _VRMA, "gltf", "vrma"),
+    Format(".html", "web page", "a page with a player: orbit, play, scrub, no network", writer="html"),
+    Format(".gif", "picture", _GIF, writer="gif", needs="PIL"),
 )
 
-READABLE = tuple(kind.extension for kind in FORMATS if kind.reads)
-WRITABLE = tuple(kind.extension for kind in FORMATS if kind.writes)
+READABLE = tuple(kind.extension for kind in FORMATS if kind.reader)
+WRITABLE = tuple(kind.extension for kind in FORMATS if kind.writer)
 MOCAP = tuple(kind.extension for kind in FORMATS if kind.mocap)
-READS = ", ".join(f"{kind.extension} ({kind.name})" for kind in FORMATS if kind.reads)
-WRITES = ", ".join(f"{kind.extension} ({kind.name})" for kind in FORMATS if kind.writes)
+READS = ", ".join(f"{kind.extension} ({kind.name})" for kind in FORMATS if kind.reader)
+WRITES = ", ".join(f"{kind.extension} ({kind.name})" for kind in FORMATS if kind.writer)
 """The formats as help texts list them."""
 
 
@@ -101,7 +113,7 @@ def read_motion(
         raise FormatError(path, f"{name!r} is an option of {takers} files only")
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # what gets infinite is refused by Motion
-            motion: Motion = kind.function("read")(file, **options)
+            motion = kind.read()(file, **options)
         log.debug("read %s: %r", path, motion)
         return motion if unit is None else _in_unit(path, motion, metres(unit))
     except FormatError:
@@ -110,14 +122,31 @@ def read_motion(
         raise FormatError(path, str(error)) from error
 
 
-def write_motion(file: File, motion: Motion, *, format: str | None = None) -> None:
+def read_character(file: File) -> Character:
+    """Read a skeleton to put motions onto: of glTF and VRM files as their nodes have it, of others that of the motion.
+
+    FormatError as :func:`read_motion`.
+    """
+    if _format(file, None, READABLE, "read").reader != "gltf":
+        return Character(read_motion(file))
+    from motet.formats import gltf
+
+    return gltf.read_character(file)
+
+
+def write_motion(
+    file: File, motion: Motion, *, format: str | None = None, like: File | Character | Motion | Skeleton | None = None
+) -> None:
     """Write a motion in the format of the path's extension, or in ``format``, which a file object needs.
 
+    like: a character whose skeleton the motion is put onto: a file of it (.bvh, .glb, .vrm, ...), a motion of it, or
+        its skeleton.
     FormatError, MotionError or OutputError if that is not possible; nothing is written then.
     """
     check_writable(file, format)
+    motion = motion if like is None else put_onto(motion, _character(like))
     with np.errstate(over="ignore", invalid="ignore"):  # writers refuse what is too large by themselves
-        _format(file, format, WRITABLE, "write").function("write")(file, motion)
+        _format(file, format, WRITABLE, "write").write()(file, motion)
 
 
 def check_writable(file: File, format: str | None = None) -> None:
@@ -138,6 +167,14 @@ def _format(file: File, format: str | None, allowed: tuple[str, ...], verb: str)
         return next(kind for kind in FORMATS if kind.extension == extension)
     what = f"files of type {extension!r}" if extension else "a file without an extension"
     raise FormatError(place_of(file), f"cannot {verb} {what}; expected one of {' '.join(allowed)}")
+
+
+def _character(like: File | Character | Motion | Skeleton) -> Character:
+    if isinstance(like, Skeleton):
+        return Character(Motion(np.zeros((1, 0)), (), (), 1.0, like))
+    if isinstance(like, Motion):
+        return Character(like)
+    return like if isinstance(like, Character) else read_character(like)
 
 
 def _in_unit(path: Path, motion: Motion, unit: float) -> Motion:

@@ -33,7 +33,7 @@ AROUND = 10
 """Corners around a bone of the body."""
 
 
-class _Buffer:
+class Buffer:
     """The binary part of the file: arrays put in, each as an accessor with its own view."""
 
     def __init__(self) -> None:
@@ -70,14 +70,14 @@ def write(file: File, motion: Motion) -> None:
     if skeleton.metres_per_unit is not None:
         motion = motion.scaled(1.0)
         skeleton = skeleton_of(motion)
-    buffer = _Buffer()
+    buffer = Buffer()
     joints = len(skeleton.joints)
     document = {
         "asset": {"version": "2.0", "generator": "motet", "extras": _facts(motion, skeleton)},
         "scene": 0,
         "scenes": [{"nodes": [0, joints]}],
-        "nodes": [*_joint_nodes(skeleton), {"name": "body", "mesh": 0, "skin": 0}],
-        "animations": [_animation(buffer, motion, skeleton)],
+        "nodes": [*joint_nodes(skeleton), {"name": "body", "mesh": 0, "skin": 0}],
+        "animations": [animation(buffer, motion, skeleton)],
         "skins": [_skin(buffer, skeleton)],
         "meshes": [{"name": "body", "primitives": [_body(buffer, skeleton)]}],
         "materials": [{"name": "body", "pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 0.6}}],
@@ -85,21 +85,23 @@ def write(file: File, motion: Motion) -> None:
         "accessors": buffer.accessors,
         "buffers": [{"byteLength": len(buffer.content)}],
     }
-    write_whole(file, _container(document, bytes(buffer.content)))
+    write_whole(file, container(document, bytes(buffer.content)))
 
 
 def _facts(motion: Motion, skeleton: Skeleton) -> dict[str, Any]:
     return {"fps": motion.fps, "frames": len(motion), "length_unit": "m" if skeleton.metres_per_unit else "unknown"}
 
 
-def _container(document: dict[str, Any], content: bytes) -> bytes:
+def container(document: dict[str, Any], content: bytes) -> bytes:
+    """A GLB file of a JSON object and the binary part."""
     text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
     text += b" " * (-len(text) % 4)
     head = struct.pack("<4sII", b"glTF", 2, 12 + 8 + len(text) + 8 + len(content))
     return head + struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(content), b"BIN\0") + content
 
 
-def _joint_nodes(skeleton: Skeleton) -> list[dict[str, Any]]:
+def joint_nodes(skeleton: Skeleton) -> list[dict[str, Any]]:
+    """A node for each joint, at rest, in their order."""
     nodes: list[dict[str, Any]] = []
     for joint, children in zip(skeleton.joints, skeleton.children, strict=True):
         node: dict[str, Any] = {"name": joint.name, "translation": list(joint.offset)}
@@ -107,7 +109,8 @@ def _joint_nodes(skeleton: Skeleton) -> list[dict[str, Any]]:
     return nodes
 
 
-def _animation(buffer: _Buffer, motion: Motion, skeleton: Skeleton) -> dict[str, Any]:
+def animation(buffer: Buffer, motion: Motion, skeleton: Skeleton) -> dict[str, Any]:
+    """The animation of the joints' nodes, the first of all nodes; its arrays go into the buffer."""
     times = buffer.add_bounded(np.arange(len(motion)) / motion.fps)
     turns, moves = _continuous(rotmat_to_quat(local_rotations(motion))), local_translations(motion)
     samplers: list[dict[str, Any]] = []
@@ -128,7 +131,7 @@ def _continuous(quats: Array) -> Array:
     return np.concatenate([quats[:1], quats[1:] * signs])
 
 
-def _skin(buffer: _Buffer, skeleton: Skeleton) -> dict[str, Any]:
+def _skin(buffer: Buffer, skeleton: Skeleton) -> dict[str, Any]:
     inverse = np.tile(np.eye(4), (len(skeleton.joints), 1, 1))
     inverse[:, 3, :3] = -_rest(skeleton)  # glTF keeps columns, so the translation is the last row here
     return {"joints": list(range(len(skeleton.joints))), "skeleton": 0, "inverseBindMatrices": buffer.add(inverse)}
@@ -140,7 +143,7 @@ def _rest(skeleton: Skeleton) -> Array:
     return rest
 
 
-def _body(buffer: _Buffer, skeleton: Skeleton) -> dict[str, Any]:
+def _body(buffer: Buffer, skeleton: Skeleton) -> dict[str, Any]:
     """The primitive of the body: a tapered prism for each bone, whose ends move with the bone's carriers."""
     body = Body(skeleton)
     points = body.points(_rest(skeleton) / body.height)

@@ -124,7 +124,7 @@ class ControlModel(BundleModel):
         return self.encode(self.starts[label])
 
     def _history_of(self, motion: Motion) -> Floats:
-        last = motion.continuous().resample(self.fps, to_end=True)[-self.taps :]
+        last = self.contract.on_figure(motion.continuous().resample(self.fps, to_end=True))[-self.taps :]
         if len(last) < self.taps:
             raise MotionError(f"a start needs {self.taps} frames at {self.fps:g} fps, this motion has {len(last)}")
         # levelled by themselves: where the figure faced long before says nothing about where it faces now

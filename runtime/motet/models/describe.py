@@ -88,7 +88,11 @@ class DescribeModel(LanguageModel):
         return rows[0] if isinstance(motions, Motion) else rows
 
     def windows(self, motion: Motion) -> list[tuple[float, Motion]]:
-        """A motion of any length in as few equal parts as the model takes, each with the second at which it starts."""
+        """A motion of any length in as few equal parts as the model takes, each with the second at which it starts.
+
+        One of another human figure is brought onto the model's first, as :meth:`frames` does it, as a whole.
+        """
+        motion = self.contract.on_figure(motion)
         most = max(1, math.floor(MAX_SECONDS * motion.fps + 1e-9))  # parts are of whole frames
         count = max(1, math.ceil(len(motion) / most))
         edges = np.linspace(0, len(motion), count + 1).round().astype(int).tolist()

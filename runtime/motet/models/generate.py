@@ -14,11 +14,13 @@ from motet.decode.noise import Recorded
 from motet.errors import DecodingError
 from motet.files import File
 from motet.formats import write_motion
+from motet.formats.character import Character
 from motet.models.language import LanguageModel
 from motet.models.progress import Progress, silent
 from motet.models.seeds import Seed, seeds_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
+from motet.motion.skeleton import Skeleton
 from motet.representation.contract import MotionContract
 
 PLAYED = 30.0
@@ -53,9 +55,16 @@ class Generated:
         """The motion at another frame rate, or without its feet planted: moving as it was drawn, with sliding feet."""
         return self.contract.motion(self.frames, plant=plant).resample(fps)
 
-    def write(self, path: File, fps: float = PLAYED, plant: bool = True) -> None:
-        """Write :meth:`playable` as :func:`motet.write` does."""
-        write_motion(path, self.playable(fps, plant))
+    def write(
+        self,
+        path: File,
+        fps: float = PLAYED,
+        plant: bool = True,
+        *,
+        like: File | Character | Motion | Skeleton | None = None,
+    ) -> None:
+        """Write :meth:`playable` as :func:`motet.write` does, perhaps put onto a character."""
+        write_motion(path, self.playable(fps, plant), like=like)
 
     def __repr__(self) -> str:
         seconds = len(self.frames) / self.contract.fps

@@ -53,7 +53,8 @@ class LanguageModel(BundleModel):
     def frames(self, motion: Motion) -> Array:
         """The frames (T, D) float64 of a motion in the contract's channels and units, resampled to its frame rate.
 
-        MotionError names the channels that the motion lacks, and refuses less than two frames and more than 30 s.
+        A motion of any other human figure is brought onto the model's (docs/humanoid.md). MotionError names the
+        channels that the motion lacks, and refuses less than two frames and more than 30 s.
         """
         if motion.duration > MAX_SECONDS:
             limit = f"the model takes at most {MAX_SECONDS:g} s: cut it, or describe its windows"

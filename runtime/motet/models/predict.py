@@ -17,6 +17,7 @@ from motet.models.base import BundleModel
 from motet.models.progress import Progress, silent
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
+from motet.representation.foreign import carried_back
 
 MAX_FRAMES, MAX_GOLDEN = 100_000, 1000
 """Of one prediction, which is in memory as a whole; and of one among the golden vectors."""
@@ -57,13 +58,15 @@ class PredictModel(BundleModel):
     ) -> Motion | list[Motion]:
         """The ``frames`` (as many as the horizon by default) that follow a motion, at the model's frame rate.
 
-        A mocap motion of the model's figure is continued in its own channels, units and skeleton, from where its root
-        is; features, in the channels of :attr:`contract`, as features. Only the last :attr:`seed_frames` at the model's
-        frame rate are looked at; one at another rate is resampled, so that its last frame is kept.
+        A mocap motion is continued in its own channels, units and skeleton, from where its root is; features, in the
+        channels of :attr:`contract`, as features. One of another human figure is brought onto the model's, and what
+        follows back, or given on the model's figure where that is not possible (docs/humanoid.md). Only the last
+        :attr:`seed_frames` at the model's frame rate are looked at; one at another rate is resampled, so that its last
+        frame is kept.
         append: give the motion, resampled, and what follows it.
         progress: called with the number of motions done and of all.
         Several motions are carried on in one batch, each as it would be alone. MotionError for a motion that is too
-        short, or lacks joints or channels of the model, which are named.
+        short, lacks channels of the model, or is of a figure that is no human's.
         """
         given = [motions] if isinstance(motions, Motion) else list(motions)
         seeds = [self._seed(motion) for motion in given]
@@ -76,20 +79,22 @@ class PredictModel(BundleModel):
         return found[0] if isinstance(motions, Motion) else found
 
     def _seed(self, motion: Motion) -> tuple[Motion, Motion, Array]:
-        """The motion at the model's frame rate, its end, and the frames (L, C) of that."""
+        """The motion at the model's frame rate, the same on the model's figure, and its last frames (L, C)."""
         whole = motion if motion.fps == self.fps else motion.continuous().resample(self.fps, to_end=True)
-        seed = whole[max(0, len(whole) - self.seed_frames - 1) :]
-        frames = self.contract.frames(seed)
+        figure = self.contract.on_figure(whole)
+        frames = self.contract.frames(figure[max(0, len(whole) - self.seed_frames - 1) :])
         if len(frames) < self.seed_frames:
             limit = f"the model needs {self.seed_frames} frames at {self.fps:g} fps"
             raise MotionError(f"{limit}, and the motion has {len(frames)} ({len(motion)} at {motion.fps:g} fps)")
-        return whole, seed, frames[-self.seed_frames :]
+        return whole, figure, frames[-self.seed_frames :]
 
-    def _carried_on(self, whole: Motion, seed: Motion, frames: Floats, append: bool) -> Motion:
-        following = self.contract.motion(frames, after=seed, plant=False)
+    def _carried_on(self, whole: Motion, figure: Motion, frames: Floats, append: bool) -> Motion:
+        following, before = self.contract.motion(frames, after=figure, plant=False), figure
+        if figure is not whole and (back := carried_back(following, figure, whole)) is not None:
+            following, before = back, whole
         if not append:
             return following
-        before = whole.select(following.channels, following.units)
+        before = before.select(following.channels, following.units)
         return replace(following, values=np.concatenate([before.values, following.values]))
 
     def next_frames(self, seeds: ArrayLike, frames: int | None = None) -> Floats:

@@ -2,19 +2,28 @@
 
 from motet.motion.feet import feet_of, ground_of, has_feet
 from motet.motion.heading import heading, without_heading
+from motet.motion.humanoid import HUMANOID
+from motet.motion.joint_map import JointMap, read_map
 from motet.motion.kinematics import global_transforms, local_rotations, local_translations, positions
 from motet.motion.mirror import lateral_axis, mirror
+from motet.motion.mixamo import MIXAMO
 from motet.motion.motion import UNITS, Motion
+from motet.motion.retarget import Humanoid, from_humanoid, to_humanoid
 from motet.motion.root_path import lay_root_path
 from motet.motion.sides import partners_of, sides_of
 from motet.motion.skeleton import Joint, Skeleton
 
 __all__ = [
+    "HUMANOID",
+    "MIXAMO",
     "UNITS",
+    "Humanoid",
     "Joint",
+    "JointMap",
     "Motion",
     "Skeleton",
     "feet_of",
+    "from_humanoid",
     "global_transforms",
     "ground_of",
     "has_feet",
@@ -26,6 +35,8 @@ __all__ = [
     "mirror",
     "partners_of",
     "positions",
+    "read_map",
     "sides_of",
+    "to_humanoid",
     "without_heading",
 ]

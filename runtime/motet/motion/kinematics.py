@@ -1,6 +1,6 @@
 """Forward kinematics: from the channels of a motion to rotations and positions of its joints."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -87,6 +87,30 @@ def with_channels(motion: Motion, names: tuple[str, ...], values: Array, units: 
         everything[:, channels.index(name)] = values[:, i]
         all_units[channels.index(name)] = units[i]
     return replace(motion, values=everything, channels=channels, units=tuple(all_units))
+
+
+def continued(last: Motion, rotations: Mapping[str, Array], translations: Mapping[str, Array]) -> Motion:
+    """What follows a motion's last frame, in its channels: local rotations (T, 3, 3) and translations (T, 3) of joints.
+
+    Lengths are in the skeleton's unit. What the channels do not have is left out, and channels of other joints stay as
+    they are.
+    """
+    skeleton, last = skeleton_of(last), last[-1:]
+    count = len(next(iter(rotations.values())))
+    values = np.repeat(last.values, count + 1, axis=0)
+    for name, columns in last.rotation_columns().items():
+        if name in rotations:
+            angles = euler_of(rotations[name], skeleton.joints[skeleton.index(name)])
+            for column in columns:
+                axis = AXES.index(last.channels[column][-1])
+                values[1:, column] = angles[:, axis] * TURN[last.units[column]] / (2 * np.pi)
+    for column, channel in enumerate(last.channels):
+        name, _, kind = channel.rpartition(".")
+        if name in translations and kind in ("tx", "ty", "tz"):
+            factor = 1.0 if last.units[column] == "length" else skeleton.unit_factor(1.0)
+            values[1:, column] = translations[name][:, AXES.index(kind[1])] * factor
+    # the frame before the first one says which of two equal angles is the nearer one
+    return replace(last, values=values).continuous()[1:]
 
 
 def _angles(motion: Motion, joints: Sequence[str]) -> Array:

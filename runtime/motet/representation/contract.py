@@ -14,6 +14,7 @@ from motet.motion.skeleton import Skeleton
 from motet.representation import named
 from motet.representation.base import FrameMirror, phases
 from motet.representation.figure import in_joints_of
+from motet.representation.foreign import brought, foreign
 
 LIMIT = 50.0
 """Standard deviations: z is clipped to this, in the nets' graphs too. Of 256 of CMU's trials one frame in a thousand
@@ -72,9 +73,32 @@ class MotionContract:
         """The frames (T, D) float64 of a motion, of any length, or of features.
 
         Angles are made continuous, in the order and axes of the contract's joints, and the motion brought to the
-        contract's frame rate, beginning with its first frame. MotionError names what the motion lacks.
+        contract's frame rate, beginning with its first frame. A motion of another human figure is brought onto the
+        contract's (:meth:`on_figure`). MotionError names what the motion lacks.
         """
-        return next(sequences(self.representation, motion, self.fps, self._like)).values
+        return next(sequences(self.representation, self.on_figure(motion), self.fps, self._like)).values
+
+    def on_figure(self, motion: Motion) -> Motion:
+        """A motion of any human figure on the contract's skeleton; as it is where it has the joints or channels.
+
+        One that is brought there comes at the contract's frame rate where its own is higher, beginning with its first
+        frame; joints of which the humanoid says nothing, such as thumbs, stand as they do on average. MotionError, with
+        the reason, where that cannot be done.
+        """
+        if self.skeleton is None or set(self.channels) <= set(motion.channels):
+            return motion
+        reason = foreign(motion, self.skeleton, self._joints)
+        if reason is None:
+            return motion
+        slower = motion.continuous().resample(self.fps) if motion.fps > self.fps else motion
+        return brought(slower, self.motion(self.mean[None], plant=False), reason)
+
+    @cached_property
+    def _joints(self) -> tuple[str, ...]:
+        """The joints that the channels speak of, but for the root where its block does."""
+        block = named(self.representation).required
+        names = (channel.rpartition(".")[0] for channel in self.channels if channel not in block)
+        return tuple(name for name in dict.fromkeys(names) if self.skeleton and name in self.skeleton.places)
 
     def motion(self, frames: ArrayLike, after: Motion | None = None, plant: bool = True) -> Motion:
         """Frames (T, D) as a motion that can be played and written, at the contract's frame rate.

@@ -22,7 +22,7 @@ def in_joints_of(motion: Motion, skeleton: Skeleton | None) -> Motion:
     """The motion with Euler angles in the order and axes that joints of the same name have in another skeleton.
 
     Joints that have them already keep their angles to the bit; without a skeleton of its own or another the motion
-    comes back as it is. MotionError where a bone points elsewhere at rest: motions are not retargeted.
+    comes back as it is. MotionError where a bone points elsewhere at rest.
     """
     if motion.skeleton is None or skeleton is None:
         return motion
@@ -48,27 +48,32 @@ def _other_joints(own: Skeleton, other: Skeleton) -> tuple[str, ...]:
     for name in own.names:
         if name not in other.places:
             continue
-        _refuse_other_bone(own, other, name)
+        if reason := other_bone(own, other, name):
+            raise MotionError(reason)
         one, two = own.joints[own.places[name]], other.joints[other.places[name]]
         if one.order != two.order or not np.allclose(one.frame, two.frame, rtol=0, atol=ALIKE):
             found.append(name)
     return tuple(found)
 
 
-def _refuse_other_bone(own: Skeleton, other: Skeleton, name: str) -> None:
+def other_bone(own: Skeleton, other: Skeleton, name: str) -> str | None:
+    """Why a joint's angles mean other poses in another skeleton: its bone points elsewhere; None if they do not."""
+    if name not in other.places:
+        return None
     parent = other.joints[other.places[name]].parent
     if parent < 0 or other.names[parent] not in own.places:
-        return
+        return None
     bones = [
         skeleton.rest_positions[skeleton.places[name]] - skeleton.rest_positions[skeleton.places[other.names[parent]]]
         for skeleton in (own, other)
     ]
     lengths = [float(np.linalg.norm(bone)) for bone in bones]
     if min(lengths) < 1e-6:
-        return
+        return None
     apart = np.degrees(np.arccos(np.clip(bones[0] @ bones[1] / (lengths[0] * lengths[1]), -1, 1)))
-    if apart > APART:
-        raise MotionError(
-            f"the bone to {name!r} points {apart:.0f} degrees away from where it does in the model's figure at rest: "
-            "the same angles mean other poses, and motions are not retargeted"
-        )
+    if apart <= APART:
+        return None
+    return (
+        f"the bone to {name!r} points {apart:.0f} degrees away from where it does in the model's figure at rest: "
+        "the same angles mean other poses"
+    )

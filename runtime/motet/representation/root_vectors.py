@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from motet.errors import MotionError
-from motet.motion.kinematics import AXES, euler_of, local_rotations, skeleton_of
-from motet.motion.motion import TURN, Motion
+from motet.motion.kinematics import AXES, continued, local_rotations, skeleton_of
+from motet.motion.motion import Motion
 from motet.motion.rotations import Array, rotmat_to_rotvec, rotvec_to_rotmat
 from motet.motion.sides import partners_of
 from motet.motion.skeleton import END_SUFFIX
@@ -102,20 +102,8 @@ def carry_on(after: Motion | None, features: Motion) -> Motion:
     last = _at_rest(features) if after is None else after[-1]
     skeleton = skeleton_of(last)
     root, places = root_in_world(features, after)
-    rotations = {skeleton.names[0]: root, **_rotations(features)}
-    values = np.repeat(last.values, len(features) + 1, axis=0)
-    for name, columns in last.rotation_columns().items():
-        if name in rotations:
-            angles = euler_of(rotations[name], skeleton.joints[skeleton.index(name)])
-            for column in columns:
-                axis = AXES.index(last.channels[column][-1])
-                values[1:, column] = angles[:, axis] * TURN[last.units[column]] / (2 * np.pi)
-    for column, name in enumerate(last.channels):
-        if name.startswith(f"{skeleton.names[0]}.t"):
-            metres = skeleton.unit_factor(1.0) if last.units[column] == "length" else 1.0
-            values[1:, column] = places[:, AXES.index(name[-1])] / metres
-    # the frame before the first one says which of two equal angles is the nearer one
-    return replace(last, values=values).continuous()[1:]
+    path = {skeleton.names[0]: places / skeleton.unit_factor(1.0)}
+    return continued(last, {skeleton.names[0]: root, **_rotations(features)}, path)
 
 
 def _at_rest(features: Motion) -> Motion:

@@ -1,0 +1,32 @@
+"""Arrays out of a .npz file, of which nothing is believed that its size does not bear out; nothing is unpickled."""
+
+import io
+import math
+import zipfile
+from typing import Any
+
+import numpy as np
+from numpy.lib import format as npy
+from numpy.typing import NDArray
+
+MAX_BYTES = 2**29
+"""Of an array, unpacked: an hour of a hundred channels at 120 frames a second, and more."""
+
+
+def array(archive: zipfile.ZipFile, name: str, kinds: str) -> NDArray[Any]:
+    """One array of a dtype of some kinds, whose size is known to be what the archive holds before memory is taken.
+
+    KeyError if there is none of that name, ValueError if it is too large, of another type or does not fit its size;
+    a damaged archive makes zipfile and its unpackers raise errors of a dozen types.
+    """
+    info = archive.getinfo(f"{name}.npy")
+    if info.file_size > MAX_BYTES:
+        raise ValueError(f"array {name!r} has {info.file_size} bytes, and at most {MAX_BYTES} are read")
+    content = archive.read(info)
+    stream = io.BytesIO(content)
+    headers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
+    shape, by_columns, dtype = headers[npy.read_magic(stream)](stream)
+    size = len(content) - stream.tell()
+    if dtype.kind not in kinds or math.prod(shape) * dtype.itemsize != size:
+        raise ValueError(f"array {name!r} of {dtype} {shape} does not fit {size} bytes, or is of the wrong type")
+    return np.frombuffer(content, dtype, offset=stream.tell()).reshape(shape, order="F" if by_columns else "C")

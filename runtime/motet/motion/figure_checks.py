@@ -1,0 +1,109 @@
+"""What a figure must be like to be taken for a human's, and how long its unit of length is."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from motet.errors import MotionError
+from motet.motion.humanoid import LEFT_RIGHT, LEG, sided
+from motet.motion.joint_map import NEEDED, JointMap
+from motet.motion.rest_pose import Aims, direction, legs_up, to_left, trunk_up, unit
+from motet.motion.rotations import Array
+from motet.motion.skeleton import Skeleton
+
+UNITS = {
+    "metres": 1.0,
+    "decimetres": 0.1,
+    "CMU's unit": 0.0254 / 0.45,
+    "inches": 0.0254,
+    "centimetres": 0.01,
+    "millimetres": 0.001,
+}
+"""Units that skeletons are written in, with their length in metres."""
+
+ADULT_LEG, LIKELY_LEG, POSSIBLE_LEG = 0.82, (0.55, 1.1), (0.2, 1.6)
+"""Metres of thigh and shin together: of an adult, within which a unit is taken for granted, and at all possible."""
+
+SHORTEST = 0.02
+"""A bone of a limb is at least this part of thigh and shin."""
+
+BENT = 0.3
+"""The sine from which on a knee counts as bent."""
+
+
+class Unit(NamedTuple):
+    """A length unit in metres, None where it is not known, and what there is to say about it."""
+
+    metres: float | None
+    note: str | None
+
+
+def leg_of(skeleton: Skeleton, joint_map: JointMap, aims: Aims, rest: Array) -> float:
+    """Length of thigh and shin in the skeleton's unit, the mean of both sides; MotionError for bones without length."""
+    lengths = {
+        bone: float(np.linalg.norm(direction(rest, joint_map.joints[bone], aims[bone])))
+        for bone in NEEDED
+        if bone not in ("hips", "spine") and "Foot" not in bone and aims[bone]
+    }
+    leg = sum(lengths[sided(side, part)] for side in LEFT_RIGHT for part in LEG[:2]) / 2
+    short = [skeleton.names[joint_map.joints[bone]] for bone, length in lengths.items() if length <= SHORTEST * leg]
+    if short or not leg > 0:
+        raise MotionError(f"bones of length zero: {', '.join(short)}; limbs of a human need a length")
+    return leg
+
+
+def unit_of(skeleton: Skeleton, leg: float) -> Unit:
+    """The skeleton's unit as it says, or else as the length of its legs tells; MotionError for giants and dwarfs."""
+    stated = skeleton.metres_per_unit
+    if stated is not None:
+        if POSSIBLE_LEG[0] < leg * stated < POSSIBLE_LEG[1]:
+            return Unit(stated, None)
+        guess = _guess(leg)
+        remedy = f"; its lengths look like {guess}" if guess else ""
+        raise MotionError(
+            f"legs of {leg * stated:.3g} m: a human's are {POSSIBLE_LEG[0]:g} to {POSSIBLE_LEG[1]:g} m{remedy}: "
+            "give the unit of the file (motet's --unit-in)"
+        )
+    guess = _guess(leg)
+    if guess is None:
+        return Unit(None, "unit not known: the figure is taken to be an adult's size")
+    return Unit(UNITS[guess], f"unit taken to be {guess} from the length of the legs, {leg * UNITS[guess]:.2f} m")
+
+
+def _guess(leg: float) -> str | None:
+    near = {name: abs(np.log(leg * metres / ADULT_LEG)) for name, metres in UNITS.items()}
+    likely = [name for name, metres in UNITS.items() if LIKELY_LEG[0] < leg * metres < LIKELY_LEG[1]]
+    return min(likely, key=lambda name: near[name], default=None)
+
+
+def check_frames(positions: Array, joint_map: JointMap, aims: Aims) -> None:
+    """Refuse frames (T, J, 3) that no human's body goes through: four legs, inside out, or with knees the other way."""
+    if not len(positions):
+        return
+    upright = np.sum(trunk_up(positions, joint_map) * legs_up(positions, joint_map), axis=-1)
+    if np.quantile(upright, 0.95) < 0.3:
+        raise MotionError(
+            "the trunk never stands above the legs: this looks like a figure on four legs, not like a human's"
+        )
+    left = unit(to_left(positions, joint_map, "UpperLeg"))
+    forward = np.cross(left, legs_up(positions, joint_map))
+    feet = [sided(side, "Foot") for side in LEFT_RIGHT if aims[sided(side, "Foot")]]
+    toes = [np.sum(forward * unit(direction(positions, joint_map.joints[bone], aims[bone])), axis=-1) for bone in feet]
+    if toes and np.median(toes) < -0.3:
+        raise MotionError("the feet point backwards: left and right are swapped, or the frames turn inside out")
+    if _wrong_knees(positions, joint_map, aims, left) > 0.6:
+        raise MotionError(
+            "the knees bend forwards: the frames turn inside out (a wrong order of rotations?), or this is no human"
+        )
+
+
+def _wrong_knees(positions: Array, joint_map: JointMap, aims: Aims, left: Array) -> float:
+    """The part of the frames with a bent knee in which it bends the wrong way; 0 where hardly any knee is bent."""
+    wrong, bent = 0, 0
+    for bones in ([sided(side, part) for part in LEG[:2]] for side in LEFT_RIGHT):
+        thigh, shin = (unit(direction(positions, joint_map.joints[bone], aims[bone])) for bone in bones)
+        hinge = np.cross(thigh, shin)
+        is_bent = np.linalg.norm(hinge, axis=-1) > BENT
+        bent += int(is_bent.sum())
+        wrong += int((np.sum(hinge * left, axis=-1)[is_bent] < 0).sum())
+    return wrong / bent if bent >= 0.1 * len(positions) else 0.0

@@ -1,0 +1,158 @@
+"""Finding the bones of the humanoid by the names of joints: one table for each convention, in the folder conventions.
+
+A table is a JSON object: "title"; "sides", pairs of what stands for left and right; "joints", bone -> the names it can
+have, with ``{s}`` in the place of the side (of "spine" and "neck" all that are there count, upwards, of others the
+first); "aside", other joints that files of this convention have and that tell it from its neighbours; "prefixes",
+regular expressions of what can stand before every name; "rest", for files that are known to rest in a T-pose of their
+own, what that pose is on the humanoid: bone -> rotation vector in degrees, of the left side; "axes", for files that
+rest in no body's pose: name -> the joint's axes that point left, up and forward in a T-pose. Upper and lower case and
+separators do not count.
+"""
+
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache, lru_cache
+from importlib.resources import files
+from typing import Any
+
+from motet.errors import MotionError
+from motet.motion.humanoid import LEFT_RIGHT, sided
+from motet.motion.joint_map import JointMap, Triple, check_map, missing_bones, missing_reason
+from motet.motion.skeleton import Skeleton
+
+CHAINS = ("spine", "neck")
+TRUNK = ("hips", "head", *CHAINS)
+
+
+@dataclass(frozen=True)
+class Convention:
+    """One table: for each bone the plain names that its joint can have; the same of joints that are no bones."""
+
+    title: str
+    names: dict[str, tuple[str, ...]]
+    aside: frozenset[str]
+    prefixes: tuple[str, ...]
+    rest: dict[str, Triple] | None
+    axes: dict[str, str]
+
+
+@dataclass(frozen=True)
+class Match:
+    """What one convention makes of a skeleton's names.
+
+    known: how many joints the convention has names for; absent: how many of its bones the skeleton lacks.
+    """
+
+    title: str
+    joints: dict[str, int]
+    chains: dict[str, tuple[int, ...]]
+    known: int
+    absent: int
+    rest: dict[str, Triple] | None
+    axes: dict[int, str]
+
+    @property
+    def missing(self) -> list[str]:
+        """The bones that are missing."""
+        return missing_bones(self.joints, self.chains["spine"])
+
+
+@cache
+def conventions() -> tuple[Convention, ...]:
+    """All tables; one with several ways to write the sides comes once for each."""
+    tables = sorted((files("motet.motion") / "conventions").iterdir(), key=lambda table: table.name)
+    found = []
+    for table in tables:
+        content = json.loads(table.read_text("utf-8"))
+        found += [_convention(content, sides) for sides in content["sides"]]
+    return tuple(found)
+
+
+def _convention(content: dict[str, Any], sides: Sequence[str]) -> Convention:
+    names = {}
+    for bone, known in content["joints"].items():
+        if bone in TRUNK:
+            names[bone] = tuple(map(plain, known))
+        else:
+            for side, word in zip(LEFT_RIGHT, sides, strict=True):
+                names[sided(side, bone)] = tuple(plain(name.replace("{s}", word)) for name in known)
+    aside = {plain(name.replace("{s}", word)) for name in content.get("aside", []) for word in sides}
+    axes = {plain(name): known for name, known in content.get("axes", {}).items()}
+    prefixes = tuple(content.get("prefixes", ()))
+    return Convention(content["title"], names, frozenset(aside), prefixes, _rest(content.get("rest")), axes)
+
+
+def _rest(turns: dict[str, list[float]] | None) -> dict[str, Triple] | None:
+    """The turns of both sides: those of the right mirror those of the left."""
+    if turns is None:
+        return None
+    rest: dict[str, Triple] = {}
+    for bone, (x, y, z) in turns.items():
+        rest |= (
+            {bone: (x, y, z)} if bone in TRUNK else {sided("left", bone): (x, y, z), sided("right", bone): (x, -y, -z)}
+        )
+    return rest
+
+
+def plain(name: str) -> str:
+    """A name without what differs between files: case, separators, and the namespace before a colon."""
+    return re.sub(r"[^a-z0-9]", "", name.rsplit(":", maxsplit=1)[-1].lower())
+
+
+def plain_names(names: Sequence[str], prefixes: Sequence[str] = ()) -> list[str]:
+    """Plain names without the prefixes given, or without the first word where nearly all names begin with it."""
+    first = [re.match(r"[A-Za-z]+[0-9]*[ _:.-]+(?=.)", name) for name in names]
+    words = [match[0] for match in first if match]
+    common = max(words, key=words.count, default="")
+    alternatives = [re.escape(common)] if words.count(common) > 0.8 * len(names) else []
+    pattern = re.compile("|".join(f"(?:{p})[ _:.-]*" for p in (*prefixes, *alternatives)) or "(?!)", re.IGNORECASE)
+    stripped = [re.sub(f"^(?:{pattern.pattern})(?=.)", "", name, flags=re.IGNORECASE) for name in names]
+    return [plain(name) for name in stripped]
+
+
+@lru_cache(maxsize=256)
+def map_by_names(skeleton: Skeleton) -> JointMap | None:
+    """The map by the convention that fits best, None where none does.
+
+    MotionError where a convention fits but for bones that are missing, or where two joints are the hips.
+    """
+    matches = [_match(convention, skeleton) for convention in conventions()]
+    whole = [match for match in matches if not match.missing]
+    best = max(whole or matches, key=lambda match: (match.known, -match.absent))
+    if not whole:
+        if len(best.joints) >= 6 and best.known > 0.5 * len(skeleton.names):
+            raise MotionError(missing_reason(best.missing, best.joints))
+        return None
+    confidence = round(1.0 - 0.3 * best.absent / (best.absent + best.known), 2)
+    found = JointMap(
+        best.joints, best.chains["spine"], best.chains["neck"], best.title, confidence, best.rest, best.axes
+    )
+    return check_map(skeleton, found)
+
+
+def _match(convention: Convention, skeleton: Skeleton) -> Match:
+    names = plain_names(skeleton.names, convention.prefixes)
+    _refuse_two_hips(skeleton, names, convention.names["hips"])
+    joints = {
+        bone: names.index(found[0])
+        for bone, known in convention.names.items()
+        if bone not in CHAINS and (found := [name for name in known if name in names])
+    }
+    chains = {
+        chain: tuple(sorted(names.index(name) for name in convention.names[chain] if name in names)) for chain in CHAINS
+    }
+    known = {name for bone in convention.names.values() for name in bone} | convention.aside
+    absent = [bone for bone in convention.names if bone not in joints and not chains.get(bone)]
+    absent += [name for chain in CHAINS for name in convention.names[chain] if name not in names]
+    axes = {i: convention.axes[name] for i, name in enumerate(names) if name in convention.axes}
+    count = sum(name in known for name in names)
+    return Match(convention.title, joints, chains, count, len(absent), convention.rest, axes)
+
+
+def _refuse_two_hips(skeleton: Skeleton, names: list[str], hips: tuple[str, ...]) -> None:
+    found = [i for i, name in enumerate(names) if name == hips[0] and len(skeleton.children[i]) >= 3]
+    if len(found) > 1:
+        both = " and ".join(repr(skeleton.names[i]) for i in found)
+        raise MotionError(f"this file has two hips, {both}: give a file with one figure, each in one of its own")

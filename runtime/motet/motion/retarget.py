@@ -1,0 +1,206 @@
+"""Motions of any human figure onto the humanoid, and the humanoid's onto any figure.
+
+A bone of the humanoid has the rotation of its joint in the world, times a constant that makes up for the rest pose
+(:mod:`motet.motion.fitting`). Back and neck share their turns out among as many joints as there are; what a figure
+lacks stays at rest. Paths are scaled by the lengths of the legs and laid so that the feet are on the ground.
+"""
+
+import logging
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from motet.errors import MotionError
+from motet.motion import fitting, humanoid
+from motet.motion.figure_checks import check_frames, unit_of
+from motet.motion.fitting import Fitted, fit, upright
+from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, NECK, PARENTS, SPINE, leg_length, sided
+from motet.motion.joint_map import JointMap
+from motet.motion.joint_names import map_by_names
+from motet.motion.joint_tree import map_by_tree
+from motet.motion.kinematics import global_transforms, local_rotations, local_translations, skeleton_of
+from motet.motion.mmm_figure import is_mmm, with_figure
+from motet.motion.motion import Motion
+from motet.motion.rest_pose import middle
+from motet.motion.rotations import Array
+from motet.motion.skeleton import END_SUFFIX, Skeleton
+from motet.motion.spread import spread
+from motet.motion.world_rotations import motion_of, places_of
+
+log = logging.getLogger(__name__)
+
+GROUND = 5.0
+"""The percentile of the lowest points of the soles that stands on the ground."""
+
+HIPS = [HUMANOID.index(sided(side, "UpperLeg")) for side in LEFT_RIGHT]
+
+
+@dataclass(frozen=True)
+class Humanoid:
+    """A motion brought to the humanoid, and what was found on the way.
+
+    motion: on :data:`motet.motion.humanoid.HUMANOID`, at the file's frame rate, root translation in metres.
+    joints: bone -> the names of the joints that it was taken from.
+    convention: the convention of the joints' names, "by the tree", or the name of the user's map.
+    confidence: from 0 to 1, how sure it is that every joint was taken for what it is.
+    leg: metres of the figure's thigh and shin together, None where its unit is not known.
+    notes: sentences about what was assumed.
+    """
+
+    motion: Motion
+    joints: dict[str, tuple[str, ...]]
+    convention: str
+    confidence: float
+    leg: float | None
+    notes: tuple[str, ...]
+
+    @property
+    def summary(self) -> str:
+        """What was found in one line: convention, confidence and notes."""
+        return "; ".join((f"joints of {self.convention}, confidence {self.confidence:.2f}", *self.notes))
+
+
+def map_of(motion: Motion) -> JointMap:
+    """Which joint of the motion's skeleton is which bone: by names, else by the tree; MotionError if it is no human."""
+    return map_by_names(skeleton_of(motion)) or map_by_tree(motion)
+
+
+def to_humanoid(motion: Motion, joint_map: JointMap | None = None) -> Humanoid:
+    """Bring a motion of any human skeleton to the humanoid.
+
+    joint_map: which joint is which bone, as :func:`motet.motion.joint_map.read_map` reads it; found where not given.
+    The path is scaled by the ratio of the legs' lengths, and the soles' lowest points are laid on y = 0 at their 5th
+    percentile. A file with z up is turned upright. MotionError, with the reason, for a figure that is no human's.
+    """
+    motion = with_figure(motion) if is_mmm(motion) else motion
+    skeleton = skeleton_of(motion)
+    if not len(motion):
+        raise MotionError("this motion has no frames: there is nothing to bring to the humanoid")
+    joint_map = joint_map or map_of(motion)
+    rotations, places = global_transforms(motion)
+    fitted = fit(skeleton, joint_map, rotations, places)
+    check_frames(places, joint_map, fitted.aims)
+    unit, turn = unit_of(skeleton, fitted.leg), upright(fitted, places)
+    turned = turn @ _humanoid_rotations(rotations, fitted)
+    legs = middle(places, joint_map, "UpperLeg") @ turn.T * (leg_length() / fitted.leg)
+    notes = [note for note in (fitted.note, unit.note) if note]
+    if joint_map.joints["hips"]:
+        notes.append(f"the joint {skeleton.names[0]!r} above the hips is folded in")
+    if not np.array_equal(turn, np.eye(3)):
+        notes.append("turned upright: the figure does not stand along y")
+    return Humanoid(
+        _on_humanoid(turned, legs, motion.fps),
+        joint_map.names(skeleton),
+        joint_map.convention,
+        round(joint_map.confidence * fitted.confidence, 2),
+        None if unit.metres is None else fitted.leg * unit.metres,
+        tuple(notes),
+    )
+
+
+def on_humanoid(motion: Motion) -> Motion:
+    """The motion of :func:`to_humanoid`, or the motion itself if it is the humanoid's; what is found is logged."""
+    if motion.skeleton == HUMANOID:
+        return motion
+    found = to_humanoid(motion)
+    log.info("brought to the humanoid: %s", found.summary)
+    return found.motion
+
+
+def _humanoid_rotations(rotations: Array, fitted: Fitted) -> Array:
+    """Rotations in the world (T, J, 3, 3) of the humanoid's joints, from those of the figure's."""
+    joint_map, aligned = fitted.joint_map, fitted.aligned
+    turned = {bone: rotations[:, joint] @ aligned[joint] for bone, joint in joint_map.joints.items()}
+    spine, neck = ([rotations[:, i] @ aligned[i] for i in chain] for chain in (joint_map.spine, joint_map.neck))
+    neck += [turned["head"]] if "head" in turned else []
+    turned |= _shared_out([turned["hips"], *spine], SPINE)
+    turned |= _shared_out([spine[-1], *neck], NECK) if neck else {}
+    for bone, parent in PARENTS.items():
+        turned.setdefault(bone, turned[parent])
+    return np.stack([turned[name.removesuffix(END_SUFFIX)] for name in HUMANOID.names], axis=1)
+
+
+def _shared_out(chain: list[Array], names: tuple[str, ...]) -> dict[str, Array]:
+    shared = spread(np.stack(chain, axis=1), len(names))
+    return {name: shared[:, i] for i, name in enumerate(names)}
+
+
+def _on_humanoid(turned: Array, legs: Array, fps: float) -> Motion:
+    """The motion of rotations in the world (T, J, 3, 3), the middle of the legs' joints at ``legs`` (T, 3)."""
+    places = places_of(HUMANOID, turned)
+    root = legs - places[:, HIPS].mean(axis=1)
+    root[:, 1] -= _ground(humanoid.sole_points(turned, places + root[:, None]))
+    return motion_of(HUMANOID, turned, {0: root}, fps)
+
+
+def _ground(soles: Array) -> float:
+    """The height of the ground under points (T, P, 3) of the soles; 0 for no frames."""
+    return float(np.percentile(soles[..., 1].min(axis=1), GROUND)) if len(soles) else 0.0
+
+
+def from_humanoid(motion: Motion, like: Motion | Skeleton, joint_map: JointMap | None = None) -> Motion:
+    """Put a motion of the humanoid onto another human skeleton, with its names, rest pose and proportions.
+
+    like: the skeleton; where its rest pose is not a standing body, a motion of it, whose frames then tell how its
+        joints stand.
+    joint_map: as for :func:`to_humanoid`. Joints that are no bones keep their rest. The path is scaled by the ratio of
+    the legs' lengths and the feet stay on the ground. Returns the translation of the hips in "length" and three angles
+    in "deg" for each joint; the skeleton knows its unit where the legs' length tells it.
+    MotionError for a motion that is not the humanoid's, or a skeleton that is no human's.
+    """
+    if motion.skeleton != HUMANOID:
+        raise MotionError("this motion is not on the humanoid: bring it there by to_humanoid first")
+    example = like if isinstance(like, Motion) else Motion(np.zeros((1, 0)), (), (), motion.fps, like)
+    joint_map = joint_map or map_of(example)
+    fitted = fit(skeleton_of(example), joint_map, *global_transforms(example))
+    skeleton, still = _still(example, fitted)
+    skeleton = replace(skeleton, metres_per_unit=unit_of(skeleton, fitted.leg).metres)
+    source, places = global_transforms(motion)
+    turned = _figure_rotations(source, fitted, skeleton, still)
+    figure = places_of(skeleton, turned)
+    scale = fitted.leg / leg_length()
+    moved = places[:, HIPS].mean(axis=1) * scale - middle(figure, joint_map, "UpperLeg")
+    bones = {bone: source[:, HUMANOID.index(bone)] for bone in fitted.heights}
+    soles = fitting.sole_points(fitted, bones, figure + moved[:, None])
+    moved[:, 1] += scale * _ground(humanoid.sole_points(source, places)) - _ground(soles)
+    carrier = joint_map.carrier(skeleton)
+    if carrier:
+        above = skeleton.joints[carrier].parent
+        from_above = figure[:, carrier] + moved - figure[:, above] - skeleton.offsets[0]
+        moved = (np.swapaxes(turned[:, above], -1, -2) @ from_above[..., None])[..., 0]
+    return motion_of(skeleton, turned, {carrier: moved}, motion.fps)
+
+
+def _still(example: Motion, fitted: Fitted) -> tuple[Skeleton, Array]:
+    """The skeleton and local rotations (J, 3, 3) of joints that are no bones: at rest, or as in the first frame."""
+    skeleton = skeleton_of(example)
+    if fitted.at_rest:
+        return skeleton, np.tile(np.eye(3), (len(skeleton.joints), 1, 1))
+    offsets = local_translations(example)[0].tolist()
+    offsets[0] = skeleton.joints[0].offset
+    joints = [replace(joint, offset=tuple(offset)) for joint, offset in zip(skeleton.joints, offsets, strict=True)]
+    return Skeleton(tuple(joints), skeleton.metres_per_unit), local_rotations(example)[0]
+
+
+def _figure_rotations(source: Array, fitted: Fitted, skeleton: Skeleton, still: Array) -> Array:
+    """Rotations in the world (T, J, 3, 3) of a figure's joints, from those of the humanoid's."""
+    joint_map = fitted.joint_map
+    wanted = {joint: source[:, HUMANOID.index(bone)] for bone, joint in joint_map.joints.items()}
+    back = [source[:, HUMANOID.index(bone)] for bone in ("hips", *SPINE)]
+    wanted |= dict(zip(joint_map.spine, _chain(back, len(joint_map.spine)), strict=True))
+    neck = [source[:, HUMANOID.index(bone)] for bone in (SPINE[-1], *NECK)]
+    # the head is the last of the chain, whether the figure has a joint for it or not
+    shared = _chain(neck, len(joint_map.neck) + ("head" in joint_map.joints))
+    wanted |= dict(zip(joint_map.neck, shared, strict=False))
+    wanted.setdefault(joint_map.carrier(skeleton), wanted[joint_map.joints["hips"]])
+    turned = np.empty((len(source), len(skeleton.joints), 3, 3))
+    for i, joint in enumerate(skeleton.joints):
+        if i in wanted:
+            turned[:, i] = wanted[i] @ fitted.aligned[i].T
+        else:
+            turned[:, i] = turned[:, joint.parent] @ still[i] if i else still[0]
+    return turned
+
+
+def _chain(chain: list[Array], count: int) -> list[Array]:
+    return list(np.moveaxis(spread(np.stack(chain, axis=1), count), 1, 0)) if count else []

@@ -1,0 +1,24 @@
+"""Sharing out turns between chains of different numbers of joints: backs and necks."""
+
+import numpy as np
+
+from motet.motion.rotations import Array, rotmat_to_rotvec, rotvec_to_rotmat
+
+
+def spread(chain: Array, count: int) -> Array:
+    """World rotations (T, count, 3, 3) of another chain with the same ends, from those of a chain (T, N + 1, 3, 3).
+
+    The first rotation is that of the joint that carries the chain and is not among the result; the last of both
+    chains is the same. Between joints rotations go the shortest way, by how far up the chain they are.
+    """
+    last = chain.shape[1] - 1
+    places = np.arange(1, count + 1) * last / count
+    below = np.minimum(places.astype(int), last - 1)
+    part = places - below
+    shared: Array = chain[:, below + 1]
+    inner = np.flatnonzero(part < 1)
+    if len(inner):
+        lower = chain[:, below[inner]]
+        turn = rotmat_to_rotvec(np.swapaxes(lower, -1, -2) @ shared[:, inner])
+        shared[:, inner] = lower @ rotvec_to_rotmat(turn * part[inner, None])
+    return shared

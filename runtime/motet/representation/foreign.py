@@ -1,0 +1,95 @@
+"""Motions of other figures: brought onto a model's figure by way of the humanoid, and what follows them back."""
+
+import logging
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from motet.errors import MotionError
+from motet.motion.kinematics import (
+    AXES,
+    continued,
+    euler_of,
+    local_rotations,
+    local_translations,
+    skeleton_of,
+    with_channels,
+)
+from motet.motion.mmm_figure import is_mmm
+from motet.motion.motion import Motion
+from motet.motion.retarget import from_humanoid, map_of, on_humanoid, to_humanoid
+from motet.motion.rotations import Array, rotmat_to_rotvec
+from motet.motion.skeleton import Skeleton
+from motet.representation.figure import other_bone
+
+log = logging.getLogger(__name__)
+
+CLEAN = 1.0
+"""Degrees by which hips that were brought to the humanoid and back may be turned: more, and the figure's own world is
+another, as where z is up."""
+
+
+def foreign(motion: Motion, skeleton: Skeleton, joints: Iterable[str]) -> str | None:
+    """Why a motion's angles do not mean the same on a skeleton, of which some joints count; None where they do."""
+    if motion.skeleton is None:
+        return "it has no skeleton of its own" if is_mmm(motion) else None
+    own = motion.skeleton
+    lacking = [name for name in joints if name not in own.places]
+    if lacking:
+        return f"the model's figure has joints that this motion lacks: {', '.join(lacking)}"
+    return next((reason for name in own.names if (reason := other_bone(own, skeleton, name))), None)
+
+
+def brought(motion: Motion, pose: Motion, reason: str) -> Motion:
+    """A motion of another human figure on the figure of a pose.
+
+    pose: one frame; joints of which the humanoid says nothing, such as thumbs, stand as in it.
+    reason: why the motion is not taken as it is, for the MotionError where one of the figures is no human's.
+    """
+    skeleton = skeleton_of(pose)
+    try:
+        found = from_humanoid(on_humanoid(motion), skeleton)
+        said = map_of(pose).names(skeleton).values()
+    except MotionError as error:
+        raise MotionError(f"{error}; and it cannot be taken as it is: {reason}") from error
+    for name in frozenset(found.rotation_columns()).difference(skeleton.names[:1], *said):
+        place = skeleton.index(name)
+        angles = np.degrees(euler_of(local_rotations(pose, [place])[:, 0], skeleton.joints[place]))
+        channels = tuple(f"{name}.r{axis}" for axis in AXES)
+        found = with_channels(found, channels, np.repeat(angles, len(found), axis=0), ("deg",) * 3)
+    return found
+
+
+def carried_back(following: Motion, figure: Motion, own: Motion) -> Motion | None:
+    """What follows a motion that was brought onto a model's figure, on the motion's own skeleton and in its channels.
+
+    following: on the model's figure, from the end of ``figure`` on; figure: ``own``, brought there; all at one frame
+    rate. It begins where ``own`` ends: each joint keeps the turn by which it differs there from what comes back, and
+    joints of which the humanoid says nothing stay as they are. None, which is logged, where the file has no skeleton or
+    no channels for the path, or the figure's own world is another than the model's.
+    """
+    if own.skeleton is None:
+        log.info("the prediction stays on the model's figure: the file has no skeleton")
+        return None
+    last, skeleton = own[-1:], own.skeleton
+    both = np.concatenate([figure.values[-1:], following.select(figure.channels, figure.units).values])
+    back = from_humanoid(to_humanoid(replace(figure, values=both)).motion, own)
+    turned, then = local_rotations(back), local_rotations(last)[0]
+    turns = np.swapaxes(turned[0], -1, -2) @ then
+    carrier = next(name.rpartition(".")[0] for name in back.channels if name.endswith(".tx"))
+    if not _clean(turns, skeleton, carrier) or not {f"{carrier}.t{axis}" for axis in "xyz"} <= set(own.channels):
+        log.info("the prediction stays on the model's figure: the file's own turns or moves its hips in another way")
+        return None
+    moved, places = local_translations(back), local_translations(last)[0]
+    rotations = {name: turned[1:, i] @ turns[i] for i, name in enumerate(skeleton.names)}
+    return continued(last, rotations, {n: places[i] + moved[1:, i] - moved[0, i] for i, n in enumerate(skeleton.names)})
+
+
+def _clean(turns: Array, skeleton: Skeleton, carrier: str) -> bool:
+    """Whether hips and all above them come back as they were."""
+    joint, above = skeleton.index(carrier), []
+    while joint >= 0:
+        above.append(joint)
+        joint = skeleton.joints[joint].parent
+    return bool((np.degrees(np.linalg.norm(rotmat_to_rotvec(turns[above]), axis=-1)) < CLEAN).all())

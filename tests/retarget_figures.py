@@ -1,0 +1,139 @@
+"""Figures of retargeting on the motion beside the project: ``python tests/retarget_figures.py ../shared/data``.
+
+Prints a table of all files by convention, how far trials that exist as AMC and as BVH agree on the humanoid, how
+cmu-describe describes both forms and takes of ACCAD, and what retargeting ten seconds takes.
+"""
+
+import sys
+import time
+import zipfile
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+import motet
+from motet.errors import MotetError
+from motet.formats import read_motion
+from motet.models.describe import DescribeModel
+from motet.motion.humanoid import BONES, HUMANOID
+from motet.motion.kinematics import global_transforms
+from motet.motion.mixamo import MIXAMO
+from motet.motion.motion import Motion
+from motet.motion.retarget import from_humanoid, to_humanoid
+
+ARCHIVES = ("cmu-asfamc.zip", "cmu-asfamc-more.zip", "cmu-bvh.zip", "cmu-bvh-more.zip", "accad-bvh.zip")
+
+LEFT_OUT = ("14_36",)
+"""A file that is another one's copy, as the data's README says."""
+
+ADDED = {"07_12": 2}
+"""Frames that a BVH has before the AMC's where it is not the added T-pose alone: this AMC lacks its first frame."""
+
+LIMBS = tuple(bone for bone in BONES if bone.endswith(("UpperLeg", "LowerLeg", "Foot", "UpperArm", "LowerArm")))
+
+
+def unpacked(data: Path, folder: Path, names: tuple[str, ...] = ARCHIVES) -> list[Path]:
+    """The motion files of the archives, unpacked; those called "NAME-more" over those called "NAME"."""
+    for name in names:
+        with zipfile.ZipFile(data / name) as archive:
+            archive.extractall(folder / name.removesuffix(".zip").removesuffix("-more"))
+    files = sorted(path for path in folder.rglob("*") if path.suffix in (".amc", ".bvh"))
+    return [path for path in files if path.stem not in LEFT_OUT]
+
+
+def agreement(bvh: Motion, amc: Motion, added: int) -> tuple[float, dict[str, float]]:
+    """Centimetres between the bones' joints, mean over frames and bones; and degrees for each limb's bone, mean.
+
+    added: frames that the BVH has before those of the AMC.
+    """
+    (turned, places), (other_turned, other_places) = (
+        global_transforms(to_humanoid(motion).motion) for motion in (bvh, amc)
+    )
+    bones = [HUMANOID.index(bone) for bone in BONES]
+    frames = min(len(turned) - added, len(other_turned))
+    apart = np.linalg.norm(places[added : added + frames, bones] - other_places[:frames, bones], axis=-1)
+    limbs = [HUMANOID.index(bone) for bone in LIMBS]
+    product = np.swapaxes(turned[added : added + frames, limbs], -1, -2) @ other_turned[:frames, limbs]
+    cosines = (np.trace(product, axis1=-2, axis2=-1) - 1) / 2
+    degrees = np.degrees(np.arccos(np.clip(cosines, -1, 1))).mean(axis=0)
+    return float(100 * apart.mean()), dict(zip(LIMBS, degrees.tolist(), strict=True))
+
+
+def both_forms(folder: Path) -> Iterator[tuple[str, Motion, Motion, int]]:
+    """Trials that exist as BVH and as AMC: name, both motions, and the frames that the BVH adds in front."""
+    for path in sorted((folder / "cmu-bvh").glob("*.bvh")):
+        amc = folder / "cmu-asfamc" / "amc" / f"{path.stem}.amc"
+        if amc.is_file():
+            yield path.stem, read_motion(path), read_motion(amc), ADDED.get(path.stem, 1)
+
+
+def _print_descriptions(folder: Path) -> None:
+    """Best sentences of trials in both forms, the T-pose in front of the BVH left out; and of every sixteenth take."""
+    model = motet.load_as(DescribeModel, "cmu-describe")
+
+    def best(motion: Motion) -> str:
+        return model.describe(model.windows(motion)[0][1])[0].text
+
+    print("trial  from AMC | from BVH")
+    for name, bvh, amc, added in both_forms(folder):
+        print(f"{name}  {best(amc)} | {best(bvh[added:])}")
+    for path in sorted((folder / "accad-bvh").rglob("*.bvh"))[::16]:
+        print(f"{path.stem}: {best(read_motion(path))}")
+
+
+def _print_times(motion: Motion) -> None:
+    """Milliseconds of one core for ten seconds of a motion of CMU's, there and on."""
+    for fps in (30, 120):
+        few = motion.resample(fps)
+        ten = replace(few, values=np.concatenate([few.values] * 20)[: 10 * fps])
+        humanoid = to_humanoid(ten).motion
+        there, on = _milliseconds(partial(to_humanoid, ten)), _milliseconds(partial(from_humanoid, humanoid, MIXAMO))
+        print(f"10 s at {fps} fps: {there:.1f} ms onto the humanoid, {on:.1f} ms from there onto Mixamo's names")
+
+
+def _milliseconds(what: Callable[[], object]) -> float:
+    times = []
+    for _ in range(7):
+        start = time.process_time()
+        what()
+        times.append(1000 * (time.process_time() - start))
+    return min(times)
+
+
+def _print_files(files: list[Path]) -> None:
+    found: dict[tuple[str, float, tuple[str, ...]], int] = defaultdict(int)
+    for path in files:
+        try:
+            humanoid = to_humanoid(read_motion(path))
+            notes = tuple(note.rpartition(",")[0] if note.endswith(" m") else note for note in humanoid.notes)
+            found[humanoid.convention, humanoid.confidence, notes] += 1
+        except MotetError as error:
+            found[f"REFUSED {path.name}: {error}", 0.0, ()] += 1
+    for (convention, confidence, notes), count in sorted(found.items()):
+        print(f"{count:5d}  {confidence:.2f}  {convention}: {'; '.join(notes)}")
+
+
+def main(data: Path) -> None:
+    """Print all figures."""
+    with TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        files = [*unpacked(data, folder), *sorted((data / "kit").glob("0*.xml"))]
+        print("files  confidence  convention: notes")
+        _print_files(files)
+        print("trial  frames  joints apart, cm  limbs apart, degrees: mean, worst bone")
+        for name, bvh, amc, added in both_forms(folder):
+            apart, limbs = agreement(bvh, amc, added)
+            worst = max(limbs, key=lambda bone: limbs[bone])
+            mean = np.mean(list(limbs.values()))
+            print(f"{name}  {len(amc):5d}  {apart:6.2f}  {mean:6.2f}  {worst} {limbs[worst]:.2f}")
+        _print_descriptions(folder)
+        _print_times(next(amc for _, _, amc, _ in both_forms(folder)))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

@@ -1,0 +1,83 @@
+"""Other figures on the command line: --humanoid, --map, --like, and VRM Animation as an output."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import check_refused, run
+from test_retarget import SKELETONS
+
+import motet
+from motet.motion import HUMANOID
+
+MIXAMO = SKELETONS / "mixamo.bvh"
+
+
+def test_convert_brings_a_file_to_the_humanoid_and_says_what_it_found(tmp_path: Path) -> None:
+    out = tmp_path / "a.npz"
+    result = run("-v", "convert", SKELETONS / "rokoko.bvh", out, "--humanoid")
+    assert result.exit_code == 0
+    assert "motet: brought to the humanoid: joints of Rokoko, confidence 1.00" in result.stderr
+    assert motet.read(out).skeleton == HUMANOID
+    assert run("convert", SKELETONS / "rokoko.bvh", out, "--humanoid").stderr == ""
+
+
+def test_convert_puts_a_file_onto_a_character(tmp_path: Path) -> None:
+    out, source = tmp_path / "a.npz", SKELETONS / "unreal.bvh"
+    assert run("convert", source, out, "--like", MIXAMO).exit_code == 0
+    expected = motet.from_humanoid(motet.to_humanoid(motet.read(source)).motion, like=motet.read(MIXAMO))
+    np.testing.assert_array_equal(motet.read(out).values, expected.values)
+
+
+def test_a_map_says_which_joint_is_which(tmp_path: Path) -> None:
+    plain = motet.read(MIXAMO)
+    found = motet.to_humanoid(plain).joints
+    entries = {bone: list(names) if bone in ("spine", "neck") else names[0] for bone, names in found.items()}
+    (tmp_path / "map.json").write_text(json.dumps(entries))
+    out = tmp_path / "out"
+    out.mkdir()
+    result = run("-v", "convert", MIXAMO, out / "a.npz", "--map", tmp_path / "map.json")
+    assert result.exit_code == 0
+    assert "joints of map.json, confidence 1.00" in result.stderr
+    np.testing.assert_allclose(motet.read(out / "a.npz").values, motet.to_humanoid(plain).motion.values, atol=1e-9)
+    (out / "a.npz").unlink()
+    (tmp_path / "map.json").write_text(json.dumps({**entries, "head": "Skull"}))
+    check_refused(
+        run("convert", MIXAMO, out / "a.npz", "--map", tmp_path / "map.json"), "map.json: head: the skeleton", out, 1
+    )
+
+
+def test_results_are_put_onto_a_character(tmp_path: Path, clips: Path) -> None:
+    names = motet.read(MIXAMO).skeleton.names
+    for command in (
+        ("generate", "a person walks", "--max-seconds", 2),
+        ("predict", clips / "39_14.amc", "--frames", 5),
+        ("control", "walk .5s"),
+    ):
+        out = tmp_path / f"{command[0]}.bvh"
+        assert run(*command, "-o", out, "--like", MIXAMO).exit_code == 0
+        assert motet.read(out).skeleton.names[0] == "mixamorig_Hips"
+        assert len(motet.read(out).skeleton.names) == len(names)
+    page = tmp_path / "control.html"
+    assert run("control", "walk .5s", "-o", page, "--like", MIXAMO).exit_code == 0
+    other = tmp_path / "other.html"
+    assert run("control", "walk .5s", "-o", other).exit_code == 0
+    assert page.read_text() != other.read_text()
+
+
+def test_generate_writes_vrm_animation(tmp_path: Path) -> None:
+    out, bvh = tmp_path / "walk.vrma", tmp_path / "walk.bvh"
+    assert run("generate", "a person walks", "-o", out, "--max-seconds", 3).exit_code == 0
+    assert run("generate", "a person walks", "-o", bvh, "--max-seconds", 3).exit_code == 0
+    written, source = motet.read(out), motet.to_humanoid(motet.read(bvh, unit="m")).motion
+    assert len(written) == len(source)
+    np.testing.assert_allclose(
+        motet.motion.positions(motet.to_humanoid(written).motion), motet.motion.positions(source), atol=2e-3
+    )
+
+
+@pytest.mark.parametrize("command", [("convert", MIXAMO), ("control", "walk 1s", "-o")])
+def test_a_character_that_is_none_is_refused(tmp_path: Path, command: tuple[object, ...]) -> None:
+    refused = run(*command, tmp_path / "a.bvh", "--like", tmp_path / "none.glb")
+    check_refused(refused, "none.glb: no such file", tmp_path)

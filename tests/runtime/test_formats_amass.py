@@ -1,0 +1,70 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from motet.errors import FormatError
+from motet.formats import amass, read_motion
+from motet.motion.humanoid import HUMANOID
+from motet.motion.kinematics import positions
+from motet.motion.retarget import to_humanoid
+from motet.motion.rotations import Array
+
+STANDING = np.array([np.pi / 2, 0.0, 0.0])
+"""The root's rotation vector of a figure that stands in a world with z up: it faces -y there, +z here."""
+
+
+def poses(frames: int = 8) -> tuple[Array, Array]:
+    """Rotation vectors (T, 156) of a body that walks one metre along -y and lifts its left arm; and its path."""
+    vectors, trans = np.zeros((frames, 156)), np.zeros((frames, 3))
+    vectors[:, :3] = STANDING
+    vectors[:, 3 * 16 + 2] = np.linspace(0, 1.3, frames)
+    trans[:, 1], trans[:, 2] = np.linspace(0, -1, frames), 0.93
+    return vectors, trans
+
+
+def test_a_body_stands_up_and_walks_forward(tmp_path: Path) -> None:
+    vectors, trans = poses()
+    np.savez(tmp_path / "a.npz", poses=vectors, trans=trans, mocap_framerate=120.0, betas=np.zeros(16), gender="male")
+    assert amass.is_amass((tmp_path / "a.npz").read_bytes())
+    motion = read_motion(tmp_path / "a.npz")
+    assert (len(motion), motion.fps) == (8, 120)
+    humanoid = to_humanoid(motion)
+    assert humanoid.convention == "SMPL, SMPL-H, SMPL-X (AMASS)"
+    place = dict(zip(HUMANOID.names, np.moveaxis(positions(humanoid.motion), 1, 0), strict=True))
+    assert place["head"][0, 1] > 1.4
+    assert place["leftHand"][0, 0] > 0.6
+    assert place["leftHand"][-1, 1] > place["head"][-1, 1]
+    assert place["leftToes"][0, 2] > place["leftFoot"][0, 2] + 0.05
+    assert place["hips"][-1, 2] - place["hips"][0, 2] == pytest.approx(1.0, abs=0.05)
+    assert place["hips"][-1, 0] == pytest.approx(place["hips"][0, 0])
+
+
+def test_the_newer_names_of_arrays_are_known(tmp_path: Path) -> None:
+    vectors, trans = poses()
+    np.savez(tmp_path / "a.npz", poses=vectors, trans=trans, mocap_framerate=60.0)
+    split = {"root_orient": vectors[:, :3], "pose_body": vectors[:, 3:66], "trans": trans, "mocap_frame_rate": 60}
+    np.savez(tmp_path / "b.npz", **split)
+    old, new = amass.read(tmp_path / "a.npz"), amass.read(tmp_path / "b.npz")
+    np.testing.assert_array_equal(old.values, new.values)
+    assert old.fps == new.fps == 60
+
+
+def test_other_files_are_refused(tmp_path: Path) -> None:
+    vectors, trans = poses()
+    cases = {
+        "no rate": ({"poses": vectors, "trans": trans}, "frame rate is missing"),
+        "narrow": ({"poses": vectors[:, :60], "trans": trans, "mocap_framerate": 30.0}, "expected .frames, 66"),
+        "path": ({"poses": vectors, "trans": trans[:3], "mocap_framerate": 30.0}, "trans must be"),
+        "nan": ({"poses": vectors * np.nan, "trans": trans, "mocap_framerate": 30.0}, "finite"),
+        "other": ({"values": trans}, "not an AMASS file"),
+    }
+    for name, (arrays, reason) in cases.items():
+        np.savez(tmp_path / "x.npz", **arrays)
+        with pytest.raises(FormatError, match=reason):
+            amass.read(tmp_path / "x.npz")
+        assert amass.is_amass((tmp_path / "x.npz").read_bytes()) == (name != "other")
+    (tmp_path / "y.npz").write_bytes(b"nothing")
+    assert not amass.is_amass((tmp_path / "y.npz").read_bytes())
+    with pytest.raises(FormatError):
+        amass.read(tmp_path / "y.npz")
