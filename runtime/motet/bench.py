@@ -3,7 +3,7 @@
 import tempfile
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -45,10 +45,6 @@ class Row:
     unit: str
     baseline: float | None = None
     ratio: float | None = None
-
-    def to_json(self) -> dict[str, Any]:
-        """A JSON object with the fields as keys."""
-        return asdict(self)
 
 
 def durations(

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from predict_manifest import predict_manifest
 
 from motet.models.load import load
 from motet.models.predict import PredictModel
@@ -25,24 +26,7 @@ def test_the_bundle_predicts_what_torch_predicts(tmp_path: Path) -> None:
     config = {"channels": CHANNELS, "kept": list(KEPT), "seed_frames": 50, "system": system}
     net = stepwise("convseq2seq", config)
     net.mean.copy_(torch.randn(45)), net.scale.copy_(torch.rand(45) + 0.5)
-    motion = {
-        "representation": "angles",
-        "channels": [f"joint{n}.e{axis}" for n in range(16) for axis in "xyz"],
-        "units": ["rad"] * CHANNELS,
-        "fps": 60.0,
-        "mean": [0.1] * CHANNELS,
-        "std": [0.5] * CHANNELS,
-        "skeleton": None,
-    }
-    manifest = {
-        "name": "x",
-        "verb": "predict",
-        "model": "convseq2seq",
-        "loop": "free_run",
-        "motion": motion,
-        "defaults": {"horizon": 25},
-    }
-    run = Run({**manifest, "config": config, "licence": {}}, net)
+    run = Run({**predict_manifest("convseq2seq", 16, 25), "config": config}, net)
     export_run(run, tmp_path / "x.zip")
     bundle = load(tmp_path / "x.zip")
     assert isinstance(bundle, PredictModel)

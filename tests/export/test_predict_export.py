@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from predict_manifest import predict_manifest
 
 from motet.bundle.manifest import Manifest
 from motet.models.load import load
@@ -35,24 +36,7 @@ def run() -> Run:
     with torch.no_grad():
         for parameter in net.parameters():
             parameter.add_(0.1 * torch.randn_like(parameter))
-    motion = {
-        "representation": "angles",
-        "channels": [f"joint{n}.e{axis}" for n in range(3) for axis in "xyz"],
-        "units": ["rad"] * CHANNELS,
-        "fps": 60.0,
-        "mean": [0.1] * CHANNELS,
-        "std": [0.5] * CHANNELS,
-        "skeleton": None,
-    }
-    manifest = {
-        "name": "x",
-        "verb": "predict",
-        "model": "trajectory",
-        "loop": "free_run",
-        "motion": motion,
-        "defaults": {"horizon": 6},
-    }
-    return Run({**manifest, "config": vars(config), "licence": {}}, net)
+    return Run({**predict_manifest("trajectory", 3, 6), "config": vars(config)}, net)
 
 
 def test_the_bundle_predicts_what_torch_predicts(run: Run, tmp_path: Path) -> None:

@@ -124,6 +124,8 @@ def test_generate_numbers_the_files_of_several_motions(tmp_path: Path) -> None:
         assert hypothesis["log_likelihood"] == generated.log_likelihood
         assert (hypothesis["frames"], hypothesis["fps"]) == (len(motion), 10)
     assert run("generate", "walks", "walks", "-o", tmp_path / "best.npz").exit_code == 0
+    assert run("generate", "walks", "walks", "-o", tmp_path / "{name}.npz").exit_code == 0
+    assert [(tmp_path / f"{number}.npz").exists() for number in (0, 1, 2)] == [False, True, True]
     assert sorted(path.name for path in tmp_path.glob("best*")) == ["best-1.npz", "best-2.npz"]
 
 

@@ -97,7 +97,7 @@ def test_help_ends_its_lines_in_whole_words() -> None:
         if name in main.list_commands(None):  # type: ignore[arg-type]
             assert re.search(rf"^  {name} +\S", text, re.MULTILINE)
             assert help_line.endswith(".")
-    assert "..." not in text
+    assert "..." not in text + run("bundle", "--help").stdout.partition("Commands:")[2]
     help_of_convert = " ".join(run("convert", "--help").stdout.split())
     for kind in FORMATS:
         assert help_of_convert.count(f"{kind.extension} ({kind.name})") == bool(kind.reader) + bool(kind.writer)

@@ -1,5 +1,6 @@
 """Settings of a run in a file: read, refused, and written so that they repeat the run."""
 
+import re
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -195,6 +196,13 @@ def test_a_unit_that_files_do_not_say_is_asked_for_and_taken(tmp_path: Path) -> 
     trained = motet(*command, "--unit-in", "inch")
     assert trained.exit_code == 0, trained.output
     assert np.isfinite(Run.load(tmp_path / "run").model.scale.numpy()).all()
+
+
+def test_help_lists_the_commands_in_whole_sentences() -> None:
+    text = motet("train", "--help").stdout.partition("Commands:")[2]
+    lines = re.findall(r"^  (\S+) +(.+(?:\n {5,}.+)*)", text, re.MULTILINE)
+    assert {"tdbn", "describe", "predict", "convseq2seq", "erd"} <= {name for name, _ in lines}
+    assert all(said.endswith(".") and not said.endswith(("...", "et al.")) for _, said in lines)
 
 
 def test_tensorboard_is_asked_for_where_it_is_missing(

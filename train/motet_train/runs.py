@@ -40,7 +40,7 @@ class RunError(MotetError, ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A trained model with all that its bundle will say about it: see :func:`motet_train.manifest.manifest_of`."""
+    """A trained model and its manifest: see :meth:`motet_train.recipes.recipe.Job.manifest`."""
 
     manifest: Mapping[str, Any]
     model: Net

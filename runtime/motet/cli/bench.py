@@ -3,6 +3,7 @@
 import importlib
 import importlib.util
 import json
+from dataclasses import asdict
 from pathlib import Path
 
 import click
@@ -33,7 +34,7 @@ def bench(
         baseline = figures(eager, seconds, motion)
     table = rows(found, baseline)
     if as_json:
-        click.echo(json.dumps([row.to_json() for row in table]))
+        click.echo(json.dumps([asdict(row) for row in table]))
         return
     click.echo("\n".join([f"on {', '.join(model.providers)}, threads: {session.threads}", *map(_line, table)]))
 

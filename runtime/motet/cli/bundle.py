@@ -67,7 +67,7 @@ def _tree(values: dict[str, Any], indent: str = "  ") -> None:
             click.echo(f"{indent}{key}: {NOT_STATED if value is None else value}")
 
 
-@bundle.command()
+@bundle.command(short_help="Check that a bundle works here.")
 @_NAME
 @session_options
 def verify(name: str, session: SessionOptions) -> None:

@@ -66,7 +66,7 @@ def generate(
         seeds = [seed + index for index in asked]
         found = model.generate([texts[index] for index in asked], seed=seeds, progress=progress, **settings)
     count = max(map(len, found), default=1) if every else 1
-    outs = places(out, [str(number) for number in range(count * len(texts))])
+    outs = places(out, [str(number + 1) for number in range(count * len(texts))])
     rows = []
     for index, results in zip(asked, found, strict=True):
         pairs = zip(results[:count], outs[count * index :], strict=False)

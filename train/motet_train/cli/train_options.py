@@ -86,7 +86,9 @@ def train_command(
         decorated: Callable[..., Any] = command
         for option in reversed((*OPTIONS, presets, *options)):
             decorated = option(decorated)
-        return click.command(name, context_settings={"default_map": dict(defaults or {})})(decorated)
+        settings = {"default_map": dict(defaults or {})}
+        first, _, _ = (function.__doc__ or "").partition("\n")
+        return click.command(name, short_help=first, context_settings=settings)(decorated)
 
     return decorate
 

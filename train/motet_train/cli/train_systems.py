@@ -11,7 +11,7 @@ from motet_train.cli.train_predict import read_expmap_files
 from motet_train.data.predict_data import expmap_material, validation_files
 from motet_train.evaluate.predict.protocol import WINDOW
 from motet_train.recipes.recipe import Job
-from motet_train.recipes.systems import RECIPES, train_system
+from motet_train.recipes.systems import RECIPES, TITLES, train_system
 from motet_train.runs import Run
 
 OPTIONS = (
@@ -34,14 +34,6 @@ SWITCHES = (
 )
 """Of the ablations; each one's default is the preset's."""
 
-TITLES = {
-    "rrnn": "the residual recurrent net (Martinez et al. 2017)",
-    "erd": "the encoder-recurrent-decoder (Fragkiadaki et al. 2015)",
-    "lstm-3lr": "three LSTMs between linear maps (Fragkiadaki et al. 2015)",
-    "srnn": "the structural RNN (Jain et al. 2016)",
-    "lstm-ae": "the LSTMs with a denoising autoencoder (Ghosh et al. 2017)",
-}
-
 
 def _command(name: str, title: str, *switches: Callable[..., Any]) -> click.Command:
     def run(job: Job, data: Path, all_files: bool) -> Run:
@@ -52,7 +44,4 @@ def _command(name: str, title: str, *switches: Callable[..., Any]) -> click.Comm
     return train_command(name, RECIPES[name], *OPTIONS, *switches)(run)
 
 
-COMMANDS = (
-    _command("convseq2seq", "the convolutional sequence-to-sequence model (Li et al. 2018)", *SWITCHES),
-    *(_command(name, title) for name, title in TITLES.items()),
-)
+COMMANDS = tuple(_command(name, title, *(SWITCHES if name == "convseq2seq" else ())) for name, title in TITLES.items())
