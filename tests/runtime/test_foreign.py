@@ -1,6 +1,7 @@
 """Motions of other figures in the verbs: brought onto the model's figure, and predictions back onto their own."""
 
 import logging
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -71,10 +72,10 @@ def test_a_motion_of_another_figure_is_described_as_on_its_own(
     describer: DescribeModel, clips: Path, clip: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     motion = motet.read(clips / f"{clip}.amc")
-    action = {"39_14": "walk", "09_07": "run", "02_06": "stoop"}[clip]
+    action = {"39_14": "walk", "09_07": "run", "02_06": "bend|stoop"}[clip]
     with caplog.at_level(logging.INFO, "motet"):
         found = describer.describe(motet.from_humanoid(motet.to_humanoid(motion).motion, MIXAMO))
-    assert action in found[0].text
+    assert re.search(action, found[0].text)
     (record,) = caplog.records
     assert record.getMessage().startswith("brought to the humanoid: joints of Mixamo, confidence 1.00")
 
@@ -176,3 +177,15 @@ def test_the_command_line_takes_any_figure(tmp_path: Path, name: str, mixamo: Mo
     assert found.skeleton is not None
     assert found.skeleton.names == source.skeleton.names
     assert run("control", "walk .5s", "--start", tmp_path / "a.bvh", "-o", tmp_path / "c.bvh").exit_code == 0
+
+
+def test_a_wrist_between_forearm_and_hand_takes_the_twist(walk: Motion) -> None:
+    skeleton = walk.skeleton
+    assert skeleton is not None
+    back = motet.from_humanoid(motet.to_humanoid(walk).motion, skeleton)
+    for channel in ("lwrist.ry", "rwrist.ry", "lhand.rx", "rhand.rx", "lhand.rz", "rhand.rz"):
+        own, found = (motion.select((channel,)).values for motion in (walk, back))
+        assert np.abs(own - found).mean() < 5  # at rest the wrists would be 17 degrees off
+    hand = skeleton.index("lhand")
+    apart = angles_between(global_transforms(back)[0][:, hand], global_transforms(walk)[0][:, hand])
+    assert np.degrees(apart).max() < 0.01

@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from figures import walker
+from test_retarget import SKELETONS
 
 from motet.draw.body import Body
 from motet.draw.figure import figure_of
 from motet.errors import MotionError, OutputError
-from motet.formats import html, write_motion
+from motet.formats import html, read_motion, write_motion
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
 from motet.motion.skeleton import Joint, Skeleton
@@ -156,3 +157,14 @@ def test_shoulders_of_a_motion_capture_skeleton_belong_to_the_trunk():
     left = [(3, 4, "middle"), (4, 0, "middle"), (4, 5, "left")]
     right = [(6, 7, "middle"), (7, 0, "middle"), (7, 8, "right")]
     assert bones == [(0, 1, "middle"), (1, 2, "middle"), *left, *right]
+
+
+def test_a_figure_whose_rest_pose_is_no_body_is_as_high_as_it_stands():
+    for name in ("lafan1", "mixamo"):
+        motion = read_motion(SKELETONS / f"{name}.bvh")
+        stands = np.ptp(positions(motion)[0, :, 1])  # the first frame is a T-pose
+        assert Body(motion.skeleton).height == pytest.approx(stands, rel=0.2)
+    assert Body(walker().skeleton).height == walker().skeleton.height
+    arm = Skeleton((Joint("root", -1, (0, 0, 0)), Joint("arm", 0, (0, 3, 0)), Joint("arm_end", 1, (0, 2, 0))))
+    assert Body(arm).height == 5
+    assert Body(Skeleton((Joint("root", -1, (5, 0, 0)),))).height == 1

@@ -1,7 +1,7 @@
 """The body that pictures put on a skeleton: round bones with a thickness and a side, and a head.
 
-Lengths are in body heights (the largest extent of the rest pose), so bodies of every skeleton are of one size. Nothing
-here knows a naming scheme: thickness follows from how much body hangs on a joint, sides from mirrored names.
+Lengths are in body heights (:attr:`Body.height`), so bodies of every skeleton are of one size. Nothing here knows a
+naming scheme: thickness follows from how much body hangs on a joint, sides from mirrored names.
 """
 
 from dataclasses import dataclass
@@ -29,6 +29,10 @@ HEAD = 0.15
 LIMB = 0.2
 """A limb has at least this length; one that hangs on the trunk above the root gets a flank down to the root."""
 
+PATH = 0.62
+"""What part of the longest way along bones from tip to tip a figure is high at least: people in an A- or a T-pose are
+.63 to .76. Figures that rest with all their bones in a line would be taken for half as high."""
+
 SKULL = ((-0.024, 0.040), (0.020, 0.050))
 """Jaw and crown: how far along the head's direction from the head's joint, and the radius."""
 
@@ -55,8 +59,8 @@ class Body:
 
     @cached_property
     def height(self) -> float:
-        """The height in the skeleton's length unit; 1 where a skeleton has no extent."""
-        return self.skeleton.height or 1.0
+        """The height in the skeleton's length unit, even where the rest pose is no body; 1 where there is no extent."""
+        return max(self.skeleton.height, PATH * _longest_path(self.skeleton)) or 1.0
 
     @cached_property
     def sides(self) -> tuple[str, ...]:
@@ -124,6 +128,17 @@ class Body:
         direction = direction / np.maximum(np.linalg.norm(direction, axis=-1, keepdims=True), 1e-9)
         skull = np.stack([head + along * direction for along, _ in SKULL], axis=-2)
         return np.concatenate([joints, skull], axis=-2)
+
+
+def _longest_path(skeleton: Skeleton) -> float:
+    """The length of the longest way along bones from one tip to another."""
+    lengths = np.linalg.norm(skeleton.offsets, axis=1)
+    below, longest = np.zeros(len(lengths)), 0.0
+    for i in range(len(lengths) - 1, 0, -1):
+        parent, reach = skeleton.joints[i].parent, lengths[i] + below[i]
+        longest = max(longest, float(below[parent] + reach))
+        below[parent] = max(below[parent], reach)
+    return longest
 
 
 def _radius(beyond: float) -> float:

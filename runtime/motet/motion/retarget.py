@@ -24,7 +24,7 @@ from motet.motion.motion import Motion
 from motet.motion.rest_pose import middle
 from motet.motion.rotations import Array
 from motet.motion.skeleton import END_SUFFIX, Skeleton
-from motet.motion.spread import spread
+from motet.motion.spread import spread, twist
 from motet.motion.world_rotations import motion_of, places_of
 
 log = logging.getLogger(__name__)
@@ -193,12 +193,18 @@ def _figure_rotations(source: Array, fitted: Fitted, skeleton: Skeleton, still: 
     shared = _chain(neck, len(joint_map.neck) + ("head" in joint_map.joints))
     wanted |= dict(zip(joint_map.neck, shared, strict=False))
     wanted.setdefault(joint_map.carrier(skeleton), wanted[joint_map.joints["hips"]])
+    # a joint between forearm and hand, as CMU's wrists, takes the hand's twist
+    hands = {joint_map.joints.get(sided(side, "Hand")) for side in LEFT_RIGHT} - {None}
     turned = np.empty((len(source), len(skeleton.joints), 3, 3))
     for i, joint in enumerate(skeleton.joints):
         if i in wanted:
             turned[:, i] = wanted[i] @ fitted.aligned[i].T
         else:
             turned[:, i] = turned[:, joint.parent] @ still[i] if i else still[0]
+            hand = next((k for k in skeleton.children[i] if k in hands), None)
+            if hand is not None:
+                wanted_hand = wanted[hand] @ fitted.aligned[hand].T
+                turned[:, i] @= twist(np.swapaxes(turned[:, i], -1, -2) @ wanted_hand, skeleton.offsets[hand])
     return turned
 
 

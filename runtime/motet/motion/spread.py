@@ -1,8 +1,8 @@
-"""Sharing out turns between chains of different numbers of joints: backs and necks."""
+"""Sharing out turns between joints: of backs and necks of different numbers of joints, of forearms and wrists."""
 
 import numpy as np
 
-from motet.motion.rotations import Array, rotmat_to_rotvec, rotvec_to_rotmat
+from motet.motion.rotations import Array, rotmat_to_quat, rotmat_to_rotvec, rotvec_to_rotmat
 
 
 def spread(chain: Array, count: int) -> Array:
@@ -22,3 +22,13 @@ def spread(chain: Array, count: int) -> Array:
         turn = rotmat_to_rotvec(np.swapaxes(lower, -1, -2) @ shared[:, inner])
         shared[:, inner] = lower @ rotvec_to_rotmat(turn * part[inner, None])
     return shared
+
+
+def twist(rotations: Array, axis: Array) -> Array:
+    """The part (T, 3, 3) of rotations (T, 3, 3) that is a turn about an axis (3): what is left of them is a swing."""
+    length = float(np.linalg.norm(axis))
+    if length == 0.0:
+        return np.broadcast_to(np.eye(3), rotations.shape)
+    quats, along = rotmat_to_quat(rotations), axis / length
+    angles = 2 * np.arctan2(quats[..., :3] @ along, quats[..., 3])
+    return rotvec_to_rotmat(angles[..., None] * along)

@@ -25,6 +25,9 @@ from motet.representation.figure import other_bone
 
 log = logging.getLogger(__name__)
 
+AT_REST = 1e-6
+"""Degrees of rounding."""
+
 CLEAN = 1.0
 """Degrees by which hips that were brought to the humanoid and back may be turned: more, and the figure's own world is
 another, as where z is up."""
@@ -54,6 +57,8 @@ def brought(motion: Motion, pose: Motion, reason: str) -> Motion:
     except MotionError as error:
         raise MotionError(f"{error}; and it cannot be taken as it is: {reason}") from error
     for name in frozenset(found.rotation_columns()).difference(skeleton.names[:1], *said):
+        if np.abs(found.values[:, found.rotation_columns()[name]]).max(initial=0) > AT_REST:
+            continue
         place = skeleton.index(name)
         angles = np.degrees(euler_of(local_rotations(pose, [place])[:, 0], skeleton.joints[place]))
         channels = tuple(f"{name}.r{axis}" for axis in AXES)
