@@ -101,9 +101,11 @@ def test_options_that_a_format_does_not_take_are_refused(tmp_path: Path) -> None
 
 def test_places_that_are_no_files_are_named(tmp_path: Path) -> None:
     (tmp_path / "folder.bvh").mkdir()
+    (tmp_path / "round.bvh").symlink_to(tmp_path / "round.bvh")
     for name, said in (
         ("none.bvh", "no such file"),
         ("folder.bvh", "it is not a file"),
+        ("round.bvh", "a link that leads nowhere"),
         ("a" * 300 + ".bvh", "cannot be read"),
         ("a.bvh/b.bvh", "no such file"),
         ("a.txt", "cannot read files of type '.txt'; expected one of .amc .bvh .npz .csv .xml"),

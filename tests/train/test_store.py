@@ -11,7 +11,7 @@ from language_data import walker
 
 from motet.cli import main
 from motet.errors import OutputError
-from motet.formats import read_motion
+from motet.formats import read_motion, write_motion
 from motet.motion.kinematics import euler_of, local_rotations, positions, with_channels
 from motet.motion.motion import Motion
 from motet.representation.contract import FLOORS
@@ -286,6 +286,16 @@ def test_the_command_prepares_and_names_what_it_skips(tmp_path: Path) -> None:
     assert "it exists" in again.output
     assert json.loads((out / "store.json").read_text())["channels"] == list(JOINTS)
     assert [path.name for path in out.parent.iterdir()] == ["store"]
+
+
+def test_when_most_motions_do_not_fit_the_first_it_is_named(tmp_path: Path) -> None:
+    for name, channels in (("a", 62), ("b", 61), ("c", 61)):
+        motion = cmu().motion
+        write_motion(tmp_path / f"{name}.npz", motion.select(motion.channels[:channels]))
+    (tmp_path / "said.tsv").write_text("clip\tsentence\n" + "".join(f"{name}\tA person runs.\n" for name in "abc"))
+    result = CliRunner().invoke(main, ["prepare", str(tmp_path), "--out", str(tmp_path / "store")])
+    assert (result.exit_code, "2 skipped" in result.stdout) == (0, True)
+    assert "channels and axes are those of the first, a" in result.stderr
 
 
 def test_the_named_preparations() -> None:

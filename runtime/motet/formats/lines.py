@@ -20,7 +20,8 @@ def read_bytes(file: File) -> bytes:
         if not isinstance(file, str | Path):
             return file.read()
         if not path.is_file():
-            raise FormatError(path, "it is not a file" if path.exists() else "no such file")
+            missing = "a link that leads nowhere" if path.is_symlink() else "no such file"
+            raise FormatError(path, "it is not a file" if path.exists() else missing)
         return path.read_bytes()
     except OSError as error:
         raise FormatError(path, f"cannot be read: {error.strerror}") from error

@@ -41,6 +41,9 @@ def prepare(data: Path, out: Path, sentences: Path | None, unit_in: str | None) 
         f"{out}: {len(store.records)} motions of {seconds:.0f} s with {texts} sentences, "
         f"{len(store.channels)} channels at {store.fps:g} fps; {len(store.skipped)} skipped"
     )
+    if len(store.skipped) > len(store.records):
+        first = store.records[0].name
+        click.echo(f"motet: most motions were skipped; channels and axes are those of the first, {first}", err=True)
 
 
 def _check_unit(corpus: Corpus) -> None:
