@@ -14,6 +14,7 @@ from test_retarget import SKELETONS, angles_between
 
 import motet
 from motet.errors import MotionError
+from motet.formats.writable import with_names
 from motet.models.control import ControlModel
 from motet.models.describe import DescribeModel
 from motet.models.predict import PredictModel
@@ -161,6 +162,16 @@ def test_control_goes_on_from_another_figure(mixamo: Motion, walk: Motion) -> No
 def test_a_figure_that_is_no_humans_is_refused_with_both_reasons(describer: DescribeModel) -> None:
     with pytest.raises(MotionError, match=r"no human's: .*; and it cannot be taken as it is: the model's figure"):
         describer.describe(walker(80))
+
+
+def test_a_figure_of_unknown_names_without_sides_is_warned_of(
+    describer: DescribeModel, mixamo: Motion, caplog: pytest.LogCaptureFixture
+) -> None:
+    assert mixamo.skeleton is not None
+    names = [f"bone{i}" + "_end" * n.endswith("_end") for i, n in enumerate(mixamo.skeleton.names)]
+    with caplog.at_level(logging.WARNING, "motet"):
+        assert "walk" in describer.describe(with_names(mixamo, names))[0].text
+    assert "joints found by the tree, confidence 0.60" in caplog.text
 
 
 @pytest.mark.parametrize("name", ["rokoko", "unreal", "xsens"])

@@ -32,6 +32,9 @@ FINGERS = 0.35
 PIECE = 0.15
 """A bone begins with at least this part of its limb: hips and buttocks often have a short one before the thigh."""
 
+BY_THE_TREE = "by the tree"
+"""What stands for a convention where none was found."""
+
 CONFIDENCE = {True: 0.8, False: 0.6}
 """How sure a map is with left and right from names, and without."""
 
@@ -94,7 +97,7 @@ def map_by_tree(motion: Motion) -> JointMap:
             joints |= {sided(side, part): limb[part] for part in parts if part in limb}
     neck, head = _neck(tree, arms)
     joints |= {} if head is None else {"head": head}
-    found = JointMap(joints, tuple(shared[::-1]), neck, "by the tree", CONFIDENCE[named])
+    found = JointMap(joints, tuple(shared[::-1]), neck, BY_THE_TREE, CONFIDENCE[named])
     return check_map(skeleton, found)
 
 

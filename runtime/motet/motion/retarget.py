@@ -17,7 +17,7 @@ from motet.motion.fitting import Fitted, fit, upright
 from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, NECK, PARENTS, SPINE, leg_length, sided
 from motet.motion.joint_map import JointMap
 from motet.motion.joint_names import map_by_names
-from motet.motion.joint_tree import map_by_tree
+from motet.motion.joint_tree import BY_THE_TREE, map_by_tree
 from motet.motion.kinematics import global_transforms, local_rotations, local_translations, skeleton_of
 from motet.motion.mmm_figure import is_mmm, with_figure
 from motet.motion.motion import Motion
@@ -31,6 +31,9 @@ log = logging.getLogger(__name__)
 
 GROUND = 5.0
 """The percentile of the lowest points of the soles that stands on the ground."""
+
+SURE = 0.75
+"""Confidence from which on what was found needs no warning: less has a skeleton whose names do not even tell sides."""
 
 HIPS = [HUMANOID.index(sided(side, "UpperLeg")) for side in LEFT_RIGHT]
 
@@ -57,7 +60,8 @@ class Humanoid:
     @property
     def summary(self) -> str:
         """What was found in one line: convention, confidence and notes."""
-        return "; ".join((f"joints of {self.convention}, confidence {self.confidence:.2f}", *self.notes))
+        found = "found by the tree" if self.convention == BY_THE_TREE else f"of {self.convention}"
+        return "; ".join((f"joints {found}, confidence {self.confidence:.2f}", *self.notes))
 
 
 def map_of(motion: Motion) -> JointMap:
@@ -103,7 +107,8 @@ def on_humanoid(motion: Motion) -> Motion:
     if motion.skeleton == HUMANOID:
         return motion
     found = to_humanoid(motion)
-    log.info("brought to the humanoid: %s", found.summary)
+    level = logging.INFO if found.confidence >= SURE else logging.WARNING
+    log.log(level, "brought to the humanoid: %s", found.summary)
     return found.motion
 
 
