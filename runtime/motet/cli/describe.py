@@ -19,7 +19,7 @@ from motet.models.load import load_as
     help=f"""Describe motion files: sentences, the best first, each with what it is ranked by: by default how well it
     agrees with all sentences drawn (0 to 1), with --draws 0 its log-probability.
 
-    All files are described in one batch, motions over 30 s in windows. Reads {READS}.
+    All files are described in one batch, motions over 30 s in windows. Any human figure will do. Reads {READS}.
     """
 )
 @click.argument("motions", nargs=-1, required=True, type=Path, metavar="MOTION...")

@@ -34,8 +34,8 @@ def predict(
 ) -> None:
     """Continue motion files from their last frames, and write the predictions.
 
-    A file must have the joints of the bundle's figure; the frames come at the bundle's frame rate. With several files
-    OUT holds {name} for their names, or the results are numbered: out-1.bvh, out-2.bvh, ...
+    A file may be of any human figure, and is continued on its own skeleton, at the bundle's frame rate. With several
+    files OUT holds {name} for their names, or the results are numbered: out-1.bvh, out-2.bvh, ...
     """
     outs = places(out, [source.stem for source in sources])
     model, tries, rates = load_as(PredictModel, bundle, session), Tries(), []
