@@ -29,7 +29,8 @@ NETS = {
 
 def torchrun(*arguments: object) -> None:
     start = [sys.executable, "-m", "torch.distributed.run", "--nproc-per-node", "2", "--standalone"]
-    subprocess.run([*start, *map(str, arguments)], check=True, capture_output=True, timeout=120)
+    done = subprocess.run([*start, *map(str, arguments)], check=False, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
 
 
 def nearly_same(one: Path, other: Path) -> None:
