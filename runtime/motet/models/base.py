@@ -1,6 +1,7 @@
 """What the models of all verbs share: a manifest, a motion contract, graphs, and the bundle that they came from."""
 
 import logging
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar, Self
@@ -16,7 +17,7 @@ from motet.errors import BundleError
 log = logging.getLogger(__name__)
 
 
-class BundleModel:
+class BundleModel(ABC):
     """A model that runs graphs; without state, so that requests and threads can share it.
 
     manifest: of a bundle of the model's verb, or of a training run.
@@ -76,9 +77,9 @@ class BundleModel:
         """The execution providers of ONNX Runtime that are active, the preferred first; torch's models have none."""
         return tuple(getattr(self.graphs["step"], "providers", ()))
 
+    @abstractmethod
     def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
         """The whole run of the golden vectors (docs/bundle.md): what follows from its inputs and settings."""
-        raise NotImplementedError
 
 
 def _reload(kind: type[BundleModel], path: Path, options: SessionOptions) -> BundleModel:
