@@ -121,3 +121,12 @@ def test_the_public_names_are_there_and_geometry_is_in_its_module() -> None:
     assert {"read", "write", "load", "Motion"} <= set(motet.__all__)
     assert motet.motion.lateral_axis is not None
     assert repr(motet.load("cmu-describe")) == "DescribeModel('cmu-describe', 62 channels, 10 fps)"
+
+
+def test_a_fault_of_a_file_is_not_said_of_the_output(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail() -> dict[str, Path]:
+        raise FileNotFoundError(2, "No such file or directory", "lost.zip")
+
+    monkeypatch.setattr("motet.cli.bundle.list_bundles", fail)
+    with pytest.raises(FileNotFoundError, match="lost.zip"):
+        main.main(["bundle", "list"])

@@ -76,6 +76,8 @@ class Commands(click.Group):
         try:
             return super().main(*args, **kwargs)
         except OSError as error:
+            if error.filename is not None:  # a fault of a file, not of what is printed
+                raise
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what Python still holds goes nowhere
             click.echo(f"motet: cannot print the results: {error.strerror}", err=True)
             sys.exit(1)
