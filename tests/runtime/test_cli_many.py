@@ -128,5 +128,5 @@ def test_a_fault_of_a_file_is_not_said_of_the_output(monkeypatch: pytest.MonkeyP
         raise FileNotFoundError(2, "No such file or directory", "lost.zip")
 
     monkeypatch.setattr("motet.cli.bundle.list_bundles", fail)
-    with pytest.raises(FileNotFoundError, match="lost.zip"):
+    with pytest.raises(FileNotFoundError, match=r"lost\.zip"):
         main.main(["bundle", "list"])
