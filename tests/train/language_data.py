@@ -50,4 +50,4 @@ def records(count: int) -> Iterator[Record]:
 
 def small_store(folder: Path, count: int = 20) -> Store:
     """The corpus prepared at 10 fps with three offsets and the root block, in ``folder``/store."""
-    return prepare(records(count), folder / "store", Preparation("root_angles", trim=False))
+    return prepare(records(count), folder / "store", Preparation("root_angles", humanoid=False, trim=False, cut=False))

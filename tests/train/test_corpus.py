@@ -12,10 +12,10 @@ from motet.formats import read_motion, write_motion
 from motet.formats.mmm import read
 from motet_train.data.archive import Archive
 from motet_train.data.clips import CMU_FOLDER
-from motet_train.data.corpus import read_corpus, read_table, recordings
+from motet_train.data.corpus import read_corpus, recordings
 from motet_train.data.errors import DataError
-from motet_train.data.preparation import ANGLES, FULL
 from motet_train.data.records import Record, Skipped
+from motet_train.data.table import Person, person, read_people, read_table
 
 
 def of(corpus: object) -> tuple[dict[str, Record], dict[str, str]]:
@@ -61,7 +61,7 @@ def test_a_folder_and_a_zip_give_the_same_records(own: Path, pack: object) -> No
     corpus = read_corpus(pack(own))  # type: ignore[operator]
     records, skipped = of(corpus)
     assert (len(corpus), list(records), skipped) == (3, ["02_06", "09_07", "stroll"], {})
-    assert corpus.preparation == FULL
+    assert not corpus.kit
     assert records["09_07"].sentences == ("A person runs.", "Somebody runs fast.")
     assert [record.subject for record in records.values()] == ["02", "09", "stroll"]
     for clip in ("02_06", "09_07"):
@@ -115,6 +115,41 @@ def test_who_moved_is_what_the_table_says_or_the_beginning_of_the_name(own: Path
     }
     with pytest.raises(DataError, match="line 3: the subject of a is 'y', and 'x' above"):
         read_table(table(own / "texts.tsv", "a\tx\tOne.", "a\ty\tTwo.", header="clip\tsubject\tsentence"))
+
+
+def test_of_two_places_the_later_counts(own: Path, tmp_path: Path) -> None:
+    more = tmp_path / "more"
+    (more / "amc").mkdir(parents=True)
+    bend = read_motion(CMU_FOLDER / "02_06.amc")
+    write_motion(more / "amc" / "02_06.amc", bend[:50])
+    (more / "amc" / "02_06.asf").rename(more / "amc" / "02.asf")
+    for first in (own, zipped(own)):
+        records, skipped = of(read_corpus([first, more], own.parent / "texts.tsv" if first != own else None))
+        assert (list(records), skipped) == (["02_06", "09_07", "stroll"], {})
+        assert len(records["02_06"].motion) == 50
+    with pytest.raises(DataError, match="no such corpus"):
+        read_corpus([own, tmp_path / "none"])
+
+
+def test_sentences_of_the_pool_for_tests_are_kept_apart(tmp_path: Path) -> None:
+    header = "clip\tsentence\tpool"
+    rows = ("run\tA person runs.\ttrain", "run\tSomeone jogs.\ttest", "run\tHe runs.\t", "bend\tShe bends.\ttest")
+    found = read_table(table(tmp_path / "texts.tsv", *rows, header=header))
+    assert list(found) == ["run"]
+    assert (found["run"].sentences, found["run"].unseen) == (["A person runs.", "He runs."], ["Someone jogs."])
+    with pytest.raises(DataError, match="line 2: the pool is one of train, test, not 'dev'"):
+        read_table(table(tmp_path / "texts.tsv", "run\tHe runs.\tdev", header=header))
+
+
+def test_a_table_of_people_says_who_moves_by_patterns(tmp_path: Path) -> None:
+    rows = ("Male1_*\tMale1\t", "60_*\t60 and 61\tdance", "*\tsomebody\t")
+    people = read_people(table(tmp_path / "people.tsv", *rows, header="clip\tsubject\ttake"))
+    assert person(people, "some/Male1_A_B").subject == "Male1"
+    assert (person(people, "60_02").subject, person(people, "60_02").take) == ("60 and 61", "dance")
+    assert person(people, "39_01").subject == "somebody"
+    assert person(people[:1], "39_01") == Person("39_01", "39")
+    with pytest.raises(DataError, match="needs the columns clip and subject"):
+        read_people(table(tmp_path / "texts.tsv", "a\tb"))
 
 
 def test_recordings_need_no_table(own: Path) -> None:
@@ -173,7 +208,7 @@ def test_what_is_no_corpus_is_refused(tmp_path: Path, own: Path) -> None:
         read_corpus(tmp_path / "bad.zip")
     with zipfile.ZipFile(tmp_path / "silent.zip", "w") as archive:
         archive.writestr("00001_mmm.xml", mmm_xml(10))
-    with pytest.raises(DataError, match=r"neither KIT's NNNNN_annotations\.json nor motion files"):
+    with pytest.raises(DataError, match=r"no motion files .*nor KIT's NNNNN_annotations\.json"):
         read_corpus(tmp_path / "silent.zip")
     (own / "texts.tsv").unlink()
     with pytest.raises(DataError, match=r"needs one table of sentences .*found: none"):
@@ -189,7 +224,7 @@ def test_kit_is_read_from_a_zip_or_a_folder(tmp_path: Path, inside: str) -> None
     for place in (path, tmp_path / "kit"):
         corpus = read_corpus(place)
         records, skipped = of(corpus)
-        assert (len(corpus), corpus.preparation, skipped) == (5, ANGLES, {})
+        assert (len(corpus), corpus.kit, skipped) == (5, True, {})
         assert list(records) == [f"{number:05}" for number in range(1, 6)]
         for name, record in records.items():
             np.testing.assert_array_equal(record.motion.values, read(folder / f"{name}_mmm.xml").values)

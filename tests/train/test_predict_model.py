@@ -129,14 +129,15 @@ def test_motion_files_are_trained_on_and_measured_in_centimetres(
     manifest = Run.load(out).manifest
     assert (manifest["licence"]["data"], len(manifest["training"]["data"]["test"])) == ("free", 1)
     assert (manifest["training"]["recipe"]["warp"], manifest["training"]["recipe"]["mirror"]) == (0.0, 0.5)
-    found = json.loads(run("evaluate", out, *given, "--json", "--plots", tmp_path / "plots").stdout)
+    store = tmp_path / "run-store"
+    found = json.loads(run("evaluate", out, "--data", store, "--json", "--plots", tmp_path / "plots").stdout)
     still = found["zero_velocity"]["place_cm"]
     assert 60 < still["frame_24"] < 130  # a walk at 1.4 m/s, after .83 s
     assert still["frame_1"] < still["frame_24"]
     assert found["zero_velocity"]["pose_cm"]["frame_24"] < still["frame_24"]
     names = sorted(path.name for path in (tmp_path / "plots").iterdir())
     assert names == sorted(["predict-distance.png", f"predict-{manifest['training']['data']['test'][0]}.png"])
-    shown = run("evaluate", out, *given).stdout
+    shown = run("evaluate", out, "--data", store).stdout
     assert "milliseconds 67 133 267 333 467 833" in " ".join(shown.split())
 
 
@@ -161,7 +162,7 @@ def test_the_mean_is_that_of_complete_actions(tmp_path: Path) -> None:
         (["train", "predict", "--data", "{empty}", "--out", "{out}"], "no motion files"),
         (["evaluate", "{run}"], "need --data"),
         (["evaluate", "{run}", "cmu-control", "--data", "{data}"], "separately"),
-        (["evaluate", "{run}", "--data", "{empty}"], "no motion files"),
+        (["evaluate", "{run}", "--data", "{empty}"], "not a prepared store"),
     ],
 )
 def test_bad_input_is_refused(tmp_path: Path, arguments: list[str], said: str) -> None:

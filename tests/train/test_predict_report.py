@@ -257,7 +257,7 @@ def test_all_runs_are_evaluated_at_once(tmp_path: Path) -> None:
     data = write_files(tmp_path / "data", actions=("running",))
     runs = [saved(tmp_path / f"conv-{n}", data, n) for n in range(2)]
     runs.append(saved(tmp_path / "none-0", data, 0, long_term="none"))
-    found, text = predict_reports({str(run): loaded(run) for run in runs}, data, tmp_path / "plots", None)
+    found, text = predict_reports({str(run): loaded(run) for run in runs}, data, tmp_path / "plots")
     assert {path.name for path in (tmp_path / "plots").iterdir()} == {"predict-error.png", "predict-running.png"}
     assert "  without long-term encoder  " in text
     assert line(text, "none-0")

@@ -187,11 +187,13 @@ def test_a_unit_that_files_do_not_say_is_asked_for_and_taken(tmp_path: Path) -> 
     for subject in range(10):
         write_motion(folder / f"{subject:02}_01.bvh", walk[10 * subject : 10 * subject + 160])
     (tmp_path / "said.tsv").write_text("clip\tsentence\n" + "".join(f"{n:02}_01\ta person walks\n" for n in range(10)))
-    prepared = motet("prepare", folder, "--out", tmp_path / "deep" / "store")
+    own = ("prepare", folder, "--figure", "own", "--out", tmp_path / "deep" / "store")
+    prepared = motet(*own)
     assert (prepared.exit_code, "--unit-in" in prepared.output, "skipped" in prepared.output) == (2, True, False)
-    prepared = motet("prepare", folder, "--out", tmp_path / "deep" / "store", "--unit-in", "inch")
-    assert prepared.exit_code == 0, prepared.output
-    command = ("train", "predict", "--data", folder, "--steps", 1, "--out", tmp_path / "run")
+    for command in ((*own, "--unit-in", "inch"), ("prepare", folder, "--out", tmp_path / "humanoid")):
+        prepared = motet(*command)
+        assert (prepared.exit_code, "0 skipped" in prepared.output) == (0, True), prepared.output
+    command = ("train", "predict", "--figure", "own", "--data", folder, "--steps", 1, "--out", tmp_path / "run")
     assert motet(*command).exit_code == 2
     trained = motet(*command, "--unit-in", "inch")
     assert trained.exit_code == 0, trained.output

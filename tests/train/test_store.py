@@ -12,20 +12,23 @@ from language_data import walker
 from motet.cli import main
 from motet.errors import OutputError
 from motet.formats import read_motion, write_motion
+from motet.motion.humanoid import HUMANOID
 from motet.motion.kinematics import euler_of, local_rotations, positions, with_channels
+from motet.motion.mixamo import MIXAMO
 from motet.motion.motion import Motion
+from motet.motion.retarget import from_humanoid, to_humanoid
 from motet.representation.contract import FLOORS
 from motet.representation.root_block import ROOT_BLOCK, from_root_block
 from motet_train.data.clips import CMU_FOLDER
 from motet_train.data.corpus import read_corpus
 from motet_train.data.errors import DataError
-from motet_train.data.preparation import ANGLES, FULL, Preparation
+from motet_train.data.preparation import ANGLES, FULL, VECTORS, Preparation, preparation
 from motet_train.data.records import Record, Skipped
 from motet_train.data.split import split
 from motet_train.data.store import Entry, Store, prepare
 from motet_train.data.trim import trim
 
-PLAIN = Preparation("root_angles", trim=False)
+PLAIN = Preparation("root_angles", humanoid=False, trim=False, cut=False)
 
 
 def cmu(clip: str = "09_07", name: str = "") -> Record:
@@ -82,7 +85,7 @@ def test_another_rate_gives_one_interpolated_sequence(tmp_path: Path) -> None:
 
 def test_kits_angles_are_stored_in_radians_without_the_root(tmp_path: Path) -> None:
     corpus = read_corpus(write_kit_zip(tmp_path / "kit.zip", 4))
-    found = prepare(corpus, tmp_path / "store", corpus.preparation)
+    found = prepare(corpus, tmp_path / "store", ANGLES)
     contract = found.contract(range(4))
     assert (found.channels, set(found.units), found.skeleton) == (JOINTS, {"rad"}, None)
     for number, item in enumerate(corpus):
@@ -293,12 +296,57 @@ def test_when_most_motions_do_not_fit_the_first_it_is_named(tmp_path: Path) -> N
         motion = cmu().motion
         write_motion(tmp_path / f"{name}.npz", motion.select(motion.channels[:channels]))
     (tmp_path / "said.tsv").write_text("clip\tsentence\n" + "".join(f"{name}\tA person runs.\n" for name in "abc"))
-    result = CliRunner().invoke(main, ["prepare", str(tmp_path), "--out", str(tmp_path / "store")])
+    result = CliRunner().invoke(main, ["prepare", str(tmp_path), "--figure", "own", "--out", str(tmp_path / "store")])
     assert (result.exit_code, "2 skipped" in result.stdout) == (0, True)
     assert "channels and axes are those of the first, a" in result.stderr
 
 
-def test_the_named_preparations() -> None:
-    assert (ANGLES.representation, ANGLES.trim) == ("angles", False)
-    assert (FULL.representation, FULL.trim) == ("root_angles", True)
+def test_how_a_corpus_is_prepared_for_a_verb() -> None:
+    assert preparation("describe", kit=True) == ANGLES
+    assert preparation("describe", kit=True, figure="humanoid") == preparation("generate", kit=False) == FULL
+    assert preparation("predict", kit=True) == preparation("predict", kit=False) == VECTORS
+    own = preparation("describe", kit=False, figure="own", fps=30)
+    assert own == replace(FULL, humanoid=False, fps=30)
     assert {ANGLES.fps, FULL.fps, ANGLES.longest, FULL.longest} == {10, 30}
+
+
+def test_a_long_motion_is_cut_into_pieces_that_share_what_is_said(tmp_path: Path) -> None:
+    bend = cmu("02_06").motion
+    long = replace(bend, values=np.tile(bend.values, (22, 1)))
+    record = Record("bends", "02", long, ("A person bends.",), ("Somebody bows.",))
+    found = prepare([record, cmu()], tmp_path / "store", replace(PLAIN, cut=True))
+    assert [entry.name for entry in found.records] == ["bends.1", "bends.2", "bends.3", "09_07"]
+    assert [(entry.take, entry.ends) for entry in found.records] == [
+        ("bends", False),
+        ("bends", False),
+        ("bends", True),
+        ("09_07", True),
+    ]
+    assert {(entry.sentences, entry.unseen) for entry in found.records[:3]} == {(record.sentences, record.unseen)}
+    lengths = [stop - start for entry in found.records[:3] for start, stop in entry.spans]
+    assert (sum(lengths), max(lengths) - min(lengths)) == (len(long), 1)
+    assert max(lengths) < 10 * PLAIN.longest
+    whole = next(PLAIN.sequences(long)).values
+    np.testing.assert_allclose(found.sequence(0)[:-2], whole[: len(found.sequence(0)) - 2], atol=1e-3)
+
+
+def test_figures_of_all_kinds_become_one_store(tmp_path: Path) -> None:
+    """A walk in CMU's joints, and the same on a skeleton with other names and proportions."""
+    walk = read_motion(CMU_FOLDER / "39_14.amc")[:240]
+    other = from_humanoid(to_humanoid(walk).motion, MIXAMO)
+    records = [Record(name, name, motion, ("A person walks.",)) for name, motion in (("a", walk), ("b", other))]
+    found = prepare(records, tmp_path / "store", FULL)
+    assert ([entry.skeleton for entry in found.records], found.skeletons) == ([0, 0], (HUMANOID,))
+    speeds = [found.sequence(number)[:, found.channels.index("root.forward")] for number in range(2)]
+    np.testing.assert_allclose(*speeds, atol=0.02)
+    angles = [column for column, unit in enumerate(found.units) if unit == "deg"]
+    apart = np.abs(found.sequence(0)[:, angles] - found.sequence(1)[:, angles])
+    assert apart.mean() < 1
+
+
+def test_takes_are_not_divided() -> None:
+    everything = [replace(entry, take=entry.name[:3]) for entry in entries([30, 30, 30])]
+    for seed in range(5):
+        parts = split(everything, seed)
+        takes = [{everything[i].take for i in part} for part in (parts.train, parts.validation, parts.test)]
+        assert sum(map(len, takes)) == len(set.union(*takes))

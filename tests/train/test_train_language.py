@@ -1,4 +1,5 @@
 import json
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -151,7 +152,7 @@ def test_refusals(store: Path, tmp_path: Path) -> None:
     (tmp_path / "other" / "thesis.txt").write_text("")
     refused = ("train", "describe", "--data", store)
     assert "it has no checkpoint.pt" in motet(*refused, "--out", tmp_path / "other", "--resume").output
-    assert "no corpus in" in motet("train", "describe", "--data", tmp_path / "empty", "--out", out).output
+    assert "no motion files" in motet("train", "describe", "--data", tmp_path / "empty", "--out", out).output
     trained("describe", store, out, "--epochs", 1)
     before = (out / CHECKPOINT).read_bytes()
     assert "it exists" in motet(*refused, "--out", out).output
@@ -172,9 +173,17 @@ def test_a_corpus_is_prepared_beside_the_run(tmp_path: Path) -> None:
         lines += [f"{record.name}\t{sentence}" for sentence in record.sentences]
     (tmp_path / "said.tsv").write_text("\n".join(lines))
     out = tmp_path / "runs" / "mine"
-    run = trained("describe", folder, out, "--sentences", tmp_path / "said.tsv", "--epochs", 1)
+    given = ("--sentences", tmp_path / "said.tsv", "--epochs", 1)
+    refused = motet("train", "describe", "--data", folder, "--out", out, *given)
+    assert "what is no human figure is prepared with --figure own" in refused.output
+    run = trained("describe", folder, out, "--figure", "own", *given)
     assert run.manifest["training"]["data"]["motions"] == 12
     assert len(Store.open(tmp_path / "runs" / "mine-store").records) == 12
+    again = motet("train", "describe", "--data", folder, "--out", out.with_name("mine"), "--figure", "own", *given)
+    assert "it exists" in again.output
+    shutil.rmtree(out)
+    stale = motet("train", "describe", "--data", folder, "--out", out, "--figure", "own", *given)
+    assert f"{out}-store: it exists" in stale.output
 
 
 def test_either_loss_can_be_trained(store: Path, tmp_path: Path) -> None:

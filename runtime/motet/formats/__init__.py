@@ -70,10 +70,10 @@ FORMATS = (
     Format(".npz", "motet's own; AMASS", _NPZ, "npz", "npz", mocap=True),
     Format(".csv", "table", "values, units and frame rate, no skeleton", "csv", "csv"),
     Format(".xml", "MMM of KIT", "angles and root; the skeleton is not in the file", "mmm"),
-    Format(".glb", "glTF 2.0", _GLB, "gltf", "glb"),
+    Format(".glb", "glTF 2.0", _GLB, "gltf", "glb", mocap=True),
     Format(".gltf", "glTF 2.0, as text", _CHARACTER, "gltf"),
     Format(".vrm", "VRM avatar", _CHARACTER, "gltf"),
-    Format(".vrma", "VRM Animation", _VRMA, "gltf", "vrma"),
+    Format(".vrma", "VRM Animation", _VRMA, "gltf", "vrma", mocap=True),
     Format(".html", "web page", "a page with a player: orbit, play, scrub, no network", writer="html"),
     Format(".gif", "picture", _GIF, writer="gif", needs="PIL"),
 )

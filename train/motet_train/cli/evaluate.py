@@ -38,7 +38,7 @@ from motet_train.settings import read_settings
     "--data",
     type=Path,
     help="Control: the clips. [default: those it was trained on] Describe and generate: the store. "
-    "Predict: text files of the protocol, or motion files.",
+    "Predict: text files of the protocol, or the store.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one nested object with stable keys.")
 @click.option("--plots", type=Path, help="Folder for the figures of the papers.")
@@ -89,7 +89,7 @@ def _measured(
 
         make_folder(plots)  # what cannot be written is said before hours of measuring
     if predicts:
-        return predict_reports(predicts, data, plots, unit)
+        return predict_reports(predicts, data, plots)
     reports = _control(controls, data, plots, unit) if controls else language_reports(others, data, plots)
     ready: dict[str, Any] = {name: json_ready(report) for name, report in reports.items()}
     for name in others:

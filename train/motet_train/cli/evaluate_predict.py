@@ -11,10 +11,11 @@ from tqdm import tqdm
 from motet.formats import read_motion
 from motet.models.predict import PredictModel
 from motet.motion.kinematics import skeleton_of
+from motet.motion.motion import Motion
 from motet_train.data.clips import CMU_FOLDER
 from motet_train.data.expmap_files import CMU_LAYOUT, ExpmapCorpus, is_expmap, read_expmap
-from motet_train.data.predict_data import STRIDE, read_trials
-from motet_train.data.records import Record
+from motet_train.data.predict_data import STRIDE
+from motet_train.data.store import Store
 from motet_train.evaluate.predict import curves, mocap, strips
 from motet_train.evaluate.predict.ablations import ablated, ablation_table
 from motet_train.evaluate.predict.costs import cost_table
@@ -36,14 +37,14 @@ Result = tuple[Ready, str]
 """The figures of each model, ready for JSON, see :func:`_ready`, and the table."""
 
 
-def predict_reports(models: Models, data: Path | None, plots: Path | None, unit: str | None) -> Result:
+def predict_reports(models: Models, data: Path | None, plots: Path | None) -> Result:
     """By the protocol where ``data`` has its text files, else the joints' distances in trials that were held out.
 
-    Runs that differ in their seed alone are one row of the table. unit: of motion files that do not state theirs.
+    Runs that differ in their seed alone are one row of the table.
     """
     if data is None:
-        raise click.UsageError("predictors need --data: text files of the protocol, or motion files")
-    return _protocol(models, data, plots) if is_expmap(data) else _mocap(models, data, plots, unit)
+        raise click.UsageError("predictors need --data: text files of the protocol, or the store they were trained on")
+    return _protocol(models, data, plots) if is_expmap(data) else _mocap(models, data, plots)
 
 
 def _protocol(models: Models, data: Path, plots: Path | None) -> Result:
@@ -77,11 +78,10 @@ def _draw_protocol(models: Models, corpus: ExpmapCorpus, shown: curves.Curves, p
     save(drawings, plots)
 
 
-def _mocap(models: Models, data: Path, plots: Path | None, unit: str | None) -> Result:
+def _mocap(models: Models, data: Path, plots: Path | None) -> Result:
     first, groups = next(iter(models.values())), seed_groups(models)
-    with tqdm(unit=" files", disable=None, leave=False) as bar:
-        trials = mocap.held_out(first, read_trials(data, lambda clip: bar.update(), unit)[0])
-    found = mocap.distances(models, trials)
+    trials = mocap.held_out(first, Store.open(data))
+    found = mocap.distances(models, list(trials.values()))
     shown, apart = pooled(found, groups), pooled(found, groups, spread)
     if plots is not None:
         _draw_mocap(_drawn(models, groups), trials, shown, plots)
@@ -90,16 +90,16 @@ def _mocap(models: Models, data: Path, plots: Path | None, unit: str | None) -> 
     return _ready(models, groups, runs, means, spreads), text
 
 
-def _draw_mocap(models: Models, trials: Sequence[Record], shown: mocap.Distances, plots: Path) -> None:
+def _draw_mocap(models: Models, trials: Mapping[str, Motion], shown: mocap.Distances, plots: Path) -> None:
     from motet_train.evaluate.figures import save
     from motet_train.evaluate.predict.plots import error_over_time, strips_drawing
 
     first = next(iter(models.values()))
     errors = {measure: {name: shown[name][measure] for name in shown} for measure in shown[curves.ZERO]}
     drawings = {"predict-distance": partial(error_over_time, errors, first.fps, "cm")}
-    for trial in trials[:: max(1, len(trials) // STRIPS)]:
-        drawn = mocap.strips(models, trial.motion, every=3)
-        drawings[f"predict-{trial.name}"] = partial(strips_drawing, drawn, skeleton_of(trial.motion))
+    for name in list(trials)[:: max(1, len(trials) // STRIPS)]:
+        drawn = mocap.strips(models, trials[name], every=3)
+        drawings[f"predict-{name}"] = partial(strips_drawing, drawn, skeleton_of(trials[name]))
     save(drawings, plots)
 
 

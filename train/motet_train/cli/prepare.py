@@ -1,5 +1,6 @@
 """``motet prepare``: a corpus into a store that models are trained on."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import click
@@ -9,32 +10,58 @@ from motet.representation import named
 from motet_train.cli.train_options import unit_in
 from motet_train.data.corpus import Corpus, read_corpus
 from motet_train.data.errors import DataError
+from motet_train.data.preparation import FIGURES, Preparation, preparation
 from motet_train.data.records import Record, Skipped
-from motet_train.data.store import Item
+from motet_train.data.store import Item, Store
 from motet_train.data.store import prepare as prepare_store
+from motet_train.data.table import read_people
+
+CORPUS = (
+    click.option("--sentences", type=Path, help="Table of sentences. [default: the only .tsv in or beside the data]"),
+    click.option("--people", type=Path, help="Table of who moves in which clips. [default: by the clips' names]"),
+    click.option("--figure", type=click.Choice(FIGURES), help="Whose joints. [default: humanoid; of KIT's data, own]"),
+    unit_in,
+)
+"""What says how a corpus is to be understood."""
+
+
+def corpus_options(function: Callable[..., None]) -> Callable[..., None]:
+    """The options of :data:`CORPUS` on a command."""
+    for option in reversed(CORPUS):
+        function = option(function)
+    return function
 
 
 @click.command()
-@click.argument("data", type=Path)
+@click.argument("data", type=Path, nargs=-1, required=True)
 @click.option("-o", "--out", type=Path, required=True, help="Folder of the store to write; must not exist.")
-@click.option("--sentences", type=Path, help="Table of sentences. [default: the only .tsv in or beside DATA]")
-@unit_in
-def prepare(data: Path, out: Path, sentences: Path | None, unit_in: str | None) -> None:
-    """Prepare the corpus DATA once: a folder or zip of motions with sentences becomes a store to train on.
+@click.option(
+    "--for", "verb", type=click.Choice(["describe", "generate", "predict"]), default="describe", show_default=True
+)
+@click.option("--fps", type=click.FloatRange(1, 240), help="Frames per second. [default: 10; for predict, 30]")
+@corpus_options
+def prepare(
+    data: tuple[Path, ...],
+    out: Path,
+    verb: str,
+    fps: float | None,
+    sentences: Path | None,
+    people: Path | None,
+    figure: str | None,
+    unit_in: str | None,
+) -> None:
+    """Prepare the corpus DATA once: folders or zips of motions with sentences become a store to train on.
 
-    DATA is the KIT Motion-Language data, or motion files .amc (with .asf) .bvh .npz with a tab-separated table
-    of the columns clip and sentence. A motion that cannot be used is named and skipped.
+    DATA is the KIT Motion-Language data, or motion files .amc (with .asf) .bvh .npz .glb .vrma with a
+    tab-separated table of the columns clip and sentence, which predict does not need. Of two files of one name that of
+    the later DATA counts. Every human figure is brought to the humanoid. A motion that cannot be used is named and
+    skipped; longer than 30 s, it is cut into pieces, which share its sentences.
     """
-    corpus = read_corpus(data, sentences, unit_in)
-    _check_unit(corpus)
-    with tqdm(total=len(corpus), unit="motion", disable=None) as bar:
-
-        def progress(item: Item) -> None:
-            bar.update()
-            if isinstance(item, Skipped):
-                bar.write(f"skipped {item.name}: {item.reason}")
-
-        store = prepare_store(corpus, out, corpus.preparation, progress)
+    who = () if people is None else read_people(people)
+    corpus = read_corpus(data, sentences, who, unit_in, described=verb != "predict")
+    found = preparation(verb, corpus.kit, figure, fps)
+    _check_unit(corpus, found)
+    store = _prepared(corpus, found, out)
     seconds = sum(stop - start for entry in store.records for start, stop in entry.spans[:1]) / store.fps
     texts = sum(len(entry.sentences) for entry in store.records)
     click.echo(
@@ -46,10 +73,21 @@ def prepare(data: Path, out: Path, sentences: Path | None, unit_in: str | None) 
         click.echo(f"motet: most motions were skipped; channels and axes are those of the first, {first}", err=True)
 
 
-def _check_unit(corpus: Corpus) -> None:
+def _prepared(corpus: Corpus, preparation: Preparation, out: Path) -> Store:
+    with tqdm(total=len(corpus), unit="motion", disable=None) as bar:
+
+        def progress(item: Item) -> None:
+            bar.update()
+            if isinstance(item, Skipped):
+                bar.write(f"skipped {item.name}: {item.reason}")
+
+        return prepare_store(corpus, out, preparation, progress)
+
+
+def _check_unit(corpus: Corpus, preparation: Preparation) -> None:
     """DataError where the first motion does not say its unit and nobody else does: the others will not, either."""
-    if not named(corpus.preparation.representation).required:
-        return  # joint angles alone have no lengths
+    if preparation.humanoid or not named(preparation.representation).required:
+        return  # the humanoid's unit is found by its height; joint angles alone have no lengths
     first = next((item for item in corpus if isinstance(item, Record)), None)
     if first is not None and first.motion.skeleton is not None and first.motion.skeleton.metres_per_unit is None:
         raise DataError(

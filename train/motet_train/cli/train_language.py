@@ -5,11 +5,9 @@ from typing import Any
 
 import click
 
-from motet_train import distributed
-from motet_train.cli.prepare import prepare
-from motet_train.cli.train_options import train_command, unit_in
-from motet_train.data.errors import DataError
-from motet_train.data.store import INDEX, Store
+from motet_train.cli.prepare import CORPUS
+from motet_train.cli.prepared import prepared
+from motet_train.cli.train_options import train_command
 from motet_train.models.language.language_to_motion import LOSSES
 from motet_train.recipes import describe as describing
 from motet_train.recipes import generate as generating
@@ -19,8 +17,7 @@ from motet_train.runs import Run
 
 OPTIONS = (
     click.option("--data", type=Path, required=True, help="A prepared store, or a corpus: folder or zip."),
-    click.option("--sentences", type=Path, help="Table of sentences of a mocap corpus. [default: the .tsv beside it]"),
-    unit_in,
+    *CORPUS,
     click.option("--epochs", type=click.IntRange(1), help="[default: the preset's]"),
     click.option("--batch", type=click.IntRange(1), help="Motions in a batch. [default: the preset's]"),
     click.option("--split", "by", type=click.Choice(["trial", "subject"]), default="trial", show_default=True),
@@ -34,22 +31,10 @@ LOSS = click.option(
 @train_command("describe", describing.RECIPES, *OPTIONS)
 def describe(job: Job, data: Path, by: str, **corpus: Any) -> Run:
     """Train motion to language: a net that describes a motion in words."""
-    return train_language(_store(data, job.folder, **corpus), job, data.name, by)
+    return train_language(prepared(data, job, **corpus), job, data.name, by)
 
 
 @train_command("generate", generating.RECIPES, *OPTIONS, LOSS)
 def generate(job: Job, data: Path, by: str, **corpus: Any) -> Run:
     """Train language to motion: a net that makes a motion from a sentence."""
-    return train_language(_store(data, job.folder, **corpus), job, data.name, by)
-
-
-def _store(data: Path, out: Path, sentences: Path | None, unit_in: str | None) -> Store:
-    """The store at ``data``, or that of the corpus which is there, prepared beside the run if it is not yet."""
-    if (data / INDEX).is_file():
-        return Store.open(data)
-    place = out.with_name(f"{out.name}-store")
-    if not place.exists():
-        if distributed.count() > 1:
-            raise DataError(f"several processes need a prepared store: motet prepare {data} --out {place}")
-        click.get_current_context().invoke(prepare, data=data, out=place, sentences=sentences, unit_in=unit_in)
-    return Store.open(place)
+    return train_language(prepared(data, job, **corpus), job, data.name, by)

@@ -1,15 +1,17 @@
 """``motet train predict``."""
 
 from pathlib import Path
+from typing import Any
 
 import click
-from tqdm import tqdm
 
 from motet_train import distributed
-from motet_train.cli.train_options import train_command, unit_in
+from motet_train.cli.prepare import CORPUS
+from motet_train.cli.prepared import prepared
+from motet_train.cli.train_options import train_command
 from motet_train.data.errors import DataError
 from motet_train.data.expmap_files import ExpmapCorpus, is_expmap, read_expmap
-from motet_train.data.predict_data import Material, expmap_material, mocap_material, read_trials
+from motet_train.data.predict_data import Material, expmap_material, store_material
 from motet_train.recipes.predict import RECIPES, train_predict
 from motet_train.recipes.recipe import Job
 from motet_train.runs import Run
@@ -22,9 +24,9 @@ from motet_train.runs import Run
         "--data",
         type=Path,
         required=True,
-        help="Folder or zip: exponential-map text files, or motion files of one figure.",
+        help="Exponential-map text files, a store prepared for predict, or motion files: folder or zip.",
     ),
-    unit_in,
+    *CORPUS,
     click.option(
         "--split",
         "by",
@@ -33,26 +35,21 @@ from motet_train.runs import Run
     ),
     click.option("--steps", type=click.IntRange(1), help="[default: the preset's]"),
 )
-def predict(job: Job, data: Path, unit_in: str | None, by: str | None) -> Run:
+def predict(job: Job, data: Path, by: str | None, **corpus: Any) -> Run:
     """Train a predictor: a net that continues a motion from its last frames.
 
-    From text files of the protocol it learns what `motet evaluate` measures; from motion files (.amc .bvh .npz) it
-    learns to continue files of the same figure.
+    From text files of the protocol it learns what `motet evaluate` measures; from motion files to continue files of any
+    human figure.
     """
-    return train_predict(_material(data, unit_in, by), job)
+    return train_predict(_material(data, job, by, **corpus), job)
 
 
-def _material(data: Path, unit_in: str | None, by: str | None) -> Material:
-    if is_expmap(data):
-        if by is not None:
-            raise DataError(f"{data} has test files of its own: --split is for motion files")
-        return expmap_material(read_expmap_files(data))
-    with tqdm(unit=" files", disable=None, leave=False) as bar:
-        trials, skipped = read_trials(data, lambda clip: bar.update(), unit_in)
-    material = mocap_material(trials, skipped, data.name, by or "subject")
-    if (names := material.about["skipped"]) and distributed.rank() == 0:
-        click.echo(f"motet: {len(names)} files cannot be used: {', '.join(names)}", err=True)
-    return material
+def _material(data: Path, job: Job, by: str | None, **corpus: Any) -> Material:
+    if not is_expmap(data):
+        return store_material(prepared(data, job, **corpus), data.name, by or "subject")
+    if by is not None:
+        raise DataError(f"{data} has test files of its own: --split is for motion files")
+    return expmap_material(read_expmap_files(data))
 
 
 def read_expmap_files(data: Path) -> ExpmapCorpus:

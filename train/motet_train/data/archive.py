@@ -1,5 +1,6 @@
-"""The files of a folder or of a zip, which is never unpacked as a whole."""
+"""The files of folders and zips, which are never unpacked as a whole."""
 
+import shutil
 import tempfile
 import zipfile
 import zlib
@@ -17,23 +18,28 @@ BROKEN = (MotionError, DataError, OSError, zipfile.BadZipFile, zlib.error, Runti
 
 
 class Archive:
-    """The files of a folder or a zip by name, as "amc/01_02.amc"; a context manager.
+    """The files of folders and zips by name, as "amc/01_02.amc", as if they were one; a context manager.
 
-    Hidden files are left out. DataError for a place that is neither a folder nor a zip.
+    Of two files of one name that of the later place counts. Hidden files are left out. DataError for a place that is
+    neither a folder nor a zip.
     """
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self._stack = ExitStack()
-        self._zip: zipfile.ZipFile | None = None
-        if path.is_dir():
-            self._folder = path
-            names = [file.relative_to(path).as_posix() for file in path.rglob("*") if file.is_file()]
-        else:
-            self._zip = self._stack.enter_context(_opened(path))
-            self._folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix="motet-")))
-            names = [name for name in self._zip.namelist() if not name.endswith("/")]
-        self.names = tuple(sorted(name for name in names if not _hidden(name)))
+    def __init__(self, *paths: Path) -> None:
+        self._sources: dict[str, tuple[Path, zipfile.ZipFile | None]] = {}
+        with ExitStack() as stack:
+            for path in paths:
+                opened = None if path.is_dir() else stack.enter_context(_opened(path))
+                self._sources |= dict.fromkeys(_files(path, opened), (path, opened))
+            self._borrowed = len(paths) == 1 and paths[0].is_dir()
+            self._folder = paths[0]
+            if not self._borrowed:
+                self._folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="motet-")))
+            self._stack = stack.pop_all()
+        self.names = tuple(sorted(name for name in self._sources if not _hidden(name)))
+
+    def origin(self, name: str) -> Path:
+        """What a file is called in errors: its name in the folder or zip that it is of."""
+        return self._sources[name][0] / name
 
     def __enter__(self) -> Self:
         return self
@@ -44,11 +50,17 @@ class Archive:
         self._stack.close()
 
     def place(self, name: str) -> Path:
-        """Where a file lies; one of a zip is unpacked first and stays until the archive is closed.
+        """Where a file lies; one of a zip or of several places is brought to one folder, and stays until the end.
 
         A damaged one raises an error of BROKEN.
         """
-        return self._folder / name if self._zip is None else Path(self._zip.extract(name, self._folder))
+        place, (path, opened) = self._folder / name, self._sources[name]
+        if self._borrowed:
+            return place
+        if opened is not None:
+            return Path(opened.extract(name, self._folder))
+        place.parent.mkdir(parents=True, exist_ok=True)
+        return Path(shutil.copyfile(path / name, place))
 
     def reason(self, error: Exception) -> str:
         """What an error says, with files named as in the archive."""
@@ -61,8 +73,14 @@ class Archive:
         try:
             yield place
         finally:
-            if self._zip is not None:
+            if not self._borrowed:
                 place.unlink()
+
+
+def _files(path: Path, opened: zipfile.ZipFile | None) -> list[str]:
+    if opened is not None:
+        return [name for name in opened.namelist() if not name.endswith("/")]
+    return [file.relative_to(path).as_posix() for file in path.rglob("*") if file.is_file()]
 
 
 def _opened(path: Path) -> zipfile.ZipFile:

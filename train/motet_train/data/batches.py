@@ -94,7 +94,8 @@ class Examples:
     def _part(self, i: int, offset: int, start: int, longest: int) -> tuple[Floats, bool]:
         """Frames of a motion, and whether it ends with them."""
         frames = self.store.sequence(self.records[i], offset)
-        return frames[start : start + longest], start + longest >= len(frames)
+        ends = self.store.records[self.records[i]].ends and start + longest >= len(frames)
+        return frames[start : start + longest], ends
 
 
 def examples(store: Store, records: Sequence[int], vocabulary: Vocabulary, mirror: FrameMirror | None) -> Examples:

@@ -187,6 +187,6 @@ def _read(archive: Archive, name: str, columns: int) -> Array | None:
         return None
     with archive.opened(known) as place:
         try:
-            return parse(place.read_text(encoding="utf-8"), archive.path / known, columns)
+            return parse(place.read_text(encoding="utf-8"), archive.origin(known), columns)
         except UnicodeDecodeError as error:
-            raise FormatError(archive.path / known, "not a text file") from error
+            raise FormatError(archive.origin(known), "not a text file") from error

@@ -1,34 +1,24 @@
 """What a predictor is trained on: the exponential-map text files of the protocol, or ordinary motion files."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
-from pathlib import Path
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motet.errors import MotionError
-from motet.formats import MOCAP
-from motet.motion.kinematics import skeleton_of
-from motet.motion.motion import Motion
 from motet.motion.rotations import Array
-from motet.representation.contract import MotionContract, living, sequences
-from motet_train.data.archive import Archive
+from motet.representation.contract import MotionContract
 from motet_train.data.clips import CMU_LICENCE
-from motet_train.data.corpus import recordings
 from motet_train.data.errors import DataError
 from motet_train.data.expmap_files import ROOT, ExpmapCorpus, Layout, scaling_of
-from motet_train.data.records import Record, Skipped
+from motet_train.data.preparation import VECTORS
 from motet_train.data.split import split
-from motet_train.data.store import Entry
-from motet_train.data.trim import trim
+from motet_train.data.store import Store
 
 STRIDE = 2
 """Of the protocol: every second frame of a text file."""
-
-FPS = 30.0
-"""Of models of ordinary motion files."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,80 +129,31 @@ def _mirrored_columns(layout: Layout) -> tuple[tuple[int, ...], tuple[float, ...
     return tuple(columns.tolist()), tuple(signs.tolist())
 
 
-def read_trials(
-    path: Path, progress: Callable[[str], object] = lambda name: None, unit: str | float | None = None
-) -> tuple[list[Record], list[Skipped]]:
-    """The motion files of a folder or zip, one of each name, idle ends cut off, and those that cannot be used.
+def store_material(store: Store, name: str, by: str = "subject") -> Material:
+    """The motions of a store that was prepared for predictors, all phases, without the test motions.
 
-    unit: the length unit of files that do not state theirs, as in :func:`motet.read`.
+    name: the store's. by: which those are, see :func:`motet_train.data.split.split`.
     """
-    items = []
-    with Archive(path) as archive:
-        for item in recordings(archive, unit):
-            progress(item.name)
-            items.append(_trimmed(item))
-    trials = [item for item in items if isinstance(item, Record)]
-    if not trials:
-        raise DataError(f"no motion files in {path} ({' '.join(MOCAP)}), or none that can be used")
-    return trials, [item for item in items if isinstance(item, Skipped)]
-
-
-def _trimmed(item: Record | Skipped) -> Record | Skipped:
-    try:
-        return replace(item, motion=trim(item.motion)) if isinstance(item, Record) else item
-    except MotionError as error:
-        return Skipped(item.name, str(error))
-
-
-def held_out_names(trials: Sequence[Record], by: str = "subject") -> tuple[str, ...]:
-    """The trials that are held out: all those of some people, a tenth at most; or a tenth by chance, ``by`` "trial"."""
-    entries = [Entry(trial.name, trial.subject, (), ()) for trial in trials]
-    return tuple(trials[index].name for index in split(entries, 0, by).test)
-
-
-def mocap_material(trials: Sequence[Record], skipped: Sequence[Skipped], name: str, by: str = "subject") -> Material:
-    """Motions of one figure as root block and exponential maps at :data:`FPS`, all phases, without the test trials.
-
-    by: which those are, see :func:`held_out_names`.
-    """
-    test = set(held_out_names(trials, by))
-    found, left_out = _figures([trial for trial in trials if trial.name not in test])
-    if not found:
-        raise DataError(f"no motion can be used: {'; '.join(item.reason for item in left_out[:3])}")
-    first = next(iter(found.values()))[0]
-    sequences = [motion.values.astype(np.float32) for motions in found.values() for motion in motions]
-    frames = np.concatenate(sequences)
-    mean, std = frames.mean(axis=0, dtype=np.float64), living(frames.std(axis=0, dtype=np.float64), first.units)
-    skeleton = skeleton_of(first).scaled(1.0)
-    contract = MotionContract("root_vectors", first.channels, first.units, FPS, mean, std, skeleton)
+    if store.representation != VECTORS.representation:
+        raise DataError(f"{name} is a store of {store.representation}: prepare it with --for predict")
+    test = split(store.records, 0, by).test
+    train = [record for record in range(len(store.records)) if record not in set(test)]
+    contract = store.contract(train)
+    spans = [span for record in train for span in store.records[record].spans]
+    lengths = np.array([stop - start for start, stop in spans], dtype=np.float64)
     mirrored, signs = _mirrored(contract)
-    names = [item.name for item in (*skipped, *left_out)]
-    about = {"name": name, "files": len(found), "skipped": names, "split": by, "test": sorted(test)}
-    lengths = np.array([len(sequence) for sequence in sequences], dtype=np.float64)
+    names = {"skipped": [item.name for item in store.skipped], "test": [store.records[record].name for record in test]}
     return Material(
         contract,
-        sequences,
+        [store.frames[start:stop] for start, stop in spans],
         lengths / lengths.sum(),
         1,
-        tuple(int(column) for column in np.flatnonzero(std)),
+        tuple(int(column) for column in np.flatnonzero(contract.std)),
         poses=False,
         mirrored=mirrored,
         signs=signs,
-        about=about,
+        about={"name": name, "files": len(train), "split": by, **names},
     )
-
-
-def _figures(trials: Sequence[Record]) -> tuple[dict[str, list[Motion]], list[Skipped]]:
-    """The features of each trial in all phases, in the joints of the first one, and the trials that have others."""
-    found: dict[str, list[Motion]] = {}
-    left_out, first = [], None
-    for trial in trials:
-        try:
-            found[trial.name] = list(sequences("root_vectors", trial.motion, FPS, first))
-            first = found[trial.name][0]
-        except MotionError as error:
-            left_out.append(Skipped(trial.name, str(error)))
-    return found, left_out
 
 
 def _mirrored(contract: MotionContract) -> tuple[tuple[int, ...], tuple[float, ...]]:

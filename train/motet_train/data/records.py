@@ -7,12 +7,18 @@ from motet.motion.motion import Motion
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """One motion and what people said about it; subject is who moved, if the corpus tells."""
+    """One motion and what people said about it.
+
+    subject: who moved, if the corpus tells. unseen: sentences whose wordings are for measuring, never for training.
+    take: what it is a part of that must not be divided; "" where it is a take of its own.
+    """
 
     name: str
     subject: str
     motion: Motion
     sentences: tuple[str, ...]
+    unseen: tuple[str, ...] = ()
+    take: str = ""
 
 
 @dataclass(frozen=True)

@@ -24,14 +24,15 @@ class Split:
 def split(entries: Sequence[Entry], seed: int, by: str = "trial") -> Split:
     """Divide motions .8/.1/.1 by chance, the same for the same seed.
 
-    by: "trial", or "subject" to keep all motions of a person together, so that validation and test show people never
-        seen in training; these parts then have at most .1 each. DataError where a part would be empty.
+    by: "trial", which keeps the pieces of a take together, or "subject" to keep all motions of a person together, so
+        that validation and test show people never seen in training; these parts then have at most .1 each. DataError
+        where a part would be empty.
     """
     if by not in ("trial", "subject"):
         raise DataError(f"motions are split by trial or by subject, not by {by!r}")
     groups: dict[str, list[int]] = {}
     for index, entry in enumerate(entries):
-        groups.setdefault(entry.subject if by == "subject" else f"{index}", []).append(index)
+        groups.setdefault(entry.subject if by == "subject" else entry.take or entry.name, []).append(index)
     wanted = max(1, round(SHARE * len(entries)))
     parts: list[list[int]] = [[], [], []]
     for key in np.random.default_rng(seed).permutation(sorted(groups)).tolist():

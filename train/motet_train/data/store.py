@@ -6,7 +6,7 @@ are, where each record's sequences lie, and what was skipped.
 
 import json
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -30,9 +30,10 @@ FRAMES, INDEX = "frames.npy", "store.json"
 
 @dataclass(frozen=True)
 class Entry:
-    """A record of the store: for each down-sampling offset the span (start, stop) of its frames.
+    """A record of the store: a motion or a piece of it, for each down-sampling offset the span (start, stop) of frames.
 
-    skeleton: the index of its figure among the store's.
+    skeleton: the index of its figure among the store's. unseen: sentences for measuring. take: what must not be
+    divided, which the pieces of a motion have in common. ends: whether the motion ends with it.
     """
 
     name: str
@@ -40,6 +41,9 @@ class Entry:
     sentences: tuple[str, ...]
     spans: tuple[tuple[int, int], ...]
     skeleton: int | None = None
+    unseen: tuple[str, ...] = ()
+    take: str = ""
+    ends: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +111,8 @@ class Store:
 
 def _entry(data: dict[str, Any]) -> Entry:
     spans = tuple((int(start), int(stop)) for start, stop in data["spans"])
-    return Entry(str(data["name"]), str(data["subject"]), tuple(data["sentences"]), spans, data["skeleton"])
+    said = {key: tuple(data[key]) for key in ("sentences", "unseen")}
+    return Entry(**{**data, **said, "spans": spans})
 
 
 def prepare(
@@ -155,8 +160,16 @@ class _Writer:
         return item
 
     def _write(self, record: Record) -> None:
+        pieces = self.preparation.pieces(record.motion)
+        found = [list(self.preparation.sequences(piece, self.first)) for piece in pieces]
+        for number, phases in enumerate(found, start=1):
+            ends = number == len(found)
+            name = record.name if len(found) == 1 else f"{record.name}.{number}"
+            self._write_piece(replace(record, name=name, take=record.take or record.name), phases, ends)
+
+    def _write_piece(self, record: Record, phases: Sequence[Motion], ends: bool) -> None:
         spans = []
-        for features in list(self.preparation.sequences(record.motion, self.first)):
+        for features in phases:
             if self.first is None:
                 self.first = features
                 self._header()
@@ -164,7 +177,8 @@ class _Writer:
             spans.append((self.frames, self.frames + len(features)))
             self.frames += len(features)
         own = None if features.skeleton is None else self._number(features.skeleton)
-        self.entries.append(Entry(record.name, record.subject, record.sentences, tuple(spans), own))
+        said = record.sentences, tuple(spans), own, record.unseen, record.take, ends
+        self.entries.append(Entry(record.name, record.subject, *said))
 
     def _number(self, skeleton: Skeleton) -> int:
         if skeleton.metres_per_unit is not None:
@@ -182,7 +196,8 @@ class _Writer:
         """Write the header, now that the number of frames is known; the content of ``store.json``."""
         if self.first is None:
             reasons = "; ".join(f"{item.name}: {item.reason}" for item in self.skipped[:3])
-            raise DataError(f"no motion can be used, {len(self.skipped)} were skipped: {reasons}")
+            other = "; what is no human figure is prepared with --figure own" if self.preparation.humanoid else ""
+            raise DataError(f"no motion can be used, {len(self.skipped)} were skipped: {reasons}{other}")
         self.file.seek(0)
         self._header()
         return {

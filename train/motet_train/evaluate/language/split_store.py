@@ -58,9 +58,13 @@ class SplitStore:
         return tuple(found.tolist())
 
     def unseen(self, records: Iterable[int]) -> list[tuple[str, ...]]:
-        """The sentences of several records, without those that were also said about a training motion."""
+        """The sentences of several records that no training saw: those kept for it and the new ones."""
         known = {sentence for said in self.references(self.parts.train) for sentence in said}
-        return [tuple(sentence for sentence in said if sentence not in known) for said in self.references(records)]
+        said = ((*self._kept(record), *self.sentences(record)) for record in records)
+        return [tuple(sentence for sentence in found if sentence not in known) for found in said]
+
+    def _kept(self, record: int) -> tuple[str, ...]:
+        return tuple(plain(sentence) for sentence in self.store.records[record].unseen if usable(sentence))
 
     def unknown_words(self, records: Iterable[int]) -> set[str]:
         """The words said about some records that were not said about training motions: models read UNK."""

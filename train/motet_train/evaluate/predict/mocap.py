@@ -1,4 +1,4 @@
-"""Predictions of motion files: how far each joint is from where it really was, in trials that were held out."""
+"""Predictions of recorded motions: how far each joint is from where it really was, in trials that were held out."""
 
 from collections.abc import Mapping, Sequence
 
@@ -8,8 +8,9 @@ from motet.models.predict import PredictModel
 from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
+from motet.representation import named
 from motet_train.data.errors import DataError
-from motet_train.data.records import Record
+from motet_train.data.store import Store
 from motet_train.evaluate.predict.curves import ZERO
 from motet_train.evaluate.predict.protocol import REPORTED
 from motet_train.evaluate.predict.protocol_table import error_row, frame_heads
@@ -22,32 +23,33 @@ PLACE, POSE = "place_cm", "pose_cm"
 """Of joints in the world, and of joints relative to the root's place."""
 
 
-def held_out(model: PredictModel, trials: Sequence[Record]) -> list[Record]:
-    """The trials that the model did not see in training; DataError where none of them is here."""
+def held_out(model: PredictModel, store: Store) -> dict[str, Motion]:
+    """By name the motions of a store that the model did not see in training; DataError where none of them is there."""
     test = set(model.manifest.training.get("data", {}).get("test", ()))
-    found = [trial for trial in trials if trial.name in test]
+    found = {entry.name: number for number, entry in enumerate(store.records) if entry.name in test}
     if not found:
         raise DataError("none of the trials held out in training was found")
-    return found
+    playable = named(store.representation).motion
+    return {name: playable(store.motion(number)) for name, number in found.items()}
 
 
-def distances(models: Mapping[str, PredictModel], trials: Sequence[Record]) -> Distances:
+def distances(models: Mapping[str, PredictModel], motions: Sequence[Motion]) -> Distances:
     """The mean over windows that begin every ``horizon`` frames, of all systems, zero velocity first.
 
-    Models must have the same frame rate, seed and horizon; DataError where the trials are too short.
+    Models must have the same frame rate, seed and horizon; DataError where the motions are too short.
     """
     first = next(iter(models.values()))
     found: dict[str, list[tuple[Array, Array]]] = {ZERO: [], **{name: [] for name in models}}
-    for trial in trials:
-        motion = trial.motion.resample(first.fps, to_end=True)
-        for start in range(0, len(motion) - first.seed_frames - first.horizon + 1, first.horizon):
-            seed = motion[start : start + first.seed_frames]
-            truth = _places(motion[start + first.seed_frames :][: first.horizon])
+    for motion in motions:
+        whole = motion.resample(first.fps, to_end=True)
+        for start in range(0, len(whole) - first.seed_frames - first.horizon + 1, first.horizon):
+            seed = whole[start : start + first.seed_frames]
+            truth = _places(whole[start + first.seed_frames :][: first.horizon])
             found[ZERO].append(_distance(_places(seed)[-1:], truth))
             for name, model in models.items():
                 found[name].append(_distance(_places(model.predict(seed, frames=first.horizon)), truth))
     if not found[ZERO]:
-        raise DataError(f"the trials are shorter than {first.seed_frames + first.horizon} frames at the model's rate")
+        raise DataError(f"the motions are shorter than {first.seed_frames + first.horizon} frames at the model's rate")
     means = {name: np.mean(windows, axis=0) for name, windows in found.items()}
     return {name: {PLACE: mean[0], POSE: mean[1]} for name, mean in means.items()}
 

@@ -1,0 +1,30 @@
+"""The store that a training command is given, or makes of the corpus that it is given."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from motet_train import distributed
+from motet_train.cli.prepare import prepare
+from motet_train.data.errors import DataError
+from motet_train.data.store import INDEX, Store
+from motet_train.recipes.recipe import Job
+from motet_train.trainer import CHECKPOINT
+
+
+def prepared(data: Path, job: Job, **corpus: Any) -> Store:
+    """The store at ``data``, or that of the corpus which is there, prepared beside the run; a resumed run has its own.
+
+    corpus: options of ``motet prepare``.
+    """
+    if (data / INDEX).is_file():
+        return Store.open(data)
+    place = job.folder.with_name(f"{job.folder.name}-store")
+    if (job.folder / CHECKPOINT).is_file():
+        return Store.open(place)
+    verb = job.recipe.verb
+    if distributed.count() > 1:
+        raise DataError(f"several processes need a prepared store: motet prepare {data} --for {verb} --out {place}")
+    click.get_current_context().invoke(prepare, data=(data,), out=place, verb=verb, fps=None, **corpus)
+    return Store.open(place)
