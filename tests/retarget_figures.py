@@ -74,7 +74,7 @@ def both_forms(folder: Path) -> Iterator[tuple[str, Motion, Motion, int]]:
 
 def _print_descriptions(folder: Path) -> None:
     """Best sentences of trials in both forms, the T-pose in front of the BVH left out; and of every sixteenth take."""
-    model = motet.load_as(DescribeModel, "cmu-describe")
+    model = motet.load_as(DescribeModel, "describe")
 
     def best(motion: Motion) -> str:
         return model.describe(model.windows(motion)[0][1])[0].text

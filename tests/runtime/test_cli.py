@@ -85,7 +85,7 @@ def test_view_prints_the_page_it_wrote(clips: Path) -> None:
 
 def test_bundle_commands(tmp_path: Path) -> None:
     rows = json.loads(run("bundle", "list", "--json").stdout)
-    assert {("cmu-control", "control"), ("cmu-predict", "predict")} <= {(row["name"], row["verb"]) for row in rows}
+    assert {("cmu-control", "control"), ("predict", "predict")} <= {(row["name"], row["verb"]) for row in rows}
     assert "cmu-control" in run("bundle", "list").stdout
     assert json.loads(run("bundle", "info", "cmu-control", "--json").stdout)["format"] == 2
     assert "NSF EIA-0196217" in run("bundle", "info", "cmu-control").stdout
@@ -104,7 +104,7 @@ def test_bench_prints_rows() -> None:
 
 def test_bench_describes_a_file_and_says_where_it_ran(clips: Path) -> None:
     for threads, motion in ((1, []), (2, ["--motion", clips / WALK])):
-        given = ("--bundle", "cmu-describe", "--seconds", 0.001, "--threads", threads, "--no-torch", *motion)
+        given = ("--bundle", "describe", "--seconds", 0.001, "--threads", threads, "--no-torch", *motion)
         lines = run("bench", *given).stdout.splitlines()
         assert lines[0] == f"on CPUExecutionProvider, threads: {threads}"
         assert any(line.startswith("describe.file") for line in lines)

@@ -18,7 +18,7 @@ from motet.motion.motion import Motion
 @pytest.fixture(autouse=True)
 def bundles(monkeypatch: pytest.MonkeyPatch) -> None:
     """Small models in the place of the shipped ones."""
-    models = {"cmu-describe": describe_model(), "cmu-generate": generate_model()}
+    models = {"describe": describe_model(), "generate": generate_model()}
     monkeypatch.setattr("motet.models.load.load", lambda name, threads=1: models.get(name) or load(name, threads))
 
 
@@ -184,7 +184,7 @@ def test_embed(tmp_path: Path, files: list[Path]) -> None:
         (2, ["describe", "{bad}/good.npz", "--beams", "0"], "range 1<=x<=100"),
         (2, ["describe", "{bad}/good.npz", "--draws", "-1"], "range 0<=x<=1000"),
         (2, ["describe", "{bad}/good.npz", "--bundle", "nothing"], "unknown bundle 'nothing'"),
-        (2, ["describe", "{bad}/good.npz", "--bundle", "cmu-generate"], "is for 'generate'; need one for 'describe'"),
+        (2, ["describe", "{bad}/good.npz", "--bundle", "generate"], "is for 'generate'; need one for 'describe'"),
         (2, ["describe"], "Missing argument"),
         (1, ["generate", "", "-o", "{out}/a.bvh"], "has no words"),
         (1, ["generate", "zebra", "-o", "{out}/a.bvh"], "knows no word of 'zebra'"),
@@ -225,8 +225,8 @@ def test_bad_input_gets_one_message_and_writes_nothing(
 
 
 def test_load_as_gives_models_of_one_verb() -> None:
-    assert isinstance(load_as(DescribeModel, "cmu-describe"), DescribeModel)
-    assert isinstance(load_as(GenerateModel, "cmu-generate"), GenerateModel)
+    assert isinstance(load_as(DescribeModel, "describe"), DescribeModel)
+    assert isinstance(load_as(GenerateModel, "generate"), GenerateModel)
 
 
 def test_a_file_without_a_unit_of_length_is_refused_until_it_is_told(tmp_path: Path) -> None:

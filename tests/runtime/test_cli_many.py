@@ -20,14 +20,14 @@ WALK, RUN = "39_14.amc", "09_07.amc"
 
 def test_describe_is_three_lines_of_python(clips: Path) -> None:
     printed = json.loads(run("describe", clips / WALK, "--json").stdout)[0]["hypotheses"]
-    model = motet.load("cmu-describe")
+    model = motet.load("describe")
     motion = motet.read(clips / WALK)
     assert printed == [vars(found) for found in model.describe(motion)]
 
 
 def test_generate_is_three_lines_of_python(tmp_path: Path) -> None:
     run("generate", "a person walks", "-o", tmp_path / "cli.bvh")
-    model = motet.load("cmu-generate")
+    model = motet.load("generate")
     best = model.generate("a person walks")[0]
     best.write(tmp_path / "library.bvh")
     assert (tmp_path / "cli.bvh").read_bytes() == (tmp_path / "library.bvh").read_bytes()
@@ -35,7 +35,7 @@ def test_generate_is_three_lines_of_python(tmp_path: Path) -> None:
 
 def test_predict_is_three_lines_of_python(tmp_path: Path, clips: Path) -> None:
     run("predict", clips / WALK, "-o", tmp_path / "cli.bvh")
-    model = motet.load("cmu-predict")
+    model = motet.load("predict")
     following = model.predict(motet.read(clips / WALK))
     motet.write(tmp_path / "library.bvh", following)
     assert (tmp_path / "cli.bvh").read_bytes() == (tmp_path / "library.bvh").read_bytes()
@@ -51,7 +51,7 @@ def test_control_is_three_lines_of_python(tmp_path: Path) -> None:
 
 def test_embed_is_three_lines_of_python(tmp_path: Path, clips: Path) -> None:
     run("embed", clips / WALK, clips / RUN, "-o", tmp_path / "cli.npy")
-    model = motet.load("cmu-describe")
+    model = motet.load("describe")
     vectors = model.embed([motet.read(clips / WALK), motet.read(clips / RUN)])
     np.save(tmp_path / "library.npy", vectors)
     assert (tmp_path / "cli.npy").read_bytes() == (tmp_path / "library.npy").read_bytes()
@@ -76,7 +76,7 @@ def test_results_are_numbered_where_no_name_is_asked_for(tmp_path: Path, clips: 
 
 
 def test_predict_carries_several_motions_on_as_it_does_each(clips: Path) -> None:
-    model, motions = motet.load("cmu-predict"), [motet.read(clips / WALK), motet.read(clips / RUN)]
+    model, motions = motet.load("predict"), [motet.read(clips / WALK), motet.read(clips / RUN)]
     for one, motion in zip(model.predict(motions, frames=4), motions, strict=True):
         np.testing.assert_array_equal(one.values, model.predict(motion, frames=4).values)
 
@@ -120,7 +120,7 @@ def test_the_public_names_are_there_and_geometry_is_in_its_module() -> None:
     assert all(hasattr(motet, name) for name in motet.__all__)
     assert {"read", "write", "load", "Motion"} <= set(motet.__all__)
     assert motet.motion.lateral_axis is not None
-    assert repr(motet.load("cmu-describe")) == "DescribeModel('cmu-describe', 62 channels, 10 fps)"
+    assert repr(motet.load("describe")) == "DescribeModel('describe', 69 channels, 10 fps)"
 
 
 def test_a_fault_of_a_file_is_not_said_of_the_output(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -26,12 +26,12 @@ CLIPS = ("39_14", "09_07", "02_06")
 
 @pytest.fixture(scope="module")
 def describer() -> DescribeModel:
-    return motet.load_as(DescribeModel, "cmu-describe")
+    return motet.load_as(DescribeModel, "describe")
 
 
 @pytest.fixture(scope="module")
 def predictor() -> PredictModel:
-    return motet.load_as(PredictModel, "cmu-predict")
+    return motet.load_as(PredictModel, "predict")
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +45,7 @@ def mixamo(walk: Motion) -> Motion:
     return motet.from_humanoid(motet.to_humanoid(walk).motion, MIXAMO)
 
 
-@pytest.mark.parametrize("bundle", ["cmu-describe", "cmu-predict", "cmu-control"])
+@pytest.mark.parametrize("bundle", ["describe", "predict", "cmu-control"])
 def test_files_of_the_models_own_joints_are_taken_as_they_are(bundle: str, tmp_path: Path, clips: Path) -> None:
     contract = motet.load(bundle).contract
     for name in CLIPS:

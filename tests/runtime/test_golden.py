@@ -14,7 +14,7 @@ from motet.bundle.manifest import Golden
 from motet.errors import BundleError
 from motet.models.load import load
 
-NAMES = ["cmu-control", "cmu-describe", "cmu-generate", "cmu-predict"]
+NAMES = ["cmu-control", "describe", "generate", "predict"]
 
 
 def packed(arrays: Mapping[str, Any]) -> bytes:
@@ -58,8 +58,8 @@ def test_a_run_follows_from_its_inputs_and_noise(name: str) -> None:
 
 
 def test_what_does_not_fit_a_model_is_refused() -> None:
-    bundle = Bundle.open("cmu-generate")
-    model, golden = load("cmu-generate"), bundle.manifest.golden
+    bundle = Bundle.open("generate")
+    model, golden = load("generate"), bundle.manifest.golden
     assert golden is not None
     arrays = read(bundle.read(golden.file))
     for change, reason in (
@@ -122,7 +122,7 @@ def test_an_npz_that_is_too_large_or_none_is_refused() -> None:
 
 
 def test_vectors_are_the_same_bytes_every_time() -> None:
-    model = load("cmu-predict")
+    model = load("predict")
     given = {"frames": np.ones((model.seed_frames, 96), np.float32)}
     feeds = {"encoder": {"frames": np.ones((2, model.seed_frames, 96), np.float32)}}
     made = [vectors(model, feeds, given, {"frames": 3}) for _ in range(2)]

@@ -11,7 +11,7 @@ import motet
 
 def test_reading_loading_and_resampling_are_logged(clips: Path, caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level("DEBUG", logger="motet"):
-        model, motion = motet.load("cmu-describe"), motet.read(clips / "39_14.amc")
+        model, motion = motet.load("describe"), motet.read(clips / "39_14.amc")
         model.embed(motion)
     lines = [(record.levelname, record.getMessage()) for record in caplog.records]
     assert lines[0][0] == "INFO"

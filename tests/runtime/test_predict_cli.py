@@ -18,7 +18,7 @@ WALK = "39_14.amc"
 def test_a_walk_goes_on(clips: Path) -> None:
     """Trial 39_14 is none of those that the bundle was trained on."""
     walk = read_motion(clips / WALK).resample(30.0, to_end=True)
-    model = load("cmu-predict")
+    model = load("predict")
     truth = positions(walk)[60:85]
     assert walk.skeleton is not None
     metres = walk.skeleton.unit_factor(1.0)
@@ -62,7 +62,7 @@ def test_append_writes_the_motion_before_what_follows(tmp_path: Path, clips: Pat
 
 
 def test_bench_says_how_long_a_frame_takes() -> None:
-    rows = json.loads(run("bench", "--bundle", "cmu-predict", "--seconds", 0.01, "--json").stdout)
+    rows = json.loads(run("bench", "--bundle", "predict", "--seconds", 0.01, "--json").stdout)
     assert [row["name"] for row in rows] == ["predict.first_frame", "predict.frame", "predict.horizons"]
     assert all(row["value"] > 0 for row in rows)
 

@@ -29,18 +29,18 @@ def check_equal(together: Sequence[NDArray[np.float32]], alone: Sequence[NDArray
 
 @pytest.mark.parametrize("draws", [0, 30])
 def test_descriptions(motions: list[Motion], draws: int) -> None:
-    model = load("cmu-describe")
+    model = load("describe")
     assert model.describe(motions, draws=draws) == [model.describe([one], draws=draws)[0] for one in motions]
 
 
 def test_contexts(motions: list[Motion]) -> None:
-    model, generator = load("cmu-describe"), load("cmu-generate")
+    model, generator = load("describe"), load("generate")
     check_equal(model.embed(motions), [model.embed([one])[0] for one in motions])
     check_equal(generator.embed(SENTENCES), [generator.embed([one])[0] for one in SENTENCES])
 
 
 def test_generated_motions() -> None:
-    model = load("cmu-generate")
+    model = load("generate")
     together = model.generate(SENTENCES, seed=[5, 6, 7, 8], max_seconds=4)
     alone = [model.generate([one], seed=[seed], max_seconds=4)[0] for seed, one in enumerate(SENTENCES, start=5)]
     for row, single in zip(together, alone, strict=True):
@@ -49,7 +49,7 @@ def test_generated_motions() -> None:
 
 
 def test_predicted_frames() -> None:
-    model = load("cmu-predict")
+    model = load("predict")
     contract = model.contract
     rng = np.random.default_rng(0)
     seeds = contract.mean + contract.std * 0.3 * rng.normal(size=(5, model.seed_frames, len(contract.channels)))

@@ -28,7 +28,7 @@ def test_five_ranked_sentences_for_each_motion_as_json(clips: Path, draws: int) 
 
 @pytest.mark.parametrize("draws", [0, 100])
 def test_a_description_scores_what_the_search_gave_it(clips: Path, draws: int) -> None:
-    model, motion = load("cmu-describe"), read_motion(clips / "39_14.amc")
+    model, motion = load("describe"), read_motion(clips / "39_14.amc")
     for found in model.describe(motion, draws=draws):
         assert model.score(motion, found.text) == pytest.approx(found.log_probability, abs=1e-4)
 
@@ -49,7 +49,7 @@ def test_a_walk_that_turns_left_travels_and_turns_and_is_written_alike_every_tim
 
 
 def test_runs_are_faster_than_walks_and_both_end_by_themselves() -> None:
-    model = load("cmu-generate")
+    model = load("generate")
     found = model.generate(["a person walks"] * 5 + ["a person runs"] * 5, hypotheses=5, seed=list(range(10)))
     forward = model.contract.channels.index("root.forward")
     speeds = [float(np.median(row[0].features.values[:, forward])) for row in found]
@@ -58,7 +58,7 @@ def test_runs_are_faster_than_walks_and_both_end_by_themselves() -> None:
 
 
 def test_a_motion_scores_what_the_search_gave_it() -> None:
-    model = load("cmu-generate")
+    model = load("generate")
     best = model.generate("a person runs", seed=3)[0]
     assert model.score("a person runs", best.contract.features(best.frames)) == pytest.approx(
         best.log_likelihood, rel=1e-4

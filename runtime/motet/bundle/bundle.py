@@ -23,6 +23,8 @@ from motet.errors import BundleError
 from motet.files import new_folder, write_whole
 
 DEFAULT_BUNDLES = Path(__file__).parents[1] / "bundles"
+STAND_FOR = {"control": "cmu-control", "generate": "cmu-generate"}
+"""Verbs whose default bundle has another name than they."""
 
 MAX_MANIFEST = 4 << 20
 """Bytes; as JSON objects in memory they can be twenty times as many."""
@@ -110,9 +112,9 @@ class Bundle:
 
 def find_bundle(name_or_path: str | Path) -> Path:
     """Path of a default bundle's name or of an existing folder or zip; BundleError lists the known names."""
-    known = list_bundles()
-    if str(name_or_path) in known:
-        return known[str(name_or_path)]
+    known, name = list_bundles(), STAND_FOR.get(str(name_or_path), str(name_or_path))
+    if name in known:
+        return known[name]
     try:
         path = Path(os.path.abspath(name_or_path))  # noqa: PTH100 - resolve() follows links, and raises where they loop
         if path.is_dir() or path.is_file():

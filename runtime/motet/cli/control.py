@@ -18,7 +18,7 @@ from motet.models.script import parse_script, starts_of
 @click.command()
 @click.argument("script")
 @out_option
-@click.option("--bundle", default="cmu-control", show_default=True, help="Name or path of a bundle.")
+@click.option("--bundle", default="control", show_default=True, help="Name or path of a bundle.")
 @click.option("--start", help="Label to start in, or a motion file to continue. [default: the script's first label]")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the noise.")
 @click.option(

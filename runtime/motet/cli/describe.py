@@ -23,7 +23,7 @@ from motet.models.load import load_as
     """
 )
 @click.argument("motions", nargs=-1, required=True, type=Path, metavar="MOTION...")
-@click.option("--bundle", default="cmu-describe", show_default=True, help="Name or path of a bundle.")
+@click.option("--bundle", default="describe", show_default=True, help="Name or path of a bundle.")
 @click.option("--beams", type=click.IntRange(1, 100), help="Sentences to print. [default: the bundle's]")
 @click.option(
     "--draws",

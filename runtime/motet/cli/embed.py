@@ -21,7 +21,7 @@ from motet.models.load import load_as
 @click.argument("motions", nargs=-1, type=Path, metavar="[MOTION...]")
 @click.option("--text", "texts", multiple=True, help="A sentence, instead of motions; may be given several times.")
 @click.option("-o", "--out", required=True, type=Path, help="The .npy to write: (N, C) float32.")
-@click.option("--bundle", help="Name or path of a bundle. [default: cmu-describe, with --text cmu-generate]")
+@click.option("--bundle", help="Name or path of a bundle. [default: describe, with --text generate]")
 @session_options
 @read_options
 def embed(
@@ -44,9 +44,9 @@ def embed(
     check_place(out)
     tries = Tries()
     if motions:
-        vectors = _of_motions(load_as(DescribeModel, bundle or "cmu-describe", session), motions, read, tries)
+        vectors = _of_motions(load_as(DescribeModel, bundle or "describe", session), motions, read, tries)
     else:
-        model = load_as(GenerateModel, bundle or "cmu-generate", session)
+        model = load_as(GenerateModel, bundle or "generate", session)
         with text_notes():
             vectors = model.embed([texts[index] for index in tries.usable(model, texts)])
     if len(vectors):

@@ -21,7 +21,7 @@ from motet.motion.motion import Motion
 @click.command()
 @click.argument("texts", nargs=-1, required=True, metavar="TEXT...")
 @out_option
-@click.option("--bundle", default="cmu-generate", show_default=True, help="Name or path of a bundle.")
+@click.option("--bundle", default="generate", show_default=True, help="Name or path of a bundle.")
 @click.option(
     "--hypotheses", type=click.IntRange(1, 100), help="Hypotheses kept while decoding. [default: the bundle's]"
 )

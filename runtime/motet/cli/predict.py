@@ -16,7 +16,7 @@ from motet.models.predict import PredictModel
 @click.command()
 @click.argument("sources", nargs=-1, required=True, type=Path, metavar="MOTION...")
 @out_option
-@click.option("--bundle", default="cmu-predict", show_default=True, help="Name or path of a bundle.")
+@click.option("--bundle", default="predict", show_default=True, help="Name or path of a bundle.")
 @click.option("--frames", type=click.IntRange(1, 100_000), help="Frames to predict. [default: the bundle's horizon]")
 @click.option("--append", is_flag=True, help="Write the motion too, then the prediction.")
 @like_option

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from motet.errors import MotionError
+from motet.motion.humanoid import HUMANOID
 from motet.motion.kinematics import (
     AXES,
     continued,
@@ -52,7 +53,10 @@ def brought(motion: Motion, pose: Motion, reason: str) -> Motion:
     """
     skeleton = skeleton_of(pose)
     try:
-        found = from_humanoid(on_humanoid(motion), skeleton)
+        found = on_humanoid(motion)
+        if skeleton == HUMANOID:
+            return found
+        found = from_humanoid(found, skeleton)
         said = map_of(pose).names(skeleton).values()
     except MotionError as error:
         raise MotionError(f"{error}; and it cannot be taken as it is: {reason}") from error
