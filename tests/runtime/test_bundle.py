@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from motet.bundle.bundle import FORMAT, Bundle, list_bundles, write_bundle, zip_bytes
+from motet.bundle.bundle import FORMAT, Bundle, find_bundle, list_bundles, write_bundle, zip_bytes
 from motet.bundle.session import SessionOptions
 from motet.errors import BundleError, OutputError
-from motet.models.load import load
+from motet.models.load import VERBS, load
 from motet.models.verify import verify
 
 SHIPPED = list_bundles()["cmu-control"]
