@@ -1,7 +1,7 @@
 """Figures of retargeting on the motion beside the project: ``python tests/retarget_figures.py ../shared/data``.
 
 Prints a table of all files by convention, how far trials that exist as AMC and as BVH agree on the humanoid, how
-cmu-describe describes both forms and takes of ACCAD, and what retargeting ten seconds takes.
+`describe` describes both forms and takes of ACCAD, and what retargeting ten seconds takes.
 """
 
 import sys
@@ -20,11 +20,13 @@ import motet
 from motet.errors import MotetError
 from motet.formats import read_motion
 from motet.models.describe import DescribeModel
+from motet.models.language import MAX_SECONDS
 from motet.motion.humanoid import BONES, HUMANOID
 from motet.motion.kinematics import global_transforms
 from motet.motion.mixamo import MIXAMO
 from motet.motion.motion import Motion
 from motet.motion.retarget import from_humanoid, to_humanoid
+from motet_train.evaluate.language.attributes import ACTIONS, said
 
 ARCHIVES = ("cmu-asfamc.zip", "cmu-asfamc-more.zip", "cmu-bvh.zip", "cmu-bvh-more.zip", "accad-bvh.zip")
 
@@ -33,6 +35,16 @@ LEFT_OUT = ("14_36",)
 
 ADDED = {"07_12": 2}
 """Frames that a BVH has before the AMC's where it is not the added T-pose alone: this AMC lacks its first frame."""
+
+SHORT = ("Leg", "Foot", "ToeBase")
+STOCKY = replace(
+    MIXAMO,
+    joints=tuple(
+        replace(joint, offset=tuple((0.8 if joint.name.endswith(SHORT) else 1.1) * x for x in joint.offset))
+        for joint in MIXAMO.joints
+    ),
+)
+"""A figure of Mixamo's names with short legs and a long trunk."""
 
 LIMBS = tuple(bone for bone in BONES if bone.endswith(("UpperLeg", "LowerLeg", "Foot", "UpperArm", "LowerArm")))
 
@@ -86,6 +98,21 @@ def _print_descriptions(folder: Path) -> None:
         print(f"{path.stem}: {best(read_motion(path))}")
 
 
+def _print_actions(folder: Path) -> None:
+    """How many of every third trial are said to be the same action from the AMC and from another figure's BVH."""
+    model, same, different = motet.load_as(DescribeModel, "describe"), 0, []
+    for path in sorted((folder / "cmu-asfamc" / "amc").glob("*.amc"))[::3]:
+        amc = read_motion(path).cut(0, MAX_SECONDS - 0.1)
+        motet.write(folder / "other.bvh", from_humanoid(to_humanoid(amc).motion, STOCKY))
+        pair = [model.describe(motion)[0].text for motion in (amc, read_motion(folder / "other.bvh"))]
+        if said(ACTIONS, pair[0]) == said(ACTIONS, pair[1]):
+            same += 1
+        else:
+            different.append(f"{path.stem}  {pair[0]} | {pair[1]}")
+    print(f"the same action from an AMC and from the BVH of another figure: {same} of {same + len(different)}")
+    print("\n".join(different))
+
+
 def _print_times(motion: Motion) -> None:
     """Milliseconds of one core for ten seconds of a motion of CMU's, there and on."""
     for fps in (30, 120):
@@ -132,6 +159,7 @@ def main(data: Path) -> None:
             mean = np.mean(list(limbs.values()))
             print(f"{name}  {len(amc):5d}  {apart:6.2f}  {mean:6.2f}  {worst} {limbs[worst]:.2f}")
         _print_descriptions(folder)
+        _print_actions(folder)
         _print_times(next(amc for _, _, amc, _ in both_forms(folder)))
 
 
