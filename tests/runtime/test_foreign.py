@@ -50,15 +50,14 @@ def test_files_of_the_models_own_joints_are_taken_as_they_are(bundle: str, tmp_p
     contract = motet.load(bundle).contract
     for name in CLIPS:
         amc = motet.read(clips / f"{name}.amc")
-        motet.write(tmp_path / "a.bvh", amc)
-        for motion in (amc, motet.read(tmp_path / "a.bvh", unit="m"), contract.features(contract.frames(amc))):
+        own = amc if bundle == "cmu-control" else motet.to_humanoid(amc).motion
+        motet.write(tmp_path / "a.bvh", own)
+        for motion in (own, motet.read(tmp_path / "a.bvh", unit="m"), contract.features(contract.frames(amc))):
             assert contract.on_figure(motion) is motion
 
 
-def test_limbs_come_out_as_those_of_the_models_own_figure(
-    describer: DescribeModel, walk: Motion, mixamo: Motion
-) -> None:
-    contract = describer.contract
+def test_limbs_come_out_as_those_of_the_models_own_figure(walk: Motion, mixamo: Motion) -> None:
+    contract = motet.load("cmu-generate").contract
     own, brought = contract.frames(walk), contract.frames(mixamo)
     limbs = [i for i, name in enumerate(contract.channels) if name.split(".")[0] in ("lfemur", "rtibia", "rhumerus")]
     np.testing.assert_allclose(brought[:, limbs], own[:, limbs], atol=0.01)
@@ -66,6 +65,19 @@ def test_limbs_come_out_as_those_of_the_models_own_figure(
     np.testing.assert_allclose(brought[:, speed], own[:, speed], atol=0.15)
     thumb = contract.channels.index("lthumb.rx")
     np.testing.assert_allclose(brought[:, thumb], contract.mean[thumb], atol=1e-6)
+
+
+def test_another_figure_of_the_humanoids_proportions_gives_a_models_frames(
+    describer: DescribeModel, walk: Motion, mixamo: Motion
+) -> None:
+    one, other = (describer.contract.frames(motion) for motion in (walk, mixamo))
+    np.testing.assert_allclose(one, other, atol=0.5)
+    np.testing.assert_allclose(one.mean(axis=0), other.mean(axis=0), atol=0.1)
+
+
+def test_a_motion_that_does_not_say_where_it_goes_is_refused(predictor: PredictModel, walk: Motion) -> None:
+    with pytest.raises(MotionError, match=r"lacks the root's tx, ty and tz"):
+        predictor.predict(walk.select(walk.channels[3:]))
 
 
 @pytest.mark.parametrize("clip", CLIPS)

@@ -15,7 +15,7 @@ def test_reading_loading_and_resampling_are_logged(clips: Path, caplog: pytest.L
         model.embed(motion)
     lines = [(record.levelname, record.getMessage()) for record in caplog.records]
     assert lines[0][0] == "INFO"
-    assert lines[0][1].endswith("cmu-describe.zip for describe on CPUExecutionProvider")
+    assert lines[0][1].endswith("describe.zip for describe on CPUExecutionProvider")
     assert lines[1:] == [
         ("DEBUG", f"read {clips / '39_14.amc'}: {motion!r}"),
         ("DEBUG", f"resampling {motion!r} to 10 fps"),
@@ -24,6 +24,6 @@ def test_reading_loading_and_resampling_are_logged(clips: Path, caplog: pytest.L
 
 def test_the_library_is_silent_by_default() -> None:
     motion = "motet.Motion([[1.0]] * 9, ['a'], ['1'], 9)"
-    code = f"import motet; motet.load('cmu-predict'); {motion}.resample(3)"
+    code = f"import motet; motet.load('predict'); {motion}.resample(3)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert (done.stdout, done.stderr) == ("", "")

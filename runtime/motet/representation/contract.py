@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from motet.errors import MotionError
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
@@ -90,6 +91,8 @@ class MotionContract:
         reason = foreign(motion, self.skeleton, self._joints)
         if reason is None:
             return motion
+        if named(self.representation).required and not any(channel.endswith(".tx") for channel in motion.channels):
+            raise MotionError("this motion lacks the root's tx, ty and tz: it does not say where the figure goes")
         slower = motion.continuous().resample(self.fps) if motion.fps > self.fps else motion
         return brought(slower, self.motion(self.mean[None], plant=False), reason)
 
