@@ -9,6 +9,7 @@ from motet.motion.calibrate import alignments_of_frames, axes_agree
 from motet.motion.figure_checks import leg_of
 from motet.motion.humanoid import LEFT_RIGHT, SOLE, leg_length, sided
 from motet.motion.joint_map import JointMap
+from motet.motion.products import rotated
 from motet.motion.rest_pose import (
     LIMBS,
     Aims,
@@ -112,7 +113,8 @@ def sole_points(fitted: Fitted, turned: dict[str, Array], places: Array) -> Arra
     for bone, height in fitted.heights.items():
         for x, _, z in SOLE[bone.removeprefix("left").removeprefix("right")]:
             points.append(
-                places[:, fitted.joint_map.joints[bone]] + turned[bone] @ np.array([x * scale, -height, z * scale])
+                places[:, fitted.joint_map.joints[bone]]
+                + rotated(turned[bone], np.array([x * scale, -height, z * scale]))
             )
     return np.stack(points, axis=1)
 

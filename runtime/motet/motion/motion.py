@@ -224,7 +224,7 @@ def rotation_columns(channels: tuple[str, ...], units: tuple[str, ...], letter: 
 
 def _frozen(values: ArrayLike) -> Array:
     try:
-        array = np.array(values, dtype=np.float64)
+        array = np.array(values, dtype=np.float64, order="C")  # frames lie one after the other, whatever made them
     except (TypeError, ValueError) as error:
         raise MotionError(f"the values of a motion must be numbers: {error}") from error
     array.flags.writeable = False
