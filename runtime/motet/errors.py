@@ -1,14 +1,24 @@
 """motet's own errors: each is also a builtin, and says what is wrong, where, and what was expected."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 SHOWN = 60
 """Characters of a faulty word that an error repeats."""
 
+LISTED = 6
+"""Names that an error lists."""
+
 
 def quoted(text: str) -> str:
     """What was given or a file says, for an error: not more of it than fits on a line."""
     return repr(text if len(text) <= SHOWN else text[:SHOWN] + "...")
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names with commas, for an error: the first of them and how many more there are."""
+    more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
+    return ", ".join(names[:LISTED]) + more
 
 
 class MotetError(Exception):

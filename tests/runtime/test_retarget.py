@@ -186,11 +186,6 @@ def limbless(motion: Motion, *gone: str) -> Motion:
 
 
 def test_figures_that_are_no_humans_are_refused_with_the_reason() -> None:
-    mixamo = skeleton_file("mixamo")
-    with pytest.raises(MotionError, match="no legs"):
-        to_humanoid(limbless(mixamo, "mixamorig:LeftUpLeg", "mixamorig:RightUpLeg"))
-    with pytest.raises(MotionError, match="one side only: rightLowerArm"):
-        to_humanoid(limbless(mixamo, "mixamorig:RightForeArm"))
     hand = [Joint("wrist", -1, (0.0, 1.0, 0.0))]
     for finger in range(5):
         for k in range(4):
@@ -223,39 +218,9 @@ def test_a_dog_is_refused() -> None:
         to_humanoid(dog)
 
 
-def test_two_figures_in_a_file_are_refused() -> None:
-    unity = skeleton_file("unity").skeleton
-    assert unity is not None
-    joints = [Joint("World", -1, (0.0, 0.0, 0.0))]
-    for figure in ("A:", "B:"):
-        start = len(joints)
-        joints += [
-            replace(j, name=figure + j.name, parent=j.parent + start if j.parent >= 0 else 0) for j in unity.joints
-        ]
-    with pytest.raises(MotionError, match="two hips"):
-        to_humanoid(Motion(np.zeros((2, 0)), (), (), 30.0, Skeleton(tuple(joints))))
-
-
-def test_giants_and_bones_without_length_are_refused() -> None:
-    mixamo = skeleton_file("mixamo")
-    with pytest.raises(MotionError, match=r"legs of 88\.9 m.*look like centimetres"):
-        to_humanoid(mixamo.with_unit(1.0))
-    skeleton = mixamo.skeleton
-    assert skeleton is not None
-    flat = [replace(j, offset=(0.0, 0.0, 0.0)) if j.name.endswith("LeftLeg") else j for j in skeleton.joints]
-    with pytest.raises(MotionError, match="length zero: mixamorig:LeftUpLeg"):
-        to_humanoid(replace(mixamo, skeleton=Skeleton(tuple(flat))))
-
-
-def test_frames_that_turn_inside_out_are_refused() -> None:
-    mixamo = skeleton_file("mixamo")
-    values = np.repeat(mixamo.values[2:3], 5, axis=0)
-    knee = mixamo.channels.index("mixamorig:RightLeg.rx")
-    values[:, knee] *= -1
-    with pytest.raises(MotionError, match="knees bend forwards"):
-        to_humanoid(replace(mixamo, values=values))
+def test_a_motion_without_frames_is_refused() -> None:
     with pytest.raises(MotionError, match="no frames"):
-        to_humanoid(mixamo[:0])
+        to_humanoid(skeleton_file("mixamo")[:0])
 
 
 def test_what_a_figure_lacks_stays_at_rest() -> None:

@@ -16,6 +16,7 @@ from motet.files import File, place_of
 from motet.formats.lines import frame_rate, read_bytes
 from motet.formats.npy import array
 from motet.motion.motion import Motion
+from motet.motion.products import product
 from motet.motion.rotations import Array, rotvec_to_rotmat
 from motet.motion.skeleton import Joint, Skeleton
 from motet.motion.world_rotations import motion_of
@@ -90,7 +91,7 @@ def parse(path: Path, content: bytes) -> Motion:
     turned = rotvec_to_rotmat(vectors)
     turned[:, 0] = UPRIGHT @ turned[:, 0]
     for i, joint in enumerate(SKELETON.joints[1:], start=1):
-        turned[:, i] = turned[:, joint.parent] @ turned[:, i]
+        turned[:, i] = product(turned[:, joint.parent], turned[:, i])
     return motion_of(SKELETON, turned, {0: trans @ UPRIGHT.T}, fps)
 
 

@@ -21,7 +21,8 @@ from motet.formats.gltf_data import Gltf, parse
 from motet.motion.humanoid import BONES, REQUIRED
 from motet.motion.joint_map import JointMap, check_map
 from motet.motion.motion import Motion
-from motet.motion.rotations import Array, quat_to_rotmat
+from motet.motion.products import inverse, product, rotated
+from motet.motion.rotations import Array, frames_last, quat_to_rotmat
 from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
 from motet.motion.world_rotations import motion_of
 
@@ -79,7 +80,7 @@ def _read(path: Path, gltf: Gltf) -> Motion:
     rest = rest_places[0, nodes]
     offsets = [rest[i] - rest[parent] if parent >= 0 else rest[i] for i, parent in enumerate(joints.parents)]
     skeleton = _skeleton(path, joints, names, offsets)
-    turned = turns[:, nodes] @ np.swapaxes(rest_turns[:, nodes], -1, -2)
+    turned = product(turns[:, nodes], inverse(rest_turns[0, nodes]))
     moved = _moved(skeleton, turned, places[:, nodes])
     return motion_of(skeleton, turned, moved, fps)
 
@@ -179,7 +180,7 @@ def _moved(skeleton: Skeleton, turned: Array, places: Array) -> dict[int, Array]
     moved = {0: places[:, 0]}
     for i, joint in enumerate(skeleton.joints[1:], start=1):
         from_parent = places[:, i] - places[:, joint.parent]
-        local = (np.swapaxes(turned[:, joint.parent], -1, -2) @ from_parent[..., None])[..., 0]
+        local = rotated(inverse(turned[:, joint.parent]), from_parent)
         if np.abs(local - joint.offset).max() > 1e-4 * max(skeleton.height, 1e-9):
             moved[i] = local
     return moved
@@ -188,8 +189,8 @@ def _moved(skeleton: Skeleton, turned: Array, places: Array) -> dict[int, Array]
 def _world(gltf: Gltf, tracks: dict[tuple[int, str], Array], count: int) -> tuple[Array, Array]:
     """Rotations (T, N, 3, 3) and positions (T, N, 3) of all nodes in the world, the tracks in place of the rest."""
     nodes = len(gltf.objects("nodes"))
-    linear, turns = np.empty((count, nodes, 3, 3)), np.empty((count, nodes, 3, 3))
-    places = np.zeros((count, nodes, 3))
+    linear, turns = frames_last((count, nodes, 3, 3)), frames_last((count, nodes, 3, 3))
+    places = frames_last((count, nodes, 3))
     for node in gltf.order:
         rest = dict(zip(("translation", "rotation", "scale"), gltf.local(node), strict=True))
         move, quat, scale = (tracks.get((node, name), rest[name]) for name in ("translation", "rotation", "scale"))
@@ -199,10 +200,9 @@ def _world(gltf: Gltf, tracks: dict[tuple[int, str], Array], count: int) -> tupl
         if parent < 0:
             linear[:, node], turns[:, node], places[:, node] = local, turn, move
         else:
-            linear[:, node] = linear[:, parent] @ local
-            turns[:, node] = turns[:, parent] @ turn
-            along = linear[:, parent] @ np.broadcast_to(move, (count, 3))[..., None]
-            places[:, node] = places[:, parent] + along[..., 0]
+            linear[:, node] = product(linear[:, parent], local)
+            turns[:, node] = product(turns[:, parent], turn)
+            places[:, node] = places[:, parent] + rotated(linear[:, parent], move)
     return turns, places
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from motet.motion.humanoid import ARM, LEFT_RIGHT, LEG, sided
 from motet.motion.joint_map import JointMap
+from motet.motion.products import product
 from motet.motion.rest_pose import (
     Aims,
     angle_between,
@@ -23,6 +24,7 @@ from motet.motion.rest_pose import (
     swing,
     to_left,
     unit,
+    with_columns,
 )
 from motet.motion.rotations import Array
 
@@ -51,8 +53,7 @@ class _Frames:
 
     def turns(self, joint: int) -> Array:
         """Rotations (T, 3, 3) of the humanoid's bone for a joint whose A is found."""
-        turned: Array = self.rotations[:, joint] @ self.aligned[joint]
-        return turned
+        return product(self.rotations[:, joint], self.aligned[joint])
 
     def toward(self, bone: str) -> Array:
         """Directions (T, 3) in which a bone points."""
@@ -159,12 +160,12 @@ def _arm(frames: _Frames, side: str) -> None:
 def _arm_frame(left: Array, up: Array) -> Array:
     left = unit(left)
     up = unit(up - np.sum(up * left, axis=-1, keepdims=True) * left)
-    return np.stack([left, up, np.cross(left, up)], axis=-1)
+    return with_columns(left, up)
 
 
 def _mean_direction(rotations: Array, along: Array) -> Array:
     """The mean direction (3,) in a joint's frame of vectors (T, 3), with the joint's rotations (T, 3, 3)."""
-    return unit(np.mean(np.swapaxes(rotations, -1, -2) @ unit(along)[..., None], axis=0)[:, 0])
+    return unit(np.einsum("tji,tj->i", rotations, unit(along)))
 
 
 def _known(axes: str) -> Array:
@@ -180,7 +181,6 @@ def _near_axes(rotation: Array) -> Array:
 
 def _mean(rotations: Array, turns: Array) -> Array:
     """The rotation (3, 3) nearest to all G^T H of rotations G and H (T, 3, 3)."""
-    total = np.sum(np.swapaxes(rotations, -1, -2) @ turns, axis=0)
-    u, _, v = np.linalg.svd(total)
+    u, _, v = np.linalg.svd(np.einsum("tji,tjk->ik", rotations, turns))
     nearest: Array = u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ v))]) @ v
     return nearest

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from motet.errors import MotionError
+from motet.errors import MotionError, listed
 from motet.motion.humanoid import LEFT_RIGHT, LEG, sided
 from motet.motion.joint_map import NEEDED, JointMap
 from motet.motion.rest_pose import Aims, direction, legs_up, to_left, trunk_up, unit
@@ -43,12 +43,13 @@ def leg_of(skeleton: Skeleton, joint_map: JointMap, aims: Aims, rest: Array) -> 
     lengths = {
         bone: float(np.linalg.norm(direction(rest, joint_map.joints[bone], aims[bone])))
         for bone in NEEDED
-        if bone not in ("hips", "spine") and "Foot" not in bone and aims[bone]
+        if bone not in ("hips", "spine") and aims[bone]
     }
     leg = sum(lengths[sided(side, part)] for side in LEFT_RIGHT for part in LEG[:2]) / 2
     short = [skeleton.names[joint_map.joints[bone]] for bone, length in lengths.items() if length <= SHORTEST * leg]
     if short or not leg > 0:
-        raise MotionError(f"bones of length zero: {', '.join(short)}; limbs of a human need a length")
+        remedy = "a human's limbs have lengths: export the skeleton with its offsets"
+        raise MotionError(f"bones of length zero: {listed(short)}; {remedy}")
     return leg
 
 
@@ -59,10 +60,12 @@ def unit_of(skeleton: Skeleton, leg: float) -> Unit:
         if POSSIBLE_LEG[0] < leg * stated < POSSIBLE_LEG[1]:
             return Unit(stated, None)
         guess = _guess(leg)
-        remedy = f"; its lengths look like {guess}" if guess else ""
+        looks = f"; its lengths look like {guess}" if guess else ""
+        remedy = (
+            "give the right unit (motet's --unit-in), or where the file says its own, scale the figure at its source"
+        )
         raise MotionError(
-            f"legs of {leg * stated:.3g} m: a human's are {POSSIBLE_LEG[0]:g} to {POSSIBLE_LEG[1]:g} m{remedy}: "
-            "give the unit of the file (motet's --unit-in)"
+            f"legs of {leg * stated:.3g} m: a human's are {POSSIBLE_LEG[0]:g} to {POSSIBLE_LEG[1]:g} m{looks}: {remedy}"
         )
     guess = _guess(leg)
     if guess is None:
@@ -83,17 +86,22 @@ def check_frames(positions: Array, joint_map: JointMap, aims: Aims) -> None:
     upright = np.sum(trunk_up(positions, joint_map) * legs_up(positions, joint_map), axis=-1)
     if np.quantile(upright, 0.95) < 0.3:
         raise MotionError(
-            "the trunk never stands above the legs: this looks like a figure on four legs, not like a human's"
+            "the trunk never stands above the legs: this looks like a figure on four legs, not like a human's; "
+            "where joints were mistaken, give a map"
         )
     left = unit(to_left(positions, joint_map, "UpperLeg"))
     forward = np.cross(left, legs_up(positions, joint_map))
     feet = [sided(side, "Foot") for side in LEFT_RIGHT if aims[sided(side, "Foot")]]
     toes = [np.sum(forward * unit(direction(positions, joint_map.joints[bone], aims[bone])), axis=-1) for bone in feet]
     if toes and np.median(toes) < -0.3:
-        raise MotionError("the feet point backwards: left and right are swapped, or the frames turn inside out")
+        raise MotionError(
+            "the feet point backwards: left and right are swapped, or the frames turn inside out: name the joints in a "
+            "map, or export the file anew"
+        )
     if _wrong_knees(positions, joint_map, aims, left) > 0.6:
         raise MotionError(
-            "the knees bend forwards: the frames turn inside out (a wrong order of rotations?), or this is no human"
+            "the knees bend forwards: the frames turn inside out (a wrong order of rotations?), or this is no human: "
+            "export the file anew"
         )
 
 

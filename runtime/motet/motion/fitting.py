@@ -6,9 +6,10 @@ import numpy as np
 
 from motet.errors import MotionError
 from motet.motion.calibrate import alignments_of_frames, axes_agree
-from motet.motion.figure_checks import leg_of
+from motet.motion.figure_checks import check_frames, leg_of
 from motet.motion.humanoid import LEFT_RIGHT, SOLE, leg_length, sided
 from motet.motion.joint_map import JointMap
+from motet.motion.products import rotated
 from motet.motion.rest_pose import (
     LIMBS,
     Aims,
@@ -74,6 +75,8 @@ def fit(skeleton: Skeleton, joint_map: JointMap, rotations: Array, places: Array
         return Fitted(joint_map, aims, aligned, leg, heights, None, 0.95, note)
     if len(places) < 2 and not known:
         raise MotionError("the rest pose is not a standing body: give a motion of this skeleton, whose frames show how")
+    if not known:
+        check_frames(places, joint_map, aims)
     aligned = alignments_of_frames(rotations, places, joint_map, aims)
     hips, carrier = joint_map.joints["hips"], joint_map.carrier(skeleton)
     aligned[carrier] = rotations[0, carrier].T @ rotations[0, hips] @ aligned[hips]
@@ -112,7 +115,8 @@ def sole_points(fitted: Fitted, turned: dict[str, Array], places: Array) -> Arra
     for bone, height in fitted.heights.items():
         for x, _, z in SOLE[bone.removeprefix("left").removeprefix("right")]:
             points.append(
-                places[:, fitted.joint_map.joints[bone]] + turned[bone] @ np.array([x * scale, -height, z * scale])
+                places[:, fitted.joint_map.joints[bone]]
+                + rotated(turned[bone], np.array([x * scale, -height, z * scale]))
             )
     return np.stack(points, axis=1)
 

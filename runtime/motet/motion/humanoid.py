@@ -11,6 +11,7 @@ the joint of the upper arm lies inside the shoulder's width, the ankle at the he
 
 import numpy as np
 
+from motet.motion.products import rotated
 from motet.motion.rotations import Array
 from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
 
@@ -100,5 +101,5 @@ def sole_points(rotations: Array, positions: Array) -> Array:
     for side in LEFT_RIGHT:
         for part, places in SOLE.items():
             joint = HUMANOID.index(sided(side, part))
-            points += [positions[:, joint] + rotations[:, joint] @ np.array(place) for place in places]
+            points += [positions[:, joint] + rotated(rotations[:, joint], np.array(place)) for place in places]
     return np.stack(points, axis=1)

@@ -19,6 +19,9 @@ NEEDED = ("hips", "spine", *(sided(side, part) for side in LEFT_RIGHT for part i
 PAIRED = tuple((sided("left", part), sided("right", part)) for part in (*LEG, *ARM))
 """Bones of the left with their partners on the right."""
 
+PARTNERS = dict(PAIRED) | {right: left for left, right in PAIRED}
+"""For each bone of one side its partner."""
+
 KEYS = tuple(bone for bone in BONES if bone not in (*SPINE[1:], *NECK[:1]))
 """What a map can name, besides "neck": the joints of the back all go by the name "spine"."""
 
@@ -89,14 +92,18 @@ def check_map(skeleton: Skeleton, joint_map: JointMap) -> JointMap:
 def missing_reason(missing: list[str], found: Mapping[str, object]) -> str:
     """A sentence that says which bones a skeleton lacks."""
     legs = [sided(side, part) for side in LEFT_RIGHT for part in LEG[:3]]
+    remedy = "export them, too, or name them in a map"
     if all(bone in missing for bone in legs):
-        return "this skeleton has no legs: a human needs hips with two legs, a spine and two arms"
-    other = {**dict(PAIRED), **{right: left for left, right in PAIRED}}
-    one_sided = [bone for bone in missing if other.get(bone) in found]
-    if one_sided == missing:
-        there = ", ".join(other[bone] for bone in missing)
-        return f"joints are missing on one side only: {', '.join(missing)} (the other side has {there})"
-    return f"no joint was found for {', '.join(missing)}"
+        return f"this skeleton has no legs: a human needs hips with two legs, a spine and two arms; {remedy}"
+    if one_sided(missing, found):
+        there = ", ".join(PARTNERS[bone] for bone in missing)
+        return f"joints are missing on one side only: {', '.join(missing)} (the other side has {there}); {remedy}"
+    return f"no joint was found for {', '.join(missing)}; {remedy}"
+
+
+def one_sided(missing: list[str], found: Mapping[str, object]) -> bool:
+    """Whether there are bones missing, all of which are there on the other side."""
+    return bool(missing) and all(PARTNERS.get(bone) in found for bone in missing)
 
 
 def _one_sided(there: set[str]) -> list[str]:
@@ -123,7 +130,7 @@ def read_map(path: str | Path, skeleton: Skeleton) -> JointMap:
     used = [joint for joints in places.values() for joint in joints]
     twice = sorted({skeleton.names[joint] for joint in used if used.count(joint) > 1})
     if twice:
-        raise FormatError(path, f"a joint can be one bone only, twice in this map: {', '.join(twice)}")
+        raise FormatError(path, f"a joint can be one bone only, twice in this map: {', '.join(twice)}; name it once")
     chains = {chain: places.pop(chain, ()) for chain in ("spine", "neck")}
     longer = [bone for bone, joints in places.items() if len(joints) != 1]
     if longer:

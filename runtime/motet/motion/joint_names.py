@@ -19,7 +19,7 @@ from typing import Any
 
 from motet.errors import MotionError
 from motet.motion.humanoid import LEFT_RIGHT, sided
-from motet.motion.joint_map import JointMap, Triple, check_map, missing_bones, missing_reason
+from motet.motion.joint_map import JointMap, Triple, check_map, missing_bones, missing_reason, one_sided
 from motet.motion.skeleton import Skeleton
 
 CHAINS = ("spine", "neck")
@@ -52,6 +52,10 @@ class Match:
     absent: int
     rest: dict[str, Triple] | None
     axes: dict[int, str]
+
+    def fit(self) -> tuple[int, int]:
+        """What is larger the better the convention fits."""
+        return self.known, -self.absent
 
     @property
     def missing(self) -> list[str]:
@@ -116,12 +120,14 @@ def plain_names(names: Sequence[str], prefixes: Sequence[str] = ()) -> list[str]
 def map_by_names(skeleton: Skeleton) -> JointMap | None:
     """The map by the convention that fits best, None where none does.
 
-    MotionError where a convention fits but for bones that are missing, or where two joints are the hips.
+    MotionError where a convention fits but for bones that are missing, where the one that knows most of the names
+    lacks bones of one side only, or where two joints are the hips.
     """
     matches = [_match(convention, skeleton) for convention in conventions()]
+    fullest = max(matches, key=Match.fit)
     whole = [match for match in matches if not match.missing]
-    best = max(whole or matches, key=lambda match: (match.known, -match.absent))
-    if not whole:
+    best = fullest if one_sided(fullest.missing, fullest.joints) else max(whole, key=Match.fit, default=fullest)
+    if best.missing:
         if len(best.joints) >= 6 and best.known > 0.5 * len(skeleton.names):
             raise MotionError(missing_reason(best.missing, best.joints))
         return None

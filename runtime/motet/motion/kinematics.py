@@ -7,7 +7,8 @@ import numpy as np
 
 from motet.errors import MotionError
 from motet.motion.motion import TURN, Motion
-from motet.motion.rotations import Array, euler_to_rotmat, rotmats_to_euler
+from motet.motion.products import inverse, product, rotated
+from motet.motion.rotations import Array, euler_to_rotmat, frames_last, rotmats_to_euler
 from motet.motion.skeleton import Joint, Skeleton
 
 AXES = ("x", "y", "z")
@@ -24,24 +25,31 @@ def local_rotations(motion: Motion, joints: Sequence[int] | None = None) -> Arra
     """Rotations (T, J, 3, 3) relative to the parent of every joint, or of the joints with the given indices."""
     skeleton = skeleton_of(motion)
     wanted = range(len(skeleton.joints)) if joints is None else joints
-    angles = _angles(motion, [skeleton.names[joint] for joint in wanted])
-    rotations = np.empty((len(motion), len(wanted), 3, 3))
-    orders = [skeleton.joints[joint].order for joint in wanted]
-    for order in dict.fromkeys(orders):
-        places = [place for place, other in enumerate(orders) if other == order]
-        columns = [AXES.index(axis) for axis in order]
-        rotations[:, places] = euler_to_rotmat(angles[:, places][..., columns], order)
-    for place, joint in enumerate(wanted):
-        if any(skeleton.joints[joint].axis):
-            frame = skeleton.joints[joint].frame
-            rotations[:, place] = frame @ rotations[:, place] @ frame.T
+    columns = motion.rotation_columns()
+    rotations = frames_last((len(motion), len(wanted), 3, 3))
+    for place, joint in enumerate(skeleton.joints[index] for index in wanted):
+        rotations[:, place] = _rotations_of(motion, joint, columns.get(joint.name, ()))
     return rotations
+
+
+def _rotations_of(motion: Motion, joint: Joint, columns: Sequence[int]) -> Array:
+    """Local rotations (T, 3, 3) of one joint from the columns of its angles, (3, 3) where it has none."""
+    if not columns:
+        return np.eye(3)
+    angles = frames_last((len(motion), 3))
+    angles[:] = 0.0
+    for column in columns:
+        axis = joint.order.index(motion.channels[column][-1])
+        angles[:, axis] = motion.values[:, column] * (2 * np.pi / TURN[motion.units[column]])
+    turns = euler_to_rotmat(angles, joint.order)
+    return product(product(joint.frame, turns), inverse(joint.frame)) if any(joint.axis) else turns
 
 
 def local_translations(motion: Motion) -> Array:
     """Translations (T, J, 3) of every joint in its parent's frame: the channel where there is one, else the offset."""
     skeleton = skeleton_of(motion)
-    translations = np.repeat(skeleton.offsets[None], len(motion), axis=0)
+    translations = frames_last((len(motion), len(skeleton.joints), 3))
+    translations[:] = skeleton.offsets
     for column, name in enumerate(motion.channels):
         joint, _, kind = name.rpartition(".")
         if kind in ("tx", "ty", "tz") and joint in skeleton.places:
@@ -57,8 +65,8 @@ def global_transforms(motion: Motion) -> tuple[Array, Array]:
     for level in skeleton.levels:
         parents = skeleton.parents[level]
         turned = rotations[:, parents]
-        positions[:, level] = positions[:, parents] + (turned @ positions[:, level, :, None])[..., 0]
-        rotations[:, level] = turned @ rotations[:, level]
+        positions[:, level] = positions[:, parents] + rotated(turned, positions[:, level])
+        rotations[:, level] = product(turned, rotations[:, level])
     return rotations, positions
 
 
@@ -72,7 +80,9 @@ def euler_of(rotations: Array, joint: Joint) -> Array:
 
     The angles do not leap from frame to frame; the first frame's middle angle is within a quarter turn.
     """
-    angles = rotmats_to_euler(joint.frame.T @ rotations @ joint.frame, joint.order)
+    if any(joint.axis):
+        rotations = product(product(inverse(joint.frame), rotations), joint.frame)
+    angles = rotmats_to_euler(rotations, joint.order)
     ordered: Array = angles[:, [joint.order.index(axis) for axis in AXES]]
     return ordered
 
@@ -111,14 +121,3 @@ def continued(last: Motion, rotations: Mapping[str, Array], translations: Mappin
             values[1:, column] = translations[name][:, AXES.index(kind[1])] * factor
     # the frame before the first one says which of two equal angles is the nearer one
     return replace(last, values=values).continuous()[1:]
-
-
-def _angles(motion: Motion, joints: Sequence[str]) -> Array:
-    """Euler angles (T, J, 3) about x, y, z in radians of the joints named; 0 where there is no channel."""
-    angles = np.zeros((len(motion), len(joints), 3))
-    found = motion.rotation_columns()
-    for place, joint in enumerate(joints):
-        for column in found.get(joint, ()):
-            radians = motion.values[:, column] * (2 * np.pi / TURN[motion.units[column]])
-            angles[:, place, AXES.index(motion.channels[column][-1])] = radians
-    return angles

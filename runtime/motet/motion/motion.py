@@ -9,7 +9,7 @@ from typing import Any, SupportsIndex
 import numpy as np
 from numpy.typing import ArrayLike
 
-from motet.errors import MotionError
+from motet.errors import MotionError, listed
 from motet.motion.resample import resampled
 from motet.motion.rotations import Array, continuous_euler, continuous_rotvec, without_turns
 from motet.motion.skeleton import Skeleton
@@ -24,9 +24,6 @@ TURN = {"deg": 360.0, "rad": 2 * np.pi}
 
 MAX_VALUES = 2**28
 """Numbers that a motion is resampled to at most: 2 GiB, of a hundred channels six hours at 120 frames a second."""
-
-LISTED = 6
-"""Channels that an error names."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -118,9 +115,7 @@ class Motion:
         places = {name: column for column, name in enumerate(self.channels)}
         missing = [name for name in channels if name not in places]
         if missing:
-            more = f" and {len(missing) - LISTED} more" if len(missing) > LISTED else ""
-            said = f"{', '.join(missing[:LISTED])}{more}"
-            raise MotionError(f"the motion lacks {len(missing)} of {len(channels)} channels: {said}")
+            raise MotionError(f"the motion lacks {len(missing)} of {len(channels)} channels: {listed(missing)}")
         columns = [places[name] for name in channels]
         units = units or tuple(self.units[column] for column in columns)
         factors = [self._factor(column, unit) for column, unit in zip(columns, units, strict=True)]
@@ -224,7 +219,7 @@ def rotation_columns(channels: tuple[str, ...], units: tuple[str, ...], letter: 
 
 def _frozen(values: ArrayLike) -> Array:
     try:
-        array = np.array(values, dtype=np.float64)
+        array = np.array(values, dtype=np.float64, order="C")  # frames lie one after the other, whatever made them
     except (TypeError, ValueError) as error:
         raise MotionError(f"the values of a motion must be numbers: {error}") from error
     array.flags.writeable = False

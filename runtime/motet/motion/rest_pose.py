@@ -13,7 +13,7 @@ import numpy as np
 
 from motet.motion.humanoid import ARM, HUMANOID, LEFT_RIGHT, LEG, sided
 from motet.motion.joint_map import JointMap
-from motet.motion.rotations import Array, rotvec_to_rotmat
+from motet.motion.rotations import Array, frames_last, rodrigues, rotvec_to_rotmat
 from motet.motion.skeleton import Skeleton
 
 LIMBS = tuple(tuple(sided(side, part) for part in limb) for side in LEFT_RIGHT for limb in (LEG, ARM[1:]))
@@ -24,7 +24,7 @@ Aims = Mapping[str, tuple[int, ...]]
 
 def unit(vectors: Array) -> Array:
     """Vectors (..., 3) of length 1; zero vectors stay."""
-    lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    lengths = np.sqrt(np.einsum("...i,...i->...", vectors, vectors))[..., None]
     scaled: Array = vectors / np.where(lengths > 1e-12, lengths, 1.0)
     return scaled
 
@@ -32,15 +32,15 @@ def unit(vectors: Array) -> Array:
 def swing(start: Array, end: Array) -> Array:
     """The shortest rotations (..., 3, 3) that turn directions (..., 3) into others; half a turn is about any axis."""
     start, end = unit(start), unit(end)
-    axis, cosine = np.cross(start, end), np.sum(start * end, axis=-1)[..., None, None]
-    x, y, z = np.moveaxis(axis, -1, 0)
-    zero = np.zeros_like(x)
-    skew = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*axis.shape[:-1], 3, 3)
-    turn = np.eye(3) + skew + skew @ skew / np.maximum(1 + cosine, 1e-9)
-    other = np.eye(3)[np.argmin(np.abs(start), axis=-1)]
-    side = unit(np.cross(start, other))
-    half = 2 * side[..., :, None] * side[..., None, :] - np.eye(3)
-    return np.where(cosine > -1 + 1e-6, turn, half)
+    axis, cosine = np.cross(start, end), np.sum(start * end, axis=-1)
+    versed = axis / np.maximum(1 + cosine, 1e-9)[..., None]
+    # 1 - (1 - cosine) and not the cosine itself: where a direction is 0, nothing is turned
+    turn = rodrigues(1 - np.sum(versed * axis, axis=-1), axis, versed, axis)
+    half = cosine < -1 + 1e-6
+    if half.any():
+        side = unit(np.cross(start, np.eye(3)[np.argmin(np.abs(start), axis=-1)]))
+        turn = np.where(half[..., None, None], 2 * side[..., :, None] * side[..., None, :] - np.eye(3), turn)
+    return turn
 
 
 def humanoid_direction(bone: str) -> Array:
@@ -90,7 +90,14 @@ def frame(left: Array, up: Array) -> Array:
     """Rotations (..., 3, 3) whose columns are left, up and forward: up as it is given, left at right angles to it."""
     up = unit(up)
     left = unit(left - np.sum(left * up, axis=-1, keepdims=True) * up)
-    return np.stack([left, up, np.cross(left, up)], axis=-1)
+    return with_columns(left, up)
+
+
+def with_columns(left: Array, up: Array) -> Array:
+    """Rotations (..., 3, 3) whose columns are left, up and forward: left and up of length 1 and at right angles."""
+    rotations = frames_last((*up.shape, 3))
+    rotations[..., 0], rotations[..., 1], rotations[..., 2] = left, up, np.cross(left, up)
+    return rotations
 
 
 def trunk_up(positions: Array, joint_map: JointMap) -> Array:

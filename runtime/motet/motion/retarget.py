@@ -21,8 +21,9 @@ from motet.motion.joint_tree import BY_THE_TREE, map_by_tree
 from motet.motion.kinematics import global_transforms, local_rotations, local_translations, skeleton_of
 from motet.motion.mmm_figure import is_mmm, with_figure
 from motet.motion.motion import Motion
+from motet.motion.products import inverse, product, rotated
 from motet.motion.rest_pose import middle
-from motet.motion.rotations import Array
+from motet.motion.rotations import Array, frames_last
 from motet.motion.skeleton import END_SUFFIX, Skeleton
 from motet.motion.spread import spread, twist
 from motet.motion.world_rotations import motion_of, places_of
@@ -85,7 +86,7 @@ def to_humanoid(motion: Motion, joint_map: JointMap | None = None) -> Humanoid:
     fitted = fit(skeleton, joint_map, rotations, places)
     check_frames(places, joint_map, fitted.aims)
     unit, turn = unit_of(skeleton, fitted.leg), upright(fitted, places)
-    turned = turn @ _humanoid_rotations(rotations, fitted)
+    turned = product(turn, _humanoid_rotations(rotations, fitted))
     legs = middle(places, joint_map, "UpperLeg") @ turn.T * (leg_length() / fitted.leg)
     notes = [note for note in (fitted.note, unit.note) if note]
     if joint_map.joints["hips"]:
@@ -115,19 +116,28 @@ def on_humanoid(motion: Motion) -> Motion:
 def _humanoid_rotations(rotations: Array, fitted: Fitted) -> Array:
     """Rotations in the world (T, J, 3, 3) of the humanoid's joints, from those of the figure's."""
     joint_map, aligned = fitted.joint_map, fitted.aligned
-    turned = {bone: rotations[:, joint] @ aligned[joint] for bone, joint in joint_map.joints.items()}
-    spine, neck = ([rotations[:, i] @ aligned[i] for i in chain] for chain in (joint_map.spine, joint_map.neck))
+    turned = {bone: product(rotations[:, i], aligned[i]) for bone, i in joint_map.joints.items()}
+    chains = (joint_map.spine, joint_map.neck)
+    spine, neck = ([product(rotations[:, i], aligned[i]) for i in chain] for chain in chains)
     neck += [turned["head"]] if "head" in turned else []
     turned |= _shared_out([turned["hips"], *spine], SPINE)
     turned |= _shared_out([spine[-1], *neck], NECK) if neck else {}
     for bone, parent in PARENTS.items():
         turned.setdefault(bone, turned[parent])
-    return np.stack([turned[name.removesuffix(END_SUFFIX)] for name in HUMANOID.names], axis=1)
+    return _side_by_side([turned[name.removesuffix(END_SUFFIX)] for name in HUMANOID.names])
 
 
 def _shared_out(chain: list[Array], names: tuple[str, ...]) -> dict[str, Array]:
-    shared = spread(np.stack(chain, axis=1), len(names))
+    shared = spread(_side_by_side(chain), len(names))
     return {name: shared[:, i] for i, name in enumerate(names)}
+
+
+def _side_by_side(rotations: list[Array]) -> Array:
+    """Rotations (T, J, 3, 3) of joints from those of each (T, 3, 3)."""
+    stacked = frames_last((len(rotations[0]), len(rotations), 3, 3))
+    for i, of_one in enumerate(rotations):
+        stacked[:, i] = of_one
+    return stacked
 
 
 def _on_humanoid(turned: Array, legs: Array, fps: float) -> Motion:
@@ -172,7 +182,7 @@ def from_humanoid(motion: Motion, like: Motion | Skeleton, joint_map: JointMap |
     if carrier:
         above = skeleton.joints[carrier].parent
         from_above = figure[:, carrier] + moved - figure[:, above] - skeleton.offsets[0]
-        moved = (np.swapaxes(turned[:, above], -1, -2) @ from_above[..., None])[..., 0]
+        moved = rotated(inverse(turned[:, above]), from_above)
     return motion_of(skeleton, turned, {carrier: moved}, motion.fps)
 
 
@@ -181,10 +191,11 @@ def _still(example: Motion, fitted: Fitted) -> tuple[Skeleton, Array]:
     skeleton = skeleton_of(example)
     if fitted.at_rest:
         return skeleton, np.tile(np.eye(3), (len(skeleton.joints), 1, 1))
-    offsets = local_translations(example)[0].tolist()
+    first = example[:1]
+    offsets = local_translations(first)[0].tolist()
     offsets[0] = skeleton.joints[0].offset
     joints = [replace(joint, offset=tuple(offset)) for joint, offset in zip(skeleton.joints, offsets, strict=True)]
-    return Skeleton(tuple(joints), skeleton.metres_per_unit), local_rotations(example)[0]
+    return Skeleton(tuple(joints), skeleton.metres_per_unit), local_rotations(first)[0]
 
 
 def _figure_rotations(source: Array, fitted: Fitted, skeleton: Skeleton, still: Array) -> Array:
@@ -200,18 +211,18 @@ def _figure_rotations(source: Array, fitted: Fitted, skeleton: Skeleton, still: 
     wanted.setdefault(joint_map.carrier(skeleton), wanted[joint_map.joints["hips"]])
     # a joint between forearm and hand, as CMU's wrists, takes the hand's twist
     hands = {joint_map.joints.get(sided(side, "Hand")) for side in LEFT_RIGHT} - {None}
-    turned = np.empty((len(source), len(skeleton.joints), 3, 3))
+    turned = frames_last((len(source), len(skeleton.joints), 3, 3))
     for i, joint in enumerate(skeleton.joints):
         if i in wanted:
-            turned[:, i] = wanted[i] @ fitted.aligned[i].T
+            turned[:, i] = product(wanted[i], fitted.aligned[i].T)
         else:
-            turned[:, i] = turned[:, joint.parent] @ still[i] if i else still[0]
+            turned[:, i] = product(turned[:, joint.parent], still[i]) if i else still[0]
             hand = next((k for k in skeleton.children[i] if k in hands), None)
             if hand is not None:
-                wanted_hand = wanted[hand] @ fitted.aligned[hand].T
-                turned[:, i] @= twist(np.swapaxes(turned[:, i], -1, -2) @ wanted_hand, skeleton.offsets[hand])
+                to_hand = product(inverse(turned[:, i]), product(wanted[hand], fitted.aligned[hand].T))
+                turned[:, i] = product(turned[:, i], twist(to_hand, skeleton.offsets[hand]))
     return turned
 
 
 def _chain(chain: list[Array], count: int) -> list[Array]:
-    return list(np.moveaxis(spread(np.stack(chain, axis=1), count), 1, 0)) if count else []
+    return list(np.moveaxis(spread(_side_by_side(chain), count), 1, 0)) if count else []

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from motet.motion.products import inverse, product
 from motet.motion.rotations import Array, rotmat_to_quat, rotmat_to_rotvec, rotvec_to_rotmat
 
 
@@ -13,14 +14,14 @@ def spread(chain: Array, count: int) -> Array:
     """
     last = chain.shape[1] - 1
     places = np.arange(1, count + 1) * last / count
-    below = np.minimum(places.astype(int), last - 1)
+    below = np.ceil(places).astype(int) - 1
     part = places - below
     shared: Array = chain[:, below + 1]
     inner = np.flatnonzero(part < 1)
     if len(inner):
         lower = chain[:, below[inner]]
-        turn = rotmat_to_rotvec(np.swapaxes(lower, -1, -2) @ shared[:, inner])
-        shared[:, inner] = lower @ rotvec_to_rotmat(turn * part[inner, None])
+        turn = rotmat_to_rotvec(product(inverse(lower), shared[:, inner]))
+        shared[:, inner] = product(lower, rotvec_to_rotmat(turn * part[inner, None]))
     return shared
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from motet.errors import MotionError
+from motet.errors import MotionError, listed
 from motet.motion.humanoid import HUMANOID
 from motet.motion.kinematics import (
     AXES,
@@ -41,7 +41,7 @@ def foreign(motion: Motion, skeleton: Skeleton, joints: Iterable[str]) -> str | 
     own = motion.skeleton
     lacking = [name for name in joints if name not in own.places]
     if lacking:
-        return f"the model's figure has joints that this motion lacks: {', '.join(lacking)}"
+        return f"the model's figure has joints that this motion lacks: {listed(lacking)}"
     return next((reason for name in own.names if (reason := other_bone(own, skeleton, name))), None)
 
 

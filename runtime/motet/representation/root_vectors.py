@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from motet.errors import MotionError
+from motet.errors import MotionError, listed
 from motet.motion.kinematics import AXES, continued, local_rotations, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, rotmat_to_rotvec, rotvec_to_rotmat
@@ -84,7 +84,7 @@ def to_joint_vectors(motion: Motion, joints: Sequence[str] | None = None) -> Mot
         joints = tuple(name for name in skeleton.names[1:] if not name.endswith(END_SUFFIX))
     lacking = [name for name in joints if name not in skeleton.places]
     if lacking:
-        raise MotionError(f"the model's figure has joints that this motion lacks: {', '.join(lacking)}")
+        raise MotionError(f"the model's figure has joints that this motion lacks: {listed(lacking)}")
     block = to_root_block(motion).select(ROOT_BLOCK, ROOT_UNITS)
     vectors = rotmat_to_rotvec(local_rotations(motion, [skeleton.places[name] for name in joints]))
     channels = (*ROOT_BLOCK, *(f"{name}.{kind}" for name in joints for kind in KINDS))
