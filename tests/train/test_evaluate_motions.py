@@ -264,7 +264,7 @@ def test_evaluate_refuses_before_it_measures(runs: Path, monkeypatch: pytest.Mon
     result = CliRunner().invoke(main, [*arguments, "--plots", str(runs / "file" / "plots")])
     assert (result.exit_code, "cannot write plots to" in result.stderr) == (2, True)
     result = CliRunner().invoke(main, [*arguments, "describe", "--save"])
-    assert (result.exit_code, "cmu-describe is a bundle" in result.stderr) == (2, True)
+    assert (result.exit_code, "describe is a bundle" in result.stderr) == (2, True)
 
 
 def test_evaluate_says_what_it_lacks(runs: Path) -> None:
