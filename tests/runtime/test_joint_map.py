@@ -1,4 +1,5 @@
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,7 @@ from motet.motion.motion import Motion
 from motet.motion.retarget import to_humanoid
 
 SKELETONS = Path(__file__).parent / "skeletons"
+DOCS = Path(__file__).parents[2] / "docs" / "formats.md"
 
 
 def numbered() -> tuple[Motion, dict[str, object]]:
@@ -70,6 +72,16 @@ def test_tables_of_conventions_are_whole() -> None:
     for table in tables:
         assert {"hips", "spine", "head", "leftUpperLeg", "rightHand"} <= set(table.names)
         assert all(names for names in table.names.values())
+
+
+def test_the_docs_say_of_every_convention_what_it_was_tested_on() -> None:
+    found = re.search("<!-- conventions -->\n(.*?)<!-- /conventions -->", DOCS.read_text(encoding="utf-8"), re.DOTALL)
+    assert found is not None
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in found[1].splitlines()[2:]]
+    assert sorted(title for title, _ in rows) == sorted({table.title for table in conventions()})
+    skeletons = [map_by_names(skeleton_of(read_motion(path))) for path in SKELETONS.glob("*.bvh")]
+    written = {title for title, tested in rows if tested.startswith("written down")}
+    assert written == {joint_map.convention for joint_map in skeletons if joint_map}
 
 
 @pytest.mark.parametrize("prefix", ["mixamorig:", "mixamorig1:", "mixamorig", "Character1_", "MyHero:mixamorig:", ""])
