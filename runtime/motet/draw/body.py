@@ -34,7 +34,7 @@ PATH = 0.62
 .63 to .76. Figures that rest with all their bones in a line would be taken for half as high."""
 
 SKULL = ((-0.024, 0.040), (0.020, 0.050))
-"""Jaw and crown: how far along the head's direction from the head's joint, and the radius."""
+"""Jaw and crown: how far along the head's direction from the middle of the head, and the radius."""
 
 
 class Bone(NamedTuple):
@@ -83,6 +83,12 @@ class Body:
         return named[-1] if named else max(tips, key=lambda i: float(skeleton.rest_positions[i, 1]), default=0)
 
     @cached_property
+    def head_is_tip(self) -> bool:
+        """Whether the joint in the head is its crown, and the one before it the neck's upper end."""
+        parent = self.skeleton.joints[self.head].parent
+        return parent >= 0 and "head" in self.skeleton.names[parent].lower()
+
+    @cached_property
     def beyond(self) -> Array:
         """For each joint (J) how much body hangs on it: along a limb lengths add up, where limbs meet their squares."""
         squares = np.zeros(len(self.lengths))
@@ -109,7 +115,7 @@ class Body:
 
     def _bones_to(self, i: int) -> list[Bone]:
         parent, side = self.skeleton.joints[i].parent, self.sides[i]
-        in_skull = i == self.head and "head" in self.skeleton.names[parent].lower()
+        in_skull = i == self.head and self.head_is_tip
         if self.lengths[i] <= SMALL or in_skull or (self.trunk[i] and side != MIDDLE):
             return []
         thick, thin = _radius(self.lengths[i] + self.beyond[i]), _radius(self.beyond[i])
@@ -123,10 +129,11 @@ class Body:
         """The points that bones join (..., P, 3), from positions of the joints (..., J, 3), all in heights."""
         if not self.head:
             return joints
-        head = joints[..., self.head, :]
-        direction = head - joints[..., self.skeleton.joints[self.head].parent, :]
+        head, below = (joints[..., i, :] for i in (self.head, self.skeleton.joints[self.head].parent))
+        direction = head - below
         direction = direction / np.maximum(np.linalg.norm(direction, axis=-1, keepdims=True), 1e-9)
-        skull = np.stack([head + along * direction for along, _ in SKULL], axis=-2)
+        middle = (head + below) / 2 if self.head_is_tip else head
+        skull = np.stack([middle + along * direction for along, _ in SKULL], axis=-2)
         return np.concatenate([joints, skull], axis=-2)
 
 
