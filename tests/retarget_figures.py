@@ -102,7 +102,8 @@ def _print_actions(folder: Path) -> None:
     """How many of every third trial are said to be the same action from the AMC and from another figure's BVH."""
     model, same, different = motet.load_as(DescribeModel, "describe"), 0, []
     for path in sorted((folder / "cmu-asfamc" / "amc").glob("*.amc"))[::3]:
-        amc = read_motion(path).cut(0, MAX_SECONDS - 0.1)
+        whole = read_motion(path)
+        amc = whole[: int(MAX_SECONDS * whole.fps)]
         motet.write(folder / "other.bvh", from_humanoid(to_humanoid(amc).motion, STOCKY))
         pair = [model.describe(motion)[0].text for motion in (amc, read_motion(folder / "other.bvh"))]
         if said(ACTIONS, pair[0]) == said(ACTIONS, pair[1]):

@@ -10,7 +10,14 @@ from torch import Tensor
 
 from motet_train.data.batch import Batch
 from motet_train.models.language.language_to_motion import LanguageToMotion, LanguageToMotionConfig
-from motet_train.models.language.motion_to_language import EOS, PAD, SOS, MotionToLanguage, MotionToLanguageConfig
+from motet_train.models.language.motion_to_language import (
+    EOS,
+    PAD,
+    SOS,
+    SPAN,
+    MotionToLanguage,
+    MotionToLanguageConfig,
+)
 from motet_train.runs import MODELS
 
 D, V = 3, 11
@@ -70,6 +77,18 @@ def test_a_row_of_a_batch_loses_what_it_loses_alone(net: MotionToLanguage | Lang
     single = torch.cat([net.losses(alone(rows, row)) for row in range(3)])
     torch.testing.assert_close(found, single, atol=1e-5, rtol=1e-5)
     assert net.loss(rows) == found.mean()
+
+
+def test_the_encoder_sees_the_way_so_far(monkeypatch: pytest.MonkeyPatch) -> None:
+    net, rows = describer(replace(DESCRIBE, travelled=2)).eval(), batch()
+    seen: list[Tensor] = []
+    monkeypatch.setattr(net.encoder, "forward", lambda frames, lengths: seen.append(frames))
+    net.encode(rows.frames, rows.lengths)
+    normal = (rows.frames - net.mean) / net.scale
+    torch.testing.assert_close(seen[0][..., :D], normal)
+    for t in range(7):
+        torch.testing.assert_close(seen[0][:, t, D : D + 2], normal[:, : t + 1, :2].sum(dim=1) / SPAN)
+    assert (seen[0][..., D + 2 :] == 1).all()
 
 
 def test_the_loss_of_words_is_the_cross_entropy_of_steps() -> None:

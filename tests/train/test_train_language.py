@@ -16,12 +16,13 @@ from motet.cli import main
 from motet.formats import write_motion
 from motet_train.data.store import Store
 from motet_train.descent import Training
+from motet_train.manifest import About
 from motet_train.models.language.language_to_motion import LanguageToMotionConfig
 from motet_train.models.language.motion_to_language import MotionToLanguageConfig
 from motet_train.progress import Shown
 from motet_train.recipes import describe, generate
-from motet_train.recipes.language import LanguageVisits, divided
-from motet_train.recipes.recipe import SETTINGS, Recipe
+from motet_train.recipes.language import LanguageVisits, divided, train_language
+from motet_train.recipes.recipe import SETTINGS, Job, Recipe
 from motet_train.runs import Run
 from motet_train.trainer import CHECKPOINT, LOG
 
@@ -65,7 +66,7 @@ def test_the_manifest_says_all(verb: str, store: Path, tmp_path: Path) -> None:
     found = divided(Store.open(store), mirror=False)
     assert (manifest["name"], manifest["verb"]) == ("mine", verb)
     assert manifest["licence"] == {"weights": None, "data": "free"}
-    assert manifest["loop"] == {"describe": "consensus", "generate": "mixture"}[verb]
+    assert manifest["loop"] == {"describe": "beam", "generate": "mixture"}[verb]
     assert manifest["vocabulary"] == list(found.vocabulary.words)
     contract = read_contract(Fields(manifest["motion"], "motion"))
     np.testing.assert_allclose(contract.mean, found.contract.mean, atol=1e-9)
@@ -184,6 +185,15 @@ def test_a_corpus_is_prepared_beside_the_run(tmp_path: Path) -> None:
     shutil.rmtree(out)
     stale = motet("train", "describe", "--data", folder, "--out", out, "--figure", "own", *given)
     assert f"{out}-store: it exists" in stale.output
+
+
+@pytest.mark.parametrize(("representation", "travelled"), [("root_angles", 2), ("angles", 0)])
+def test_only_channels_that_travel_are_summed(store: Path, tmp_path: Path, representation: str, travelled: int) -> None:
+    recipe = describe.RECIPES["default"]
+    config, visits = replace(recipe.config, travelled=2), replace(recipe.visits, mirror=False)
+    job = Job(replace(recipe, config=config, visits=visits), About("x", "x"), tmp_path)
+    run = train_language(replace(Store.open(store), representation=representation), job)
+    assert run.manifest["config"]["travelled"] == run.model.config.travelled == travelled
 
 
 def test_either_loss_can_be_trained(store: Path, tmp_path: Path) -> None:

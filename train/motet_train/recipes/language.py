@@ -9,6 +9,7 @@ import numpy as np
 import torch
 
 from motet.models.text import RULES, Vocabulary
+from motet.representation import named
 from motet.representation.base import FrameMirror
 from motet.representation.contract import MotionContract
 from motet_train.data.batch import Batch
@@ -78,7 +79,7 @@ def train_language(store: Store, job: Job, data: str = "", by: str = "trial") ->
     """
     recipe = job.recipe
     found = divided(store, recipe.visits.mirror, by)
-    config = asdict(recipe.sized(channels=len(found.contract.channels), words=len(found.vocabulary)))
+    config = _fitting(asdict(recipe.sized(channels=len(found.contract.channels), words=len(found.vocabulary))), store)
     torch.manual_seed(job.about.seed)
     net = MODELS[recipe.model](config)
     assert isinstance(net, LanguageNet)
@@ -87,6 +88,12 @@ def train_language(store: Store, job: Job, data: str = "", by: str = "trial") ->
     known = {"text": RULES.to_json(), "vocabulary": found.vocabulary.words}
     manifest = job.manifest(found.contract, config, recipe.defaults, None, training, **known)
     return job.run(net, _learner(net.to(job.device), found, job), manifest)
+
+
+def _fitting(config: dict[str, Any], store: Store) -> dict[str, Any]:
+    """The configuration without sums of channels that do not say where the figure goes."""
+    travels = named(store.representation).required
+    return config if travels or "travelled" not in config else {**config, "travelled": 0}
 
 
 def _learner(net: LanguageNet, found: Divided, job: Job) -> GradientLearner:

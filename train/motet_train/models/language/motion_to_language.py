@@ -21,6 +21,9 @@ from motet_train.models.language.summary import SummaryHead
 from motet_train.models.net import Part, tuples
 from motet_train.models.normalised import normalised
 
+SPAN = 10.0
+"""Frames that sums are divided by: a second's at the usual rate, so that they are about as large as the frames."""
+
 PAD, SOS, EOS = 0, 1, 2
 """Ids of the special words."""
 
@@ -38,6 +41,8 @@ class MotionToLanguageConfig:
     gates: str = "sigmoid"
     frame_noise: float = 0.0
     """Standard deviation of what training adds to the frames, in normalised units."""
+    travelled: int = 0
+    """Of how many channels, the first ones, the encoder also sees the sum so far: way and turn since the start."""
     summary: float = 0.0
     """Weight of the training-only loss of :mod:`motet_train.models.language.summary`; 0 leaves its head out."""
 
@@ -49,7 +54,7 @@ class MotionToLanguage(LanguageNet):
         super().__init__(config.channels)
         self.config = config
         context, shared = 2 * config.encoder_units[-1], (config.gates, config.dropout)
-        self.encoder = Encoder(GRU, config.channels + 1, config.encoder_units, *shared)
+        self.encoder = Encoder(GRU, config.channels + config.travelled + 1, config.encoder_units, *shared)
         self.embedding = WordEmbedding(config.words, config.embedding, config.dropout)
         self.decoder = Decoder(GRU, config.embedding, context, config.decoder_units, False, *shared)
         self.output = nn.Linear(sum(config.decoder_units), config.words)
@@ -60,9 +65,10 @@ class MotionToLanguage(LanguageNet):
     def encode(self, frames: Tensor, lengths: Tensor) -> Tensor:
         """Frames (B, T, D) in the contract's units, of lengths (B,), to contexts (B, C)."""
         normal = normalised(frames, self.mean, self.scale)
+        sums = normal[..., : self.config.travelled].cumsum(dim=1) / SPAN
         if self.training and self.config.frame_noise:
             normal = normal + self.config.frame_noise * torch.randn_like(normal)
-        context: Tensor = self.encoder(torch.cat([normal, torch.ones_like(normal[..., :1])], dim=-1), lengths)
+        context: Tensor = self.encoder(torch.cat([normal, sums, torch.ones_like(normal[..., :1])], dim=-1), lengths)
         return context
 
     def outputs(self, words: Tensor, context: Tensor) -> Tensor:
