@@ -1,0 +1,150 @@
+"""Rules on arms and hands: raising, waving, punching, reaching. Each says whether a track does it.
+
+side: "left", "right", "either" or "both".
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, sided
+from motet.motion.rotations import Array
+from motet_train.evaluate.says.track import RATE, Track, calm, longest, spells, swings
+
+ARM = float(sum(np.linalg.norm(HUMANOID.offsets[HUMANOID.index(f"left{part}")]) for part in ("LowerArm", "Hand")))
+"""Length of the humanoid's arm from shoulder to wrist, metres."""
+
+
+def raises(track: Track, side: str, above: float, seconds: float = 0.3) -> bool:
+    """A hand is so many metres above the head's joint, about the mouth, for a while; "both": at the same time."""
+    up = np.stack([track.height(sided(one, "Hand")) - track.height("head") >= above for one in LEFT_RIGHT])
+    flags = {"left": up[0], "right": up[1], "either": up.any(axis=0), "both": up.all(axis=0)}[side]
+    return longest(flags) >= seconds
+
+
+def waves(track: Track, side: str, count: int, metres: float = 0.1) -> bool:
+    """A raised hand, above the elbow and the shoulder's height less a hand, goes from side to side so many times."""
+
+    def found(one: str) -> bool:
+        hand = track.body(sided(one, "Hand"))
+        high = hand[:, 1] > np.maximum(track.height(sided(one, "LowerArm")), track.height(sided(one, "UpperArm")) - 0.1)
+        return any(swings(hand[start:stop, 0], metres) >= count for start, stop in spells(high))
+
+    return _sides(found, side)
+
+
+def punches(track: Track, side: str, speed: float = 2.5, count: int = 1) -> bool:
+    """A hand shoots out or up from the body at a speed, m/s, at shoulder height or below, so many times; for one side
+    alone it is faster than the other hand."""
+
+    def found(one: str) -> bool:
+        return len(spells(_thrust(track, one) >= speed)) >= count
+
+    if side in LEFT_RIGHT:
+        tops = [_thrust(track, one).max() for one in LEFT_RIGHT]
+        return found(side) and int(np.argmax(tops)) == LEFT_RIGHT.index(side)
+    return _sides(found, side)
+
+
+def reaches_down(track: Track, most: float, side: str = "either", seconds: float = 0.1) -> bool:
+    """A hand comes as near to the ground as so many metres, for a moment."""
+    low = np.stack([track.height(sided(one, "Hand")) <= most for one in LEFT_RIGHT])
+    flags = {"left": low[0], "right": low[1], "either": low.any(axis=0), "both": low.all(axis=0)}[side]
+    return longest(flags) >= seconds
+
+
+def wipes(track: Track, count: int, metres: float = 0.2, share: float = 0.3) -> bool:
+    """A hand in front at chest height or above, for a share of the time, goes to and fro so many times."""
+
+    def found(one: str) -> bool:
+        hand = track.body(sided(one, "Hand"))
+        there = (hand[:, 1] > 1.0) & (hand[:, 2] > 0.2)
+        moves = max(sum(swings(hand[a:b, i], metres) for a, b in spells(there)) for i in (0, 1))
+        return there.mean() >= share and moves >= count
+
+    return _sides(found, "either")
+
+
+def to_mouth(track: Track, seconds: float = 0.5) -> bool:
+    """One hand is at the mouth for a while, the other one lower than the chest."""
+    near = [np.linalg.norm(track.joint(sided(one, "Hand")) - track.joint("head"), axis=1) < 0.42 for one in LEFT_RIGHT]
+    low = [track.height(sided(one, "Hand")) < track.height("chest") + 0.05 for one in LEFT_RIGHT]
+    return max(longest(near[0] & low[1]), longest(near[1] & low[0])) >= seconds
+
+
+def on_guard(track: Track, share: float = 0.5) -> bool:
+    """Both hands are in front of the chest, between its height and the mouth, for a share of the time."""
+    up = [_in_front(track, one) for one in LEFT_RIGHT]
+    return bool((up[0] & up[1]).mean() >= share)
+
+
+def hands_together(track: Track, most: float, share: float = 0.5) -> bool:
+    """The hands are no farther than so many metres apart for a share of the time."""
+    return bool((between_hands(track) <= most).mean() >= share)
+
+
+def arms_out(track: Track, metres: float = 1.0, seconds: float = 1.0) -> bool:
+    """The arms are spread, the hands so many metres apart, for a while."""
+    return longest(between_hands(track) >= metres) >= seconds
+
+
+def arms_ahead(track: Track, share: float = 0.5) -> bool:
+    """Both arms are stretched out to the front at about shoulder height for a share of the time."""
+    out = []
+    for one in LEFT_RIGHT:
+        hand, shoulder = track.body(sided(one, "Hand")), track.body(sided(one, "UpperArm"))
+        out.append((hand[:, 2] - shoulder[:, 2] > 0.6 * ARM) & (np.abs(hand[:, 1] - shoulder[:, 1]) < 0.3))
+    return bool((out[0] & out[1]).mean() >= share)
+
+
+def swings_arms(track: Track, count: int, metres: float = 0.2) -> bool:
+    """Both hands, relative to the hips, go to and fro by so many metres so many times, or both from side to side."""
+    hands = [track.body(sided(one, "Hand")) for one in LEFT_RIGHT]
+    return any(min(swings(hand[:, axis], metres) for hand in hands) >= count for axis in (0, 1, 2))
+
+
+def arms_up_and_down(track: Track, count: int, metres: float = 0.5) -> bool:
+    """Both hands go up or down by so many metres at least so many times."""
+    return min(swings(track.height(sided(one, "Hand")), metres) for one in LEFT_RIGHT) >= count
+
+
+def hands_still(track: Track, most: float) -> bool:
+    """The hands move relative to the hips by no more than so many m/s, on the whole: they do not swing."""
+    return all(track.motion_of(sided(one, "Hand")).mean() <= most for one in LEFT_RIGHT)
+
+
+def hands_move(track: Track, least: float, most: float = np.inf) -> bool:
+    """The mean speed of the hands relative to the chest is from least to most, m/s."""
+    speeds = [track.motion_of(sided(one, "Hand"), "upperChest").mean() for one in LEFT_RIGHT]
+    return least <= float(np.mean(speeds)) <= most
+
+
+def hands_fast(track: Track, least: float, most: float = np.inf) -> bool:
+    """The highest speed of either hand relative to the chest is from least to most, m/s."""
+    speeds = [track.motion_of(sided(one, "Hand"), "upperChest").max() for one in LEFT_RIGHT]
+    return least <= float(max(speeds)) <= most
+
+
+def between_hands(track: Track) -> Array:
+    """The distance (T,) between the wrists, metres."""
+    found: Array = np.linalg.norm(track.joint("leftHand") - track.joint("rightHand"), axis=1)
+    return found
+
+
+def _thrust(track: Track, side: str) -> Array:
+    """How fast (T,) a hand goes away from its shoulder's side of the chest, m/s; 0 where it comes back."""
+    away = track.body(sided(side, "Hand")) - track.body("chest")
+    speed = np.diff(away, axis=0) * RATE
+    out = np.sqrt(np.maximum(speed[:, 2], 0) ** 2 + np.maximum(speed[:, 1], 0) ** 2)
+    return np.concatenate([[0.0], calm(out, 0.1)])
+
+
+def _in_front(track: Track, side: str) -> Array:
+    hand = track.body(sided(side, "Hand"))
+    return (hand[:, 1] > track.height("chest") - 0.1) & (hand[:, 1] < track.height("head") + 0.05) & (hand[:, 2] > 0.1)
+
+
+def _sides(found: Callable[[str], bool], side: str) -> bool:
+    if side in LEFT_RIGHT:
+        return found(side)
+    return (any if side == "either" else all)(map(found, LEFT_RIGHT))

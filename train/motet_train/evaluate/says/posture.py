@@ -1,0 +1,134 @@
+"""Rules on the whole body: lying, sitting, crouching, bending, upside down, still. Each says whether a track does it."""
+
+import numpy as np
+
+from motet.motion.humanoid import LEFT_RIGHT, sided
+from motet.motion.rotations import Array
+from motet_train.evaluate.says.legs import knee
+from motet_train.evaluate.says.track import RATE, Track, calm, longest, swings
+
+WHEN = {"any": (0.0, 1.0), "start": (0.0, 0.2), "end": (0.8, 1.0), "middle": (0.2, 0.8)}
+"""When something is to be -> the part of the motion, shares of its time."""
+
+
+def lies(track: Track, when: str = "any", seconds: float = 0.3) -> bool:
+    """Head and hips are near the ground for a while."""
+    part = track.part(*WHEN[when])
+    return longest((part.height("hips") < 0.42) & (part.height("head") < 0.55)) >= min(seconds, part.seconds)
+
+
+def crouches(track: Track, when: str = "any", hips: float = 0.65, seconds: float = 0.15) -> bool:
+    """The hips are lower than so many metres on bent knees for a while, the head over them."""
+    part = track.part(*WHEN[when])
+    bent = np.minimum(knee(part, "left"), knee(part, "right")) < 110
+    low = (part.height("hips") < hips) & (part.height("head") > part.height("hips") + 0.25)
+    return longest(low & bent) >= min(seconds, part.seconds)
+
+
+def upright(track: Track, when: str = "any", hips: float = 0.8, seconds: float = 0.2) -> bool:
+    """Stands or goes upright for a while: the hips high, the head well above them."""
+    part = track.part(*WHEN[when])
+    tall = (part.height("hips") > hips) & (part.height("head") > part.height("hips") + 0.4)
+    return longest(tall) >= min(seconds, part.seconds)
+
+
+def prone(track: Track, share: float) -> bool:
+    """Hips and head are low, as in lying or on hands and knees, for a share of the time."""
+    return bool(((track.height("hips") < 0.6) & (track.height("head") < 0.75)).mean() >= share)
+
+
+def comes_up(track: Track, metres: float) -> bool:
+    """The hips are so many metres higher at the end than at the start; a negative number for lower ones."""
+    hips = track.height("hips")
+    count = max(1, len(hips) // 10)
+    gain = float(np.median(hips[-count:]) - np.median(hips[:count]))
+    return gain >= metres if metres > 0 else gain <= metres
+
+
+def sits(track: Track, seconds: float = 1.0, when: str = "any") -> bool:
+    """The thighs are level and the shins hang, the hips behind the feet, at rest, for a while: on a seat."""
+    part = track.part(*WHEN[when])
+    return longest(seated(part) & (part.pace < 0.3)) >= seconds
+
+
+def bends(track: Track, least: float, most: float = np.inf, seconds: float = 0.1) -> bool:
+    """The trunk leans by least degrees for a while, and never by more than most."""
+    lean = tilt(track)
+    return longest(lean >= least) >= seconds and bool(lean.max() <= most)
+
+
+def upside_down(track: Track) -> bool:
+    """The hips are above the head, and a foot above the hips."""
+    feet = np.maximum(track.height("leftFoot"), track.height("rightFoot"))
+    return longest((track.height("hips") > track.height("head")) & (feet > track.height("hips"))) > 0.05
+
+
+def rolls(track: Track) -> bool:
+    """Goes over the head near the ground: the hips above the head, which is no higher than a knee."""
+    return longest((track.height("hips") > track.height("head")) & (track.height("head") < 0.5)) > 0.05
+
+
+def ducks(track: Track, metres: float = 0.2, most: float = 1.35) -> bool:
+    """The head goes down by so many metres to less than most above the ground and comes up again."""
+    head = track.height("head")
+    lowest = int(head.argmin())
+    before, after = head[: lowest + 1].max(), head[lowest:].max()
+    return bool(head[lowest] <= most and min(before, after) - head[lowest] >= metres)
+
+
+def still(track: Track, share: float = 0.8, speed: float = 0.2) -> bool:
+    """No joint moves faster than so many m/s for a share of the time."""
+    steps = np.linalg.norm(np.diff(track.points, axis=0), axis=-1).max(axis=1, initial=0.0) * RATE
+    return bool(len(steps)) and bool((calm(steps, 0.3) < speed).mean() >= share)
+
+
+def sways(track: Track, count: int, metres: float = 0.1) -> bool:
+    """The trunk goes from side to side above the feet so many times, by so many metres."""
+    feet = (track.body("leftFoot")[:, 0] + track.body("rightFoot")[:, 0]) / 2
+    return swings(calm(track.body("upperChest")[:, 0] - feet, 0.2), metres) >= count
+
+
+def twists(track: Track, count: int, degrees: float = 40.0) -> bool:
+    """The shoulders turn against the hips, to and fro by so many degrees, so many times."""
+    return swings(twist(track), degrees) >= count
+
+
+def climbs(track: Track, metres: float, seconds: float = 1.0) -> bool:
+    """Comes to stand so many metres higher than at the lowest, both feet, for a while."""
+    return longest(track.soles.min(axis=1) >= metres) >= seconds
+
+
+def feet_stay(track: Track, most: float = 0.15) -> bool:
+    """Each foot stays within so many metres of its typical place on the ground."""
+    feet = [track.joint(sided(side, "Foot"))[:, [0, 2]] for side in LEFT_RIGHT]
+    return all(np.percentile(np.linalg.norm(foot - np.median(foot, axis=0), axis=1), 95) <= most for foot in feet)
+
+
+def lasts(track: Track, least: float, most: float = np.inf) -> bool:
+    """Takes from least to most seconds."""
+    return least <= track.seconds <= most
+
+
+def tilt(track: Track) -> Array:
+    """The angle (T,) between trunk and vertical, degrees."""
+    trunk = track.joint("neck") - track.joint("hips")
+    return np.degrees(np.arccos(np.clip(trunk[:, 1] / np.maximum(np.linalg.norm(trunk, axis=1), 1e-9), -1, 1)))
+
+
+def twist(track: Track) -> Array:
+    """The angle (T,) about y from hips to shoulders, degrees."""
+    angles = []
+    for part in ("UpperLeg", "UpperArm"):
+        across = track.joint(sided("left", part)) - track.joint(sided("right", part))
+        angles.append(np.arctan2(-across[:, 2], across[:, 0]))
+    return np.degrees(np.unwrap(angles[1] - angles[0]))
+
+
+def seated(track: Track) -> Array:
+    """Frames (T,) in which both thighs are within 40 degrees of level, the hips over 0.3 m high and behind the feet."""
+    flags = track.height("hips") > 0.35
+    for side in LEFT_RIGHT:
+        hip, bent, foot = (track.body(sided(side, part)) for part in ("UpperLeg", "LowerLeg", "Foot"))
+        level = np.abs(hip[:, 1] - bent[:, 1]) < np.sin(np.radians(40)) * 0.42
+        flags &= level & (foot[:, 2] - hip[:, 2] > 0.2)
+    return flags
