@@ -36,6 +36,13 @@ def travels(track: Track, least: float, most: float = np.inf) -> bool:
     return bool(least <= np.linalg.norm(path[-1] - path[0]) <= most)
 
 
+def wanders(track: Track, metres: float = 2.0) -> bool:
+    """Goes so many metres over the ground in all, and ends less than half of that away from where it started."""
+    path = track.joint("hips")[:, [0, 2]]
+    way = float(track.pace.sum() / RATE)
+    return way >= metres and bool(np.linalg.norm(path[-1] - path[0]) < way / 2)
+
+
 def turns(track: Track, least: float, most: float = np.inf) -> bool:
     """Turns by least to most degrees from start to end, to the left where they are above 0."""
     return least <= track.turn <= most

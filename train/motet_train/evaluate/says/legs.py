@@ -28,14 +28,11 @@ def jumps(track: Track, rise: float, count: int = 1, metres: float = 0.0, most_m
     return sum(found) >= count
 
 
-def hops(track: Track, count: int = 1) -> bool:
-    """Jumps off one foot and lands on the same one at least so many times, the other foot up all the while."""
-    found = 0
-    for start, stop in flights(track):
-        around = track.soles[max(0, start - 3) : stop + 3]
-        held = around.min(axis=0) > CLEAR
-        found += bool(held.any() and not held.all())
-    return found >= count
+def hops(track: Track, count: int = 2, metres: float = 0.06) -> bool:
+    """Hops on one foot at least so many times: one foot is held up, and the hips rise and fall by so many metres."""
+    hips = track.height("hips")
+    held = [spells(track.soles[:, i] > CLEAR) for i in range(2)]
+    return any(swings(hips[start:stop], metres) >= 2 * count for start, stop in held[0] + held[1])
 
 
 def kicks(track: Track, side: str, height: float, speed: float = 4.0, count: int = 1) -> bool:
@@ -56,10 +53,11 @@ def on_one_leg(track: Track, seconds: float, height: float = 0.2) -> bool:
     return longest(raised & (track.pace < 0.3)) >= seconds
 
 
-def legs_open_and_close(track: Track, count: int, metres: float = 0.3) -> bool:
-    """The feet go apart sideways or together, by so many metres, at least so many times."""
-    apart = np.abs(track.body("leftFoot")[:, 0] - track.body("rightFoot")[:, 0])
-    return swings(apart, metres) >= count
+def jumping_jacks(track: Track, count: int, metres: float = 0.5) -> bool:
+    """At least so many times the feet are so many metres apart sideways while both hands are above the shoulders."""
+    apart = np.abs(track.body("leftFoot")[:, 0] - track.body("rightFoot")[:, 0]) >= metres
+    up = [track.height(sided(side, "Hand")) > track.height(sided(side, "UpperArm")) for side in LEFT_RIGHT]
+    return len(spells(apart & up[0] & up[1])) >= count
 
 
 def lifts_feet(track: Track, count: int, height: float, most_pace: float = np.inf) -> bool:

@@ -5,7 +5,7 @@ import numpy as np
 from motet.motion.humanoid import LEFT_RIGHT, sided
 from motet.motion.rotations import Array
 from motet_train.evaluate.says.legs import knee
-from motet_train.evaluate.says.track import RATE, Track, calm, longest, swings
+from motet_train.evaluate.says.track import RATE, Track, calm, longest, spells, swings
 
 WHEN = {"any": (0.0, 1.0), "start": (0.0, 0.2), "end": (0.8, 1.0), "middle": (0.2, 0.8)}
 """When something is to be -> the part of the motion, shares of its time."""
@@ -51,10 +51,17 @@ def sits(track: Track, seconds: float = 1.0, when: str = "any") -> bool:
     return longest(seated(part) & (part.pace < 0.3)) >= seconds
 
 
-def bends(track: Track, least: float, most: float = np.inf, seconds: float = 0.1) -> bool:
-    """The trunk leans by least degrees for a while, and never by more than most."""
-    lean = tilt(track)
-    return longest(lean >= least) >= seconds and bool(lean.max() <= most)
+def bends(track: Track, least: float, seconds: float = 0.1) -> bool:
+    """The trunk leans by so many degrees for a while."""
+    return longest(tilt(track) >= least) >= seconds
+
+
+def bows(track: Track, degrees: float = 25.0) -> bool:
+    """Standing on straight legs, the trunk leans by so many degrees, once, and comes up again."""
+    lean = calm(tilt(track), 0.2)
+    there = lean >= degrees
+    stands = bool(track.pace[there].max(initial=0.0) < 0.6) and track.height("hips")[there].min(initial=1.0) > 0.8
+    return stands and len(spells(there)) == 1 and bool(max(lean[0], lean[-1]) < degrees / 2)
 
 
 def upside_down(track: Track) -> bool:
@@ -76,9 +83,9 @@ def ducks(track: Track, metres: float = 0.2, most: float = 1.35) -> bool:
     return bool(head[lowest] <= most and min(before, after) - head[lowest] >= metres)
 
 
-def still(track: Track, share: float = 0.8, speed: float = 0.2) -> bool:
-    """No joint moves faster than so many m/s for a share of the time."""
-    steps = np.linalg.norm(np.diff(track.points, axis=0), axis=-1).max(axis=1, initial=0.0) * RATE
+def still(track: Track, share: float = 0.8, speed: float = 0.08) -> bool:
+    """The joints move by no more than so many m/s on average for a share of the time."""
+    steps = np.linalg.norm(np.diff(track.points, axis=0), axis=-1).mean(axis=1) * RATE
     return bool(len(steps)) and bool((calm(steps, 0.3) < speed).mean() >= share)
 
 
@@ -125,10 +132,11 @@ def twist(track: Track) -> Array:
 
 
 def seated(track: Track) -> Array:
-    """Frames (T,) in which both thighs are within 40 degrees of level, the hips over 0.3 m high and behind the feet."""
-    flags = track.height("hips") > 0.35
+    """Frames (T,) in which both thighs are within 50 degrees of level, the hips over a seat and behind a foot."""
+    flags = track.height("hips") > 0.45
+    ahead = np.full(len(track), -np.inf)
     for side in LEFT_RIGHT:
         hip, bent, foot = (track.body(sided(side, part)) for part in ("UpperLeg", "LowerLeg", "Foot"))
-        level = np.abs(hip[:, 1] - bent[:, 1]) < np.sin(np.radians(40)) * 0.42
-        flags &= level & (foot[:, 2] - hip[:, 2] > 0.2)
-    return flags
+        flags &= np.abs(hip[:, 1] - bent[:, 1]) < np.sin(np.radians(50)) * 0.42
+        ahead = np.maximum(ahead, foot[:, 2] - hip[:, 2])
+    return flags & (ahead > 0.2)
