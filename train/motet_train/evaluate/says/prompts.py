@@ -19,6 +19,7 @@ class Prompt:
     """One prompt. group: "locomotion" or "rest". rules: what must be so.
 
     shown: patterns of the actions whose trials show it. aside: of those that may show it, counted neither way.
+    walk: whether it asks for a walk forward, of which sliding feet are measured.
     """
 
     text: str
@@ -26,6 +27,12 @@ class Prompt:
     rules: tuple[Condition, ...]
     shown: tuple[str, ...]
     aside: tuple[str, ...]
+    walk: bool
+
+    @property
+    def turns(self) -> bool:
+        """Whether it asks for a turn of a certain angle."""
+        return any(rule["is"] == "turns" for rule in self.rules)
 
     def passes(self, track: Track) -> bool:
         """Whether a motion does what the prompt says."""
@@ -43,7 +50,15 @@ def prompts() -> tuple[Prompt, ...]:
     """All prompts, in the order of the file."""
     rows = tomllib.loads(PROMPTS_FILE.read_text(encoding="utf-8"))["prompt"]
     return tuple(
-        Prompt(row["text"], row["group"], tuple(row["rules"]), tuple(row["shown"]), tuple(row["aside"])) for row in rows
+        Prompt(
+            text=row["text"],
+            group=row["group"],
+            rules=tuple(row["rules"]),
+            shown=tuple(row["shown"]),
+            aside=tuple(row["aside"]),
+            walk=row.get("walk", False),
+        )
+        for row in rows
     )
 
 
