@@ -1,15 +1,13 @@
 """Rules on arms and hands: raising, waving, punching, reaching. Each says whether a track does it.
 
-side: "left", "right", "either" or "both".
+side: "left", "right", or "both", and where it says so "either".
 """
-
-from collections.abc import Callable
 
 import numpy as np
 
 from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, sided
 from motet.motion.rotations import Array
-from motet_train.evaluate.says.track import RATE, Track, calm, longest, spells, swings
+from motet_train.evaluate.says.track import RATE, Flags, Track, calm, longest, spells, swings
 
 ARM = float(sum(np.linalg.norm(HUMANOID.offsets[HUMANOID.index(f"left{part}")]) for part in ("LowerArm", "Hand")))
 """Length of the humanoid's arm from shoulder to wrist, metres."""
@@ -17,55 +15,56 @@ ARM = float(sum(np.linalg.norm(HUMANOID.offsets[HUMANOID.index(f"left{part}")]) 
 
 def raises(track: Track, side: str, above: float, seconds: float = 0.3) -> bool:
     """A hand is so many metres above the head's joint, about the mouth, for a while; "both": at the same time."""
-    up = np.stack([track.height(sided(one, "Hand")) - track.height("head") >= above for one in LEFT_RIGHT])
-    flags = {"left": up[0], "right": up[1], "either": up.any(axis=0), "both": up.all(axis=0)}[side]
-    return longest(flags) >= seconds
+    up = [track.height(sided(one, "Hand")) - track.height("head") >= above for one in LEFT_RIGHT]
+    return longest(_hands(up, side)) >= seconds
 
 
-def waves(track: Track, side: str, count: int, metres: float = 0.1) -> bool:
-    """A raised hand, above the elbow and the shoulder's height less a hand, goes from side to side so many times."""
+def waves(track: Track, count: int) -> bool:
+    """A raised hand, above its elbow and about shoulder height, goes from side to side so many times, by 10 cm."""
 
     def found(one: str) -> bool:
         hand = track.body(sided(one, "Hand"))
         high = hand[:, 1] > np.maximum(track.height(sided(one, "LowerArm")), track.height(sided(one, "UpperArm")) - 0.1)
-        return any(swings(hand[start:stop, 0], metres) >= count for start, stop in spells(high))
+        return any(swings(hand[start:stop, 0], 0.1) >= count for start, stop in spells(high))
 
-    return _sides(found, side)
+    return any(map(found, LEFT_RIGHT))
 
 
 def punches(track: Track, side: str, speed: float = 2.5, count: int = 1) -> bool:
-    """A hand shoots forward or up from the chest at a speed, m/s, so many times; asked for one side, it is half as fast
-    again as the other hand."""
+    """A hand shoots forward or up from the chest at a speed, m/s, so many times; "both": each does. Asked for one side,
+    it is half as fast again as the other hand."""
     thrust = {one: _thrust(track, one) for one in LEFT_RIGHT}
-    if side in LEFT_RIGHT and thrust[side].max() < 1.5 * min(thrust.values(), key=np.max).max():
-        return False
-    return _sides(lambda one: len(spells(thrust[one] >= speed)) >= count, side)
+    if side in LEFT_RIGHT:
+        other = next(one for one in LEFT_RIGHT if one != side)
+        if thrust[side].max() < 1.5 * thrust[other].max():
+            return False
+    return all(len(spells(thrust[one] >= speed)) >= count for one in LEFT_RIGHT if side in (one, "both"))
 
 
-def reaches_down(track: Track, most: float, side: str = "either", seconds: float = 0.1) -> bool:
+def reaches_down(track: Track, most: float, side: str = "either") -> bool:
     """A hand comes as near to the ground as so many metres, for a moment."""
-    low = np.stack([track.height(sided(one, "Hand")) <= most for one in LEFT_RIGHT])
-    flags = {"left": low[0], "right": low[1], "either": low.any(axis=0), "both": low.all(axis=0)}[side]
-    return longest(flags) >= seconds
+    low = [track.height(sided(one, "Hand")) <= most for one in LEFT_RIGHT]
+    return longest(_hands(low, side)) >= 0.1
 
 
-def wipes(track: Track, count: int, metres: float = 0.2, share: float = 0.3) -> bool:
-    """A hand in front, above the chest, for a share of the time, goes up and down or to the sides so many times."""
+def wipes(track: Track, count: int) -> bool:
+    """A hand, in front and above the chest for a third of the time, goes up and down or sideways so many times, by 20
+    cm."""
 
     def found(one: str) -> bool:
         hand = track.body(sided(one, "Hand"))
         there = (hand[:, 1] > track.height("upperChest")) & (hand[:, 2] > 0.2)
-        moves = max(sum(swings(hand[a:b, i], metres) for a, b in spells(there)) for i in (0, 1))
-        return bool(there.mean() >= share) and moves >= count
+        moves = max(sum(swings(hand[a:b, i], 0.2) for a, b in spells(there)) for i in (0, 1))
+        return bool(there.mean() >= 0.3) and moves >= count
 
-    return _sides(found, "either")
+    return any(map(found, LEFT_RIGHT))
 
 
-def to_mouth(track: Track, seconds: float = 0.5) -> bool:
-    """One hand is at the mouth for a while, the other one lower than the chest."""
+def to_mouth(track: Track) -> bool:
+    """One hand is at the mouth for half a second, the other one lower than the chest."""
     near = [np.linalg.norm(track.joint(sided(one, "Hand")) - track.joint("head"), axis=1) < 0.42 for one in LEFT_RIGHT]
     low = [track.height(sided(one, "Hand")) < track.height("chest") + 0.05 for one in LEFT_RIGHT]
-    return max(longest(near[0] & low[1]), longest(near[1] & low[0])) >= seconds
+    return max(longest(near[0] & low[1]), longest(near[1] & low[0])) >= 0.5
 
 
 def on_guard(track: Track, share: float = 0.5) -> bool:
@@ -79,18 +78,18 @@ def hands_together(track: Track, most: float, share: float = 0.5) -> bool:
     return bool((between_hands(track) <= most).mean() >= share)
 
 
-def arms_out(track: Track, metres: float = 1.0, seconds: float = 1.0) -> bool:
-    """The arms are spread, the hands so many metres apart, for a while."""
-    return longest(between_hands(track) >= metres) >= seconds
+def arms_out(track: Track) -> bool:
+    """The arms are spread, the hands 90 cm apart or more, for a while."""
+    return longest(between_hands(track) >= 0.9) >= 0.3
 
 
-def arms_ahead(track: Track, share: float = 0.5) -> bool:
-    """Both arms are stretched out to the front at about shoulder height for a share of the time."""
+def arms_ahead(track: Track) -> bool:
+    """Both arms are stretched out to the front at about shoulder height for half of the time."""
     out = []
     for one in LEFT_RIGHT:
         hand, shoulder = track.body(sided(one, "Hand")), track.body(sided(one, "UpperArm"))
         out.append((hand[:, 2] - shoulder[:, 2] > 0.6 * ARM) & (np.abs(hand[:, 1] - shoulder[:, 1]) < 0.3))
-    return bool((out[0] & out[1]).mean() >= share)
+    return bool((out[0] & out[1]).mean() >= 0.5)
 
 
 def swings_arms(track: Track, count: int, metres: float = 0.2) -> bool:
@@ -110,10 +109,10 @@ def hands_move(track: Track, least: float, most: float = np.inf) -> bool:
     return least <= float(np.mean(speeds)) <= most
 
 
-def hands_fast(track: Track, least: float, most: float = np.inf) -> bool:
-    """The highest speed of either hand relative to the chest is from least to most, m/s."""
+def hands_fast(track: Track, least: float) -> bool:
+    """A hand reaches a speed relative to the chest, m/s."""
     speeds = [track.motion_of(sided(one, "Hand"), "upperChest").max() for one in LEFT_RIGHT]
-    return least <= float(max(speeds)) <= most
+    return bool(max(speeds) >= least)
 
 
 def between_hands(track: Track) -> Array:
@@ -130,12 +129,15 @@ def _thrust(track: Track, side: str) -> Array:
     return np.concatenate([[0.0], calm(out, 0.1)])
 
 
-def _in_front(track: Track, side: str) -> Array:
+def _in_front(track: Track, side: str) -> Flags:
     hand = track.body(sided(side, "Hand"))
-    return (hand[:, 1] > track.height("chest") - 0.1) & (hand[:, 1] < track.height("head") + 0.05) & (hand[:, 2] > 0.1)
+    low, high = track.height("chest") - 0.1, track.height("head") + 0.05
+    found: Flags = (hand[:, 1] > low) & (hand[:, 1] < high) & (hand[:, 2] > 0.1)
+    return found
 
 
-def _sides(found: Callable[[str], bool], side: str) -> bool:
+def _hands(flags: list[Flags], side: str) -> Flags:
+    """Frames in which a hand, one of both, or both do what each of them does in ``flags``."""
     if side in LEFT_RIGHT:
-        return found(side)
-    return (any if side == "either" else all)(map(found, LEFT_RIGHT))
+        return flags[LEFT_RIGHT.index(side)]
+    return flags[0] | flags[1] if side == "either" else flags[0] & flags[1]

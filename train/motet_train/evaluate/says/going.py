@@ -12,6 +12,12 @@ STANDING = float(REST[HUMANOID.index("hips"), 1])
 WAYS = {"forward": (0, 1), "backward": (0, -1), "left": (1, 1), "right": (1, -1)}
 """Way -> the column of the velocity, and its sign."""
 
+MOMENT = 0.4
+"""Seconds: the first or the last moments."""
+
+STRIDE = 0.2
+"""Metres that one foot is moved past the other in a stride."""
+
 TYPICAL = 75
 """Per cent: the velocity of which a quarter of the frames has more, so that standing at the ends does not matter."""
 
@@ -20,7 +26,7 @@ def goes(track: Track, way: str, least: float, most: float = np.inf, metres: flo
     """Goes one way at a typical velocity from least to most, m/s, and comes so many metres that way in all."""
     column, sign = WAYS[way]
     there = sign * track.velocity[:, column]
-    return least <= np.percentile(there, TYPICAL) <= most and there.sum() / RATE >= metres
+    return bool(least <= np.percentile(there, TYPICAL) <= most and there.sum() / RATE >= metres)
 
 
 def sidesteps(track: Track, side: str, metres: float) -> bool:
@@ -30,17 +36,17 @@ def sidesteps(track: Track, side: str, metres: float) -> bool:
     return bool(sign * (forward, sideways)[column] >= max(metres, abs(forward)))
 
 
-def travels(track: Track, least: float, most: float = np.inf) -> bool:
-    """Ends from least to most metres away from where it started."""
+def travels(track: Track, metres: float) -> bool:
+    """Ends so many metres or more away from where it started."""
     path = track.joint("hips")[:, [0, 2]]
-    return bool(least <= np.linalg.norm(path[-1] - path[0]) <= most)
+    return bool(np.linalg.norm(path[-1] - path[0]) >= metres)
 
 
-def wanders(track: Track, metres: float = 2.0) -> bool:
-    """Goes so many metres over the ground in all, and ends less than half of that away from where it started."""
+def wanders(track: Track) -> bool:
+    """Goes two metres over the ground or more, and ends less than half of its way from where it started."""
     path = track.joint("hips")[:, [0, 2]]
     way = float(track.pace.sum() / RATE)
-    return way >= metres and bool(np.linalg.norm(path[-1] - path[0]) < way / 2)
+    return way >= 2.0 and bool(np.linalg.norm(path[-1] - path[0]) < way / 2)
 
 
 def turns(track: Track, least: float, most: float = np.inf) -> bool:
@@ -50,7 +56,7 @@ def turns(track: Track, least: float, most: float = np.inf) -> bool:
 
 def turned_about(track: Track, least: float, most: float = np.inf) -> bool:
     """Turns by least to most degrees, no matter to which side: between the two headings that are farthest apart."""
-    return least <= np.ptp(calm(track.facing, CALM)) <= most
+    return bool(least <= np.ptp(calm(track.facing, CALM)) <= most)
 
 
 def straight(track: Track, most: float = 30.0) -> bool:
@@ -58,14 +64,14 @@ def straight(track: Track, most: float = 30.0) -> bool:
     return abs(track.turn) <= most
 
 
-def starts(track: Track, least: float = 0.0, most: float = np.inf, seconds: float = 0.4) -> bool:
+def starts(track: Track, least: float = 0.0, most: float = np.inf) -> bool:
     """Moves at a speed from least to most, m/s, in the first moments."""
-    return least <= np.median(track.pace[: _count(track, seconds)]) <= most
+    return bool(least <= np.median(track.pace[: _moment(track)]) <= most)
 
 
-def ends(track: Track, least: float = 0.0, most: float = np.inf, seconds: float = 0.4) -> bool:
+def ends(track: Track, least: float = 0.0, most: float = np.inf) -> bool:
     """Moves at a speed from least to most, m/s, in the last moments."""
-    return least <= np.median(track.pace[-_count(track, seconds) :]) <= most
+    return bool(least <= np.median(track.pace[-_moment(track) :]) <= most)
 
 
 def reaches(track: Track, least: float = 0.0, most: float = np.inf) -> bool:
@@ -79,17 +85,17 @@ def stays(track: Track, most: float) -> bool:
     return bool(np.linalg.norm(path - path[0], axis=1).max() <= most)
 
 
-def strides(track: Track, least: int = 2, most: float = np.inf, metres: float = 0.2) -> bool:
-    """One foot is moved past the other from least to most times, each time by so many metres."""
-    return least <= swings(ahead(track), metres) <= most
+def strides(track: Track, least: int = 2, most: float = np.inf) -> bool:
+    """One foot is moved past the other from least to most times."""
+    return least <= swings(ahead(track), STRIDE) <= most
 
 
-def bobs(track: Track, least: float, most: float = np.inf) -> bool:
-    """The hips move up and down by least to most metres in the typical half second."""
+def bobs(track: Track, metres: float) -> bool:
+    """The hips move up and down by so many metres in the typical half second."""
     window = round(0.5 * RATE)
     hips = track.height("hips")
     spans = [np.ptp(hips[i : i + window]) for i in range(max(1, len(hips) - window + 1))]
-    return least <= np.median(spans) <= most
+    return bool(np.median(spans) >= metres)
 
 
 def rises_and_falls(track: Track, metres: float, count: int) -> bool:
@@ -108,5 +114,5 @@ def ahead(track: Track) -> Array:
     return track.body("leftFoot")[:, 2] - track.body("rightFoot")[:, 2]
 
 
-def _count(track: Track, seconds: float) -> int:
-    return max(1, min(round(seconds * RATE), len(track)))
+def _moment(track: Track) -> int:
+    return min(round(MOMENT * RATE), len(track))

@@ -25,59 +25,57 @@ def jumps(track: Track, rise: float, count: int = 1, metres: float = 0.0, most_m
         and metres <= np.linalg.norm(path[stop] - path[start - 1]) <= most_metres
         for start, stop in flights(track)
     ]
-    return sum(found) >= count
+    return len([one for one in found if one]) >= count
 
 
-def hops(track: Track, count: int = 2, metres: float = 0.06) -> bool:
-    """Hops on one foot at least so many times: one foot is held up, and the hips rise and fall by so many metres."""
+def hops(track: Track) -> bool:
+    """Hops on one foot at least twice: while the other foot is held up, the hips rise and fall by a few centimetres."""
     hips = track.height("hips")
     held = [spells(track.soles[:, i] > CLEAR) for i in range(2)]
-    return any(swings(hips[start:stop], metres) >= 2 * count for start, stop in held[0] + held[1])
+    return any(swings(hips[start:stop], 0.06) >= 4 for start, stop in held[0] + held[1])
 
 
-def kicks(track: Track, side: str, height: float, speed: float = 4.0, count: int = 1) -> bool:
-    """The foot of a side swings up to a height, metres, at a speed, m/s, the other foot on the ground."""
-    found = 0
+def kicks(track: Track, side: str, height: float, speed: float = 4.0) -> bool:
+    """The foot of a side ("left", "right", "either") swings up to a height, metres, at a speed, m/s, the other foot on
+    the ground."""
+    window = round(0.3 * RATE)
     for one in LEFT_RIGHT if side == "either" else (side,):
         foot = track.height(sided(one, "Foot"))
         fast = track.motion_of(sided(one, "Foot"))
         up = (foot >= height) & (track.soles[:, 1 - LEFT_RIGHT.index(one)] < 2 * CLEAR)
-        window = round(0.3 * RATE)
-        found += sum(fast[max(0, start - window) : stop].max() >= speed for start, stop in spells(up))
-    return found >= count
+        if any(fast[max(0, start - window) : stop].max() >= speed for start, stop in spells(up)):
+            return True
+    return False
 
 
-def on_one_leg(track: Track, seconds: float, height: float = 0.2) -> bool:
-    """Stands in place on one leg for so many seconds, the other foot so much higher, metres."""
-    raised = np.abs(track.soles[:, 0] - track.soles[:, 1]) >= height
+def on_one_leg(track: Track, seconds: float) -> bool:
+    """Stands in place on one leg for so many seconds, the other foot 20 cm higher or more."""
+    raised = np.abs(track.soles[:, 0] - track.soles[:, 1]) >= 0.2
     return longest(raised & (track.pace < 0.3)) >= seconds
 
 
-def jumping_jacks(track: Track, count: int, metres: float = 0.5) -> bool:
-    """At least so many times the feet are so many metres apart sideways while both hands are above the shoulders."""
-    apart = np.abs(track.body("leftFoot")[:, 0] - track.body("rightFoot")[:, 0]) >= metres
+def jumping_jacks(track: Track, count: int) -> bool:
+    """At least so many times the feet are half a metre apart sideways while both hands are above the shoulders."""
+    apart = np.abs(track.body("leftFoot")[:, 0] - track.body("rightFoot")[:, 0]) >= 0.5
     up = [track.height(sided(side, "Hand")) > track.height(sided(side, "UpperArm")) for side in LEFT_RIGHT]
     return len(spells(apart & up[0] & up[1])) >= count
 
 
-def lifts_feet(track: Track, count: int, height: float, most_pace: float = np.inf) -> bool:
-    """Each foot is lifted to a height, metres, at least so many times, while the figure is slower than most_pace."""
-    slow = track.pace <= most_pace
-    found = [len(spells((track.soles[:, i] >= height) & slow)) for i in range(2)]
-    return min(found) >= count
+def lifts_feet(track: Track, height: float) -> bool:
+    """Each foot is lifted to a height, metres, at least once."""
+    return bool((track.soles.max(axis=0) >= height).all())
 
 
-def steps_a_second(track: Track, least: float, most: float = np.inf) -> bool:
-    """Feet are lifted by 3 cm from least to most times a second, both together."""
-    found = sum(len(spells(track.soles[:, i] > 0.03)) for i in range(2))
-    return least <= found / track.seconds <= most
+def steps_a_second(track: Track, least: float) -> bool:
+    """Feet are lifted, by 3 cm, so many times a second or more, both together."""
+    return sum(len(spells(track.soles[:, i] > 0.03)) for i in range(2)) >= least * track.seconds
 
 
 def flights(track: Track) -> list[tuple[int, int]]:
     """Frames (start, stop) in which both feet are off the ground, between two in which one is on it."""
     found = spells(track.soles.min(axis=1) > CLEAR)
     least, most = FLIGHT
-    return [(a, b) for a, b in found if 0 < a and b < len(track) and least <= (b - a) / RATE <= most]
+    return [(a, b) for a, b in found if a > 0 and b < len(track) and least <= (b - a) / RATE <= most]
 
 
 def knee(track: Track, side: str) -> Array:

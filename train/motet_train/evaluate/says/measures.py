@@ -5,9 +5,9 @@ from itertools import combinations
 
 import numpy as np
 
+from motet.motion.feet import feet_of
 from motet.motion.humanoid import HUMANOID
 from motet.motion.rotations import Array
-from motet.motion.feet import feet_of
 from motet_train.evaluate.feet import sliding
 from motet_train.evaluate.says.track import RATE, Track
 

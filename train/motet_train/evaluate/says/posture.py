@@ -1,35 +1,38 @@
-"""Rules on the whole body: lying, sitting, crouching, bending, upside down, still. Each says whether a track does it."""
+"""Rules on the whole body: lying, sitting, crouching, bending, turning over. Each says whether a track does it."""
 
 import numpy as np
 
 from motet.motion.humanoid import LEFT_RIGHT, sided
 from motet.motion.rotations import Array
 from motet_train.evaluate.says.legs import knee
-from motet_train.evaluate.says.track import RATE, Track, calm, longest, spells, swings
+from motet_train.evaluate.says.track import RATE, Flags, Track, calm, longest, spells, swings
 
-WHEN = {"any": (0.0, 1.0), "start": (0.0, 0.2), "end": (0.8, 1.0), "middle": (0.2, 0.8)}
+WHEN = {"any": (0.0, 1.0), "start": (0.0, 0.2), "end": (0.8, 1.0)}
 """When something is to be -> the part of the motion, shares of its time."""
 
+WHILE = 0.2
+"""Seconds that it is to be so."""
 
-def lies(track: Track, when: str = "any", seconds: float = 0.3) -> bool:
+
+def lies(track: Track, when: str) -> bool:
     """Head and hips are near the ground for a while."""
     part = track.part(*WHEN[when])
-    return longest((part.height("hips") < 0.42) & (part.height("head") < 0.55)) >= min(seconds, part.seconds)
+    return longest((part.height("hips") < 0.42) & (part.height("head") < 0.55)) >= min(WHILE, part.seconds)
 
 
-def crouches(track: Track, when: str = "any", hips: float = 0.65, seconds: float = 0.15) -> bool:
+def crouches(track: Track, when: str = "any", hips: float = 0.65) -> bool:
     """The hips are lower than so many metres on bent knees for a while, the head over them."""
     part = track.part(*WHEN[when])
     bent = np.minimum(knee(part, "left"), knee(part, "right")) < 110
     low = (part.height("hips") < hips) & (part.height("head") > part.height("hips") + 0.25)
-    return longest(low & bent) >= min(seconds, part.seconds)
+    return longest(low & bent) >= min(WHILE, part.seconds)
 
 
-def upright(track: Track, when: str = "any", hips: float = 0.8, seconds: float = 0.2) -> bool:
+def upright(track: Track, when: str = "any") -> bool:
     """Stands or goes upright for a while: the hips high, the head well above them."""
     part = track.part(*WHEN[when])
-    tall = (part.height("hips") > hips) & (part.height("head") > part.height("hips") + 0.4)
-    return longest(tall) >= min(seconds, part.seconds)
+    tall = (part.height("hips") > 0.8) & (part.height("head") > part.height("hips") + 0.4)
+    return longest(tall) >= min(WHILE, part.seconds)
 
 
 def prone(track: Track, share: float) -> bool:
@@ -45,23 +48,22 @@ def comes_up(track: Track, metres: float) -> bool:
     return gain >= metres if metres > 0 else gain <= metres
 
 
-def sits(track: Track, seconds: float = 1.0, when: str = "any") -> bool:
-    """The thighs are level and the shins hang, the hips behind the feet, at rest, for a while: on a seat."""
-    part = track.part(*WHEN[when])
-    return longest(seated(part) & (part.pace < 0.3)) >= seconds
+def sits(track: Track) -> bool:
+    """Sits on a seat for a second, at rest: the thighs about level, the hips behind a foot."""
+    return longest(seated(track) & (track.pace < 0.3)) >= 1.0
 
 
-def bends(track: Track, least: float, seconds: float = 0.1) -> bool:
-    """The trunk leans by so many degrees for a while."""
-    return longest(tilt(track) >= least) >= seconds
+def bends(track: Track, degrees: float, seconds: float) -> bool:
+    """The trunk leans by so many degrees for so long."""
+    return longest(tilt(track) >= degrees) >= seconds
 
 
-def bows(track: Track, degrees: float = 25.0) -> bool:
-    """Standing on straight legs, the trunk leans by so many degrees, once, and comes up again."""
+def bows(track: Track) -> bool:
+    """Standing on straight legs, the trunk leans by 25 degrees or more, once, and comes up again."""
     lean = calm(tilt(track), 0.2)
-    there = lean >= degrees
+    there = lean >= 25
     stands = bool(track.pace[there].max(initial=0.0) < 0.6) and track.height("hips")[there].min(initial=1.0) > 0.8
-    return stands and len(spells(there)) == 1 and bool(max(lean[0], lean[-1]) < degrees / 2)
+    return stands and len(spells(there)) == 1 and bool(max(lean[0], lean[-1]) < 12)
 
 
 def upside_down(track: Track) -> bool:
@@ -83,10 +85,10 @@ def ducks(track: Track, metres: float = 0.2, most: float = 1.35) -> bool:
     return bool(head[lowest] <= most and min(before, after) - head[lowest] >= metres)
 
 
-def still(track: Track, share: float = 0.8, speed: float = 0.08) -> bool:
-    """The joints move by no more than so many m/s on average for a share of the time."""
+def still(track: Track) -> bool:
+    """The joints move by no more than 8 cm/s on average, for four fifths of the time."""
     steps = np.linalg.norm(np.diff(track.points, axis=0), axis=-1).mean(axis=1) * RATE
-    return bool(len(steps)) and bool((calm(steps, 0.3) < speed).mean() >= share)
+    return bool(len(steps)) and bool((calm(steps, 0.3) < 0.08).mean() >= 0.8)
 
 
 def sways(track: Track, count: int, metres: float = 0.1) -> bool:
@@ -100,9 +102,9 @@ def twists(track: Track, count: int, degrees: float = 40.0) -> bool:
     return swings(twist(track), degrees) >= count
 
 
-def climbs(track: Track, metres: float, seconds: float = 1.0) -> bool:
-    """Comes to stand so many metres higher than at the lowest, both feet, for a while."""
-    return longest(track.soles.min(axis=1) >= metres) >= seconds
+def climbs(track: Track, metres: float) -> bool:
+    """Both feet are so many metres above the ground for a second or more, on something."""
+    return longest(track.soles.min(axis=1) >= metres) >= 1.0
 
 
 def feet_stay(track: Track, most: float = 0.15) -> bool:
@@ -111,15 +113,16 @@ def feet_stay(track: Track, most: float = 0.15) -> bool:
     return all(np.percentile(np.linalg.norm(foot - np.median(foot, axis=0), axis=1), 95) <= most for foot in feet)
 
 
-def lasts(track: Track, least: float, most: float = np.inf) -> bool:
-    """Takes from least to most seconds."""
-    return least <= track.seconds <= most
+def lasts(track: Track, seconds: float) -> bool:
+    """Takes so many seconds or more."""
+    return track.seconds >= seconds
 
 
 def tilt(track: Track) -> Array:
     """The angle (T,) between trunk and vertical, degrees."""
     trunk = track.joint("neck") - track.joint("hips")
-    return np.degrees(np.arccos(np.clip(trunk[:, 1] / np.maximum(np.linalg.norm(trunk, axis=1), 1e-9), -1, 1)))
+    found: Array = np.degrees(np.arccos(np.clip(trunk[:, 1] / np.maximum(np.linalg.norm(trunk, axis=1), 1e-9), -1, 1)))
+    return found
 
 
 def twist(track: Track) -> Array:
@@ -128,12 +131,13 @@ def twist(track: Track) -> Array:
     for part in ("UpperLeg", "UpperArm"):
         across = track.joint(sided("left", part)) - track.joint(sided("right", part))
         angles.append(np.arctan2(-across[:, 2], across[:, 0]))
-    return np.degrees(np.unwrap(angles[1] - angles[0]))
+    found: Array = np.degrees(np.unwrap(angles[1] - angles[0]))
+    return found
 
 
-def seated(track: Track) -> Array:
+def seated(track: Track) -> Flags:
     """Frames (T,) in which both thighs are within 50 degrees of level, the hips over a seat and behind a foot."""
-    flags = track.height("hips") > 0.45
+    flags: Flags = track.height("hips") > 0.45
     ahead = np.full(len(track), -np.inf)
     for side in LEFT_RIGHT:
         hip, bent, foot = (track.body(sided(side, part)) for part in ("UpperLeg", "LowerLeg", "Foot"))

@@ -14,7 +14,7 @@ from motet_train.evaluate.says.measures import depth, jerk, slide, spread
 from motet_train.evaluate.says.prompts import Prompt, prompts
 from motet_train.evaluate.says.track import Track, track_of
 from motet_train.evaluate.says.trials import Trial
-from motet_train.evaluate.tables import Goals, Report
+from motet_train.evaluate.tables import Goals, Report, aligned, report_table, short_names
 
 SEEDS = 10
 
@@ -117,6 +117,25 @@ def real(prompt: Prompt, trials: Sequence[Trial]) -> Figures:
         "share": found["share"] if shown else np.nan,
         "spread": _mean([spread(tracks[:: -(-len(tracks) // TAKES)]) for tracks in takes.values()]),
     }
+
+
+def says_text(reports: Mapping[str, Report]) -> str:
+    """The shares of each prompt in per cent, of every generator and beside them those of the look-up, of real trials
+    and of trials of other actions; then all other figures with the goals."""
+    columns = {
+        name: report["prompt"] for name, report in zip(short_names(list(reports)), reports.values(), strict=True)
+    }
+    first = next(iter(reports.values()))
+    columns |= {key: first[f"prompt_{key}"] for key in ("lookup", "real", "others") if f"prompt_{key}" in first}
+    rows = [["%", *columns]]
+    for prompt in prompts():
+        values = [shares[prompt.text] for shares in columns.values()]
+        rows.append([prompt.text, *("" if np.isnan(value) else f"{100 * value:.0f}" for value in values)])
+    rest = {
+        name: {group: found for group, found in report.items() if not group.startswith("prompt")}
+        for name, report in reports.items()
+    }
+    return f"{aligned(rows)}\n\n{report_table(rest, GOALS)}"
 
 
 def _floor(trials: Sequence[Trial], training: Iterable[str] | None) -> tuple[LookUp | None, set[str]]:

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, sided
 from motet.motion.kinematics import positions
@@ -12,6 +13,9 @@ from motet.motion.resample import resampled
 from motet.motion.retarget import on_humanoid
 from motet.motion.rotations import Array
 from motet_train.data.errors import DataError
+
+Flags = NDArray[np.bool_]
+"""What is so in which frames."""
 
 RATE = 30.0
 """Frames per second at which rules look at a motion, whatever its own rate is."""
@@ -77,8 +81,9 @@ class Track:
     def facing(self) -> Array:
         """The angle (T,) about y that hips and shoulders face, in degrees, unwrapped; 0 is along z, 90 along x."""
         pairs = [(sided("left", part), sided("right", part)) for part in ("UpperLeg", "UpperArm")]
-        across = sum(_unit((self.joint(left) - self.joint(right))[:, [0, 2]]) for left, right in pairs)
-        return np.degrees(np.unwrap(np.arctan2(-across[:, 1], across[:, 0])))  # type: ignore[index]
+        across = np.sum([_unit((self.joint(left) - self.joint(right))[:, [0, 2]]) for left, right in pairs], axis=0)
+        found: Array = np.degrees(np.unwrap(np.arctan2(-across[:, 1], across[:, 0])))
+        return found
 
     @property
     def turn(self) -> float:
@@ -121,7 +126,8 @@ class Track:
     def angle(self, above: str, joint: str, below: str) -> Array:
         """The angle (T,) between two bones at a joint, degrees: 180 where they are in line."""
         one, other = (_unit(self.joint(end) - self.joint(joint)) for end in (above, below))
-        return np.degrees(np.arccos(np.clip((one * other).sum(axis=-1), -1, 1)))
+        found: Array = np.degrees(np.arccos(np.clip((one * other).sum(axis=-1), -1, 1)))
+        return found
 
 
 def track_of(motion: Motion) -> Track:
@@ -140,25 +146,25 @@ def calm(values: Array, seconds: float) -> Array:
     return found
 
 
-def spells(flags: Array) -> list[tuple[int, int]]:
+def spells(flags: Flags) -> list[tuple[int, int]]:
     """The frames (start, stop) of each stretch over which flags (T,) are true."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
     return [(int(start), int(stop)) for start, stop in edges.reshape(-1, 2)]
 
 
-def longest(flags: Array) -> float:
+def longest(flags: Flags) -> float:
     """Seconds of the longest stretch over which flags (T,) are true."""
     return max((stop - start for start, stop in spells(flags)), default=0) / RATE
 
 
 def swings(values: Array, least: float) -> int:
-    """How many times values (T,) rise or fall by at least ``least`` before they turn by as much: half periods."""
-    count, way, low, high = 0, 0, np.inf, -np.inf
-    for value in values:
+    """How many times values (T,) rise or fall by at least ``least``; what goes back by less is part of the same."""
+    count, rising, low, high = 0, None, np.inf, -np.inf
+    for value in values.tolist():
         low, high = min(low, value), max(high, value)
-        if (way <= 0 and value - low >= least) or (way >= 0 and high - value >= least):
-            way = 1 if way <= 0 and value - low >= least else -1
-            count, low, high = count + 1, value, value
+        up, down = value - low >= least and rising is not True, high - value >= least and rising is not False
+        if up or down:
+            count, rising, low, high = count + 1, up, value, value
     return count
 
 
