@@ -74,7 +74,7 @@ def evaluate(
     if save and (bundles := [name for name in models if name not in runs]):
         raise click.UsageError(f"--save keeps figures in training runs; {', '.join(bundles)} is a bundle")
     loaded = {name: _model(runs[name]) if name in runs else load(name, session) for name in models}
-    ready, text = _says(loaded, data) if says else _measured(loaded, data, plots, unit_in)
+    ready, text = _says(loaded, data, unit_in) if says else _measured(loaded, data, plots, unit_in)
     for name in runs if save else ():
         Run({**runs[name].manifest, "quality": ready[name]}, runs[name].model).save(Path(name))
     click.echo(json.dumps(ready[models[0]] if len(models) == 1 else ready) if as_json else text)
@@ -84,12 +84,12 @@ def _model(run: Run) -> Model:
     return build(Manifest.from_json(run.manifest), run.torch_graphs())
 
 
-def _says(models: Mapping[str, Model], data: Path | None) -> tuple[dict[str, Any], str]:
+def _says(models: Mapping[str, Model], data: Path | None, unit: str | None) -> tuple[dict[str, Any], str]:
     """As :func:`_measured`, of everyday prompts."""
     found = {name: model for name, model in models.items() if isinstance(model, GenerateModel)}
     if others := [name for name in models if name not in found]:
         raise click.UsageError(f"--says asks generate models; {', '.join(others)} is none")
-    reports = says_reports(found, data)
+    reports = says_reports(found, data, unit)
     return {name: json_ready(report) for name, report in reports.items()}, says_text(reports)
 
 

@@ -27,9 +27,9 @@ class Best:
         return self.model.generate(text, seed=seed)[0].motion
 
 
-def says_reports(models: Mapping[str, GenerateModel], data: Path | None) -> dict[str, Report]:
+def says_reports(models: Mapping[str, GenerateModel], data: Path | None, unit: str | None) -> dict[str, Report]:
     """The table of each model. data: a store or a corpus of motion files, for the real trials and the look-up."""
-    trials = [] if data is None else list(read_trials(data))
+    trials = [] if data is None else list(read_trials(data, unit))
     if data is not None and not trials:
         raise DataError(f"{data} has no motion that can be used")
     reports = {}

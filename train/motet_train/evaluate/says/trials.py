@@ -5,9 +5,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from motet.errors import MotionError
 from motet.motion.motion import Motion
 from motet.representation import named
 from motet_train.data.corpus import read_corpus
+from motet_train.data.errors import DataError
 from motet_train.data.records import Record
 from motet_train.data.store import INDEX, Store
 from motet_train.evaluate.says.prompts import actions
@@ -29,27 +31,28 @@ class Trial:
 
     @cached_property
     def track(self) -> Track:
-        """The track of its motion."""
-        return track_of(self.motion)
+        """The track of its motion; DataError for a motion that is none of a human figure."""
+        try:
+            return track_of(self.motion)
+        except MotionError as error:
+            raise DataError(f"{self.name} cannot be judged: {error}") from error
 
 
-def read_trials(path: Path) -> Iterator[Trial]:
-    """The trials in a store, or in a corpus of motion files with a table of sentences; DataError where it is neither.
+def read_trials(path: Path, unit: str | float | None = None) -> Iterator[Trial]:
+    """The trials in a store, or in a folder or zip of motion files with a table of sentences; DataError where it is
+    neither. What cannot be read or has no sentence is left out.
 
-    What a corpus skips is left out, and so is what of a store was cut: parts of a trial do not show all that it does.
+    unit: the length unit of files that do not state theirs, as in :func:`motet.read`.
     """
     if (path / INDEX).is_file():
         yield from of_store(Store.open(path))
     else:
-        yield from (
-            Trial(record.name, record.sentences, record.motion)
-            for record in read_corpus(path)
-            if isinstance(record, Record)
-        )
+        records = (item for item in read_corpus(path, unit=unit) if isinstance(item, Record))
+        yield from (Trial(record.name, record.sentences, record.motion) for record in records)
 
 
 def of_store(store: Store) -> Iterator[Trial]:
     """The records of a store as trials, at its frame rate, the figure moving over the ground as its root block says."""
+    representation = named(store.representation)
     for index, record in enumerate(store.records):
-        features = store.motion(index)
-        yield Trial(record.name, record.sentences, named(store.representation).motion(features, None))
+        yield Trial(record.name, record.sentences, representation.motion(store.motion(index)))
