@@ -5,21 +5,29 @@ from itertools import combinations
 
 import numpy as np
 
-from motet.motion.feet import feet_of
-from motet.motion.humanoid import HUMANOID
+from motet.motion.feet import feet_of, ground_of
+from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, sided
 from motet.motion.rotations import Array
-from motet_train.evaluate.feet import sliding
+from motet_train.evaluate.language.motions import LOW
 from motet_train.evaluate.says.track import RATE, Track
+
+FEET = feet_of(HUMANOID)
 
 POSES = 32
 """Poses, evenly spaced in time, by which two motions of any length are compared."""
 
-FEET = feet_of(HUMANOID)
+BALLS = [HUMANOID.index(sided(side, "Toes")) for side in LEFT_RIGHT]
+"""The joints in the balls of the feet, which stay in place from the heel's landing to the toes' leaving."""
 
 
 def slide(track: Track) -> float:
-    """How fast feet on the ground slide, m/s (:func:`motet_train.evaluate.feet.sliding`)."""
-    return sliding(track.points[:, FEET], RATE)
+    """How fast feet on the ground slide, m/s: the mean speed over the ground of the balls of the feet from one frame to
+    the next, in both of which they are low (LOW). NaN where none ever is."""
+    balls = track.points[:, BALLS]
+    low = balls[..., 1] <= ground_of(track.points[:, FEET, 1]) + LOW
+    speed = np.linalg.norm(np.diff(balls[..., [0, 2]], axis=0), axis=-1) * RATE
+    standing = low[1:] & low[:-1]
+    return float(speed[standing].mean()) if standing.any() else np.nan
 
 
 def jerk(track: Track) -> float:
