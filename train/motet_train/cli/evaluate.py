@@ -65,7 +65,8 @@ def evaluate(
 
     Control: the thesis' experiments. Describe and generate: BLEU, floors, attributes, measures; with both, of the
     same split, also the chain from sentence to motion and back. Predict: the protocol's Euler errors on its text files,
-    beside zero velocity and published rows, or distances in held out motion files.
+    beside zero velocity and published rows, or distances in held out motion files. With --says, generate: the share of
+    motions that do what everyday prompts say, and how good they are, whatever they show.
     """
     if says and (plots is not None or save):
         raise click.UsageError("--says prints figures only; it goes with neither --plots nor --save")

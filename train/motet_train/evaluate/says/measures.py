@@ -8,10 +8,12 @@ import numpy as np
 from motet.motion.feet import feet_of, ground_of
 from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, sided
 from motet.motion.rotations import Array
-from motet_train.evaluate.language.motions import LOW
 from motet_train.evaluate.says.track import RATE, Track
 
 FEET = feet_of(HUMANOID)
+
+LOW = 0.04
+"""Metres above the ground: the ball of a foot that is no higher, 2 cm above where it is in standing, is on it."""
 
 POSES = 32
 """Poses, evenly spaced in time, by which two motions of any length are compared."""
