@@ -282,3 +282,10 @@ def test_the_table_of_trials_has_each_trial_once() -> None:
     names = [name for line in folder.read_text().splitlines()[1:] for name in line.split("\t")[1].split()]
     assert len(names) == len(set(names)) == len(actions())
     assert actions()["16_01"] == "jump"
+
+
+def test_the_page_has_every_prompt_with_its_rules() -> None:
+    page = (Path(__file__).parents[2] / "docs/says.md").read_text(encoding="utf-8")
+    rows = {cells[1].strip(): cells[2] for line in page.splitlines() if len(cells := line.split("|")) == 8}
+    for prompt in prompts():
+        assert [rule.split()[0] for rule in rows[prompt.text].split(";")] == [rule["is"] for rule in prompt.rules]
