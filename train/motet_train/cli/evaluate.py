@@ -21,11 +21,13 @@ from motet.models.load import Model, build, load
 from motet.models.predict import PredictModel
 from motet_train.cli.evaluate_language import by_subject, language_reports
 from motet_train.cli.evaluate_predict import predict_reports
+from motet_train.cli.evaluate_says import says_reports
 from motet_train.cli.train_options import unit_in
 from motet_train.data.clips import Clips, read_clips
 from motet_train.data.errors import DataError
 from motet_train.evaluate.control.experiments import GOALS, control_report, study_of
 from motet_train.evaluate.language.report import GOALS as LANGUAGE_GOALS
+from motet_train.evaluate.says.table import says_text
 from motet_train.evaluate.tables import Report, json_ready, report_table
 from motet_train.recipes.recipe import SETTINGS
 from motet_train.runs import MANIFEST, Run
@@ -38,7 +40,11 @@ from motet_train.settings import read_settings
     "--data",
     type=Path,
     help="Control: the clips. [default: those it was trained on] Describe and generate: the store. "
-    "Predict: text files of the protocol, or the store.",
+    "Predict: text files of the protocol, or the store. With --says: a store or a folder or zip of motion files "
+    "with a table of sentences, for the columns of real trials and of the look-up.",
+)
+@click.option(
+    "--says", is_flag=True, help="Generate: ask everyday prompts, and count the motions that do what they say."
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one nested object with stable keys.")
 @click.option("--plots", type=Path, help="Folder for the figures of the papers.")
@@ -48,6 +54,7 @@ from motet_train.settings import read_settings
 def evaluate(
     models: tuple[str, ...],
     data: Path | None,
+    says: bool,
     as_json: bool,
     plots: Path | None,
     unit_in: str | None,
@@ -58,14 +65,17 @@ def evaluate(
 
     Control: the thesis' experiments. Describe and generate: BLEU, floors, attributes, measures; with both, of the
     same split, also the chain from sentence to motion and back. Predict: the protocol's Euler errors on its text files,
-    beside zero velocity and published rows, or distances in held out motion files.
+    beside zero velocity and published rows, or distances in held out motion files. With --says, generate: the share of
+    motions that do what everyday prompts say, and how good they are, whatever they show.
     """
+    if says and (plots is not None or save):
+        raise click.UsageError("--says prints figures only; it goes with neither --plots nor --save")
     torch.set_num_threads(1)
     runs = {name: Run.load(Path(name)) for name in models if (Path(name) / MANIFEST).is_file()}
     if save and (bundles := [name for name in models if name not in runs]):
         raise click.UsageError(f"--save keeps figures in training runs; {', '.join(bundles)} is a bundle")
     loaded = {name: _model(runs[name]) if name in runs else load(name, session) for name in models}
-    ready, text = _measured(loaded, data, plots, unit_in)
+    ready, text = _says(loaded, data, unit_in) if says else _measured(loaded, data, plots, unit_in)
     for name in runs if save else ():
         Run({**runs[name].manifest, "quality": ready[name]}, runs[name].model).save(Path(name))
     click.echo(json.dumps(ready[models[0]] if len(models) == 1 else ready) if as_json else text)
@@ -73,6 +83,15 @@ def evaluate(
 
 def _model(run: Run) -> Model:
     return build(Manifest.from_json(run.manifest), run.torch_graphs())
+
+
+def _says(models: Mapping[str, Model], data: Path | None, unit: str | None) -> tuple[dict[str, Any], str]:
+    """As :func:`_measured`, of everyday prompts."""
+    found = {name: model for name, model in models.items() if isinstance(model, GenerateModel)}
+    if others := [name for name in models if name not in found]:
+        raise click.UsageError(f"--says asks generate models; {', '.join(others)} is none")
+    reports = says_reports(found, data, unit)
+    return {name: json_ready(report) for name, report in reports.items()}, says_text(reports)
 
 
 def _measured(

@@ -1,0 +1,227 @@
+"""The table of "does what it says" on made-up trials and generators, its measures, and the command."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from says_figures import HIPS, led, shifted, standing, stepping, times, walking
+
+from motet.cli import main
+from motet.errors import TextError
+from motet.motion.humanoid import HUMANOID
+from motet.motion.motion import Motion
+from motet.representation.root_block import to_root_block
+from motet_train.cli.evaluate_says import trained_on
+from motet_train.data.errors import DataError
+from motet_train.data.store import Entry, Store
+from motet_train.evaluate.says import table
+from motet_train.evaluate.says.lookup import LookUp
+from motet_train.evaluate.says.measures import depth, distance, jerk, poses, slide, spread
+from motet_train.evaluate.says.prompts import Prompt, prompts
+from motet_train.evaluate.says.table import says_table, says_text
+from motet_train.evaluate.says.track import RATE, Track
+from motet_train.evaluate.says.trials import Trial, of_store, read_trials
+
+CMU = Path(__file__).parents[2] / "train/motet_train/data/cmu"
+STILL, LYING, LEFT, ZOMBIE = (
+    "a person just stands there",
+    "a man is lying on the floor",
+    "a person walks forward and turns left 90 degrees",
+    "a zombie walks with arms stretched out",
+)
+
+
+def gliding(speed: float = 0.0, turn: float = 0.0, tip: float = 0.0, seconds: float = 3.0) -> Motion:
+    """A stiff humanoid led over the ground, or turned over forward by so many degrees."""
+    facing = np.linspace(0, turn, len(times(seconds)))
+    path = np.cumsum(np.stack([np.sin(np.radians(facing)), np.cos(np.radians(facing))], axis=1), axis=0) * speed / RATE
+    height = np.full(len(facing), 0.2 if tip else HIPS)
+    values = np.column_stack([path[:, 0], height, path[:, 1], np.full(len(facing), tip), facing, 0 * facing])
+    channels = (*(f"hips.t{axis}" for axis in "xyz"), *(f"hips.r{axis}" for axis in "xyz"))
+    return Motion(values, channels, ("length",) * 3 + ("deg",) * 3, RATE, HUMANOID)
+
+
+TRIALS = (
+    Trial("ACCAD_Male2_A1_Stand", ("someone stands",), gliding()),
+    Trial("ACCAD_Female1_A01_Stand", ("she stands there", "she does nothing"), gliding(speed=1.0)),
+    Trial("ACCAD_Male2_A9_Lie", ("a man is on the floor",), gliding(tip=90)),
+    Trial("16_01", ("a person jumps there",), gliding()),
+    Trial("unheard_of", ("a person just stands there and then there",), gliding(speed=2.0)),
+)
+
+
+class Half:
+    """Stands still with even seeds, glides with others, turns by 80 or 100 degrees; knows no zombie."""
+
+    def generate(self, text: str, seed: int) -> Motion:
+        if "zombie" in text:
+            raise TextError("no word is known")
+        return gliding(turn=80 + 20 * (seed % 2)) if "90 degrees" in text else gliding(speed=seed % 2)
+
+
+def only(*texts: str) -> tuple[Prompt, ...]:
+    return tuple(prompt for prompt in prompts() if prompt.text in texts)
+
+
+@pytest.fixture
+def few(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Some prompts instead of all."""
+    monkeypatch.setattr(table, "prompts", lambda: only(STILL, LYING, LEFT, ZOMBIE))
+
+
+@pytest.mark.usefixtures("few")
+def test_shares_of_a_generator_that_does_it_half_of_the_times() -> None:
+    report = says_table(Half(), TRIALS, training=[trial.name for trial in TRIALS[:4]], seeds=4)
+    assert report["prompt"][STILL] == 0.5
+    assert report["prompt"][ZOMBIE] == 0
+    assert report["turn"][LEFT] == pytest.approx(90 * 0.9, abs=1)  # 0.3 s at each end are averaged
+    assert report["says"] == {"all": 0.125, "locomotion": 0, "rest": 0.25, "known": 0.25}
+
+
+@pytest.mark.usefixtures("few")
+def test_the_columns_of_trials() -> None:
+    report = says_table(Half(), TRIALS, training=[trial.name for trial in TRIALS[:4]], seeds=2)
+    assert report["prompt_real"][STILL] == 0.5  # of two who stand one moves
+    assert report["prompt_real"][LYING] == 1
+    assert np.isnan(report["prompt_real"][LEFT])  # no trial shows it
+    assert report["prompt_others"][LYING] == 0
+    assert report["prompt_others"][STILL] == 0.5  # the "jump" stands, too, who lies does not; one is of no known action
+    assert report["prompt_lookup"][LYING] == 1
+    assert report["quality_real"]["seconds"] == pytest.approx(3, abs=0.1)
+
+
+@pytest.mark.usefixtures("few")
+def test_without_trials_there_are_no_other_columns() -> None:
+    report = says_table(Half(), seeds=1)
+    assert set(report) == {"says", "quality", "turn", "prompt"}
+    assert set(report["says"]) == {"all", "locomotion", "rest"}
+    assert "real" not in says_text({"half": report})
+    with pytest.raises(DataError, match="none of the trials is one of the training motions"):
+        says_table(Half(), TRIALS, training=["05_01"], seeds=1)
+
+
+def test_the_text_has_a_column_for_each_generator(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(table, "prompts", lambda: only(STILL, LEFT))
+    report = says_table(Half(), TRIALS, seeds=2)
+    lines = says_text({"runs/a": report, "runs/b": report}).splitlines()
+    assert lines[0].split() == ["%", "a", "b", "lookup", "real", "others"]
+    assert lines[2].split("   ")[0] == STILL
+    assert lines[2].split()[-5:] == ["50", "50", "0", "50", "50"]
+    assert any(line.startswith("says.all") and line.endswith("NOT REACHED") for line in lines)
+
+
+def test_the_look_up_shares_most_words_in_fewest() -> None:
+    found = LookUp(TRIALS)
+    assert found.found(STILL).name == "unheard_of"  # five words
+    assert found.found("he stands").name == "ACCAD_Male2_A1_Stand"  # one word of two, before one of three
+    assert found.found("what is it").name == "ACCAD_Male2_A9_Lie"  # "is"
+    assert found.found("xyzzy").name == "ACCAD_Male2_A1_Stand"  # nothing is shared: the shortest, and by name
+    assert found.generate(LYING, 3) is TRIALS[2].motion
+    with pytest.raises(DataError, match="no trial to look up has a sentence"):
+        LookUp([replace(TRIALS[0], sentences=())])
+
+
+def test_training_trials_are_those_not_held_out() -> None:
+    class Told:
+        training = {"split": {"validation": ["16_01"], "test": ["unheard_of"]}}  # noqa: RUF012
+
+    names = {trial.name for trial in TRIALS}
+    assert trained_on(Told(), list(TRIALS)) == names - {"16_01", "unheard_of"}  # type: ignore[arg-type]
+
+
+def test_a_store_gives_its_motions_where_they_go() -> None:
+    motion = gliding(speed=1.5, turn=60)
+    block = to_root_block(motion)
+    frames = block.values.astype(np.float32)
+    entry = Entry("16_01", "16", ("a jump",), ((0, len(frames)),), 0)
+    store = Store(frames, "root_angles", block.channels, block.units, RATE, (HUMANOID,), (entry,), ())
+    (trial,) = of_store(store)
+    assert trial.action == "jump"
+    np.testing.assert_allclose(trial.track.pace, 1.5, atol=0.02)
+    assert trial.track.turn == pytest.approx(54, abs=1)
+
+
+def test_a_motion_that_is_no_human_is_named() -> None:
+    motion = Motion(np.zeros((5, 1)), ("box.tx",), ("m",), 30.0)
+    with pytest.raises(DataError, match="16_01 cannot be judged"):
+        _ = Trial("16_01", (), motion).track
+
+
+def test_feet_of_a_figure_that_is_led_slide_as_fast_as_it() -> None:
+    assert slide(Track(led(standing(), 1.5))) == pytest.approx(1.5)
+    assert slide(Track(standing())) == 0
+    # a foot that goes back under a figure that goes forward stays in place
+    assert slide(Track(led(shifted(standing(), "Foot", z=-1.5 * times(2.0)), 1.5))) == pytest.approx(1.5)
+    assert slide(Track(led(shifted(standing(), "Toes", z=-1.5 * times(2.0)), 1.5))) == pytest.approx(0, abs=1e-9)
+    lifted = shifted(standing(), "Toes", y=0.2 * (times(2.0) > 1))
+    assert slide(Track(led(lifted, 1.0 + (times(2.0) > 1)))) == pytest.approx(1.0)  # in the air it may be fast
+
+
+def test_jerk_of_a_cubic_and_of_a_tremble() -> None:
+    assert jerk(Track(shifted(standing(), "", x=0.5 * times(2.0) ** 3))) == pytest.approx(3.0)
+    tremble = 0.01 * (-1.0) ** np.arange(61)
+    assert jerk(Track(shifted(standing(), "", y=tremble))) == pytest.approx(8 * 0.01 * RATE**3)
+    assert np.isnan(jerk(Track(standing()[:3])))
+
+
+def test_depth_is_under_the_ground() -> None:
+    assert depth(Track(shifted(standing(), "", y=-0.02))) == pytest.approx(0.02)
+    assert depth(Track(shifted(standing(), "", y=0.02))) == 0
+
+
+def test_poses_differ_by_what_a_figure_does_alone() -> None:
+    here = poses(Track(walking(1.0)))
+    np.testing.assert_allclose(here, poses(Track(walking(1.0) + np.array([3.0, 0.0, 5.0]))), atol=1e-9)
+    assert distance(here, poses(Track(led(stepping(4.0), 0.0, turn=120)))) < 1e-9
+    raised = shifted(standing(), "Hand", y=0.5)
+    moved = sum("Hand" in name for name in HUMANOID.names)
+    expected = 0.5 * moved / len(HUMANOID.names)
+    assert distance(poses(Track(raised)), poses(Track(standing(5.0)))) == pytest.approx(expected)
+    assert spread([Track(raised), Track(standing()), Track(standing())]) == pytest.approx(expected * 2 / 3)
+    assert np.isnan(spread([Track(raised)]))
+
+
+@pytest.fixture
+def corpus(tmp_path: Path) -> Path:
+    """The three trials that motet carries, with sentences."""
+    for file in CMU.iterdir():
+        if file.suffix in (".amc", ".asf"):
+            (tmp_path / file.name).symlink_to(file)
+    rows = ["clip\tsentence", "39_14\tshe walks", "09_07\tsomebody runs", "02_06\tsomeone picks something up"]
+    (tmp_path / "said.tsv").write_text("\n".join(rows) + "\n")
+    return tmp_path
+
+
+def test_trials_of_a_folder(corpus: Path) -> None:
+    found = {trial.name: trial for trial in read_trials(corpus)}
+    assert {name: trial.action for name, trial in found.items()} == {
+        "02_06": "bend over, scoop up, rise, lift arm",
+        "09_07": "run",
+        "39_14": "walk",
+    }
+    assert found["09_07"].sentences == ("somebody runs",)
+    assert np.median(found["09_07"].track.pace) > 3
+
+
+def test_the_command_asks_a_bundle(corpus: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    run = "a person runs straight forward"
+    monkeypatch.setattr(table, "prompts", lambda: only(run))
+    result = CliRunner().invoke(main, ["evaluate", "cmu-generate", "--says", "--data", str(corpus), "--json"])
+    assert result.exit_code == 0, result.output
+    report = json.loads(result.stdout)
+    assert report["prompt"] == report["prompt_real"] == report["prompt_lookup"] == {run: 1.0}
+    assert report["says"] == {"all": 1.0, "locomotion": 1.0, "rest": None, "known": 1.0}
+
+
+def test_the_command_says_what_does_not_go_together(tmp_path: Path) -> None:
+    for arguments, said in (
+        (["cmu-generate", "--save"], "neither --plots nor --save"),
+        (["cmu-describe"], "cmu-describe is none"),
+        (["cmu-generate", "--data", str(tmp_path)], "no corpus in"),
+    ):
+        result = CliRunner().invoke(main, ["evaluate", "--says", *arguments])
+        assert result.exit_code != 0
+        assert said in str(result.output) + str(result.exception)
