@@ -219,8 +219,8 @@ def test_the_command_asks_a_bundle(corpus: Path, monkeypatch: pytest.MonkeyPatch
 def test_the_command_says_what_does_not_go_together(tmp_path: Path) -> None:
     for arguments, said in (
         (["cmu-generate", "--save"], "neither --plots nor --save"),
-        (["cmu-describe"], "cmu-describe is none"),
-        (["cmu-generate", "--data", str(tmp_path)], "no corpus in"),
+        (["describe"], "describe is none"),
+        (["cmu-generate", "--data", str(tmp_path)], "no motion files"),
     ):
         result = CliRunner().invoke(main, ["evaluate", "--says", *arguments])
         assert result.exit_code != 0
