@@ -1,5 +1,6 @@
 """A padded batch of motions with their sentences: what both directions between motion and language train on."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import torch
@@ -14,12 +15,14 @@ class Batch:
     lengths: (B,) int64, frames of each motion, at least 1.
     words: (B, W) int64, ids without SOS and EOS; PAD = 0 after the sentence's end.
     ended: (B,) bool, whether the motion ends after its last frame rather than being part of a longer one; None: all do.
+    groups: (B,) int64, equal for rows that are said to show the same; None where nobody asks.
     """
 
     frames: Tensor
     lengths: Tensor
     words: Tensor
     ended: Tensor | None = None
+    groups: Tensor | None = None
 
     def __len__(self) -> int:
         """B."""
@@ -27,13 +30,15 @@ class Batch:
 
     def __getitem__(self, rows: slice) -> "Batch":
         """Some of the rows, padded as all of them are."""
-        ended = None if self.ended is None else self.ended[rows]
-        return Batch(self.frames[rows], self.lengths[rows], self.words[rows], ended)
+        return self._each(lambda tensor: tensor[rows])
 
     def to(self, device: torch.device | str) -> "Batch":
         """The same batch on a device."""
-        ended = None if self.ended is None else self.ended.to(device)
-        return Batch(self.frames.to(device), self.lengths.to(device), self.words.to(device), ended)
+        return self._each(lambda tensor: tensor.to(device))
+
+    def _each(self, change: Callable[[Tensor], Tensor]) -> "Batch":
+        ended, groups = (None if part is None else change(part) for part in (self.ended, self.groups))
+        return Batch(change(self.frames), change(self.lengths), change(self.words), ended, groups)
 
 
 def before(lengths: Tensor, steps: int) -> Tensor:

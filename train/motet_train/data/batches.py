@@ -14,14 +14,15 @@ from motet.models.language import padded
 from motet.models.text import MAX_WORDS, RULES, Vocabulary
 from motet.representation.base import FrameMirror
 from motet.representation.contract import MotionContract
+from motet_train.data.alike import alike
 from motet_train.data.batch import Batch
 from motet_train.data.errors import DataError
 from motet_train.data.mirror_text import mirror_text
 from motet_train.data.store import Store
 
 Ids = NDArray[np.int64]
-Row = tuple[Floats, bool, Ids]
-"""Frames (T, D), whether the motion ends with them, and the ids of a sentence."""
+Row = tuple[Floats, bool, Ids, int]
+"""Frames (T, D), whether the motion ends with them, the ids of a sentence, and the number of what both show."""
 
 MAX = sys.maxsize
 
@@ -33,13 +34,15 @@ SHUFFLED = 16
 class Examples:
     """The motions of one part of a store, each with its sentences as ids, and the mirrored ones' where mirror is set.
 
-    sentences: for each of ``records`` its sentences; mirrored: the same sentences, mirrored.
+    sentences: for each of ``records`` its sentences; mirrored: the same sentences, mirrored. groups: for each record
+    the number of what it shows, as it is and mirrored: equal for records that share a sentence, or a chain of them.
     """
 
     store: Store
     records: tuple[int, ...]
     sentences: tuple[tuple[Ids, ...], ...]
     mirrored: tuple[tuple[Ids, ...], ...]
+    groups: tuple[tuple[int, int], ...]
     mirror: FrameMirror | None = None
 
     def epoch(
@@ -72,7 +75,7 @@ class Examples:
         pairs = [(i, sentence) for i, found in enumerate(self.sentences) for sentence in found]
         pairs.sort(key=lambda pair: self._length(pair[0], 0))
         for start in range(0, len(pairs), batch):
-            cut = [(*self._part(i, 0, 0, longest or MAX), s) for i, s in pairs[start : start + batch]]
+            cut = [(*self._part(i, 0, 0, longest or MAX), s, self.groups[i][0]) for i, s in pairs[start : start + batch]]
             yield _padded(cut)
 
     def _drawn(self, rng: np.random.Generator, i: int, offsets: int | None) -> Ids:
@@ -88,8 +91,8 @@ class Examples:
         frames, ended = self._part(i, offset, start, longest)
         sentence = int(rng.integers(len(self.sentences[i])))
         if self.mirror is not None and rng.random() < 0.5:
-            return self.mirror(frames), ended, self.mirrored[i][sentence]
-        return frames, ended, self.sentences[i][sentence]
+            return self.mirror(frames), ended, self.mirrored[i][sentence], self.groups[i][1]
+        return frames, ended, self.sentences[i][sentence], self.groups[i][0]
 
     def _part(self, i: int, offset: int, start: int, longest: int) -> tuple[Floats, bool]:
         """Frames of a motion, and whether it ends with them."""
@@ -113,7 +116,12 @@ def examples(store: Store, records: Sequence[int], vocabulary: Vocabulary, mirro
             mirrored.append(tuple(vocabulary.encode(mirror_text(s))[0] for s in found) if mirror else ())
     if not kept:
         raise DataError(f"none of {len(records)} motions has a sentence of 1 to {MAX_WORDS} words that can be used")
-    return Examples(store, tuple(kept), tuple(sentences), tuple(mirrored), mirror)
+    return Examples(store, tuple(kept), tuple(sentences), tuple(mirrored), _groups(sentences, mirrored), mirror)
+
+
+def _groups(sentences: Sequence[Sequence[Ids]], mirrored: Sequence[Sequence[Ids]]) -> tuple[tuple[int, int], ...]:
+    found = alike([[ids.tobytes() for ids in said] for said in (*sentences, *mirrored)])
+    return tuple(zip(found[: len(sentences)], found[len(sentences) :], strict=True))
 
 
 def frame_mirror(contract: MotionContract) -> FrameMirror:
@@ -131,7 +139,8 @@ def usable(sentence: str) -> bool:
 
 def _padded(rows: Sequence[Row]) -> Batch:
     """The rows as one batch, padded on the right, sentences with PAD, whose id is 0."""
-    frames, lengths = padded([frames for frames, _, _ in rows], "float32")
-    sentences, _ = padded([sentence for _, _, sentence in rows], "int64")
-    ended = torch.tensor([end for _, end, _ in rows])
-    return Batch(torch.from_numpy(frames), torch.from_numpy(lengths), torch.from_numpy(sentences), ended)
+    motions, ends, said, groups = zip(*rows, strict=True)
+    frames, lengths = padded(motions, "float32")
+    sentences, _ = padded(said, "int64")
+    tensors = (torch.from_numpy(array) for array in (frames, lengths, sentences))
+    return Batch(*tensors, torch.tensor(ends), torch.tensor(groups))
