@@ -75,7 +75,9 @@ class Examples:
         pairs = [(i, sentence) for i, found in enumerate(self.sentences) for sentence in found]
         pairs.sort(key=lambda pair: self._length(pair[0], 0))
         for start in range(0, len(pairs), batch):
-            cut = [(*self._part(i, 0, 0, longest or MAX), s, self.groups[i][0]) for i, s in pairs[start : start + batch]]
+            cut = [
+                (*self._part(i, 0, 0, longest or MAX), s, self.groups[i][0]) for i, s in pairs[start : start + batch]
+            ]
             yield _padded(cut)
 
     def _drawn(self, rng: np.random.Generator, i: int, offsets: int | None) -> Ids:
@@ -142,5 +144,5 @@ def _padded(rows: Sequence[Row]) -> Batch:
     motions, ends, said, groups = zip(*rows, strict=True)
     frames, lengths = padded(motions, "float32")
     sentences, _ = padded(said, "int64")
-    tensors = (torch.from_numpy(array) for array in (frames, lengths, sentences))
-    return Batch(*tensors, torch.tensor(ends), torch.tensor(groups))
+    arrays = frames, lengths, sentences, np.array(ends), np.array(groups)
+    return Batch(*map(torch.from_numpy, arrays))

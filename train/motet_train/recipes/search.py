@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 from torch.nn import functional
 
 from motet.models.language import padded
@@ -28,7 +28,17 @@ DEFAULT = Recipe(
     "nearest",
     JointEmbeddingConfig(0, 0),
     ("channels", "words", "figure"),
-    Training(epochs=100, batch=128, optimiser="adamw", learning_rate=1e-3, warm_up=2, cosine=True, weight_decay=0.05, average=0.995, keep="last"),
+    Training(
+        epochs=100,
+        batch=128,
+        optimiser="adamw",
+        learning_rate=1e-3,
+        warm_up=2,
+        cosine=True,
+        weight_decay=0.05,
+        average=0.995,
+        keep="last",
+    ),
     LanguageVisits(offsets=3, mirror=True),
     {"count": 5},
 )
@@ -86,8 +96,9 @@ class _Asked:
         self.rows = torch.tensor([row for _, row in said])
 
     @torch.no_grad()
-    def measures(self, net: JointEmbedding) -> dict[str, float]:
+    def measures(self, net: nn.Module) -> dict[str, float]:
         """The mean surprise at the motions that show what a sentence says, and how often one is among the first."""
+        assert isinstance(net, JointEmbedding)
         device = net.mean.device
         motions = net.embed_motion(*(part.to(device) for part in self.motions)).cpu()
         texts = net.embed_text(*(part.to(device) for part in self.texts)).cpu()

@@ -65,7 +65,8 @@ class Mixed(nn.Module):
     def forward(self, x: Tensor, active: Tensor) -> Tensor:
         """Sequences (B, T, U), of which the steps count where active (B, T, 1) is 1."""
         y: Tensor = self.convolution((self.norm(x) * active).transpose(1, 2)).transpose(1, 2)
-        return (x + self.dropout(functional.gelu(y))) * active
+        mixed: Tensor = (x + self.dropout(functional.gelu(y))) * active
+        return mixed
 
 
 class Pooled(nn.Module):
@@ -97,7 +98,7 @@ class JointEmbedding(Net):
         self.config = config
         self.places = Places(config.figure) if config.figure.parents else None
         seen = config.channels + 3 * len(config.figure.parents)
-        self.frames = nn.Linear(seen, config.units)
+        self.frames = nn.Conv1d(seen, config.units, 3, stride=2, padding=1)
         dilations = tuple(2**block for block in range(config.blocks))
         self.motion = Pooled(config.units, dilations, config.vector, config.dropout)
         self.words = WordEmbedding(config.words, config.embedding, config.word_dropout)
@@ -112,7 +113,8 @@ class JointEmbedding(Net):
         if self.training:
             x = x + self.config.frame_noise * torch.randn_like(x)
             x = x + self.config.posture_noise * torch.randn_like(x[:, :1])
-        found: Tensor = self.motion(self.frames(x), lengths)
+        x = x * before(lengths, x.shape[1])[..., None]
+        found: Tensor = self.motion(self.frames(x.transpose(1, 2)).transpose(1, 2), (lengths + 1) // 2)
         return found
 
     def embed_text(self, words: Tensor, lengths: Tensor) -> Tensor:
@@ -129,7 +131,10 @@ class JointEmbedding(Net):
 
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """Both encoders, each with its contract."""
-        vector, lengths = TensorSpec("vector", ("batch", self.config.vector)), TensorSpec("lengths", ("batch",), "int64")
+        vector, lengths = (
+            TensorSpec("vector", ("batch", self.config.vector)),
+            TensorSpec("lengths", ("batch",), "int64"),
+        )
         frames = TensorSpec("frames", ("batch", "time", self.config.channels))
         words = TensorSpec("words", ("batch", "words"), "int64")
         return {

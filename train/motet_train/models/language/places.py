@@ -4,18 +4,18 @@ Angles of one pose differ from person to person by how its skeleton was fitted; 
 compare motions see both.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
 
 from motet.motion.kinematics import AXES
-from motet.motion.skeleton import Skeleton
+from motet.motion.skeleton import END_SUFFIX
 from motet.representation.contract import MotionContract
 
-TILT = ("root.roll", "root.pitch")
-"""How the root is turned but for its heading: its angles about z and x of the order "yxz"."""
+ROOT_ORDER = "yxz"
+TILT = {"x": "root.pitch", "z": "root.roll"}
+"""The root's angles of that order, but for the heading about y."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Figure:
     """The tree of J joints, and where in D channels their angles are.
 
     parents: index of each joint's parent, -1 for the root. offsets: (x, y, z) from the parent in metres. orders: of the
-    Euler angles, "zyx" for Rz Ry Rx. columns: the channels of the angles about x, y and z in degrees, D where there is
+    Euler angles, "zyx" for Rz Ry Rx. columns: the channels of these angles, in degrees, in that order; D where there is
     none and the angle is 0.
     """
 
@@ -34,24 +34,27 @@ class Figure:
 
 
 def figure_of(contract: MotionContract) -> Figure:
-    """The figure that frames in Euler angles move; one without joints where the contract has no such frames."""
+    """The figure that frames of Euler angles move, without the tips of its bones.
+
+    One without joints where the contract has no such frames, or says nothing of lengths.
+    """
     skeleton = contract.skeleton
-    if contract.representation != "root_angles" or skeleton is None or any(any(j.axis) for j in skeleton.joints):
+    if contract.representation != "root_angles" or skeleton is None or skeleton.metres_per_unit is None:
         return Figure()
+    joints = [joint for joint in skeleton.scaled(1.0).joints if not joint.name.endswith(END_SUFFIX)]
+    if any(any(joint.axis) for joint in joints):
+        return Figure()
+    names = [joint.name for joint in joints]
+    orders = (ROOT_ORDER, *(joint.order for joint in joints[1:]))
+    channels = [[f"{name}.r{axis}" for axis in order] for name, order in zip(names, orders, strict=True)]
+    channels[0] = [TILT.get(axis, "") for axis in ROOT_ORDER]
     at = {channel: column for column, channel in enumerate(contract.channels)}
-    names = [[f"{joint.name}.r{axis}" for axis in AXES] for joint in skeleton.joints]
-    names[0] = [TILT[1], "", TILT[0]]
-    columns = tuple(tuple(at.get(name, len(at)) for name in row) for row in names)
     return Figure(
-        tuple(joint.parent for joint in skeleton.joints),
-        tuple(tuple(offset) for offset in _metres(skeleton)),
-        ("yxz", *(joint.order for joint in skeleton.joints[1:])),
-        columns,
+        tuple(names.index(skeleton.names[joint.parent]) if joint.parent >= 0 else -1 for joint in joints),
+        tuple(joint.offset for joint in joints),
+        orders,
+        tuple(tuple(at.get(channel, len(at)) for channel in row) for row in channels),
     )
-
-
-def _metres(skeleton: Skeleton) -> Sequence[tuple[float, float, float]]:
-    return [joint.offset for joint in (skeleton.scaled(1.0) if skeleton.metres_per_unit else skeleton).joints]
 
 
 class Places(nn.Module):
@@ -59,37 +62,35 @@ class Places(nn.Module):
 
     columns: Tensor
     offsets: Tensor
-    orders: Tensor
+    unit: Tensor
+    along: Tensor
+    across: Tensor
 
     def __init__(self, figure: Figure) -> None:
         super().__init__()
         self.parents = figure.parents
-        orders = [[AXES.index(axis) for axis in order] for order in figure.orders]
-        for name, values in (("columns", figure.columns), ("orders", orders), ("offsets", figure.offsets)):
-            self.register_buffer(name, torch.tensor(values), persistent=False)
+        axes = torch.eye(3)[torch.tensor([[AXES.index(axis) for axis in order] for order in figure.orders])]
+        crosses = torch.linalg.cross(torch.eye(3).expand(*axes.shape[:2], 3, 3), axes[..., None, :], dim=-1)
+        self.register_buffer("unit", torch.eye(3), persistent=False)
+        self.register_buffer("columns", torch.tensor(figure.columns), persistent=False)
+        self.register_buffer("offsets", torch.tensor(figure.offsets), persistent=False)
+        self.register_buffer("along", axes[..., None] * axes[..., None, :], persistent=False)
+        self.register_buffer("across", crosses, persistent=False)
 
     def forward(self, frames: Tensor) -> Tensor:
         """Frames (B, T, D), angles in degrees, to places (B, T, 3 J) in metres from the root, the heading taken out."""
-        angles = torch.cat([frames, torch.zeros_like(frames[..., :1])], dim=-1)[..., self.columns.flatten()]
-        local = self._rotations(torch.deg2rad(angles).unflatten(-1, (-1, 3)))
-        turned: list[Tensor] = [local[..., 0, :, :]]
-        found: list[Tensor] = [torch.zeros_like(turned[0][..., 0])]
+        padded = torch.cat([frames, torch.zeros_like(frames[..., :1])], dim=-1)
+        angles = torch.deg2rad(padded[..., self.columns])[..., None, None]
+        first, second, third = (self._about(place, angles[..., place, :, :]) for place in range(3))
+        local = first @ second @ third
+        turned, found = {0: local[..., 0, :, :]}, [torch.zeros_like(frames[..., :3])]
         for joint, parent in enumerate(self.parents[1:], start=1):
             found.append(found[parent] + turned[parent] @ self.offsets[joint])
-            turned.append(turned[parent] @ local[..., joint, :, :])
+            if joint in self.parents:
+                turned[joint] = turned[parent] @ local[..., joint, :, :]
         return torch.cat(found, dim=-1)
 
-    def _rotations(self, angles: Tensor) -> Tensor:
-        """Angles (..., J, 3) about x, y, z to the matrices (..., J, 3, 3) of their product in each joint's order."""
-        cos, sin, one, none = angles.cos(), angles.sin(), torch.ones_like(angles), torch.zeros_like(angles)
-        rows = []
-        for axis in range(3):
-            c, s, o, n = cos[..., axis], sin[..., axis], one[..., axis], none[..., axis]
-            matrix = ([o, n, n, n, c, -s, n, s, c], [c, n, s, n, o, n, -s, n, c], [c, -s, n, s, c, n, n, n, o])[axis]
-            rows.append(torch.stack(matrix, dim=-1))
-        about = torch.stack(rows, dim=-2)  # (..., J, axis, 9)
-        joints = torch.arange(len(self.parents), device=angles.device)
-        first, second, third = (
-            about[..., joints, self.orders[:, place], :].unflatten(-1, (3, 3)) for place in range(3)
-        )
-        return first @ second @ third
+    def _about(self, place: int, angles: Tensor) -> Tensor:
+        """Rotations (..., J, 3, 3) by angles (..., J, 1, 1) about the axis at a place in each joint's order."""
+        along = self.along[:, place]
+        return along + angles.cos() * (self.unit - along) + angles.sin() * self.across[:, place]
