@@ -19,6 +19,7 @@ from motet.models.describe import DescribeModel
 from motet.models.generate import GenerateModel
 from motet.models.load import Model, build, load
 from motet.models.predict import PredictModel
+from motet.models.search import SearchModel
 from motet_train.cli.evaluate_language import by_subject, language_reports
 from motet_train.cli.evaluate_predict import predict_reports
 from motet_train.cli.train_options import unit_in
@@ -26,6 +27,7 @@ from motet_train.data.clips import Clips, read_clips
 from motet_train.data.errors import DataError
 from motet_train.evaluate.control.experiments import GOALS, control_report, study_of
 from motet_train.evaluate.language.report import GOALS as LANGUAGE_GOALS
+from motet_train.evaluate.language.search import GOALS as SEARCH_GOALS
 from motet_train.evaluate.tables import Report, json_ready, report_table
 from motet_train.recipes.recipe import SETTINGS
 from motet_train.runs import MANIFEST, Run
@@ -37,7 +39,7 @@ from motet_train.settings import read_settings
 @click.option(
     "--data",
     type=Path,
-    help="Control: the clips. [default: those it was trained on] Describe and generate: the store. "
+    help="Control: the clips. [default: those it was trained on] Describe, generate and search: the store. "
     "Predict: text files of the protocol, or the store.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one nested object with stable keys.")
@@ -57,7 +59,8 @@ def evaluate(
     """Run the papers' experiments on MODELS: run folders, or names and paths of bundles.
 
     Control: the thesis' experiments. Describe and generate: BLEU, floors, attributes, measures; with both, of the
-    same split, also the chain from sentence to motion and back. Predict: the protocol's Euler errors on its text files,
+    same split, also the chain from sentence to motion and back. Search: how often what is asked for is among the first
+    found, beside floors. Predict: the protocol's Euler errors on its text files,
     beside zero velocity and published rows, or distances in held out motion files.
     """
     torch.set_num_threads(1)
@@ -80,7 +83,7 @@ def _measured(
 ) -> tuple[dict[str, Any], str]:
     """The figures of each model, ready for JSON, and all of them as text."""
     controls = {name: model for name, model in models.items() if isinstance(model, ControlModel)}
-    others = {name: model for name, model in models.items() if isinstance(model, DescribeModel | GenerateModel)}
+    others = {name: model for name, model in models.items() if isinstance(model, DescribeModel | GenerateModel | SearchModel)}
     predicts = {name: model for name, model in models.items() if isinstance(model, PredictModel)}
     if sum(map(bool, (controls, others, predicts))) > 1:
         raise click.UsageError("evaluate control, predict and language models separately: their data differ")
@@ -95,7 +98,7 @@ def _measured(
     for name in others:
         if (other := by_subject(others, name)) is not None:
             ready[name]["people_unseen"] = json_ready(reports[other])
-    return ready, report_table(reports, GOALS if controls else LANGUAGE_GOALS)
+    return ready, report_table(reports, GOALS if controls else {**LANGUAGE_GOALS, **SEARCH_GOALS})
 
 
 def _control(

@@ -98,7 +98,7 @@ class JointEmbedding(Net):
         self.config = config
         self.places = Places(config.figure) if config.figure.parents else None
         seen = config.channels + 3 * len(config.figure.parents)
-        self.frames = nn.Conv1d(seen, config.units, 3, stride=2, padding=1)
+        self.frames = nn.Conv1d(seen, config.units, 3, stride=2, padding=2)
         dilations = tuple(2**block for block in range(config.blocks))
         self.motion = Pooled(config.units, dilations, config.vector, config.dropout)
         self.words = WordEmbedding(config.words, config.embedding, config.word_dropout)
@@ -114,7 +114,7 @@ class JointEmbedding(Net):
             x = x + self.config.frame_noise * torch.randn_like(x)
             x = x + self.config.posture_noise * torch.randn_like(x[:, :1])
         x = x * before(lengths, x.shape[1])[..., None]
-        found: Tensor = self.motion(self.frames(x.transpose(1, 2)).transpose(1, 2), (lengths + 1) // 2)
+        found: Tensor = self.motion(self.frames(x.transpose(1, 2)).transpose(1, 2), lengths // 2 + 1)
         return found
 
     def embed_text(self, words: Tensor, lengths: Tensor) -> Tensor:
