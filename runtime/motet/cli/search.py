@@ -2,6 +2,7 @@
 
 import json
 import sys
+import warnings
 from dataclasses import asdict
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from motet.bundle.session import SessionOptions
 from motet.cli.notes import text_notes
 from motet.cli.options import session_options
 from motet.cli.reading import bar
+from motet.errors import TextWarning
 from motet.formats import READABLE, read_motion
 from motet.models.index import NAME, Hit, Index
 from motet.models.load import load_as
@@ -35,12 +37,13 @@ def search(
     """
     model = load_as(SearchModel, bundle, session)
     motion = read_motion(query) if Path(query).suffix.lower() in READABLE else None
-    with text_notes():
-        if motion is None:
-            model.embed_text(query)  # refused before all motions are read
+    if motion is None:
+        with text_notes():
+            model.ids(query)  # refused before all motions are read
     with bar("embedding") as progress:
         index = Index.open(folder, model, file, progress=progress)
-    hits = index.search(query if motion is None else motion, count)
+    with warnings.catch_warnings(action="ignore", category=TextWarning):  # said already
+        hits = index.search(query if motion is None else motion, count)
     _print(hits, as_json)
     for path, fault in index.failed.items():
         click.echo(f"motet: {path}: {fault}", err=True)

@@ -83,7 +83,9 @@ def _measured(
 ) -> tuple[dict[str, Any], str]:
     """The figures of each model, ready for JSON, and all of them as text."""
     controls = {name: model for name, model in models.items() if isinstance(model, ControlModel)}
-    others = {name: model for name, model in models.items() if isinstance(model, DescribeModel | GenerateModel | SearchModel)}
+    others = {
+        name: model for name, model in models.items() if isinstance(model, DescribeModel | GenerateModel | SearchModel)
+    }
     predicts = {name: model for name, model in models.items() if isinstance(model, PredictModel)}
     if sum(map(bool, (controls, others, predicts))) > 1:
         raise click.UsageError("evaluate control, predict and language models separately: their data differ")

@@ -121,7 +121,10 @@ def _motions(model: SearchModel, corpus: SplitStore, groups: NDArray[np.int64]) 
     index = _index(model, corpus, corpus.parts.train)
     by_model = [int(index.search(motion, 1)[0].path.name) for motion in corpus.motions(test.tolist())]
     by_features = _distances(_features(corpus, test.tolist()), _features(corpus, train.tolist())).argmin(axis=1)
-    right = {"alike": groups[train[by_model]] == groups[test], "features_alike": groups[train[by_features]] == groups[test]}
+    right = {
+        "alike": groups[train[by_model]] == groups[test],
+        "features_alike": groups[train[by_features]] == groups[test],
+    }
     shares = {name: float(row[known].mean()) if known.any() else np.nan for name, row in right.items()}
     return {**shares, "of": float(known.sum())}
 
