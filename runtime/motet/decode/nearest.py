@@ -11,7 +11,7 @@ MAX_COUNT = 1000
 
 
 def nearest(scores: Floats, count: int) -> Ids:
-    """The columns (..., count) of the greatest of scores (..., N), best first, of equal ones the first; all if fewer."""
+    """The columns (..., count) of the greatest of scores (..., N), best first, of equal ones the first."""
     order: NDArray[np.int64] = np.argsort(-scores, axis=-1, kind="stable")[..., :count]
     return order
 

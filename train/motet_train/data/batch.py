@@ -16,6 +16,7 @@ class Batch:
     words: (B, W) int64, ids without SOS and EOS; PAD = 0 after the sentence's end.
     ended: (B,) bool, whether the motion ends after its last frame rather than being part of a longer one; None: all do.
     groups: (B,) int64, equal for rows that are said to show the same; None where nobody asks.
+    others: (B, W) int64, a second sentence of each motion, as words; None where nobody asks.
     """
 
     frames: Tensor
@@ -23,6 +24,7 @@ class Batch:
     words: Tensor
     ended: Tensor | None = None
     groups: Tensor | None = None
+    others: Tensor | None = None
 
     def __len__(self) -> int:
         """B."""
@@ -37,8 +39,8 @@ class Batch:
         return self._each(lambda tensor: tensor.to(device))
 
     def _each(self, change: Callable[[Tensor], Tensor]) -> "Batch":
-        ended, groups = (None if part is None else change(part) for part in (self.ended, self.groups))
-        return Batch(change(self.frames), change(self.lengths), change(self.words), ended, groups)
+        rest = (None if part is None else change(part) for part in (self.ended, self.groups, self.others))
+        return Batch(change(self.frames), change(self.lengths), change(self.words), *rest)
 
 
 def before(lengths: Tensor, steps: int) -> Tensor:

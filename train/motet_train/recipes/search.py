@@ -29,17 +29,17 @@ DEFAULT = Recipe(
     JointEmbeddingConfig(0, 0),
     ("channels", "words", "figure"),
     Training(
-        epochs=100,
-        batch=128,
+        epochs=250,
+        every=10,
+        batch=256,
         optimiser="adamw",
-        learning_rate=1e-3,
-        warm_up=2,
+        learning_rate=2e-3,
+        warm_up=10,
         cosine=True,
         weight_decay=0.05,
-        average=0.995,
         keep="last",
     ),
-    LanguageVisits(offsets=3, mirror=True),
+    LanguageVisits(offsets=1, windows=(25, 300), mirror=True, wordings=2),
     {"count": 5},
 )
 """What is shipped."""
@@ -68,7 +68,7 @@ def _learner(net: JointEmbedding, found: Divided, job: Job) -> GradientLearner:
     train, asked = found.examples(found.parts.train), _Asked(found, found.parts.validation)
 
     def batches(rng: np.random.Generator) -> Iterator[Batch]:
-        return train.epoch(rng, training.batch, visits.offsets, visits.windows)
+        return train.epoch(rng, training.batch, visits.offsets, visits.windows, visits.wordings)
 
     def validated() -> Mapping[str, Any]:
         return asked.measures(learner.kept)

@@ -1,10 +1,12 @@
-"""Motions and sentences in one space, where what belongs together is near: the design of CLIP and of TMR, small.
+"""Motions and sentences in one space, where what belongs together is near: the idea of CLIP and of TMR, made small.
 
-An encoder of motions and one of sentences give unit vectors. In a batch each motion is to be nearer to its sentence
-than to the others, and each sentence to its motion (symmetric InfoNCE, as in Radford et al. 2021 and Petrovich et al.
-2023); pairs that mean the same without being a pair are no negatives.
+Two encoders give unit vectors. In a batch each motion is to be nearer to its sentence than to the others, and each
+sentence to its motion (symmetric InfoNCE: Radford et al. 2021, Petrovich et al. 2023), and to another wording of it;
+what is said to show the same without being a pair is left out. With some hundred motions of a few dozen people, nets
+that see every frame learn the people; so the encoder of motions sees statistics, and that of sentences a weighted mean
+of words.
 
-Letters in shapes: B rows, T frames, D channels, W words, U units, E numbers of a vector.
+Letters in shapes: B rows, T frames, D channels, W words, S statistics, E numbers of a vector.
 """
 
 from collections.abc import Mapping
@@ -19,75 +21,41 @@ from motet.bundle.graph import GraphSpec, TensorSpec
 from motet_train.data.batch import Batch, before
 from motet_train.models.language.dropout import WordEmbedding
 from motet_train.models.language.places import Figure, Places
+from motet_train.models.language.statistics import of_frames, of_speeds
 from motet_train.models.net import Net, Part, tuples
 from motet_train.models.normalised import normalised
 
 PAD = 0
+
 LIMIT = 5.0
-"""Standard deviations: wilder frames would outweigh the motion."""
+"""Standard deviations: wilder channels and statistics would outweigh all else."""
 
 NEAR = 0.2
-"""Metres: what places are divided by."""
+"""Metres by which places are divided."""
+
+STILL = 1e-3
+"""Variance of a statistic that says nothing."""
 
 
 @dataclass(frozen=True)
 class JointEmbeddingConfig:
-    """Sizes. channels: D. words: of the vocabulary. figure: whose joints' places are seen, too.
+    """Sizes, and what training adds.
 
-    frame_noise: standard deviation of what training adds to normalised frames, posture_noise of what it adds to all
-    frames of a motion alike, as another person's posture would.
+    channels: D. words: of the vocabulary. figure: whose joints' places are seen, instead of the channels of joints.
+    embedding: numbers of a word's vector. vector: E. noise: standard deviation of what training adds to the statistics,
+    in theirs. temperature: what scores are divided by. wordings: weight of the loss between two wordings.
     """
 
     channels: int
     words: int
     figure: Figure = field(default_factory=Figure)
-    units: int = 128
-    blocks: int = 3
     embedding: int = 96
     vector: int = 128
-    dropout: float = 0.2
-    word_dropout: float = 0.1
-    frame_noise: float = 0.1
-    posture_noise: float = 0.2
+    dropout: float = 0.3
+    word_dropout: float = 0.3
+    noise: float = 0.2
     temperature: float = 0.1
-    texts: float = 0.0
-
-
-class Mixed(nn.Module):
-    """A residual convolution along a sequence; padded steps stay 0."""
-
-    def __init__(self, units: int, dilation: int, dropout: float) -> None:
-        super().__init__()
-        self.norm = nn.LayerNorm(units)
-        self.convolution = nn.Conv1d(units, units, 3, padding=dilation, dilation=dilation)
-        self.dropout = nn.Dropout(dropout)
-
-    def forward(self, x: Tensor, active: Tensor) -> Tensor:
-        """Sequences (B, T, U), of which the steps count where active (B, T, 1) is 1."""
-        y: Tensor = self.convolution((self.norm(x) * active).transpose(1, 2)).transpose(1, 2)
-        mixed: Tensor = (x + self.dropout(functional.gelu(y))) * active
-        return mixed
-
-
-class Pooled(nn.Module):
-    """Layers over a sequence, and the unit vector of the mean and the greatest of what they give."""
-
-    def __init__(self, units: int, dilations: tuple[int, ...], vector: int, dropout: float) -> None:
-        super().__init__()
-        self.layers = nn.ModuleList(Mixed(units, dilation, dropout) for dilation in dilations)
-        self.norm, self.dropout = nn.LayerNorm(2 * units), nn.Dropout(dropout)
-        self.output = nn.Linear(2 * units, vector)
-
-    def forward(self, x: Tensor, lengths: Tensor) -> Tensor:
-        """Sequences (B, T, U) of the given lengths (B,) to vectors (B, E)."""
-        active = before(lengths, x.shape[1])[..., None].to(x.dtype)
-        x = x * active
-        for layer in self.layers:
-            x = layer(x, active)
-        mean = x.sum(dim=1) / lengths[:, None]
-        most = (x - 1e4 * (1 - active)).amax(dim=1)
-        found = self.output(self.dropout(self.norm(torch.cat([mean, most], dim=1))))
-        return functional.normalize(found.float(), dim=1)
+    wordings: float = 1.0
 
 
 class JointEmbedding(Net):
@@ -97,37 +65,52 @@ class JointEmbedding(Net):
         super().__init__(config.channels)
         self.config = config
         self.places = Places(config.figure) if config.figure.parents else None
-        seen = config.channels + 3 * len(config.figure.parents)
-        self.frames = nn.Conv1d(seen, config.units, 3, stride=2, padding=2)
-        dilations = tuple(2**block for block in range(config.blocks))
-        self.motion = Pooled(config.units, dilations, config.vector, config.dropout)
+        joints = max(0, len(config.figure.parents) - 1)
+        seen = 3 * joints + len(config.figure.root) if joints else config.channels
+        statistics = of_frames(torch.zeros(1, 1, seen), torch.ones(1)).shape[1] + 2 * joints + 1
+        self.scaled = nn.BatchNorm1d(statistics, eps=STILL, affine=False)
+        self.motion = nn.Linear(statistics, config.vector)
         self.words = WordEmbedding(config.words, config.embedding, config.word_dropout)
-        self.text = Pooled(config.embedding, (1,), config.vector, config.dropout)
+        self.weight = nn.Linear(config.embedding, 1)
+        self.text = nn.Linear(config.embedding, config.vector)
+        self.dropout = nn.Dropout(config.dropout)
 
     def embed_motion(self, frames: Tensor, lengths: Tensor) -> Tensor:
         """Frames (B, T, D) in the contract's units, of lengths (B,), to unit vectors (B, E)."""
-        seen = [normalised(frames, self.mean, self.scale, LIMIT)]
-        if self.places is not None:
-            seen.append(self.places(frames) / NEAR)
-        x = torch.cat(seen, dim=-1)
+        found = self.scaled(self.statistics(frames, lengths)).clamp(-LIMIT, LIMIT)
         if self.training:
-            x = x + self.config.frame_noise * torch.randn_like(x)
-            x = x + self.config.posture_noise * torch.randn_like(x[:, :1])
-        x = x * before(lengths, x.shape[1])[..., None]
-        found: Tensor = self.motion(self.frames(x.transpose(1, 2)).transpose(1, 2), lengths // 2 + 1)
-        return found
+            found = found + self.config.noise * torch.randn_like(found)
+        return functional.normalize(self.motion(self.dropout(found)), dim=1)
+
+    def statistics(self, frames: Tensor, lengths: Tensor) -> Tensor:
+        """Frames (B, T, D) of lengths (B,) to what is seen of the whole motion (B, S)."""
+        normal, length = normalised(frames, self.mean, self.scale, LIMIT), lengths[:, None].log()
+        if self.places is None:
+            return torch.cat([of_frames(normal, lengths), length], dim=1)
+        places = self.places(frames) / NEAR
+        seen = torch.cat([places, normal[..., list(self.config.figure.root)]], dim=-1)
+        return torch.cat([of_frames(seen, lengths), of_speeds(places, lengths), length], dim=1)
 
     def embed_text(self, words: Tensor, lengths: Tensor) -> Tensor:
         """Ids (B, W) of sentences of lengths (B,) to unit vectors (B, E)."""
-        found: Tensor = self.text(self.words(words), lengths)
-        return found
+        vectors = self.words(words)
+        known = before(lengths, words.shape[1])
+        weights = self.weight(vectors)[..., 0].masked_fill(~known, -torch.inf).softmax(dim=1)
+        mean = (weights[..., None] * vectors).sum(dim=1)
+        return functional.normalize(self.text(self.dropout(mean)), dim=1)
 
     def losses(self, batch: Batch) -> Tensor:
         """For each row how hard its motion and its sentence find each other among the others' (B,)."""
-        motions = self.embed_motion(batch.frames, batch.lengths)
-        texts = self.embed_text(batch.words, (batch.words != PAD).sum(dim=1))
         assert batch.groups is not None
-        return contrast(motions @ texts.T / self.config.temperature, batch.groups)
+        motions, texts = self.embed_motion(batch.frames, batch.lengths), self._texts(batch.words)
+        found = contrast(motions @ texts.T / self.config.temperature, batch.groups)
+        if batch.others is None:
+            return found
+        between = texts @ self._texts(batch.others).T / self.config.temperature
+        return found + self.config.wordings * contrast(between, batch.groups)
+
+    def _texts(self, words: Tensor) -> Tensor:
+        return self.embed_text(words, (words != PAD).sum(dim=1))
 
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """Both encoders, each with its contract."""
@@ -144,14 +127,15 @@ class JointEmbedding(Net):
 
 
 def contrast(scores: Tensor, groups: Tensor) -> Tensor:
-    """Symmetric InfoNCE (B,) of the scores (B, B) of motions (rows) and sentences (columns), whose diagonal is right.
+    """Symmetric InfoNCE (B,) of scores (B, B) of one kind (rows) and another (columns), whose diagonal is right.
 
-    groups: (B,) what a row means: pairs off the diagonal that mean the same are left out.
+    groups: (B,) what a row shows: pairs off the diagonal that show the same are left out.
     """
-    alike = (groups[:, None] == groups) & ~torch.eye(len(groups), dtype=torch.bool, device=groups.device)
-    scores, right = scores.masked_fill(alike, -torch.inf), torch.arange(len(groups), device=groups.device)
-    both = (functional.cross_entropy(way, right, reduction="none") for way in (scores, scores.T))
-    return sum(both) / 2  # type: ignore[return-value]
+    right = torch.arange(len(groups), device=groups.device)
+    alike = (groups[:, None] == groups) & (right[:, None] != right)
+    scores = scores.masked_fill(alike, -torch.inf)
+    rows, columns = (functional.cross_entropy(way, right, reduction="none") for way in (scores, scores.T))
+    return (rows + columns) / 2
 
 
 def from_config(config: Mapping[str, Any]) -> JointEmbedding:

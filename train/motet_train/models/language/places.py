@@ -12,6 +12,7 @@ from torch import Tensor, nn
 from motet.motion.kinematics import AXES
 from motet.motion.skeleton import END_SUFFIX
 from motet.representation.contract import MotionContract
+from motet.representation.root_block import ROOT_BLOCK
 
 ROOT_ORDER = "yxz"
 TILT = {"x": "root.pitch", "z": "root.roll"}
@@ -24,13 +25,14 @@ class Figure:
 
     parents: index of each joint's parent, -1 for the root. offsets: (x, y, z) from the parent in metres. orders: of the
     Euler angles, "zyx" for Rz Ry Rx. columns: the channels of these angles, in degrees, in that order; D where there is
-    none and the angle is 0.
+    none and the angle is 0. root: the channels of the root block.
     """
 
     parents: tuple[int, ...] = ()
     offsets: tuple[tuple[float, ...], ...] = ()
     orders: tuple[str, ...] = ()
     columns: tuple[tuple[int, ...], ...] = ()
+    root: tuple[int, ...] = ()
 
 
 def figure_of(contract: MotionContract) -> Figure:
@@ -54,6 +56,7 @@ def figure_of(contract: MotionContract) -> Figure:
         tuple(joint.offset for joint in joints),
         orders,
         tuple(tuple(at.get(channel, len(at)) for channel in row) for row in channels),
+        tuple(at[channel] for channel in ROOT_BLOCK),
     )
 
 
@@ -78,7 +81,7 @@ class Places(nn.Module):
         self.register_buffer("across", crosses, persistent=False)
 
     def forward(self, frames: Tensor) -> Tensor:
-        """Frames (B, T, D), angles in degrees, to places (B, T, 3 J) in metres from the root, the heading taken out."""
+        """Frames (B, T, D), angles in degrees, to places (B, T, 3 (J - 1)) in metres of all but the root, seen from it."""
         padded = torch.cat([frames, torch.zeros_like(frames[..., :1])], dim=-1)
         angles = torch.deg2rad(padded[..., self.columns])[..., None, None]
         first, second, third = (self._about(place, angles[..., place, :, :]) for place in range(3))
@@ -88,7 +91,7 @@ class Places(nn.Module):
             found.append(found[parent] + turned[parent] @ self.offsets[joint])
             if joint in self.parents:
                 turned[joint] = turned[parent] @ local[..., joint, :, :]
-        return torch.cat(found, dim=-1)
+        return torch.cat(found[1:], dim=-1)
 
     def _about(self, place: int, angles: Tensor) -> Tensor:
         """Rotations (..., J, 3, 3) by angles (..., J, 1, 1) about the axis at a place in each joint's order."""
