@@ -39,7 +39,7 @@ DEFAULT = Recipe(
         weight_decay=0.05,
         keep="last",
     ),
-    LanguageVisits(offsets=1, windows=(25, 300), mirror=True, wordings=2),
+    LanguageVisits(offsets=1, windows=(25, 120), mirror=True, wordings=2),
     {"count": 5},
 )
 """What is shipped."""
