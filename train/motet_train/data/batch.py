@@ -1,6 +1,5 @@
 """A padded batch of motions with their sentences: what both directions between motion and language train on."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import torch
@@ -15,16 +14,12 @@ class Batch:
     lengths: (B,) int64, frames of each motion, at least 1.
     words: (B, W) int64, ids without SOS and EOS; PAD = 0 after the sentence's end.
     ended: (B,) bool, whether the motion ends after its last frame rather than being part of a longer one; None: all do.
-    groups: (B,) int64, equal for rows that are said to show the same; None where nobody asks.
-    others: (B, W) int64, a second sentence of each motion, as words; None where nobody asks.
     """
 
     frames: Tensor
     lengths: Tensor
     words: Tensor
     ended: Tensor | None = None
-    groups: Tensor | None = None
-    others: Tensor | None = None
 
     def __len__(self) -> int:
         """B."""
@@ -32,15 +27,13 @@ class Batch:
 
     def __getitem__(self, rows: slice) -> "Batch":
         """Some of the rows, padded as all of them are."""
-        return self._each(lambda tensor: tensor[rows])
+        ended = None if self.ended is None else self.ended[rows]
+        return Batch(self.frames[rows], self.lengths[rows], self.words[rows], ended)
 
     def to(self, device: torch.device | str) -> "Batch":
         """The same batch on a device."""
-        return self._each(lambda tensor: tensor.to(device))
-
-    def _each(self, change: Callable[[Tensor], Tensor]) -> "Batch":
-        rest = (None if part is None else change(part) for part in (self.ended, self.groups, self.others))
-        return Batch(change(self.frames), change(self.lengths), change(self.words), *rest)
+        ended = None if self.ended is None else self.ended.to(device)
+        return Batch(self.frames.to(device), self.lengths.to(device), self.words.to(device), ended)
 
 
 def before(lengths: Tensor, steps: int) -> Tensor:

@@ -3,7 +3,6 @@
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -15,24 +14,14 @@ from motet.models.language import padded
 from motet.models.text import MAX_WORDS, RULES, Vocabulary
 from motet.representation.base import FrameMirror
 from motet.representation.contract import MotionContract
-from motet_train.data.alike import alike
 from motet_train.data.batch import Batch
 from motet_train.data.errors import DataError
 from motet_train.data.mirror_text import mirror_text
 from motet_train.data.store import Store
 
 Ids = NDArray[np.int64]
-
-
-class Row(NamedTuple):
-    """Frames (T, D), whether the motion ends with them, the ids of two sentences, and the number of what all show."""
-
-    frames: Floats
-    ends: bool
-    sentence: Ids
-    other: Ids
-    group: int
-
+Row = tuple[Floats, bool, Ids]
+"""Frames (T, D), whether the motion ends with them, and the ids of a sentence."""
 
 MAX = sys.maxsize
 
@@ -44,31 +33,24 @@ SHUFFLED = 16
 class Examples:
     """The motions of one part of a store, each with its sentences as ids, and the mirrored ones' where mirror is set.
 
-    sentences: for each of ``records`` its sentences; mirrored: the same sentences, mirrored. groups: for each record
-    the number of what it shows, as it is and mirrored: equal for records that share a sentence, or a chain of them.
+    sentences: for each of ``records`` its sentences; mirrored: the same sentences, mirrored.
     """
 
     store: Store
     records: tuple[int, ...]
     sentences: tuple[tuple[Ids, ...], ...]
     mirrored: tuple[tuple[Ids, ...], ...]
-    groups: tuple[tuple[int, int], ...]
     mirror: FrameMirror | None = None
 
     def epoch(
-        self,
-        rng: np.random.Generator,
-        batch: int,
-        offsets: int | None = None,
-        windows: tuple[int, int] | None = None,
-        wordings: int = 1,
+        self, rng: np.random.Generator, batch: int, offsets: int | None = None, windows: tuple[int, int] | None = None
     ) -> Iterator[Batch]:
         """Visit motions once in batches of at most ``batch``, each with one of its sentences, drawn afresh.
 
         Every down-sampling offset of a motion is a visit of its own; ``offsets`` draws only so many for each. With a
         mirror every other visit, by chance, is to the mirrored motion and sentence. With
         ``windows`` a batch takes no more frames of a motion than a number drawn between the two, as often short as
-        long on a logarithmic scale, and from a place drawn afresh. wordings: 2 for a second sentence of each, too.
+        long on a logarithmic scale, and from a place drawn afresh.
         """
         longest = windows[1] if windows else MAX
         visits = [(i, int(offset)) for i in range(len(self.records)) for offset in self._drawn(rng, i, offsets)]
@@ -80,7 +62,7 @@ class Examples:
             found += [alike[i : i + batch] for i in range(0, len(alike), batch)]
         for place in rng.permutation(len(found)):
             limit = round(float(np.exp(rng.uniform(*np.log(windows))))) if windows else MAX
-            yield _padded([self._visit(rng, i, offset, limit, wordings) for i, offset in found[place]], wordings)
+            yield _padded([self._visit(rng, i, offset, limit) for i, offset in found[place]])
 
     def everything(self, batch: int, longest: int | None = None) -> Iterator[Batch]:
         """The first ``longest`` frames of every motion, at its first offset, with each of its sentences: to validate.
@@ -90,8 +72,8 @@ class Examples:
         pairs = [(i, sentence) for i, found in enumerate(self.sentences) for sentence in found]
         pairs.sort(key=lambda pair: self._length(pair[0], 0))
         for start in range(0, len(pairs), batch):
-            cut = [(*self._part(i, 0, 0, longest or MAX), s, i) for i, s in pairs[start : start + batch]]
-            yield _padded([Row(frames, ends, s, s, self.groups[i][0]) for frames, ends, s, i in cut])
+            cut = [(*self._part(i, 0, 0, longest or MAX), s) for i, s in pairs[start : start + batch]]
+            yield _padded(cut)
 
     def _drawn(self, rng: np.random.Generator, i: int, offsets: int | None) -> Ids:
         count = len(self.store.records[self.records[i]].spans)
@@ -101,16 +83,13 @@ class Examples:
         start, stop = self.store.records[self.records[i]].spans[offset]
         return stop - start
 
-    def _visit(self, rng: np.random.Generator, i: int, offset: int, longest: int, wordings: int) -> Row:
+    def _visit(self, rng: np.random.Generator, i: int, offset: int, longest: int) -> Row:
         start = int(rng.integers(max(0, self._length(i, offset) - longest) + 1))
         frames, ended = self._part(i, offset, start, longest)
-        sentence = other = int(rng.integers(len(self.sentences[i])))
-        mirrored = self.mirror is not None and rng.random() < 0.5
-        if wordings > 1:
-            other = int(rng.integers(len(self.sentences[i])))
-        if self.mirror is None or not mirrored:
-            return Row(frames, ended, self.sentences[i][sentence], self.sentences[i][other], self.groups[i][0])
-        return Row(self.mirror(frames), ended, self.mirrored[i][sentence], self.mirrored[i][other], self.groups[i][1])
+        sentence = int(rng.integers(len(self.sentences[i])))
+        if self.mirror is not None and rng.random() < 0.5:
+            return self.mirror(frames), ended, self.mirrored[i][sentence]
+        return frames, ended, self.sentences[i][sentence]
 
     def _part(self, i: int, offset: int, start: int, longest: int) -> tuple[Floats, bool]:
         """Frames of a motion, and whether it ends with them."""
@@ -134,12 +113,7 @@ def examples(store: Store, records: Sequence[int], vocabulary: Vocabulary, mirro
             mirrored.append(tuple(vocabulary.encode(mirror_text(s))[0] for s in found) if mirror else ())
     if not kept:
         raise DataError(f"none of {len(records)} motions has a sentence of 1 to {MAX_WORDS} words that can be used")
-    return Examples(store, tuple(kept), tuple(sentences), tuple(mirrored), _groups(sentences, mirrored), mirror)
-
-
-def _groups(sentences: Sequence[Sequence[Ids]], mirrored: Sequence[Sequence[Ids]]) -> tuple[tuple[int, int], ...]:
-    found = alike([[ids.tobytes() for ids in said] for said in (*sentences, *mirrored)])
-    return tuple(zip(found[: len(sentences)], found[len(sentences) :], strict=True))
+    return Examples(store, tuple(kept), tuple(sentences), tuple(mirrored), mirror)
 
 
 def frame_mirror(contract: MotionContract) -> FrameMirror:
@@ -155,15 +129,9 @@ def usable(sentence: str) -> bool:
     return 1 <= len(RULES.words(sentence)) <= MAX_WORDS
 
 
-def _padded(rows: Sequence[Row], wordings: int = 1) -> Batch:
+def _padded(rows: Sequence[Row]) -> Batch:
     """The rows as one batch, padded on the right, sentences with PAD, whose id is 0."""
-    frames, lengths = padded([row.frames for row in rows], "float32")
-    sentences, others = (padded(said, "int64")[0] for said in zip(*((r.sentence, r.other) for r in rows), strict=True))
-    return Batch(
-        torch.from_numpy(frames),
-        torch.from_numpy(lengths),
-        torch.from_numpy(sentences),
-        torch.tensor([row.ends for row in rows]),
-        torch.tensor([row.group for row in rows]),
-        torch.from_numpy(others) if wordings > 1 else None,
-    )
+    frames, lengths = padded([frames for frames, _, _ in rows], "float32")
+    sentences, _ = padded([sentence for _, _, sentence in rows], "int64")
+    ended = torch.tensor([end for _, end, _ in rows])
+    return Batch(torch.from_numpy(frames), torch.from_numpy(lengths), torch.from_numpy(sentences), ended)

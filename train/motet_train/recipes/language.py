@@ -30,13 +30,12 @@ class LanguageVisits:
     """Which motions an epoch visits: see :meth:`motet_train.data.batches.Examples.epoch`.
 
     offsets: how many down-sampling offsets of each motion. windows: frames of each. mirror: whether half of all visits
-    are to left-right mirrored motions. wordings: 2 for a second sentence of each motion.
+    are to left-right mirrored motions.
     """
 
     offsets: int | None = None
     windows: tuple[int, int] | None = None
     mirror: bool = False
-    wordings: int = 1
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,26 +1,36 @@
 """The recipe of the joint embedding of motions and sentences, and its training from a store."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import asdict
-from typing import Any
+from dataclasses import asdict, dataclass
 
-import numpy as np
 import torch
-from torch import Tensor, nn
+from torch import Tensor
 from torch.nn import functional
 
 from motet.models.language import padded
 from motet.models.text import RULES
 from motet_train.data.alike import alike
-from motet_train.data.batch import Batch
 from motet_train.data.batches import usable
 from motet_train.data.store import Store
+from motet_train.data.views import Pairs, views
 from motet_train.descent import GradientLearner, Term, Training
 from motet_train.models.language.joint_embedding import JointEmbedding, JointEmbeddingConfig, from_config
 from motet_train.models.language.places import figure_of
-from motet_train.recipes.language import Divided, LanguageVisits, divided, manifest
+from motet_train.recipes.language import Divided, divided, manifest
 from motet_train.recipes.recipe import Job, Recipe
 from motet_train.runs import Run
+
+
+@dataclass(frozen=True)
+class SearchVisits:
+    """How motions are seen: so many views of each, of at most a number of frames drawn between the two; mirrored, too.
+
+    See :func:`motet_train.data.views.views`.
+    """
+
+    views: int = 8
+    windows: tuple[int, int] = (25, 120)
+    mirror: bool = True
+
 
 DEFAULT = Recipe(
     "search",
@@ -39,7 +49,7 @@ DEFAULT = Recipe(
         weight_decay=0.05,
         keep="last",
     ),
-    LanguageVisits(offsets=1, windows=(25, 120), mirror=True, wordings=2),
+    SearchVisits(),
     {"count": 5},
 )
 """What is shipped."""
@@ -59,25 +69,22 @@ def train_search(store: Store, job: Job, data: str = "", by: str = "trial") -> R
     torch.manual_seed(job.about.seed)
     net = from_config(config)
     net.measure_by(found.contract.mean, found.contract.std)
-    return job.run(net, _learner(net.to(job.device), found, job), manifest(job, found, config, data, by))
+    return job.run(net, _learner(net, found, job), manifest(job, found, config, data, by))
 
 
 def _learner(net: JointEmbedding, found: Divided, job: Job) -> GradientLearner:
     assert job.recipe.training is not None
     training, visits = job.recipe.training, job.recipe.visits
-    train, asked = found.examples(found.parts.train), _Asked(found, found.parts.validation)
+    asked = _Asked(found, found.parts.validation)
+    seen = views(found.examples(found.parts.train), net.statistics, visits.views, tuple(visits.windows), job.about.seed)
+    net.see_by(seen.seen)
 
-    def batches(rng: np.random.Generator) -> Iterator[Batch]:
-        return train.epoch(rng, training.batch, visits.offsets, visits.windows, visits.wordings)
+    def losses(pairs: Pairs) -> tuple[Term, ...]:
+        return (Term(net.losses(pairs), len(pairs)),)
 
-    def validated() -> Mapping[str, Any]:
-        return asked.measures(learner.kept)
-
-    def losses(batch: Batch) -> tuple[Term, ...]:
-        return (Term(net.losses(batch), len(batch)),)
-
-    learner = GradientLearner(net, training, losses, batches, validated)
-    return learner
+    return GradientLearner(
+        net.to(job.device), training, losses, lambda rng: seen.epoch(rng, training.batch), lambda: asked.measures(net)
+    )
 
 
 class _Asked:
@@ -96,9 +103,8 @@ class _Asked:
         self.rows = torch.tensor([row for _, row in said])
 
     @torch.no_grad()
-    def measures(self, net: nn.Module) -> dict[str, float]:
+    def measures(self, net: JointEmbedding) -> dict[str, float]:
         """The mean surprise at the motions that show what a sentence says, and how often one is among the first."""
-        assert isinstance(net, JointEmbedding)
         device = net.mean.device
         motions = net.embed_motion(*(part.to(device) for part in self.motions)).cpu()
         texts = net.embed_text(*(part.to(device) for part in self.texts)).cpu()

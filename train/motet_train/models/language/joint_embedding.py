@@ -18,7 +18,8 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from motet.bundle.graph import GraphSpec, TensorSpec
-from motet_train.data.batch import Batch, before
+from motet_train.data.batch import before
+from motet_train.data.views import Pairs
 from motet_train.models.language.dropout import WordEmbedding
 from motet_train.models.language.places import Figure, Places
 from motet_train.models.language.statistics import of_frames, of_speeds
@@ -33,8 +34,8 @@ LIMIT = 5.0
 NEAR = 0.2
 """Metres by which places are divided."""
 
-STILL = 1e-3
-"""Variance of a statistic that says nothing."""
+STILL = 0.03
+"""The least standard deviation of a statistic by which it is divided."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,10 @@ class JointEmbeddingConfig:
 
 
 class JointEmbedding(Net):
-    """Both encoders with the motions' normalisation."""
+    """Both encoders with the motions' normalisation. seen_mean, seen_scale: of the statistics."""
+
+    seen_mean: Tensor
+    seen_scale: Tensor
 
     def __init__(self, config: JointEmbeddingConfig) -> None:
         super().__init__(config.channels)
@@ -68,7 +72,8 @@ class JointEmbedding(Net):
         joints = max(0, len(config.figure.parents) - 1)
         seen = 3 * joints + len(config.figure.root) if joints else config.channels
         statistics = of_frames(torch.zeros(1, 1, seen), torch.ones(1)).shape[1] + 2 * joints + 1
-        self.scaled = nn.BatchNorm1d(statistics, eps=STILL, affine=False)
+        self.register_buffer("seen_mean", torch.zeros(statistics))
+        self.register_buffer("seen_scale", torch.ones(statistics))
         self.motion = nn.Linear(statistics, config.vector)
         self.words = WordEmbedding(config.words, config.embedding, config.word_dropout)
         self.weight = nn.Linear(config.embedding, 1)
@@ -77,10 +82,20 @@ class JointEmbedding(Net):
 
     def embed_motion(self, frames: Tensor, lengths: Tensor) -> Tensor:
         """Frames (B, T, D) in the contract's units, of lengths (B,), to unit vectors (B, E)."""
-        found = self.scaled(self.statistics(frames, lengths)).clamp(-LIMIT, LIMIT)
+        return self.embed_statistics(self.statistics(frames, lengths))
+
+    def embed_statistics(self, seen: Tensor) -> Tensor:
+        """Statistics (B, S) to unit vectors (B, E)."""
+        found = normalised(seen, self.seen_mean, self.seen_scale, LIMIT)
         if self.training:
             found = found + self.config.noise * torch.randn_like(found)
         return functional.normalize(self.motion(self.dropout(found)), dim=1)
+
+    def see_by(self, seen: Tensor) -> None:
+        """Set mean and scale of statistics from examples (..., S)."""
+        rows = seen.flatten(0, -2)
+        self.seen_mean.copy_(rows.mean(dim=0))
+        self.seen_scale.copy_(rows.std(dim=0).clamp(min=STILL))
 
     def statistics(self, frames: Tensor, lengths: Tensor) -> Tensor:
         """Frames (B, T, D) of lengths (B,) to what is seen of the whole motion (B, S)."""
@@ -99,15 +114,12 @@ class JointEmbedding(Net):
         mean = (weights[..., None] * vectors).sum(dim=1)
         return functional.normalize(self.text(self.dropout(mean)), dim=1)
 
-    def losses(self, batch: Batch) -> Tensor:
-        """For each row how hard its motion and its sentence find each other among the others' (B,)."""
-        assert batch.groups is not None
-        motions, texts = self.embed_motion(batch.frames, batch.lengths), self._texts(batch.words)
-        found = contrast(motions @ texts.T / self.config.temperature, batch.groups)
-        if batch.others is None:
-            return found
-        between = texts @ self._texts(batch.others).T / self.config.temperature
-        return found + self.config.wordings * contrast(between, batch.groups)
+    def losses(self, pairs: Pairs) -> Tensor:
+        """For each row how hard its motion and its sentence, and its sentences, find each other among all (B,)."""
+        motions, texts, others = self.embed_statistics(pairs.seen), self._texts(pairs.words), self._texts(pairs.others)
+        found = contrast(motions @ texts.T / self.config.temperature, pairs.groups)
+        between = contrast(texts @ others.T / self.config.temperature, pairs.groups)
+        return found + self.config.wordings * between
 
     def _texts(self, words: Tensor) -> Tensor:
         return self.embed_text(words, (words != PAD).sum(dim=1))

@@ -81,7 +81,7 @@ class Places(nn.Module):
         self.register_buffer("across", crosses, persistent=False)
 
     def forward(self, frames: Tensor) -> Tensor:
-        """Frames (B, T, D), angles in degrees, to places (B, T, 3 (J - 1)) in metres of all but the root, seen from it."""
+        """Frames (B, T, D), angles in degrees, to places (B, T, 3 (J - 1)) in metres from the root of the others."""
         padded = torch.cat([frames, torch.zeros_like(frames[..., :1])], dim=-1)
         angles = torch.deg2rad(padded[..., self.columns])[..., None, None]
         first, second, third = (self._about(place, angles[..., place, :, :]) for place in range(3))

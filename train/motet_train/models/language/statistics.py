@@ -29,7 +29,9 @@ def of_frames(x: Tensor, lengths: Tensor) -> Tensor:
 def of_speeds(places: Tensor, lengths: Tensor) -> Tensor:
     """Places (B, T, 3 J) of joints to roots of their mean and greatest speeds (B, 2 J), per frame."""
     steps = torch.diff(places, dim=1, prepend=places[:, :1]).reshape(*places.shape[:2], -1, 3)
-    speed = torch.where(before(lengths, places.shape[1])[..., None], (steps.square().sum(dim=-1) + SMALLEST**2).sqrt(), 0.0)
+    speed = torch.where(
+        before(lengths, places.shape[1])[..., None], (steps.square().sum(dim=-1) + SMALLEST**2).sqrt(), 0.0
+    )
     return torch.cat([speed.sum(dim=1) / lengths[:, None], speed.amax(dim=1)], dim=1).sqrt()
 
 
