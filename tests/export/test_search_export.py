@@ -39,7 +39,7 @@ def run() -> Run:
     net = JointEmbedding(JointEmbeddingConfig(D, len(WORDS), figure_of(CONTRACT), embedding=8, vector=6))
     net.measure_by(CONTRACT.mean, CONTRACT.std)
     frames = torch.from_numpy(walks(CONTRACT, np.random.default_rng(0), 50, 20))
-    net.train().embed_motion(frames, torch.full((50,), 20))  # what statistics are like
+    net.see_by(net.statistics(frames, torch.full((50,), 20)))
     named = {"name": "small-search", "verb": "search", "model": "joint-embedding", "loop": "nearest"}
     known = {"text": RULES.to_json(), "vocabulary": WORDS, "config": asdict(net.config), "defaults": {"count": 5}}
     return Run({**named, **known, "motion": CONTRACT.to_json(), "licence": {}, "training": {}}, net)

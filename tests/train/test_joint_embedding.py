@@ -17,12 +17,13 @@ from motet.motion.kinematics import positions
 from motet.representation.contract import MotionContract
 from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS
 from motet_train.data.alike import alike
-from motet_train.data.batch import Batch
 from motet_train.data.preparation import Preparation
-from motet_train.data.store import prepare
+from motet_train.data.store import Store, prepare
+from motet_train.data.views import Pairs, views
 from motet_train.models.language.joint_embedding import JointEmbedding, JointEmbeddingConfig, contrast
 from motet_train.models.language.places import Figure, Places, figure_of
 from motet_train.models.language.statistics import PARTS, SMALLEST, of_frames, of_speeds
+from motet_train.recipes.language import divided
 from motet_train.runs import MODELS, Run
 
 JOINTS = [joint.name for joint in HUMANOID.joints[1:] if not joint.name.endswith("_end")]
@@ -40,10 +41,10 @@ def net(**changes: float) -> JointEmbedding:
     return found
 
 
-def batch() -> Batch:
-    frames = 20 * torch.randn(4, 9, D, generator=torch.Generator().manual_seed(1))
-    words = torch.tensor([[5, 4, 3], [6, 0, 0], [7, 8, 0], [9, 10, 11]])
-    return Batch(frames, torch.tensor([9, 2, 5, 3]), words, None, torch.tensor([0, 1, 0, 2]), words.flip(0))
+FRAMES = 20 * torch.randn(4, 9, D, generator=torch.Generator().manual_seed(1))
+LENGTHS = torch.tensor([9, 2, 5, 3])
+WORDS = torch.tensor([[5, 4, 3], [6, 0, 0], [7, 8, 0], [9, 10, 11]])
+COUNTS = (WORDS != 0).sum(dim=1)
 
 
 def test_places_are_those_of_the_motion_that_plays() -> None:
@@ -76,16 +77,15 @@ def test_statistics_are_those_of_numpy() -> None:
 
 
 def test_a_row_of_a_padded_batch_gets_what_it_gets_alone() -> None:
-    model, rows = net().eval(), batch()
-    counts = (rows.words != 0).sum(dim=1)
-    motions, texts = model.embed_motion(rows.frames, rows.lengths), model.embed_text(rows.words, counts)
+    model = net().eval()
+    motions, texts = model.embed_motion(FRAMES, LENGTHS), model.embed_text(WORDS, COUNTS)
     assert torch.allclose(motions.norm(dim=1), torch.ones(4))
     assert torch.allclose(texts.norm(dim=1), torch.ones(4))
     for row in range(4):
-        frames, words = rows.frames[row : row + 1, : rows.lengths[row]], rows.words[row : row + 1, : counts[row]]
-        alone = model.embed_motion(frames, rows.lengths[row : row + 1])
+        alone = model.embed_motion(FRAMES[row : row + 1, : LENGTHS[row]], LENGTHS[row : row + 1])
         torch.testing.assert_close(alone, motions[row : row + 1])
-        torch.testing.assert_close(model.embed_text(words, counts[row : row + 1]), texts[row : row + 1])
+        alone = model.embed_text(WORDS[row : row + 1, : COUNTS[row]], COUNTS[row : row + 1])
+        torch.testing.assert_close(alone, texts[row : row + 1])
 
 
 def naive_contrast(scores: Tensor, groups: list[int]) -> list[float]:
@@ -104,15 +104,14 @@ def test_the_loss_is_that_of_a_naive_twin() -> None:
     np.testing.assert_allclose(contrast(scores, torch.tensor(groups)), naive_contrast(scores, groups), rtol=1e-5)
 
 
-def test_a_second_wording_adds_its_loss() -> None:
-    model, rows = net(wordings=0.5).eval(), batch()
-    texts, others = (model.embed_text(said, (said != 0).sum(dim=1)) for said in (rows.words, rows.words.flip(0)))
-    motions = model.embed_motion(rows.frames, rows.lengths)
-    groups = rows.groups
-    assert groups is not None
+def test_motions_are_set_against_sentences_and_sentences_against_wordings() -> None:
+    model, groups = net(wordings=0.5).eval(), torch.tensor([0, 1, 0, 2])
+    motions = model.embed_motion(FRAMES, LENGTHS)
+    texts, others = model.embed_text(WORDS, COUNTS), model.embed_text(WORDS.flip(0), COUNTS.flip(0))
     wanted = contrast(motions @ texts.T / 0.1, groups) + 0.5 * contrast(texts @ others.T / 0.1, groups)
-    torch.testing.assert_close(model.losses(rows), wanted)
-    torch.testing.assert_close(model.losses(replace(rows, others=None)), contrast(motions @ texts.T / 0.1, groups))
+    pairs = Pairs(model.statistics(FRAMES, LENGTHS), WORDS, WORDS.flip(0), groups)
+    torch.testing.assert_close(model.losses(pairs), wanted)
+    assert torch.equal(pairs[1:3].groups, groups[1:3])
 
 
 def test_what_shows_the_same_is_what_is_linked_by_sentences() -> None:
@@ -128,13 +127,8 @@ def test_a_net_comes_back_from_its_configuration() -> None:
     model = net()
     again = MODELS["joint-embedding"](json.loads(json.dumps(asdict(model.config))))
     again.load_state_dict(model.state_dict())
-    rows = batch()
     assert isinstance(again, JointEmbedding)
-    assert torch.equal(again.eval().embed_motion(rows.frames, rows.lengths), model.eval().embed_motion(*_motion(rows)))
-
-
-def _motion(rows: Batch) -> tuple[Tensor, Tensor]:
-    return rows.frames, rows.lengths
+    assert torch.equal(again.eval().embed_motion(FRAMES, LENGTHS), model.eval().embed_motion(FRAMES, LENGTHS))
 
 
 @pytest.fixture(scope="module")
@@ -147,6 +141,20 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
     prepare(said, folder, Preparation("root_angles", humanoid=False, trim=False, cut=False))
     return folder
+
+
+def test_views_are_parts_of_the_motions_with_their_sentences(store: Path) -> None:
+    found = divided(Store.open(store), mirror=False)
+    examples = found.examples(found.parts.train)
+    made = views(examples, lambda frames, lengths: frames[:, :1].sum(dim=2), 3, (2, 4), seed=0)
+    assert made.seen.shape == (1, len(examples.records), 3, 1)
+    (pairs,) = made.epoch(np.random.default_rng(0), 100)
+    firsts = [{float(f.sum()) for o in range(3) for f in found.store.sequence(r, o)} for r in examples.records]
+    for seen, words, other in zip(pairs.seen, pairs.words, pairs.others, strict=True):
+        (record,) = [i for i, known in enumerate(firsts) if any(np.isclose(float(seen), one) for one in known)]
+        said = [ids.tolist() for ids in examples.sentences[record]]
+        assert words[words != 0].tolist() in said
+        assert other[other != 0].tolist() in said
 
 
 def trained(store: Path, out: Path, *options: object) -> Run:

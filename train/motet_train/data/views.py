@@ -79,7 +79,7 @@ def views(examples: Examples, see: See, count: int, windows: tuple[int, int], se
         frames, lengths = padded([*parts, *mirrored], "float32")
         found.append(see(torch.from_numpy(frames), torch.from_numpy(lengths)))
     sentences = (examples.sentences,) if examples.mirror is None else (examples.sentences, examples.mirrored)
-    seen = torch.stack(found).unflatten(1, (len(sentences), count)).transpose(0, 1)
+    seen = torch.stack(found).reshape(len(found), len(sentences), count, -1).transpose(0, 1)
     groups = alike([[ids.tobytes() for ids in said] for kind in sentences for said in kind])
     return Views(seen, sentences, np.array(groups, dtype=np.int64).reshape(len(sentences), -1))
 

@@ -126,10 +126,8 @@ class JointEmbedding(Net):
 
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """Both encoders, each with its contract."""
-        vector, lengths = (
-            TensorSpec("vector", ("batch", self.config.vector)),
-            TensorSpec("lengths", ("batch",), "int64"),
-        )
+        vector = TensorSpec("vector", ("batch", self.config.vector))
+        lengths = TensorSpec("lengths", ("batch",), "int64")
         frames = TensorSpec("frames", ("batch", "time", self.config.channels))
         words = TensorSpec("words", ("batch", "words"), "int64")
         return {
