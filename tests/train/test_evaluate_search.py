@@ -66,7 +66,7 @@ def test_a_perfect_model_finds_all_at_once(corpus: SplitStore) -> None:
     report = search_report(FakeSearch(corpus.store), corpus, progress=parts.append)  # type: ignore[arg-type]
     assert parts == ["sentences", "floors", "motions"]
     first = {"first_1": 1, "first_5": 1, "first_10": 1, "median_rank": 1}
-    assert report["asked"] == {"sentences": 5}
+    assert report["asked"] == {"sentences": 5, "known": 1, "best_5": 1}
     assert report["text"] == report["text_alike"] == report["words_text"] == first
     assert report["motion"] == {"alike": 1, "features_alike": 1, "of": 5}
     assert "text.first_5" in report_table({"fake": report}, GOALS)

@@ -34,13 +34,14 @@ def search_report(
     """Ranks of test motions, asked for by sentences, and nearest training motions of test motions; beside floors.
 
     "text": the sentences of test motions whose wordings no training saw ask for their own among all test motions:
-    shares that are among the first, and the median rank. "text_alike": any motion counts of which the same was said.
+    shares that are among the first, and the median rank. "asked": how many sentences; the share of them that are about
+    what a training motion shows; and "best_5", the "first_5" of knowing what is alike and no more. "text_alike": any motion counts of which the same was said.
     "words_": the floor of them: the training motion with the most similar sentence (TF-IDF), and the test motions that
     are nearest to it. "likelihood_": by a describe model of the same split, where one is given. "motion": the share of
     test motions whose nearest training motion is one of which the same was said, of those ("of") that have any.
     """
     asked = _Asked(corpus)
-    report: Report = {**origin(model.manifest, corpus), "asked": {"sentences": float(len(asked.sentences))}}
+    report: Report = {**origin(model.manifest, corpus), "asked": asked.told()}
     progress("sentences")
     with unknown_words_allowed():
         index = _index(model, corpus, corpus.parts.test)
@@ -58,7 +59,7 @@ class _Asked:
     """The sentences about test motions, and which motions each is about."""
 
     def __init__(self, corpus: SplitStore) -> None:
-        self.records = corpus.parts.test
+        self.records, self.train = corpus.parts.test, corpus.parts.train
         kept = [corpus.kept(record) for record in self.records]
         rows = [(row, s) for row, said in enumerate(kept if any(kept) else corpus.unseen(self.records)) for s in said]
         known = {word for said in corpus.references(corpus.parts.train) for s in said for word in s.split()}
@@ -70,6 +71,13 @@ class _Asked:
     def groups(self) -> NDArray[np.int64]:
         """For each record of the store the number of what was said of it."""
         return np.array(alike([[*map(RULES.normalise, (*e.sentences, *e.unseen))] for e in self.entries]))
+
+    def told(self) -> dict[str, float]:
+        """How many sentences there are, and what can be expected of them."""
+        groups, known = self.groups[list(self.records)][self.rows], self.groups[list(self.train)]
+        alike = (groups[:, None] == self.groups[list(self.records)]).sum(axis=1)
+        best = float(np.minimum(1, 5 / alike).mean())
+        return {"sentences": float(len(groups)), "known": float(np.isin(groups, known).mean()), "best_5": best}
 
     def measured(self, name: str, order: Order) -> Report:
         """Two groups of figures, of own motions and of those alike."""
