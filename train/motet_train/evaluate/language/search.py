@@ -33,9 +33,10 @@ def search_report(
 ) -> Report:
     """Ranks of test motions, asked for by sentences, and nearest training motions of test motions; beside floors.
 
+    "asked": how many sentences there are, the share of them that are about what a training motion shows ("known"), and
+    the "first_5" of "text" for who knows what is said and no more ("best_5").
     "text": the sentences of test motions whose wordings no training saw ask for their own among all test motions:
-    shares that are among the first, and the median rank. "asked": how many sentences; the share of them that are about
-    what a training motion shows; and "best_5", the "first_5" of knowing what is alike and no more. "text_alike": any motion counts of which the same was said.
+    shares that are among the first, and the median rank. "text_alike": any motion counts of which the same was said.
     "words_": the floor of them: the training motion with the most similar sentence (TF-IDF), and the test motions that
     are nearest to it. "likelihood_": by a describe model of the same split, where one is given. "motion": the share of
     test motions whose nearest training motion is one of which the same was said, of those ("of") that have any.
