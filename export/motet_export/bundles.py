@@ -71,7 +71,8 @@ def parity(manifest: Manifest, onnx: Mapping[str, Graph], torch: Mapping[str, Gr
         f"{role}.one_step": check_one_step(role, onnx[role], graph, draws[role]) for role, graph in torch.items()
     }
     horizon = manifest.defaults["horizon"] if manifest.verb == "predict" else None
-    report["step.carried"] = check_carried(onnx["step"], torch["step"], draws["step"], horizon)
+    if "step" in torch:
+        report["step.carried"] = check_carried(onnx["step"], torch["step"], draws["step"], horizon)
     report["runs"] = check_runs(whole_runs(manifest, onnx, torch))
     report["versions"] = {name: version(name) for name in ("torch", "onnx", "onnxruntime")}
     report["machine"] = f"{platform.system()} {platform.machine()}"

@@ -12,8 +12,10 @@ from motet.bundle.manifest import Manifest
 from motet.models.control import ControlModel
 from motet.models.describe import DescribeModel
 from motet.models.generate import GenerateModel
+from motet.models.language import LanguageModel
 from motet.models.load import build
 from motet.models.predict import PredictModel
+from motet.models.search import SearchModel
 from motet.models.text import MAX_WORDS, SPECIALS
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
@@ -110,11 +112,19 @@ def _predicted(horizons: int, model: PredictModel) -> Decoded:
     return {"frames": contract.normalised(found)}
 
 
+def _search(_: SearchModel) -> Named:
+    return {"vectors": lambda model: {"motions": model.embed(_motions(model)), "texts": _texts(model)}}
+
+
+def _texts(model: SearchModel) -> NDArray[np.float32]:
+    return model.embed_text(_sentences(model))
+
+
 def _pair(models: Sequence[Any], run: Callable[[Any], Decoded]) -> tuple[Decoded, Decoded]:
     return run(models[0]), run(models[1])
 
 
-def _motions(model: DescribeModel | GenerateModel) -> list[Motion]:
+def _motions(model: LanguageModel) -> list[Motion]:
     """Eight random walks of 5 to 75 frames about the mean of the training data."""
     rng = np.random.default_rng(3)
     contract = model.contract
@@ -126,7 +136,7 @@ def _motions(model: DescribeModel | GenerateModel) -> list[Motion]:
     return [contract.features(walk(frames)) for frames in range(5, 85, 10)]
 
 
-def _sentences(model: DescribeModel | GenerateModel) -> list[str]:
+def _sentences(model: LanguageModel) -> list[str]:
     """Eight sentences of 1 to 15 words of the vocabulary."""
     rng = np.random.default_rng(4)
     words = model.vocabulary.words[len(SPECIALS) :]
@@ -138,4 +148,5 @@ _RUNS: Mapping[str, Callable[..., Named]] = {
     "describe": _describe,
     "generate": _generate,
     "predict": _predict,
+    "search": _search,
 }

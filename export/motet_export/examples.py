@@ -31,7 +31,7 @@ def examples(manifest: Manifest, torch: Mapping[str, Graph]) -> dict[str, Exampl
     A history of codes is what the encoder makes of such frames in torch; and a predictor's step gets all that its
     encoder gives: from numbers far from any frames a net that feeds its frames back can make much of a rounding.
     """
-    encoder, contract = torch["encoder"], manifest.motion
+    contract = manifest.motion
 
     def draw(spec: GraphSpec, rng: np.random.Generator, rows: int) -> Arrays:
         found = example(spec, rng, rows, vocabulary=max(1, len(manifest.vocabulary)))
@@ -40,7 +40,7 @@ def examples(manifest: Manifest, torch: Mapping[str, Graph]) -> dict[str, Exampl
     def _like(value: NDArray[Any], name: str, rng: np.random.Generator) -> NDArray[Any]:
         if name == "history":
             frames = walks(contract, rng, *value.shape[:2])
-            return encoder({"frames": frames.reshape(-1, frames.shape[2])})["codes"].reshape(value.shape)
+            return torch["encoder"]({"frames": frames.reshape(-1, frames.shape[2])})["codes"].reshape(value.shape)
         frames = walks(contract, rng, len(value), value.shape[1] if value.ndim == 3 else 1).reshape(
             *value.shape[:-1], -1
         )
@@ -51,7 +51,7 @@ def examples(manifest: Manifest, torch: Mapping[str, Graph]) -> dict[str, Exampl
 
     draws: dict[str, Examples] = {role: partial(draw, graph.spec) for role, graph in torch.items()}
     if manifest.verb == "predict":
-        draws["step"] = lambda rng, rows: encoder(draws["encoder"](rng, rows))
+        draws["step"] = lambda rng, rows: torch["encoder"](draws["encoder"](rng, rows))
     return draws
 
 

@@ -13,8 +13,10 @@ from motet.decode.noise import Recording
 from motet.models.control import ControlModel
 from motet.models.describe import DescribeModel
 from motet.models.generate import GenerateModel
+from motet.models.language import LanguageModel
 from motet.models.load import build
 from motet.models.predict import PredictModel
+from motet.models.search import SearchModel
 from motet.models.text import SPECIALS
 from motet_export.examples import Examples, walks
 
@@ -59,7 +61,7 @@ def _describe(model: DescribeModel, rng: np.random.Generator) -> Run:
 
 def _generate(model: GenerateModel, rng: np.random.Generator) -> Run:
     """Two seconds for a sentence of five words, with few hypotheses where the loop has such."""
-    text = " ".join(rng.choice(model.vocabulary.words[len(SPECIALS) :], 5))
+    text = _text(model, rng)
     settings: dict[str, Any] = {
         name: 2 for name in ("hypotheses", "candidates", "max_seconds") if name in model.defaults
     }
@@ -74,9 +76,19 @@ def _predict(model: PredictModel, rng: np.random.Generator) -> Run:
     return {"frames": walks(model.contract, rng, 1, model.seed_frames)[0]}, {"frames": model.horizon + 1}
 
 
+def _search(model: SearchModel, rng: np.random.Generator) -> Run:
+    """A motion, and a sentence of five words."""
+    return {"frames": walks(model.contract, rng, 1, FRAMES)[0]}, {"text": _text(model, rng)}
+
+
+def _text(model: LanguageModel, rng: np.random.Generator) -> str:
+    return " ".join(rng.choice(model.vocabulary.words[len(SPECIALS) :], 5))
+
+
 _RUNS: Mapping[str, Callable[..., Run]] = {
     "control": _control,
     "describe": _describe,
     "generate": _generate,
     "predict": _predict,
+    "search": _search,
 }

@@ -28,8 +28,10 @@ from motet.formats import write_motion as write
 from motet.models.control import ControlModel, ControlSession, Snapshot
 from motet.models.describe import DescribeModel, Description
 from motet.models.generate import Generated, GenerateModel
+from motet.models.index import Hit, Index
 from motet.models.load import load, load_as
 from motet.models.predict import PredictModel, PredictSession
+from motet.models.search import SearchModel
 from motet.motion.joint_map import read_map
 from motet.motion.motion import Motion
 from motet.motion.retarget import Humanoid, from_humanoid, to_humanoid
@@ -48,7 +50,9 @@ __all__ = [
     "FormatError",
     "GenerateModel",
     "Generated",
+    "Hit",
     "Humanoid",
+    "Index",
     "MotetError",
     "Motion",
     "MotionError",
@@ -56,6 +60,7 @@ __all__ = [
     "PredictModel",
     "PredictSession",
     "ScriptError",
+    "SearchModel",
     "SessionOptions",
     "Snapshot",
     "TextError",

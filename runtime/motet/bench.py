@@ -16,6 +16,7 @@ from motet.models.control import ControlModel
 from motet.models.describe import DescribeModel
 from motet.models.generate import GenerateModel
 from motet.models.predict import PredictModel
+from motet.models.search import SearchModel
 from motet.models.text import EOS, SPECIALS
 
 BATCHES = (64, 256, 512, 1024, 2048, 4096)
@@ -29,6 +30,9 @@ FILE_SECONDS = 2.8
 
 DRAWS = 100
 """Draws of a consensus."""
+
+VECTORS = 100_000
+"""Of motions that are searched."""
 
 TIMES = ("us", "ms")
 """Units where less is better."""
@@ -154,11 +158,25 @@ def predict_figures(model: PredictModel, seconds: float) -> Figures:
     }
 
 
+def search_figures(model: SearchModel, seconds: float) -> Figures:
+    """A sentence of :data:`WORDS` words, a motion of :data:`SECONDS`, and a question to :data:`VECTORS` vectors."""
+    rng, known = np.random.default_rng(0), model.vocabulary.words[len(SPECIALS) :]
+    text, size = " ".join(rng.choice(known, WORDS)), (round(SECONDS * model.fps), len(model.contract.channels))
+    motion = model.contract.features(rng.normal(model.contract.mean, model.contract.std, size))
+    vectors = rng.normal(size=(VECTORS, model.sizes["E"])).astype(np.float32)
+    return {
+        "search.text": (_milliseconds(lambda: model.embed_text(text), seconds), "ms"),
+        "search.motion": (_milliseconds(lambda: model.embed(motion), seconds), "ms"),
+        "search.nearest": (_milliseconds(lambda: model.loop.run(vectors @ vectors[0], 5), seconds), "ms"),
+    }
+
+
 _FIGURES: Mapping[str, Callable[[Any, float], Figures]] = {
     "control": control_figures,
     "describe": describe_figures,
     "generate": generate_figures,
     "predict": predict_figures,
+    "search": search_figures,
 }
 
 

@@ -1,4 +1,4 @@
-"""Small models of describe and generate whose graphs are numpy functions of random matrices."""
+"""Small models of describe, generate and search whose graphs are numpy functions of random matrices."""
 
 from collections.abc import Callable
 from typing import Any
@@ -10,6 +10,7 @@ from motet.bundle.graph import Arrays, GraphSpec, TensorSpec
 from motet.bundle.manifest import Manifest
 from motet.models.describe import DescribeModel
 from motet.models.generate import GenerateModel
+from motet.models.search import SearchModel
 from motet.models.text import SPECIALS, Vocabulary
 from motet.motion.motion import Motion
 from motet.motion.skeleton import Joint, Skeleton
@@ -176,6 +177,26 @@ def generate_model() -> GenerateModel:
     return GenerateModel(_manifest("generate", defaults), graphs)
 
 
+def search_model(name: str = "fake-search") -> SearchModel:
+    """A search model of three channels and ten words: a motion is its mean, a sentence the mean of its words."""
+    size = len(CHANNELS)
+    table = np.random.default_rng(4).normal(size=(len(VOCABULARY), size))
+
+    def motion(frames: Array, lengths: Array) -> tuple[Array]:
+        return (_unit(_means((frames - CONTRACT.mean) / [0.5, 10, 1], lengths)),)
+
+    def text(words: Array, lengths: Array) -> tuple[Array]:
+        return (_unit(_means(table[words], lengths)),)
+
+    sizes, vector = {"D": size, "E": size}, {"vector": "batch E"}
+    graphs = {
+        "motion": FakeGraph(spec({"frames": "batch time D", "lengths": "*batch"}, vector, sizes), motion),
+        "text": FakeGraph(spec({"words": "*batch words", "lengths": "*batch"}, vector, sizes), text),
+    }
+    known = {**_manifest("search", {"count": 2}).source, "name": name}
+    return SearchModel(Manifest.from_json(known), graphs)
+
+
 def log_likelihood(frame: Array, out: dict[str, Array], row: int) -> float:
     """Equation 8 times the flag's Bernoulli, in the most literal way."""
     active = float(out["active"][row])
@@ -193,7 +214,13 @@ def moving(frames: int, fps: float = FPS, seed: int = 0) -> Motion:
 
 
 def _manifest(verb: str, defaults: dict[str, Any]) -> Manifest:
-    return manifest(verb, {"describe": "beam", "generate": "mixture"}[verb], CONTRACT, defaults, VOCABULARY)
+    return manifest(
+        verb, {"describe": "beam", "generate": "mixture", "search": "nearest"}[verb], CONTRACT, defaults, VOCABULARY
+    )
+
+
+def _unit(vectors: Array) -> Array:
+    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
 
 
 def _means(values: Array, lengths: Array) -> Array:

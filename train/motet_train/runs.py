@@ -16,7 +16,7 @@ from motet.bundle.graph import Graph, GraphSpec
 from motet.errors import MotetError
 from motet.files import write_whole
 from motet_train.models.control import angle_crbm, tdbn
-from motet_train.models.language import language_to_motion, motion_to_language
+from motet_train.models.language import joint_embedding, language_to_motion, motion_to_language
 from motet_train.models.net import Net
 from motet_train.models.predict import predictor, systems
 from motet_train.torch_graph import TorchGraph
@@ -27,6 +27,7 @@ MODELS: Mapping[str, Callable[[Mapping[str, Any]], Net]] = {
     "tdbn": tdbn.from_config,
     "motion-to-language": motion_to_language.from_config,
     "language-to-motion": language_to_motion.from_config,
+    "joint-embedding": joint_embedding.from_config,
     "angle-crbm": angle_crbm.from_config,
     "trajectory": predictor.from_config,
     **{name: partial(systems.stepwise, name) for name in systems.SYSTEMS},

@@ -74,7 +74,7 @@ class Bundle:
             return data
 
     def graph(self, role: str, options: SessionOptions | None = None) -> OnnxGraph:
-        """The graph of a role ("encoder", "step"), checked against its contract."""
+        """The graph of a role ("encoder", "step", ...), checked against its contract."""
         found = self.manifest.graphs.get(role)
         with self.named(f", {role} graph"):
             if found is None:

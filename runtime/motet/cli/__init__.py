@@ -17,6 +17,7 @@ COMMANDS = {
     "generate": ("motet.cli.generate:generate", "", "Generate motions from sentences."),
     "predict": ("motet.cli.predict:predict", "", "Predict how motions continue."),
     "control": ("motet.cli.control:control", "", "Run a script such as 'walk 3s, run 3s'."),
+    "search": ("motet.cli.search:search", "", "Find motions in a folder by a sentence or a motion."),
     "embed": ("motet.cli.embed:embed", "", "Write context vectors of motions or sentences."),
     "convert": ("motet.cli.convert:convert", "", "Convert motion files to other formats, rates, units."),
     "view": ("motet.cli.convert:view", "", "Write a web page that plays a motion."),

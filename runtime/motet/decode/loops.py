@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from motet.decode import beam, consensus, free_run, mixture, session
+from motet.decode import beam, consensus, free_run, mixture, nearest, session
 from motet.decode.loop import Loop
 from motet.errors import BundleError
 
@@ -12,6 +12,7 @@ LOOPS: Mapping[str, Loop] = {
     "mixture": mixture.LOOP,
     "free_run": free_run.LOOP,
     "session": session.LOOP,
+    "nearest": nearest.LOOP,
 }
 
 

@@ -26,13 +26,14 @@ class BundleModel(ABC):
     """
 
     VERB: ClassVar[str]
+    ROLES: ClassVar[tuple[str, ...]] = ("encoder", "step")
 
     _source: tuple[Path, SessionOptions] | None = None
 
     def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph]) -> None:
         if manifest.verb != self.VERB:
             raise BundleError(f"manifest, verb: {manifest.verb!r}, expected {self.VERB!r}")
-        for role in ("encoder", "step"):
+        for role in self.ROLES:
             if role not in graphs:
                 raise BundleError(f"manifest, graphs: there is no graph for the role {role!r}")
         self.manifest = manifest
@@ -75,7 +76,7 @@ class BundleModel(ABC):
     @property
     def providers(self) -> tuple[str, ...]:
         """The execution providers of ONNX Runtime that are active, the preferred first; torch's models have none."""
-        return tuple(getattr(self.graphs["step"], "providers", ()))
+        return tuple(getattr(self.graphs[self.ROLES[-1]], "providers", ()))
 
     @abstractmethod
     def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:

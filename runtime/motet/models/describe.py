@@ -1,9 +1,7 @@
 """Describe: ranked sentences for a motion. Section 4.2 of Plappert et al. 2017."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any, overload
 
 import numpy as np
@@ -13,7 +11,7 @@ from motet.bundle.manifest import Manifest
 from motet.decode.beam import Hypothesis, Limits
 from motet.decode.loop import Loop
 from motet.decode.loops import LOOPS
-from motet.models.language import MAX_SECONDS, LanguageModel
+from motet.models.language import LanguageModel
 from motet.models.progress import Progress, silent
 from motet.models.text import EOS, PAD, SOS, UNK
 from motet.motion.motion import Motion
@@ -86,17 +84,6 @@ class DescribeModel(LanguageModel):
             progress(len(found), len(contexts))
         rows = [[Description(self.vocabulary.decode(ids), *scores) for ids, *scores in row] for row in found]
         return rows[0] if isinstance(motions, Motion) else rows
-
-    def windows(self, motion: Motion) -> list[tuple[float, Motion]]:
-        """A motion of any length in as few equal parts as the model takes, each with the second at which it starts.
-
-        One of another human figure is brought onto the model's first, as :meth:`frames` does it, as a whole.
-        """
-        motion = self.contract.on_figure(motion)
-        most = max(1, math.floor(MAX_SECONDS * motion.fps + 1e-9))  # parts are of whole frames
-        count = max(1, math.ceil(len(motion) / most))
-        edges = np.linspace(0, len(motion), count + 1).round().astype(int).tolist()
-        return [(start / motion.fps, motion[start:stop]) for start, stop in pairwise(edges)]
 
     def _decoded(self, loop: Loop, contexts: Floats, settings: Mapping[str, Any]) -> list[list[Hypothesis]]:
         rest = {name: value for name, value in settings.items() if name != "max_words"}

@@ -1,7 +1,9 @@
 """What describe and generate share: the vocabulary, limits on inputs, and batches of sequences."""
 
+import math
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -68,9 +70,20 @@ class LanguageModel(BundleModel):
         """What the model sees of a motion, to be prepared once and asked about often; MotionError as :meth:`frames`."""
         return self.contract.features(self.frames(motion))
 
-    def contexts(self, sequences: Sequence[NDArray[Any]]) -> Floats:
-        """Context vectors (N, C) float32 of the sequences (T_i, ...) that the encoder takes."""
-        encoder = self.graphs["encoder"]
+    def windows(self, motion: Motion, longest: float = MAX_SECONDS) -> list[tuple[float, Motion]]:
+        """A motion of any length in as few equal parts as are no longer, each with the second at which it starts.
+
+        One of another human figure is brought onto the model's first, as :meth:`frames` does it, as a whole.
+        """
+        motion = self.contract.on_figure(motion)
+        most = max(1, math.floor(longest * motion.fps + 1e-9))  # parts are of whole frames
+        count = max(1, math.ceil(len(motion) / most))
+        edges = np.linspace(0, len(motion), count + 1).round().astype(int).tolist()
+        return [(start / motion.fps, motion[start:stop]) for start, stop in pairwise(edges)]
+
+    def contexts(self, sequences: Sequence[NDArray[Any]], role: str = "encoder") -> Floats:
+        """Vectors (N, C) float32 of the sequences (T_i, ...) that the encoder of a role takes."""
+        encoder = self.graphs[role]
         given, context = encoder.spec.inputs[0], encoder.spec.outputs[0]
         found = np.empty((len(sequences), context.size(1)), dtype=np.float32)
         for batch in batches([len(sequence) for sequence in sequences], BATCH):

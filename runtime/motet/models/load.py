@@ -14,11 +14,12 @@ from motet.models.control import ControlModel
 from motet.models.describe import DescribeModel
 from motet.models.generate import GenerateModel
 from motet.models.predict import PredictModel
+from motet.models.search import SearchModel
 
-Model = ControlModel | DescribeModel | GenerateModel | PredictModel
+Model = ControlModel | DescribeModel | GenerateModel | PredictModel | SearchModel
 Kind = TypeVar("Kind", bound=BundleModel)
 
-_KINDS: tuple[type[Model], ...] = (ControlModel, DescribeModel, GenerateModel, PredictModel)
+_KINDS: tuple[type[Model], ...] = (ControlModel, DescribeModel, GenerateModel, PredictModel, SearchModel)
 VERBS: dict[str, type[Model]] = {kind.VERB: kind for kind in _KINDS}
 """Verb of a bundle -> the class of its model."""
 
@@ -31,6 +32,8 @@ def load(name_or_path: Literal["describe"], options: SessionOptions | None = Non
 def load(name_or_path: Literal["generate", "cmu-generate"], options: SessionOptions | None = None) -> GenerateModel: ...
 @overload
 def load(name_or_path: Literal["predict"], options: SessionOptions | None = None) -> PredictModel: ...
+@overload
+def load(name_or_path: Literal["search"], options: SessionOptions | None = None) -> SearchModel: ...
 @overload
 def load(name_or_path: str | Path, options: SessionOptions | None = None) -> Model: ...
 def load(name_or_path: str | Path, options: SessionOptions | None = None) -> Model:

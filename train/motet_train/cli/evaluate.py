@@ -19,6 +19,7 @@ from motet.models.describe import DescribeModel
 from motet.models.generate import GenerateModel
 from motet.models.load import Model, build, load
 from motet.models.predict import PredictModel
+from motet.models.search import SearchModel
 from motet_train.cli.evaluate_language import by_subject, language_reports
 from motet_train.cli.evaluate_predict import predict_reports
 from motet_train.cli.evaluate_says import says_reports
@@ -27,6 +28,7 @@ from motet_train.data.clips import Clips, read_clips
 from motet_train.data.errors import DataError
 from motet_train.evaluate.control.experiments import GOALS, control_report, study_of
 from motet_train.evaluate.language.report import GOALS as LANGUAGE_GOALS
+from motet_train.evaluate.language.search import GOALS as SEARCH_GOALS
 from motet_train.evaluate.says.table import says_text
 from motet_train.evaluate.tables import Report, json_ready, report_table
 from motet_train.recipes.recipe import SETTINGS
@@ -39,7 +41,7 @@ from motet_train.settings import read_settings
 @click.option(
     "--data",
     type=Path,
-    help="Control: the clips. [default: those it was trained on] Describe and generate: the store. "
+    help="Control: the clips. [default: those it was trained on] Describe, generate and search: the store. "
     "Predict: text files of the protocol, or the store. With --says: a store or a folder or zip of motion files "
     "with a table of sentences, for the columns of real trials and of the look-up.",
 )
@@ -99,7 +101,9 @@ def _measured(
 ) -> tuple[dict[str, Any], str]:
     """The figures of each model, ready for JSON, and all of them as text."""
     controls = {name: model for name, model in models.items() if isinstance(model, ControlModel)}
-    others = {name: model for name, model in models.items() if isinstance(model, DescribeModel | GenerateModel)}
+    others = {
+        name: model for name, model in models.items() if isinstance(model, DescribeModel | GenerateModel | SearchModel)
+    }
     predicts = {name: model for name, model in models.items() if isinstance(model, PredictModel)}
     if sum(map(bool, (controls, others, predicts))) > 1:
         raise click.UsageError("evaluate control, predict and language models separately: their data differ")
@@ -114,7 +118,7 @@ def _measured(
     for name in others:
         if (other := by_subject(others, name)) is not None:
             ready[name]["people_unseen"] = json_ready(reports[other])
-    return ready, report_table(reports, GOALS if controls else LANGUAGE_GOALS)
+    return ready, report_table(reports, GOALS if controls else {**LANGUAGE_GOALS, **SEARCH_GOALS})
 
 
 def _control(

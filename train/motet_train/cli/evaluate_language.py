@@ -9,27 +9,29 @@ from tqdm import tqdm
 
 from motet.models.describe import DescribeModel
 from motet.models.generate import GenerateModel
+from motet.models.search import SearchModel
 from motet_train.data.store import Store
 from motet_train.evaluate.language.prompts import ASKED
 from motet_train.evaluate.language.report import describe_report, generate_report
+from motet_train.evaluate.language.search import search_report
 from motet_train.evaluate.language.split_store import SplitStore, split_as
 from motet_train.evaluate.tables import Report
 from motet_train.trainer import LOG
 
-Models = Mapping[str, DescribeModel | GenerateModel]
+Models = Mapping[str, DescribeModel | GenerateModel | SearchModel]
 
 
 def language_reports(models: Models, data: Path | None, plots: Path | None) -> dict[str, Report]:
-    """The report of each model. Generate models are chained with the first describe model that had the same split."""
+    """The report of each model. Others are compared with the first describe model that had the same split."""
     if data is None:
-        raise click.UsageError("describe and generate models need --data: the store that they were trained on")
+        raise click.UsageError("describe, generate and search models need --data: the store that they were trained on")
     store = Store.open(data)
     corpora = {name: split_as(model.manifest, store) for name, model in models.items()}
     reports = {}
     with tqdm(unit=" parts", disable=None, leave=False) as bar:
         for name, model in models.items():
             reports[name] = _report(name, models, corpora, bar)
-            if plots is not None:
+            if plots is not None and not isinstance(model, SearchModel):
                 bar.set_description(f"{name}: pictures")
                 _draw(name, model, corpora[name], plots if len(models) == 1 else plots / Path(name).name)
     return reports
@@ -56,6 +58,8 @@ def _report(name: str, models: Models, corpora: Mapping[str, SplitStore], bar: "
         if isinstance(other, DescribeModel) and corpora[key].parts == corpus.parts
     )
     partner = next(describe, None)
+    if isinstance(model, SearchModel):
+        return search_report(model, corpus, partner, progress)
     if partner is None:
         click.echo(f"{name}: tables 3 and 4 need a describe model of the same split; they are left out", err=True)
     report = generate_report(model, corpus, partner, progress)

@@ -3,7 +3,7 @@
 import click
 
 from motet_train.cli.train_control import crbm, tdbn
-from motet_train.cli.train_language import describe, generate
+from motet_train.cli.train_language import describe, generate, search
 from motet_train.cli.train_predict import predict
 from motet_train.cli.train_systems import COMMANDS
 
@@ -13,5 +13,5 @@ def train() -> None:
     """Train a model; the run goes into a new folder that evaluate and export take."""
 
 
-for command in (tdbn, crbm, describe, generate, predict, *COMMANDS):
+for command in (tdbn, crbm, describe, generate, search, predict, *COMMANDS):
     train.add_command(command)

@@ -1,4 +1,4 @@
-"""``motet train describe`` and ``motet train generate``: the two ways between motion and language."""
+"""``motet train describe``, ``generate`` and ``search``: the two ways between motion and language, and one space."""
 
 from pathlib import Path
 from typing import Any
@@ -11,8 +11,10 @@ from motet_train.cli.train_options import train_command
 from motet_train.models.language.language_to_motion import LOSSES
 from motet_train.recipes import describe as describing
 from motet_train.recipes import generate as generating
+from motet_train.recipes import search as searching
 from motet_train.recipes.language import train_language
 from motet_train.recipes.recipe import Job
+from motet_train.recipes.search import train_search
 from motet_train.runs import Run
 
 OPTIONS = (
@@ -38,3 +40,9 @@ def describe(job: Job, data: Path, by: str, **corpus: Any) -> Run:
 def generate(job: Job, data: Path, by: str, **corpus: Any) -> Run:
     """Train language to motion: a net that makes a motion from a sentence."""
     return train_language(prepared(data, job, **corpus), job, data.name, by)
+
+
+@train_command("search", searching.RECIPES, *OPTIONS)
+def search(job: Job, data: Path, by: str, **corpus: Any) -> Run:
+    """Train a joint embedding: motions and sentences in one space, to search by."""
+    return train_search(prepared(data, job, **corpus), job, data.name, by)

@@ -1,6 +1,6 @@
 """Training between motion and language: from a store and a recipe to a run, the same for both directions."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from itertools import chain
 from typing import Any
@@ -84,10 +84,14 @@ def train_language(store: Store, job: Job, data: str = "", by: str = "trial") ->
     net = MODELS[recipe.model](config)
     assert isinstance(net, LanguageNet)
     net.measure_by(found.contract.mean, found.contract.std)
-    training = {"data": _data(store, data), "split": _split(found, by)}
+    return job.run(net, _learner(net.to(job.device), found, job), manifest(job, found, config, data, by))
+
+
+def manifest(job: Job, found: Divided, config: Mapping[str, Any], data: str, by: str) -> dict[str, Any]:
+    """The manifest of a run of a model that reads or writes sentences. data: the store's name."""
+    training = {"data": _data(found.store, data), "split": _split(found, by)}
     known = {"text": RULES.to_json(), "vocabulary": found.vocabulary.words}
-    manifest = job.manifest(found.contract, config, recipe.defaults, None, training, **known)
-    return job.run(net, _learner(net.to(job.device), found, job), manifest)
+    return job.manifest(found.contract, config, job.recipe.defaults, None, training, **known)
 
 
 def _fitting(config: dict[str, Any], store: Store) -> dict[str, Any]:

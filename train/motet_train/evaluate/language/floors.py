@@ -17,8 +17,8 @@ from motet_train.evaluate.nearest import nearest
 def nearest_motions(corpus: SplitStore, motions: Sequence[Motion]) -> list[int]:
     """For each motion the training record with the most similar pose features: mean and deviation of each channel."""
     train = corpus.described(corpus.parts.train)
-    known = np.array([_features(corpus, motion) for motion in corpus.motions(train)])
-    asked = np.array([_features(corpus, motion) for motion in motions])
+    known = np.array([pose_features(corpus, motion) for motion in corpus.motions(train)])
+    asked = np.array([pose_features(corpus, motion) for motion in motions])
     return [train[i] for i in nearest(asked, known)[0]]
 
 
@@ -53,7 +53,7 @@ def retrieved(corpus: SplitStore, sentences: Sequence[str]) -> list[int]:
     return [known[i][0] for i in alike.argmax(axis=1)]
 
 
-def _features(corpus: SplitStore, motion: Motion) -> Array:
+def pose_features(corpus: SplitStore, motion: Motion) -> Array:
     """(2 D,): mean and standard deviation over time of each channel, in the training motions' units of deviation."""
     z = corpus.z(motion)
     features: Array = np.concatenate([z.mean(axis=0), z.std(axis=0)])

@@ -50,7 +50,7 @@ def describe_report(model: DescribeModel, corpus: SplitStore, progress: Told = l
     describe from a pool of phrases, BLEU rewards knowing the pool. Motions without such a reference are left out.
     A figure that does not exist is NaN.
     """
-    report = _origin(model.manifest, corpus)
+    report = origin(model.manifest, corpus)
     test = corpus.described(corpus.parts.test)
     references = corpus.references(test)
     found: dict[str, list[list[str]]] = {}
@@ -84,7 +84,7 @@ def generate_report(
     describe: the model that closes the chain, trained on the same part of the corpus; without it the tables are left
         out. Relative performance is chained BLEU over its first training BLEU, as in the paper (there .387).
     """
-    report = _origin(model.manifest, corpus)
+    report = origin(model.manifest, corpus)
     test = corpus.described(corpus.parts.test)
     progress("generate test")
     found = answers(model, corpus, test)
@@ -113,7 +113,8 @@ def hypotheses(model: DescribeModel, corpus: SplitStore, records: tuple[int, ...
     return [[found.text for found in row] for row in model.describe(corpus.motions(records), RANKS)]
 
 
-def _origin(manifest: Manifest, corpus: SplitStore) -> Report:
+def origin(manifest: Manifest, corpus: SplitStore) -> Report:
+    """How the model was trained, and how many motions and people are in each part of the data."""
     training, parts, store = manifest.training, corpus.parts, corpus.store
     people = [{store.records[i].subject for i in part} for part in (parts.train, parts.test)]
     return {

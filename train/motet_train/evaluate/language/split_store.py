@@ -60,10 +60,11 @@ class SplitStore:
     def unseen(self, records: Iterable[int]) -> list[tuple[str, ...]]:
         """The sentences of several records that no training saw: those kept for it and the new ones."""
         known = {sentence for said in self.references(self.parts.train) for sentence in said}
-        said = ((*self._kept(record), *self.sentences(record)) for record in records)
+        said = ((*self.kept(record), *self.sentences(record)) for record in records)
         return [tuple(sentence for sentence in found if sentence not in known) for found in said]
 
-    def _kept(self, record: int) -> tuple[str, ...]:
+    def kept(self, record: int) -> tuple[str, ...]:
+        """The sentences about a record that are kept for measuring, normalised."""
         return tuple(plain(sentence) for sentence in self.store.records[record].unseen if usable(sentence))
 
     def unknown_words(self, records: Iterable[int]) -> set[str]:

@@ -1,0 +1,226 @@
+"""The motions of a folder as vectors, kept in one file, so that a question about them is answered at once.
+
+The file is an .npz of two arrays: ``vectors`` (N, E) float32, a unit vector for each window of each motion, and
+``index``, the bytes of a JSON object that says which model made them and, for each motion file, its size and time of
+change, its windows in seconds, or why it could not be used.
+"""
+
+import io
+import json
+import logging
+import zipfile
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from motet.bundle.graph import Floats
+from motet.errors import FormatError, MotetError, MotionError, OutputError
+from motet.files import write_whole
+from motet.formats import MOCAP, read_motion
+from motet.formats.npy import array
+from motet.models.progress import Progress, silent
+from motet.models.search import SearchModel
+from motet.motion.motion import Motion
+
+log = logging.getLogger(__name__)
+
+NAME = ".motet-search.npz"
+"""The file of a folder's index, in the folder."""
+
+VERSION = 1
+"""Of what is in the file."""
+
+WINDOW = 10.0
+"""Seconds: longer motions are cut into windows, so that what is found says when it is."""
+
+
+@dataclass(frozen=True)
+class Hit:
+    """A motion file, the seconds in which it shows what was asked for, and how near that is: 1 is the same."""
+
+    path: Path
+    start: float
+    stop: float
+    score: float
+
+
+@dataclass(frozen=True)
+class Member:
+    """A motion file of the folder, by its path within it; windows: (start, stop) in seconds; fault: why it has none."""
+
+    path: str
+    size: int
+    changed: int
+    windows: tuple[tuple[float, float], ...] = ()
+    fault: str = ""
+
+
+class Index:
+    """The motions of a folder, to be asked about; :meth:`open` makes one.
+
+    folder: where the paths of the hits begin. vectors: (N, E) float32, of all windows of all members. vanished: the
+    files that were there before, and are not any more.
+    """
+
+    def __init__(
+        self,
+        model: SearchModel,
+        folder: Path,
+        members: Sequence[Member],
+        vectors: Floats,
+        vanished: Sequence[Path] = (),
+    ) -> None:
+        self.model, self.folder, self.members, self.vectors = model, folder, tuple(members), vectors
+        self.vanished = tuple(vanished)
+        self._windows = [(member, *window) for member in members for window in member.windows]
+
+    @staticmethod
+    def open(
+        place: str | Path, model: SearchModel, file: str | Path | None = None, *, progress: Progress = silent
+    ) -> "Index":
+        """The index of a folder's motion files, and those of the folders in it; or of the folder of an index file.
+
+        What a file already knows is taken from there; new and changed motion files are read and embedded, and the file
+        is written anew, whole. Motion files that cannot be read or used are named in :attr:`failed`, vanished ones in
+        :attr:`vanished`.
+        file: where the index is kept, by default ".motet-search.npz" in the folder, if that can be written to.
+        progress: called with the number of motion files done and of all.
+        FormatError where there is no folder, no motion file in it, or where the index is damaged or another model's;
+        MotionError where no motion can be used.
+        """
+        place = Path(place)
+        kept = place if place.is_file() else Path(file or place / NAME)
+        before = _read(kept, model) if kept.is_file() else None
+        folder = before.folder if before is not None and kept == place else place
+        found = _renewed(folder, model, before, progress)
+        if before is None or found.members != before.members or folder.absolute() != before.folder:
+            _keep(found, kept, needed=file is not None)
+        for path in found.vanished:
+            log.warning("%s has vanished since it was indexed", path)
+        if not len(found.vectors):
+            path, fault = next(iter(found.failed.items()))
+            raise MotionError(f"none of {len(found.members)} motion files of {folder} can be used: {path}: {fault}")
+        return found
+
+    @property
+    def failed(self) -> dict[Path, str]:
+        """The motion files that cannot be found by any question, and why."""
+        return {self.folder / member.path: member.fault for member in self.members if member.fault}
+
+    def search(self, query: str | Motion, count: int | None = None) -> list[Hit]:
+        """The ``count`` files that are nearest to a sentence or a motion, best first, each with its best window.
+
+        count: the bundle's by default. TextError for a sentence without a known word, MotionError for a motion that
+        the model cannot take, DecodingError for a count that is not between 1 and 1,000.
+        """
+        wanted = self.model.loop.settled(self.model.defaults, {"count": count})["count"]
+        scores = self.vectors @ self._vector(query)
+        found: dict[str, Hit] = {}
+        for row in self.model.loop.run(scores, len(scores)):
+            member, start, stop = self._windows[row]
+            if member.path not in found:
+                found[member.path] = Hit(self.folder / member.path, start, stop, float(scores[row]))
+            if len(found) == wanted:
+                break
+        return list(found.values())
+
+    def _vector(self, query: str | Motion) -> Floats:
+        """The vector (E,) of a sentence, or the mean direction of a motion's windows."""
+        if isinstance(query, str):
+            return self.model.embed_text(query)
+        mean = self.model.embed([part for _, part in self.model.windows(query, WINDOW)]).mean(axis=0)
+        found: Floats = mean / np.linalg.norm(mean)
+        return found
+
+
+def _renewed(folder: Path, model: SearchModel, before: Index | None, progress: Progress) -> Index:
+    """The index of a folder as it is now, with what is known already of files that did not change."""
+    known = {} if before is None else dict(_by_member(before))
+    paths = sorted(_motion_files(folder))
+    if not paths:
+        raise FormatError(folder, f"no motion files ({' '.join(MOCAP)}) are in it")
+    members, vectors = [], []
+    for done, path in enumerate(paths, start=1):
+        state = path.stat()
+        member = Member(path.relative_to(folder).as_posix(), state.st_size, state.st_mtime_ns)
+        was = known.get((member.path, member.size, member.changed))
+        now, rows = was or _embedded(path, member, model)
+        members.append(now)
+        vectors.append(rows)
+        progress(done, len(paths))
+    gone = {path for path, _, _ in known} - {member.path for member in members}
+    return Index(model, folder, members, np.concatenate(vectors), [folder / path for path in sorted(gone)])
+
+
+def _by_member(index: Index) -> Iterator[tuple[tuple[str, int, int], tuple[Member, Floats]]]:
+    stop = 0
+    for member in index.members:
+        start, stop = stop, stop + len(member.windows)
+        yield (member.path, member.size, member.changed), (member, index.vectors[start:stop])
+
+
+def _motion_files(folder: Path) -> Iterator[Path]:
+    if not folder.is_dir():
+        raise FormatError(folder, "it is neither a folder of motion files nor the index of one")
+    for path in folder.rglob("*"):
+        if path.suffix.lower() in MOCAP and not path.name.startswith(".") and path.is_file():
+            yield path
+
+
+def _embedded(path: Path, member: Member, model: SearchModel) -> tuple[Member, Floats]:
+    """A member with its windows, and their vectors; or with the reason why it has none."""
+    size = model.sizes["E"]
+    try:
+        parts = model.windows(read_motion(path), WINDOW)
+        vectors = model.embed([part for _, part in parts])
+    except MotetError as error:
+        fault = str(error).removeprefix(f"{path}: ")
+        return Member(member.path, member.size, member.changed, (), fault), np.empty((0, size), np.float32)
+    windows = tuple((start, start + part.duration) for start, part in parts)
+    return Member(member.path, member.size, member.changed, windows), vectors
+
+
+def _keep(index: Index, file: Path, needed: bool) -> None:
+    """Write the file; one that nobody named is left out where it cannot be written."""
+    text = {
+        "version": VERSION,
+        "model": index.model.identity,
+        "folder": str(index.folder.absolute()),
+        "members": [asdict(member) for member in index.members],
+    }
+    content = io.BytesIO()
+    np.savez(content, vectors=index.vectors, index=np.frombuffer(json.dumps(text).encode(), np.uint8))
+    try:
+        write_whole(file, content.getvalue())
+    except OutputError as error:
+        if needed:
+            raise
+        log.warning("the index is not kept: %s", error)
+
+
+def _read(file: Path, model: SearchModel) -> Index:
+    """What :func:`_keep` wrote; FormatError where it is something else, or another model's."""
+    try:
+        with zipfile.ZipFile(file) as archive:
+            vectors, text = array(archive, "vectors", "f"), array(archive, "index", "u")
+        data = json.loads(text.tobytes())
+        version, made, folder = int(data["version"]), str(data["model"]), Path(data["folder"])
+        members = [_member(entry) for entry in data["members"]] if version == VERSION else []
+    # a damaged archive makes zipfile, its unpackers, numpy and json raise errors of a dozen types
+    except Exception as error:
+        reason = str(error)[:200]
+        raise FormatError(file, f"not an index of motions: {reason}; remove it, or name another") from error
+    if version != VERSION or made != model.identity:
+        by = f"the model {made}, not {model.identity}" if version == VERSION else f"another motet (version {version})"
+        raise FormatError(file, f"this index was made by {by}: remove it, or name another")
+    if vectors.shape != (sum(len(member.windows) for member in members), model.sizes["E"]):
+        raise FormatError(file, "this index is damaged: its vectors are not those of its windows; remove it")
+    return Index(model, folder, members, vectors.astype(np.float32, copy=False))
+
+
+def _member(data: dict[str, Any]) -> Member:
+    windows = tuple((float(start), float(stop)) for start, stop in data["windows"])
+    return Member(str(data["path"]), int(data["size"]), int(data["changed"]), windows, str(data["fault"]))

@@ -1,0 +1,55 @@
+"""Search: motions and sentences as unit vectors of one space, in which what belongs together is near."""
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+from motet.bundle.graph import Arrays, Floats, Graph
+from motet.bundle.manifest import Manifest
+from motet.models.language import LanguageModel
+from motet.motion.motion import Motion
+
+
+class SearchModel(LanguageModel):
+    """A model that puts motions and sentences into one space; how near two are is the product of their vectors.
+
+    graphs: "motion" (frames, lengths -> vector) and "text" (words, lengths -> vector).
+    Its loop takes scores (Q, N) and the count of the best that are wanted, and gives their columns.
+    """
+
+    VERB = "search"
+    ROLES = ("motion", "text")
+
+    def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph]) -> None:
+        super().__init__(manifest, graphs)
+        vector = {"vector": "batch E"}
+        self.bind("motion", {"frames": "batch time D", "lengths": "*batch"}, vector)
+        self.bind("text", {"words": "*batch words", "lengths": "*batch"}, vector)
+
+    def embed(self, motions: Motion | Sequence[Motion]) -> Floats:
+        """The unit vector (E,) float32 of a motion, or vectors (N, E) of several; MotionError as :meth:`frames`."""
+        if isinstance(motions, Motion):
+            vector: Floats = self.embed([motions])[0]
+            return vector
+        return self.contexts([self.frames(motion) for motion in motions], "motion")
+
+    def embed_text(self, sentences: str | Sequence[str]) -> Floats:
+        """The unit vector (E,) float32 of a sentence, or vectors (N, E) of several; errors as :meth:`ids`."""
+        if isinstance(sentences, str):
+            vector: Floats = self.embed_text([sentences])[0]
+            return vector
+        return self.contexts([self.ids(text) for text in sentences], "text")
+
+    @cached_property
+    def identity(self) -> str:
+        """What tells this model from any other: its name, its version and a hash of its manifest."""
+        text = json.dumps(self.manifest.source, sort_keys=True).encode()
+        return f"{self.manifest.name} {self.manifest.version} {hashlib.sha256(text).hexdigest()[:16]}"
+
+    def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
+        """Frames (T, D) and a sentence ("text" of the settings) to ids (words,) int64 and the vectors (E,) of both."""
+        ids, _ = self.vocabulary.encode(str(settings["text"]))
+        motion, text = self.contexts([given["frames"]], "motion"), self.contexts([ids], "text")
+        return {"ids": ids, "motion": motion[0], "text": text[0]}

@@ -1,0 +1,90 @@
+"""The joint embedding as an ONNX bundle: what torch computes, for sequences of any length."""
+
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from motet.bundle.bundle import Bundle
+from motet.models.load import load
+from motet.models.search import SearchModel
+from motet.models.text import RULES, SPECIALS
+from motet.models.verify import verify
+from motet.motion.humanoid import HUMANOID
+from motet.representation.contract import MotionContract
+from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS
+from motet_export.bundles import export_run, parity_of
+from motet_export.examples import example, walks
+from motet_train.models.language.joint_embedding import JointEmbedding, JointEmbeddingConfig
+from motet_train.models.language.places import figure_of
+from motet_train.runs import Run
+
+pytestmark = pytest.mark.slow  # torch's exporter
+
+WORDS = [*SPECIALS, "a", "person", "walks", "runs", "left", "right", "slowly"]
+CHANNELS = (
+    *ROOT_BLOCK,
+    *(f"{joint}.r{axis}" for joint in ("spine", "leftUpperLeg", "rightUpperLeg") for axis in "xyz"),
+)
+D = len(CHANNELS)
+CONTRACT = MotionContract(
+    "root_angles", CHANNELS, (*ROOT_BLOCK_UNITS, *("deg",) * 9), 10.0, np.zeros(D), np.full(D, 10.0), HUMANOID
+)
+
+
+def run() -> Run:
+    torch.manual_seed(0)
+    net = JointEmbedding(JointEmbeddingConfig(D, len(WORDS), figure_of(CONTRACT), embedding=8, vector=6))
+    net.measure_by(CONTRACT.mean, CONTRACT.std)
+    frames = torch.from_numpy(walks(CONTRACT, np.random.default_rng(0), 50, 20))
+    net.see_by(net.statistics(frames, torch.full((50,), 20)))
+    named = {"name": "small-search", "verb": "search", "model": "joint-embedding", "loop": "nearest"}
+    known = {"text": RULES.to_json(), "vocabulary": WORDS, "config": asdict(net.config), "defaults": {"count": 5}}
+    return Run({**named, **known, "motion": CONTRACT.to_json(), "licence": {}, "training": {}}, net)
+
+
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("bundles") / "search.zip"
+    export_run(run(), place)
+    return place
+
+
+def test_a_bundle_keeps_its_contracts_and_carries_its_parity(bundle: Path) -> None:
+    opened = Bundle.open(bundle)
+    found = verify(opened)
+    assert found.files == ("golden.npz", "motion.onnx", "text.onnx")
+    assert max(found.errors.values()) < 1e-5
+    report = opened.manifest.parity
+    rungs = {"motion.one_step", "text.one_step", "runs"}
+    assert {name for name in report if "." in name or name == "runs"} == rungs
+    assert all(report[rung]["error"] < report[rung]["bound"] / 2 for rung in rungs)
+    again = parity_of(run(), opened)
+    assert {rung: again[rung] for rung in rungs} == {rung: report[rung] for rung in rungs}
+
+
+@pytest.mark.parametrize("role", ["motion", "text"])
+def test_a_row_of_a_padded_batch_gets_what_it_gets_alone(bundle: Path, role: str) -> None:
+    graph = Bundle.open(bundle).graph(role)
+    feeds = example(graph.spec, np.random.default_rng(0), batch=6, vocabulary=len(WORDS))
+    padded = graph.spec.inputs[0].name
+    together = graph(feeds)["vector"]
+    for row, length in enumerate(feeds["lengths"]):
+        single = {name: array[row : row + 1] for name, array in feeds.items()}
+        single[padded] = single[padded][:, :length]
+        np.testing.assert_allclose(graph(single)["vector"], together[row : row + 1], atol=1e-6)
+
+
+def test_a_loaded_bundle_gives_what_the_net_gives(bundle: Path) -> None:
+    model, net = load(bundle), run().model.eval()
+    assert isinstance(model, SearchModel)
+    assert isinstance(net, JointEmbedding)
+    frames = walks(CONTRACT, np.random.default_rng(1), 3, 25)
+    found = model.embed([model.contract.features(row) for row in frames])
+    with torch.no_grad():
+        expected = net.embed_motion(torch.from_numpy(frames), torch.full((3,), 25))
+        said = net.embed_text(torch.tensor([[4, 5, 6]]), torch.tensor([3]))
+    np.testing.assert_allclose(found, expected, atol=1e-6)
+    np.testing.assert_allclose(model.embed_text("a person walks"), said[0], atol=1e-6)

@@ -1,0 +1,148 @@
+"""How well a model finds: motions by sentences that no training saw, and motions by motions."""
+
+from collections.abc import Sequence
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motet.models.describe import DescribeModel
+from motet.models.index import WINDOW, Index, Member
+from motet.models.search import SearchModel
+from motet.models.text import RULES
+from motet.motion.motion import Motion
+from motet.motion.rotations import Array
+from motet_train.data.alike import alike
+from motet_train.evaluate.language.floors import pose_features, retrieved
+from motet_train.evaluate.language.report import Told, origin
+from motet_train.evaluate.language.split_store import SplitStore, unknown_words_allowed
+from motet_train.evaluate.tables import Goals, Report
+
+GOALS: Goals = {"text.first_5": (0.8, None)}
+
+FIRST = (1, 5, 10)
+"""Among so many the right one is looked for."""
+
+Order = NDArray[np.intp]
+"""For each question (Q, N) the things that were searched, best first."""
+
+
+def search_report(
+    model: SearchModel, corpus: SplitStore, describe: DescribeModel | None = None, progress: Told = lambda group: None
+) -> Report:
+    """Ranks of test motions, asked for by sentences, and nearest training motions of test motions; beside floors.
+
+    "asked": how many sentences there are, the share of them that are about what a training motion shows ("known"), and
+    the "first_5" of "text" for who knows what is said and no more ("best_5").
+    "text": the sentences of test motions whose wordings no training saw ask for their own among all test motions:
+    shares that are among the first, and the median rank. "text_alike": any motion counts of which the same was said.
+    "words_": the floor of them: the training motion with the most similar sentence (TF-IDF), and the test motions that
+    are nearest to it. "likelihood_": by a describe model of the same split, where one is given. "motion": the share of
+    test motions whose nearest training motion is one of which the same was said, of those ("of") that have any.
+    """
+    asked = _Asked(corpus)
+    report: Report = {**origin(model.manifest, corpus), "asked": asked.told()}
+    progress("sentences")
+    with unknown_words_allowed():
+        index = _index(model, corpus, corpus.parts.test)
+        report |= asked.measured("", np.array([_order(index, sentence) for sentence in asked.sentences]))
+    progress("floors")
+    report |= asked.measured("words_", _by_words(corpus, asked.sentences))
+    if describe is not None:
+        progress("likelihood")
+        report |= asked.measured("likelihood_", _by_likelihood(describe, corpus, asked.sentences))
+    progress("motions")
+    return {**report, "motion": _motions(model, corpus, asked.groups)}
+
+
+class _Asked:
+    """The sentences about test motions, and which motions each is about."""
+
+    def __init__(self, corpus: SplitStore) -> None:
+        self.records, self.train = corpus.parts.test, corpus.parts.train
+        kept = [corpus.kept(record) for record in self.records]
+        rows = [(row, s) for row, said in enumerate(kept if any(kept) else corpus.unseen(self.records)) for s in said]
+        known = {word for said in corpus.references(corpus.parts.train) for s in said for word in s.split()}
+        rows = [(row, sentence) for row, sentence in rows if not known.isdisjoint(sentence.split())]
+        self.rows, self.sentences = [row for row, _ in rows], [sentence for _, sentence in rows]
+        self.entries = corpus.store.records
+
+    @cached_property
+    def groups(self) -> NDArray[np.int64]:
+        """For each record of the store the number of what was said of it."""
+        return np.array(alike([[*map(RULES.normalise, (*e.sentences, *e.unseen))] for e in self.entries]))
+
+    def told(self) -> dict[str, float]:
+        """How many sentences there are, and what can be expected of them."""
+        groups, known = self.groups[list(self.records)][self.rows], self.groups[list(self.train)]
+        alike = (groups[:, None] == self.groups[list(self.records)]).sum(axis=1)
+        best = float(np.minimum(1, 5 / alike).mean())
+        return {"sentences": float(len(groups)), "known": float(np.isin(groups, known).mean()), "best_5": best}
+
+    def measured(self, name: str, order: Order) -> Report:
+        """Two groups of figures, of own motions and of those alike."""
+        takes = np.array([self.entries[record].take or self.entries[record].name for record in self.records])
+        groups = self.groups[list(self.records)]
+        return {
+            f"{name}text": _ranks(takes[order] == takes[self.rows][:, None]),
+            f"{name}text_alike": _ranks(groups[order] == groups[self.rows][:, None]),
+        }
+
+
+def _ranks(right: NDArray[np.bool_]) -> dict[str, float]:
+    """Of which of the found (Q, N) are right, best first."""
+    ranks = right.argmax(axis=1) + 1
+    shares = {f"first_{count}": float((ranks <= count).mean()) for count in FIRST}
+    return {**shares, "median_rank": float(np.median(ranks))}
+
+
+def _index(model: SearchModel, corpus: SplitStore, records: Sequence[int]) -> Index:
+    """An index of some records, whose paths are their places."""
+    members, vectors = [], []
+    for place, motion in enumerate(corpus.motions(records)):
+        parts = model.windows(motion, WINDOW)
+        windows = tuple((start, start + part.duration) for start, part in parts)
+        members.append(Member(str(place), 0, 0, windows))
+        vectors.append(model.embed([part for _, part in parts]))
+    return Index(model, Path(), members, np.concatenate(vectors))
+
+
+def _order(index: Index, query: str | Motion) -> list[int]:
+    return [int(hit.path.name) for hit in index.search(query, len(index.members))]
+
+
+def _by_words(corpus: SplitStore, sentences: Sequence[str]) -> Order:
+    looked_up = _features(corpus, retrieved(corpus, sentences))
+    return _distances(looked_up, _features(corpus, corpus.parts.test)).argsort(axis=1, kind="stable")
+
+
+def _by_likelihood(describe: DescribeModel, corpus: SplitStore, sentences: Sequence[str]) -> Order:
+    motions = [describe.prepared(motion) for motion in corpus.motions(corpus.parts.test)]
+    with unknown_words_allowed():
+        scores = np.array([[describe.score(motion, sentence) for motion in motions] for sentence in sentences])
+    return (-scores).argsort(axis=1, kind="stable")
+
+
+def _motions(model: SearchModel, corpus: SplitStore, groups: NDArray[np.int64]) -> dict[str, float]:
+    train, test = np.array(corpus.parts.train), np.array(corpus.parts.test)
+    known = np.isin(groups[test], groups[train])
+    index = _index(model, corpus, corpus.parts.train)
+    by_model = [int(index.search(motion, 1)[0].path.name) for motion in corpus.motions(test.tolist())]
+    by_features = _distances(_features(corpus, test.tolist()), _features(corpus, train.tolist())).argmin(axis=1)
+    right = {
+        "alike": groups[train[by_model]] == groups[test],
+        "features_alike": groups[train[by_features]] == groups[test],
+    }
+    shares = {name: float(row[known].mean()) if known.any() else np.nan for name, row in right.items()}
+    return {**shares, "of": float(known.sum())}
+
+
+def _features(corpus: SplitStore, records: Sequence[int]) -> Array:
+    return np.array([pose_features(corpus, motion) for motion in corpus.motions(records)])
+
+
+def _distances(some: Array, others: Array) -> Array:
+    """Squared distances (M, N) of points (M, D) and (N, D)."""
+    found: Array = ((some[:, None] - others) ** 2).sum(axis=-1)
+    return found

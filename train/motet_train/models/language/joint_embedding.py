@@ -1,0 +1,154 @@
+"""Motions and sentences in one space, where what belongs together is near: the idea of CLIP and of TMR, made small.
+
+Two encoders give unit vectors. In a batch each motion is to be nearer to its sentence than to the others, and each
+sentence to its motion (symmetric InfoNCE: Radford et al. 2021, Petrovich et al. 2023), and to another wording of it;
+what is said to show the same without being a pair is left out. With some hundred motions of a few dozen people, nets
+that see every frame learn the people; so the encoder of motions sees statistics, and that of sentences a weighted mean
+of words.
+
+Letters in shapes: B rows, T frames, D channels, W words, S statistics, E numbers of a vector.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from motet.bundle.graph import GraphSpec, TensorSpec
+from motet_train.data.batch import before
+from motet_train.data.views import Pairs
+from motet_train.models.language.dropout import WordEmbedding
+from motet_train.models.language.places import Figure, Places
+from motet_train.models.language.statistics import of_frames, of_speeds
+from motet_train.models.net import Net, Part, tuples
+from motet_train.models.normalised import normalised
+
+PAD = 0
+
+LIMIT = 5.0
+"""Standard deviations: wilder channels and statistics would outweigh all else."""
+
+NEAR = 0.2
+"""Metres by which places are divided."""
+
+STILL = 0.03
+"""The least standard deviation of a statistic by which it is divided."""
+
+
+@dataclass(frozen=True)
+class JointEmbeddingConfig:
+    """Sizes, and what training adds.
+
+    channels: D. words: of the vocabulary. figure: whose joints' places are seen, instead of the channels of joints.
+    embedding: numbers of a word's vector. vector: E. noise: standard deviation of what training adds to the statistics,
+    in theirs. temperature: what scores are divided by. wordings: weight of the loss between two wordings.
+    """
+
+    channels: int
+    words: int
+    figure: Figure = field(default_factory=Figure)
+    embedding: int = 96
+    vector: int = 128
+    dropout: float = 0.3
+    word_dropout: float = 0.3
+    noise: float = 0.2
+    temperature: float = 0.1
+    wordings: float = 1.0
+
+
+class JointEmbedding(Net):
+    """Both encoders with the motions' normalisation. seen_mean, seen_scale: of the statistics."""
+
+    seen_mean: Tensor
+    seen_scale: Tensor
+
+    def __init__(self, config: JointEmbeddingConfig) -> None:
+        super().__init__(config.channels)
+        self.config = config
+        self.places = Places(config.figure) if config.figure.parents else None
+        joints = max(0, len(config.figure.parents) - 1)
+        seen = 3 * joints + len(config.figure.root) if joints else config.channels
+        statistics = of_frames(torch.zeros(1, 1, seen), torch.ones(1)).shape[1] + 2 * joints + 1
+        self.register_buffer("seen_mean", torch.zeros(statistics))
+        self.register_buffer("seen_scale", torch.ones(statistics))
+        self.motion = nn.Linear(statistics, config.vector)
+        self.words = WordEmbedding(config.words, config.embedding, config.word_dropout)
+        self.weight = nn.Linear(config.embedding, 1)
+        self.text = nn.Linear(config.embedding, config.vector)
+        self.dropout = nn.Dropout(config.dropout)
+
+    def embed_motion(self, frames: Tensor, lengths: Tensor) -> Tensor:
+        """Frames (B, T, D) in the contract's units, of lengths (B,), to unit vectors (B, E)."""
+        return self.embed_statistics(self.statistics(frames, lengths))
+
+    def embed_statistics(self, seen: Tensor) -> Tensor:
+        """Statistics (B, S) to unit vectors (B, E)."""
+        found = normalised(seen, self.seen_mean, self.seen_scale, LIMIT)
+        if self.training:
+            found = found + self.config.noise * torch.randn_like(found)
+        return functional.normalize(self.motion(self.dropout(found)), dim=1)
+
+    def see_by(self, seen: Tensor) -> None:
+        """Set mean and scale of statistics from examples (..., S)."""
+        rows = seen.flatten(0, -2)
+        self.seen_mean.copy_(rows.mean(dim=0))
+        self.seen_scale.copy_(rows.std(dim=0).clamp(min=STILL))
+
+    def statistics(self, frames: Tensor, lengths: Tensor) -> Tensor:
+        """Frames (B, T, D) of lengths (B,) to what is seen of the whole motion (B, S)."""
+        normal, length = normalised(frames, self.mean, self.scale, LIMIT), lengths[:, None].log()
+        if self.places is None:
+            return torch.cat([of_frames(normal, lengths), length], dim=1)
+        places = self.places(frames) / NEAR
+        seen = torch.cat([places, normal[..., list(self.config.figure.root)]], dim=-1)
+        return torch.cat([of_frames(seen, lengths), of_speeds(places, lengths), length], dim=1)
+
+    def embed_text(self, words: Tensor, lengths: Tensor) -> Tensor:
+        """Ids (B, W) of sentences of lengths (B,) to unit vectors (B, E)."""
+        vectors = self.words(words)
+        known = before(lengths, words.shape[1])
+        weights = self.weight(vectors)[..., 0].masked_fill(~known, -torch.inf).softmax(dim=1)
+        mean = (weights[..., None] * vectors).sum(dim=1)
+        return functional.normalize(self.text(self.dropout(mean)), dim=1)
+
+    def losses(self, pairs: Pairs) -> Tensor:
+        """For each row how hard its motion and its sentence, and its sentences, find each other among all (B,)."""
+        motions, texts, others = self.embed_statistics(pairs.seen), self._texts(pairs.words), self._texts(pairs.others)
+        found = contrast(motions @ texts.T / self.config.temperature, pairs.groups)
+        between = contrast(texts @ others.T / self.config.temperature, pairs.groups)
+        return found + self.config.wordings * between
+
+    def _texts(self, words: Tensor) -> Tensor:
+        return self.embed_text(words, (words != PAD).sum(dim=1))
+
+    def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
+        """Both encoders, each with its contract."""
+        vector = TensorSpec("vector", ("batch", self.config.vector))
+        lengths = TensorSpec("lengths", ("batch",), "int64")
+        frames = TensorSpec("frames", ("batch", "time", self.config.channels))
+        words = TensorSpec("words", ("batch", "words"), "int64")
+        return {
+            "motion": (Part(self, self.embed_motion), GraphSpec((frames, lengths), (vector,))),
+            "text": (Part(self, self.embed_text), GraphSpec((words, lengths), (vector,))),
+        }
+
+
+def contrast(scores: Tensor, groups: Tensor) -> Tensor:
+    """Symmetric InfoNCE (B,) of scores (B, B) of one kind (rows) and another (columns), whose diagonal is right.
+
+    groups: (B,) what a row shows: pairs off the diagonal that show the same are left out.
+    """
+    right = torch.arange(len(groups), device=groups.device)
+    alike = (groups[:, None] == groups) & (right[:, None] != right)
+    scores = scores.masked_fill(alike, -torch.inf)
+    rows, columns = (functional.cross_entropy(way, right, reduction="none") for way in (scores, scores.T))
+    return (rows + columns) / 2
+
+
+def from_config(config: Mapping[str, Any]) -> JointEmbedding:
+    """An untrained net of a configuration as it stands in a manifest."""
+    found = dict(tuples(config))
+    return JointEmbedding(JointEmbeddingConfig(**{**found, "figure": Figure(**found["figure"])}))
