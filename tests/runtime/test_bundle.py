@@ -35,14 +35,15 @@ def edit(folder: Path, change: Callable[[dict[str, Any]], None]) -> None:
 
 
 def test_the_shipped_bundles_are_whole_and_give_their_golden_vectors() -> None:
-    assert list(list_bundles()) == ["cmu-control", "cmu-generate", "describe", "predict"]
-    assert [find_bundle(verb).stem for verb in VERBS] == ["cmu-control", "describe", "cmu-generate", "predict"]
+    assert list(list_bundles()) == ["cmu-control", "cmu-generate", "describe", "predict", "search"]
+    assert [find_bundle(verb).stem for verb in VERBS] == ["cmu-control", "describe", "cmu-generate", "predict", "search"]
     for name, path in list_bundles().items():
         bundle = Bundle.open(name)
         assert bundle.name == name == path.stem
         found = verify(bundle)
-        assert {"encoder.onnx", "step.onnx", "golden.npz"} <= set(found.files)
-        assert {"encoder", "step", "run"} <= found.errors.keys()
+        roles = VERBS[bundle.manifest.verb].ROLES
+        assert {*(f"{role}.onnx" for role in roles), "golden.npz"} <= set(found.files)
+        assert {*roles, "run"} <= found.errors.keys()
         assert max(found.errors.values()) < found.tolerance
         assert found.providers == ("CPUExecutionProvider",)
 
