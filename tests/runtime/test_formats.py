@@ -109,6 +109,8 @@ def test_places_that_are_no_files_are_named(tmp_path: Path) -> None:
         ("a" * 300 + ".bvh", "cannot be read"),
         ("a.bvh/b.bvh", "no such file"),
         ("a.txt", "cannot read files of type '.txt'; expected one of .amc .bvh .npz .csv .xml"),
+        ("a.c3d", r"cannot read files of type '.c3d', which hold markers and no skeleton: .* expected one of .amc"),
+        ("a.fbx", "cannot read files of type '.fbx': export glTF or BVH from the program that made them; expected"),
     ):
         with pytest.raises(FormatError, match=said):
             read_motion(tmp_path / name)

@@ -78,6 +78,12 @@ FORMATS = (
     Format(".gif", "picture", _GIF, writer="gif", needs="PIL"),
 )
 
+OTHERS = {
+    ".c3d": ", which hold markers and no skeleton: solve them for one first, with the program that recorded them",
+    ".fbx": ": export glTF or BVH from the program that made them",
+}
+"""What is known of other types of motion files: it is said when they are refused."""
+
 READABLE = tuple(kind.extension for kind in FORMATS if kind.reader)
 WRITABLE = tuple(kind.extension for kind in FORMATS if kind.writer)
 MOCAP = tuple(kind.extension for kind in FORMATS if kind.mocap)
@@ -166,7 +172,8 @@ def _format(file: File, format: str | None, allowed: tuple[str, ...], verb: str)
     if extension in allowed:
         return next(kind for kind in FORMATS if kind.extension == extension)
     what = f"files of type {extension!r}" if extension else "a file without an extension"
-    raise FormatError(place_of(file), f"cannot {verb} {what}; expected one of {' '.join(allowed)}")
+    why = OTHERS.get(extension, "")
+    raise FormatError(place_of(file), f"cannot {verb} {what}{why}; expected one of {' '.join(allowed)}")
 
 
 def _character(like: File | Character | Motion | Skeleton) -> Character:

@@ -25,7 +25,7 @@ DEFAULT = replace(
     PAPER,
     loop="beam",
     config=MotionToLanguageConfig(0, 0, dropout=0.2, frame_noise=0.3, travelled=3, summary=5.0),
-    training=Training(epochs=100, batch=32, optimiser="nadam", learning_rate=2e-3, falling=0.5, clip=8.0, keep="last"),
+    training=Training(epochs=200, batch=32, optimiser="nadam", learning_rate=2e-3, falling=0.5, clip=8.0, keep="last"),
     visits=LanguageVisits(offsets=3, mirror=True),
     defaults={**DEFAULTS, "draws": 100, "temperature": 0.7},
 )
