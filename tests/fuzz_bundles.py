@@ -197,9 +197,9 @@ def use(path: Path) -> None:
     if isinstance(model, ControlModel):
         model.start(variety=0.5).step()
     else:
-        spec, rng = model.graphs["encoder"].spec, np.random.default_rng(0)
-        feeds = {tensor.name: tensor.example(rng, 2) for tensor in spec.inputs}
-        model.graphs["encoder"]({**feeds, **({"lengths": np.ones(2, np.int64)} if "lengths" in feeds else {})})
+        encoder, rng = model.graphs[model.ROLES[0]], np.random.default_rng(0)
+        feeds = {tensor.name: tensor.example(rng, 2) for tensor in encoder.spec.inputs}
+        encoder({**feeds, **({"lengths": np.ones(2, np.int64)} if "lengths" in feeds else {})})
     verify(Bundle.open(path))
 
 
