@@ -26,7 +26,6 @@ from motet.motion.kinematics import global_transforms
 from motet.motion.mixamo import MIXAMO
 from motet.motion.motion import Motion
 from motet.motion.retarget import from_humanoid, to_humanoid
-from motet_train.evaluate.language.attributes import ACTIONS, said
 
 ARCHIVES = ("cmu-asfamc.zip", "cmu-asfamc-more.zip", "cmu-bvh.zip", "cmu-bvh-more.zip", "accad-bvh.zip")
 
@@ -100,6 +99,9 @@ def _print_descriptions(folder: Path) -> None:
 
 def _print_actions(folder: Path) -> None:
     """How many of every third trial are said to be the same action from the AMC and from another figure's BVH."""
+    # not above: tests of the runtime take the rest of this file, without the packages of evaluation
+    from motet_train.evaluate.language.attributes import ACTIONS, said
+
     model, same, different = motet.load_as(DescribeModel, "describe"), 0, []
     for path in sorted((folder / "cmu-asfamc" / "amc").glob("*.amc"))[::3]:
         whole = read_motion(path)
