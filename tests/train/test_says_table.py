@@ -214,12 +214,16 @@ def test_the_command_asks_a_bundle(corpus: Path, monkeypatch: pytest.MonkeyPatch
     report = json.loads(result.stdout)
     assert report["prompt"] == report["prompt_real"] == report["prompt_lookup"] == {run: 1.0}
     assert report["says"] == {"all": 1.0, "locomotion": 1.0, "rest": None, "known": 1.0}
+    assert report["r_precision"]["1"] is None  # there is no other prompt
+    assert report["frechet"]["generated_motions"] == 10
+    assert report["frechet"]["trials_motions"] == 1
 
 
 def test_the_command_says_what_does_not_go_together(tmp_path: Path) -> None:
     for arguments, said in (
         (["cmu-generate", "--save"], "neither --plots nor --save"),
         (["describe"], "describe is none"),
+        (["cmu-generate", "--search", "describe"], "need one for 'search'"),
         (["cmu-generate", "--data", str(tmp_path)], "no motion files"),
     ):
         result = CliRunner().invoke(main, ["evaluate", "--says", *arguments])

@@ -128,12 +128,16 @@ class Index:
         return list(found.values())
 
     def _vector(self, query: str | Motion) -> Floats:
-        """The vector (E,) of a sentence, or the mean direction of a motion's windows."""
-        if isinstance(query, str):
-            return self.model.embed_text(query)
-        mean = self.model.embed([part for _, part in self.model.windows(query, WINDOW)]).mean(axis=0)
-        found: Floats = mean / np.linalg.norm(mean)
-        return found
+        """The vector (E,) of a sentence or a motion."""
+        return self.model.embed_text(query) if isinstance(query, str) else direction(self.model, query)
+
+
+def direction(model: SearchModel, motion: Motion) -> Floats:
+    """The unit vector (E,) float32 of a motion of any length: the mean direction of its windows; MotionError for one
+    that the model cannot take."""
+    mean = model.embed([part for _, part in model.windows(motion, WINDOW)]).mean(axis=0)
+    found: Floats = mean / np.linalg.norm(mean)
+    return found
 
 
 def _renewed(folder: Path, model: SearchModel, before: Index | None, progress: Progress) -> Index:

@@ -17,7 +17,7 @@ from motet.cli.options import session_options
 from motet.models.control import ControlModel
 from motet.models.describe import DescribeModel
 from motet.models.generate import GenerateModel
-from motet.models.load import Model, build, load
+from motet.models.load import Model, build, load, load_as
 from motet.models.predict import PredictModel
 from motet.models.search import SearchModel
 from motet_train.cli.evaluate_language import by_subject, language_reports
@@ -48,6 +48,12 @@ from motet_train.settings import read_settings
 @click.option(
     "--says", is_flag=True, help="Generate: ask everyday prompts, and count the motions that do what they say."
 )
+@click.option(
+    "--search",
+    default="search",
+    show_default=True,
+    help="With --says: the name or path of a search bundle, in whose space motions and prompts are compared.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one nested object with stable keys.")
 @click.option("--plots", type=Path, help="Folder for the figures of the papers.")
 @unit_in
@@ -57,6 +63,7 @@ def evaluate(
     models: tuple[str, ...],
     data: Path | None,
     says: bool,
+    search: str,
     as_json: bool,
     plots: Path | None,
     unit_in: str | None,
@@ -68,7 +75,8 @@ def evaluate(
     Control: the thesis' experiments. Describe and generate: BLEU, floors, attributes, measures; with both, of the
     same split, also the chain from sentence to motion and back. Predict: the protocol's Euler errors on its text files,
     beside zero velocity and published rows, or distances in held out motion files. With --says, generate: the share of
-    motions that do what everyday prompts say, and how good they are, whatever they show.
+    motions that do what everyday prompts say, how good they are, whatever they show, and how near they are to their
+    prompts and to recorded motions in the space of a search model.
     """
     if says and (plots is not None or save):
         raise click.UsageError("--says prints figures only; it goes with neither --plots nor --save")
@@ -77,7 +85,11 @@ def evaluate(
     if save and (bundles := [name for name in models if name not in runs]):
         raise click.UsageError(f"--save keeps figures in training runs; {', '.join(bundles)} is a bundle")
     loaded = {name: _model(runs[name]) if name in runs else load(name, session) for name in models}
-    ready, text = _says(loaded, data, unit_in) if says else _measured(loaded, data, plots, unit_in)
+    ready, text = (
+        _says(loaded, data, unit_in, load_as(SearchModel, search, session))
+        if says
+        else _measured(loaded, data, plots, unit_in)
+    )
     for name in runs if save else ():
         Run({**runs[name].manifest, "quality": ready[name]}, runs[name].model).save(Path(name))
     click.echo(json.dumps(ready[models[0]] if len(models) == 1 else ready) if as_json else text)
@@ -87,12 +99,14 @@ def _model(run: Run) -> Model:
     return build(Manifest.from_json(run.manifest), run.torch_graphs())
 
 
-def _says(models: Mapping[str, Model], data: Path | None, unit: str | None) -> tuple[dict[str, Any], str]:
+def _says(
+    models: Mapping[str, Model], data: Path | None, unit: str | None, search: SearchModel
+) -> tuple[dict[str, Any], str]:
     """As :func:`_measured`, of everyday prompts."""
     found = {name: model for name, model in models.items() if isinstance(model, GenerateModel)}
     if others := [name for name in models if name not in found]:
         raise click.UsageError(f"--says asks generate models; {', '.join(others)} is none")
-    reports = says_reports(found, data, unit)
+    reports = says_reports(found, data, unit, search)
     return {name: json_ready(report) for name, report in reports.items()}, says_text(reports)
 
 

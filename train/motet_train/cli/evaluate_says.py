@@ -8,6 +8,7 @@ from tqdm import tqdm
 
 from motet.bundle.manifest import Manifest
 from motet.models.generate import GenerateModel
+from motet.models.search import SearchModel
 from motet.motion.motion import Motion
 from motet_train.data.errors import DataError
 from motet_train.evaluate.says.prompts import prompts
@@ -27,7 +28,9 @@ class Best:
         return self.model.generate(text, seed=seed)[0].motion
 
 
-def says_reports(models: Mapping[str, GenerateModel], data: Path | None, unit: str | None) -> dict[str, Report]:
+def says_reports(
+    models: Mapping[str, GenerateModel], data: Path | None, unit: str | None, search: SearchModel
+) -> dict[str, Report]:
     """The table of each model. data: a store or a corpus of motion files, for the real trials and the look-up."""
     trials = [] if data is None else list(read_trials(data, unit))
     if data is not None and not trials:
@@ -37,7 +40,7 @@ def says_reports(models: Mapping[str, GenerateModel], data: Path | None, unit: s
         for name, model in models.items():
             bar.set_description(name)
             training = trained_on(model.manifest, trials)
-            reports[name] = says_table(Best(model), trials, training, progress=lambda text: bar.update())
+            reports[name] = says_table(Best(model), trials, training, progress=lambda text: bar.update(), search=search)
     return reports
 
 

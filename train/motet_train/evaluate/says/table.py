@@ -5,13 +5,16 @@ from typing import Protocol
 
 import numpy as np
 
+from motet.bundle.graph import Floats
 from motet.errors import TextError
+from motet.models.search import SearchModel
 from motet.motion.motion import Motion
 from motet_train.data.errors import DataError
 from motet_train.evaluate.language.split_store import unknown_words_allowed
 from motet_train.evaluate.says.lookup import LookUp
 from motet_train.evaluate.says.measures import depth, jerk, slide, spread
 from motet_train.evaluate.says.prompts import Prompt, prompts
+from motet_train.evaluate.says.space import embedded, space_report
 from motet_train.evaluate.says.track import Track, track_of
 from motet_train.evaluate.says.trials import Trial
 from motet_train.evaluate.tables import Goals, Report, aligned, report_table, short_names
@@ -55,6 +58,7 @@ def says_table(
     training: Iterable[str] | None = None,
     seeds: int = SEEDS,
     progress: Told = lambda text: None,
+    search: SearchModel | None = None,
 ) -> Report:
     """The shares of motions that do what prompts say, by prompt and as means over groups of prompts, and how good the
     motions are.
@@ -62,33 +66,39 @@ def says_table(
     trials: recorded trials; with them come "real", the share of those that pass whose action the prompt asks for,
         "others", of those that show something else, and the look-up among the trials named in ``training`` (by default
         all). "known" is the mean over the prompts whose action a training trial shows.
+    search: a model in whose space motions and prompts are compared (:func:`space_report`); without one they are not.
     """
     lookup, names = _floor(trials, training)
+    floor: dict[str, tuple[Generator, int]] = {} if lookup is None else {"_lookup": (lookup, 1)}
+    sources = {"": (generator, seeds)} | floor
     rows: dict[str, dict[str, Figures]] = {"": {}, "_lookup": {}, "_real": {}}
     others: Figures = {}
+    seen: dict[str, dict[str, Floats]] = {kind: {} for kind in sources}
     for prompt in prompts():
         progress(prompt.text)
-        rows[""][prompt.text] = figures(prompt, asked(generator, prompt, seeds))
+        for kind, (source, count) in sources.items():
+            motions = asked(source, prompt, count)
+            rows[kind][prompt.text] = figures(prompt, [track_of(motion) for motion in motions])
+            if search is not None:
+                seen[kind][prompt.text] = embedded(search, motions)
         if lookup is not None:
-            rows["_lookup"][prompt.text] = figures(prompt, asked(lookup, prompt, 1))
             rows["_real"][prompt.text] = real(prompt, trials)
             others[prompt.text] = _share(prompt, [trial.track for trial in trials if _shows(prompt, trial) is False])
     known = {prompt.text for prompt in prompts() if any(t.name in names and _shows(prompt, t) for t in trials)}
     report: Report = {}
     for kind, found in rows.items():
-        if found:
-            report |= _groups(kind, found, known)
+        report |= _groups(kind, found, known) if found else {}
     if others:
         report["prompt_others"] = others
         report["quality"] |= _ratios(rows[""], rows["_real"])
-    return report
+    return report if search is None else report | space_report(search, prompts(), seen, trials)
 
 
-def asked(generator: Generator, prompt: Prompt, seeds: int) -> list[Track]:
-    """The tracks of the motions for a prompt, one for each seed; none where the generator cannot take the prompt."""
+def asked(generator: Generator, prompt: Prompt, seeds: int) -> list[Motion]:
+    """The motions for a prompt, one for each seed; none where the generator cannot take the prompt."""
     with unknown_words_allowed():
         try:
-            return [track_of(generator.generate(prompt.text, seed)) for seed in range(seeds)]
+            return [generator.generate(prompt.text, seed) for seed in range(seeds)]
         except TextError:
             return []
 
