@@ -67,7 +67,9 @@ def test_a_perfect_model_finds_all_at_once(corpus: SplitStore) -> None:
     assert parts == ["sentences", "floors", "motions"]
     first = {"first_1": 1, "first_5": 1, "first_10": 1, "median_rank": 1}
     assert report["asked"] == {"sentences": 5, "known": 1, "best_5": 1}
-    assert report["text"] == report["text_alike"] == report["words_text"] == first
+    assert report["text"] == report["text_alike"] == first
+    # whoever turns right in training swings the legs as whoever walks in the test: by looks that is nearer
+    assert report["words_text"] == {**first, "first_1": 0.8}
     assert report["motion"] == {"alike": 1, "features_alike": 1, "of": 5}
     assert "text.first_5" in report_table({"fake": report}, GOALS)
 

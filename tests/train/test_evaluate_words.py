@@ -19,10 +19,11 @@ from motet_train.evaluate.language.attributes import (
 )
 from motet_train.evaluate.language.bleu import agreement, bleu, ranks
 from motet_train.evaluate.language.floors import (
+    copied_bleu,
     frequent_bleu,
     frequent_sentence,
-    nearest_bleu,
     nearest_motions,
+    nearest_said,
     retrieved,
 )
 from motet_train.evaluate.language.split_store import SplitStore, split_as
@@ -34,10 +35,10 @@ def corpus() -> SplitStore:
     return split_as(told(store, "describe"), store)
 
 
-def naive_bleu(hypotheses: list[list[str]], references: list[list[list[str]]]) -> float:
+def naive_bleu(hypotheses: list[list[str]], references: list[list[list[str]]], longest: int = 4) -> float:
     """Papineni et al. 2002, literally: clipped precisions, closest reference length, the shorter of two as close."""
     logs = 0.0
-    for n in range(1, 5):
+    for n in range(1, longest + 1):
         hits = total = 0
         for words, row in zip(hypotheses, references, strict=True):
             grams = [Counter(tuple(text[i : i + n]) for i in range(len(text) - n + 1)) for text in (words, *row)]
@@ -45,7 +46,7 @@ def naive_bleu(hypotheses: list[list[str]], references: list[list[list[str]]]) -
             total += sum(grams[0].values())
         if not hits:
             return 0.0
-        logs += np.log(hits / total) / 4
+        logs += np.log(hits / total) / longest
     length = sum(map(len, hypotheses))
     closest = sum(
         min((abs(len(one) - len(words)), len(one)) for one in row)[1]
@@ -64,6 +65,9 @@ def test_bleu_is_that_of_a_naive_twin() -> None:
         expected = naive_bleu(hypotheses, references)
         texts = [[" ".join(words) for words in row] for row in references]
         assert bleu([" ".join(words) for words in hypotheses], texts) == pytest.approx(expected, abs=1e-6)
+        for longest in (1, 2):
+            shorter = bleu([" ".join(words) for words in hypotheses], texts, longest=longest)
+            assert shorter == pytest.approx(naive_bleu(hypotheses, references, longest), abs=1e-6)
         marked = [["SOS", *words, "EOS"] for words in hypotheses]
         expected = naive_bleu(marked, [[["SOS", *words, "EOS"] for words in row] for row in references])
         assert bleu([" ".join(words) for words in hypotheses], texts, True) == pytest.approx(expected, abs=1e-6)
@@ -147,9 +151,14 @@ def test_the_nearest_motion_and_sentence(corpus: SplitStore) -> None:
     assert [r % 5 for r in retrieved(corpus, ["someone jumps", "he turns right"])] == [4, 3]
     # two of three sentences of a kind are the same, the third has a word of its own
     references = corpus.references(test)
-    nearest = corpus.references(nearest_motions(corpus, corpus.motions(test)))
+    nearest = nearest_said(corpus, test)
+    assert nearest == corpus.references(nearest_motions(corpus, corpus.motions(test)))
     expected = np.mean([1.0, 1.0, bleu([said[2] for said in nearest], references)])
-    assert nearest_bleu(corpus, test) == pytest.approx(expected)
+    assert copied_bleu(nearest, references) == pytest.approx(expected)
+    fewer = [nearest[0][:2], *nearest[1:]]  # begins again with its first
+    last = [fewer[0][0], *(said[2] for said in fewer[1:])]
+    expected = np.mean([1.0, 1.0, bleu(last, references)])
+    assert copied_bleu(fewer, references) == pytest.approx(expected)
 
 
 def test_the_most_frequent_sentence(corpus: SplitStore) -> None:

@@ -16,15 +16,16 @@ References = Sequence[Sequence[str]]
 """For each motion what was said about it, normalised."""
 
 
-def bleu(hypotheses: Sequence[str], references: References, marks: bool = False) -> float:
-    """Corpus BLEU of one sentence for each motion, 0 to 1: n-grams up to 4, not smoothed, closest reference length.
+def bleu(hypotheses: Sequence[str], references: References, marks: bool = False, longest: int = 4) -> float:
+    """Corpus BLEU of one sentence for each motion, 0 to 1: not smoothed, closest reference length.
 
+    longest: n-grams up to so many words count.
     marks: keep SOS and EOS in hypotheses and references, as the authors did. Both are matched in every sentence, which
     makes the figure higher; later papers leave them out.
     """
     mark = _marked if marks else str
     streams = zip_longest(*(map(mark, said) for said in references))
-    metric = BLEU(smooth_method="none", tokenize="none", force=True)
+    metric = BLEU(smooth_method="none", tokenize="none", force=True, max_ngram_order=longest)
     score: float = metric.corpus_score([mark(plain(text)) for text in hypotheses], list(map(list, streams))).score
     return min(score / 100, 1.0)  # which rounding may exceed
 

@@ -8,26 +8,29 @@ from numpy.typing import NDArray
 from sklearn.feature_extraction.text import TfidfVectorizer
 
 from motet.motion.motion import Motion
-from motet.motion.rotations import Array
 from motet_train.evaluate.language.bleu import References, bleu
+from motet_train.evaluate.language.looks import Looks
 from motet_train.evaluate.language.split_store import SplitStore
 from motet_train.evaluate.nearest import nearest
 
 
 def nearest_motions(corpus: SplitStore, motions: Sequence[Motion]) -> list[int]:
-    """For each motion the training record with the most similar pose features: mean and deviation of each channel."""
-    train = corpus.described(corpus.parts.train)
-    known = np.array([pose_features(corpus, motion) for motion in corpus.motions(train)])
-    asked = np.array([pose_features(corpus, motion) for motion in motions])
-    return [train[i] for i in nearest(asked, known)[0]]
+    """For each motion the training record that looks most like it."""
+    train, looks = corpus.described(corpus.parts.train), Looks(corpus)
+    found, _ = nearest(looks.features(motions), looks.features(corpus.motions(train)))
+    return [train[i] for i in found]
 
 
-def nearest_bleu(corpus: SplitStore, records: Sequence[int]) -> float:
-    """BLEU of repeating the sentences of the nearest motion: the mean over its sentences."""
-    found = corpus.references(nearest_motions(corpus, corpus.motions(records)))
-    references = corpus.references(records)
-    most = max(map(len, found))
-    return float(np.mean([bleu([said[place % len(said)] for said in found], references) for place in range(most)]))
+def nearest_said(corpus: SplitStore, records: Sequence[int]) -> list[tuple[str, ...]]:
+    """What was said about the nearest training motion of each record."""
+    return corpus.references(nearest_motions(corpus, corpus.motions(records)))
+
+
+def copied_bleu(said: References, references: References, longest: int = 4) -> float:
+    """BLEU of repeating what was said about other motions: the mean over their sentences."""
+    most = max(map(len, said))
+    copies = [[sentences[place % len(sentences)] for sentences in said] for place in range(most)]
+    return float(np.mean([bleu(copy, references, longest=longest) for copy in copies]))
 
 
 def frequent_sentence(corpus: SplitStore) -> str:
@@ -51,10 +54,3 @@ def retrieved(corpus: SplitStore, sentences: Sequence[str]) -> list[int]:
     table = vectors.fit_transform([said for _, said in known])
     alike: NDArray[np.float64] = (vectors.transform(sentences) @ table.T).toarray()
     return [known[i][0] for i in alike.argmax(axis=1)]
-
-
-def pose_features(corpus: SplitStore, motion: Motion) -> Array:
-    """(2 D,): mean and standard deviation over time of each channel, in the training motions' units of deviation."""
-    z = corpus.z(motion)
-    features: Array = np.concatenate([z.mean(axis=0), z.std(axis=0)])
-    return features

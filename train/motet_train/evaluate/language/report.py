@@ -13,7 +13,7 @@ from motet.models.text import RULES
 from motet_train.evaluate.language.attributes import Score, sides_right, turns_right, verbs_right
 from motet_train.evaluate.language.bleu import RANKS, References, agreement, bleu, ranks
 from motet_train.evaluate.language.chain import Answers, answers, best_descriptions, bounds_chained, chained, likelihood
-from motet_train.evaluate.language.floors import frequent_bleu, nearest_bleu
+from motet_train.evaluate.language.floors import copied_bleu, frequent_bleu, nearest_said
 from motet_train.evaluate.language.motions import measures, quiet_energy
 from motet_train.evaluate.language.prompts import kinds, measurable, prompted, recognised, thresholds
 from motet_train.evaluate.language.split_store import SplitStore, unknown_words_allowed
@@ -40,6 +40,9 @@ GOALS: Goals = {
 SAMPLE, CHAIN_SAMPLE = 200, 40
 """Training motions, always the same, of which training BLEU is taken, and chained training BLEU."""
 
+LENGTHS = (1, 2, 3, 4)
+"""n-grams up to so many words count in BLEU of wordings that no training saw."""
+
 TRAINING = ("seconds", "epochs", "kept_epoch", "loss", "validation", "steps_per_second")
 
 
@@ -48,6 +51,8 @@ def describe_report(model: DescribeModel, corpus: SplitStore, progress: Told = l
 
     "bleu_unseen" is of those references alone that nobody said, word for word, about a training motion: where people
     describe from a pool of phrases, BLEU rewards knowing the pool. Motions without such a reference are left out.
+    Since a phrase of four words either stands there or does not, "unseen" has BLEU-1 to BLEU-4 of the best description
+    by the same references, and beside it that of copying what was said about the nearest training motion.
     A figure that does not exist is NaN.
     """
     report = origin(model.manifest, corpus)
@@ -60,9 +65,10 @@ def describe_report(model: DescribeModel, corpus: SplitStore, progress: Told = l
         said = corpus.references(records)
         report[f"bleu_{part}"] = ranks(found[part], said)
         report[f"bleu_{part}_marked"] = ranks(found[part], said, marks=True)
-    report |= _unseen(found["test"], corpus, test)
     progress("floors")
-    report["floor"] = _floors(corpus, test, references)
+    copied = nearest_said(corpus, test)
+    report |= _unseen(found["test"], copied, corpus, test)
+    report["floor"] = _floors(corpus, copied, references)
     best = report["bleu_test"]["1"]
     report["gain"] = {key: best - report["floor"][key] for key in ("nearest", "frequent")}
     report["words"] = _words([row[0] for row in found["test"]], references)
@@ -130,8 +136,8 @@ def origin(manifest: Manifest, corpus: SplitStore) -> Report:
     }
 
 
-def _unseen(hypotheses: list[list[str]], corpus: SplitStore, records: tuple[int, ...]) -> Report:
-    """BLEU on references that stand in no training sentence, and how many do."""
+def _unseen(hypotheses: list[list[str]], copied: References, corpus: SplitStore, records: tuple[int, ...]) -> Report:
+    """BLEU on references that stand in no training sentence, and how many do; beside the floor."""
     unseen = corpus.unseen(records)
     kept = [i for i, said in enumerate(unseen) if said]
     sentences = sum(map(len, corpus.references(records)))
@@ -140,13 +146,18 @@ def _unseen(hypotheses: list[list[str]], corpus: SplitStore, records: tuple[int,
         "test_sentences_seen": 1 - sum(map(len, unseen)) / sentences,
         "test_motions_unseen": float(len(kept)),
     }
-    figures = ranks([hypotheses[i] for i in kept], [unseen[i] for i in kept]) if kept else {}
-    return {"wording": counts, "bleu_unseen": figures or dict.fromkeys(map(str, range(1, RANKS + 1)), np.nan)}
+    if not kept:
+        return {"wording": counts, "bleu_unseen": dict.fromkeys(map(str, range(1, RANKS + 1)), np.nan)}
+    found, said, references = ([rows[i] for i in kept] for rows in (hypotheses, copied, unseen))
+    best = [row[0] for row in found]
+    by_length = {f"bleu_{n}": bleu(best, references, longest=n) for n in LENGTHS}
+    floor = {f"nearest_{n}": copied_bleu(said, references, n) for n in LENGTHS}
+    return {"wording": counts, "bleu_unseen": ranks(found, references), "unseen": by_length | floor}
 
 
-def _floors(corpus: SplitStore, test: tuple[int, ...], references: References) -> dict[str, float]:
+def _floors(corpus: SplitStore, copied: References, references: References) -> dict[str, float]:
     return {
-        "nearest": nearest_bleu(corpus, test),
+        "nearest": copied_bleu(copied, references),
         "frequent": frequent_bleu(corpus, references),
         "human": agreement(references),
     }

@@ -14,7 +14,8 @@ from motet.models.text import RULES
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet_train.data.alike import alike
-from motet_train.evaluate.language.floors import pose_features, retrieved
+from motet_train.evaluate.language.floors import retrieved
+from motet_train.evaluate.language.looks import Looks
 from motet_train.evaluate.language.report import Told, origin
 from motet_train.evaluate.language.split_store import SplitStore, unknown_words_allowed
 from motet_train.evaluate.tables import Goals, Report
@@ -41,19 +42,19 @@ def search_report(
     are nearest to it. "likelihood_": by a describe model of the same split, where one is given. "motion": the share of
     test motions whose nearest training motion is one of which the same was said, of those ("of") that have any.
     """
-    asked = _Asked(corpus)
+    asked, looks = _Asked(corpus), Looks(corpus)
     report: Report = {**origin(model.manifest, corpus), "asked": asked.told()}
     progress("sentences")
     with unknown_words_allowed():
         index = _index(model, corpus, corpus.parts.test)
         report |= asked.measured("", np.array([_order(index, sentence) for sentence in asked.sentences]))
     progress("floors")
-    report |= asked.measured("words_", _by_words(corpus, asked.sentences))
+    report |= asked.measured("words_", _by_words(looks, asked.sentences))
     if describe is not None:
         progress("likelihood")
         report |= asked.measured("likelihood_", _by_likelihood(describe, corpus, asked.sentences))
     progress("motions")
-    return {**report, "motion": _motions(model, corpus, asked.groups)}
+    return {**report, "motion": _motions(model, looks, asked.groups)}
 
 
 class _Asked:
@@ -112,9 +113,9 @@ def _order(index: Index, query: str | Motion) -> list[int]:
     return [int(hit.path.name) for hit in index.search(query, len(index.members))]
 
 
-def _by_words(corpus: SplitStore, sentences: Sequence[str]) -> Order:
-    looked_up = _features(corpus, retrieved(corpus, sentences))
-    return _distances(looked_up, _features(corpus, corpus.parts.test)).argsort(axis=1, kind="stable")
+def _by_words(looks: Looks, sentences: Sequence[str]) -> Order:
+    looked_up = _features(looks, retrieved(looks.corpus, sentences))
+    return _distances(looked_up, _features(looks, looks.corpus.parts.test)).argsort(axis=1, kind="stable")
 
 
 def _by_likelihood(describe: DescribeModel, corpus: SplitStore, sentences: Sequence[str]) -> Order:
@@ -124,12 +125,13 @@ def _by_likelihood(describe: DescribeModel, corpus: SplitStore, sentences: Seque
     return (-scores).argsort(axis=1, kind="stable")
 
 
-def _motions(model: SearchModel, corpus: SplitStore, groups: NDArray[np.int64]) -> dict[str, float]:
+def _motions(model: SearchModel, looks: Looks, groups: NDArray[np.int64]) -> dict[str, float]:
+    corpus = looks.corpus
     train, test = np.array(corpus.parts.train), np.array(corpus.parts.test)
     known = np.isin(groups[test], groups[train])
     index = _index(model, corpus, corpus.parts.train)
     by_model = [int(index.search(motion, 1)[0].path.name) for motion in corpus.motions(test.tolist())]
-    by_features = _distances(_features(corpus, test.tolist()), _features(corpus, train.tolist())).argmin(axis=1)
+    by_features = _distances(_features(looks, test.tolist()), _features(looks, train.tolist())).argmin(axis=1)
     right = {
         "alike": groups[train[by_model]] == groups[test],
         "features_alike": groups[train[by_features]] == groups[test],
@@ -138,8 +140,8 @@ def _motions(model: SearchModel, corpus: SplitStore, groups: NDArray[np.int64]) 
     return {**shares, "of": float(known.sum())}
 
 
-def _features(corpus: SplitStore, records: Sequence[int]) -> Array:
-    return np.array([pose_features(corpus, motion) for motion in corpus.motions(records)])
+def _features(looks: Looks, records: Sequence[int]) -> Array:
+    return looks.features(looks.corpus.motions(records))
 
 
 def _distances(some: Array, others: Array) -> Array:
