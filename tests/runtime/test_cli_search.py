@@ -51,6 +51,19 @@ def test_a_file_that_fails_is_named_and_the_rest_is_found(folder: Path) -> None:
     assert result.stderr.startswith(f"motet: {folder / 'broken.bvh'}: ")
 
 
+def test_the_unit_of_files_that_do_not_state_it(tmp_path: Path) -> None:
+    for seed in range(2):
+        write_motion(tmp_path / f"{seed}.bvh", moving(20, seed=seed))
+    refused = run("search", "walks", tmp_path)
+    assert refused.exit_code == 2
+    assert "unit of length is not known" in refused.stderr
+    assert "--unit-in" in refused.stderr
+    rows = json.loads(run("search", tmp_path / "1.bvh", tmp_path, "--unit-in", "m", "--json").stdout)
+    assert rows[0]["path"] == str(tmp_path / "1.bvh")
+    assert rows[0]["score"] == pytest.approx(1, abs=1e-6)
+    assert Index.open(tmp_path, search_model(), unit="m").unit == "m"
+
+
 def test_unknown_words_are_said_once(folder: Path) -> None:
     result = run("search", "a person limps", folder)
     assert result.stderr == "motet: the model does not know limps (in 'a person limps')\n"

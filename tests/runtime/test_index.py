@@ -1,5 +1,6 @@
 """The index of a folder: what it finds, and what it does with files that change, vanish or cannot be read."""
 
+import json
 import logging
 from dataclasses import replace
 from pathlib import Path
@@ -37,9 +38,9 @@ def reads(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The names of the files that an index reads."""
     found: list[str] = []
 
-    def noted(path: Path) -> object:
+    def noted(path: Path, unit: str | float | None = None) -> object:
         found.append(path.name)
-        return read_motion(path)
+        return read_motion(path, unit=unit)
 
     monkeypatch.setattr(indexing, "read_motion", noted)
     return found
@@ -111,6 +112,38 @@ def test_unreadable_files_are_named_and_the_rest_works(folder: Path, model: Sear
     assert len(whole.search("walks", 9)) == 4
     reads.clear()
     assert Index.open(folder, model).failed == whole.failed
+    assert reads == []
+
+
+def test_another_unit_is_read_anew(tmp_path: Path, model: SearchModel, reads: list[str]) -> None:
+    write_motion(tmp_path / "a.bvh", moving(20, seed=1))
+    write_motion(tmp_path / "b.bvh", moving(20, seed=2))
+    with pytest.raises(MotionError, match=r"none of 2 motion files .* unit"):
+        Index.open(tmp_path, model)
+    own = read_motion(tmp_path / "b.bvh", unit="cm")
+    reads.clear()
+    found = Index.open(tmp_path, model, unit="cm")
+    assert sorted(reads) == ["a.bvh", "b.bvh"]
+    assert found.search(own, 1) == [Hit(tmp_path / "b.bvh", 0.0, 2.0, pytest.approx(1, abs=1e-6))]
+    reads.clear()
+    (tmp_path / "a.bvh").unlink()
+    same = Index.open(tmp_path, model, unit="cm")
+    assert (reads, same.unit, same.vanished) == ([], "cm", (tmp_path / "a.bvh",))
+    other = Index.open(tmp_path, model, unit="m")
+    assert (reads, other.unit, other.vanished) == (["b.bvh"], "m", ())
+    assert not np.allclose(other.vectors, same.vectors)
+    with pytest.raises(MotionError, match="length unit"):
+        Index.open(tmp_path, model, unit="parsec")
+
+
+def test_an_index_of_before_there_were_units_is_taken(folder: Path, model: SearchModel, reads: list[str]) -> None:
+    Index.open(folder, model)
+    with np.load(folder / NAME) as arrays:
+        text, vectors = json.loads(arrays["index"].tobytes()), arrays["vectors"]
+    del text["unit"]
+    np.savez(folder / NAME, index=np.frombuffer(json.dumps(text).encode(), np.uint8), vectors=vectors)
+    reads.clear()
+    Index.open(folder, model)
     assert reads == []
 
 

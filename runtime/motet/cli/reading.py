@@ -24,6 +24,10 @@ Read = Callable[[Path], Motion]
 FPS = click.FloatRange(0, 10_000, min_open=True)
 """Frame rates that a motion is resampled to."""
 
+unit_option = click.option(
+    "--unit-in", type=click.Choice(list(METRES)), help="Length unit of files that do not state theirs."
+)
+
 out_option = click.option(
     "-o", "--out", required=True, type=Path, help=f"File to write; its extension is the format: {' '.join(WRITABLE)}."
 )
@@ -49,7 +53,7 @@ def like_option(command: Callable[..., None]) -> Callable[..., None]:
 def read_options(command: Callable[..., None]) -> Callable[..., None]:
     """Gives a command ``read``, which reads a motion file as the options of :func:`motet.read` say."""
 
-    @click.option("--unit-in", type=click.Choice(list(METRES)), help="Length unit of files that do not state theirs.")
+    @unit_option
     @click.option("--fps-in", type=FPS, help=f"Frame rate of files that have none ({_takers('fps')}).")
     @click.option(
         "--asf", type=Path, help=f"Skeleton of the files ({_takers('asf')}). [default: looked for beside them]"

@@ -11,7 +11,7 @@ import click
 from motet.bundle.session import SessionOptions
 from motet.cli.notes import text_notes
 from motet.cli.options import session_options
-from motet.cli.reading import bar
+from motet.cli.reading import bar, unit_option
 from motet.errors import TextWarning
 from motet.formats import READABLE, read_motion
 from motet.models.index import NAME, Hit, Index
@@ -25,10 +25,18 @@ from motet.models.search import SearchModel
 @click.option("--count", type=click.IntRange(1, 1000), help="Motions to print. [default: the bundle's]")
 @click.option("--bundle", default="search", show_default=True, help="Name or path of a bundle.")
 @click.option("--index", "file", type=Path, help=f"File to keep the vectors in. [default: {NAME} in FOLDER]")
+@unit_option
 @session_options
 @click.option("--json", "as_json", is_flag=True, help="Print a list with path, start, stop and score of each.")
 def search(
-    query: str, folder: Path, count: int | None, bundle: str, file: Path | None, session: SessionOptions, as_json: bool
+    query: str,
+    folder: Path,
+    count: int | None,
+    bundle: str,
+    file: Path | None,
+    unit_in: str | None,
+    session: SessionOptions,
+    as_json: bool,
 ) -> None:
     """Find the motions in FOLDER that are nearest to QUERY, a sentence or a motion file; FOLDER may be an index file.
 
@@ -36,12 +44,12 @@ def search(
     embeds all motion files, and later ones those that are new or have changed.
     """
     model = load_as(SearchModel, bundle, session)
-    motion = read_motion(query) if Path(query).suffix.lower() in READABLE else None
+    motion = read_motion(query, unit=unit_in) if Path(query).suffix.lower() in READABLE else None
     if motion is None:
         with text_notes():
             model.ids(query)  # refused before all motions are read
     with bar("embedding") as progress:
-        index = Index.open(folder, model, file, progress=progress)
+        index = Index.open(folder, model, file, unit=unit_in, progress=progress)
     with warnings.catch_warnings(action="ignore", category=TextWarning):  # said already
         hits = index.search(query if motion is None else motion, count)
     _print(hits, as_json)

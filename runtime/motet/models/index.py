@@ -17,13 +17,14 @@ from typing import Any
 import numpy as np
 
 from motet.bundle.graph import Floats
-from motet.errors import FormatError, MotetError, MotionError, OutputError
+from motet.errors import FormatError, MotetError, MotionError, OutputError, UnitError
 from motet.files import write_whole
 from motet.formats import MOCAP, read_motion
 from motet.formats.npy import array
 from motet.models.progress import Progress, silent
 from motet.models.search import SearchModel
 from motet.motion.motion import Motion
+from motet.motion.units import metres
 
 log = logging.getLogger(__name__)
 
@@ -62,7 +63,7 @@ class Index:
     """The motions of a folder, to be asked about; :meth:`open` makes one.
 
     folder: where the paths of the hits begin. vectors: (N, E) float32, of all windows of all members. vanished: the
-    files that were there before, and are not any more.
+    files that were there before, and are not any more. unit: what :func:`motet.read` was told to read them.
     """
 
     def __init__(
@@ -72,14 +73,20 @@ class Index:
         members: Sequence[Member],
         vectors: Floats,
         vanished: Sequence[Path] = (),
+        unit: str | float | None = None,
     ) -> None:
         self.model, self.folder, self.members, self.vectors = model, folder, tuple(members), vectors
-        self.vanished = tuple(vanished)
+        self.vanished, self.unit = tuple(vanished), unit
         self._windows = [(member, *window) for member in members for window in member.windows]
 
     @staticmethod
     def open(
-        place: str | Path, model: SearchModel, file: str | Path | None = None, *, progress: Progress = silent
+        place: str | Path,
+        model: SearchModel,
+        file: str | Path | None = None,
+        *,
+        unit: str | float | None = None,
+        progress: Progress = silent,
     ) -> "Index":
         """The index of a folder's motion files, and those of the folders in it; or of the folder of an index file.
 
@@ -87,16 +94,20 @@ class Index:
         is written anew, whole. Motion files that cannot be read or used are named in :attr:`failed`, vanished ones in
         :attr:`vanished`.
         file: where the index is kept, by default ".motet-search.npz" in the folder, if that can be written to.
+        unit: the length unit of files that do not state theirs, as in :func:`motet.read`; an index that was made with
+        another one is made anew.
         progress: called with the number of motion files done and of all.
         FormatError where there is no folder, no motion file in it, or where the index is damaged or another model's;
-        MotionError where no motion can be used.
+        MotionError where no motion can be used, or for an unknown unit.
         """
+        if unit is not None:
+            metres(unit)
         place = Path(place)
         kept = place if place.is_file() else Path(file or place / NAME)
         before = _read(kept, model) if kept.is_file() else None
         folder = before.folder if before is not None and kept == place else place
-        found = _renewed(folder, model, before, progress)
-        if before is None or found.members != before.members or folder.absolute() != before.folder:
+        found = _renewed(folder, model, before, unit, progress)
+        if before is None or found._told() != before._told():
             _keep(found, kept, needed=file is not None)
         for path in found.vanished:
             log.warning("%s has vanished since it was indexed", path)
@@ -127,6 +138,10 @@ class Index:
                 break
         return list(found.values())
 
+    def _told(self) -> tuple[Path, str | float | None, tuple[Member, ...]]:
+        """What the file says, but for the vectors and the model."""
+        return self.folder.absolute(), self.unit, self.members
+
     def _vector(self, query: str | Motion) -> Floats:
         """The vector (E,) of a sentence or a motion."""
         return self.model.embed_text(query) if isinstance(query, str) else direction(self.model, query)
@@ -140,9 +155,12 @@ def direction(model: SearchModel, motion: Motion) -> Floats:
     return found
 
 
-def _renewed(folder: Path, model: SearchModel, before: Index | None, progress: Progress) -> Index:
+def _renewed(
+    folder: Path, model: SearchModel, before: Index | None, unit: str | float | None, progress: Progress
+) -> Index:
     """The index of a folder as it is now, with what is known already of files that did not change."""
     known = {} if before is None else dict(_by_member(before))
+    usable = known if before is not None and before.unit == unit else {}
     paths = sorted(_motion_files(folder))
     if not paths:
         raise FormatError(folder, f"no motion files ({' '.join(MOCAP)}) are in it")
@@ -150,13 +168,13 @@ def _renewed(folder: Path, model: SearchModel, before: Index | None, progress: P
     for done, path in enumerate(paths, start=1):
         state = path.stat()
         member = Member(path.relative_to(folder).as_posix(), state.st_size, state.st_mtime_ns)
-        was = known.get((member.path, member.size, member.changed))
-        now, rows = was or _embedded(path, member, model)
+        was = usable.get((member.path, member.size, member.changed))
+        now, rows = was or _embedded(path, member, model, unit)
         members.append(now)
         vectors.append(rows)
         progress(done, len(paths))
     gone = {path for path, _, _ in known} - {member.path for member in members}
-    return Index(model, folder, members, np.concatenate(vectors), [folder / path for path in sorted(gone)])
+    return Index(model, folder, members, np.concatenate(vectors), [folder / path for path in sorted(gone)], unit)
 
 
 def _by_member(index: Index) -> Iterator[tuple[tuple[str, int, int], tuple[Member, Floats]]]:
@@ -174,14 +192,15 @@ def _motion_files(folder: Path) -> Iterator[Path]:
             yield path
 
 
-def _embedded(path: Path, member: Member, model: SearchModel) -> tuple[Member, Floats]:
+def _embedded(path: Path, member: Member, model: SearchModel, unit: str | float | None) -> tuple[Member, Floats]:
     """A member with its windows, and their vectors; or with the reason why it has none."""
     size = model.sizes["E"]
     try:
-        parts = model.windows(read_motion(path), WINDOW)
+        parts = model.windows(read_motion(path, unit=unit), WINDOW)
         vectors = model.embed([part for _, part in parts])
     except MotetError as error:
-        fault = str(error).removeprefix(f"{path}: ")
+        hint = " (Index.open's unit, --unit-in)" if isinstance(error, UnitError) else ""
+        fault = str(error).removeprefix(f"{path}: ") + hint
         return Member(member.path, member.size, member.changed, (), fault), np.empty((0, size), np.float32)
     windows = tuple((start, start + part.duration) for start, part in parts)
     return Member(member.path, member.size, member.changed, windows), vectors
@@ -193,6 +212,7 @@ def _keep(index: Index, file: Path, needed: bool) -> None:
         "version": VERSION,
         "model": index.model.identity,
         "folder": str(index.folder.absolute()),
+        "unit": index.unit,
         "members": [asdict(member) for member in index.members],
     }
     content = io.BytesIO()
@@ -211,7 +231,8 @@ def _read(file: Path, model: SearchModel) -> Index:
         with zipfile.ZipFile(file) as archive:
             vectors, text = array(archive, "vectors", "f"), array(archive, "index", "u")
         data = json.loads(text.tobytes())
-        version, made, folder = int(data["version"]), str(data["model"]), Path(data["folder"])
+        version, made = int(data["version"]), str(data["model"])
+        folder, unit = Path(data["folder"]), data.get("unit")
         members = [_member(entry) for entry in data["members"]] if version == VERSION else []
     # a damaged archive makes zipfile, its unpackers, numpy and json raise errors of a dozen types
     except Exception as error:
@@ -222,7 +243,7 @@ def _read(file: Path, model: SearchModel) -> Index:
         raise FormatError(file, f"this index was made by {by}: remove it, or name another")
     if vectors.shape != (sum(len(member.windows) for member in members), model.sizes["E"]):
         raise FormatError(file, "this index is damaged: its vectors are not those of its windows; remove it")
-    return Index(model, folder, members, vectors.astype(np.float32, copy=False))
+    return Index(model, folder, members, vectors.astype(np.float32, copy=False), unit=unit)
 
 
 def _member(data: dict[str, Any]) -> Member:
