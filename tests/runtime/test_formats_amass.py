@@ -1,3 +1,5 @@
+import io
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -68,3 +70,25 @@ def test_other_files_are_refused(tmp_path: Path) -> None:
     assert not amass.is_amass((tmp_path / "y.npz").read_bytes())
     with pytest.raises(FormatError):
         amass.read(tmp_path / "y.npz")
+
+
+def test_damaged_archives_are_not_of_amass(tmp_path: Path) -> None:
+    vectors, trans = poses()
+    np.savez(tmp_path / "a.npz", poses=vectors, trans=trans, mocap_framerate=30.0)
+    whole = (tmp_path / "a.npz").read_bytes()
+    assert amass.is_amass(whole)
+    entry = whole.rindex(b"PK\x01\x02")  # the last of the directory
+    newer = whole[: entry + 6] + b"\xff" + whole[entry + 7 :]
+    flagged = whole[: entry + 9] + b"\x08" + whole[entry + 10 :]  # its name is said to be UTF-8
+    name = flagged.index(b"mocap", entry)
+    unnamed = flagged[:name] + b"\xff" + flagged[name + 1 :]
+    for content, raised in ((newer, NotImplementedError), (unnamed, UnicodeDecodeError), (b"", zipfile.BadZipFile)):
+        with pytest.raises(raised):
+            zipfile.ZipFile(io.BytesIO(content))
+        assert not amass.is_amass(content)
+    rng = np.random.default_rng(0)
+    for _ in range(300):
+        content = bytearray(whole)
+        for place in rng.integers(entry - 200, len(whole), 3):
+            content[place] = rng.integers(256)
+        assert amass.is_amass(bytes(content)) in (True, False)  # and nothing is raised
