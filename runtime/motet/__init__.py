@@ -26,7 +26,7 @@ from motet.errors import (
 from motet.formats import read_motion as read
 from motet.formats import write_motion as write
 from motet.models.control import ControlModel, ControlSession, Snapshot
-from motet.models.describe import DescribeModel, Description
+from motet.models.describe import DescribeModel, Description, Part
 from motet.models.generate import Generated, GenerateModel
 from motet.models.index import Hit, Index
 from motet.models.load import load, load_as
@@ -57,6 +57,7 @@ __all__ = [
     "Motion",
     "MotionError",
     "OutputError",
+    "Part",
     "PredictModel",
     "PredictSession",
     "ScriptError",

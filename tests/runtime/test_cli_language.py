@@ -38,7 +38,7 @@ def test_describe_prints_json_for_every_file(files: list[Path]) -> None:
     assert [row["input"] for row in rows] == [str(path) for path in files]
     expected = describe_model().describe([read_motion(path) for path in files], 3)
     for row, wanted in zip(rows, expected, strict=True):
-        assert [set(h) for h in row["hypotheses"]] == [{"text", "log_probability", "score"}] * 3
+        assert [set(h) for h in row["hypotheses"]] == [{"text", "log_probability", "score", "confident"}] * 3
         assert [h["text"] for h in row["hypotheses"]] == [d.text for d in wanted]
         np.testing.assert_allclose(
             [h["log_probability"] for h in row["hypotheses"]], [d.log_probability for d in wanted], atol=1e-5
@@ -96,6 +96,30 @@ def test_a_long_motion_is_described_in_windows(tmp_path: Path, files: list[Path]
         "22.5 to 45.0 s",
         str(files[0]),
     ]
+
+
+def test_a_timeline_has_a_line_for_each_part(tmp_path: Path, files: list[Path]) -> None:
+    path = tmp_path / "long.npz"
+    write_motion(path, moving(450))
+    expected = describe_model().timeline(read_motion(path))
+    rows = json.loads(run("describe", path, "--timeline", "--json").stdout)
+    assert rows == [{"input": str(path), **part.to_json()} for part in expected]
+    assert {"start", "stop", "text", "log_probability", "confident"} <= set(rows[0])
+    lines = run("describe", path, "--timeline").stdout.splitlines()
+    told = [f"{part.start:.1f}-{part.stop:.1f} s  {'' if part.confident else '? '}{part.text}" for part in expected]
+    assert lines == told
+    both = run("describe", path, tmp_path / "none.npz", files[0], "--timeline")
+    assert (both.exit_code, both.stderr.count("none.npz: no such file")) == (1, 1)
+    assert both.stdout.splitlines()[: len(lines) + 2] == [str(path), *lines, str(files[0])]
+
+
+def test_what_is_not_sure_has_a_question_mark(files: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    expected = describe_model().describe(read_motion(files[0]))
+    monkeypatch.setattr("motet.models.describe.CONFIDENT", expected[1].log_probability)
+    texts = [line[10:] for line in run("describe", files[0]).stdout.splitlines()]
+    assert texts == [*(found.text for found in expected[:2]), *(f"? {found.text}" for found in expected[2:])]
+    (row,) = json.loads(run("describe", files[0], "--json").stdout)
+    assert [found["confident"] for found in row["hypotheses"]] == [True, True, False, False, False]
 
 
 def test_generate_writes_the_same_bytes_every_time(tmp_path: Path) -> None:
@@ -182,6 +206,7 @@ def test_embed(tmp_path: Path, files: list[Path]) -> None:
         (1, ["embed", "{bad}/long.npz", "-o", "{out}/a.npy"], "long.npz: the motion lasts 31.0 s"),
         (1, ["describe", "{bad}/nan.csv"], "nan.csv"),
         (2, ["describe", "{bad}/good.npz", "--beams", "0"], "range 1<=x<=100"),
+        (2, ["describe", "{bad}/good.npz", "--timeline", "--beams", "3"], "goes with neither --beams nor --draws"),
         (2, ["describe", "{bad}/good.npz", "--draws", "-1"], "range 0<=x<=1000"),
         (2, ["describe", "{bad}/good.npz", "--bundle", "nothing"], "unknown bundle 'nothing'"),
         (2, ["describe", "{bad}/good.npz", "--bundle", "generate"], "is for 'generate'; need one for 'describe'"),

@@ -22,7 +22,7 @@ def test_describe_is_three_lines_of_python(clips: Path) -> None:
     printed = json.loads(run("describe", clips / WALK, "--json").stdout)[0]["hypotheses"]
     model = motet.load("describe")
     motion = motet.read(clips / WALK)
-    assert printed == [vars(found) for found in model.describe(motion)]
+    assert printed == [found.to_json() for found in model.describe(motion)]
 
 
 def test_generate_is_three_lines_of_python(tmp_path: Path) -> None:

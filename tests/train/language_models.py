@@ -1,7 +1,7 @@
 """A corpus of five kinds of motions whose measures are known, and models whose answers to it are known."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,7 +9,7 @@ import numpy as np
 from language_data import SKELETON
 
 from motet.errors import TextError
-from motet.models.describe import Description
+from motet.models.describe import Description, Part
 from motet.motion.motion import Motion
 from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS
 from motet_train.data.store import Entry, Store
@@ -78,6 +78,14 @@ class FakeDescribe:
     def describe(self, motions: Sequence[Motion], beams: int = 5) -> list[list[Description]]:
         rows = [self.said.get(motion.values.astype(np.float32).tobytes(), ("somebody dances",)) for motion in motions]
         return [[Description(plain(text), -float(i), -float(i)) for i, text in enumerate(row[:beams])] for row in rows]
+
+    def timeline(self, motion: Motion) -> list[Part]:
+        """A part for each motion of the store."""
+        starts = range(0, len(motion), FRAMES)
+        said = [self.describe([motion[start : start + FRAMES]], 1)[0][0] for start in starts]
+        return [
+            Part(**asdict(one), start=s / FPS, stop=(s + FRAMES) / FPS) for one, s in zip(said, starts, strict=True)
+        ]
 
     def score(self, motion: Motion, sentence: str) -> float:
         return -2.0 * (len(sentence.split()) + 1)

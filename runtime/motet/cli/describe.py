@@ -1,7 +1,7 @@
 """``motet describe``: motion files in, ranked sentences out."""
 
 import json
-from dataclasses import asdict
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,15 +11,16 @@ from motet.bundle.session import SessionOptions
 from motet.cli.options import session_options
 from motet.cli.reading import Read, Tries, bar, read_options, say_resampled
 from motet.formats import READS
-from motet.models.describe import DescribeModel, Description
+from motet.models.describe import DescribeModel, Description, Part
 from motet.models.load import load_as
 
 
 @click.command(
-    help=f"""Describe motion files: sentences, the best first, each with what it is ranked by: by default how well it
-    agrees with all sentences drawn (0 to 1), with --draws 0 its log-probability.
+    help=f"""Describe motion files: sentences, the best first, each with its log-probability, or, with --draws, with how
+    well it agrees with all sentences drawn (0 to 1). A sentence after "?" is one that the model is not sure of.
 
-    All files are described in one batch, motions over 30 s in windows. Any human figure will do. Reads {READS}.
+    All files are described in one batch, motions over 30 s in windows; with --timeline, motions of any length are cut
+    where what is done changes. Any human figure will do. Reads {READS}.
     """
 )
 @click.argument("motions", nargs=-1, required=True, type=Path, metavar="MOTION...")
@@ -28,23 +29,43 @@ from motet.models.load import load_as
 @click.option(
     "--draws",
     type=click.IntRange(0, 1000),
-    help="Samples for consensus (MBR) decoding; 0: beam search. [default: the bundle's]",
+    help="Samples for consensus (MBR) decoding; 0: beam search. [default: the bundle's; of describe: beam search]",
 )
+@click.option("--timeline", is_flag=True, help="Say what happens when: a sentence for each part of a motion.")
 @session_options
 @read_options
-@click.option("--json", "as_json", is_flag=True, help="Print a list with input, seconds and hypotheses of each window.")
+@click.option("--json", "as_json", is_flag=True, help="Print a list: each window or part with its input and seconds.")
 def describe(
     motions: tuple[Path, ...],
     bundle: str,
     beams: int | None,
     draws: int | None,
+    timeline: bool,
     session: SessionOptions,
     read: Read,
     as_json: bool,
 ) -> None:
     """Describe motion files."""
-    model = load_as(DescribeModel, bundle, session)
-    tries, rows, parts, rates = Tries(), [], [], []
+    if timeline and (beams, draws) != (None, None):
+        raise click.UsageError("--timeline gives one sentence for each part: it goes with neither --beams nor --draws")
+    model, tries = load_as(DescribeModel, bundle, session), Tries()
+    if timeline:
+        _timelines(model, motions, read, tries, as_json)
+    else:
+        _hypotheses(model, motions, read, tries, beams, draws, as_json)
+    tries.finish()
+
+
+def _hypotheses(
+    model: DescribeModel,
+    motions: Sequence[Path],
+    read: Read,
+    tries: Tries,
+    beams: int | None,
+    draws: int | None,
+    as_json: bool,
+) -> None:
+    rows, parts, rates = [], [], []
     for path in motions:
         with tries.of(path):
             motion = read(path)
@@ -56,13 +77,37 @@ def describe(
     with bar("describing") as progress:
         found = model.describe(parts, beams, draws, progress=progress)
     _print(rows, found, as_json, several=len(motions) > 1)
-    tries.finish()
+
+
+def _timelines(model: DescribeModel, motions: Sequence[Path], read: Read, tries: Tries, as_json: bool) -> None:
+    found: list[tuple[str, list[Part]]] = []
+    rates = []
+    for path in motions:
+        with tries.of(path), bar(path.name) as progress:
+            motion = read(path)
+            found.append((str(path), model.timeline(motion, progress=progress)))
+            rates.append(motion.fps)
+    say_resampled(rates, model.fps)
+    if as_json:
+        click.echo(json.dumps([{"input": name, **part.to_json()} for name, parts in found for part in parts]))
+        return
+    for name, parts in found:
+        if len(motions) > 1:
+            click.echo(name)
+        for part in parts:
+            click.echo(f"{part.start:.1f}-{part.stop:.1f} s  {_told(part)}")
+
+
+def _told(description: Description) -> str:
+    return description.text if description.confident else f"? {description.text}"
 
 
 def _print(rows: list[dict[str, Any]], found: list[list[Description]], as_json: bool, several: bool) -> None:
     if as_json:
         click.echo(
-            json.dumps([{**row, "hypotheses": list(map(asdict, of))} for row, of in zip(rows, found, strict=True)])
+            json.dumps(
+                [{**row, "hypotheses": [one.to_json() for one in of]} for row, of in zip(rows, found, strict=True)]
+            )
         )
         return
     files = [row["input"] for row in rows]
@@ -72,4 +117,4 @@ def _print(rows: list[dict[str, Any]], found: list[list[Description]], as_json: 
         if files.count(row["input"]) > 1:
             click.echo(f"{row['start']:.1f} to {row['stop']:.1f} s")
         for description in descriptions:
-            click.echo(f"{description.score:8.2f}  {description.text}")
+            click.echo(f"{description.score:8.2f}  {_told(description)}")

@@ -1,7 +1,8 @@
 """Describe: ranked sentences for a motion. Section 4.2 of Plappert et al. 2017."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from itertools import pairwise
 from typing import Any, overload
 
 import numpy as np
@@ -11,10 +12,15 @@ from motet.bundle.manifest import Manifest
 from motet.decode.beam import Hypothesis, Limits
 from motet.decode.loop import Loop
 from motet.decode.loops import LOOPS
-from motet.models.language import LanguageModel
+from motet.models.language import MAX_SECONDS, LanguageModel
 from motet.models.progress import Progress, silent
 from motet.models.text import EOS, PAD, SOS, UNK
+from motet.models.timeline import CHANGE, HOP, NEAR, best_path, edges, near_scores, windows
 from motet.motion.motion import Motion
+
+CONFIDENT = -5.5
+"""From this log-probability on a description is believed. Chosen for the bundle that ships, on its validation people:
+where their motions' best descriptions are less probable, most are wrong (docs/language.md)."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +34,23 @@ class Description:
     text: str
     log_probability: float
     score: float
+
+    @property
+    def confident(self) -> bool:
+        """Whether it is as probable as right descriptions are (:data:`CONFIDENT`)."""
+        return self.log_probability >= CONFIDENT
+
+    def to_json(self) -> dict[str, Any]:
+        """A JSON object of all that it says."""
+        return {**asdict(self), "confident": self.confident}
+
+
+@dataclass(frozen=True)
+class Part(Description):
+    """A description of a part of a motion, from ``start`` to ``stop`` in seconds."""
+
+    start: float
+    stop: float
 
 
 class DescribeModel(LanguageModel):
@@ -78,12 +101,52 @@ class DescribeModel(LanguageModel):
         """
         loop = self.loop if draws is None else LOOPS["consensus" if draws else "beam"]
         settings = loop.settled(loop.defaults(self.manifest.defaults), {"beams": beams, "draws": draws or None})
-        contexts, found = self.embed([motions] if isinstance(motions, Motion) else motions), []
+        contexts = self.embed([motions] if isinstance(motions, Motion) else motions)
+        found = self._hypotheses(loop, contexts, settings, progress)
+        rows = [[Description(self.vocabulary.decode(ids), *scores) for ids, *scores in row] for row in found]
+        return rows[0] if isinstance(motions, Motion) else rows
+
+    def timeline(self, motion: Motion, *, progress: Progress = silent) -> list[Part]:
+        """What happens in a motion of any length: parts that follow each other, each with its best description.
+
+        Short windows are described, each sentence is scored for all windows near it, and the motion is cut where
+        another sentence is worth a change (:mod:`motet.models.timeline`). Each part is then described as
+        :meth:`describe` does it, one of more than 30 s by its middle; neighbours of which the same is said are one.
+
+        progress: called with the number of windows done and of all.
+        MotionError as :meth:`frames`, but for long motions; BundleError where the model has no graph "score".
+        """
+        motion = self.contract.on_figure(motion).resample(self.fps)
+        spans = windows(len(motion), motion.fps)
+        contexts = self.embed([motion[start:stop] for start, stop in spans])
+        scores = near_scores(self.score_graph(), contexts, self._likeliest(contexts), round(NEAR / HOP), progress)
+        return self._parts(motion, edges(spans, best_path(scores, CHANGE)))
+
+    def _likeliest(self, contexts: Floats) -> list[tuple[int, ...]]:
+        """The most probable sentence of each context, as ids from the start to the end."""
+        start, end = (self.vocabulary.ids[word] for word in (SOS, EOS))
+        beam = LOOPS["beam"]
+        found = self._hypotheses(beam, contexts, beam.defaults(self.manifest.defaults))
+        return [(start, *best.ids, end) for best, *_ in found]
+
+    def _parts(self, motion: Motion, cuts: list[int]) -> list[Part]:
+        """Parts of a motion between frames; those are left out on whose two sides the same is said."""
+        found = [row[0] for row in self.describe([_middle(motion[a:b]) for a, b in pairwise(cuts)])]
+        inner = [cut for cut, (one, two) in zip(cuts[1:-1], pairwise(found), strict=True) if one.text != two.text]
+        if len(inner) < len(cuts) - 2:
+            return self._parts(motion, [cuts[0], *inner, cuts[-1]])
+        times = pairwise(cut / motion.fps for cut in cuts)
+        return [Part(**asdict(said), start=a, stop=b) for said, (a, b) in zip(found, times, strict=True)]
+
+    def _hypotheses(
+        self, loop: Loop, contexts: Floats, settings: Mapping[str, Any], progress: Progress = silent
+    ) -> list[list[Hypothesis]]:
+        """The hypotheses of many contexts, as many at a time as the loop decodes at once."""
+        found: list[list[Hypothesis]] = []
         for place in range(0, len(contexts), loop.batch):
             found += self._decoded(loop, contexts[place : place + loop.batch], settings)
             progress(len(found), len(contexts))
-        rows = [[Description(self.vocabulary.decode(ids), *scores) for ids, *scores in row] for row in found]
-        return rows[0] if isinstance(motions, Motion) else rows
+        return found
 
     def _decoded(self, loop: Loop, contexts: Floats, settings: Mapping[str, Any]) -> list[list[Hypothesis]]:
         rest = {name: value for name, value in settings.items() if name != "max_words"}
@@ -118,3 +181,10 @@ class DescribeModel(LanguageModel):
         for place, found in zip(ids, row, strict=True):
             place[: len(found.ids)] = found.ids
         return {"ids": ids, "log_probabilities": np.array([found.log_probability for found in row])}
+
+
+def _middle(motion: Motion) -> Motion:
+    """The middle of a motion that is longer than a model takes."""
+    most = int(MAX_SECONDS * motion.fps + 1e-9)
+    start = max(0, len(motion) - most) // 2
+    return motion[start : start + most]
