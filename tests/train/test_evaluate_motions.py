@@ -134,7 +134,7 @@ def test_the_report_of_a_perfect_describe_model(corpus: SplitStore) -> None:
     parts: list[str] = []
     model: Any = FakeDescribe(STORE)
     report = describe_report(model, corpus, parts.append)
-    assert parts == ["describe train", "describe test", "floors", "likelihood"]
+    assert parts == ["describe train", "describe test", "floors", "likelihood", "timelines"]
     assert report["train"] == {"seconds": 1.5, "epochs": 3}
     assert report["data"] == {
         **{"train": 20, "validation": 5, "test": 5},
@@ -155,6 +155,10 @@ def test_the_report_of_a_perfect_describe_model(corpus: SplitStore) -> None:
     assert report["words"] == {"verbs": 1, "sides": 1, "turns": 1, "verbs_of": 5, "sides_of": 2, "turns_of": 4}
     assert report["gain"]["frequent"] == 1 - report["floor"]["frequent"]
     assert report["likelihood"] == {"test": -2.0}
+    right = {"of": 5, "right": 1, "confident": 1, "right_if_confident": 1, "kept": 1}
+    assert {key: value for key, value in report["confidence"].items() if np.isfinite(value)} == right
+    shares = ("joins_found", "cuts_right", "time_right", "time_confident", "time_right_if_confident", "alone_right")
+    assert report["timeline"] == {**dict.fromkeys(shares, 1.0), "parts": 3}
     assert reached(GOALS, "words.verbs", report["words"]["verbs"])
     assert "words.sides1>=0.8" in report_table({"fake": report}, GOALS).replace(" ", "").splitlines()
 

@@ -95,6 +95,12 @@ def sides_right(hypotheses: Sequence[str], references: References) -> Score:
     return sum(found), len(found)
 
 
+def action_right(text: str, sentences: Sequence[str]) -> bool:
+    """Whether a sentence about a motion names an action, and none that nobody named."""
+    named = said(ACTIONS, text)
+    return bool(named) and named <= frozenset().union(*(said(ACTIONS, sentence) for sentence in sentences))
+
+
 def turns_right(hypotheses: Sequence[str], references: References) -> Score:
     """Of walking and running: a hypothesis is right if it says about turning what people agree on."""
     pairs = [(turning(text), turns(sentences)) for text, sentences in zip(hypotheses, references, strict=True)]

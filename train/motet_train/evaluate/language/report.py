@@ -13,10 +13,12 @@ from motet.models.text import RULES
 from motet_train.evaluate.language.attributes import Score, sides_right, turns_right, verbs_right
 from motet_train.evaluate.language.bleu import RANKS, References, agreement, bleu, ranks
 from motet_train.evaluate.language.chain import Answers, answers, best_descriptions, bounds_chained, chained, likelihood
-from motet_train.evaluate.language.floors import copied_bleu, frequent_bleu, nearest_said
+from motet_train.evaluate.language.confidence import confidence
+from motet_train.evaluate.language.floors import frequent_bleu, nearest_bleu
 from motet_train.evaluate.language.motions import measures, quiet_energy
 from motet_train.evaluate.language.prompts import kinds, measurable, prompted, recognised, thresholds
 from motet_train.evaluate.language.split_store import SplitStore, unknown_words_allowed
+from motet_train.evaluate.language.timelines import timeline_figures
 from motet_train.evaluate.tables import Goals, Report
 
 Told = Callable[[str], object]
@@ -49,6 +51,7 @@ TRAINING = ("seconds", "epochs", "kept_epoch", "loss", "validation", "steps_per_
 def describe_report(model: DescribeModel, corpus: SplitStore, progress: Told = lambda group: None) -> Report:
     """Table 2, with and without SOS and EOS; floors and ceiling; what the best description of test motions gets right.
 
+    "confidence" and "timeline" are of validation motions, as the constants behind them were chosen on these.
     "bleu_unseen" is of those references alone that nobody said, word for word, about a training motion: where people
     describe from a pool of phrases, BLEU rewards knowing the pool. Motions without such a reference are left out.
     Since a phrase of four words either stands there or does not, "unseen" has BLEU-1 to BLEU-4 of the best description
@@ -74,6 +77,11 @@ def describe_report(model: DescribeModel, corpus: SplitStore, progress: Told = l
     report["words"] = _words([row[0] for row in found["test"]], references)
     progress("likelihood")
     report["likelihood"] = {"test": _log_probability(model, corpus, test)}
+    progress("timelines")
+    validation = [record for record in corpus.parts.validation if corpus.sentences(record)]
+    if validation:
+        report["confidence"] = confidence(model, corpus, validation)
+        report["timeline"] = timeline_figures(model, corpus, validation)
     return report
 
 
