@@ -30,6 +30,26 @@ def test_convert_puts_a_file_onto_a_character(tmp_path: Path) -> None:
     np.testing.assert_array_equal(motet.read(out).values, expected.values)
 
 
+def test_convert_holds_feet(tmp_path: Path, clips: Path) -> None:
+    out, source = tmp_path / "a.npz", clips / "39_14.amc"
+    assert run("convert", source, out, "--hold-feet").exit_code == 0
+    own = motet.to_humanoid(motet.read(source)).motion
+    np.testing.assert_array_equal(motet.read(out).values, motet.motion.hold_feet(own).values)
+    assert run("convert", source, out, "--hold-feet", "--like", MIXAMO).exit_code == 0
+    expected = motet.from_humanoid(motet.motion.hold_feet(own), like=motet.read(MIXAMO))
+    np.testing.assert_array_equal(motet.read(out).values, expected.values)
+
+
+def test_convert_cuts_a_loop(tmp_path: Path, clips: Path) -> None:
+    out, source = tmp_path / "a.npz", clips / "39_14.amc"
+    assert run("convert", source, out, "--fps", 30, "--loop").exit_code == 0
+    expected = motet.motion.looped(motet.read(source).resample(30))
+    np.testing.assert_array_equal(motet.read(out).values, expected.values)
+    refused = run("convert", clips / "02_06.amc", tmp_path / "b.npz", "--loop")
+    assert refused.exit_code == 1
+    assert "02_06.amc: nothing in this motion repeats" in refused.stderr
+
+
 def test_a_map_says_which_joint_is_which(tmp_path: Path) -> None:
     plain = motet.read(MIXAMO)
     found = motet.to_humanoid(plain).joints

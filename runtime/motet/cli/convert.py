@@ -10,8 +10,10 @@ import click
 from motet.cli.reading import FPS, Read, Tries, like_option, places, read_options
 from motet.formats import READS, WRITES, write_motion
 from motet.formats.character import Character, put_onto
+from motet.motion.foot_hold import hold_feet as feet_held
 from motet.motion.joint_map import read_map
 from motet.motion.kinematics import skeleton_of
+from motet.motion.looping import looped
 from motet.motion.mirror import mirror as mirrored
 from motet.motion.motion import Motion
 from motet.motion.retarget import to_humanoid
@@ -39,6 +41,8 @@ log = logging.getLogger(__name__)
 @click.option(
     "--map", "map_file", type=Path, metavar="FILE", help="Which joint of IN is which bone, as JSON; implies --humanoid."
 )
+@click.option("--hold-feet", is_flag=True, help="Keep feet that stand from sliding; implies --humanoid.")
+@click.option("--loop", is_flag=True, help="Cut to what plays in a circle without a leap, as strides of a walk.")
 @like_option
 @read_options
 def convert(
@@ -51,6 +55,8 @@ def convert(
     unit: str | None,
     humanoid: bool,
     map_file: Path | None,
+    hold_feet: bool,
+    loop: bool,
     like: Character | None,
     read: Read,
 ) -> None:
@@ -63,11 +69,13 @@ def convert(
     for source, place in zip(files, outs, strict=True):
         with tries.of(source):
             motion = _cut(read(source), start, stop)
-            if humanoid or map_file:
+            if humanoid or map_file or hold_feet:
                 motion = _to_humanoid(motion, map_file)
+            motion = feet_held(motion) if hold_feet else motion
             motion = put_onto(motion, like) if like else motion
             motion = motion.scaled(METRES[unit]) if unit else motion
             motion = motion.resample(fps) if fps else motion
+            motion = looped(motion) if loop else motion
             write_motion(place, mirrored(motion) if mirror else motion)
             click.echo(f"{place}: {len(motion)} frames at {motion.fps:g} fps, {motion.duration:g} s")
     tries.finish()

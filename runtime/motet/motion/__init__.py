@@ -1,10 +1,12 @@
 """Geometry: motions, skeletons, rotations, and what is done to them without a model."""
 
 from motet.motion.feet import feet_of, ground_of, has_feet
+from motet.motion.foot_hold import hold_feet
 from motet.motion.heading import heading, without_heading
 from motet.motion.humanoid import HUMANOID
 from motet.motion.joint_map import JointMap, read_map
 from motet.motion.kinematics import global_transforms, local_rotations, local_translations, positions
+from motet.motion.looping import looped
 from motet.motion.mirror import lateral_axis, mirror
 from motet.motion.mixamo import MIXAMO
 from motet.motion.motion import UNITS, Motion
@@ -28,10 +30,12 @@ __all__ = [
     "ground_of",
     "has_feet",
     "heading",
+    "hold_feet",
     "lateral_axis",
     "lay_root_path",
     "local_rotations",
     "local_translations",
+    "looped",
     "mirror",
     "partners_of",
     "positions",

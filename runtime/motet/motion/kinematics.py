@@ -105,19 +105,26 @@ def continued(last: Motion, rotations: Mapping[str, Array], translations: Mappin
     Lengths are in the skeleton's unit. What the channels do not have is left out, and channels of other joints stay as
     they are.
     """
-    skeleton, last = skeleton_of(last), last[-1:]
+    last = last[-1:]
     count = len(next(iter(rotations.values())))
-    values = np.repeat(last.values, count + 1, axis=0)
-    for name, columns in last.rotation_columns().items():
+    after = posed(replace(last, values=np.repeat(last.values, count, axis=0)), rotations, translations)
+    # the frame before the first one says which of two equal angles is the nearer one
+    return replace(last, values=np.concatenate([last.values, after.values])).continuous()[1:]
+
+
+def posed(motion: Motion, rotations: Mapping[str, Array], translations: Mapping[str, Array]) -> Motion:
+    """The motion in its channels with other local rotations (T, 3, 3) and translations (T, 3) of some joints, as
+    :func:`continued` takes them."""
+    skeleton, values = skeleton_of(motion), np.array(motion.values)
+    for name, columns in motion.rotation_columns().items():
         if name in rotations:
             angles = euler_of(rotations[name], skeleton.joints[skeleton.index(name)])
             for column in columns:
-                axis = AXES.index(last.channels[column][-1])
-                values[1:, column] = angles[:, axis] * TURN[last.units[column]] / (2 * np.pi)
-    for column, channel in enumerate(last.channels):
+                axis = AXES.index(motion.channels[column][-1])
+                values[:, column] = angles[:, axis] * TURN[motion.units[column]] / (2 * np.pi)
+    for column, channel in enumerate(motion.channels):
         name, _, kind = channel.rpartition(".")
         if name in translations and kind in ("tx", "ty", "tz"):
-            factor = 1.0 if last.units[column] == "length" else skeleton.unit_factor(1.0)
-            values[1:, column] = translations[name][:, AXES.index(kind[1])] * factor
-    # the frame before the first one says which of two equal angles is the nearer one
-    return replace(last, values=values).continuous()[1:]
+            factor = 1.0 if motion.units[column] == "length" else skeleton.unit_factor(1.0)
+            values[:, column] = translations[name][:, AXES.index(kind[1])] * factor
+    return replace(motion, values=values)

@@ -30,9 +30,6 @@ from motet.motion.world_rotations import motion_of, places_of
 
 log = logging.getLogger(__name__)
 
-GROUND = 5.0
-"""The percentile of the lowest points of the soles that stands on the ground."""
-
 SURE = 0.75
 """Confidence from which on what was found needs no warning: less has a skeleton whose names do not even tell sides."""
 
@@ -144,13 +141,8 @@ def _on_humanoid(turned: Array, legs: Array, fps: float) -> Motion:
     """The motion of rotations in the world (T, J, 3, 3), the middle of the legs' joints at ``legs`` (T, 3)."""
     places = places_of(HUMANOID, turned)
     root = legs - places[:, HIPS].mean(axis=1)
-    root[:, 1] -= _ground(humanoid.sole_points(turned, places + root[:, None]))
+    root[:, 1] -= humanoid.ground_under(humanoid.sole_points(turned, places + root[:, None]))
     return motion_of(HUMANOID, turned, {0: root}, fps)
-
-
-def _ground(soles: Array) -> float:
-    """The height of the ground under points (T, P, 3) of the soles; 0 for no frames."""
-    return float(np.percentile(soles[..., 1].min(axis=1), GROUND)) if len(soles) else 0.0
 
 
 def from_humanoid(motion: Motion, like: Motion | Skeleton, joint_map: JointMap | None = None) -> Motion:
@@ -177,7 +169,7 @@ def from_humanoid(motion: Motion, like: Motion | Skeleton, joint_map: JointMap |
     moved = places[:, HIPS].mean(axis=1) * scale - middle(figure, joint_map, "UpperLeg")
     bones = {bone: source[:, HUMANOID.index(bone)] for bone in fitted.heights}
     soles = fitting.sole_points(fitted, bones, figure + moved[:, None])
-    moved[:, 1] += scale * _ground(humanoid.sole_points(source, places)) - _ground(soles)
+    moved[:, 1] += scale * humanoid.ground_under(humanoid.sole_points(source, places)) - humanoid.ground_under(soles)
     carrier = joint_map.carrier(skeleton)
     if carrier:
         above = skeleton.joints[carrier].parent

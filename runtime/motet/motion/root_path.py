@@ -58,7 +58,7 @@ def lay_root_path(
     places = positions(motion)
     points = (places[:, joints] - places[:, :1]) * metres
     height = _height(points[..., 1], motion.fps)
-    plane = _smooth(points[..., [0, 2]], tremble, motion.fps)
+    plane = smoothed(points[..., [0, 2]], tremble, motion.fps)
     velocity = (
         velocity_by_feet(plane, points[..., 1] + height[:, None], motion.fps) if len(motion) > 1 else np.zeros((0, 2))
     )
@@ -79,7 +79,7 @@ def _height(points: Array, fps: float) -> Array:
     standing = -points.min(axis=1)
     # what jumps up forward in time falls down backward: only what both agree on is flight
     flight = np.minimum(_with_flight(standing, fps), _with_flight(standing[::-1], fps)[::-1])
-    return _smooth(flight[:, None, None], TREMBLE, fps)[:, 0, 0]
+    return smoothed(flight[:, None, None], TREMBLE, fps)[:, 0, 0]
 
 
 def _with_flight(standing: Array, fps: float) -> Array:
@@ -114,15 +114,15 @@ def velocity_by_feet(
     return velocity
 
 
-def _smooth(points: Array, tremble: float, fps: float) -> Array:
+def smoothed(points: Array, tremble: float, fps: float) -> Array:
     """Points (T, ..., ...) through a Gaussian window in time, continued at both ends as they come in."""
     reach = round(3 * tremble * fps)
     if len(points) < 2 or not reach:
         return points
     window = np.exp(-0.5 * (np.arange(-reach, reach + 1) / (tremble * fps)) ** 2)
     padded = np.pad(points, ((reach, reach), (0, 0), (0, 0)), mode="reflect", reflect_type="odd")
-    smoothed: Array = sum(weight * padded[i : i + len(points)] for i, weight in enumerate(window / window.sum()))
-    return smoothed
+    calm: Array = sum(weight * padded[i : i + len(points)] for i, weight in enumerate(window / window.sum()))
+    return calm
 
 
 def _agreed(votes: Array, weights: Array, fps: float, guess: Array | float, trust: float) -> Array:

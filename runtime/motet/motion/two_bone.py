@@ -1,0 +1,116 @@
+"""Inverse kinematics of two bones: a thigh and a shin turn so that the ankle comes to another place."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from motet.motion.products import product, rotated
+from motet.motion.rotations import Array, rotvec_to_rotmat
+
+SHORTEST = -0.95
+"""The cosine of the angle by which a knee bends at most, 162 degrees: what would bend it more is not reached."""
+
+SHARE = 0.5
+"""The share of what is left until a leg is straight that it is lengthened by at most."""
+
+GIVES = (0.012, 0.006)
+"""Of the length of a straight leg, 1 cm: how much it stays too long where it has to bend; and what it is short of
+straight, 5 mm or a knee bent by 12 degrees, where that is e times less."""
+
+
+@dataclass(frozen=True, eq=False)
+class Leg:
+    """A thigh and a shin: where hip, knee and ankle are, (T, 3), and the knee's axis (T, 3), about which the shin turns
+    back when the knee bends. Any unit of length."""
+
+    hip: Array
+    knee: Array
+    ankle: Array
+    hinge: Array
+
+    def eased(self, target: Array) -> Array:
+        """The place (T, 3) nearby ``target`` (T, 3), on the line to the hip, that the ankle comes to without a snap.
+
+        A straight knee bends, and a bent one becomes straight, infinitely fast for the length that the leg gains or
+        loses. So a leg lengthens the less the straighter it gets, and a straight one gives way but softly.
+        """
+        away = target - self.hip
+        now, wanted = _length(self.ankle - self.hip), _length(away)
+        left = np.maximum(self._longest - now, 1e-9)
+        longer = -SHARE * left * np.expm1(-np.maximum(wanted - now, 0) / (SHARE * left))
+        less = np.maximum(now - wanted, 0)
+        give, fade = (part * self._longest for part in GIVES)
+        shorter = less**2 / np.maximum(less + give * np.exp(-left / fade), 1e-12)
+        found: Array = self.hip + away * ((now + longer - shorter) / np.maximum(wanted, 1e-12))
+        return found
+
+    def turns(self, target: Array) -> tuple[Array, Array]:
+        """Turns (T, 3, 3) in the world of thigh and shin that bring the ankle to ``target`` (T, 3), or as near to it as
+        it can be brought.
+
+        The knee turns about its axis, as far as that is square to the thigh, until the leg is as long as it has to be;
+        then thigh and shin turn together the shortest way. What of the shin stands out of the plane of the bend stays.
+        """
+        upper, lower = self._upper, self._lower
+        cosine = (_length(target - self.hip) ** 2 - upper**2 - lower**2) / (2 * upper * lower * self._in_plane)
+        bent = self._bent
+        after = np.arccos(np.clip(cosine, SHORTEST, 1.0)) * np.where(bent < 0, -1.0, 1.0)
+        bend = rotvec_to_rotmat(self._axis * (after - bent))
+        ankle = self.knee - self.hip + rotated(bend, self.ankle - self.knee)
+        swing = _shortest_turn(ankle, target - self.hip)
+        return swing, product(swing, bend)
+
+    @cached_property
+    def _upper(self) -> Array:
+        return _length(self.knee - self.hip)
+
+    @cached_property
+    def _lower(self) -> Array:
+        return _length(self.ankle - self.knee)
+
+    @cached_property
+    def _axis(self) -> Array:
+        along = self.knee - self.hip
+        return _unit(self.hinge - _dot(self.hinge, along) / _dot(along, along) * along)
+
+    @cached_property
+    def _bent(self) -> Array:
+        """By how much the knee bends, radians (T, 1): less than 0 where it bends forward."""
+        along, down = self.knee - self.hip, self.ankle - self.knee
+        found: Array = np.arctan2(_dot(np.cross(along, down), self._axis), _dot(along, down))
+        return found
+
+    @cached_property
+    def _in_plane(self) -> Array:
+        """The part of the shin that is in the plane of the bend."""
+        out = _dot(_unit(self.ankle - self.knee), self._axis)
+        return np.sqrt(np.maximum(1 - out**2, 1e-12))
+
+    @cached_property
+    def _longest(self) -> Array:
+        upper, lower = self._upper, self._lower
+        return np.sqrt(upper**2 + lower**2 + 2 * upper * lower * self._in_plane)
+
+
+def _shortest_turn(start: Array, end: Array) -> Array:
+    """Rotations (T, 3, 3) from the direction of one vector (T, 3) to that of another, which is not its opposite."""
+    start, end = _unit(start), _unit(end)
+    axis = np.cross(start, end)
+    sine = _length(axis)
+    angle = np.arctan2(sine, _dot(start, end))
+    return rotvec_to_rotmat(axis * angle / np.maximum(sine, 1e-12))
+
+
+def _dot(one: Array, other: Array) -> Array:
+    found: Array = (one * other).sum(axis=-1, keepdims=True)
+    return found
+
+
+def _length(vectors: Array) -> Array:
+    found: Array = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return found
+
+
+def _unit(vectors: Array) -> Array:
+    return vectors / np.maximum(_length(vectors), 1e-12)
