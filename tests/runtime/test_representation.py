@@ -179,7 +179,7 @@ def test_a_contract_comes_back_from_json(name: str) -> None:
         contract.skeleton,
     )
     np.testing.assert_allclose(again.std, contract.std, atol=1e-9)
-    with pytest.raises(BundleError, match="must be one of angles, root_angles, root_vectors, not 'smpl'"):
+    with pytest.raises(BundleError, match="must be one of angles, root_angles, root_sixd, root_vectors, not 'smpl'"):
         named("smpl")
 
 

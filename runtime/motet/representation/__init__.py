@@ -4,9 +4,10 @@ from motet.errors import BundleError
 from motet.representation.angles import Angles
 from motet.representation.base import Representation
 from motet.representation.root_angles import RootAngles
+from motet.representation.root_sixd import RootSixd
 from motet.representation.root_vectors import RootVectors
 
-_ALL: tuple[Representation, ...] = (Angles(), RootAngles(), RootVectors())
+_ALL: tuple[Representation, ...] = (Angles(), RootAngles(), RootSixd(), RootVectors())
 
 REPRESENTATIONS = {found.name: found for found in _ALL}
 """By the names that manifests have."""

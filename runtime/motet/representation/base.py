@@ -1,6 +1,6 @@
-"""What representations offer, and what they share: mirroring by columns, down-sampling in all phases."""
+"""What representations offer, and what they share: mirroring by columns, down-sampling in phases, rest."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.errors import MotionError
-from motet.motion.kinematics import skeleton_of
+from motet.motion.kinematics import AXES, skeleton_of
 from motet.motion.mirror import lateral_axis
 from motet.motion.motion import Motion
 from motet.motion.skeleton import Skeleton
@@ -75,6 +75,14 @@ def lateral_x(features: Motion) -> Skeleton:
     if lateral_axis(skeleton) != 0:
         raise MotionError("left and right of the rest pose must lie along x for the root block")
     return skeleton
+
+
+def at_rest(features: Motion, joints: Sequence[str]) -> Motion:
+    """One frame of the features' figure at rest at the origin: the root's place and Euler angles of some joints."""
+    skeleton = skeleton_of(features)
+    channels = [f"{skeleton.names[0]}.t{axis}" for axis in AXES] + [f"{name}.r{a}" for name in joints for a in AXES]
+    units = ("length",) * 3 + ("deg",) * (3 * len(joints))
+    return Motion(np.zeros((1, len(channels))), tuple(channels), units, features.fps, skeleton)
 
 
 def in_units(motion: Motion, change: Callable[[str], str]) -> Motion:

@@ -9,6 +9,7 @@ at.
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from motet.errors import MotionError
 from motet.motion.feet import feet_of, ground_of, has_feet
@@ -49,19 +50,20 @@ def to_root_block(motion: Motion) -> Motion:
         raise MotionError(f"the root's path and rotation are needed, and this motion lacks {', '.join(missing)}")
     angles = rotmats_to_euler(local_rotations(motion, [0])[:, 0], ORDER)
     places = motion.select(names[:3], ("m",) * 3).values
-    velocities = _velocities(places, angles[:, 0], motion.fps)
+    velocities = ground_velocities(places, angles[:, 0], motion.fps)
+    velocities[:, 2] = np.degrees(velocities[:, 2])
     block = np.column_stack([velocities, places[:, 1], np.degrees(angles[:, 1:])])
     rest = motion.select(tuple(name for name in motion.channels if name not in names))
     return with_channels(rest, ROOT_BLOCK, block, ROOT_BLOCK_UNITS)
 
 
-def _velocities(places: Array, heading: Array, fps: float) -> Array:
-    """Forward, left (m/s) and turn (deg/s): (T, 3) from places (T, 3) in metres and headings (T,) in radians."""
+def ground_velocities(places: Array, heading: Array, fps: float) -> Array:
+    """Forward, left (m/s) and turn (rad/s): (T, 3) from places (T, 3) in metres and headings (T,) in radians."""
     if len(places) < 2:
         return np.zeros((len(places), 3))
     x, z = np.diff(places[:, [0, 2]], axis=0).T
     sin, cos = np.sin(heading[:-1]), np.cos(heading[:-1])
-    found = np.column_stack([x * sin + z * cos, x * cos - z * sin, np.degrees(np.diff(heading))]) * fps
+    found = np.column_stack([x * sin + z * cos, x * cos - z * sin, np.diff(heading)]) * fps
     return np.concatenate([found[:1], found])
 
 
@@ -83,22 +85,31 @@ def from_root_block(motion: Motion, after: Motion | None = None) -> Motion:
 def root_in_world(motion: Motion, after: Motion | None = None) -> tuple[Array, Array]:
     """Rotations (T, 3, 3) and places (T, 3) in metres of the root whose block a motion has, from the origin or on."""
     block = motion.select(ROOT_BLOCK, ROOT_BLOCK_UNITS).values
-    steps = block[:, :3] / motion.fps
+    steps = block[:, :3] * (1, 1, np.pi / 180) / motion.fps
     if after is None:
         steps[:1] = 0
-        start, facing = np.zeros(3), 0.0
+        facing, x, z = way(steps)
     else:
-        start, facing = _last_place(after), heading(after[-1])[0]
-    turns = np.radians(steps[:, 2])
-    now = facing + np.cumsum(turns)
-    sin, cos = np.sin(now - turns), np.cos(now - turns)
-    x = start[0] + np.cumsum(steps[:, 0] * sin + steps[:, 1] * cos)
-    z = start[2] + np.cumsum(steps[:, 0] * cos - steps[:, 1] * sin)
-    rotations = euler_to_rotmat(np.column_stack([now, np.radians(block[:, 4:])]), ORDER)
+        facing, x, z = way(steps, last_place(after), heading(after[-1])[0])
+    rotations = euler_to_rotmat(np.column_stack([facing, np.radians(block[:, 4:])]), ORDER)
     return rotations, np.column_stack([x, block[:, 3], z])
 
 
-def _last_place(motion: Motion) -> Array:
+def way(steps: Array, start: ArrayLike = (0.0, 0.0, 0.0), facing: float = 0.0) -> tuple[Array, Array, Array]:
+    """Facing (T,) in radians, x and z (T,) in metres, after each of the steps (T, 3).
+
+    steps: forward and to the left in metres, turn in radians. start: the place (3,) of which x and z are those before
+    the first step. facing: before it.
+    """
+    origin, turns = np.asarray(start, dtype=np.float64), steps[:, 2]
+    now = facing + np.cumsum(turns)
+    sin, cos = np.sin(now - turns), np.cos(now - turns)
+    x = origin[0] + np.cumsum(steps[:, 0] * sin + steps[:, 1] * cos)
+    z = origin[2] + np.cumsum(steps[:, 0] * cos - steps[:, 1] * sin)
+    return now, x, z
+
+
+def last_place(motion: Motion) -> Array:
     """The root's place (3,) in a motion's last frame, in metres."""
     place: Array = local_translations(motion[-1])[0, 0] * skeleton_of(motion).unit_factor(1.0)
     return place

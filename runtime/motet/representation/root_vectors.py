@@ -11,12 +11,12 @@ from dataclasses import replace
 import numpy as np
 
 from motet.errors import MotionError, listed
-from motet.motion.kinematics import AXES, continued, local_rotations, skeleton_of
+from motet.motion.kinematics import continued, local_rotations, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, rotmat_to_rotvec, rotvec_to_rotmat
 from motet.motion.sides import partners_of
 from motet.motion.skeleton import END_SUFFIX
-from motet.representation.base import FrameMirror, lateral_x
+from motet.representation.base import FrameMirror, at_rest, lateral_x
 from motet.representation.root_block import (
     ROOT_BLOCK,
     ROOT_BLOCK_UNITS,
@@ -99,20 +99,11 @@ def carry_on(after: Motion | None, features: Motion) -> Motion:
     They start where the motion ends and face as it does there; both have the same frame rate. Channels of which the
     features know nothing stay as they are in the motion's last frame.
     """
-    last = _at_rest(features) if after is None else after[-1]
-    skeleton = skeleton_of(last)
+    name = skeleton_of(features if after is None else after).names[0]
+    last = at_rest(features, (name, *joints_of(features.channels))) if after is None else after[-1]
     root, places = root_in_world(features, after)
-    path = {skeleton.names[0]: places / skeleton.unit_factor(1.0)}
-    return continued(last, {skeleton.names[0]: root, **_rotations(features)}, path)
-
-
-def _at_rest(features: Motion) -> Motion:
-    """One frame of the features' figure at rest at the origin, in Euler angles of all its joints."""
-    skeleton = skeleton_of(features)
-    joints = (skeleton.names[0], *joints_of(features.channels))
-    channels = [f"{skeleton.names[0]}.t{axis}" for axis in AXES] + [f"{name}.r{a}" for name in joints for a in AXES]
-    units = ("length",) * 3 + ("deg",) * (3 * len(joints))
-    return Motion(np.zeros((1, len(channels))), tuple(channels), units, features.fps, skeleton)
+    path = {name: places / skeleton_of(last).unit_factor(1.0)}
+    return continued(last, {name: root, **_rotations(features)}, path)
 
 
 def _rotations(features: Motion) -> dict[str, Array]:

@@ -1,0 +1,153 @@
+"""``root_sixd``: how the root moves over the ground, and every joint's rotation as two axes of its frame.
+
+Two axes are the continuous representation in six numbers of Zhou et al., "On the Continuity of Rotation Representations
+in Neural Networks" (2019): where the joint's x axis and its y axis point in the parent's frame; for the root's joint,
+in the frame of the facing. A model may give any six numbers: they are made orthogonal again.
+
+The facing is the turn of the root about the vertical axis, smoothed over time. It counts the less, the more the root is
+tilted, so it stays calm in cartwheels and where a figure lies.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motet.motion.foot_hold import hold_feet
+from motet.motion.humanoid import HUMANOID
+from motet.motion.kinematics import AXES, continued, local_rotations, skeleton_of
+from motet.motion.motion import Motion
+from motet.motion.products import product
+from motet.motion.rotations import Array, axis_to_rotmat, rotmat_to_quat
+from motet.motion.sides import partners_of
+from motet.motion.skeleton import END_SUFFIX
+from motet.representation.base import FrameMirror, at_rest, lateral_x
+from motet.representation.root_block import ground_velocities, last_place, way
+
+ROOT_SIXD = ("root.forward", "root.left", "root.turn", "root.height")
+ROOT_SIXD_UNITS = ("m/s", "m/s", "rad/s", "m")
+"""As in :mod:`motet.representation.root_block`, but for the facing and for radians."""
+
+KINDS = ("xx", "xy", "xz", "yx", "yy", "yz")
+"""Where the x axis and where the y axis points."""
+
+SIGNS = (1.0, -1.0, -1.0, -1.0, 1.0, 1.0)
+"""What a mirror image in the plane x = 0 makes of them."""
+
+CALM = 4 / 30
+"""Seconds: the standard deviation of the window by which the facing is smoothed. Hips sway by a stride, .5 s."""
+
+
+class RootSixd:
+    """See :class:`motet.representation.base.Representation`."""
+
+    name = "root_sixd"
+    required: tuple[str, ...] = ROOT_SIXD
+
+    def features(self, motion: Motion, like: Motion | None = None) -> Motion:
+        """Root and two axes of the joints of ``like``, or of all that are no tips."""
+        if set(ROOT_SIXD) <= set(motion.channels):
+            return motion if like is None else motion.select(like.channels, like.units)
+        features = to_sixd(motion)
+        return features if like is None else features.select(like.channels, like.units)
+
+    def planted(self, features: Motion) -> Motion:
+        """The features with feet that stay where they stand (:func:`motet.motion.foot_hold.hold_feet`)."""
+        if features.skeleton != HUMANOID or len(features) < 2:
+            return features
+        return self.features(hold_feet(self.motion(features)), features)
+
+    def motion(self, features: Motion, after: Motion | None = None) -> Motion:
+        """In Euler angles of the skeleton: from the origin, or in the channels of ``after`` where that motion ends."""
+        return in_world(features, after)[0]
+
+    def mirror(self, features: Motion) -> FrameMirror:
+        """The axes of each joint's partner, mirrored."""
+        lateral_x(features)
+        joints = joints_of(features)
+        places = {name: column for column, name in enumerate(features.channels)}
+        columns, signs = np.arange(len(places)), np.ones(len(places), dtype=np.float32)
+        signs[[places["root.left"], places["root.turn"]]] = -1
+        for joint, partner in zip(joints, partners_of(joints), strict=True):
+            for kind, sign in zip(KINDS, SIGNS, strict=True):
+                columns[places[f"{joint}.{kind}"]] = places[f"{joints[partner]}.{kind}"]
+                signs[places[f"{joint}.{kind}"]] = sign
+        return FrameMirror(columns, signs)
+
+
+def in_world(features: Motion, after: Motion | None = None, pose: Array | None = None) -> tuple[Motion, Array]:
+    """Features as a motion that can be played, and the pose (x, z, facing) of its last frame.
+
+    From the origin; or after a motion, in its channels, from its last pose or from a ``pose`` that is known better.
+    """
+    last = at_rest(features, joints_of(features)) if after is None else after[-1]
+    skeleton = skeleton_of(last)
+    steps = features.select(ROOT_SIXD[:3]).values / features.fps
+    if after is None:
+        steps[:1] = 0
+        pose = np.zeros(3)
+    elif pose is None:
+        place = last_place(after)
+        pose = np.array([place[0], place[2], facing(after)[-1]])
+    facings, x, z = way(steps, (pose[0], 0.0, pose[1]), pose[2])
+    root = skeleton.names[0]
+    rotations = joint_rotations(features)
+    rotations[root] = product(axis_to_rotmat("y", facings), rotations[root])
+    height = features.select(("root.height",)).values[:, 0]
+    path = np.column_stack([x, height, z]) / skeleton.unit_factor(1.0)
+    return continued(last, rotations, {root: path}), np.array([x[-1], z[-1], facings[-1]])
+
+
+def joints_of(features: Motion) -> tuple[str, ...]:
+    """The joints whose axes are among the channels."""
+    return tuple(name.rpartition(".")[0] for name in features.channels if name.endswith(".xx"))
+
+
+def to_sixd(motion: Motion) -> Motion:
+    """The motion's features; MotionError where it has no skeleton that knows its unit of length."""
+    skeleton = skeleton_of(motion)
+    joints = [i for i, name in enumerate(skeleton.names) if not name.endswith(END_SUFFIX)]
+    rotations = np.ascontiguousarray(local_rotations(motion, joints))
+    angles = facing(motion)
+    rotations[:, 0] = product(axis_to_rotmat("y", -angles), rotations[:, 0])
+    places = motion.select(tuple(f"{skeleton.names[0]}.t{axis}" for axis in AXES), ("m",) * 3).values
+    axes = np.swapaxes(rotations[..., :2], 2, 3).reshape(len(motion), -1)
+    values = np.column_stack([ground_velocities(places, angles, motion.fps), places[:, 1], axes])
+    names = tuple(f"{skeleton.names[joint]}.{kind}" for joint in joints for kind in KINDS)
+    return replace(motion, values=values, channels=ROOT_SIXD + names, units=ROOT_SIXD_UNITS + ("1",) * len(names))
+
+
+def facing(motion: Motion) -> Array:
+    """The angle (T,) in radians about the vertical axis that the root faces, calm and unwrapped; 0 is along z.
+
+    The root's rotation is a turn about y after a tilt; as complex numbers, twice the half turn of the quaternion's y
+    and w, these add up with weights that vanish where the root is upside down.
+    """
+    quat = rotmat_to_quat(local_rotations(motion, [0])[:, 0])
+    half = quat[:, 3] + 1j * quat[:, 1]
+    smooth = _smoothed(half * half, CALM * motion.fps)
+    return np.unwrap(np.angle(smooth))
+
+
+def _smoothed(values: NDArray[np.complex128], spread: float) -> NDArray[np.complex128]:
+    reach = max(1, round(4 * spread))
+    window = np.exp(-0.5 * (np.arange(-reach, reach + 1) / spread) ** 2)
+    found: NDArray[np.complex128] = np.convolve(values, window)[reach : reach + len(values)]
+    return found
+
+
+def joint_rotations(features: Motion) -> dict[str, Array]:
+    """Local rotations (T, 3, 3) by joint; the root's is seen from the facing."""
+    joints = joints_of(features)
+    values = features.select(tuple(f"{joint}.{kind}" for joint in joints for kind in KINDS)).values
+    matrices = sixd_to_rotmat(values.reshape(len(features), len(joints), 6))
+    return {joint: matrices[:, place] for place, joint in enumerate(joints)}
+
+
+def sixd_to_rotmat(sixd: Array) -> Array:
+    """Two axes (..., 6), of any length and not quite orthogonal, to matrices (..., 3, 3) by Gram and Schmidt."""
+    x, y = sixd[..., :3], sixd[..., 3:]
+    x = x / np.maximum(np.linalg.norm(x, axis=-1, keepdims=True), 1e-9)
+    y = y - (x * y).sum(axis=-1, keepdims=True) * x
+    y = y / np.maximum(np.linalg.norm(y, axis=-1, keepdims=True), 1e-9)
+    return np.stack([x, y, np.cross(x, y)], axis=-1)
