@@ -22,7 +22,7 @@ from motet.representation.root_block import ROOT_BLOCK, from_root_block
 from motet_train.data.clips import CMU_FOLDER
 from motet_train.data.corpus import read_corpus
 from motet_train.data.errors import DataError
-from motet_train.data.preparation import ANGLES, FULL, VECTORS, Preparation, preparation
+from motet_train.data.preparation import ANGLES, FULL, SIXD, VECTORS, Preparation, preparation
 from motet_train.data.records import Record, Skipped
 from motet_train.data.split import split
 from motet_train.data.store import Entry, Store, prepare
@@ -304,6 +304,7 @@ def test_when_most_motions_do_not_fit_the_first_it_is_named(tmp_path: Path) -> N
 def test_how_a_corpus_is_prepared_for_a_verb() -> None:
     assert preparation("describe", kit=True) == ANGLES
     assert preparation("describe", kit=True, figure="humanoid") == preparation("generate", kit=False) == FULL
+    assert preparation("codes", kit=False) == SIXD
     assert preparation("predict", kit=True) == preparation("predict", kit=False) == VECTORS
     own = preparation("describe", kit=False, figure="own", fps=30)
     assert own == replace(FULL, humanoid=False, fps=30)

@@ -36,9 +36,13 @@ def corpus_options(function: Callable[..., None]) -> Callable[..., None]:
 @click.argument("data", type=Path, nargs=-1, required=True)
 @click.option("-o", "--out", type=Path, required=True, help="Folder of the store to write; must not exist.")
 @click.option(
-    "--for", "verb", type=click.Choice(["describe", "generate", "predict"]), default="describe", show_default=True
+    "--for",
+    "verb",
+    type=click.Choice(["describe", "generate", "codes", "predict"]),
+    default="describe",
+    show_default=True,
 )
-@click.option("--fps", type=click.FloatRange(1, 240), help="Frames per second. [default: 10; for predict, 30]")
+@click.option("--fps", type=click.FloatRange(1, 240), help="Frames per second. [default: 10; for codes, predict 30]")
 @corpus_options
 def prepare(
     data: tuple[Path, ...],

@@ -111,7 +111,7 @@ def _record(
         with archive.opened(file) as place:
             motion = read_motion(place, unit=unit)
         subject = said.subject or who.subject
-        return Record(clip, subject, motion, tuple(said.sentences), tuple(said.unseen), who.take)
+        return Record(clip, subject, motion, tuple(said.sentences), tuple(said.unseen), who.take, said.action)
     except BROKEN as error:
         return Skipped(clip, archive.reason(error))
 

@@ -58,6 +58,9 @@ ANGLES = Preparation("angles", humanoid=False, trim=False, cut=False)
 FULL = Preparation("root_angles", humanoid=True, trim=True, cut=True)
 """Joint angles and the root block of the humanoid, so that any figure counts, and generated ones travel and turn."""
 
+SIXD = Preparation("root_sixd", humanoid=True, trim=True, cut=True, fps=30.0)
+"""Smooth ways and the axes of joints, at a rate that shows feet standing: what motion codes are made of."""
+
 VECTORS = Preparation("root_vectors", humanoid=True, trim=True, cut=False, fps=30.0, longest=math.inf)
 """The root block and exponential maps: what predictors continue."""
 
@@ -65,12 +68,12 @@ FIGURES = ("humanoid", "own")
 
 
 def preparation(verb: str, kit: bool, figure: str | None = None, fps: float | None = None) -> Preparation:
-    """How a corpus is prepared for a verb: "describe", "generate" or "predict".
+    """How a corpus is prepared for a verb: "describe", "generate", "codes" or "predict".
 
     kit: whether it is the KIT Motion-Language data, which is prepared as in the paper if no figure is asked for.
     figure: one of :data:`FIGURES`, by default the humanoid. fps: of the frames, by default the verb's.
     """
-    found = VECTORS if verb == "predict" else FULL
+    found = {"predict": VECTORS, "codes": SIXD}.get(verb, FULL)
     if kit and verb != "predict" and figure != "humanoid":
         found = ANGLES
     elif figure == "own":

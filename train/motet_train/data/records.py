@@ -10,7 +10,8 @@ class Record:
     """One motion and what people said about it.
 
     subject: who moved, if the corpus tells. unseen: sentences whose wordings are for measuring, never for training.
-    take: what it is a part of that must not be divided; "" where it is a take of its own.
+    take: what it is a part of that must not be divided; "" where it is a take of its own. action: what it shows, named
+    alike for all motions that show it; "" where it is not said.
     """
 
     name: str
@@ -19,6 +20,7 @@ class Record:
     sentences: tuple[str, ...]
     unseen: tuple[str, ...] = ()
     take: str = ""
+    action: str = ""
 
 
 @dataclass(frozen=True)

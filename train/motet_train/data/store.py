@@ -33,7 +33,8 @@ class Entry:
     """A record of the store: a motion or a piece of it, for each down-sampling offset the span (start, stop) of frames.
 
     skeleton: the index of its figure among the store's. unseen: sentences for measuring. take: what must not be
-    divided, which the pieces of a motion have in common. ends: whether the motion ends with it.
+    divided, which the pieces of a motion have in common. ends: whether the motion ends with it. starts: whether it
+    begins with it. action: what is shown, named alike in all records that show it; "" where it is not said.
     """
 
     name: str
@@ -44,6 +45,8 @@ class Entry:
     unseen: tuple[str, ...] = ()
     take: str = ""
     ends: bool = True
+    starts: bool = True
+    action: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,11 +166,11 @@ class _Writer:
         pieces = self.preparation.pieces(record.motion)
         found = [list(self.preparation.sequences(piece, self.first)) for piece in pieces]
         for number, phases in enumerate(found, start=1):
-            ends = number == len(found)
+            place = number == len(found), number == 1
             name = record.name if len(found) == 1 else f"{record.name}.{number}"
-            self._write_piece(replace(record, name=name, take=record.take or record.name), phases, ends)
+            self._write_piece(replace(record, name=name, take=record.take or record.name), phases, place)
 
-    def _write_piece(self, record: Record, phases: Sequence[Motion], ends: bool) -> None:
+    def _write_piece(self, record: Record, phases: Sequence[Motion], place: tuple[bool, bool]) -> None:
         spans = []
         for features in phases:
             if self.first is None:
@@ -177,7 +180,7 @@ class _Writer:
             spans.append((self.frames, self.frames + len(features)))
             self.frames += len(features)
         own = None if features.skeleton is None else self._number(features.skeleton)
-        said = record.sentences, tuple(spans), own, record.unseen, record.take, ends
+        said = record.sentences, tuple(spans), own, record.unseen, record.take, *place, record.action
         self.entries.append(Entry(record.name, record.subject, *said))
 
     def _number(self, skeleton: Skeleton) -> int:
