@@ -2,7 +2,7 @@
 
 import re
 import sys
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,7 @@ from test_predict_data import write_files
 from motet.cli import main
 from motet.formats import read_motion, write_motion
 from motet_train.data.clips import CMU_FOLDER
-from motet_train.recipes import describe, predict
+from motet_train.recipes import codec, codes, describe, predict
 from motet_train.recipes.control import RECIPES as CONTROL
 from motet_train.recipes.systems import RECIPES as SYSTEMS
 from motet_train.runs import Run
@@ -29,6 +29,8 @@ def motet(*arguments: object) -> Result:
 RECIPES = [
     *describe.RECIPES.values(),
     *predict.RECIPES.values(),
+    *codec.RECIPES.values(),
+    *codes.RECIPES.values(),
     *CONTROL.values(),
     *(recipe for presets in SYSTEMS.values() for recipe in presets.values()),
 ]
@@ -44,6 +46,13 @@ def test_what_is_written_reads_back_as_the_same_recipe(recipe, tmp_path: Path) -
     derived = {name: getattr(recipe.config, name) for name in recipe.derived}
     plain = replace(recipe, config=type(recipe.config)(**derived), training=recipe.training and type(recipe.training)())
     assert changed(plain, tables, {}) == recipe
+
+
+@pytest.mark.parametrize("recipe", RECIPES, ids=lambda recipe: recipe.model)
+def test_a_setting_is_of_the_training_or_of_the_visits(recipe) -> None:
+    """An option changes every field of its name, and the manifest has one value for each."""
+    parts = [{field.name for field in fields(part)} for part in (recipe.training, recipe.visits) if part is not None]
+    assert len(set().union(*parts)) == sum(map(len, parts))
 
 
 def test_options_win_over_tables_and_reach_the_field_of_their_name() -> None:

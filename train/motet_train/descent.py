@@ -13,12 +13,15 @@ from torch import Tensor, nn
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
 from motet_train import distributed
+from motet_train.models.net import Net
+from motet_train.muon import Muon, Optimiser
 from motet_train.runs import RunError
 from motet_train.trainer import Part
 
-OPTIMISERS: Mapping[str, Callable[..., torch.optim.Optimizer]] = {
+OPTIMISERS: Mapping[str, Callable[..., Optimiser]] = {
     "adam": torch.optim.Adam,
     "adamw": partial(torch.optim.AdamW, betas=(0.9, 0.98)),
+    "muon": Muon,
     "nadam": torch.optim.NAdam,
     "sgd": torch.optim.SGD,
 }
@@ -31,18 +34,18 @@ class Training:
     epochs or steps: how long; one of the two. every: of these from one line of the log, validation and checkpoint to
     the next. warm_up: over so many the learning rate rises from zero; falling: the share, at the end, over which it
     falls linearly to zero; cosine: it falls to a hundredth along half a cosine; decay: a factor for every so many.
-    l2: the weight of the squared weights, not biases, in the loss. weight_decay: of "adamw", apart from the loss. clip:
-    the greatest norm of the gradient. adversary: the weight of a discriminator's opinion in the loss. average: of the
-    running mean of weights, which is then what is kept. keep: the weights of the "best" validation or the "last".
-    patience: training ends when so many validations in a row brought nothing better. precision: of the products of
-    matrices in training; what is trained is float32.
+    l2: the weight of the squared weights, not biases, in the loss. weight_decay: of "adamw" and "muon", apart from
+    the loss. clip: the greatest norm of the gradient. adversary: the weight of a discriminator's opinion in the loss.
+    average: of the running mean of weights, which is then what is kept. keep: the weights of the "best" validation or
+    the "last". patience: training ends when so many validations in a row brought nothing better. precision: of the
+    products of matrices in training; what is trained is float32.
     """
 
     epochs: int = 0
     steps: int = 0
     every: int = 1
     batch: int = 16
-    optimiser: Literal["adam", "adamw", "nadam", "sgd"] = "adam"
+    optimiser: Literal["adam", "adamw", "muon", "nadam", "sgd"] = "adam"
     learning_rate: float = 1e-3
     warm_up: int = 0
     falling: float = 0.0
@@ -119,10 +122,15 @@ class Descent:
     def __init__(self, net: nn.Module, loss: Callable[[Any], Terms], training: Training) -> None:
         self.net, self.training = net, training
         # added to the loss, l2 times the squared weights is a decay of twice as much
-        decay = training.weight_decay if training.optimiser == "adamw" else 2 * training.l2
-        weights = [parameter for parameter in net.parameters() if parameter.ndim > 1]
-        biases = [parameter for parameter in net.parameters() if parameter.ndim <= 1]
-        groups = [{"params": weights, "weight_decay": decay}, {"params": biases, "weight_decay": 0.0}]
+        decay = training.weight_decay if training.optimiser in ("adamw", "muon") else 2 * training.l2
+        trained = [parameter for parameter in net.parameters() if parameter.requires_grad]
+        matrices = set(net.matrices()) if isinstance(net, Net) and training.optimiser == "muon" else set()
+        groups = [
+            {"params": [one for one in trained if one in matrices], "weight_decay": decay, "muon": True},
+            {"params": [one for one in trained if one.ndim > 1 and one not in matrices], "weight_decay": decay},
+            {"params": [one for one in trained if one.ndim <= 1], "weight_decay": 0.0},
+        ]
+        groups = [group for group in groups if group["params"]]
         self.optimiser = OPTIMISERS[training.optimiser](groups, lr=training.learning_rate)
         self._called = distributed.wrapped(_Called(net, loss))
 

@@ -17,12 +17,13 @@ from motet_train.recipes.recipe import Job
 from motet_train.recipes.search import train_search
 from motet_train.runs import Run
 
+DATA = (click.option("--data", type=Path, required=True, help="A prepared store, or a corpus: folder or zip."), *CORPUS)
+SPLIT = click.option("--split", "by", type=click.Choice(["trial", "subject"]), default="trial", show_default=True)
 OPTIONS = (
-    click.option("--data", type=Path, required=True, help="A prepared store, or a corpus: folder or zip."),
-    *CORPUS,
+    *DATA,
     click.option("--epochs", type=click.IntRange(1), help="[default: the preset's]"),
     click.option("--batch", type=click.IntRange(1), help="Motions in a batch. [default: the preset's]"),
-    click.option("--split", "by", type=click.Choice(["trial", "subject"]), default="trial", show_default=True),
+    SPLIT,
     click.option("--mirror/--no-mirror", default=None, help="Mirror left and right at random. [default: the preset's]"),
 )
 LOSS = click.option(

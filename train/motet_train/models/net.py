@@ -27,6 +27,10 @@ class Net(nn.Module, ABC):
         self.mean.copy_(torch.from_numpy(mean))
         self.scale.copy_(torch.from_numpy(scale))
 
+    def matrices(self) -> list[Tensor]:
+        """The weights that Muon may train: the matrices of linear layers."""
+        return [module.weight for module in self.modules() if isinstance(module, nn.Linear)]
+
     @abstractmethod
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """For each role the module to export and the contract that its forward keeps."""

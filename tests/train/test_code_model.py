@@ -1,0 +1,428 @@
+"""The model that writes codes: its steps and its loss, actions, the windows that it learns from, and its training."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from click.testing import CliRunner
+from codes_data import ACTIONS, CODEC, CODES, small_store, trained
+from torch import Tensor, nn
+from torch.nn import functional
+
+from motet.cli import main
+from motet_train.data.actions import actions_of
+from motet_train.data.code_windows import CodeBatch, CodedMotion, CodeWindows, memory_of
+from motet_train.data.mirror_text import mirror_text
+from motet_train.data.store import Store
+from motet_train.descent import GradientLearner, Term, Terms, Training
+from motet_train.models.codes.actions import UNK, ActionNet, ActionsConfig, stem, stems_of
+from motet_train.models.codes.code_model import CodeModelConfig
+from motet_train.models.codes.codec import CodecConfig, MotionCodec
+from motet_train.models.codes.motion_codes import NEVER, MotionCodes, MotionCodesConfig, to_json
+from motet_train.models.codes.sixd_places import Tree
+from motet_train.models.net import Net
+from motet_train.muon import Muon
+from motet_train.recipes.coded import coded, codes_of
+from motet_train.runs import MODELS
+from motet_train.trainer import train
+
+TREE = Tree((-1, 0), ((0.0, 0.0, 0.0), (0.0, 0.4, 0.0)), (0, 1))
+MOVES, END, NOBODY, NOTHING = 6, 6, 4, 7
+SIZES = (MOVES + 1, 15, 15)
+
+
+def net(**changes: float) -> MotionCodes:
+    """A tiny one, all of whose weights are drawn by chance."""
+    torch.manual_seed(0)
+    codec = CodecConfig(16, TREE, moves=MOVES, groups=2, levels=(3, 5), width=8, blocks=1, ahead=(1, 0), fine=4)
+    text = ActionsConfig(9, NOBODY, (0, 1, 2, 3, 4, 5, 6, 6, 7), embedding=6, hidden=5)
+    writer = CodeModelConfig(NOBODY, width=12, layers=2, heads=2, action=5, ages=6, **changes)  # type: ignore[arg-type]
+    found = MotionCodes(MotionCodesConfig(codec, text, writer, remembered=20))
+    for parameter in found.writer.parameters():
+        nn.init.normal_(parameter, std=0.3)
+    nn.init.normal_(found.codec.book)
+    return found.eval()
+
+
+def window(rows: int = 3, steps: int = 9, seed: int = 0) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    """codes, before (B, N, P), action and age (B, N) by chance, two of the rows with an end."""
+    rng = np.random.default_rng(seed)
+    codes = np.stack([rng.integers(size - (part == 0), size=(rows, steps)) for part, size in enumerate(SIZES)], axis=-1)
+    codes[0, 5, 0] = codes[2, 8, 0] = END
+    before = np.concatenate([np.zeros_like(codes[:, :1]), codes[:, :-1]], axis=1)
+    before[:, 0, 0] = NOTHING
+    action, age = rng.integers(NOBODY + 1, size=(rows, steps)), rng.integers(9, size=(rows, steps))
+    return tuple(torch.from_numpy(part) for part in (codes, before, action, age))  # type: ignore[return-value]
+
+
+@torch.no_grad()
+def known_of(model: MotionCodes, before: Tensor, action: Tensor, age: Tensor) -> Tensor:
+    """What is known (B, N, C), the whole window at once."""
+    codec, moves = model.codec, before[..., 0]
+    there = (moves < END)[..., None].float()
+    values = codec.from_codes(before[..., 1:])
+    numbers = torch.cat([codec.book[moves.clamp_max(END - 1)] / codec.book_scale, values], dim=-1) * there
+    known, _ = model.writer(moves, numbers, action, age, model.writer.start(len(moves)))
+    found: Tensor = known
+    return found
+
+
+@torch.no_grad()
+def test_step_by_step_is_the_whole_window_at_once() -> None:
+    model, (_, before, action, age) = net(), window()
+    expected, past, found = known_of(model, before, action, age), model.writer.start(3), []
+    for step in range(9):
+        known, numbers, past = model.step(before[:, step], action[:, step], age[:, step], past)
+        found.append(known)
+        assert past.shape[3] == step + 1
+        there = before[:, step, 0] < END
+        assert numbers.abs().sum(dim=1).bool().tolist() == there.tolist()
+        torch.testing.assert_close(numbers[there, 3:], model.codec.from_codes(before[there, step, 1:]))
+    torch.testing.assert_close(torch.stack(found, dim=1), expected, atol=1e-5, rtol=1e-5)
+    # all that it is told makes a difference, to this step and to later ones, never to earlier ones
+    for place, part in enumerate((before, action, age)):
+        others = [before, action, age]
+        others[place] = part.clone()
+        others[place][:, 4] = (part[:, 4] + 1) % 3
+        apart = (known_of(model, *others) - expected).abs().amax(dim=(0, 2)) > 1e-6
+        assert apart.tolist() == [False] * 4 + [True] * 5
+
+
+@torch.no_grad()
+def test_ages_beyond_those_told_apart_are_alike() -> None:
+    model, (_, before, action, age) = net(), window()
+    assert torch.equal(known_of(model, before, action, age + 6), known_of(model, before, action, age + 60))
+
+
+def naive_loss(model: MotionCodes, known: Tensor, codes: list[int]) -> list[float]:
+    """Of one step's parts: each by its own net, knowing the parts before it; nothing of what follows an end."""
+    found = []
+    for part, head in enumerate(model.writer.heads):
+        logits = head(known).tolist()
+        found.append(float(np.log(np.exp(logits).sum()) - logits[codes[part]]))
+        if codes[0] == END:
+            return [*found, 0.0, 0.0]
+        if part < 2:
+            known = known + model.writer.before[part].weight[codes[part]]  # type: ignore[union-attr, index, operator]
+    return found
+
+
+@torch.no_grad()
+def test_the_loss_is_that_of_a_naive_twin_and_of_the_graph() -> None:
+    model, (codes, before, action, age) = net(), window()
+    known, found = known_of(model, before, action, age), model.losses(codes, before, action, age)
+    assert found.shape == codes.shape
+    expected = [[naive_loss(model, known[b, n], codes[b, n].tolist()) for n in range(9)] for b in range(3)]
+    np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-5)
+    assert not found[0, 5, 1:].any()
+    assert found[0, 5, 0] > 0
+    chances = model.part(known.flatten(0, 1), codes.flatten(0, 1))
+    assert chances.shape == (27, 3, 15)
+    told = chances.gather(2, codes.flatten(0, 1)[..., None])[..., 0].unflatten(0, (3, 9))
+    real = (codes[..., :1] != END) | torch.tensor([True, False, False])
+    torch.testing.assert_close(-told[real], found[real], atol=1e-5, rtol=1e-5)
+    torch.testing.assert_close(chances.exp().sum(dim=2), torch.ones(27, 3))
+    assert (chances[:, 0, len(range(MOVES + 1)) :] == NEVER).all()
+
+
+def test_hidden_steps_tell_nothing() -> None:
+    model, (_, before, action, age) = net(hidden=1.0).train(), window()
+    others = before.flip(1)
+    assert torch.equal(known_of(model, before, action, age), known_of(model, others, action, age))
+    model.eval()
+    assert not torch.equal(known_of(model, before, action, age), known_of(model, others, action, age))
+
+
+def test_what_is_remembered_comes_back() -> None:
+    model = net()
+    rows = np.random.default_rng(0).integers(6, size=(20, 5))
+    rows[3, 0] = END
+    model.memory.copy_(torch.from_numpy(rows))
+    codes, numbers, action, age = model.remember(torch.tensor([3, 7, 7]))
+    assert codes.tolist() == rows[[3, 7, 7], :3].tolist()
+    assert (action.tolist(), age.tolist()) == (rows[[3, 7, 7], 3].tolist(), rows[[3, 7, 7], 4].tolist())
+    assert not numbers[0].any()
+    torch.testing.assert_close(numbers[1:, 3:], model.codec.from_codes(codes[1:, 1:]))
+
+
+def test_a_model_comes_back_from_its_configuration() -> None:
+    model, (codes, *rest) = net(), window()
+    again = MODELS["motion-codes"](json.loads(json.dumps(to_json(model.config))))
+    again.load_state_dict(model.state_dict())
+    assert isinstance(again, MotionCodes)
+    assert torch.equal(again.eval().losses(codes, *rest), model.losses(codes, *rest))
+
+
+def test_of_the_codec_nothing_is_trained() -> None:
+    model, (codes, *rest) = net().train(), window()
+    model.losses(codes, *rest).sum().backward()
+    assert all(parameter.grad is None for parameter in model.codec.parameters())
+    assert all(parameter.grad is not None for parameter in model.writer.blocks.parameters())
+    assert all(any(weight is own for own in model.writer.blocks.parameters()) for weight in model.matrices())
+
+
+@torch.no_grad()
+def test_a_sentence_of_a_padded_batch_gets_what_it_gets_alone() -> None:
+    torch.manual_seed(1)
+    model = ActionNet(ActionsConfig(9, 4, tuple(range(9)), embedding=6, hidden=5)).eval()
+    nn.init.constant_(model.around.bias, -1.0)  # type: ignore[arg-type]  # so that the most of a number is below 0
+    words, lengths = torch.tensor([[4, 5, 6, 7], [8, 0, 0, 0], [6, 4, 0, 0]]), torch.tensor([4, 1, 2])
+    found = model(words, lengths)
+    torch.testing.assert_close(found.exp().sum(dim=1), torch.ones(3))
+    for row, length in enumerate(lengths.tolist()):
+        alone = model(words[row : row + 1, :length], lengths[row : row + 1])
+        torch.testing.assert_close(alone, found[row : row + 1])
+    assert not torch.allclose(found[0], model(torch.tensor([[7, 6, 5, 4]]), torch.tensor([4]))[0])
+
+
+@torch.no_grad()
+def test_words_are_dropped_in_training_alone() -> None:
+    model = ActionNet(ActionsConfig(9, 4, tuple(range(9)), dropout=0.0, word_dropout=1.0))
+    words, unknown = torch.tensor([[4, 5, 6]]), torch.full((1, 3), UNK)
+    assert torch.equal(model.train()(words, torch.tensor([3])), model(unknown, torch.tensor([3])))
+    assert not torch.equal(model.eval()(words, torch.tensor([3])), model(unknown, torch.tensor([3])))
+
+
+def test_words_of_one_stem_have_one_number() -> None:
+    for words in (
+        ("run", "runs", "running"),
+        ("walk", "walks", "walked", "walking", "walker", "walkers"),
+        ("jump", "jumps", "jumping", "jumped"),
+        ("slow", "slowly"),
+        ("dance", "dances", "dancing", "dancer"),
+    ):
+        assert len({stem(word) for word in words}) == 1, words
+        assert len(set(stems_of(words))) == 1
+    assert [stem(word) for word in ("is", "bed", "she", "red")] == ["is", "bed", "she", "red"]
+    assert stems_of(("a", "walks", "the", "walking")) == (0, 1, 2, 1)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    found = tmp_path_factory.mktemp("codes")
+    small_store(found)
+    return found
+
+
+@pytest.fixture(scope="module")
+def store(folder: Path) -> Store:
+    return Store.open(folder / "store")
+
+
+def test_mirrored_motions_show_mirrored_actions(store: Store) -> None:
+    found = actions_of(store, tuple(range(8)))
+    names = [entry.action for entry in store.records[:8]]
+    assert len(found) == 6  # the two that say a side have a mirror image each
+    for record, name in enumerate(names):
+        own, other = found.of[record, False], found.of[record, True]
+        assert found.sentences[own] == ACTIONS[name]
+        assert found.sentences[other] == tuple(map(mirror_text, ACTIONS[name]))
+        assert (own == other) == (name in ("walk", "run"))
+        assert found.of[record, False] == found.of[(record + 4) % 8, False]
+    assert found.unseen[found.of[1, True]] == ("a person turns right slowly",)
+    assert sorted(set(found.of.values())) == list(range(6))
+    assert len(actions_of(store, (0, 4))) == 1
+
+
+def coded_store(store: Store, records: tuple[int, ...]) -> tuple[list[CodedMotion], MotionCodec]:
+    contract = store.contract(records)
+    torch.manual_seed(0)
+    codec = MotionCodec(CodecConfig(len(contract.channels), TREE, moves=MOVES, groups=2, levels=(3, 5), fine=4))
+    codec.measure_by(contract.mean, contract.std)
+    nn.init.normal_(codec.book, std=0.1)
+    return coded(store, records, codec.eval(), actions_of(store, records), contract.mirror), codec
+
+
+def test_recordings_become_codes_as_they_are_and_mirrored(store: Store) -> None:
+    records = (0, 1, 6)
+    motions, codec = coded_store(store, records)
+    mirror = store.contract(records).mirror
+    assert len(motions) == 6
+    actions = actions_of(store, records)
+    for number, motion in enumerate(motions):
+        record, mirrored = records[number // 2], bool(number % 2)
+        frames = np.array(store.sequence(record), np.float64)
+        frames = mirror(frames) if mirrored else frames
+        steps = len(frames) // 4
+        assert (motion.action, motion.starts, motion.first) == (actions.of[record, mirrored], True, True)
+        assert motion.codes.shape == (steps + 1, 3)
+        assert motion.codes[-1].tolist() == [MOVES, 0, 0]
+        np.testing.assert_array_equal(motion.codes[:-1], codes_of(codec, frames, 30.0))
+        body = codec.to_codes(codec.encode(torch.tensor(frames[None, : 4 * steps]).float()))[0]
+        assert motion.codes[:-1, 1:].tolist() == body.tolist()
+    assert codes_of(codec, np.zeros((3, len(store.channels))), 30.0).shape == (0, 3)
+    kept = memory_of([*motions[:2], CodedMotion(motions[2].codes, 1, True, first=False)])
+    assert kept[:, :3].tolist() == np.concatenate([motion.codes for motion in motions[:2]]).tolist()
+    assert kept[:, 3].tolist() == [motion.action for motion in motions[:2] for _ in motion.codes]
+    assert kept[:, 4].tolist() == [age for motion in motions[:2] for age in range(len(motion.codes))]
+
+
+def motion_of(length: int, action: int, first: int, starts: bool = True) -> CodedMotion:
+    """A motion each step of which is found again by its codes; it ends."""
+    codes = np.stack([np.arange(length) % MOVES, np.full(length, first), np.arange(length)], axis=1)
+    codes[-1] = END, 0, 0
+    return CodedMotion(codes, action, starts, True)
+
+
+def test_windows_are_parts_of_motions_with_what_was_before() -> None:
+    motions = [motion_of(12, 0, 0), motion_of(5, 1, 1), motion_of(9, 2, 2, starts=False)]
+    windows = CodeWindows(motions, 7, END, first=4.0)
+    codes, before, action, age, weights = windows.draw(400, 0.25, NOBODY, np.random.default_rng(0))
+    assert codes.shape == before.shape == (400, 7, 3)
+    assert action.shape == age.shape == weights.shape == (400, 7)
+    starts = set()
+    for row in range(400):
+        motion, start = motions[int(codes[row, 0, 1])], int(age[row, 0])
+        real = min(7, len(motion.codes) - start)
+        assert codes[row, :real].tolist() == motion.codes[start : start + 7].tolist()
+        assert not codes[row, real:].any()
+        assert before[row, 1:real].tolist() == motion.codes[start : start + real - 1].tolist()
+        assert before[row, 0].tolist() == (motion.codes[start - 1].tolist() if start else [NOTHING, 0, 0])
+        assert age[row].tolist() == list(range(start, start + 7))
+        first = (4.0 if motion.starts else 0.0) if start == 0 else 1.0
+        assert weights[row].tolist() == [first] + [1.0] * (real - 1) + [0.0] * (7 - real)
+        assert set(action[row].tolist()) in ({motion.action}, {NOBODY})
+        starts.add((motion.action, start))
+    assert {(0, 0), (0, 7), (1, 0), (2, 4)} <= starts
+    assert (action[:, 0] == NOBODY).float().mean() == pytest.approx(0.25, abs=0.07)
+    batch = CodeBatch(codes, before, action, age, weights, *(torch.zeros(2) for _ in range(3)))
+    assert len(batch[1::2]) == 200
+    assert torch.equal(batch[1::2].codes, codes[1::2])
+
+
+def test_windows_of_rare_actions_are_drawn_oftener() -> None:
+    windows = CodeWindows([motion_of(16, 0, 0), motion_of(9, 0, 1), motion_of(25, 1, 2)], 7, END, 1.0)
+    np.testing.assert_allclose(windows.chances, np.array([16 / 5, 9 / 5, 5]) / 10)
+
+
+class Lines(Net):
+    """Two matrices, of which Muon may train one, and biases."""
+
+    def __init__(self) -> None:
+        super().__init__(1)
+        self.first, self.second = nn.Linear(4, 5), nn.Linear(5, 3)
+
+    def matrices(self) -> list[Tensor]:
+        return [self.first.weight]
+
+    def loss(self, rows: Tensor) -> Terms:
+        found = self.second(self.first(rows).tanh()) - rows[:, 1:]
+        return (Term(found.square().mean(dim=1), len(rows)),)
+
+    def graphs(self) -> dict[str, tuple[nn.Module, object]]:  # type: ignore[override]
+        return {}
+
+
+MUON = Training(steps=6, every=2, batch=8, optimiser="muon", learning_rate=0.03, weight_decay=0.1, falling=0.5)
+
+
+def lines(training: Training = MUON) -> GradientLearner:
+    torch.manual_seed(0)
+    model = Lines()
+
+    def batches(rng: np.random.Generator) -> Iterator[Tensor]:
+        yield torch.from_numpy(rng.normal(size=(training.batch, 4)).astype(np.float32))
+
+    return GradientLearner(model, training, model.loss, batches)
+
+
+def test_muon_trains_matrices_and_adamw_all_else(tmp_path: Path) -> None:
+    learner = lines()
+    train(learner, 3, tmp_path)
+    torch.manual_seed(0)
+    model = Lines()
+    matrices, rest = [model.first.weight], [model.second.weight]
+    biases = [model.first.bias, model.second.bias]
+    muon = torch.optim.Muon(matrices, lr=0.03, weight_decay=0.1, adjust_lr_fn="match_rms_adamw")
+    decayed = torch.optim.AdamW(rest, lr=0.03, weight_decay=0.1, betas=(0.9, 0.98))
+    others = torch.optim.AdamW(biases, lr=0.03, weight_decay=0.0, betas=(0.9, 0.98))
+    for chunk in range(3):
+        rng = np.random.default_rng((3, chunk))
+        for step in (2 * chunk, 2 * chunk + 1):
+            rate = 0.03 * min(1.0, (6 - step) / 3)
+            rows = torch.from_numpy(rng.normal(size=(8, 4)).astype(np.float32))
+            for optimiser in (muon, decayed, others):
+                optimiser.param_groups[0]["lr"] = rate
+                optimiser.zero_grad()
+            model.loss(rows)[0].losses.mean().backward()
+            for optimiser in (muon, decayed, others):
+                optimiser.step()
+    for name, value in model.state_dict().items():
+        torch.testing.assert_close(learner.kept.state_dict()[name], value, msg=name)
+
+
+def test_a_resumed_muon_goes_on_to_the_same_bits(tmp_path: Path) -> None:
+    for name in ("whole", "parts"):
+        (tmp_path / name).mkdir()
+    whole, parts = lines(), lines(Training(**{**asdict(MUON), "steps": 2, "falling": 0.0}))
+    train(whole, 3, tmp_path / "whole")
+    train(parts, 3, tmp_path / "parts")
+    again = lines()
+    train(again, 3, tmp_path / "parts")
+    assert all(torch.equal(value, again.kept.state_dict()[name]) for name, value in whole.kept.state_dict().items())
+    assert not torch.equal(parts.kept.state_dict()["first.weight"], again.kept.state_dict()["first.weight"])
+
+
+def test_muon_does_with_matrices_alone_or_without_any() -> None:
+    weight, bias = nn.Parameter(torch.eye(3)), nn.Parameter(torch.zeros(3))
+    for groups in ([{"params": [weight], "muon": True}], [{"params": [bias]}]):
+        optimiser = Muon(groups, lr=0.1)
+        assert len(optimiser.parts) == len(optimiser.param_groups) == 1
+        before = groups[0]["params"][0].detach().clone()  # type: ignore[index]
+        functional.linear(torch.ones(1, 3), weight, bias).square().sum().backward()
+        optimiser.step()
+        assert not torch.equal(groups[0]["params"][0], before)  # type: ignore[index]
+        optimiser.zero_grad()
+        assert groups[0]["params"][0].grad is None  # type: ignore[index]
+
+
+@pytest.fixture(scope="module")
+def codec(folder: Path) -> Path:
+    trained("codec", CODEC, folder / "store", folder / "codec")
+    return folder / "codec"
+
+
+def test_a_run_learns_and_says_what_it_knows(folder: Path, codec: Path, tmp_path: Path) -> None:
+    longer = CODES.replace("steps = 6\nevery = 3", "steps = 60\nevery = 20")
+    run = trained("codes", longer, folder / "store", tmp_path / "run", "--codec", codec)
+    log = [json.loads(line) for line in (tmp_path / "run" / "log.jsonl").read_text().splitlines()]
+    assert [line["step"] for line in log] == [20, 40, 60]
+    assert log[-1]["loss"] < log[0]["loss"]
+    assert all(0 <= line["understood"] <= 1 for line in log)
+    manifest, model = run.manifest, run.model
+    assert isinstance(model, MotionCodes)
+    assert (manifest["verb"], manifest["model"], manifest["loop"]) == ("generate", "motion-codes", "codes")
+    assert len(manifest["actions"]) == model.config.text.actions == model.config.writer.actions == 6
+    by = {entry["sentence"]: entry["words"] for entry in manifest["actions"]}
+    assert by["a person turns left"] == ["a", "goes", "left", "person", "someone", "the", "to", "turns"]
+    assert set(by) >= {said[0] for said in ACTIONS.values()}
+    assert len(model.memory) == model.config.remembered
+    recipe = manifest["training"]["recipe"]
+    assert (recipe["steps"], recipe["window"]) == (60, 6)
+    ages = model.memory[:, -1]
+    assert int((ages == 0).sum()) == int((model.memory[:, 0] == model.end).sum()) > 0
+
+
+def test_resumed_training_is_the_same_to_the_bit(folder: Path, codec: Path, tmp_path: Path) -> None:
+    given = ("codes", CODES, folder / "store")
+    whole = trained(*given, tmp_path / "whole", "--codec", codec).model.state_dict()
+    trained(*given, tmp_path / "parts", "--codec", codec, "--steps", 3)
+    parts = trained(*given, tmp_path / "parts", "--codec", codec, "--resume").model.state_dict()
+    assert all(torch.equal(whole[name], parts[name]) for name in whole)
+    other = trained(*given, tmp_path / "other", "--codec", codec, "--seed", 1).model.state_dict()
+    assert any(not torch.equal(whole[name], other[name]) for name in whole)
+    # the codec's part is what it was
+    kept = torch.load(codec / "weights.pt", weights_only=True)
+    assert all(torch.equal(whole[f"codec.{name}"], kept[name]) for name in kept)
+
+
+def test_codes_need_a_codec(folder: Path, codec: Path, tmp_path: Path) -> None:
+    trained("codes", CODES, folder / "store", tmp_path / "run", "--codec", codec)
+    given = ["train", "codes", "--data", folder / "store", "--out", tmp_path / "other", "--codec", tmp_path / "run"]
+    result = CliRunner().invoke(main, [str(option) for option in given])
+    assert result.exit_code != 0
+    assert "codes need the run of a codec (motet train codec), not of motion-codes" in result.output

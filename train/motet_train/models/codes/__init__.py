@@ -1,0 +1,1 @@
+"""Motion as words: a codec of motions, and the model that writes its codes."""

@@ -1,0 +1,74 @@
+"""Which action a sentence asks for: a small net over words and their stems.
+
+Letters in shapes: B rows, W words, A actions, E numbers of a word's vector.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+UNK = 3
+"""The id of a word that is not known, :data:`motet.models.text.SPECIALS`."""
+
+ENDINGS = ("ingly", "edly", "ing", "ers", "ed", "es", "er", "ly", "s", "e")
+"""What a word may end in besides its stem, the longest first; what is left has at least three letters."""
+
+
+@dataclass(frozen=True)
+class ActionsConfig:
+    """Sizes. words: of the vocabulary. stems: for each word the index of its stem."""
+
+    words: int
+    actions: int
+    stems: tuple[int, ...] = ()
+    embedding: int = 96
+    hidden: int = 128
+    dropout: float = 0.5
+    word_dropout: float = 0.3
+
+
+class ActionNet(nn.Module):
+    """Words to the probabilities of actions: vectors of words and stems, convolved over three words, mean and most."""
+
+    stems: Tensor
+
+    def __init__(self, config: ActionsConfig) -> None:
+        super().__init__()
+        self.config = config
+        self.register_buffer("stems", torch.tensor(config.stems), persistent=False)
+        self.words = nn.Embedding(config.words, config.embedding)
+        self.roots = nn.Embedding(max(config.stems) + 1, config.embedding)
+        self.around = nn.Conv1d(config.embedding, config.hidden, 3, padding=1)
+        self.outward = nn.Linear(2 * config.hidden + config.embedding, config.actions)
+        self.dropout = nn.Dropout(config.dropout)
+
+    def forward(self, words: Tensor, lengths: Tensor) -> Tensor:
+        """Ids (B, W) int64 of sentences of lengths (B,) int64 to log-probabilities (B, A)."""
+        known = (torch.arange(words.shape[1], device=words.device) < lengths[:, None]).to(torch.float32)
+        if self.training:
+            words = words.masked_fill(torch.rand(words.shape, device=words.device) < self.config.word_dropout, UNK)
+        vectors = self.words(words) + self.roots(self.stems[words])
+        vectors = self.dropout(vectors) * known[..., None]
+        around = functional.gelu(self.around(vectors.transpose(1, 2))) * known[:, None]
+        count = known.sum(dim=1, keepdim=True).clamp_min(1)
+        most = around.amax(dim=2).clamp_min(0)  # as if a word followed that says nothing: padding changes nothing
+        seen = [around.sum(dim=2) / count, most, vectors.sum(dim=1) / count]
+        return functional.log_softmax(self.outward(self.dropout(torch.cat(seen, dim=1))), dim=1)
+
+
+def stem(word: str) -> str:
+    """A word without its ending, and one of two equal letters left at the end: "running" and "runs" are "run"."""
+    for ending in ENDINGS:
+        if word.endswith(ending) and len(word) - len(ending) >= 3:
+            word = word[: -len(ending)]
+            break
+    return word[:-1] if len(word) > 3 and word[-1] == word[-2] else word
+
+
+def stems_of(words: Sequence[str]) -> tuple[int, ...]:
+    """For each word the number of its stem."""
+    numbers: dict[str, int] = {}
+    return tuple(numbers.setdefault(stem(word), len(numbers)) for word in words)
