@@ -2,6 +2,7 @@
 
 import tempfile
 import time
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,8 +11,10 @@ from typing import Any
 import numpy as np
 
 from motet.bundle.graph import Arrays, Graph
+from motet.errors import TextWarning
 from motet.formats import read_motion, write_motion
 from motet.models.base import BundleModel
+from motet.models.codes import CodesModel
 from motet.models.control import ControlModel
 from motet.models.describe import DescribeModel
 from motet.models.generate import GenerateModel
@@ -135,15 +138,28 @@ def generate_figures(model: GenerateModel, seconds: float) -> Figures:
     """Motions of :data:`SECONDS` a second, many at once and one alone; encoder and step of one alone."""
     always = {"active": np.ones_like}
     defaults = {**model.defaults, "hypotheses": BEAMS, "max_seconds": SECONDS}
-    steady = GenerateModel(replace(model.manifest, defaults=defaults), _steady(model.graphs, always))
-    known = model.vocabulary.words[len(SPECIALS) :]
-    text = model.vocabulary.decode(range(len(SPECIALS), len(SPECIALS) + min(WORDS, len(known))))
+    text = " ".join(model.vocabulary.words[len(SPECIALS) :][:WORDS])
+    if isinstance(model, CodesModel):
+        return codes_figures(model, text, seconds)
+    steady = type(model)(replace(model.manifest, defaults=defaults), _steady(model.graphs, always))
     return {
         "generate.motions": (_batch_rate(steady.generate, [text], 64, seconds), "motions/s"),
         "generate.one": (_milliseconds(lambda: steady.generate(text), seconds), "ms"),
         "generate.encoder": (_milliseconds(lambda: model.embed(text), seconds), "ms"),
         "generate.step": (_milliseconds(_step_call(model.graphs["step"]), seconds), "ms"),
     }
+
+
+def codes_figures(model: CodesModel, text: str, seconds: float) -> Figures:
+    """The first frames of a stream, and :data:`SECONDS` of motion, alone and many at once."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", TextWarning)
+        rate = _batch_rate(lambda texts: model.generate(texts, seconds=SECONDS), [text], 64, seconds)
+        return {
+            "generate.motions": (rate, "motions/s"),
+            "generate.one": (_milliseconds(lambda: model.generate(text, seconds=SECONDS), seconds), "ms"),
+            "generate.first_frame": (_milliseconds(lambda: next(model.stream(text)), seconds), "ms"),
+        }
 
 
 def predict_figures(model: PredictModel, seconds: float) -> Figures:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from motet.bundle.graph import Arrays, GraphSpec, TensorSpec
 from motet.bundle.manifest import Manifest
 from motet.models.describe import DescribeModel
-from motet.models.generate import GenerateModel
+from motet.models.mixture import MixtureModel
 from motet.models.search import SearchModel
 from motet.models.text import SPECIALS, Vocabulary
 from motet.motion.motion import Motion
@@ -145,7 +145,7 @@ def describe_model() -> DescribeModel:
     return DescribeModel(_manifest("describe", {"beams": 5, "max_words": 6}), graphs)
 
 
-def generate_model() -> GenerateModel:
+def generate_model() -> MixtureModel:
     """A generate model of three channels and ten words."""
     size, context = len(CHANNELS), 4
     step = frame_step(2, size, context)
@@ -174,7 +174,7 @@ def generate_model() -> GenerateModel:
         ),
     }
     defaults = {"hypotheses": 3, "candidates": 4, "temperature": 1.0, "max_seconds": 3}
-    return GenerateModel(_manifest("generate", defaults), graphs)
+    return MixtureModel(_manifest("generate", defaults), graphs)
 
 
 def search_model(name: str = "fake-search") -> SearchModel:

@@ -14,7 +14,7 @@ from motet.bundle.manifest import Golden
 from motet.errors import BundleError
 from motet.models.load import load
 
-NAMES = ["cmu-control", "describe", "generate", "predict"]
+NAMES = ["cmu-control", "cmu-generate", "describe", "generate", "predict"]
 
 
 def packed(arrays: Mapping[str, Any]) -> bytes:
@@ -58,8 +58,8 @@ def test_a_run_follows_from_its_inputs_and_noise(name: str) -> None:
 
 
 def test_what_does_not_fit_a_model_is_refused() -> None:
-    bundle = Bundle.open("generate")
-    model, golden = load("generate"), bundle.manifest.golden
+    bundle = Bundle.open("cmu-generate")
+    model, golden = load("cmu-generate"), bundle.manifest.golden
     assert golden is not None
     arrays = read(bundle.read(golden.file))
     for change, reason in (

@@ -39,10 +39,11 @@ def test_contexts(motions: list[Motion]) -> None:
     check_equal(generator.embed(SENTENCES), [generator.embed([one])[0] for one in SENTENCES])
 
 
-def test_generated_motions() -> None:
-    model = load("generate")
-    together = model.generate(SENTENCES, seed=[5, 6, 7, 8], max_seconds=4)
-    alone = [model.generate([one], seed=[seed], max_seconds=4)[0] for seed, one in enumerate(SENTENCES, start=5)]
+@pytest.mark.parametrize("name", ["generate", "cmu-generate"])
+def test_generated_motions(name: str) -> None:
+    model = load(name)
+    together = model.generate(SENTENCES, 3, seed=[5, 6, 7, 8], max_seconds=4)
+    alone = [model.generate([one], 3, seed=[seed], max_seconds=4)[0] for seed, one in enumerate(SENTENCES, start=5)]
     for row, single in zip(together, alone, strict=True):
         assert [found.log_likelihood for found in row] == [found.log_likelihood for found in single]
         check_equal([found.motion.values for found in row], [found.motion.values for found in single])

@@ -23,7 +23,7 @@ from motet.errors import BundleError
 from motet.files import new_folder, write_whole
 
 DEFAULT_BUNDLES = Path(__file__).parents[1] / "bundles"
-STAND_FOR = {"control": "cmu-control", "generate": "cmu-generate"}
+STAND_FOR = {"control": "cmu-control"}
 """Verbs whose default bundle has another name than they."""
 
 MAX_MANIFEST = 4 << 20

@@ -1,7 +1,9 @@
 """``motet generate``: sentences in, motion files out."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +13,12 @@ from motet.bundle.session import SessionOptions
 from motet.cli.notes import text_notes
 from motet.cli.options import session_options
 from motet.cli.reading import FPS, Tries, bar, like_option, out_option, places
-from motet.formats import check_writable, write_motion
+from motet.formats import check_writable, read_motion, write_motion
 from motet.formats.character import Character
+from motet.models.codes import CodesModel, Story
 from motet.models.generate import PLAYED, Generated, GenerateModel
 from motet.models.load import load_as
-from motet.motion.motion import Motion
+from motet.motion.looping import looped
 
 
 @click.command()
@@ -31,6 +34,8 @@ from motet.motion.motion import Motion
     help="Draws per hypothesis; 1: independent samples. [default: the bundle's]",
 )
 @click.option("--temperature", type=click.FloatRange(0.01, 100), help="Sampling temperature. [default: the bundle's]")
+@click.option("--top-p", type=click.FloatRange(0.01, 1), help="Draw codes from the likeliest of this share.")
+@click.option("--seconds", type=click.FloatRange(0, 600), help="Length of each text; 0: it ends by itself.")
 @click.option("--max-seconds", type=click.FloatRange(0, 600), help="Maximum length in seconds. [default: the bundle's]")
 @click.option(
     "--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed; later texts use seed + 1, ..."
@@ -38,6 +43,11 @@ from motet.motion.motion import Motion
 @click.option("--fps", type=FPS, default=PLAYED, show_default=True, help="Frame rate to write.")
 @click.option("--no-plant", is_flag=True, help="Skip foot planting: the figure moves as drawn.")
 @click.option("--all", "every", is_flag=True, help="Write all hypotheses, not only the best.")
+@click.option("--story", is_flag=True, help="One motion for all texts, one after the other.")
+@click.option("--after", type=Path, metavar="MOTION", help="Go on from the end of this motion file.")
+@click.option("--stand", type=click.Choice(["start", "end", "both"]), help="Start or end in standing.")
+@click.option("--loop", is_flag=True, help="Write the part that plays in a circle without a leap.")
+@click.option("--strict", is_flag=True, help="Refuse a text of which the model knows only a part.")
 @like_option
 @session_options
 @click.option("--json", "as_json", is_flag=True, help="Print a list with input and hypotheses of each text.")
@@ -50,6 +60,11 @@ def generate(
     every: bool,
     seed: int,
     like: Character | None,
+    story: bool,
+    after: Path | None,
+    stand: str | None,
+    loop: bool,
+    strict: bool,
     as_json: bool,
     session: SessionOptions,
     **settings: Any,
@@ -57,30 +72,85 @@ def generate(
     """Generate a motion for each TEXT, such as "a person walks and turns left", and write it to OUT.
 
     With several texts, or --all, the files are numbered: out-1.bvh, out-2.bvh, ... A text that cannot be used has none.
+    With --story the texts become one motion, each taking over from the one before.
     """
     check_writable(out)
     model = load_as(GenerateModel, bundle, session)
     tries = Tries()
     asked = tries.usable(model, texts)
-    with text_notes(), bar("generating") as progress:
-        seeds = [seed + index for index in asked]
-        found = model.generate([texts[index] for index in asked], seed=seeds, progress=progress, **settings)
-    count = max(map(len, found), default=1) if every else 1
-    outs = places(out, [str(number + 1) for number in range(count * len(texts))])
-    rows = []
-    for index, results in zip(asked, found, strict=True):
-        pairs = zip(results[:count], outs[count * index :], strict=False)
-        written = [_write(result.playable(fps, not no_plant), result, place, like) for result, place in pairs]
-        rows.append({"input": texts[index], "hypotheses": written})
+    given = {"strict": strict, **settings}
+    shown = partial(_written, fps=fps, plant=not no_plant, loop=loop, like=like)
+    with text_notes():
+        if story or after is not None or stand is not None:
+            groups = [asked] if story and asked else [[index] for index in asked]
+            found = list(_stories(tries, model, texts, groups, {"after": after, "stand": stand, "seed": seed, **given}))
+        else:
+            found = _motions(tries, model, texts, asked, seed, given)
+    rows = _rows(tries, found, out, 1 if story else len(texts), every, shown)
     if rows:
         click.echo(json.dumps(rows) if as_json else "\n".join(_lines(rows)))
     tries.finish()
 
 
-def _write(motion: Motion, result: Generated, place: Path, like: Character | None) -> dict[str, Any]:
+Found = tuple[int, str, list[Generated]]
+"""The place of an input among all, the input, and its motions, the best first."""
+
+
+def _motions(
+    tries: Tries, model: GenerateModel, texts: Sequence[str], asked: list[int], seed: int, given: Mapping[str, Any]
+) -> list[Found]:
+    """The motions of each text by itself, of all of them in one batch."""
+    if given["strict"]:  # one text that is refused leaves the others
+        asked = [index for index in asked if tries.done(texts[index], partial(model.check, texts[index]))]
+    with bar("generating") as progress:
+        seeds = [seed + index for index in asked]
+        found = model.generate([texts[index] for index in asked], seed=seeds, progress=progress, **given)
+    return [(index, texts[index], results) for index, results in zip(asked, found, strict=True)]
+
+
+def _stories(
+    tries: Tries, model: GenerateModel, texts: Sequence[str], groups: list[list[int]], given: dict[str, Any]
+) -> Iterator[Found]:
+    """One motion for the texts of each group."""
+    if not isinstance(model, CodesModel):
+        raise click.UsageError(f"--story, --after and --stand need a bundle that writes codes; {model!r} does not")
+    options = {key: value for key, value in given.items() if value is not None and key != "hypotheses"}
+    if "after" in options:
+        options["after"] = read_motion(options["after"])
+    for number, group in enumerate(groups):
+        asked = [texts[index] for index in group]
+        with tries.of(" / ".join(asked)):
+            yield number, " / ".join(asked), [model.story(asked, **{**options, "seed": given["seed"] + group[0]})]
+
+
+def _rows(
+    tries: Tries,
+    found: list[Found],
+    out: Path,
+    inputs: int,
+    every: bool,
+    shown: Callable[[Generated, Path], dict[str, Any]],
+) -> list[dict[str, Any]]:
+    """Write the motions of each input; what is said of those that could be written."""
+    count = max((len(results) for *_, results in found), default=1) if every else 1
+    outs = places(out, [str(number + 1) for number in range(count * inputs)])
+    rows = []
+    for index, text, results in found:
+        pairs = zip(results[:count], outs[count * index :], strict=False)
+        with tries.of(text):
+            rows.append({"input": text, "hypotheses": [shown(result, place) for result, place in pairs]})
+    return rows
+
+
+def _written(
+    result: Generated, place: Path, fps: float, plant: bool, loop: bool, like: Character | None
+) -> dict[str, Any]:
+    motion = result.playable(fps, plant)
+    motion = looped(motion) if loop else motion
     write_motion(place, motion, like=like)
     size = {"frames": len(motion), "fps": motion.fps, "seconds": motion.duration}
-    return {"output": str(place), "log_likelihood": result.log_likelihood, **size}
+    passages = {"passages": list(map(asdict, result.passages))} if isinstance(result, Story) else {}
+    return {"output": str(place), "log_likelihood": result.log_likelihood, **size, **passages}
 
 
 def _lines(rows: list[dict[str, Any]]) -> Iterator[str]:
@@ -90,3 +160,5 @@ def _lines(rows: list[dict[str, Any]]) -> Iterator[str]:
             likelihood = found["log_likelihood"]
             score = "" if likelihood is None else f", log-likelihood {likelihood:.1f}"
             yield f"{found['output']}: {size}{score}: {row['input']}"
+            for passage in found.get("passages", ()):
+                yield f"  {passage['start']:.1f}-{passage['stop']:.1f} s {passage['text']}"

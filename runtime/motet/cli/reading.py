@@ -88,6 +88,13 @@ class Tries:
             self.failed += 1
             click.echo(f"motet: {_named(given, error)}", err=True)
 
+    def done(self, given: Path | str, work: Callable[[], object]) -> bool:
+        """Whether work for one file or text ended without an error of motet's own."""
+        before = self.failed
+        with self.of(given):
+            work()
+        return self.failed == before
+
     def usable(self, model: LanguageModel, texts: Sequence[str]) -> list[int]:
         """The indices of the texts that the model takes."""
         found = []

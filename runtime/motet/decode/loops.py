@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from motet.decode import beam, consensus, free_run, mixture, nearest, session
+from motet.decode import beam, codes, consensus, free_run, mixture, nearest, session
 from motet.decode.loop import Loop
 from motet.errors import BundleError
 
@@ -10,6 +10,7 @@ LOOPS: Mapping[str, Loop] = {
     "beam": beam.LOOP,
     "consensus": consensus.LOOP,
     "mixture": mixture.LOOP,
+    "codes": codes.LOOP,
     "free_run": free_run.LOOP,
     "session": session.LOOP,
     "nearest": nearest.LOOP,

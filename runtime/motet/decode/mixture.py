@@ -1,37 +1,19 @@
 """Beam search over frames drawn from a mixture of Gaussians. Section 4.3.3 of Plappert et al. 2017."""
 
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motet.bundle.graph import Arrays, Floats, Graph
 from motet.decode.loop import Loop, Setting
+from motet.decode.noise import Noise
 from motet.decode.rollout import Ids, Scores, advance, two_rows, zero_state
+from motet.decode.sample import Sample
 
 SMALLEST = 2.0**-24
 """A probability of the flag below this counts as this, where a logarithm is taken."""
-
-
-class Sample(NamedTuple):
-    """A finished sequence: its normalised frames (T, D) float32, and the sum of its steps' log-likelihoods.
-
-    None where a loop has no likelihoods.
-    """
-
-    frames: Floats
-    log_likelihood: float | None
-
-
-class Noise(Protocol):
-    """Where the random numbers of a row come from: a :class:`numpy.random.Generator`, or numbers that are given."""
-
-    def standard_normal(self, size: tuple[int, ...], dtype: type[np.float32]) -> Floats:
-        """Normal numbers."""
-
-    def random(self, size: tuple[int, ...], dtype: type[np.float32]) -> Floats:
-        """Uniform numbers in [0, 1)."""
 
 
 def mixture_search(

@@ -1,7 +1,7 @@
 """Noise for step graphs: reproducible per row, independent of the batch around it, recorded and played again."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,16 @@ from motet.errors import BundleError
 
 BLOCK = 16
 """Ticks drawn at once."""
+
+
+class Noise(Protocol):
+    """Where the random numbers of a row come from: a :class:`numpy.random.Generator`, or numbers that are given."""
+
+    def standard_normal(self, size: tuple[int, ...], dtype: type[np.float32]) -> Floats:
+        """Normal numbers."""
+
+    def random(self, size: tuple[int, ...], dtype: type[np.float32]) -> Floats:
+        """Uniform numbers in [0, 1)."""
 
 
 class RowNoise:
@@ -74,7 +84,7 @@ class Recorded:
     """The numbers of a recording, (calls, ...) of each kind, given again; BundleError where they do not fit."""
 
     def __init__(self, drawn: Mapping[str, NDArray[Any]]) -> None:
-        self._left = {kind: iter(drawn[kind]) for kind in ("normal", "uniform")}
+        self._left = {kind: iter(drawn.get(kind, ())) for kind in ("normal", "uniform")}
 
     def standard_normal(self, size: tuple[int, ...], dtype: type[np.float32]) -> Floats:
         """Normal numbers."""

@@ -1,17 +1,18 @@
-"""Generate: ranked motions for a sentence. Section 4.3 of Plappert et al. 2017."""
+"""Generate: motions for a sentence; what all models that do so have in common."""
 
+import warnings
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, overload
 
 import numpy as np
 
-from motet.bundle.graph import Arrays, Floats, Graph
-from motet.bundle.manifest import Manifest
-from motet.decode.mixture import Noise, Sample
-from motet.decode.noise import Recorded
-from motet.errors import DecodingError
+from motet.bundle.graph import Arrays, Floats
+from motet.decode.noise import Noise, Recorded
+from motet.decode.sample import Sample
+from motet.errors import DecodingError, TextError, TextWarning
 from motet.files import File
 from motet.formats import write_motion
 from motet.formats.character import Character
@@ -23,6 +24,9 @@ from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
 from motet.representation.contract import MotionContract
 
+SETTLED = 0.3
+"""Seconds after which feet are planted that were not before."""
+
 PLAYED = 30.0
 """Frames per second of what is generated, whatever the model's own rate is."""
 
@@ -31,20 +35,29 @@ PLAYED = 30.0
 class Generated:
     """A generated motion, its log-likelihood given the sentence, and the words that were unknown.
 
-    contract: what the frames mean. frames: (T, D) as they were drawn, in its channels; their feet slide.
+    contract: what the frames mean. frames: (T, D) as they were drawn, in its channels.
     log_likelihood: of the normalised frames as drawn and of where they end, as :meth:`GenerateModel.score` gives it;
         None where the model's loop has no likelihoods.
+    after: the motion that it goes on from; else it starts at the origin.
     """
 
     contract: MotionContract
     frames: Array
     log_likelihood: float | None
     unknown: tuple[str, ...] = ()
+    after: Motion | None = None
 
     @cached_property
     def features(self) -> Motion:
-        """The motion in the contract's channels and at its frame rate, its feet planted: to be measured."""
-        return self.contract.features(self.frames, plant=True)
+        """The motion in the contract's channels and at its frame rate, its feet planted: to be measured.
+
+        What goes on from a motion whose feet are not planted is planted little by little.
+        """
+        planted = self.contract.features(self.frames, plant=True)
+        if self.after is None:
+            return planted
+        share = np.minimum(np.arange(len(planted)) / (SETTLED * planted.fps), 1.0)[:, None]
+        return replace(planted, values=self.frames + share * (planted.values - self.frames))
 
     @cached_property
     def motion(self) -> Motion:
@@ -53,7 +66,8 @@ class Generated:
 
     def playable(self, fps: float = PLAYED, plant: bool = True) -> Motion:
         """The motion at another frame rate, or without its feet planted: moving as it was drawn, with sliding feet."""
-        return self.contract.motion(self.frames, plant=plant).resample(fps)
+        frames = self.features.values if plant else self.frames
+        return self.contract.motion(frames, after=self.after, plant=False).resample(fps)
 
     def write(
         self,
@@ -73,25 +87,10 @@ class Generated:
 
 
 class GenerateModel(LanguageModel):
-    """A model that puts words into motion.
-
-    graphs: "encoder" (words, lengths -> context), "step" (for the loop "mixture" frame, context, states ->
-        log_weights, means, stds, active, next states) and perhaps "score" (context, frames -> log_likelihood), with
-        frames normalised and the active flag last.
-    Its loops (:mod:`motet.decode.loops`) take the step, contexts (B, C), a generator of noise for each row, the longest
-    number of frames and their settings by name, and give samples for each row, best first.
-    """
+    """A model that puts words into motion: :class:`motet.models.mixture.MixtureModel` or
+    :class:`motet.models.codes.CodesModel`, as the bundle's loop says."""
 
     VERB = "generate"
-
-    def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph]) -> None:
-        super().__init__(manifest, graphs)
-        self.sizes["F"] = self.sizes["D"] + 1  # with the active flag
-        context = {"context": "batch C"}
-        self.bind("encoder", {"words": "*batch words", "lengths": "*batch"}, context)
-        self.bind("step", self.loop.inputs, self.loop.outputs)
-        if "score" in graphs:
-            self.bind("score", {**context, "frames": "batch time F"}, {"log_likelihood": "batch time"})
 
     @overload
     def generate(  # type: ignore[overload-overlap]  # a string is a sequence of strings, too
@@ -99,11 +98,10 @@ class GenerateModel(LanguageModel):
         sentences: str,
         hypotheses: int | None = None,
         *,
-        candidates: int | None = None,
-        temperature: float | None = None,
         seed: Seed = 0,
-        max_seconds: float | None = None,
+        strict: bool = False,
         progress: Progress = silent,
+        **settings: float | None,
     ) -> list[Generated]: ...
     @overload
     def generate(
@@ -111,58 +109,67 @@ class GenerateModel(LanguageModel):
         sentences: Sequence[str],
         hypotheses: int | None = None,
         *,
-        candidates: int | None = None,
-        temperature: float | None = None,
         seed: Seed = 0,
-        max_seconds: float | None = None,
+        strict: bool = False,
         progress: Progress = silent,
+        **settings: float | None,
     ) -> list[list[Generated]]: ...
     def generate(
         self,
         sentences: str | Sequence[str],
         hypotheses: int | None = None,
         *,
-        candidates: int | None = None,
-        temperature: float | None = None,
         seed: Seed = 0,
-        max_seconds: float | None = None,
+        strict: bool = False,
         progress: Progress = silent,
+        **settings: float | None,
     ) -> list[Generated] | list[list[Generated]]:
-        """``hypotheses`` motions for a sentence, the likeliest per frame first; for several sentences a list for each.
+        """``hypotheses`` motions for a sentence; for several sentences a list for each.
 
-        See :func:`motet.decode.mixture.mixture_search`.
-        candidates: frames that each hypothesis draws in a step; 1 gives independent samples.
-        temperature: of the draws about the centres of the mixture's components; lower trembles less.
+        A mixture ranks them, the likeliest per frame first. Of codes they are independent, in the order of their draws.
         seed: sentence i has seed + i (or seed[i]), and the motions it would have alone with that seed.
-        max_seconds: a motion that has not ended by then ends there.
         progress: called with the number of sentences done and of all.
-        What is None comes from the bundle. TextError for a sentence that is empty, too long or wholly unknown;
-        DecodingError for a setting out of range. Unknown words are named by a TextWarning and in the result.
+        strict: refuse a sentence of which the model knows only a part, instead of warning.
+        settings: those of the model's loop (:mod:`motet.decode.loops`); None, as by default, for the bundle's.
+            temperature: of the draws: about the centres of a mixture's components, or of codes. max_seconds: a motion
+            that has not ended by then ends there. Of a mixture also candidates: frames that each hypothesis draws in a
+            step; 1 gives independent samples. Of codes also seconds: how long the motion lasts, an action that ends
+            before is done again; and top_p: codes are drawn from the likeliest that make up this share.
+        TextError for a sentence that is empty, too long or wholly unknown; DecodingError for a setting out of range, or
+        that the loop does not have. Unknown words are named by a TextWarning and in the result.
         """
         texts = [sentences] if isinstance(sentences, str) else list(sentences)
         ids, seeds = [self.ids(text) for text in texts], seeds_of(seed, len(texts), DecodingError)
-        chosen = {
-            "hypotheses": hypotheses,
-            "candidates": candidates,
-            "temperature": temperature,
-            "max_seconds": max_seconds,
-        }
-        settings = self.loop.settled(self.defaults, chosen)
+        chosen = self.loop.settled(self.defaults, {"hypotheses": hypotheses, **settings})
         noise = [np.random.Generator(np.random.PCG64(one)) for one in seeds]
         contexts, found = self.contexts(ids), []
+        for text, context in zip(texts, contexts, strict=True):
+            self.note(text, context, strict)
         for place in range(0, len(texts), self.loop.batch):
             batch = slice(place, place + self.loop.batch)
-            found += self.decode(contexts[batch], noise[batch], settings)
+            found += self.decode(contexts[batch], noise[batch], chosen)
             progress(len(found), len(texts))
         rows = [[self._generated(s, text) for s in row] for text, row in zip(texts, found, strict=True)]
         return rows[0] if isinstance(sentences, str) else rows
 
+    def check(self, sentence: str) -> None:
+        """TextError where a model knows only a part of a sentence, or nothing; see :meth:`note`."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", TextWarning)
+            self.note(sentence, self.embed(sentence), strict=True)
+
+    def note(self, sentence: str, context: Floats, strict: bool) -> None:
+        """Say that a model knows only a part of a sentence with this context (C,), beside the unknown words.
+
+        strict: TextError instead.
+        """
+        if strict and (unknown := self.unknown(sentence)):
+            raise TextError(f"the model does not know {', '.join(unknown)} (in {sentence!r})")
+
+    @abstractmethod
     def decode(self, contexts: Floats, noise: Sequence[Noise], settings: Mapping[str, Any]) -> list[list[Sample]]:
-        """Samples for each context (B, C) by the model's loop, from the noise of each and all the loop's settings."""
-        rest = {name: value for name, value in settings.items() if name != "max_seconds"}
-        frames = max(1, round(settings["max_seconds"] * self.fps))
-        found: list[list[Sample]] = self.loop.run(self.graphs["step"], contexts, noise, frames, **rest)
-        return found
+        """Samples for each context (B, C), from the noise of each and all the loop's settings; frames in the contract's
+        units."""
 
     def embed(self, sentences: str | Sequence[str]) -> Floats:
         """The context vector (C,) float32 of a sentence, or vectors (N, C) of several; errors as :meth:`ids`."""
@@ -172,7 +179,10 @@ class GenerateModel(LanguageModel):
         return self.contexts([self.ids(text) for text in sentences])
 
     def score(self, sentence: str, motion: Motion) -> float:
-        """Log-likelihood of a motion, and of its end, given a sentence; a TextWarning names words that count as UNK."""
+        """Log-likelihood of a motion, and of its end, given a sentence; a TextWarning names words that count as UNK.
+
+        BundleError for a model without a graph "score".
+        """
         normal = self.contract.normalised(self.frames(motion))
         frames = np.zeros((1, len(normal) + 1, normal.shape[1] + 1), dtype=np.float32)
         frames[0, :-1, :-1], frames[0, :-1, -1] = normal, 1
@@ -182,13 +192,12 @@ class GenerateModel(LanguageModel):
     def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
         """A sentence ("text" of the settings) and its noise to ids (words,) int64 and the frames of the best motion.
 
-        The noise of each kind is (steps, ...), the frames (T, D) are normalised.
+        The noise of each kind is (calls, ...), the frames (T, D) are normalised.
         """
         ids, _ = self.vocabulary.encode(str(settings["text"]))
         chosen = self.loop.settled(self.defaults, {k: v for k, v in settings.items() if k != "text"})
         (row,) = self.decode(self.contexts([ids]), [Recorded(given)], chosen)
-        return {"ids": ids, "frames": row[0].frames}
+        return {"ids": ids, "frames": self.contract.normalised(row[0].frames).astype(np.float32)}
 
     def _generated(self, sample: Sample, text: str) -> Generated:
-        frames = self.contract.denormalised(sample.frames)
-        return Generated(self.contract, frames, sample.log_likelihood, tuple(self.unknown(text)))
+        return Generated(self.contract, sample.frames, sample.log_likelihood, tuple(self.unknown(text)))

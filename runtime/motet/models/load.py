@@ -10,18 +10,23 @@ from motet.bundle.manifest import Manifest
 from motet.bundle.session import SessionOptions
 from motet.errors import BundleError
 from motet.models.base import BundleModel
+from motet.models.codes import CodesModel
 from motet.models.control import ControlModel
 from motet.models.describe import DescribeModel
 from motet.models.generate import GenerateModel
+from motet.models.mixture import MixtureModel
 from motet.models.predict import PredictModel
 from motet.models.search import SearchModel
 
 Model = ControlModel | DescribeModel | GenerateModel | PredictModel | SearchModel
 Kind = TypeVar("Kind", bound=BundleModel)
 
-_KINDS: tuple[type[Model], ...] = (ControlModel, DescribeModel, GenerateModel, PredictModel, SearchModel)
+_KINDS: tuple[type[Model], ...] = (ControlModel, DescribeModel, MixtureModel, PredictModel, SearchModel)
 VERBS: dict[str, type[Model]] = {kind.VERB: kind for kind in _KINDS}
-"""Verb of a bundle -> the class of its model."""
+"""Verb of a bundle -> the class of its model, where the loop does not say another."""
+
+BY_LOOP: dict[str, type[Model]] = {"codes": CodesModel}
+""":data:`VERBS` for some loops."""
 
 
 @overload
@@ -61,7 +66,7 @@ def build(manifest: Manifest, graphs: Mapping[str, Graph]) -> Model:
 
 
 def kind_of(manifest: Manifest) -> type[Model]:
-    """The class of a manifest's verb; BundleError for a verb that is unknown."""
+    """The class of a manifest's verb and loop; BundleError for a verb that is unknown."""
     if manifest.verb not in VERBS:
         raise BundleError(f"manifest, verb: {manifest.verb!r} is unknown; expected one of {', '.join(VERBS)}")
-    return VERBS[manifest.verb]
+    return BY_LOOP.get(manifest.loop, VERBS[manifest.verb])

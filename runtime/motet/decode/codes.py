@@ -1,0 +1,232 @@
+"""Motions drawn code by code: an action from what a sentence asks for, then steps of codes from what follows.
+
+A step of codes is a move of the root and some codes of the body; each is drawn knowing those before it, as words are:
+by temperature, and from the likeliest that make up ``top_p`` together (nucleus sampling: Holtzman et al. 2020). How far
+an action is followed can be raised by classifier-free guidance (Ho and Salimans 2022).
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motet.bundle.graph import Floats, Graph
+from motet.decode.loop import Loop, Setting
+from motet.decode.memory import PAST, Memory
+from motet.decode.noise import Noise
+from motet.decode.rollout import Ids, Scores, advance, zero_state
+
+
+class Drawing(NamedTuple):
+    """How codes are drawn. first: the temperature of the first step, which decides how an action is done.
+
+    memory: the share of steps that are taken from what is remembered.
+    """
+
+    temperature: float
+    first: float
+    top_p: float
+    guidance: float
+    memory: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """What writers draw from: the graphs "step" and "part", and a memory.
+
+    end: the move that ends a motion; the one after it, ``nothing``, stands for what comes before the first step.
+    nobody: the action that says nothing, for guidance.
+    """
+
+    step: Graph
+    part: Graph
+    end: int
+    nobody: int
+    memory: Memory
+
+    @property
+    def nothing(self) -> int:
+        """See the class."""
+        return self.end + 1
+
+    @property
+    def parts(self) -> int:
+        """P, the codes of a step."""
+        return self.part.spec.input("codes").size(1)
+
+    def uniform(self, noise: Sequence[Noise]) -> Scores:
+        """A block (B, P + 2) of uniform numbers from the noise of each row."""
+        return np.stack([one.random((self.parts + 2,), np.float32) for one in noise]).astype(np.float64)
+
+
+class Writer:
+    """Draws codes for B rows, each of its own action and noise; holds all state of one request.
+
+    age: (B,) int64 steps since the action began.
+    """
+
+    def __init__(self, source: Source, noise: Sequence[Noise], drawing: Drawing) -> None:
+        self.source, self.noise, self.drawing = source, list(noise), drawing
+        rows = 2 * len(self.noise)  # told the action, and not told
+        self.age = np.zeros(len(self.noise), dtype=np.int64)
+        self.state = zero_state(source.step, rows)
+        self.last = np.zeros((rows, source.parts), dtype=np.int64)
+        self.last[:, 0] = source.nothing
+        self.recent: list[Floats] = []  # numbers (B, L) of the last steps, the latest first
+        self._before = self.last, self.state, self.recent, self.age
+
+    def see(self, codes: Ids) -> None:
+        """Take steps (N, P) as what every row did before, whatever action it was."""
+        for step in codes:
+            self._known(np.full(len(self.noise), self.source.nobody))
+            self.last = np.tile(step, (len(self.last), 1))
+
+    def draw(self, actions: Ids, ends: bool = True) -> Ids:
+        """The next step (B, P) of rows with the given actions (B,).
+
+        ends: whether a motion may end; else an action that would end begins again. Each row takes one block of uniform
+        numbers (P + 2,) from its noise.
+        """
+        known = self._known(actions)
+        uniform = self.source.uniform(self.noise)
+        given = self._remembered(actions, uniform[:, :2], ends)
+        codes, again = self._parts(known, uniform[:, 2:], given, ends)
+        self.last = np.tile(codes, (2, 1))
+        self.age = np.where(again, 0, self.age + 1)
+        return codes
+
+    def begin(self) -> None:
+        """An action begins with the next step, whatever was done before."""
+        self.age = np.zeros_like(self.age)
+
+    def take_back(self) -> None:
+        """Forget the last draw, such as that of an end, and go on before it."""
+        self.last, self.state, self.recent, self.age = self._before
+
+    def _known(self, actions: Ids) -> Floats:
+        self._before = self.last, self.state, self.recent, self.age
+        told = np.concatenate([actions, np.full(len(actions), self.source.nobody)]).astype(np.int64)
+        inputs = {"codes": self.last, "action": told, "age": np.tile(self.age, 2)}
+        outputs, self.state = advance(self.source.step, self.state, inputs)
+        if self.last[0, 0] != self.source.nothing:
+            self.recent = [outputs["numbers"][: len(actions)], *self.recent][: len(PAST)]
+        known: Floats = outputs["known"]
+        return known
+
+    def _remembered(self, actions: Ids, uniform: Scores, ends: bool) -> Ids:
+        """Steps (B, P) from memory, -1 in rows that the net draws."""
+        found = np.full((len(actions), self.source.parts), -1, dtype=np.int64)
+        memory = self.source.memory
+        for row in np.flatnonzero(uniform[:, 0] < self.drawing.memory):
+            if int(actions[row]) not in memory.rows:
+                continue
+            recent = [numbers[row] for numbers in self.recent]
+            place = memory.next(int(actions[row]), recent, int(self.age[row]), ends, uniform[row, 1])
+            found[row] = memory.codes[place]
+        return found
+
+    def _parts(self, known: Floats, uniform: Scores, given: Ids, ends: bool) -> tuple[Ids, NDArray[np.bool_]]:
+        """Steps (B, P), their parts drawn one after the other where they are not given; and which rows begin again."""
+        drawing, end = self.drawing, self.source.end
+        again = (given[:, 0] == end) & (not ends)
+        rows = np.flatnonzero((given[:, 0] < 0) | again)
+        codes = given.copy()
+        codes[rows] = 0
+        told, temperature = known[np.concatenate([rows, rows + len(given)])], self._temperature()[rows]
+        for part in range(self.source.parts) if len(rows) else ():
+            asked = {"known": told, "codes": np.tile(codes[rows], (2, 1))}
+            with_action, without = np.split(self.source.part(asked)["log_probabilities"][:, part].astype(np.float64), 2)
+            chances = without + drawing.guidance * (with_action - without)
+            drawn = nucleus(chances, uniform[rows, part], temperature, drawing.top_p)
+            if part == 0 and not ends:
+                again[rows] |= drawn == end
+                chances[:, end] = -np.inf
+                other = uniform[rows, part] * 1024 % 1  # the same number would give a neighbour of the end
+                drawn = nucleus(chances, np.where(again[rows], other, uniform[rows, part]), temperature, drawing.top_p)
+            codes[rows, part] = drawn
+        return codes, again
+
+    def _temperature(self) -> Scores:
+        """Of each row (B,)."""
+        return np.where(self.age == 0, self.drawing.first, self.drawing.temperature)
+
+    def keep(self, rows: NDArray[np.intp]) -> None:
+        """Go on with some of the rows only."""
+        both = np.concatenate([rows, rows + len(self.noise)])
+        self.noise, self.age = [self.noise[row] for row in rows], self.age[rows]
+        self.recent = [numbers[rows] for numbers in self.recent]
+        self.last, self.state = self.last[both], {name: array[both] for name, array in self.state.items()}
+
+
+def nucleus(log_weights: Scores, uniform: Scores, temperature: Scores | float, top_p: float) -> Ids:
+    """One of V things for each row of (B, V), by uniform numbers (B,): of those likeliest that make up ``top_p``."""
+    divisor = np.broadcast_to(temperature, len(log_weights))[:, None]
+    weights = np.exp((log_weights - log_weights.max(axis=1, keepdims=True)) / divisor)
+    order = np.argsort(-weights, axis=1, kind="stable")
+    shares = np.cumsum(np.take_along_axis(weights, order, axis=1), axis=1)
+    kept = shares - np.take_along_axis(weights, order, axis=1) < top_p * shares[:, -1:]  # the last goes beyond it
+    inside = np.zeros_like(weights)
+    np.put_along_axis(inside, order, kept, axis=1)
+    # in the order of the things themselves: that of their weights would change with a rounding
+    places = np.cumsum(weights * inside, axis=1)
+    found: Ids = (places > uniform[:, None] * places[:, -1:]).argmax(axis=1)
+    return found
+
+
+def drawn_actions(source: Source, contexts: Floats, noise: Sequence[Noise], certainty: float) -> Ids:
+    """For each row an action (B,) from log-probabilities (B, A), raised to the power ``certainty``."""
+    uniform = source.uniform(noise)[:, 0]
+    return nucleus(certainty * contexts.astype(np.float64), uniform, 1.0, 1.0)
+
+
+def draw_codes(writer: Writer, actions: Ids, longest: int, exactly: bool = False) -> list[Ids]:
+    """Steps (N, P) that each row of a writer draws for its action (B,): up to its end, or to ``longest`` steps.
+
+    exactly: to ``longest`` steps; an action that ends before is done again.
+    """
+    alive = np.arange(len(actions))
+    steps: list[list[Ids]] = [[] for _ in actions]
+    writer.begin()
+    for length in range(longest):
+        codes = writer.draw(actions[alive], ends=not exactly and length > 0)
+        going = codes[:, 0] != writer.source.end
+        for row, step in zip(alive[going].tolist(), codes[going], strict=True):
+            steps[row].append(step)
+        alive = alive[going]
+        if not len(alive):
+            break
+        if not going.all():
+            writer.keep(np.flatnonzero(going))
+    return [np.array(row, dtype=np.int64).reshape(-1, writer.source.parts) for row in steps]
+
+
+def drawn_steps(writer: Writer, action: int, longest: int, exactly: bool = False) -> Iterator[Ids]:
+    """Step by step (P,) what :func:`draw_codes` draws for a writer of one row; it can go on with another action."""
+    writer.begin()
+    for length in range(longest):
+        codes = writer.draw(np.array([action]), ends=not exactly and length > 0)
+        if codes[0, 0] == writer.source.end:
+            writer.take_back()
+            return
+        yield codes[0]
+
+
+LOOP = Loop(
+    "generate",
+    draw_codes,
+    {"codes": "*batch P", "action": "*batch", "age": "*batch"},
+    {"known": "batch H", "numbers": "batch L"},
+    {
+        "hypotheses": Setting(1, 100, whole=True, default=1),
+        "temperature": Setting(0.01, 100, default=1.0),
+        "first_temperature": Setting(0.01, 100, default=1.0),
+        "top_p": Setting(0.01, 1, default=1.0),
+        "guidance": Setting(0, 10, default=1.0),
+        "memory": Setting(0, 1, default=0),
+        "certainty": Setting(0.01, 100, default=1.0),
+        "seconds": Setting(0, 600, default=0),
+        "max_seconds": Setting(0, 600, default=30),
+    },
+)

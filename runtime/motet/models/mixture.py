@@ -1,0 +1,37 @@
+"""Motions drawn frame by frame from mixtures of Gaussians. Section 4.3 of Plappert et al. 2017."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from motet.bundle.graph import Floats, Graph
+from motet.bundle.manifest import Manifest
+from motet.decode.noise import Noise
+from motet.decode.sample import Sample
+from motet.models.generate import GenerateModel
+
+
+class MixtureModel(GenerateModel):
+    """A model whose step gives a mixture, or frames.
+
+    graphs: "encoder" (words, lengths -> context), "step" (for the loop "mixture" frame, context, states ->
+        log_weights, means, stds, active, next states) and perhaps "score" (context, frames -> log_likelihood), with
+        frames normalised and the active flag last.
+    Its loops (:mod:`motet.decode.loops`) take the step, contexts (B, C), a generator of noise for each row, the longest
+    number of frames and their settings by name, and give samples for each row, best first.
+    """
+
+    def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph]) -> None:
+        super().__init__(manifest, graphs)
+        self.sizes["F"] = self.sizes["D"] + 1  # with the active flag
+        context = {"context": "batch C"}
+        self.bind("encoder", {"words": "*batch words", "lengths": "*batch"}, context)
+        self.bind("step", self.loop.inputs, self.loop.outputs)
+        if "score" in graphs:
+            self.bind("score", {**context, "frames": "batch time F"}, {"log_likelihood": "batch time"})
+
+    def decode(self, contexts: Floats, noise: Sequence[Noise], settings: Mapping[str, Any]) -> list[list[Sample]]:
+        """See :meth:`GenerateModel.decode`."""
+        rest = {name: value for name, value in settings.items() if name != "max_seconds"}
+        frames = max(1, round(settings["max_seconds"] * self.fps))
+        found: list[list[Sample]] = self.loop.run(self.graphs["step"], contexts, noise, frames, **rest)
+        return [[one._replace(frames=self.contract.denormalised(one.frames)) for one in row] for row in found]

@@ -1,0 +1,126 @@
+"""The shipped model that writes motions as codes, as a user has it: lengths, stories, streams, what it knows."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import run
+
+import motet
+from motet.errors import DecodingError, MotionError, TextError, TextWarning
+from motet.models.codes import CodesModel
+from motet.motion.kinematics import positions
+from motet.motion.motion import Motion
+
+WALK, JUMP = "a person walks forward", "a person jumps up"
+
+
+@pytest.fixture(scope="module")
+def model() -> CodesModel:
+    found = motet.load("generate")
+    assert isinstance(found, CodesModel)
+    return found
+
+
+@pytest.fixture(scope="module")
+def walk(clips: Path) -> Motion:
+    return motet.read(clips / "39_14.amc")
+
+
+def test_a_motion_lasts_as_long_as_is_asked(model: CodesModel) -> None:
+    for seconds in (0.5, 3, 12):
+        found = model.generate([WALK, JUMP], 2, seconds=seconds)
+        for row in found:
+            for one in row:
+                assert len(one.frames) / model.fps == pytest.approx(seconds)
+                assert np.isfinite(one.frames).all()
+
+
+def test_a_story_of_one_sentence_is_what_generate_gives(model: CodesModel) -> None:
+    (alone,) = model.generate(WALK, seed=4)
+    story = model.story([WALK], seed=4)
+    np.testing.assert_array_equal(story.frames, alone.frames)
+    assert [(one.text, one.start) for one in story.passages] == [(WALK, 0.0)]
+
+
+def test_a_stream_gives_the_motion_in_pieces_at_once(model: CodesModel) -> None:
+    whole = positions(model.story([WALK, JUMP], seconds=2, seed=1).playable(plant=False))
+    pieces = [positions(piece) for piece in model.stream([WALK, JUMP], seconds=2, seed=1)]
+    assert len(pieces) > 20
+    np.testing.assert_allclose(np.concatenate(pieces), whole, atol=1e-9)
+
+
+def test_a_story_goes_on_without_a_leap_and_says_what_is_when(model: CodesModel) -> None:
+    story = model.story([WALK, JUMP, WALK], seconds=[2, 3, 2], seed=2)
+    assert [one.text for one in story.passages] == [WALK, JUMP, WALK]
+    assert [one.stop for one in story.passages[:-1]] == [one.start for one in story.passages[1:]]
+    assert story.passages[-1].stop == pytest.approx(len(story.frames) / model.fps)
+    steps = np.linalg.norm(np.diff(positions(story.motion), axis=0), axis=-1)
+    assert steps.max() < 0.35  # metres in a frame: the hand of a cartwheel, no more
+
+
+def test_a_given_motion_is_gone_on_with(model: CodesModel, walk: Motion) -> None:
+    story = model.story([WALK], after=walk, seconds=2)
+    before = model.contract.on_figure(walk.resample(30.0, to_end=True))
+    seam = np.linalg.norm(positions(story.playable(plant=False))[0] - positions(before)[-1], axis=-1)
+    usual = np.linalg.norm(np.diff(positions(before), axis=0), axis=-1)
+    assert seam.max() < 2 * usual.max()
+    with pytest.raises(MotionError, match="too short to go on with"):
+        model.story([WALK], after=walk[:10])
+
+
+def test_a_figure_stands_where_that_is_asked(model: CodesModel) -> None:
+    story = model.story([WALK], stand="both", seconds=3)
+    assert [one.text for one in story.passages] == ["a person stands still", WALK, "a person stands still"]
+
+
+def test_it_says_what_it_does_not_know(model: CodesModel) -> None:
+    assert model.understood(WALK).confident
+    strange = "a person repairs the violin of an astronaut"
+    found = model.understood(strange)
+    assert not found.confident
+    assert len(found.nearest) == 3
+    with pytest.warns(TextWarning, match="outside of what the model knows"):
+        model.generate(strange, seconds=1)
+    with pytest.raises(TextError, match="nearest: '"):
+        model.generate(strange, seconds=1, strict=True)
+    with pytest.raises(TextError, match="nearest: '"):
+        model.story([WALK, strange], seconds=1, strict=True)
+
+
+@pytest.mark.parametrize("text", ["人が歩く", "🙂 🏃", "", "walk " * 2000])
+def test_a_text_without_a_known_word_is_refused(model: CodesModel, text: str) -> None:
+    with pytest.raises(TextError):
+        model.generate(text, seconds=1)
+
+
+def test_a_text_in_another_language_is_said_to_be_outside(model: CodesModel) -> None:
+    with pytest.warns(TextWarning, match="outside of what the model knows"):
+        model.generate("ein Mann in einem Haus", seconds=1)
+
+
+def test_settings_out_of_range_are_refused(model: CodesModel) -> None:
+    for seconds in (-1.0, 601.0, float("nan")):
+        with pytest.raises(DecodingError):
+            model.generate(WALK, seconds=seconds)
+    with pytest.raises(DecodingError, match="one for each of 2"):
+        model.story([WALK, JUMP], seconds=[1.0])
+    with pytest.raises(DecodingError, match="no setting 'candidates'"):
+        model.generate(WALK, candidates=3)
+
+
+def test_the_command_line_tells_a_story(tmp_path: Path, clips: Path, model: CodesModel) -> None:
+    out, options = tmp_path / "story.npz", ["--story", "--seconds", 2, "--seed", 3]
+    result = run("generate", WALK, JUMP, *options, "-o", out, "--json")
+    assert result.exit_code == 0
+    (row,) = json.loads(result.stdout)
+    assert [one["text"] for one in row["hypotheses"][0]["passages"]] == [WALK, JUMP]
+    again = tmp_path / "again.npz"
+    model.story([WALK, JUMP], seconds=2, seed=3).write(again)
+    assert again.read_bytes() == out.read_bytes()
+    assert "0.0-2.0 s " + WALK in run("generate", WALK, JUMP, *options, "-o", out).stdout
+    result = run("generate", WALK, "--after", clips / "39_14.amc", "--stand", "end", "-o", out)
+    assert result.exit_code == 0, result.stderr
+    assert run("generate", WALK, "--story", "--bundle", "cmu-generate", "-o", out).exit_code == 2
+    assert run("generate", "a violin", "--strict", "-o", out).exit_code == 1
