@@ -16,6 +16,7 @@ from motet_export.decoded import whole_runs
 from motet_export.examples import examples
 from motet_export.exporter import ExportError, export_graph
 from motet_export.golden import FILE, golden_vectors
+from motet_export.half import HALF, halved, round_weights
 from motet_export.parity import check_carried, check_one_step, check_runs
 from motet_export.quantise import difference, quantised
 from motet_train.runs import Run
@@ -23,22 +24,28 @@ from motet_train.runs import Run
 log = logging.getLogger("motet.export")
 
 
-def export_run(run: Run, out: str | Path, int8: bool = False) -> dict[str, Any]:
+def export_run(run: Run, out: str | Path, int8: bool = False, half: bool = False) -> dict[str, Any]:
     """Export a training run as the bundle ``out`` (a .zip or a new folder) and return the parity report.
 
     Nothing is written where a graph does not export or a rung of the parity ladder fails (ExportError).
     int8: quantise the graphs after that; the report then has "int8", the difference that it makes.
+    half: round the run's weights to 16 bits before that, and keep them so.
     """
     check_place(out)
+    if half:
+        round_weights(run.model)
     manifest, modules, torch = Manifest.from_json(run.manifest), run.graphs(), run.torch_graphs()
     label = {"motet": version("motet"), "bundle": manifest.name, "model": manifest.model}
     files = {}
     for role, (module, spec) in modules.items():
         log.info("exporting the graph %s", role)
-        files[f"{role}.onnx"] = export_graph(module, spec, {**label, "role": role})
+        graph = export_graph(module, spec, {**label, "role": role})
+        files[f"{role}.onnx"] = halved(graph) if half else graph
     log.info("comparing it with torch")
     onnx = _sessions(files, torch)
     report = parity(manifest, onnx, torch)
+    if half:
+        report["weights"] = HALF
     if int8:
         files, exact = {name: quantised(data) for name, data in files.items()}, onnx
         onnx = _sessions(files, torch)
@@ -60,6 +67,8 @@ def parity_of(run: Run, bundle: Bundle, options: SessionOptions | None = None) -
     """
     if "int8" in bundle.manifest.parity:
         raise ExportError(f"bundle {bundle.path} has 8-bit weights, which torch cannot check; export without --int8")
+    if bundle.manifest.parity.get("weights") == HALF:
+        round_weights(run.model)
     onnx = {role: bundle.graph(role, options or SessionOptions()) for role in run.graphs()}
     return parity(bundle.manifest, onnx, run.torch_graphs())
 

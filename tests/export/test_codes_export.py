@@ -1,0 +1,146 @@
+"""The model that writes codes as an ONNX bundle: what torch computes, decoded to motions code by code."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from torch import nn
+
+import motet
+from motet.bundle.bundle import Bundle
+from motet.models.codes import CodesModel
+from motet.models.text import RULES, SPECIALS
+from motet.models.verify import verify
+from motet.motion.humanoid import HUMANOID
+from motet.motion.kinematics import positions
+from motet.motion.skeleton import END_SUFFIX
+from motet.representation.contract import MotionContract
+from motet.representation.root_sixd import KINDS, ROOT_SIXD, ROOT_SIXD_UNITS
+from motet_export.bundles import export_run, parity_of
+from motet_export.examples import example, walks
+from motet_train.models.codes.actions import ActionsConfig, stems_of
+from motet_train.models.codes.code_model import CodeModelConfig
+from motet_train.models.codes.codec import CodecConfig
+from motet_train.models.codes.motion_codes import MotionCodes, MotionCodesConfig, to_json
+from motet_train.models.codes.sixd_places import tree_of
+from motet_train.recipes.codes import DRAWING
+from motet_train.runs import Run
+
+pytestmark = pytest.mark.slow  # torch's exporter
+
+WORDS = [*SPECIALS, "a", "person", "walks", "runs", "left", "right", "stands", "still"]
+SAID = ("a person walks", "a person runs left", "a person stands still")
+BONES = [name for name in HUMANOID.names if not name.endswith(END_SUFFIX)]
+CHANNELS = (*ROOT_SIXD, *(f"{bone}.{kind}" for bone in BONES for kind in KINDS))
+D, MOVES, PARTS = len(CHANNELS), 6, 3
+MEAN = np.array([0.5, 0, 0, 0.9] + [1.0, 0, 0, 0, 1.0, 0] * len(BONES))
+CONTRACT = MotionContract(
+    "root_sixd", CHANNELS, (*ROOT_SIXD_UNITS, *("1",) * (D - 4)), 30.0, MEAN, np.full(D, 0.1), HUMANOID
+)
+
+
+def run() -> Run:
+    torch.manual_seed(0)
+    codec = CodecConfig(D, tree_of(CONTRACT), moves=MOVES, groups=2, levels=(3, 3), width=8, blocks=1, fine=6)
+    text = ActionsConfig(len(WORDS), len(SAID), stems_of(WORDS), embedding=6, hidden=5)
+    writer = CodeModelConfig(len(SAID), width=12, layers=2, heads=2, action=5, ages=16)
+    net = MotionCodes(MotionCodesConfig(codec, text, writer, remembered=36))
+    for parameter in net.writer.parameters():
+        nn.init.normal_(parameter, std=0.3)
+    net.measure_by(CONTRACT.mean, CONTRACT.std)
+    net.codec.measure_by(CONTRACT.mean, CONTRACT.std)
+    nn.init.normal_(net.codec.book, std=0.1)
+    net.memory.copy_(torch.from_numpy(remembered()))
+    named = {"name": "small-codes", "verb": "generate", "model": "motion-codes", "loop": "codes"}
+    actions = [{"sentence": said, "words": said.split()} for said in SAID]
+    plain = json.loads(json.dumps(to_json(net.config)))
+    known = {"text": RULES.to_json(), "vocabulary": WORDS, "actions": actions, "config": plain}
+    settings = {"defaults": {**DRAWING, "memory": 0.3}, "licence": {}, "training": {}}
+    return Run({**named, **known, **settings, "motion": CONTRACT.to_json()}, net.eval())
+
+
+def remembered() -> np.ndarray:
+    """Three motions (36, P + 2) of eleven steps and an end, one for each action."""
+    rng = np.random.default_rng(0)
+    codes = np.concatenate([rng.integers(MOVES, size=(36, 1)), rng.integers(9, size=(36, 2))], axis=1)
+    codes[11::12] = MOVES, 0, 0
+    return np.column_stack([codes, np.arange(36) // 12, np.arange(36) % 12]).astype(np.int16)
+
+
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("bundles") / "codes.zip"
+    export_run(run(), place)
+    return place
+
+
+def test_a_bundle_keeps_its_contracts_and_carries_its_parity(bundle: Path) -> None:
+    opened = Bundle.open(bundle)
+    found = verify(opened)
+    roles = CodesModel.ROLES
+    assert found.files == tuple(sorted(("golden.npz", *(f"{role}.onnx" for role in roles))))
+    assert max(found.errors.values()) < 1e-4
+    report = opened.manifest.parity
+    rungs = {name: rung for name, rung in report.items() if isinstance(rung, dict) and "bound" in rung}
+    assert {f"{role}.one_step" for role in roles} | {"runs"} <= set(rungs)
+    assert all(rung["error"] < rung["bound"] / 2 for rung in rungs.values())
+    again = parity_of(run(), opened)
+    assert {name: again[name] for name in rungs} == rungs
+
+
+@pytest.mark.parametrize("role", CodesModel.ROLES)
+def test_a_row_of_a_batch_gets_what_it_gets_alone(bundle: Path, role: str) -> None:
+    graph = Bundle.open(bundle).graph(role)
+    below = {"words": len(WORDS), "codes": MOVES, "action": 4, "age": 16, "row": 36}
+    feeds = example(graph.spec, np.random.default_rng(0), batch=5, below=below)
+    together = graph(feeds)
+    for row in range(5):
+        single = {name: array[row : row + 1] for name, array in feeds.items()}
+        if role == "encoder":  # padded on the right
+            single["words"] = single["words"][:, : int(feeds["lengths"][row])]
+        for name, array in graph(single).items():
+            np.testing.assert_allclose(array, together[name][row : row + 1], atol=1e-5, err_msg=name)
+
+
+def test_a_loaded_bundle_computes_what_the_net_computes(bundle: Path) -> None:
+    model, net = motet.load(bundle), run().model
+    assert isinstance(model, CodesModel)
+    assert isinstance(net, MotionCodes)
+    frames = walks(CONTRACT, np.random.default_rng(1), 1, 24)[0].astype(np.float64)
+    codes = model.codes_of(frames)
+    assert codes.shape == (6, PARTS)
+    with torch.no_grad():
+        body = net.codec.to_codes(net.codec.encode(torch.from_numpy(frames).float()[None]))[0]
+        said = net.text(torch.tensor([[4, 5, 6]]), torch.tensor([3]))[0]
+    assert codes[:, 1:].tolist() == body.tolist()
+    np.testing.assert_allclose(model.embed("a person walks"), said, atol=1e-6)
+
+
+def test_motions_last_as_long_as_is_asked_and_differ(bundle: Path) -> None:
+    model = motet.load(bundle)
+    assert isinstance(model, CodesModel)
+    found = model.generate("a person walks", 3, seconds=2)
+    assert [generated.frames.shape for generated in found] == [(60, D)] * 3
+    assert np.isfinite(positions(found[0].motion)).all()
+    assert len({generated.frames.tobytes() for generated in found}) == 3
+    free = model.generate(["a person walks", "a person runs left"], 2, max_seconds=1, seed=5)
+    # eight steps of four frames are as near to a second as steps come
+    assert all(4 <= len(generated.frames) <= 32 for row in free for generated in row)
+    alone = model.generate("a person runs left", 2, max_seconds=1, seed=6)
+    for one, other in zip(alone, free[1], strict=True):
+        np.testing.assert_array_equal(one.frames, other.frames)
+
+
+def test_all_from_memory_plays_what_is_remembered(bundle: Path) -> None:
+    """Whatever action is drawn, the whole motion is one of the three, through the codec."""
+    model, net = motet.load(bundle), run().model
+    assert isinstance(model, CodesModel)
+    assert isinstance(net, MotionCodes)
+    codes = torch.from_numpy(remembered()).long().reshape(3, 12, 5)[:, :-1, :PARTS]
+    with torch.no_grad():
+        known = net.decode(codes)[0].flatten(1, 2)[..., 4:].numpy()
+    for generated in model.generate("a person walks", 4, memory=1.0):
+        off = [float(np.abs(generated.frames[:, 4:] - one).max()) for one in known if len(generated.frames) == len(one)]
+        assert min(off) < 1e-4
