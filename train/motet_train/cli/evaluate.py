@@ -22,7 +22,7 @@ from motet.models.predict import PredictModel
 from motet.models.search import SearchModel
 from motet_train.cli.evaluate_language import by_subject, language_reports
 from motet_train.cli.evaluate_predict import predict_reports
-from motet_train.cli.evaluate_says import says_reports
+from motet_train.cli.evaluate_says import Best, says_reports
 from motet_train.cli.train_options import unit_in
 from motet_train.data.clips import Clips, read_clips
 from motet_train.data.errors import DataError
@@ -78,15 +78,15 @@ def evaluate(
     motions that do what everyday prompts say, how good they are, whatever they show, and how near they are to their
     prompts and to recorded motions in the space of a search model.
     """
-    if says and (plots is not None or save):
-        raise click.UsageError("--says prints figures only; it goes with neither --plots nor --save")
+    if says and save:
+        raise click.UsageError("--says prints figures, and draws them with --plots; it does not go with --save")
     torch.set_num_threads(1)
     runs = {name: Run.load(Path(name)) for name in models if (Path(name) / MANIFEST).is_file()}
     if save and (bundles := [name for name in models if name not in runs]):
         raise click.UsageError(f"--save keeps figures in training runs; {', '.join(bundles)} is a bundle")
     loaded = {name: _model(runs[name]) if name in runs else load(name, session) for name in models}
     ready, text = (
-        _says(loaded, data, unit_in, load_as(SearchModel, search, session))
+        _says(loaded, data, unit_in, load_as(SearchModel, search, session), plots)
         if says
         else _measured(loaded, data, plots, unit_in)
     )
@@ -100,12 +100,18 @@ def _model(run: Run) -> Model:
 
 
 def _says(
-    models: Mapping[str, Model], data: Path | None, unit: str | None, search: SearchModel
+    models: Mapping[str, Model], data: Path | None, unit: str | None, search: SearchModel, plots: Path | None
 ) -> tuple[dict[str, Any], str]:
     """As :func:`_measured`, of everyday prompts."""
     found = {name: model for name, model in models.items() if isinstance(model, GenerateModel)}
     if others := [name for name in models if name not in found]:
         raise click.UsageError(f"--says asks generate models; {', '.join(others)} is none")
+    if plots is not None:
+        from motet_train.evaluate.figures import save
+        from motet_train.evaluate.says.pictures import says_drawings
+
+        for name, model in found.items():
+            save(says_drawings(Best(model)), plots if len(found) == 1 else plots / Path(name).name)
     reports = says_reports(found, data, unit, search)
     return {name: json_ready(report) for name, report in reports.items()}, says_text(reports)
 

@@ -7,10 +7,12 @@ from pathlib import Path
 from tqdm import tqdm
 
 from motet.bundle.manifest import Manifest
+from motet.models.codes import CodesModel
 from motet.models.generate import GenerateModel
 from motet.models.search import SearchModel
 from motet.motion.motion import Motion
 from motet_train.data.errors import DataError
+from motet_train.evaluate.says.outside import OUTSIDE, said_to_be_outside
 from motet_train.evaluate.says.prompts import prompts
 from motet_train.evaluate.says.table import says_table
 from motet_train.evaluate.says.trials import Trial, read_trials
@@ -41,6 +43,9 @@ def says_reports(
             bar.set_description(name)
             training = trained_on(model.manifest, trials)
             reports[name] = says_table(Best(model), trials, training, progress=lambda text: bar.update(), search=search)
+            if isinstance(model, CodesModel):
+                asked = {"outside": OUTSIDE, "prompts": [prompt.text for prompt in prompts()]}
+                reports[name]["said_outside"] = {key: said_to_be_outside(model, texts) for key, texts in asked.items()}
     return reports
 
 

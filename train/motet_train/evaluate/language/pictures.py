@@ -5,28 +5,25 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from sklearn.manifold import TSNE
 
-from motet.draw.body import COLOURS
-from motet.draw.figure import figure_of
 from motet.models.describe import DescribeModel
 from motet.models.generate import GenerateModel
-from motet.motion.motion import Motion
 from motet.representation.root_block import from_root_block
 from motet_train.data.errors import DataError
-from motet_train.evaluate.figures import SPACING, Drawings, panels, stick_figures
+from motet_train.evaluate.figures import Drawings, panels
 from motet_train.evaluate.language.attributes import ACTIONS, DIRECTIONS, Patterns, common, said
 from motet_train.evaluate.language.chain import known_sentences, knows
 from motet_train.evaluate.language.motions import moves
 from motet_train.evaluate.language.prompts import ASKED
 from motet_train.evaluate.language.split_store import SplitStore, unknown_words_allowed
+from motet_train.evaluate.strips import strips
 from motet_train.trainer import LOG
 
-FIGURES, STRIPS = 9, 6
-"""Stick figures of a strip, and strips of a picture of test motions."""
+STRIPS = 6
+"""Strips of a picture of test motions."""
 
 ELSE = "other"
 
@@ -110,38 +107,18 @@ def descriptions(model: DescribeModel, corpus: SplitStore) -> Figure:
     rows = [
         "\n".join(f"{found.text}   {found.log_probability:.2f}" for found in row[:3]) for row in model.describe(motions)
     ]
-    return _strips(motions, rows, "Test motions, their descriptions and log P")
+    return strips([from_root_block(motion) for motion in motions], rows, "Test motions, their descriptions and log P")
 
 
 def generated(model: GenerateModel, texts: Sequence[str]) -> Figure:
     """Figure 8: the likeliest motion for each of a few sentences."""
     rows = model.generate(texts)
-    titles = [f"{text}   {row[0].log_likelihood:.1f}" for text, row in zip(texts, rows, strict=True)]
-    return _strips([row[0].features for row in rows], titles, "Generated motions and their log-likelihood")
+    scores = ["" if row[0].log_likelihood is None else f"   {row[0].log_likelihood:.1f}" for row in rows]
+    titles = [text + score for text, score in zip(texts, scores, strict=True)]
+    return strips([row[0].motion for row in rows], titles, "Generated motions and their log-likelihood")
 
 
 def _kind(patterns: Patterns, sentences: Sequence[str]) -> str:
     """The one attribute that half of the sentences agree on."""
     found = common([said(patterns, sentence) for sentence in sentences])
     return next(iter(found)) if len(found) == 1 else ELSE
-
-
-def _strips(motions: Sequence[Motion], titles: Sequence[str], title: str) -> Figure:
-    picture, rows = panels(len(motions), 1, (9, 2.0 * len(motions)), title)
-    for axes, motion, text in zip(rows, motions, titles, strict=True):
-        _strip(axes, from_root_block(motion))
-        axes.set_title(text, fontsize=8, loc="left")
-    return picture
-
-
-def _strip(axes: Axes, motion: Motion) -> None:
-    """Stick figures at even times from left to right, seen from a little in front of the side they first turn to."""
-    figure = figure_of(motion)
-    view = figure.heading + np.radians(60)
-    frames = np.linspace(0, len(figure.points) - 1, FIGURES).round().astype(int)
-    points = figure.points[frames]
-    across = (points - points[:, :1])[..., [0, 2]] @ [np.sin(view), np.cos(view)]
-    colours = [np.array(COLOURS[bone.side]) / 255 for bone in figure.bones]
-    bones = [(bone.start, bone.end) for bone in figure.bones]
-    stick_figures(axes, np.stack([across, points[..., 1]], axis=-1), bones, [colours] * FIGURES, width=1.2)
-    axes.set(xlim=(-SPACING, SPACING * FIGURES), ylim=(-0.05, 1.25))

@@ -14,7 +14,7 @@ from motet_train.evaluate.language.attributes import Score, sides_right, turns_r
 from motet_train.evaluate.language.bleu import RANKS, References, agreement, bleu, ranks
 from motet_train.evaluate.language.chain import Answers, answers, best_descriptions, bounds_chained, chained, likelihood
 from motet_train.evaluate.language.confidence import confidence
-from motet_train.evaluate.language.floors import frequent_bleu, nearest_bleu
+from motet_train.evaluate.language.floors import copied_bleu, frequent_bleu, nearest_said
 from motet_train.evaluate.language.motions import measures, quiet_energy
 from motet_train.evaluate.language.prompts import kinds, measurable, prompted, recognised, thresholds
 from motet_train.evaluate.language.split_store import SplitStore, unknown_words_allowed
