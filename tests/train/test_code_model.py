@@ -1,8 +1,6 @@
 """The model that writes codes: its steps and its loss, actions, the windows that it learns from, and its training."""
 
 import json
-from collections.abc import Iterator
-from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -11,24 +9,19 @@ import torch
 from click.testing import CliRunner
 from codes_data import ACTIONS, CODEC, CODES, small_store, trained
 from torch import Tensor, nn
-from torch.nn import functional
 
 from motet.cli import main
 from motet_train.data.actions import actions_of
 from motet_train.data.code_windows import CodeBatch, CodedMotion, CodeWindows, memory_of
 from motet_train.data.mirror_text import mirror_text
 from motet_train.data.store import Store
-from motet_train.descent import GradientLearner, Term, Terms, Training
 from motet_train.models.codes.actions import UNK, ActionNet, ActionsConfig, stem, stems_of
 from motet_train.models.codes.code_model import CodeModelConfig
 from motet_train.models.codes.codec import CodecConfig, MotionCodec
 from motet_train.models.codes.motion_codes import NEVER, MotionCodes, MotionCodesConfig, to_json
 from motet_train.models.codes.sixd_places import Tree
-from motet_train.models.net import Net
-from motet_train.muon import Muon
 from motet_train.recipes.coded import coded, codes_of
 from motet_train.runs import MODELS
-from motet_train.trainer import train
 
 TREE = Tree((-1, 0), ((0.0, 0.0, 0.0), (0.0, 0.4, 0.0)), (0, 1))
 MOVES, END, NOBODY, NOTHING = 6, 6, 4, 7
@@ -297,87 +290,6 @@ def test_windows_are_parts_of_motions_with_what_was_before() -> None:
 def test_windows_of_rare_actions_are_drawn_oftener() -> None:
     windows = CodeWindows([motion_of(16, 0, 0), motion_of(9, 0, 1), motion_of(25, 1, 2)], 7, END, 1.0)
     np.testing.assert_allclose(windows.chances, np.array([16 / 5, 9 / 5, 5]) / 10)
-
-
-class Lines(Net):
-    """Two matrices, of which Muon may train one, and biases."""
-
-    def __init__(self) -> None:
-        super().__init__(1)
-        self.first, self.second = nn.Linear(4, 5), nn.Linear(5, 3)
-
-    def matrices(self) -> list[Tensor]:
-        return [self.first.weight]
-
-    def loss(self, rows: Tensor) -> Terms:
-        found = self.second(self.first(rows).tanh()) - rows[:, 1:]
-        return (Term(found.square().mean(dim=1), len(rows)),)
-
-    def graphs(self) -> dict[str, tuple[nn.Module, object]]:  # type: ignore[override]
-        return {}
-
-
-MUON = Training(steps=6, every=2, batch=8, optimiser="muon", learning_rate=0.03, weight_decay=0.1, falling=0.5)
-
-
-def lines(training: Training = MUON) -> GradientLearner:
-    torch.manual_seed(0)
-    model = Lines()
-
-    def batches(rng: np.random.Generator) -> Iterator[Tensor]:
-        yield torch.from_numpy(rng.normal(size=(training.batch, 4)).astype(np.float32))
-
-    return GradientLearner(model, training, model.loss, batches)
-
-
-def test_muon_trains_matrices_and_adamw_all_else(tmp_path: Path) -> None:
-    learner = lines()
-    train(learner, 3, tmp_path)
-    torch.manual_seed(0)
-    model = Lines()
-    matrices, rest = [model.first.weight], [model.second.weight]
-    biases = [model.first.bias, model.second.bias]
-    muon = torch.optim.Muon(matrices, lr=0.03, weight_decay=0.1, adjust_lr_fn="match_rms_adamw")
-    decayed = torch.optim.AdamW(rest, lr=0.03, weight_decay=0.1, betas=(0.9, 0.98))
-    others = torch.optim.AdamW(biases, lr=0.03, weight_decay=0.0, betas=(0.9, 0.98))
-    for chunk in range(3):
-        rng = np.random.default_rng((3, chunk))
-        for step in (2 * chunk, 2 * chunk + 1):
-            rate = 0.03 * min(1.0, (6 - step) / 3)
-            rows = torch.from_numpy(rng.normal(size=(8, 4)).astype(np.float32))
-            for optimiser in (muon, decayed, others):
-                optimiser.param_groups[0]["lr"] = rate
-                optimiser.zero_grad()
-            model.loss(rows)[0].losses.mean().backward()
-            for optimiser in (muon, decayed, others):
-                optimiser.step()
-    for name, value in model.state_dict().items():
-        torch.testing.assert_close(learner.kept.state_dict()[name], value, msg=name)
-
-
-def test_a_resumed_muon_goes_on_to_the_same_bits(tmp_path: Path) -> None:
-    for name in ("whole", "parts"):
-        (tmp_path / name).mkdir()
-    whole, parts = lines(), lines(Training(**{**asdict(MUON), "steps": 2, "falling": 0.0}))
-    train(whole, 3, tmp_path / "whole")
-    train(parts, 3, tmp_path / "parts")
-    again = lines()
-    train(again, 3, tmp_path / "parts")
-    assert all(torch.equal(value, again.kept.state_dict()[name]) for name, value in whole.kept.state_dict().items())
-    assert not torch.equal(parts.kept.state_dict()["first.weight"], again.kept.state_dict()["first.weight"])
-
-
-def test_muon_does_with_matrices_alone_or_without_any() -> None:
-    weight, bias = nn.Parameter(torch.eye(3)), nn.Parameter(torch.zeros(3))
-    for groups in ([{"params": [weight], "muon": True}], [{"params": [bias]}]):
-        optimiser = Muon(groups, lr=0.1)
-        assert len(optimiser.parts) == len(optimiser.param_groups) == 1
-        before = groups[0]["params"][0].detach().clone()  # type: ignore[index]
-        functional.linear(torch.ones(1, 3), weight, bias).square().sum().backward()
-        optimiser.step()
-        assert not torch.equal(groups[0]["params"][0], before)  # type: ignore[index]
-        optimiser.zero_grad()
-        assert groups[0]["params"][0].grad is None  # type: ignore[index]
 
 
 @pytest.fixture(scope="module")

@@ -59,7 +59,7 @@ DEFAULT = Recipe(
     Written(),
     (),
     Training(
-        steps=4500,
+        steps=6000,
         every=300,
         batch=16,
         optimiser="muon",

@@ -1,0 +1,43 @@
+"""Weights in 16 bits: half the size, and the very same numbers out."""
+
+import numpy as np
+import pytest
+import torch
+from torch import nn
+
+from motet.bundle.graph import GraphSpec, OnnxGraph, TensorSpec
+from motet_export.exporter import export_graph
+from motet_export.half import halved, round_weights
+
+SPEC = GraphSpec((TensorSpec("x", ("batch", 64)),), (TensorSpec("y", ("batch", 8)),))
+
+
+class Net(nn.Module):
+    def __init__(self) -> None:
+        super().__init__()
+        self.layers = nn.Sequential(nn.Linear(64, 256), nn.ReLU(), nn.Linear(256, 8))
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        found: torch.Tensor = self.layers(x)
+        return found
+
+
+@pytest.mark.slow
+def test_rounded_weights_are_kept_in_half_the_bytes_and_give_the_same() -> None:
+    torch.manual_seed(0)
+    net = Net()
+    exact = net.layers[0].weight.detach().clone()
+    round_weights(net)
+    assert 0 < (net.layers[0].weight - exact).abs().max() < 2**-11
+    data = export_graph(net, SPEC, {"motet": "test"})
+    small = halved(data)
+    assert len(small) < 0.6 * len(data)
+    x = np.random.default_rng(0).normal(size=(5, 64)).astype(np.float32)
+    np.testing.assert_array_equal(OnnxGraph(small, SPEC)({"x": x})["y"], OnnxGraph(data, SPEC)({"x": x})["y"])
+
+
+@pytest.mark.slow
+def test_weights_that_would_lose_something_stay_as_they_are() -> None:
+    torch.manual_seed(0)
+    data = export_graph(Net(), SPEC, {"motet": "test"})
+    assert len(halved(data)) > 0.9 * len(data)
