@@ -1,6 +1,7 @@
 """The model that writes codes as an ONNX bundle: what torch computes, decoded to motions code by code."""
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,7 @@ from motet_export.examples import example, walks
 from motet_train.models.codes.actions import ActionsConfig, stems_of
 from motet_train.models.codes.code_model import CodeModelConfig
 from motet_train.models.codes.codec import CodecConfig
-from motet_train.models.codes.motion_codes import MotionCodes, MotionCodesConfig, to_json
+from motet_train.models.codes.motion_codes import MotionCodes, MotionCodesConfig
 from motet_train.models.codes.sixd_places import tree_of
 from motet_train.recipes.codes import DRAWING
 from motet_train.runs import Run
@@ -55,7 +56,7 @@ def run() -> Run:
     net.memory.copy_(torch.from_numpy(remembered()))
     named = {"name": "small-codes", "verb": "generate", "model": "motion-codes", "loop": "codes"}
     actions = [{"sentence": said, "words": said.split()} for said in SAID]
-    plain = json.loads(json.dumps(to_json(net.config)))
+    plain = json.loads(json.dumps(asdict(net.config)))
     known = {"text": RULES.to_json(), "vocabulary": WORDS, "actions": actions, "config": plain}
     settings = {"defaults": {**DRAWING, "memory": 0.3}, "licence": {}, "training": {}}
     return Run({**named, **known, **settings, "motion": CONTRACT.to_json()}, net.eval())

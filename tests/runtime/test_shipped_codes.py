@@ -110,6 +110,31 @@ def test_settings_out_of_range_are_refused(model: CodesModel) -> None:
         model.generate(WALK, candidates=3)
 
 
+def test_what_cannot_be_told_is_refused(model: CodesModel) -> None:
+    assert model.generate([]) == []
+    with pytest.raises(TextError, match="needs a sentence"):
+        model.story([])
+    with pytest.raises(DecodingError, match="not at 'middle'"):
+        model.story([WALK], stand="middle")
+    with pytest.raises(TextError, match="nearest: '"):
+        next(model.stream("a person repairs the violin of an astronaut", strict=True))
+
+
+def test_refusals_of_the_command_line_say_which_file_or_text(tmp_path: Path, walk: Motion) -> None:
+    out, short = tmp_path / "out.bvh", tmp_path / "short.npz"
+    motet.write(short, walk[:8])
+    for given, code, said in (
+        ([""], 1, "has no words"),
+        (["", "", "--story"], 1, "has no words"),
+        ([WALK, "--after", short], 1, "short.npz"),
+        ([WALK, "--after", tmp_path / "none.bvh"], 2, "no such file"),
+        ([WALK, "--story", "--hypotheses", 3], 2, "leave --hypotheses out"),
+    ):
+        result = run("generate", *given, "-o", out)
+        assert (result.exit_code, said in result.stderr) == (code, True), (given, result.stderr)
+        assert not out.exists()
+
+
 def test_the_command_line_tells_a_story(tmp_path: Path, clips: Path, model: CodesModel) -> None:
     out, options = tmp_path / "story.npz", ["--story", "--seconds", 2, "--seed", 3]
     result = run("generate", WALK, JUMP, *options, "-o", out, "--json")

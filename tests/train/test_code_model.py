@@ -1,6 +1,7 @@
 """The model that writes codes: its steps and its loss, actions, the windows that it learns from, and its training."""
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from motet_train.data.store import Store
 from motet_train.models.codes.actions import UNK, ActionNet, ActionsConfig, stem, stems_of
 from motet_train.models.codes.code_model import CodeModelConfig
 from motet_train.models.codes.codec import CodecConfig, MotionCodec
-from motet_train.models.codes.motion_codes import NEVER, MotionCodes, MotionCodesConfig, to_json
+from motet_train.models.codes.motion_codes import NEVER, MotionCodes, MotionCodesConfig
 from motet_train.models.codes.sixd_places import Tree
 from motet_train.recipes.coded import coded, codes_of
 from motet_train.runs import MODELS
@@ -144,7 +145,7 @@ def test_what_is_remembered_comes_back() -> None:
 
 def test_a_model_comes_back_from_its_configuration() -> None:
     model, (codes, *rest) = net(), window()
-    again = MODELS["motion-codes"](json.loads(json.dumps(to_json(model.config))))
+    again = MODELS["motion-codes"](json.loads(json.dumps(asdict(model.config))))
     again.load_state_dict(model.state_dict())
     assert isinstance(again, MotionCodes)
     assert torch.equal(again.eval().losses(codes, *rest), model.losses(codes, *rest))

@@ -12,7 +12,7 @@ import click
 from motet.bundle.session import SessionOptions
 from motet.cli.notes import text_notes
 from motet.cli.options import session_options
-from motet.cli.reading import FPS, Tries, bar, like_option, out_option, places
+from motet.cli.reading import FPS, Tries, bar, like_option, naming, out_option, places
 from motet.formats import check_writable, read_motion, write_motion
 from motet.formats.character import Character
 from motet.models.codes import CodesModel, Story
@@ -114,12 +114,15 @@ def _stories(
     """One motion for the texts of each group."""
     if not isinstance(model, CodesModel):
         raise click.UsageError(f"--story, --after and --stand need a bundle that writes codes; {model!r} does not")
-    options = {key: value for key, value in given.items() if value is not None and key != "hypotheses"}
-    if "after" in options:
-        options["after"] = read_motion(options["after"])
+    options = {key: value for key, value in given.items() if value is not None}
+    if options.pop("hypotheses", 1) != 1:
+        raise click.UsageError("--story, --after and --stand give one motion: leave --hypotheses out")
+    source = options.get("after")
+    if source is not None:
+        options["after"] = read_motion(source)
     for number, group in enumerate(groups):
         asked = [texts[index] for index in group]
-        with tries.of(" / ".join(asked)):
+        with tries.of(" / ".join(asked)), naming(source):
             yield number, " / ".join(asked), [model.story(asked, **{**options, "seed": given["seed"] + group[0]})]
 
 

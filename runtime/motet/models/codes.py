@@ -91,7 +91,8 @@ class CodesModel(GenerateModel):
 
     def contexts(self, sequences: Sequence[NDArray[Any]], role: str = "encoder") -> Floats:
         """See :meth:`motet.models.language.LanguageModel.contexts`; one by one: padding changes how sums round."""
-        return np.concatenate([super(CodesModel, self).contexts([sequence], role) for sequence in sequences])
+        alone = [super(CodesModel, self).contexts([sequence], role) for sequence in sequences]
+        return np.concatenate([np.empty((0, self.sizes["A"]), dtype=np.float32), *alone])
 
     def understood(self, sentence: str) -> Understood:
         """How well a sentence is known, and the known sentences nearest to it; errors as :meth:`ids`."""
@@ -135,16 +136,17 @@ class CodesModel(GenerateModel):
 
         after: a motion that is gone on with, of any human figure; its last seconds are looked at. seconds: how long
         each sentence is shown, or all alike; by default until it ends by itself. stand: "start", "end" or "both": where
-        the figure is to stand for a moment. Others as :meth:`generate`; a story of
-        one sentence is the motion that :meth:`generate` gives for it.
+        the figure is to stand for a moment. Others as :meth:`generate`; a story of one sentence is the motion that
+        :meth:`generate` gives for it.
         """
-        for text in sentences:
-            self.note(text, self.embed(text), strict)
+        if stand not in (None, "start", "end", "both"):
+            raise DecodingError(f"a figure stands at the start, the end or both, not at {stand!r}")
+        figure = None if after is None else self._figure(after)
         chosen = _each(self.defaults["seconds"] if seconds is None else seconds, len(sentences))
         before, behind = ([STANDING] if stand in (end, "both") else [] for end in ("start", "end"))
         sentences = [*before, *sentences, *behind]
         seconds = [STAND] * len(before) + chosen + [STAND] * len(behind)
-        pieces = list(self._told(sentences, after, seconds, seed, settings))
+        pieces = list(self._told(sentences, figure, seconds, seed, strict, settings))
         frames = np.concatenate([found for _, found in pieces])
         if all(one > 0 for one in seconds):
             frames = frames[: round(sum(seconds) * self.fps)]
@@ -154,7 +156,7 @@ class CodesModel(GenerateModel):
             frames,
             None,
             tuple(word for text in sentences for word in self.unknown(text)),
-            None if after is None else self._figure(after),
+            figure,
             passages,
         )
 
@@ -173,15 +175,17 @@ class CodesModel(GenerateModel):
         after: Motion | None = None,
         seconds: float | Sequence[float] | None = None,
         seed: int = 0,
+        strict: bool = False,
         **settings: float | None,
     ) -> Iterator[Motion]:
         """The motion of :meth:`story` in pieces, as they are drawn: each can be played where the last one ends.
 
-        Feet are as drawn: what holds them still has to know how long they stand.
+        Feet are as drawn: what holds them still has to know how long they stand. Errors and warnings come with the
+        first piece.
         """
         texts = [sentences] if isinstance(sentences, str) else list(sentences)
         last, pose = None if after is None else self._figure(after), None
-        for _, frames in self._told(texts, after, seconds, seed, settings):
+        for _, frames in self._told(texts, last, seconds, seed, strict, settings):
             if len(frames):
                 last, pose = in_world(self.contract.features(frames), last, pose)
                 yield last
@@ -189,18 +193,26 @@ class CodesModel(GenerateModel):
     def _told(
         self,
         sentences: Sequence[str],
-        after: Motion | None,
+        figure: Motion | None,
         seconds: float | Sequence[float] | None,
         seed: int,
+        strict: bool,
         settings: Mapping[str, float | None],
     ) -> Iterator[tuple[str, Array]]:
-        """For each step of codes its sentence, and frames (T, D) that are settled with it; then the frames left."""
+        """For each step of codes its sentence, and frames (T, D) that are settled with it; then the frames left.
+
+        figure: a motion on the model's figure that is gone on with.
+        """
+        if not sentences:
+            raise TextError("a story needs a sentence")
         chosen = self.loop.settled(self.defaults, settings)
         lengths = _each(seconds if seconds is not None else chosen["seconds"], len(sentences))
         contexts = self.contexts([self.ids(text) for text in sentences])
+        for text, context in zip(sentences, contexts, strict=True):
+            self.note(text, context, strict)
         noise = [np.random.Generator(np.random.PCG64(seed))]
-        writer, unrolled = self._writer(noise, chosen), self._joined(after)
-        if after is not None:
+        writer, unrolled = self._writer(noise, chosen), self._joined(figure)
+        if figure is not None:
             writer.see(np.array(unrolled.codes))
         for text, context, length in zip(sentences, contexts, lengths, strict=True):
             (action,) = drawn_actions(self.source, context[None], noise, chosen["certainty"])
@@ -222,11 +234,11 @@ class CodesModel(GenerateModel):
         """Frames (T, D) in the contract's units of steps of codes (N, P), from the origin."""
         return Unrolled(self.graphs["decoder"], self.sight, self.fps, codes[:0]).all(codes)
 
-    def _joined(self, after: Motion | None) -> Unrolled:
-        """What makes frames of codes, at the start or after a motion."""
-        if after is None:
+    def _joined(self, figure: Motion | None) -> Unrolled:
+        """What makes frames of codes, at the start or after a motion on the model's figure."""
+        if figure is None:
             return Unrolled(self.graphs["decoder"], self.sight, self.fps)
-        frames = self.contract.frames(self._figure(after))[-self.steps(CONTEXT) * self.sight.hop :]
+        frames = self.contract.frames(figure)[-self.steps(CONTEXT) * self.sight.hop :]
         if len(frames) < 2 * self.sight.hop:
             raise MotionError(
                 f"a motion of {len(frames)} frames is too short to go on with: {2 * self.sight.hop} are needed"

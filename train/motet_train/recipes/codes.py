@@ -1,7 +1,7 @@
 """Recipes of the model that writes motions as codes, and its training on a codec."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from motet_train.descent import GradientLearner, Term, Terms, Training
 from motet_train.models.codes.actions import ActionsConfig, stems_of
 from motet_train.models.codes.code_model import CodeModelConfig
 from motet_train.models.codes.codec import MotionCodec
-from motet_train.models.codes.motion_codes import MotionCodes, MotionCodesConfig, to_json
+from motet_train.models.codes.motion_codes import MotionCodes, MotionCodesConfig
 from motet_train.recipes.coded import coded
 from motet_train.recipes.language import divided, manifest
 from motet_train.recipes.recipe import Job, Recipe
@@ -102,7 +102,7 @@ def train_codes(store: Store, codec: Run, job: Job, data: str = "", by: str = "t
     learner = GradientLearner(
         net.to(job.device), training, lambda batch: _loss(net, batch), batches, lambda: said.measured(net)
     )
-    about = manifest(job, found, to_json(net.config), data, by)
+    about = manifest(job, found, asdict(net.config), data, by)
     about["actions"] = [
         {"sentence": sentences[0], "words": sorted({word for s in sentences for word in RULES.words(s)})}
         for sentences in actions.sentences
@@ -120,16 +120,13 @@ def _made(training: Mapping[str, Any]) -> dict[str, Any]:
 def _untrained(
     config: Written, codec: MotionCodec, actions: Actions, vocabulary: Vocabulary, memory: torch.Tensor
 ) -> MotionCodes:
-    text = ActionsConfig(len(vocabulary), len(actions), stems_of(vocabulary.words), *_rest(config.text))
-    writer = CodeModelConfig(len(actions), *list(vars(config.writer).values())[1:])
+    stems = stems_of(vocabulary.words)
+    text = replace(config.text, words=len(vocabulary), actions=len(actions), stems=stems)
+    writer = replace(config.writer, actions=len(actions))
     net = MotionCodes(MotionCodesConfig(codec.config, text, writer, len(memory)))
     net.take(codec)
     net.memory.copy_(memory)
     return net
-
-
-def _rest(text: ActionsConfig) -> tuple[Any, ...]:
-    return text.embedding, text.hidden, text.dropout, text.word_dropout
 
 
 def _loss(net: MotionCodes, batch: CodeBatch) -> Terms:

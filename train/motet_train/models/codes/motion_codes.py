@@ -5,7 +5,7 @@ largest part, T frames, D channels.
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import torch
@@ -157,11 +157,6 @@ class MotionCodes(Net):
             "decoder": (Part(self, self.decode), GraphSpec((codes,), (frames, moves))),
             "tokens": (Part(self, self.to_codes), GraphSpec((frames,), (body,))),
         }
-
-
-def to_json(config: MotionCodesConfig) -> dict[str, Any]:
-    """A configuration for a manifest; :func:`from_config` reads it."""
-    return asdict(config)
 
 
 def from_config(config: Mapping[str, Any]) -> MotionCodes:
