@@ -51,18 +51,25 @@ batch = 4
 warm_up = 0
 falling = 0.0
 precision = "float32"
-[model.writer]
+[model]
 width = 12
 layers = 2
 heads = 2
 action = 5
 ages = 6
-[model.text]
-embedding = 6
-hidden = 5
 [visits]
 window = 6
-sentences = 5
+"""
+
+TEXT = """
+[training]
+steps = 6
+every = 3
+batch = 8
+falling = 0.0
+[model]
+embedding = 6
+hidden = 5
 """
 
 
@@ -90,5 +97,5 @@ def trained(command: str, settings: str, store: Path, out: Path, *options: objec
     config.write_text(settings)
     given = ("train", command, "--data", store, "--out", out, "--config", config, *options)
     result = CliRunner().invoke(main, [str(option) for option in given])
-    assert result.exit_code == 0, result.output
+    assert result.exit_code == 0, result.output or result.exception
     return Run.load(out)

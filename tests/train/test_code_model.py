@@ -1,4 +1,4 @@
-"""The model that writes codes: its steps and its loss, actions, the windows that it learns from, and its training."""
+"""The model that writes codes: its steps and its loss, the windows that it learns from, and its training."""
 
 import json
 from dataclasses import asdict
@@ -8,21 +8,20 @@ import numpy as np
 import pytest
 import torch
 from click.testing import CliRunner
-from codes_data import ACTIONS, CODEC, CODES, small_store, trained
+from codes_data import CODEC, CODES, TEXT, small_store, trained
 from torch import Tensor, nn
 
 from motet.cli import main
 from motet_train.data.actions import actions_of
-from motet_train.data.code_windows import CodeBatch, CodedMotion, CodeWindows, memory_of
-from motet_train.data.mirror_text import mirror_text
+from motet_train.data.code_windows import CodedMotion, CodeWindows, memory_of
 from motet_train.data.store import Store
-from motet_train.models.codes.actions import UNK, ActionNet, ActionsConfig, stem, stems_of
+from motet_train.models.codes.actions import ActionsConfig
 from motet_train.models.codes.code_model import CodeModelConfig
 from motet_train.models.codes.codec import CodecConfig, MotionCodec
 from motet_train.models.codes.motion_codes import NEVER, MotionCodes, MotionCodesConfig
 from motet_train.models.codes.sixd_places import Tree
 from motet_train.recipes.coded import coded, codes_of
-from motet_train.runs import MODELS
+from motet_train.runs import MODELS, Run
 
 TREE = Tree((-1, 0), ((0.0, 0.0, 0.0), (0.0, 0.4, 0.0)), (0, 1))
 MOVES, END, NOBODY, NOTHING = 6, 6, 4, 7
@@ -159,42 +158,6 @@ def test_of_the_codec_nothing_is_trained() -> None:
     assert all(any(weight is own for own in model.writer.blocks.parameters()) for weight in model.matrices())
 
 
-@torch.no_grad()
-def test_a_sentence_of_a_padded_batch_gets_what_it_gets_alone() -> None:
-    torch.manual_seed(1)
-    model = ActionNet(ActionsConfig(9, 4, tuple(range(9)), embedding=6, hidden=5)).eval()
-    nn.init.constant_(model.around.bias, -1.0)  # type: ignore[arg-type]  # so that the most of a number is below 0
-    words, lengths = torch.tensor([[4, 5, 6, 7], [8, 0, 0, 0], [6, 4, 0, 0]]), torch.tensor([4, 1, 2])
-    found = model(words, lengths)
-    torch.testing.assert_close(found.exp().sum(dim=1), torch.ones(3))
-    for row, length in enumerate(lengths.tolist()):
-        alone = model(words[row : row + 1, :length], lengths[row : row + 1])
-        torch.testing.assert_close(alone, found[row : row + 1])
-    assert not torch.allclose(found[0], model(torch.tensor([[7, 6, 5, 4]]), torch.tensor([4]))[0])
-
-
-@torch.no_grad()
-def test_words_are_dropped_in_training_alone() -> None:
-    model = ActionNet(ActionsConfig(9, 4, tuple(range(9)), dropout=0.0, word_dropout=1.0))
-    words, unknown = torch.tensor([[4, 5, 6]]), torch.full((1, 3), UNK)
-    assert torch.equal(model.train()(words, torch.tensor([3])), model(unknown, torch.tensor([3])))
-    assert not torch.equal(model.eval()(words, torch.tensor([3])), model(unknown, torch.tensor([3])))
-
-
-def test_words_of_one_stem_have_one_number() -> None:
-    for words in (
-        ("run", "runs", "running"),
-        ("walk", "walks", "walked", "walking", "walker", "walkers"),
-        ("jump", "jumps", "jumping", "jumped"),
-        ("slow", "slowly"),
-        ("dance", "dances", "dancing", "dancer"),
-    ):
-        assert len({stem(word) for word in words}) == 1, words
-        assert len(set(stems_of(words))) == 1
-    assert [stem(word) for word in ("is", "bed", "she", "red")] == ["is", "bed", "she", "red"]
-    assert stems_of(("a", "walks", "the", "walking")) == (0, 1, 2, 1)
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     found = tmp_path_factory.mktemp("codes")
@@ -205,21 +168,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def store(folder: Path) -> Store:
     return Store.open(folder / "store")
-
-
-def test_mirrored_motions_show_mirrored_actions(store: Store) -> None:
-    found = actions_of(store, tuple(range(8)))
-    names = [entry.action for entry in store.records[:8]]
-    assert len(found) == 6  # the two that say a side have a mirror image each
-    for record, name in enumerate(names):
-        own, other = found.of[record, False], found.of[record, True]
-        assert found.sentences[own] == ACTIONS[name]
-        assert found.sentences[other] == tuple(map(mirror_text, ACTIONS[name]))
-        assert (own == other) == (name in ("walk", "run"))
-        assert found.of[record, False] == found.of[(record + 4) % 8, False]
-    assert found.unseen[found.of[1, True]] == ("a person turns right slowly",)
-    assert sorted(set(found.of.values())) == list(range(6))
-    assert len(actions_of(store, (0, 4))) == 1
 
 
 def coded_store(store: Store, records: tuple[int, ...]) -> tuple[list[CodedMotion], MotionCodec]:
@@ -265,7 +213,8 @@ def motion_of(length: int, action: int, first: int, starts: bool = True) -> Code
 def test_windows_are_parts_of_motions_with_what_was_before() -> None:
     motions = [motion_of(12, 0, 0), motion_of(5, 1, 1), motion_of(9, 2, 2, starts=False)]
     windows = CodeWindows(motions, 7, END, first=4.0)
-    codes, before, action, age, weights = windows.draw(400, 0.25, NOBODY, np.random.default_rng(0))
+    batch = windows.draw(400, 0.25, NOBODY, np.random.default_rng(0))
+    codes, before, action, age, weights = batch.codes, batch.before, batch.action, batch.age, batch.weights
     assert codes.shape == before.shape == (400, 7, 3)
     assert action.shape == age.shape == weights.shape == (400, 7)
     starts = set()
@@ -283,7 +232,6 @@ def test_windows_are_parts_of_motions_with_what_was_before() -> None:
         starts.add((motion.action, start))
     assert {(0, 0), (0, 7), (1, 0), (2, 4)} <= starts
     assert (action[:, 0] == NOBODY).float().mean() == pytest.approx(0.25, abs=0.07)
-    batch = CodeBatch(codes, before, action, age, weights, *(torch.zeros(2) for _ in range(3)))
     assert len(batch[1::2]) == 200
     assert torch.equal(batch[1::2].codes, codes[1::2])
 
@@ -294,48 +242,65 @@ def test_windows_of_rare_actions_are_drawn_oftener() -> None:
 
 
 @pytest.fixture(scope="module")
-def codec(folder: Path) -> Path:
+def parts(folder: Path) -> tuple[object, ...]:
     trained("codec", CODEC, folder / "store", folder / "codec")
-    return folder / "codec"
+    trained("actions", TEXT, folder / "store", folder / "actions")
+    return "--codec", folder / "codec", "--actions", folder / "actions"
 
 
-def test_a_run_learns_and_says_what_it_knows(folder: Path, codec: Path, tmp_path: Path) -> None:
+def test_a_run_learns_and_says_how_its_parts_were_made(folder: Path, parts: tuple[object, ...], tmp_path: Path) -> None:
     longer = CODES.replace("steps = 6\nevery = 3", "steps = 60\nevery = 20")
-    run = trained("codes", longer, folder / "store", tmp_path / "run", "--codec", codec)
+    run = trained("codes", longer, folder / "store", tmp_path / "run", *parts)
     log = [json.loads(line) for line in (tmp_path / "run" / "log.jsonl").read_text().splitlines()]
     assert [line["step"] for line in log] == [20, 40, 60]
     assert log[-1]["loss"] < log[0]["loss"]
-    assert all(0 <= line["understood"] <= 1 for line in log)
     manifest, model = run.manifest, run.model
     assert isinstance(model, MotionCodes)
     assert (manifest["verb"], manifest["model"], manifest["loop"]) == ("generate", "motion-codes", "codes")
     assert len(manifest["actions"]) == model.config.text.actions == model.config.writer.actions == 6
-    by = {entry["sentence"]: entry["words"] for entry in manifest["actions"]}
-    assert by["a person turns left"] == ["a", "goes", "left", "person", "someone", "the", "to", "turns"]
-    assert set(by) >= {said[0] for said in ACTIONS.values()}
     assert len(model.memory) == model.config.remembered
     recipe = manifest["training"]["recipe"]
     assert (recipe["steps"], recipe["window"]) == (60, 6)
     ages = model.memory[:, -1]
     assert int((ages == 0).sum()) == int((model.memory[:, 0] == model.end).sum()) > 0
+    for name in ("codec", "actions"):
+        own = Run.load(folder / name).manifest
+        assert {key: own["training"][key] for key in ("command", "seed", "steps", "seconds")} == manifest["training"][
+            name
+        ]
+    assert (manifest["actions"], manifest["vocabulary"]) == (own["actions"], own["vocabulary"])
 
 
-def test_resumed_training_is_the_same_to_the_bit(folder: Path, codec: Path, tmp_path: Path) -> None:
+def test_resumed_training_is_the_same_to_the_bit(folder: Path, parts: tuple[object, ...], tmp_path: Path) -> None:
     given = ("codes", CODES, folder / "store")
-    whole = trained(*given, tmp_path / "whole", "--codec", codec).model.state_dict()
-    trained(*given, tmp_path / "parts", "--codec", codec, "--steps", 3)
-    parts = trained(*given, tmp_path / "parts", "--codec", codec, "--resume").model.state_dict()
-    assert all(torch.equal(whole[name], parts[name]) for name in whole)
-    other = trained(*given, tmp_path / "other", "--codec", codec, "--seed", 1).model.state_dict()
+    whole = trained(*given, tmp_path / "whole", *parts).model.state_dict()
+    trained(*given, tmp_path / "parts", *parts, "--steps", 3)
+    again = trained(*given, tmp_path / "parts", *parts, "--resume").model.state_dict()
+    assert all(torch.equal(whole[name], again[name]) for name in whole)
+    other = trained(*given, tmp_path / "other", *parts, "--seed", 1).model.state_dict()
     assert any(not torch.equal(whole[name], other[name]) for name in whole)
-    # the codec's part is what it was
-    kept = torch.load(codec / "weights.pt", weights_only=True)
-    assert all(torch.equal(whole[f"codec.{name}"], kept[name]) for name in kept)
+    # codec and net of actions are what they were
+    for name, prefix in (("codec", "codec"), ("actions", "text")):
+        kept = torch.load(folder / name / "weights.pt", weights_only=True)
+        assert all(torch.equal(whole[f"{prefix}.{key}"], kept[key]) for key in kept)
 
 
-def test_codes_need_a_codec(folder: Path, codec: Path, tmp_path: Path) -> None:
-    trained("codes", CODES, folder / "store", tmp_path / "run", "--codec", codec)
-    given = ["train", "codes", "--data", folder / "store", "--out", tmp_path / "other", "--codec", tmp_path / "run"]
-    result = CliRunner().invoke(main, [str(option) for option in given])
-    assert result.exit_code != 0
-    assert "codes need the run of a codec (motet train codec), not of motion-codes" in result.output
+def test_codes_need_a_codec_and_a_net_of_the_same_actions(
+    folder: Path, parts: tuple[object, ...], tmp_path: Path
+) -> None:
+    small_store(tmp_path, 10)
+    trained("actions", TEXT, tmp_path / "store", tmp_path / "other")
+    codec, net, other = folder / "codec", folder / "actions", tmp_path / "other"
+    for given, said in (
+        ((net, net), "codes need the run of a codec (motet train codec), not of motion-actions"),
+        ((codec, codec), "codes need the run of a net of actions (motet train actions), not of motion-codec"),
+        (
+            (codec, other),
+            "the net of actions other was trained on other sentences: train it on the same data and split",
+        ),
+    ):
+        command = ["train", "codes", "--data", folder / "store", "--codec", given[0], "--actions", given[1]]
+        result = CliRunner().invoke(main, [str(option) for option in (*command, "--out", tmp_path / "run")])
+        assert result.exit_code != 0
+        assert said in result.output
+        assert not (tmp_path / "run").exists()

@@ -15,7 +15,7 @@ from torch import nn
 from motet.bundle.graph import Graph, GraphSpec
 from motet.errors import MotetError
 from motet.files import write_whole
-from motet_train.models.codes import codec, motion_codes
+from motet_train.models.codes import actions, codec, motion_codes
 from motet_train.models.control import angle_crbm, tdbn
 from motet_train.models.language import joint_embedding, language_to_motion, motion_to_language
 from motet_train.models.net import Net
@@ -29,6 +29,7 @@ MODELS: Mapping[str, Callable[[Mapping[str, Any]], Net]] = {
     "motion-to-language": motion_to_language.from_config,
     "language-to-motion": language_to_motion.from_config,
     "joint-embedding": joint_embedding.from_config,
+    "motion-actions": actions.from_config,
     "motion-codec": codec.from_config,
     "motion-codes": motion_codes.from_config,
     "angle-crbm": angle_crbm.from_config,

@@ -122,7 +122,9 @@ def _train(
 
 
 def _is_of(name: str, recipe: Recipe) -> bool:
-    return any(hasattr(part, name) for part in (recipe.training, recipe.config, recipe.visits) if part is not None)
+    """Whether an option changes the recipe; what is found in the data is not for options to say."""
+    parts = (part for part in (recipe.training, recipe.config, recipe.visits) if part is not None)
+    return name not in recipe.derived and any(hasattr(part, name) for part in parts)
 
 
 def _kept(context: click.Context, given: Mapping[str, Any]) -> dict[str, Any]:

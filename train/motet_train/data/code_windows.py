@@ -36,36 +36,28 @@ def memory_of(motions: list[CodedMotion]) -> Tensor:
 
 @dataclass(frozen=True, eq=False)
 class CodeBatch:
-    """B windows of N steps. codes, before: (B, N, P). action, age: (B, N). weights: (B, N), 0 after the end.
-
-    words, lengths, asked: sentences (S, W) and the actions (S,) that they ask for.
-    """
+    """B windows of N steps. codes, before: (B, N, P). action, age: (B, N). weights: (B, N), 0 after the end."""
 
     codes: Tensor
     before: Tensor
     action: Tensor
     age: Tensor
     weights: Tensor
-    words: Tensor
-    lengths: Tensor
-    asked: Tensor
 
     def __len__(self) -> int:
         """B."""
         return len(self.codes)
 
     def __getitem__(self, rows: slice) -> "CodeBatch":
-        """Some of the windows, and all sentences."""
-        kept = self.codes[rows], self.before[rows], self.action[rows], self.age[rows], self.weights[rows]
-        return CodeBatch(*kept, self.words, self.lengths, self.asked)
+        """Some of the windows."""
+        return CodeBatch(*(part[rows] for part in self._parts()))
 
     def to(self, device: torch.device | str) -> "CodeBatch":
         """The same on a device."""
-        parts = (self.codes, self.before, self.action, self.age, self.weights, self.words, self.lengths, self.asked)
-        return CodeBatch(*(part.to(device) for part in parts))
+        return CodeBatch(*(part.to(device) for part in self._parts()))
 
-
-Drawn = tuple[Tensor, Tensor, Tensor, Tensor, Tensor]
+    def _parts(self) -> tuple[Tensor, ...]:
+        return self.codes, self.before, self.action, self.age, self.weights
 
 
 class CodeWindows:
@@ -80,9 +72,8 @@ class CodeWindows:
         chances = lengths / np.sqrt(shown[actions])
         self.chances = chances / chances.sum()
 
-    def draw(self, batch: int, unsaid: float, nobody: int, rng: np.random.Generator) -> Drawn:
-        """codes, before, action, age and weights of a :class:`CodeBatch`; a share ``unsaid`` has the action
-        ``nobody``."""
+    def draw(self, batch: int, unsaid: float, nobody: int, rng: np.random.Generator) -> CodeBatch:
+        """A batch; a share ``unsaid`` of it has the action ``nobody``."""
         parts = self.motions[0].codes.shape[1]
         codes, before = (np.zeros((batch, self.steps, parts), dtype=np.int64) for _ in range(2))
         action, age = (np.zeros((batch, self.steps), dtype=np.int64) for _ in range(2))
@@ -102,5 +93,4 @@ class CodeWindows:
                 weights[row, 0] = self.first if motion.starts else 0.0
             age[row] = start + np.arange(self.steps)
             action[row] = nobody if rng.random() < unsaid else motion.action
-        first, second, third, fourth = (torch.from_numpy(part) for part in (codes, before, action, age))
-        return first, second, third, fourth, torch.from_numpy(weights)
+        return CodeBatch(*map(torch.from_numpy, (codes, before, action, age, weights)))

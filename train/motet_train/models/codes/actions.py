@@ -3,18 +3,25 @@
 Letters in shapes: B rows, W words, A actions, E numbers of a word's vector.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
+
+from motet.bundle.graph import GraphSpec, TensorSpec
+from motet_train.models.net import Net, tuples
 
 UNK = 3
 """The id of a word that is not known, :data:`motet.models.text.SPECIALS`."""
 
 ENDINGS = ("ingly", "edly", "ing", "ers", "ed", "es", "er", "ly", "s", "e")
 """What a word may end in besides its stem, the longest first; what is left has at least three letters."""
+
+BESIDE = 0.3
+"""The standard deviation of the numbers of stems before training, where those of words are given: theirs is 1."""
 
 
 @dataclass(frozen=True)
@@ -30,13 +37,13 @@ class ActionsConfig:
     word_dropout: float = 0.3
 
 
-class ActionNet(nn.Module):
+class ActionNet(Net):
     """Words to the probabilities of actions: vectors of words and stems, convolved over three words, mean and most."""
 
     stems: Tensor
 
     def __init__(self, config: ActionsConfig) -> None:
-        super().__init__()
+        super().__init__(0)  # it takes words, no channels
         self.config = config
         self.register_buffer("stems", torch.tensor(config.stems), persistent=False)
         self.words = nn.Embedding(config.words, config.embedding)
@@ -44,6 +51,12 @@ class ActionNet(nn.Module):
         self.around = nn.Conv1d(config.embedding, config.hidden, 3, padding=1)
         self.outward = nn.Linear(2 * config.hidden + config.embedding, config.actions)
         self.dropout = nn.Dropout(config.dropout)
+
+    @torch.no_grad()
+    def start_from(self, vectors: Tensor, known: Tensor) -> None:
+        """Take up vectors of words (words, E), of those that are known (words,) bool; stems say little beside them."""
+        self.words.weight[known] = vectors[known]
+        self.roots.weight.mul_(BESIDE)
 
     def forward(self, words: Tensor, lengths: Tensor) -> Tensor:
         """Ids (B, W) int64 of sentences of lengths (B,) int64 to log-probabilities (B, A)."""
@@ -57,6 +70,18 @@ class ActionNet(nn.Module):
         most = around.amax(dim=2).clamp_min(0)  # as if a word followed that says nothing: padding changes nothing
         seen = [around.sum(dim=2) / count, most, vectors.sum(dim=1) / count]
         return functional.log_softmax(self.outward(self.dropout(torch.cat(seen, dim=1))), dim=1)
+
+    def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
+        """The encoder of sentences."""
+        words, lengths = TensorSpec("words", ("batch", "words"), "int64"), TensorSpec("lengths", ("batch",), "int64")
+        return {
+            "encoder": (self, GraphSpec((words, lengths), (TensorSpec("context", ("batch", self.config.actions)),)))
+        }
+
+
+def from_config(config: Mapping[str, Any]) -> ActionNet:
+    """An untrained net of a configuration as it stands in a manifest."""
+    return ActionNet(ActionsConfig(**tuples(config)))
 
 
 def stem(word: str) -> str:

@@ -33,7 +33,7 @@ class MotionCodesConfig:
 
 
 class MotionCodes(Net):
-    """The three nets, and a memory. Of the codec nothing is trained here.
+    """The three nets, and a memory. The writer alone is trained here.
 
     memory: (M, P + 2) int16 steps of training motions one after the other, each with its action and its age.
     """
@@ -44,7 +44,7 @@ class MotionCodes(Net):
         super().__init__(config.codec.channels)
         self.config = config
         self.codec = MotionCodec(config.codec).requires_grad_(False)
-        self.text = ActionNet(config.text)
+        self.text = ActionNet(config.text).requires_grad_(False)
         codec = config.codec
         self.sizes = (codec.moves + 1, *[codec.codes] * codec.groups)
         self.writer = CodeModel(config.writer, self.sizes, 3 + codec.groups * len(codec.levels))
@@ -52,7 +52,7 @@ class MotionCodes(Net):
         self.register_buffer("memory", torch.zeros(config.remembered, len(self.sizes) + 2, dtype=torch.int16))
 
     def matrices(self) -> list[Tensor]:
-        """Those of the writer's blocks; small nets with many classes learn better otherwise."""
+        """Those of the writer's blocks; layers with many classes learn better otherwise."""
         return [module.weight for module in self.writer.blocks.modules() if isinstance(module, nn.Linear)]
 
     @property
@@ -60,9 +60,10 @@ class MotionCodes(Net):
         """The move that ends a motion; one more stands for what comes before the first step."""
         return self.config.codec.moves
 
-    def take(self, codec: MotionCodec) -> None:
-        """Take up a trained codec, with its normalisation."""
+    def take(self, codec: MotionCodec, text: ActionNet) -> None:
+        """Take up a trained codec, with its normalisation, and a trained net of actions."""
         self.codec.load_state_dict(codec.state_dict())
+        self.text.load_state_dict(text.state_dict())
         self.mean.copy_(codec.mean)
         self.scale.copy_(codec.scale)
 
@@ -125,10 +126,7 @@ class MotionCodes(Net):
 
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """The encoder of sentences, the step and its parts, the codec's two ways, and the memory."""
-        words, lengths = TensorSpec("words", ("batch", "words"), "int64"), TensorSpec("lengths", ("batch",), "int64")
-        context = TensorSpec("context", ("batch", self.config.text.actions))
-        encoder = Part(self, self.text.forward), GraphSpec((words, lengths), (context,))
-        return {"encoder": encoder, **self._writing(), **self._moving()}
+        return {**self.text.graphs(), **self._writing(), **self._moving()}
 
     def _writing(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """The step, its parts, and the memory."""
