@@ -223,6 +223,15 @@ def test_resumed_training_is_the_same_to_the_bit(folder: Path, tmp_path: Path) -
     assert all(torch.equal(whole[name], parts[name]) for name in whole)
 
 
+def test_a_net_of_actions_is_no_bundle_by_itself(folder: Path, tmp_path: Path) -> None:
+    pytest.importorskip("motet_export")
+    trained("actions", TEXT, folder, tmp_path / "run")
+    result = CliRunner().invoke(main, ["export", str(tmp_path / "run"), "--out", str(tmp_path / "run.zip")])
+    assert result.exit_code != 0
+    assert "manifest, verb: 'actions' is unknown" in result.output
+    assert not (tmp_path / "run.zip").exists()
+
+
 def test_a_wrong_file_of_vectors_leaves_no_run(folder: Path, tmp_path: Path) -> None:
     (tmp_path / "vectors.txt").write_text("walks 1 2\nruns 1 x\n")
     given = ["train", "actions", "--data", folder, "--word-vectors", tmp_path / "vectors.txt"]

@@ -71,12 +71,14 @@ class ActionNet(Net):
         seen = [around.sum(dim=2) / count, most, vectors.sum(dim=1) / count]
         return functional.log_softmax(self.outward(self.dropout(torch.cat(seen, dim=1))), dim=1)
 
-    def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
-        """The encoder of sentences."""
+    def encoder(self) -> tuple[nn.Module, GraphSpec]:
+        """Itself as a graph, the encoder of sentences."""
         words, lengths = TensorSpec("words", ("batch", "words"), "int64"), TensorSpec("lengths", ("batch",), "int64")
-        return {
-            "encoder": (self, GraphSpec((words, lengths), (TensorSpec("context", ("batch", self.config.actions)),)))
-        }
+        return self, GraphSpec((words, lengths), (TensorSpec("context", ("batch", self.config.actions)),))
+
+    def graphs(self) -> dict[str, Any]:
+        """None: it is a part of the model that writes codes."""
+        return {}
 
 
 def from_config(config: Mapping[str, Any]) -> ActionNet:

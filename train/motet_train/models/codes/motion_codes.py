@@ -126,7 +126,7 @@ class MotionCodes(Net):
 
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """The encoder of sentences, the step and its parts, the codec's two ways, and the memory."""
-        return {**self.text.graphs(), **self._writing(), **self._moving()}
+        return {"encoder": self.text.encoder(), **self._writing(), **self._moving()}
 
     def _writing(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """The step, its parts, and the memory."""
