@@ -2,7 +2,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_retarget import SKELETONS
 
 from motet.errors import MotionError
 from motet.formats import read_motion
@@ -11,6 +10,7 @@ from motet.motion.foot_hold import BENT, FARTHEST
 from motet.motion.humanoid import LEFT_RIGHT, ground_under, sole_points
 from motet.motion.motion import Motion
 from motet.motion.rotations import euler_to_rotmat
+from motet.motion.skeleton import Joint, Skeleton
 from motet.motion.two_bone import Leg
 
 BALLS = [HUMANOID.index(side + "Toes") for side in LEFT_RIGHT]
@@ -230,6 +230,33 @@ def test_short_motions(recorded, frames):
     assert held.channels == motion.channels
 
 
-def test_other_figures_are_refused():
-    with pytest.raises(MotionError, match="bring it there by to_humanoid"):
-        hold_feet(read_motion(SKELETONS / "mixamo.bvh"))
+def test_feet_of_other_figures_stand(clips):
+    """CMU's own figure, whose knees have one angle and whose ankles have two, with a root that drifts."""
+    motion = read_motion(clips / f"{WALK}.amc").resample(60)
+    rng, values = np.random.default_rng(0), np.array(motion.values)
+    for axis in (0, 2):
+        values[:, axis] += np.cumsum(slow_noise(rng, motion, 0.07, 1)) / motion.fps / motion.skeleton.metres_per_unit
+    sliding = replace(motion, values=values)
+    held = hold_feet(sliding)
+    assert held.channels == motion.channels
+    assert slide(to_humanoid(held).motion) < 0.7 * slide(to_humanoid(sliding).motion)
+    legs = {f"{side}{part}" for side in "lr" for part in ("femur", "tibia", "foot")}
+    rest = tuple(channel for channel in motion.channels if channel.split(".")[0] not in legs)
+    np.testing.assert_array_equal(held.select(rest).values, sliding.select(rest).values)
+    # feet keep their directions in the world, as far as two angles let them
+    toes = [motion.skeleton.index(name) for name in ("ltoes", "rtoes")]
+    turns = np.einsum("tjba,tjbc->tjac", *(global_transforms(each)[0][:, toes] for each in (held, sliding)))
+    assert np.trace(turns, axis1=2, axis2=3).min() > 1 + 2 * np.cos(np.radians(5))
+
+
+def test_feet_that_tremble_stand(recorded):
+    """A tremble of 7 Hz, faster than feet that stand go."""
+    motion = standing(40, z=lambda t: 0.02 * np.sin(2 * np.pi * 7 * t), knee=30)
+    across = [np.ptp(soles_of(hold_feet(motion, trembling=t))[40:-40, :, 2], axis=0).max() for t in (False, True)]
+    assert across[0] > 0.02
+    assert across[1] < 0.01
+
+
+def test_what_is_no_human_is_refused():
+    with pytest.raises(MotionError, match="human"):
+        hold_feet(Motion(np.zeros((2, 1)), ("a.rx",), ("deg",), 30, Skeleton((Joint("a", -1, (0, 0, 0)),))))

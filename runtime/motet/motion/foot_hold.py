@@ -7,69 +7,96 @@ foot; over a stance its median is 0, so the foot stands where it stood on averag
 and goes smoothly. Hip, knee and ankle follow by :mod:`motet.motion.two_bone`.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from motet.errors import MotionError
-from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, SOLE, ground_under, sided, sole_points
-from motet.motion.kinematics import AXES, euler_of, global_transforms, with_channels
+from motet.motion.fitting import Fitted, fit, sole_points, upright
+from motet.motion.humanoid import GROUND, HUMANOID, LEFT_RIGHT, ground_under, leg_length, sided
+from motet.motion.kinematics import AXES, euler_of, global_transforms, skeleton_of, with_channels
 from motet.motion.motion import TURN, Motion
 from motet.motion.products import inverse, product
-from motet.motion.root_path import TREMBLE, smoothed
+from motet.motion.retarget import map_of
+from motet.motion.root_path import GENERATED, TREMBLE, smoothed
 from motet.motion.rotations import Array
+from motet.motion.skeleton import Skeleton
 from motet.motion.two_bone import Leg
 
 LOW = (0.02, 0.05)  # m above the ground: a point of the sole touches it surely, and not at all
 SLOW = (0.3, 0.9)  # m/s over the ground: it stands surely, and not at all
+SLIDING = (0.5, 2.5)  # m/s: the same for feet that tremble and slide
 LIFTED = 0.1  # s: a foot that does not touch the ground for less goes on standing where it stands
 BLEND = 0.2  # s: in which a shift comes and goes, most of it in half of that
 FARTHEST = 0.15  # m: a foot is shifted by less; what slides farther than twice that in a stance does slide
 SOFT = 0.05  # s: before and after a foot is in the ground it is being lifted out of it
 
-POINTS = sum(len(places) for places in SOLE.values())
 BENT = ("UpperLeg", "LowerLeg", "Foot")
 
 Flags = NDArray[np.bool_]
 
 
-def hold_feet(motion: Motion) -> Motion:
-    """The motion with feet that stay where they stand and are never deeper than the ground, by turning hips, knees and
-    ankles; the root and all other joints are as they were, and the feet keep their directions in the world.
+def hold_feet(motion: Motion, trembling: bool = False) -> Motion:
+    """The motion of any human figure with feet that stay where they stand and are never deeper than the ground, by
+    turning hips, knees and ankles; the root and all other joints are as they were, and the feet keep their directions
+    in the world.
 
     The ground is level, and where :func:`motet.motion.to_humanoid` lays it: the soles are deeper in 5 % of the frames.
     A foot is shifted by FARTHEST at most, and a leg that is nearly straight is hardly drawn longer: what is left slides
-    on. MotionError for a motion that is not the humanoid's.
+    on. Lengths are those of the figure at the humanoid's size.
+
+    trembling: whether the feet tremble and slide as those of a model that gives joint angles alone: where they stand is
+        then seen over longer, and what slides faster stands, too.
+    MotionError, with the reason, for a figure that is no human's, or one that does not stand along y.
     """
-    if motion.skeleton != HUMANOID:
-        raise MotionError("this motion is not on the humanoid, whose feet can be held: bring it there by to_humanoid")
     if len(motion) < 2:
         return motion
+    skeleton, joint_map = skeleton_of(motion), map_of(motion)
     rotations, places = global_transforms(motion)
-    soles = sole_points(rotations, places)
-    soles[..., 1] -= ground_under(soles)
+    fitted = fit(skeleton, joint_map, rotations, places)
+    if not np.array_equal(upright(fitted, places), np.eye(3)):
+        raise MotionError("this figure does not stand along y: turn it upright by to_humanoid")
+    soles = _soles(skeleton, fitted, rotations, places)
+    places = places * (leg_length() / fitted.leg)
     turned = np.array(rotations)
-    for number, side in enumerate(LEFT_RIGHT):
-        hip, knee, ankle = (HUMANOID.index(sided(side, part)) for part in BENT)
-        leg = Leg(places[:, hip], places[:, knee], places[:, ankle], rotations[:, knee, :, 0])
-        thigh, shin = leg.turns(_target(leg, soles[:, number * POINTS : (number + 1) * POINTS], motion.fps))
-        turned[:, hip] = product(thigh, rotations[:, hip])
-        turned[:, knee] = product(shin, rotations[:, knee])
-    return _with_legs(motion, turned)
+    for side, points in zip(LEFT_RIGHT, np.split(soles, 2, axis=1), strict=True):
+        joints = [joint_map.joints[sided(side, part)] for part in BENT]
+        bend = product(rotations[:, joints[1]], fitted.aligned[joints[1]])[..., 0]
+        hip, knee, ankle = (places[:, joint] for joint in joints)
+        leg = Leg(hip, knee, ankle, bend)
+        for joint, turn in zip(
+            joints, (*leg.turns(_target(leg, points, motion.fps, trembling)), np.eye(3)), strict=True
+        ):
+            hanging = list(skeleton.subtree(skeleton.names[joint]))
+            turned[:, hanging] = product(turn[..., None, :, :], rotations[:, hanging])
+    return _with_joints(motion, [joint_map.joints[sided(side, part)] for side in LEFT_RIGHT for part in BENT], turned)
 
 
-def _target(leg: Leg, points: Array, fps: float) -> Array:
+def _soles(skeleton: Skeleton, fitted: Fitted, rotations: Array, places: Array) -> Array:
+    """Points (T, P, 3) of both soles, first the left one, above a ground at 0, at the humanoid's size."""
+    joints = fitted.joint_map.joints
+    bones = {bone: product(rotations[:, joints[bone]], fitted.aligned[joints[bone]]) for bone in fitted.heights}
+    soles = sole_points(fitted, bones, places) * (leg_length() / fitted.leg)
+    # how thick the soles of another figure are is not known: each of their points is on the ground where it is lowest
+    own = np.percentile(soles[..., 1], GROUND, axis=0)
+    soles[..., 1] -= ground_under(soles) if skeleton == HUMANOID else own
+    return soles
+
+
+def _target(leg: Leg, points: Array, fps: float, trembling: bool) -> Array:
     """Where the ankle comes to (T, 3), from points (T, K, 3) of the sole above a ground at 0."""
-    over_ground = _held(points, fps)
+    over_ground = _held(points, fps, trembling)
     target = leg.eased(leg.ankle + np.insert(over_ground, 1, 0.0, axis=1))
     lowest = points[..., 1].min(axis=1) + target[:, 1] - leg.ankle[:, 1]
     target[:, 1] += np.minimum(_lift(-lowest, fps), FARTHEST)
     return target
 
 
-def _held(points: Array, fps: float) -> Array:
+def _held(points: Array, fps: float, trembling: bool) -> Array:
     """The shift (T, 2) over the ground."""
     steps = np.diff(points[..., [0, 2]], axis=0)
-    touch = _touch(points, fps)
+    touch = _touch(points, fps, trembling)
     weights = touch / np.maximum(touch.sum(axis=1, keepdims=True), 1e-9)
     undone = -(touch.max(axis=1) * (weights[..., None] * steps).sum(axis=1).T).T
     times, values = [], []
@@ -83,12 +110,12 @@ def _held(points: Array, fps: float) -> Array:
     return _bounded(smoothed(shift[:, None], TREMBLE, fps)[:, 0])
 
 
-def _touch(points: Array, fps: float) -> Array:
+def _touch(points: Array, fps: float, trembling: bool) -> Array:
     """How much points (T, K, 3) touch the ground and stand from each frame to the next, (T - 1, K) from 0 to 1."""
-    calm = smoothed(points, TREMBLE, fps)
+    calm = smoothed(points, GENERATED if trembling else TREMBLE, fps)
     speed = np.linalg.norm(np.diff(calm[..., [0, 2]], axis=0), axis=-1) * fps
     height = (points[1:, :, 1] + points[:-1, :, 1]) / 2
-    return _fading(height, *LOW) * _fading(speed, *SLOW)
+    return _fading(height, *LOW) * _fading(speed, *(SLIDING if trembling else SLOW))
 
 
 def _fading(values: Array, full: float, none: float) -> Array:
@@ -152,16 +179,19 @@ def _bounded(shift: Array) -> Array:
     return bounded
 
 
-def _with_legs(motion: Motion, turned: Array) -> Motion:
-    """The motion with the angles of hips, knees and ankles from the joints' rotations in the world (T, J, 3, 3)."""
-    for side in LEFT_RIGHT:
-        for part in BENT:
-            index = HUMANOID.index(sided(side, part))
-            joint = HUMANOID.joints[index]
-            local = product(inverse(turned[:, joint.parent]), turned[:, index])
-            names = tuple(f"{joint.name}.r{axis}" for axis in AXES)
-            had = dict(zip(motion.channels, motion.units, strict=True))
-            units = tuple(had.get(name, "deg") for name in names)
-            angles = euler_of(local, joint) * np.array([TURN[unit] for unit in units]) / (2 * np.pi)
-            motion = with_channels(motion, names, angles, units)
+def _with_joints(motion: Motion, joints: Sequence[int], turned: Array) -> Motion:
+    """The motion with the angles of some joints from the joints' rotations in the world (T, J, 3, 3).
+
+    The humanoid's get three. Those of another figure keep to the angles that they have, as knees that have one.
+    """
+    skeleton = skeleton_of(motion)
+    for index in joints:
+        joint, had = skeleton.joints[index], dict(zip(motion.channels, motion.units, strict=True))
+        names = tuple(f"{joint.name}.r{axis}" for axis in AXES)
+        own = [] if skeleton == HUMANOID else [i for i, name in enumerate(names) if name in had]
+        kept = own or [0, 1, 2]
+        units = tuple(had.get(names[i], "deg") for i in kept)
+        angles = euler_of(product(inverse(turned[:, joint.parent]), turned[:, index]), joint)[:, kept]
+        values = angles * np.array([TURN[unit] for unit in units]) / (2 * np.pi)
+        motion = with_channels(motion, tuple(names[i] for i in kept), values, units)
     return motion
