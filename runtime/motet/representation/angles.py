@@ -1,12 +1,13 @@
 """``angles``: Euler angles of joints, and whatever other channels a model has, as they are in motions.
 
-They do not say where a figure goes: its path is laid by what its feet do.
+They do not say where a figure goes: its path is laid by what its feet do, and what then still slides is held.
 """
 
 import numpy as np
 
 from motet.errors import MotionError
 from motet.motion.feet import has_feet
+from motet.motion.foot_hold import hold_feet
 from motet.motion.mirror import mirror
 from motet.motion.motion import Motion
 from motet.motion.root_path import GENERATED, lay_root_path
@@ -28,10 +29,14 @@ class Angles:
         return in_units(motion.select(kept), str)
 
     def planted(self, features: Motion) -> Motion:
-        """With the root's translation, found from the feet's contact with the ground."""
+        """With the root's translation, found from the feet's contact with the ground; a human's feet stay there."""
         if features.skeleton is None or not has_feet(features.skeleton):
             return features
-        return lay_root_path(features, tremble=GENERATED)
+        laid = lay_root_path(features, tremble=GENERATED)
+        try:
+            return hold_feet(laid, trembling=True)
+        except MotionError:  # not a human: what its legs are is not known
+            return laid
 
     def motion(self, features: Motion, after: Motion | None = None) -> Motion:
         """The features themselves: what they do not tell is not taken from another motion either."""
