@@ -50,7 +50,7 @@ def _controlled(variety: float, model: ControlModel) -> Decoded:
     corners = np.repeat(np.eye(labels), hold + ramp, axis=0)
     smooth = np.stack([np.convolve(column, np.ones(ramp) / ramp)[: len(corners)] for column in corners.T], axis=1)
     iterations = 2 if model.has_free_units else 1
-    session = model.start(characters=4, seed=7, variety=variety, iterations=iterations)
+    session = model.start(characters=4, seed=7, variety=variety, iterations=iterations, smooth=False)
     return {"frames": session.frames(smooth.clip(0, 1))}
 
 

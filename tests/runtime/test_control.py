@@ -50,7 +50,8 @@ def test_the_documented_loop_gives_the_same_frames(model: ControlModel) -> None:
         }
         frame, history = step.run(["frame", "next_history"], feeds)
         frames.append(frame[0])
-    np.testing.assert_array_equal(model.start().run(SCRIPT, in_place=True)[0].values, np.stack(frames))
+    found = model.start(smooth=False).run(SCRIPT, in_place=True)[0]
+    np.testing.assert_array_equal(found.values, np.stack(frames))
 
 
 @pytest.mark.parametrize("variety", [0.0, 0.5, 1.0])
@@ -233,6 +234,64 @@ def test_frames_come_in_the_contract(model: ControlModel) -> None:
     assert (motions[0].fps, len(motions[0]), set(motions[0].units)) == (40.0, 40, {"deg", "length"})
     assert set(session.run("walk 1s", in_place=True)[0].units) == {"deg"}
     assert session.frames(np.zeros((0, 3))).shape == (3, 0, 59)
+
+
+@pytest.mark.parametrize("variety", [0.0, 0.7])
+def test_the_net_runs_as_it_does_whatever_is_shown(model: ControlModel, variety: float) -> None:
+    smooth, plain = (model.start(characters=2, seed=1, variety=variety, smooth=s) for s in (True, False))
+    for control in (
+        np.random.default_rng(0).uniform(size=(12, 2, 3)).repeat([1, 1, 2, 3, 5, 1, 8, 2, 1, 1, 4, 9], axis=0)
+    ):
+        for session in (smooth, plain):
+            session.set_control(control)
+            session.step()
+        np.testing.assert_allclose(smooth.snapshot().history, plain.snapshot().history, atol=1e-6)
+
+
+def test_a_smooth_frame_is_the_mean_of_those_around_it(model: ControlModel) -> None:
+    """Under one control, against a loop over frames; before the first are those of the start."""
+    plain = model.start(smooth=False).frames(np.eye(3)[[0] * 60])[0].astype(np.float64)
+    shown = model.start().frames(np.eye(3)[[0] * 50])[0]
+    every = np.concatenate([np.array(model.starts["walk"]), plain])
+    weights = [np.exp(-0.5 * (apart / model.fps / 0.04) ** 2) for apart in range(-3, 4)]
+    for frame, found in enumerate(shown, start=len(model.starts["walk"])):
+        around = zip(weights, every[frame - 3 : frame + 4], strict=True)
+        np.testing.assert_allclose(found, sum(w * f for w, f in around) / sum(weights), atol=1e-3)
+
+
+def test_no_joint_leaps_when_the_control_does(model: ControlModel) -> None:
+    track = np.random.default_rng(0).uniform(size=(60, 3)).repeat(10, axis=0)
+    leaps = [np.abs(np.diff(model.start(smooth=s).frames(track)[0], axis=0)).max() for s in (True, False)]
+    assert leaps[0] <= 1.9 * 360 / 40 + 1e-3
+    assert leaps[1] > 40
+    # what is held back comes all the same
+    held = model.start()
+    held.frames(track)
+    last, plain = (session.frames(np.eye(3)[[0] * 400])[0, -100:] for session in (held, model.start(smooth=False)))
+    assert np.abs(last.max(axis=0) - plain.max(axis=0)).max() < 15
+
+
+def test_what_is_shown_is_not_late(model: ControlModel, clips: Path) -> None:
+    smooth, plain = (model.start("run", smooth=s).frames(np.eye(3)[[1] * 400])[0, 200:] for s in (True, False))
+    moving = model.contract.std > 5
+    apart = [np.square(smooth[10:-10] - np.roll(plain, lag, axis=0)[10:-10])[:, moving].mean() for lag in range(-3, 4)]
+    assert int(np.argmin(apart)) - 3 == 0
+
+
+def test_a_snapshot_knows_what_has_been_run_ahead(model: ControlModel) -> None:
+    session = model.start(characters=2, seed=4, variety=0.3)
+    session.frames(_track(model)[:13])
+    saved, after = session.snapshot(), []
+    for _ in range(2):
+        session.restore(saved)
+        session.control(run=[1.0, 0.5])
+        after.append([session.step() for _ in range(20)])
+    np.testing.assert_array_equal(*after)
+    plain = model.start(characters=2, smooth=False)
+    plain.restore(saved)
+    plain.step()
+    with pytest.raises(ControlError, match="not smooth does not fit"):
+        session.restore(plain.snapshot())
 
 
 def _track(model: ControlModel) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
+from motet.decode.ahead import Ahead, begun, ticked
 from motet.decode.noise import RowNoise, RowsOfNoise
 from motet.decode.session import tick
 from motet.errors import BundleError, ControlError, DecodingError, MotionError
@@ -16,10 +18,14 @@ from motet.models.base import BundleModel
 from motet.models.script import control_track, parse_script
 from motet.models.seeds import Seed, seeds_of
 from motet.motion.heading import without_heading
-from motet.motion.motion import Motion
+from motet.motion.motion import TURN, Motion
 
 MAX_CHARACTERS = 100_000
 """Of one session, whose state is in memory."""
+
+FASTEST = 1.9
+"""Turns a second: no angle of a smooth session changes faster. Of recorded walking and running the fastest that does
+not tremble, a foot's, has as much."""
 
 
 class ControlModel(BundleModel):
@@ -44,6 +50,8 @@ class ControlModel(BundleModel):
         free = {"codes": "batch H"} if self.has_free_units else {}
         self.bind("step", {**self.loop.inputs, **free}, self.loop.outputs)
         self.taps, self.codes = self.sizes["K"], self.sizes["H"]
+        turns = [TURN.get(unit, np.inf) for unit in self.contract.units]
+        self.fastest = np.array(turns, dtype=np.float32) * np.float32(FASTEST / self.fps)
         if "history" not in self.stepper.spec.feedback:
             raise BundleError("manifest, graphs.step.feedback: nothing gives the next history")
         for label, frames in self.starts.items():
@@ -64,6 +72,7 @@ class ControlModel(BundleModel):
         variety: float = 0.0,
         temperature: float | None = None,
         iterations: int | None = None,
+        smooth: bool = True,
     ) -> "ControlSession":
         """A session of ``characters`` figures with the same start.
 
@@ -74,18 +83,20 @@ class ControlModel(BundleModel):
         temperature: of the sigmoid, the bundle's by default; lower is more deterministic.
         iterations: Gibbs iterations for each frame, by default as many as the bundle's; more than 1 only in models
             with free hidden units.
+        smooth: show frames that do not tremble more than recorded ones (:mod:`motet.decode.ahead`); else those of the
+            net as they are. What the net does is the same.
         Raises ControlError for values out of range, MotionError for a motion that does not fit.
         """
         if not 1 <= characters <= MAX_CHARACTERS:
             raise ControlError(f"a session has 1 to {MAX_CHARACTERS} characters, not {characters}")
         seeds = seeds_of(seed, characters, ControlError)
         if isinstance(start, Motion):
-            history, label = self._history_of(start), None
+            first, label = self._frames_of(start), None
         else:
             label = self.labels[0] if start is None else start
-            history = self._history_at(label)
+            first = self._frames_at(label)
         settings = self._settings(variety, temperature, iterations)
-        session = ControlSession(self, np.repeat(history[None], characters, axis=0), seeds, settings)
+        session = ControlSession(self, first, seeds, settings, smooth)
         if label is not None:
             session.control(**{label: 1.0})
         return session
@@ -99,6 +110,7 @@ class ControlModel(BundleModel):
         variety: float = 0.0,
         temperature: float | None = None,
         in_place: bool = False,
+        smooth: bool = True,
     ) -> Motion:
         """The motion of one figure that runs a control script, from the script's first label unless ``start`` says.
 
@@ -106,7 +118,7 @@ class ControlModel(BundleModel):
         """
         first = parse_script(script, self.labels)[0].start
         begin = max(first, key=first.__getitem__) if start is None else start
-        session = self.start(begin, seed=seed, variety=variety, temperature=temperature)
+        session = self.start(begin, seed=seed, variety=variety, temperature=temperature, smooth=smooth)
         return session.run(script, in_place)[0]
 
     def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
@@ -114,21 +126,21 @@ class ControlModel(BundleModel):
 
         With several iterations a tick (of the settings), there are so many rows of noise for each.
         """
-        session = self.start(variety=1.0, iterations=settings.get("iterations"))
+        session = self.start(variety=1.0, iterations=settings.get("iterations"), smooth=False)
         session.noise = RowsOfNoise(given["noise"])
         return {"frames": session.frames(given["track"])[0]}
 
-    def _history_at(self, label: str) -> Floats:
+    def _frames_at(self, label: str) -> Floats:
         if label not in self.starts:
             raise ControlError(f"cannot start from {label!r}; expected one of {', '.join(self.starts)}")
-        return self.encode(self.starts[label])
+        return np.asarray(self.starts[label], dtype=np.float32)
 
-    def _history_of(self, motion: Motion) -> Floats:
+    def _frames_of(self, motion: Motion) -> Floats:
         last = self.contract.on_figure(motion.continuous().resample(self.fps, to_end=True))[-self.taps :]
         if len(last) < self.taps:
             raise MotionError(f"a start needs {self.taps} frames at {self.fps:g} fps, this motion has {len(last)}")
         # levelled by themselves: where the figure faced long before says nothing about where it faces now
-        return self.encode(self.contract.frames(without_heading(last)))
+        return self.contract.frames(without_heading(last)).astype(np.float32)
 
     def _settings(self, variety: float, temperature: float | None, iterations: int | None) -> "_Settings":
         if not 0 <= variety <= 1:
@@ -151,11 +163,13 @@ class _Settings:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Snapshot:
-    """All that changes in a session, for n characters: history (n, K, H), control (n, labels), the tick."""
+    """All that changes in a session, for n characters: history (n, K, H), control (n, labels), the tick, and of a
+    smooth session what it has run ahead."""
 
     history: Floats
     control: Floats
     tick: int
+    ahead: Ahead | None = None
 
     def __repr__(self) -> str:
         return f"Snapshot({len(self.history)} characters, tick {self.tick})"
@@ -164,9 +178,14 @@ class Snapshot:
 class ControlSession:
     """Characters that move in one batch, each with its own control; holds their whole state."""
 
-    def __init__(self, model: ControlModel, history: Floats, seeds: Sequence[int], settings: _Settings) -> None:
-        self.model, self.settings, self.characters = model, settings, len(history)
-        self._history = history
+    def __init__(
+        self, model: ControlModel, first: Floats, seeds: Sequence[int], settings: _Settings, smooth: bool
+    ) -> None:
+        """first: the frames (K, D) that all characters go on from, one for each seed."""
+        self.model, self.settings, self.smooth, self.characters = model, settings, smooth, len(seeds)
+        self._first = np.repeat(first[:, None], self.characters, axis=1)
+        self._history = np.repeat(model.encode(first)[None], self.characters, axis=0)
+        self._ahead: Ahead | None = None
         self._tick = 0
         column = np.ones((self.characters, 1), dtype=np.float32)
         self._inputs: dict[str, Floats] = {
@@ -221,14 +240,26 @@ class ControlSession:
 
     def step(self) -> Floats:
         """One tick: the next frame (characters, D) float32, in the units of ``model.contract``."""
-        frame, self._history = tick(self.model.stepper, self._history, self._next_inputs, self.settings.iterations)
+        if self.smooth:
+            control, fps = self._inputs["control"], self.model.fps
+            now = self._ahead or begun(self._run, self._history, self._first, control, fps)
+            self._ahead = ticked(now, self._run, control, fps, self.model.fastest)
+            frame, self._history = self._ahead.shown, self._ahead.histories[0]
+        else:
+            frame, self._history = self._run(self._history, 0)
+        self._tick += 1
         return frame
 
-    def _next_inputs(self) -> Arrays:
-        if self.noise is not None:
-            self._inputs["noise"] = self.noise.at(self._tick)
-        self._tick += 1
-        return self._inputs
+    def _run(self, history: Floats, later: int) -> tuple[Floats, Floats]:
+        """The net's frame (characters, D) after a history, and the next history, so many ticks from now."""
+        calls = count((self._tick + later) * self.settings.iterations)
+
+        def inputs() -> Arrays:
+            if self.noise is not None:
+                self._inputs["noise"] = self.noise.at(next(calls))
+            return self._inputs
+
+        return tick(self.model.stepper, history, inputs, self.settings.iterations)
 
     def run(self, script: str, in_place: bool = False) -> list[Motion]:
         """Run a control script (:mod:`motet.models.script`) for all characters; one motion for each.
@@ -251,7 +282,7 @@ class ControlSession:
 
     def snapshot(self) -> Snapshot:
         """Frames, control and tick, without the noise: the session that goes on from it goes on with its own seeds."""
-        return Snapshot(self._history.copy(), self._inputs["control"].copy(), self._tick)
+        return Snapshot(self._history.copy(), self._inputs["control"].copy(), self._tick, self._ahead)
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go back to a snapshot, of this session or of one with as many characters of the same model.
@@ -260,6 +291,9 @@ class ControlSession:
         """
         if snapshot.history.shape != self._history.shape:
             raise ControlError(f"a snapshot of history {snapshot.history.shape} does not fit {self._history.shape}")
+        if self.smooth and snapshot.tick and snapshot.ahead is None:
+            raise ControlError("a snapshot of a session that is not smooth does not fit one that is")
         self.set_control(snapshot.control)
         self._tick = snapshot.tick
         self._history = np.array(snapshot.history, dtype=np.float32)
+        self._ahead = snapshot.ahead if self.smooth else None

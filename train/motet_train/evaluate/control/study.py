@@ -76,7 +76,7 @@ class ControlStudy:
 
     def start(self, history: Codes, **options: Any) -> ControlSession:
         """A session whose characters have the given histories (B, K, H)."""
-        session = self.model.start(characters=len(history), **options)
+        session = self.model.start(characters=len(history), smooth=False, **options)
         session.restore(replace(session.snapshot(), history=history.astype(np.float32)))
         return session
 
