@@ -21,6 +21,7 @@ from motet_train.evaluate.control.gaits import (
     synchronisation,
 )
 from motet_train.evaluate.control.measures import Reference
+from motet_train.evaluate.control.shown import leaps, standing_feet
 from motet_train.evaluate.control.study import ControlStudy, Leg
 from motet_train.evaluate.control.variety import sampled_runs
 from motet_train.evaluate.tables import Goals, Report, reached
@@ -45,6 +46,13 @@ GOALS: Goals = {
     "bend.share": (0.95, None),
     "bend.share_from_run": (0.95, None),
     "bend.interrupt_s": (None, 0.8),
+    "feet.slide_walk": (None, 0.025),
+    "feet.speed_walk": (None, 0.15),
+    "feet.acceleration_walk": (None, 6),
+    "feet.slide_run": (None, 0.06),
+    "feet.speed_run": (None, 0.15),
+    "feet.acceleration_run": (None, 11),
+    "feet.leap": (None, 26),
 }
 """Figure -> (least, most) that the default recipe is to reach; its clips show walk, run and bend."""
 
@@ -73,6 +81,7 @@ def experiments(study: ControlStudy) -> dict[str, list[Callable[[], Mapping[str,
     found: dict[str, list[Callable[[], Mapping[str, float]]]] = {
         "cycle": [lambda: limit_cycle(study), lambda: convergence(study)],
         "sync": [lambda: synchronisation(study)],
+        "feet": [lambda: standing_feet(study), lambda: leaps(study)],
     }
     if study.run is None:
         return found
