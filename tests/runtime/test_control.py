@@ -239,9 +239,8 @@ def test_frames_come_in_the_contract(model: ControlModel) -> None:
 @pytest.mark.parametrize("variety", [0.0, 0.7])
 def test_the_net_runs_as_it_does_whatever_is_shown(model: ControlModel, variety: float) -> None:
     smooth, plain = (model.start(characters=2, seed=1, variety=variety, smooth=s) for s in (True, False))
-    for control in (
-        np.random.default_rng(0).uniform(size=(12, 2, 3)).repeat([1, 1, 2, 3, 5, 1, 8, 2, 1, 1, 4, 9], axis=0)
-    ):
+    changes = np.random.default_rng(0).uniform(size=(12, 2, 3))
+    for control in changes.repeat([1, 1, 2, 3, 5, 1, 8, 2, 1, 1, 4, 9], axis=0):
         for session in (smooth, plain):
             session.set_control(control)
             session.step()

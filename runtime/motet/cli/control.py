@@ -1,5 +1,6 @@
 """``motet control``: from a script to a motion."""
 
+from functools import partial
 from pathlib import Path
 
 import click
@@ -29,6 +30,7 @@ from motet.models.script import parse_script, starts_of
     type=click.FloatRange(0.01, 100),
     help="Sampling temperature; lower is more deterministic. [default: the bundle's]",
 )
+@click.option("--no-smooth", is_flag=True, help="Show the net's frames as they are, which tremble.")
 @click.option("--in-place", is_flag=True, help="Leave the root in place, without a path.")
 @like_option
 @session_options
@@ -41,6 +43,7 @@ def control(
     seed: int,
     variety: float,
     temperature: float | None,
+    no_smooth: bool,
     in_place: bool,
     like: Character | None,
     session: SessionOptions,
@@ -55,7 +58,8 @@ def control(
     segments = parse_script(script, model.labels)
     with naming(start):
         first = read(Path(start)) if start and Path(start).suffix else start
-        motion = model.run(script, first, seed=seed, variety=variety, temperature=temperature, in_place=in_place)
+        sampled = partial(model.run, script, first, seed=seed, variety=variety, temperature=temperature)
+        motion = sampled(in_place=in_place, smooth=not no_smooth)
     motion = put_onto(motion, like) if like else motion
     if out.suffix.lower() == ".html":
         write_html(out, motion, captions=starts_of(segments), title=script)
