@@ -47,7 +47,7 @@ def test_the_shipped_bundle_reaches_every_goal_and_says_what_is_measured(clips: 
     assert report["feet"]["slide_walk_recorded"] > 0
     for name in GOALS:
         group, key = name.split(".")
-        if group == "feet":  # not of the net but of how it is shown
+        if group in ("feet", "random"):  # not of the net but of how it is shown
             continue
         assert model.manifest.quality[group][key] == pytest.approx(_of(report, name), rel=0.05, abs=0.05), name
 

@@ -16,14 +16,16 @@ from motet_train.evaluate.control.gaits import Figures
 from motet_train.evaluate.control.study import ControlStudy
 
 SECONDS = 20.0
-"""Of each gait, and of each random control."""
+"""Of each gait."""
 
-CHANGES = (0.25, 0.5, 1.0)
-"""Seconds after which a random control changes, to uniform numbers between 0 and 1 for every label."""
+RANDOM_S, CHANGES = 60.0, (0.25, 0.5, 1.0)
+"""Seconds of each random control, and after which it changes, to uniform numbers between 0 and 1 for every label."""
 
 
 def standing_feet(study: ControlStudy) -> Figures:
-    """How far feet slide and how fast they are while they stand, how much joints tremble, in both gaits.
+    """How far feet slide and how fast they are while they stand, how much joints tremble, and the pace, in both gaits.
+
+    "plain" is without smoothing.
 
     None for a figure that is no human's: which joints are in the balls of its feet is not known.
     """
@@ -34,25 +36,29 @@ def standing_feet(study: ControlStudy) -> Figures:
         return {}
     for role in ("walk", "run"):
         label = getattr(study, role)
-        if label is not None:
-            clips = [lay_root_path(model.contract.features(clip)) for clip in study.reference.motions[label]]
-            of_clips = [_measured(clip, balls) for clip in clips]
-            for key, value in _measured(model.run(f"{label} {SECONDS:g}s"), balls).items():
-                figures[f"{key}_{role}"] = value
-                figures[f"{key}_{role}_recorded"] = float(np.mean([one[key] for one in of_clips]))
+        if label is None:
+            continue
+        clips = [lay_root_path(model.contract.features(clip)) for clip in study.reference.motions[label]]
+        script = f"{label} {SECONDS:g}s"
+        of = {f"_{role}": [model.run(script)], f"_{role}_plain": [model.run(script, smooth=False)]}
+        for ending, motions in {**of, f"_{role}_recorded": clips}.items():
+            measured = [_measured(motion, balls) for motion in motions]
+            figures |= {key + ending: float(np.mean([one[key] for one in measured])) for key in measured[0]}
     return figures
 
 
 def leaps(study: ControlStudy) -> Figures:
     """The largest turn of a joint in a frame, degrees, under controls that change at random."""
-    rng, model = np.random.default_rng(0), study.model
-    found = []
+    found, model = {"leap": 0.0, "leap_plain": 0.0}, study.model
+    rng = np.random.default_rng(0)
     for seconds in CHANGES:
-        controls = rng.uniform(size=(round(SECONDS / seconds), len(model.labels)))
+        controls = rng.uniform(size=(round(RANDOM_S / seconds), len(model.labels)))
         track = controls.repeat(study.frames(seconds), axis=0)
-        found.append(leap(model.contract.features(model.start().frames(track)[0])))
+        for key, smooth in (("leap", True), ("leap_plain", False)):
+            frames = model.start(smooth=smooth).frames(track)[0]
+            found[key] = max(found[key], leap(model.contract.features(frames)))
     recorded = [leap(model.contract.features(clip)) for clips in study.reference.motions.values() for clip in clips]
-    return {"leap": max(found), "leap_recorded": max(recorded)}
+    return {**found, "leap_recorded": max(recorded)}
 
 
 def _balls(motion: Motion) -> list[int]:
@@ -68,4 +74,5 @@ def _measured(motion: Motion, balls: list[int]) -> Figures:
         "slide": slide(points, root, motion.fps),
         "speed": speed(points, root, motion.fps),
         "acceleration": acceleration(places, root, motion.fps),
+        "pace": float(np.linalg.norm((root[-1] - root[0])[[0, 2]])) / motion.duration,
     }
