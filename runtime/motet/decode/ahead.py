@@ -10,7 +10,6 @@ Letters in shapes: R frames of reach, B characters, D channels, K taps, H codes,
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 from functools import cache
 from typing import NamedTuple
 
@@ -35,8 +34,7 @@ class Fade(NamedTuple):
     speed: Floats
 
 
-@dataclass(frozen=True, eq=False)
-class Ahead:
+class Ahead(NamedTuple):
     """Where a run is. Nothing in it is changed in place.
 
     frames: (2R + 1, B, D) of the net, those before, at and after the one that is shown. histories: (B, K, H) after that
@@ -62,7 +60,7 @@ def begun(run: Run, history: Floats, past: Floats, control: Floats, fps: float) 
 def ticked(now: Ahead, run: Run, control: Floats, fps: float, most: Floats) -> Ahead:
     """One tick later; ``run`` counts from the tick that is now. A channel changes by no more than ``most`` (D)."""
     reach, fade = reach_of(fps), None if now.fade is None else _faded(now.fade, 1 / fps)
-    if np.array_equal(control, now.control):
+    if control is now.control or np.array_equal(control, now.control):
         frames, histories = _run_on(run, now.frames[1:], now.histories, 1)
     else:
         frames, histories = _run_on(run, now.frames[1 : reach + 1], now.histories[:1], reach + 1)
@@ -75,13 +73,13 @@ def ticked(now: Ahead, run: Run, control: Floats, fps: float, most: Floats) -> A
 
 def _held_back(before: Floats, after: Ahead, most: Floats) -> Ahead:
     """What is shown (B, D) after a frame: with what fades, and no faster than ``most`` (D); what is too fast fades."""
-    step = after.shown - before if after.fade is None else after.shown + after.fade.offset - before
-    within = np.clip(step, -most, most)
-    shown = before + within
-    if after.fade is None and np.array_equal(within, step):
-        return after
+    wanted = after.shown if after.fade is None else after.shown + after.fade.offset
+    step = wanted - before
+    if (np.abs(step) <= most).all():
+        return after._replace(shown=wanted)
+    shown = before + np.clip(step, -most, most)
     offset = shown - after.shown
-    return replace(after, shown=shown, fade=Fade(offset, after.fade.speed if after.fade else np.zeros_like(offset)))
+    return after._replace(shown=shown, fade=Fade(offset, after.fade.speed if after.fade else np.zeros_like(offset)))
 
 
 def reach_of(fps: float) -> int:
@@ -94,9 +92,9 @@ def _run_on(run: Run, frames: Floats, histories: tuple[Floats, ...], count: int)
     found = []
     for _ in range(count):
         frame, history = run(histories[-1], len(histories) - 1)
-        found.append(frame)
+        found.append(frame[None])
         histories = (*histories, history)
-    return np.concatenate([frames, found]), histories
+    return np.concatenate([frames, *found]), histories
 
 
 def _mean(frames: Floats, fps: float) -> Floats:
