@@ -26,7 +26,7 @@ from motet.motion.two_bone import Leg
 
 LOW = (0.02, 0.05)  # m above the ground: a point of the sole touches it surely, and not at all
 SLOW = (0.3, 0.9)  # m/s over the ground: it stands surely, and not at all
-SLIDING = (0.5, 2.5)  # m/s: the same for feet that tremble and slide
+SLIDING = (0.7, 3.0)  # m/s: the same for feet that tremble and slide
 LIFTED = 0.1  # s: a foot that does not touch the ground for less goes on standing where it stands
 BLEND = 0.2  # s: in which a shift comes and goes, most of it in half of that
 FARTHEST = 0.15  # m: a foot is shifted by less; what slides farther than twice that in a stance does slide

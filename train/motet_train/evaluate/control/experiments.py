@@ -97,7 +97,7 @@ def experiments(study: ControlStudy) -> dict[str, list[Callable[[], Mapping[str,
     return found
 
 
-REHEARSED = ("gait", "bend", "sync", "cycle_run", "cycle", "hysteresis", "feet")
+REHEARSED = ("gait", "bend", "sync", "cycle_run", "cycle", "hysteresis")
 """Groups of experiments with goals, quick ones first."""
 
 
