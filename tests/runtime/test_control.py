@@ -270,7 +270,15 @@ def test_no_joint_leaps_when_the_control_does(model: ControlModel) -> None:
     assert np.abs(last.max(axis=0) - plain.max(axis=0)).max() < 15
 
 
-def test_what_is_shown_is_not_late(model: ControlModel, clips: Path) -> None:
+def test_frames_that_were_given_can_be_changed(model: ControlModel) -> None:
+    first, other = model.start(), model.start()
+    for _ in range(5):
+        frame = first.step()
+        np.testing.assert_array_equal(frame, other.step())
+        frame += 100
+
+
+def test_what_is_shown_is_not_late(model: ControlModel) -> None:
     smooth, plain = (model.start("run", smooth=s).frames(np.eye(3)[[1] * 400])[0, 200:] for s in (True, False))
     moving = model.contract.std > 5
     apart = [np.square(smooth[10:-10] - np.roll(plain, lag, axis=0)[10:-10])[:, moving].mean() for lag in range(-3, 4)]

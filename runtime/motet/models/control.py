@@ -244,7 +244,7 @@ class ControlSession:
             control, fps = self._inputs["control"], self.model.fps
             now = self._ahead or begun(self._run, self._history, self._first, control, fps)
             self._ahead = ticked(now, self._run, control, fps, self.model.fastest)
-            frame, self._history = self._ahead.shown, self._ahead.histories[0]
+            frame, self._history = self._ahead.shown.copy(), self._ahead.histories[0]
         else:
             frame, self._history = self._run(self._history, 0)
         self._tick += 1
