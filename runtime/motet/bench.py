@@ -1,5 +1,6 @@
 """How fast a model runs here: complete calls, as a user makes them."""
 
+import itertools
 import tempfile
 import time
 import warnings
@@ -95,11 +96,23 @@ def _made_file(model: DescribeModel, folder: Path) -> Path:
 
 
 def control_figures(model: ControlModel, seconds: float) -> Figures:
-    """One character's tick (median and 99th percentile) and the frame rate at the best batch, plain and sampled."""
-    tick = durations(model.start().step, seconds) * 1e6
+    """One character's tick (median and 99th percentile) and the frame rate at the best batch, plain and sampled.
+
+    Of the net alone; and of a smooth session whose control stays, and of one whose control changes at every tick.
+    """
+    tick = durations(model.start(smooth=False).step, seconds) * 1e6
+    smooth, changing = model.start(), model.start()
+    controls = itertools.cycle([np.ones(len(model.labels)), np.zeros(len(model.labels))])
+
+    def changed() -> None:
+        changing.set_control(next(controls))
+        changing.step()
+
     figures = {
         "control.tick": (float(np.median(tick)), "us"),
         "control.tick_p99": (float(np.percentile(tick, 99)), "us"),
+        "control.tick_smooth": (float(np.median(durations(smooth.step, seconds)) * 1e6), "us"),
+        "control.tick_changing": (float(np.median(durations(changed, seconds)) * 1e6), "us"),
     }
     for name, variety in (("control.frames", 0.0), ("control.frames_sampled", 1.0)):
         rates = {batch: _rate(model, batch, variety, seconds / 3) for batch in BATCHES}
@@ -110,7 +123,7 @@ def control_figures(model: ControlModel, seconds: float) -> Figures:
 
 
 def _rate(model: ControlModel, batch: int, variety: float, seconds: float) -> float:
-    session = model.start(characters=batch, variety=variety)
+    session = model.start(characters=batch, variety=variety, smooth=False)
     return batch / float(np.median(durations(session.step, seconds)))
 
 
