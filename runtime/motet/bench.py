@@ -21,6 +21,8 @@ from motet.models.describe import DescribeModel
 from motet.models.generate import GenerateModel
 from motet.models.predict import PredictModel
 from motet.models.search import SearchModel
+from motet.models.steer import SteerModel
+from motet.models.steer_session import SteerSession
 from motet.models.text import EOS, SPECIALS
 
 BATCHES = (64, 256, 512, 1024, 2048, 4096)
@@ -34,6 +36,9 @@ FILE_SECONDS = 2.8
 
 DRAWS = 100
 """Draws of a consensus."""
+
+CROWD = 1000
+"""Characters that are steered together."""
 
 VECTORS = 100_000
 """Of motions that are searched."""
@@ -95,11 +100,13 @@ def _made_file(model: DescribeModel, folder: Path) -> Path:
     return folder / "motion.amc"
 
 
-def control_figures(model: ControlModel, seconds: float) -> Figures:
+def control_figures(model: ControlModel | SteerModel, seconds: float) -> Figures:
     """One character's tick (median and 99th percentile) and the frame rate at the best batch, plain and sampled.
 
     Of the net alone; and of a smooth session whose control stays, and of one whose control changes at every tick.
     """
+    if isinstance(model, SteerModel):
+        return steer_figures(model, seconds)
     tick = durations(model.start(smooth=False).step, seconds) * 1e6
     smooth, changing = model.start(), model.start()
     controls = itertools.cycle([np.ones(len(model.labels)), np.zeros(len(model.labels))])
@@ -125,6 +132,30 @@ def control_figures(model: ControlModel, seconds: float) -> Figures:
 def _rate(model: ControlModel, batch: int, variety: float, seconds: float) -> float:
     session = model.start(characters=batch, variety=variety, smooth=False)
     return batch / float(np.median(durations(session.step, seconds)))
+
+
+def steer_figures(model: SteerModel, seconds: float) -> Figures:
+    """A tick of one character that walks (median and 99th percentile), and of :data:`CROWD` that go all ways, without
+    and with the foot lock; and the positions of all joints of the crowd."""
+    one, locked = (durations(_steered(model, 1, hold).tick, seconds) * 1e6 for hold in (False, True))
+    crowd = _steered(model, CROWD, True)
+    pose = crowd.tick()
+    return {
+        "control.tick": (float(np.median(one)), "us"),
+        "control.tick_p99": (float(np.percentile(one, 99)), "us"),
+        "control.tick_locked": (float(np.median(locked)), "us"),
+        "control.tick_locked_p99": (float(np.percentile(locked, 99)), "us"),
+        "control.crowd": (_milliseconds(_steered(model, CROWD, False).tick, seconds), "ms"),
+        "control.crowd_locked": (_milliseconds(crowd.tick, seconds), "ms"),
+        "control.crowd_positions": (_milliseconds(pose.positions, seconds), "ms"),
+    }
+
+
+def _steered(model: SteerModel, characters: int, hold_feet: bool) -> SteerSession:
+    session = model.start(characters=characters, hold_feet=hold_feet)
+    gait = model.gaits[0]
+    session.control(speed=model.usual[gait], direction=np.arange(characters) * 360 / characters)
+    return session
 
 
 def describe_figures(model: DescribeModel, seconds: float) -> Figures:

@@ -65,6 +65,10 @@ class ControlError(MotetError, ValueError):
     """A control value, label or number of characters that the model cannot take."""
 
 
+class ControlWarning(UserWarning):
+    """A control value that a model cannot take was brought into its range."""
+
+
 class ScriptError(MotetError, ValueError):
     """A control script that does not parse: shows the script and marks the place."""
 

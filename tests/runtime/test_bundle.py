@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from motet.bundle.bundle import FORMAT, Bundle, find_bundle, list_bundles, write_bundle, zip_bytes
+from motet.bundle.bundle import FORMAT, Bundle, list_bundles, write_bundle, zip_bytes
 from motet.bundle.session import SessionOptions
 from motet.errors import BundleError, OutputError
 from motet.models.load import VERBS, kind_of, load
@@ -35,9 +35,7 @@ def edit(folder: Path, change: Callable[[dict[str, Any]], None]) -> None:
 
 
 def test_the_shipped_bundles_are_whole_and_give_their_golden_vectors() -> None:
-    assert list(list_bundles()) == ["cmu-control", "cmu-generate", "describe", "generate", "predict", "search"]
-    shipped = {verb: find_bundle(verb).stem for verb in VERBS}
-    assert shipped == {**{verb: verb for verb in VERBS}, "control": "cmu-control"}
+    assert list(list_bundles()) == sorted([*VERBS, "cmu-control", "cmu-generate"])
     for name, path in list_bundles().items():
         bundle = Bundle.open(name)
         assert bundle.name == name == path.stem

@@ -16,11 +16,12 @@ from motet.formats import read_motion
 from motet.motion.kinematics import positions
 
 WALK = "39_14.amc"
+CMU = ("--bundle", "cmu-control")
 
 
 def test_a_script_becomes_a_motion_that_travels(tmp_path: Path) -> None:
     out = tmp_path / "out.bvh"
-    result = run("control", "walk 3s, walk>run 1s, run 3s", "-o", out)
+    result = run("control", *CMU, "walk 3s, walk>run 1s, run 3s", "-o", out)
     assert (result.exit_code, result.stdout) == (0, f"{out}: 280 frames at 40 fps, 7 s\n")
     motion = read_motion(out)
     root = positions(motion)[:, 0]
@@ -29,14 +30,32 @@ def test_a_script_becomes_a_motion_that_travels(tmp_path: Path) -> None:
     assert 1 < np.median(speed[:100]) < 2  # the training walk goes at 1.4 m/s, the run at 3.4
     assert 2 < np.median(speed[-80:]) < 5
     again = tmp_path / "again.bvh"
-    run("control", "walk 3s, walk>run 1s, run 3s", "-o", again)
+    run("control", *CMU, "walk 3s, walk>run 1s, run 3s", "-o", again)
     assert again.read_bytes() == out.read_bytes()
+
+
+def test_a_steered_figure_goes_where_its_script_says(tmp_path: Path) -> None:
+    out = tmp_path / "out.bvh"
+    result = run("control", "walk 2s speed 1.4, turn left 90, run 3s, stop", "-o", out)
+    assert (result.exit_code, result.stdout) == (0, f"{out}: 240 frames at 30 fps, 8 s\n")
+    root = positions(read_motion(out))[:, 0]
+    speed = np.linalg.norm(np.diff(root[:, [0, 2]], axis=0), axis=1) * 30
+    assert 1.2 < np.median(speed[30:60]) < 1.6
+    assert 2 < np.median(speed[150:190]) < 3
+    assert speed[-10:].max() < 0.3
+    step = root[185] - root[150]
+    assert abs(np.degrees(np.arctan2(step[0], step[2])) - 90) < 10
+    noted = run("control", "walk 1s speed 9", "-o", out)
+    assert "9 m/s is out of what 'walk' can do" in noted.stderr
+    html = tmp_path / "out.html"
+    assert run("control", "walk 1s, turn left 90", "--loose-feet", "-o", html).exit_code == 0
+    assert "turn left 90" in html.read_text()
 
 
 @pytest.mark.parametrize("extension", WRITTEN)
 def test_control_writes_every_format(tmp_path: Path, extension: str) -> None:
     out = tmp_path / f"out{extension}"
-    assert run("control", "walk .5s", "-o", out, "--in-place").exit_code == 0
+    assert run("control", *CMU, "walk .5s", "-o", out, "--in-place").exit_code == 0
     assert out.stat().st_size > 1000
 
 
@@ -46,7 +65,7 @@ def test_control_starts_from_a_motion_and_varies(tmp_path: Path, clips: Path) ->
         ([], ["--start", clips / WALK], ["--start", "bend"], ["--variety", 1, "--seed", 5], ["--no-smooth"])
     ):
         out = tmp_path / f"{number}.npz"
-        assert run("control", "walk 1s", "-o", out, *options).exit_code == 0
+        assert run("control", *CMU, "walk 1s", "-o", out, *options).exit_code == 0
         frames.append(read_motion(out).values)
     for i in range(len(frames)):
         for j in range(i):
@@ -114,13 +133,18 @@ def test_bench_describes_a_file_and_says_where_it_ran(clips: Path) -> None:
 @pytest.mark.parametrize(
     ("code", "arguments", "said"),
     [
-        (2, ["control", "walk 3", "-o", "{out}/a.html"], "duration in seconds"),
-        (2, ["control", "swim 3s", "-o", "{out}/a.html"], "expected one of walk, run, bend"),
+        (2, ["control", *CMU, "walk 3", "-o", "{out}/a.html"], "duration in seconds"),
+        (2, ["control", *CMU, "swim 3s", "-o", "{out}/a.html"], "expected one of walk, run, bend"),
+        (2, ["control", "walk 3", "-o", "{out}/a.html"], "expected seconds such as"),
+        (2, ["control", "swim 3s", "-o", "{out}/a.html"], "unknown order 'swim'; expected one of walk, run"),
+        (2, ["control", "walk 3s", "-o", "{out}/a.bvh", "--start", "fly"], "unknown gait 'fly'"),
+        (2, ["control", "walk 3s", "-o", "{out}/a.bvh", "--variety", ".5"], "no setting 'variety'"),
+        (2, ["control", *CMU, "walk 3s", "-o", "{out}/a.bvh", "--loose-feet"], "no setting 'hold_feet'"),
         (2, ["control", "walk 3s", "-o", "{out}/no/a.html"], "does not exist"),
         (2, ["control", "walk 3s", "-o", "{out}/a.xyz"], "expected one of .amc"),
         (2, ["control", "walk 3s", "-o", "{out}"], "expected one of .amc"),
         (2, ["control", "walk 3s", "-o", "{out}/a.bvh", "--bundle", "cmu"], "expected one of cmu-control"),
-        (2, ["control", "walk 3s", "-o", "{out}/a.bvh", "--start", "fly"], "expected one of walk, run, bend"),
+        (2, ["control", "walk 3s", "-o", "{out}/a.bvh", "--start", "fly", *CMU], "expected one of walk, run, bend"),
         (2, ["control", "walk 3s", "-o", "{out}/a.bvh", "--start", "fly.amc"], "no such file"),
         (2, ["control", "walk 3s", "-o", "{out}/a.bvh", "--variety", "2"], "range 0<=x<=1"),
         (2, ["control", "walk 3s", "-o", "{out}/a.bvh", "--temperature", "0"], "range 0.01<=x<=100"),
@@ -143,7 +167,7 @@ def test_bench_describes_a_file_and_says_where_it_ran(clips: Path) -> None:
         (1, ["convert", "{clips}/39_14.amc", "{out}/a.bvh", "--unit-in", "cm"], "according to the file, not 0.01 m"),
         (1, ["convert", "{clips}/39_14.amc", "{out}/a.bvh", "--fps-in", "nan"], "cannot have nan frames"),
         (1, ["convert", "{clips}/39_14.amc", "{out}/a.bvh", "--asf", "none.asf"], "none.asf: no such file"),
-        (2, ["control", "walk 0.001s", "-o", "{out}/a.bvh"], "less than one frame"),
+        (2, ["control", *CMU, "walk 0.001s", "-o", "{out}/a.bvh"], "less than one frame"),
         (2, ["control", "walk 1s", "--start", "{bad}/text.bvh", "-o", "{out}/a.bvh"], "text.bvh, line 1"),
         (2, ["predict", "{clips}/39_14.amc", "-o", "{out}/a.bvh", "--frames", "1000000000"], "range 1<=x<=100000"),
         (1, ["convert", "{bad}/broken.bvh", "{out}/a.npz"], "broken.bvh, line "),

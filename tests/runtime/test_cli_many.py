@@ -42,11 +42,12 @@ def test_predict_is_three_lines_of_python(tmp_path: Path, clips: Path) -> None:
 
 
 def test_control_is_three_lines_of_python(tmp_path: Path) -> None:
-    run("control", "run 1s, walk 1s", "-o", tmp_path / "cli.bvh")
-    model = motet.load("cmu-control")
-    motion = model.run("run 1s, walk 1s")
-    motet.write(tmp_path / "library.bvh", motion)
-    assert (tmp_path / "cli.bvh").read_bytes() == (tmp_path / "library.bvh").read_bytes()
+    for bundle in ("control", "cmu-control"):
+        run("control", "run 1s, walk 1s", "--bundle", bundle, "-o", tmp_path / "cli.bvh")
+        model = motet.load(bundle)
+        motion = model.run("run 1s, walk 1s")
+        motet.write(tmp_path / "library.bvh", motion)
+        assert (tmp_path / "cli.bvh").read_bytes() == (tmp_path / "library.bvh").read_bytes()
 
 
 def test_embed_is_three_lines_of_python(tmp_path: Path, clips: Path) -> None:

@@ -23,9 +23,6 @@ from motet.errors import BundleError
 from motet.files import new_folder, write_whole
 
 DEFAULT_BUNDLES = Path(__file__).parents[1] / "bundles"
-STAND_FOR = {"control": "cmu-control"}
-"""Verbs whose default bundle has another name than they."""
-
 MAX_MANIFEST = 4 << 20
 """Bytes; as JSON objects in memory they can be twenty times as many."""
 
@@ -112,7 +109,7 @@ class Bundle:
 
 def find_bundle(name_or_path: str | Path) -> Path:
     """Path of a default bundle's name or of an existing folder or zip; BundleError lists the known names."""
-    known, name = list_bundles(), STAND_FOR.get(str(name_or_path), str(name_or_path))
+    known, name = list_bundles(), str(name_or_path)
     if name in known:
         return known[name]
     try:

@@ -1,37 +1,50 @@
 """``motet control``: from a script to a motion."""
 
-from functools import partial
 from pathlib import Path
+from typing import Any
 
 import click
 
 from motet.bundle.session import SessionOptions
+from motet.cli.notes import noted
 from motet.cli.options import session_options
 from motet.cli.reading import Read, like_option, naming, out_option, read_options
 from motet.formats import check_writable, write_motion
 from motet.formats.character import Character, put_onto
 from motet.formats.html import write as write_html
-from motet.models.control import ControlModel
+from motet.models.controllable import Controllable
 from motet.models.load import load_as
-from motet.models.script import parse_script, starts_of
 
 
 @click.command()
 @click.argument("script")
 @out_option
 @click.option("--bundle", default="control", show_default=True, help="Name or path of a bundle.")
-@click.option("--start", help="Label to start in, or a motion file to continue. [default: the script's first label]")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the noise.")
+@click.option("--start", help="Where to start: a gait or label, or a motion file to continue.")
+@click.option("--seed", type=click.IntRange(0), help="Seed of the noise, of models that have such.  [default: 0]")
 @click.option(
-    "--variety", type=click.FloatRange(0, 1), default=0.0, show_default=True, help="0: always alike; 1: fully sampled."
+    "--variety",
+    type=click.FloatRange(0, 1),
+    help="0: always alike; 1: fully sampled, of models that draw.  [default: 0]",
 )
 @click.option(
     "--temperature",
     type=click.FloatRange(0.01, 100),
-    help="Sampling temperature; lower is more deterministic. [default: the bundle's]",
+    help="Sampling temperature of models that draw; lower is more deterministic.  [default: the bundle's]",
 )
-@click.option("--no-smooth", is_flag=True, help="Show the net's frames as they are, which tremble.")
-@click.option("--in-place", is_flag=True, help="Leave the root in place, without a path.")
+@click.option(
+    "--in-place", is_flag=True, default=None, help="Leave the root in place, of models whose feet say where they go."
+)
+@click.option(
+    "--loose-feet", "hold_feet", flag_value=False, default=None, help="Do not hold feet to the ground as they stand."
+)
+@click.option(
+    "--no-smooth",
+    "smooth",
+    flag_value=False,
+    default=None,
+    help="Show the frames of a net that trembles as they are.",
+)
 @like_option
 @session_options
 @read_options
@@ -40,29 +53,26 @@ def control(
     out: Path,
     bundle: str,
     start: str | None,
-    seed: int,
-    variety: float,
-    temperature: float | None,
-    no_smooth: bool,
-    in_place: bool,
     like: Character | None,
     session: SessionOptions,
     read: Read,
+    **settings: Any,
 ) -> None:
-    """Run SCRIPT, such as "walk 3s, walk>run 2s, run 3s", and write the motion.
+    """Run SCRIPT, such as "walk 3s speed 1.4, turn left 90, run 4s, stop", and write the motion.
 
-    Segments are separated by commas: a label and seconds; a ramp "walk>run 5s"; a mix "walk*.3+run*.7 2s".
+    Orders are separated by commas: a gait, "turn" or "stop", and in any order seconds ("3s"), a speed in m/s ("speed
+    1.4"), a way ("backwards", "left", "right") and a turn in degrees ("turn left 90").
+    With --bundle cmu-control: a label and seconds; a ramp "walk>run 5s"; a mix "walk*.3+run*.7 2s".
     """
     check_writable(out)
-    model = load_as(ControlModel, bundle, session)
-    segments = parse_script(script, model.labels)
-    with naming(start):
+    model = load_as(Controllable, bundle, session)
+    captions = model.captions(script)
+    with naming(start), noted():
         first = read(Path(start)) if start and Path(start).suffix else start
-        sampled = partial(model.run, script, first, seed=seed, variety=variety, temperature=temperature)
-        motion = sampled(in_place=in_place, smooth=not no_smooth)
+        motion = model.run(script, first, **{name: value for name, value in settings.items() if value is not None})
     motion = put_onto(motion, like) if like else motion
     if out.suffix.lower() == ".html":
-        write_html(out, motion, captions=starts_of(segments), title=script)
+        write_html(out, motion, captions=captions, title=script)
     else:
         write_motion(out, motion)
     click.echo(f"{out}: {len(motion)} frames at {motion.fps:g} fps, {motion.duration:g} s")

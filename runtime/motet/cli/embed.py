@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.bundle.session import SessionOptions
-from motet.cli.notes import text_notes
+from motet.cli.notes import noted
 from motet.cli.options import session_options
 from motet.cli.reading import Read, Tries, read_options, say_resampled
 from motet.files import check_place, write_whole
@@ -47,7 +47,7 @@ def embed(
         vectors = _of_motions(load_as(DescribeModel, bundle or "describe", session), motions, read, tries)
     else:
         model = load_as(GenerateModel, bundle or "generate", session)
-        with text_notes():
+        with noted():
             vectors = model.embed([texts[index] for index in tries.usable(model, texts)])
     if len(vectors):
         buffer = io.BytesIO()

@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from motet.bundle.session import SessionOptions
-from motet.cli.notes import text_notes
+from motet.cli.notes import noted
 from motet.cli.options import session_options
 from motet.cli.reading import FPS, Tries, bar, like_option, naming, out_option, places
 from motet.formats import check_writable, read_motion, write_motion
@@ -80,7 +80,7 @@ def generate(
     asked = tries.usable(model, texts)
     given = {"strict": strict, **settings}
     shown = partial(_written, fps=fps, plant=not no_plant, loop=loop, like=like)
-    with text_notes():
+    with noted():
         if story or after is not None or stand is not None:
             groups = [asked] if story and asked else [[index] for index in asked]
             found = list(_stories(tries, model, texts, groups, {"after": after, "stand": stand, "seed": seed, **given}))

@@ -1,4 +1,4 @@
-"""What commands say on stderr beside their results: the log of ``motet``, and words that a model does not know."""
+"""What commands say on stderr beside their results: the log of ``motet``, and its warnings."""
 
 import logging
 import warnings
@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 import click
 
-from motet.errors import TextWarning
+from motet.errors import ControlWarning, TextWarning
 
 log = logging.getLogger("motet")
 
@@ -26,10 +26,11 @@ def show_log(level: int) -> None:
 
 
 @contextmanager
-def text_notes() -> Iterator[None]:
-    """Log unknown words, once for each sentence."""
+def noted() -> Iterator[None]:
+    """Log what motet warns of, words that are not known and speeds that a gait does not have, each once."""
     with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", TextWarning)
+        for category in (TextWarning, ControlWarning):
+            warnings.simplefilter("always", category)
         yield
     for text in dict.fromkeys(str(warning.message) for warning in caught):
         log.warning(text)

@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 from motet.bundle.session import SessionOptions
-from motet.cli.notes import text_notes
+from motet.cli.notes import noted
 from motet.cli.options import session_options
 from motet.cli.reading import bar, unit_option
 from motet.errors import TextWarning
@@ -46,7 +46,7 @@ def search(
     model = load_as(SearchModel, bundle, session)
     motion = read_motion(query, unit=unit_in) if Path(query).suffix.lower() in READABLE else None
     if motion is None:
-        with text_notes():
+        with noted():
             model.ids(query)  # refused before all motions are read
     with bar("embedding") as progress:
         index = Index.open(folder, model, file, unit=unit_in, progress=progress)

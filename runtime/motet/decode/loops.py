@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from motet.decode import beam, codes, consensus, free_run, mixture, nearest, session
+from motet.decode import beam, codes, consensus, free_run, matching, mixture, nearest, session
 from motet.decode.loop import Loop
 from motet.errors import BundleError
 
@@ -13,6 +13,7 @@ LOOPS: Mapping[str, Loop] = {
     "codes": codes.LOOP,
     "free_run": free_run.LOOP,
     "session": session.LOOP,
+    "matching": matching.LOOP,
     "nearest": nearest.LOOP,
 }
 

@@ -14,8 +14,8 @@ from motet.decode.ahead import Ahead, begun, ticked
 from motet.decode.noise import RowNoise, RowsOfNoise
 from motet.decode.session import tick
 from motet.errors import BundleError, ControlError, DecodingError, MotionError
-from motet.models.base import BundleModel
-from motet.models.script import control_track, parse_script
+from motet.models.controllable import Controllable
+from motet.models.script import control_track, parse_script, starts_of
 from motet.models.seeds import Seed, seeds_of
 from motet.motion.heading import without_heading
 from motet.motion.motion import TURN, Motion
@@ -28,15 +28,13 @@ FASTEST = 1.8
 running that does not tremble, a foot's 1.9, as the three angles of a joint add up."""
 
 
-class ControlModel(BundleModel):
+class ControlModel(Controllable):
     """A model of labelled motions that runs live; any number of sessions and threads share it.
 
     manifest: of a control bundle, or of a training run with the same keys.
     graphs: "encoder" (frames -> codes) and "step" (history, control, noise, variety, temperature -> codes, frame,
         next history), and for models with free hidden units also codes -> step.
     """
-
-    VERB = "control"
 
     def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph]) -> None:
         super().__init__(manifest, graphs)
@@ -111,15 +109,22 @@ class ControlModel(BundleModel):
         temperature: float | None = None,
         in_place: bool = False,
         smooth: bool = True,
+        **other: Any,
     ) -> Motion:
         """The motion of one figure that runs a control script, from the script's first label unless ``start`` says.
 
         The parameters are those of :meth:`start` and :meth:`ControlSession.run`.
         """
+        if other:
+            raise ControlError(f"this model has no setting {next(iter(other))!r}")
         first = parse_script(script, self.labels)[0].start
         begin = max(first, key=first.__getitem__) if start is None else start
         session = self.start(begin, seed=seed, variety=variety, temperature=temperature, smooth=smooth)
         return session.run(script, in_place)[0]
+
+    def captions(self, script: str) -> list[tuple[float, str]]:
+        """See :meth:`Controllable.captions`."""
+        return starts_of(parse_script(script, self.labels))
 
     def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
         """From the start of the first label, at variety 1: a track (T, labels) and noise (T, N) to frames (T, D).

@@ -17,20 +17,23 @@ from motet.models.generate import GenerateModel
 from motet.models.mixture import MixtureModel
 from motet.models.predict import PredictModel
 from motet.models.search import SearchModel
+from motet.models.steer import SteerModel
 
-Model = ControlModel | DescribeModel | GenerateModel | PredictModel | SearchModel
+Model = ControlModel | DescribeModel | GenerateModel | PredictModel | SearchModel | SteerModel
 Kind = TypeVar("Kind", bound=BundleModel)
 
 _KINDS: tuple[type[Model], ...] = (ControlModel, DescribeModel, MixtureModel, PredictModel, SearchModel)
 VERBS: dict[str, type[Model]] = {kind.VERB: kind for kind in _KINDS}
 """Verb of a bundle -> the class of its model, where the loop does not say another."""
 
-BY_LOOP: dict[str, type[Model]] = {"codes": CodesModel}
+BY_LOOP: dict[str, type[Model]] = {"codes": CodesModel, "matching": SteerModel}
 """:data:`VERBS` for some loops."""
 
 
 @overload
-def load(name_or_path: Literal["control", "cmu-control"], options: SessionOptions | None = None) -> ControlModel: ...
+def load(name_or_path: Literal["control"], options: SessionOptions | None = None) -> SteerModel: ...
+@overload
+def load(name_or_path: Literal["cmu-control"], options: SessionOptions | None = None) -> ControlModel: ...
 @overload
 def load(name_or_path: Literal["describe"], options: SessionOptions | None = None) -> DescribeModel: ...
 @overload

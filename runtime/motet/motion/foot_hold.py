@@ -96,7 +96,7 @@ def _target(leg: Leg, points: Array, fps: float, trembling: bool) -> Array:
 def _held(points: Array, fps: float, trembling: bool) -> Array:
     """The shift (T, 2) over the ground."""
     steps = np.diff(points[..., [0, 2]], axis=0)
-    touch = _touch(points, fps, trembling)
+    touch = touching(points, fps, trembling)
     weights = touch / np.maximum(touch.sum(axis=1, keepdims=True), 1e-9)
     undone = -(touch.max(axis=1) * (weights[..., None] * steps).sum(axis=1).T).T
     times, values = [], []
@@ -110,8 +110,8 @@ def _held(points: Array, fps: float, trembling: bool) -> Array:
     return _bounded(smoothed(shift[:, None], TREMBLE, fps)[:, 0])
 
 
-def _touch(points: Array, fps: float, trembling: bool) -> Array:
-    """How much points (T, K, 3) touch the ground and stand from each frame to the next, (T - 1, K) from 0 to 1."""
+def touching(points: Array, fps: float, trembling: bool = False) -> Array:
+    """How much points (T, K, 3) touch a ground at 0 and stand from each frame to the next, (T - 1, K) from 0 to 1."""
     calm = smoothed(points, GENERATED if trembling else TREMBLE, fps)
     speed = np.linalg.norm(np.diff(calm[..., [0, 2]], axis=0), axis=-1) * fps
     height = (points[1:, :, 1] + points[:-1, :, 1]) / 2

@@ -49,13 +49,14 @@ class Leg:
         """Turns (T, 3, 3) in the world of thigh and shin that bring the ankle to ``target`` (T, 3), or as near to it as
         it can be brought.
 
-        The knee turns about its axis, as far as that is square to the thigh, until the leg is as long as it has to be;
+        The knee turns about its axis, as far as that is square to the thigh, until the leg is as long as it has to be,
+        bent back, as knees are, even where it was bent forward;
         then thigh and shin turn together the shortest way. What of the shin stands out of the plane of the bend stays.
         """
         upper, lower = self._upper, self._lower
         cosine = (_length(target - self.hip) ** 2 - upper**2 - lower**2) / (2 * upper * lower * self._in_plane)
         bent = self._bent
-        after = np.arccos(np.clip(cosine, SHORTEST, 1.0)) * np.where(bent < 0, -1.0, 1.0)
+        after = np.arccos(np.clip(cosine, SHORTEST, 1.0))
         bend = rotvec_to_rotmat(self._axis * (after - bent))
         ankle = self.knee - self.hip + rotated(bend, self.ankle - self.knee)
         swing = _shortest_turn(ankle, target - self.hip)

@@ -1,0 +1,89 @@
+"""The pose of characters at a moment, as an engine takes it: where they are, how they face, how their bones turn."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motet.motion.humanoid import BONES, HUMANOID
+from motet.motion.quaternions import quat_product, quat_rotated, wrapped
+
+Floats = NDArray[np.float32]
+
+LEVELS = [[int(joint) for joint in level] for level in HUMANOID.levels]
+"""Joints of the humanoid but the root, those of one depth together."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Pose:
+    """The pose of B characters on the humanoid; arrays are float32, metres, y up.
+
+    ground: (B, 3) x, z, and the facing in radians: 0 along z, positive to the left. rotations: (B, J, 4) quaternions
+    (x, y, z, w) of the bones (:data:`motet.motion.BONES`) in their parents' frames; of the hips in the frame of the
+    facing. height: (B,) of the hips above the ground. contacts: (B, 2) from 0 to 1, how much the left and the right
+    foot stand.
+    """
+
+    ground: Floats
+    rotations: Floats
+    height: Floats
+    contacts: Floats
+
+    def __len__(self) -> int:
+        """B."""
+        return len(self.ground)
+
+    def __repr__(self) -> str:
+        return f"Pose({len(self)} characters)"
+
+    @property
+    def place(self) -> Floats:
+        """Where the characters stand (B, 3): on the ground under the hips."""
+        return np.insert(self.ground[:, :2], 1, np.float32(0), axis=1)
+
+    @property
+    def heading(self) -> Floats:
+        """Quaternions (B, 4), (x, y, z, w), of the facing: with :attr:`place` the transform of an engine's root."""
+        half = self.ground[:, 2] / 2
+        zero = np.zeros_like(half)
+        return np.stack([zero, np.sin(half), zero, np.cos(half)], axis=1)
+
+    def positions(self) -> Floats:
+        """Places (B, J', 3) of all joints of the humanoid in the world, in the order of ``HUMANOID.names``."""
+        return self.global_transforms()[1]
+
+    def global_transforms(self) -> tuple[Floats, Floats]:
+        """Rotations (B, J', 4) and places (B, J', 3) of all joints of the humanoid in the world."""
+        count = len(HUMANOID.names)
+        turned = np.zeros((count, len(self), 4), dtype=np.float32)
+        turned[..., 3] = 1
+        turned[[HUMANOID.index(bone) for bone in BONES]] = np.swapaxes(self.rotations, 0, 1)
+        places = np.empty((count, len(self), 3), dtype=np.float32)
+        turned[0] = quat_product(self.heading, turned[0])
+        places[0] = self.place
+        places[0, :, 1] = self.height
+        offsets = HUMANOID.offsets.astype(np.float32)[:, None]
+        for level in LEVELS:
+            parents = HUMANOID.parents[level]
+            places[level] = places[parents] + quat_rotated(turned[parents], offsets[level])
+            turned[level] = quat_product(turned[parents], turned[level])
+        return np.swapaxes(turned, 0, 1), np.swapaxes(places, 0, 1)
+
+    def only(self, rows: NDArray[np.intp]) -> "Pose":
+        """The pose of some of the characters."""
+        return Pose(self.ground[rows], self.rotations[rows], self.height[rows], self.contacts[rows])
+
+    def towards(self, other: "Pose", part: float) -> "Pose":
+        """The pose ``part`` of the way to another, which is near; for frame rates that are not the model's."""
+        share = np.float32(part)
+        step = other.ground - self.ground
+        step[:, 2] = wrapped(step[:, 2])
+        signs = np.where((self.rotations * other.rotations).sum(axis=-1, keepdims=True) < 0, np.float32(-1), 1)
+        mixed = self.rotations + share * (signs * other.rotations - self.rotations)
+        return replace(
+            self,
+            ground=self.ground + share * step,
+            rotations=mixed / np.linalg.norm(mixed, axis=-1, keepdims=True),
+            height=self.height + share * (other.height - self.height),
+            contacts=self.contacts + share * (other.contacts - self.contacts),
+        )

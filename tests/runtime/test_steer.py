@@ -1,0 +1,207 @@
+"""Figures that are steered: they go where they are told, alone as in a crowd, and refuse what makes no sense."""
+
+import numpy as np
+import pytest
+
+from motet import ControlError, ControlWarning, SteerModel, load
+from motet.motion.humanoid import HUMANOID
+from motet.motion.kinematics import positions
+from motet.motion.pose import Pose
+
+
+@pytest.fixture(scope="module")
+def model() -> SteerModel:
+    return load("control")
+
+
+def walked(model: SteerModel, ticks: int, **control: float) -> list[Pose]:
+    session = model.start()
+    session.control(**control)
+    return [session.tick() for _ in range(ticks)]
+
+
+@pytest.mark.parametrize(("gait", "speed"), [("walk", 0.8), ("walk", 1.5), ("run", 3.0), ("run", 4.0)])
+def test_it_goes_as_fast_and_where_it_is_told(model: SteerModel, gait: str, speed: float) -> None:
+    session = model.start(gait)
+    session.control(speed=speed, direction=60)
+    poses = [session.tick() for _ in range(90)]
+    velocity = (poses[-1].ground - poses[-31].ground)[0, :2]
+    assert np.hypot(*velocity) == pytest.approx(speed, rel=0.1)
+    assert np.degrees(np.arctan2(velocity[0], velocity[1])) == pytest.approx(60, abs=5)
+    assert np.degrees(poses[-1].ground[0, 2]) == pytest.approx(60, abs=8)
+
+
+def test_it_walks_backwards_and_stands_still(model: SteerModel) -> None:
+    session = model.start()
+    session.control(speed=1.0, direction=180, facing=0)
+    poses = [session.tick() for _ in range(60)]
+    assert poses[-1].ground[0, 1] < -1
+    assert abs(np.degrees(poses[-1].ground[0, 2])) < 15
+    session.control(speed=0)
+    poses = [session.tick() for _ in range(90)]
+    assert np.hypot(*(poses[-1].ground - poses[-31].ground)[0, :2]) < 0.1
+    assert poses[-1].contacts.min() > 0.5
+
+
+def test_each_of_a_crowd_moves_as_it_would_alone(model: SteerModel) -> None:
+    ways = np.array([0.0, 90.0, -120.0])
+    crowd = model.start(characters=3)
+    crowd.control(gait=["walk", "run", "walk"], speed=[1.0, 3.0, 1.5], direction=ways)
+    together = [crowd.tick() for _ in range(60)]
+    alone = model.start("run")
+    alone.control(speed=3.0, direction=90)
+    own = [alone.tick() for _ in range(60)]
+    # searches of a crowd are spread over ticks, so that they differ by when a row is found
+    np.testing.assert_allclose(together[-1].ground[1, :2], own[-1].ground[0, :2], atol=0.5)
+    again = model.start(characters=3)
+    again.control(gait=["walk", "run", "walk"], speed=[1.0, 3.0, 1.5], direction=ways)
+    for pose in together:
+        np.testing.assert_array_equal(again.tick().rotations, pose.rotations)
+
+
+def test_a_snapshot_comes_back_to_the_same_bits(model: SteerModel) -> None:
+    session = model.start(characters=2)
+    session.control(speed=1.4, direction=[0, 45])
+    for _ in range(20):
+        session.tick()
+    snapshot = session.snapshot()
+    first = [session.tick() for _ in range(20)]
+    session.control(gait="run", speed=3)
+    session.tick()
+    session.restore(snapshot)
+    for pose in first:
+        again = session.tick()
+        np.testing.assert_array_equal(again.rotations, pose.rotations)
+        np.testing.assert_array_equal(again.ground, pose.ground)
+    with pytest.raises(ControlError, match="2 characters does not fit 1"):
+        model.start().restore(snapshot)
+
+
+def test_feet_that_are_held_slide_less(model: SteerModel) -> None:
+    def slide(hold_feet: bool) -> float:
+        session = model.start(hold_feet=hold_feet)
+        session.control(speed=1.6)
+        poses = [session.tick() for _ in range(150)]
+        toes = np.stack([pose.positions()[0, HUMANOID.index("leftToes")] for pose in poses])
+        stands = np.array([pose.contacts[0, 0] > 0.9 for pose in poses])
+        steps = np.linalg.norm(np.diff(toes[:, [0, 2]], axis=0), axis=1)
+        return float(steps[stands[1:] & stands[:-1]].mean())
+
+    assert slide(True) < 0.5 * slide(False)
+
+
+def test_between_ticks_a_display_sees_what_lies_between(model: SteerModel) -> None:
+    ticking, shown = model.start(), model.start()
+    for session in (ticking, shown):
+        session.control(speed=1.4)
+    ticks = [ticking.tick() for _ in range(12)]
+    for tick in range(10):
+        np.testing.assert_allclose(shown.advance(0).ground, ticks[tick].ground, atol=1e-5)
+        middle = shown.advance(0.5 / model.fps)
+        np.testing.assert_allclose(middle.ground, (ticks[tick].ground + ticks[tick + 1].ground) / 2, atol=1e-5)
+        np.testing.assert_allclose(np.linalg.norm(middle.rotations, axis=-1), 1, atol=1e-5)
+        shown.advance(0.5 / model.fps)
+
+
+def test_poses_are_the_motion_that_a_script_gives(model: SteerModel) -> None:
+    session = model.start(hold_feet=False)
+    session.control(speed=1.2, direction=30)
+    poses = [session.tick() for _ in range(40)]
+    motion = model.contract.motion(session.frames_of(poses)[0], plant=False)
+    found, seen = positions(motion), np.stack([pose.positions()[0] for pose in poses])
+    # the motion begins at the origin and faces z
+    shape = np.linalg.norm(found[:, :, None] - found[:, None], axis=-1)
+    np.testing.assert_allclose(shape, np.linalg.norm(seen[:, :, None] - seen[:, None], axis=-1), atol=1e-4)
+    way = np.linalg.norm(np.diff(found[:, 0], axis=0), axis=1)
+    np.testing.assert_allclose(way, np.linalg.norm(np.diff(seen[:, 0], axis=0), axis=1), atol=1e-4)
+
+
+def test_it_is_pushed_put_and_bent(model: SteerModel) -> None:
+    session = model.start(characters=2)
+    session.put([[1, 2, 90], [-1, 0, 0]])
+    np.testing.assert_allclose(session.tick().ground[:, :2], [[1, 2], [-1, 0]], atol=0.01)
+    session.push((4, 0))
+    pushed = [session.tick() for _ in range(60)]
+    assert (pushed[-1].ground[:, 0] - [1, -1] > 0.1).all()
+    assert np.abs(pushed[-1].ground - pushed[-10].ground).max() < 0.05  # caught
+    other = model.start("zombie")
+    other.control(speed=0.5)
+    zombie = [other.tick() for _ in range(30)][-1]
+    session.take(zombie)
+    bent = session.tick()
+    distance = np.abs(bent.rotations - zombie.rotations).max()
+    assert distance < 0.4
+    for _ in range(40):
+        bent = session.tick()
+    assert np.abs(bent.rotations - zombie.rotations).max() > distance
+
+
+def test_it_goes_on_from_a_motion(model: SteerModel) -> None:
+    walk = model.run("walk 2s speed 1.4")
+    session = model.start(walk)
+    np.testing.assert_allclose(
+        session.tick().positions()[0, :, 1], positions(model.contract.on_figure(walk))[-1, :, 1], atol=0.06
+    )
+
+
+def test_a_speed_that_a_gait_does_not_have(model: SteerModel) -> None:
+    session = model.start()
+    with pytest.warns(ControlWarning, match="20 m/s is out of what 'walk' can do"):
+        session.control(speed=20)
+    session.control(speed=21)  # said once
+    poses = [session.tick() for _ in range(60)]
+    assert np.hypot(*(poses[-1].ground - poses[-31].ground)[0, :2]) < 2.5
+    with pytest.raises(ControlError, match="20 m/s is out of"):
+        model.start(strict=True).control(speed=20)
+
+
+@pytest.mark.parametrize(
+    ("control", "reason"),
+    [
+        ({"speed": np.nan}, "speed must be of finite numbers"),
+        ({"direction": np.inf}, "direction must be of finite numbers"),
+        ({"speed": [1, 2, 3]}, "one for each of 2 characters"),
+        ({"gait": "swim"}, "unknown gait 'swim'; expected one of walk, run"),
+        ({"gait": ["walk"]}, "1 gaits do not fit 2 characters"),
+        ({"velocity": (1, 2, 3)}, "a velocity needs x and z"),
+        ({"velocity": (1, 2), "speed": 1}, "give it or them"),
+        ({"velocity": (np.nan, 2)}, "a velocity must be of finite numbers"),
+        ({"facing": "left"}, "facing needs a number"),
+    ],
+)
+def test_what_is_told_is_refused_and_changes_nothing(
+    model: SteerModel, control: dict[str, object], reason: str
+) -> None:
+    session, other = (model.start(characters=2) for _ in range(2))
+    with pytest.raises(ControlError, match=reason):
+        session.control(**control)  # type: ignore[arg-type]
+    for _ in range(3):
+        np.testing.assert_array_equal(session.tick().ground, other.tick().ground)
+
+
+def test_sessions_and_poses_that_make_no_sense(model: SteerModel) -> None:
+    for count in (0, 1_000_000):
+        with pytest.raises(ControlError, match="1 to 100000 characters"):
+            model.start(characters=count)
+    session = model.start(characters=2)
+    pose = session.tick()
+    with pytest.raises(ControlError, match="does not fit 2 characters"):
+        session.take(Pose(pose.ground, pose.rotations[:, :5], pose.height, pose.contacts))
+    with pytest.raises(ControlError, match="a pose must be of finite numbers"):
+        session.take(Pose(pose.ground, pose.rotations * np.float32(np.nan), pose.height, pose.contacts))
+    with pytest.raises(ControlError, match="advances by 0 to 1 s"):
+        session.advance(5)
+    with pytest.raises(ControlError, match="places need x, z and facing"):
+        session.put([1, 2])
+
+
+def test_a_velocity_of_no_length_stops_and_faces_as_before(model: SteerModel) -> None:
+    session = model.start()
+    session.control(velocity=(1.0, 1.0))
+    for _ in range(60):
+        pose = session.tick()
+    assert np.degrees(pose.ground[0, 2]) == pytest.approx(45, abs=8)
+    session.control(velocity=(0, 0))
+    for _ in range(60):
+        pose = session.tick()
+    assert np.degrees(pose.ground[0, 2]) == pytest.approx(45, abs=8)

@@ -1,0 +1,48 @@
+"""Scripts for figures that are steered."""
+
+import pytest
+
+from motet.errors import ScriptError
+from motet.models.steer_script import Order, captions, parse_orders
+
+GAITS = ("walk", "run")
+
+
+def test_orders_say_what_to_do_in_any_order_of_their_words() -> None:
+    script = "walk 3s speed 1.4, turn left 90, walk backwards 2s, run turn right 45 4s, stop"
+    assert parse_orders(script, GAITS) == [
+        Order("walk", 1.4, 0.0, 0.0, 3.0, "walk 3s speed 1.4"),
+        Order(None, -1.0, None, 90.0, 1.5, "turn left 90"),
+        Order("walk", None, 180.0, 0.0, 2.0, "walk backwards 2s"),
+        Order("run", None, 0.0, -45.0, 4.0, "run turn right 45 4s"),
+        Order(None, 0.0, None, 0.0, 1.5, "stop"),
+    ]
+    assert captions(parse_orders("walk, turn left 90 2s,stop 1s", GAITS)) == [
+        (0.0, "walk"),
+        (2.0, "turn left 90 2s"),
+        (4.0, "stop 1s"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("script", "position", "reason"),
+    [
+        ("", 0, "expected an order here: walk, run, turn or stop"),
+        ("walk 3s,", 8, "expected an order"),
+        ("walk 3s, , run", 9, "expected an order"),
+        ("swim 3s", 0, "unknown order 'swim'"),
+        ("walk 3", 5, "expected seconds"),
+        ("walk speed", 5, "expected metres a second after this"),
+        ("walk speed fast", 11, "expected metres a second, such as"),
+        ("turn 90", 5, "expected left or right"),
+        ("turn left", 5, "expected degrees after this"),
+        ("walk 3s 4s", 8, "says its seconds twice"),
+        ("walk 9999s", 0, "at most 3600 s"),
+        ("walk -3s", 5, "expected seconds"),
+        ("walk>run 3s", 0, "unknown order 'walk>run'"),
+    ],
+)
+def test_errors_mark_their_place(script: str, position: int, reason: str) -> None:
+    with pytest.raises(ScriptError, match=reason) as caught:
+        parse_orders(script, GAITS)
+    assert caught.value.position == position
