@@ -18,6 +18,7 @@ from motet.models.language import LanguageModel
 from motet.models.load import build
 from motet.models.predict import PredictModel
 from motet.models.search import SearchModel
+from motet.models.steer import SteerModel
 from motet.models.text import MAX_WORDS, SPECIALS
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
@@ -36,7 +37,10 @@ Graphs = Mapping[str, Graph]
 def whole_runs(manifest: Manifest, onnx: Graphs, torch: Graphs) -> Runs:
     """The runs by which a bundle of the manifest's verb is judged, each by its name."""
     models = [build(manifest, graphs) for graphs in (onnx, torch)]
-    return {name: partial(_pair, models, run) for name, run in _RUNS[manifest.verb](models[0]).items()}
+    return {
+        name: partial(_pair, models, run)
+        for name, run in _RUNS.get(manifest.loop, _RUNS[manifest.verb])(models[0]).items()
+    }
 
 
 def _control(_: ControlModel) -> Named:
@@ -52,6 +56,20 @@ def _controlled(variety: float, model: ControlModel) -> Decoded:
     iterations = 2 if model.has_free_units else 1
     session = model.start(characters=4, seed=7, variety=variety, iterations=iterations, smooth=False)
     return {"frames": session.frames(smooth.clip(0, 1))}
+
+
+def _steer(_: SteerModel) -> Named:
+    return {"steered": _steered}
+
+
+def _steered(model: SteerModel) -> Decoded:
+    """Four characters in all gaits, one after the other, for a second each, every one in another direction."""
+    session = model.start(characters=4)
+    poses = []
+    for gait in model.gaits:
+        session.control(gait=gait, speed=model.usual[gait], direction=np.arange(4) * 70.0 - 100)
+        poses += [session.tick() for _ in range(round(model.fps))]
+    return {"frames": session.frames_of(poses)}
 
 
 def _describe(model: DescribeModel) -> Named:
@@ -149,6 +167,7 @@ def _sentences(model: LanguageModel) -> list[str]:
 
 _RUNS: Mapping[str, Callable[..., Named]] = {
     "control": _control,
+    "matching": _steer,
     "describe": _describe,
     "generate": _generate,
     "predict": _predict,

@@ -17,6 +17,7 @@ from motet.models.language import LanguageModel
 from motet.models.load import build
 from motet.models.predict import PredictModel
 from motet.models.search import SearchModel
+from motet.models.steer import SteerModel
 from motet.models.text import SPECIALS
 from motet_export.examples import Examples, walks
 
@@ -38,7 +39,7 @@ def golden_vectors(
     """The file of golden vectors, and what the manifest says of it."""
     rng, model = np.random.default_rng(5), build(manifest, graphs)
     feeds = {role: draws[role](rng, ROWS) for role in graphs}
-    given, settings = _RUNS[manifest.verb](model, rng)
+    given, settings = _RUNS.get(manifest.loop, _RUNS[manifest.verb])(model, rng)
     entry = {"file": FILE, "tolerance": INT8_TOLERANCE if int8 else TOLERANCE, "run": settings}
     return vectors(model, feeds, given, settings), entry
 
@@ -50,6 +51,12 @@ def _control(model: ControlModel, rng: np.random.Generator) -> Run:
     iterations = 2 if model.has_free_units else 1
     noise = rng.random((TICKS * iterations, model.sizes["N"]), np.float32)
     return {"track": track, "noise": noise}, {"iterations": iterations}
+
+
+def _steer(_: SteerModel, rng: np.random.Generator) -> Run:
+    """Off into any direction, and into another, at a walk's speeds."""
+    asked = rng.uniform(-1.5, 1.5, (2, 3))
+    return {"track": np.repeat(asked, TICKS, axis=0).astype(np.float32)}, {}
 
 
 def _describe(model: DescribeModel, rng: np.random.Generator) -> Run:
@@ -87,6 +94,7 @@ def _text(model: LanguageModel, rng: np.random.Generator) -> str:
 
 _RUNS: Mapping[str, Callable[..., Run]] = {
     "control": _control,
+    "matching": _steer,
     "describe": _describe,
     "generate": _generate,
     "predict": _predict,

@@ -16,7 +16,7 @@ from motet.bundle.graph import Graph, GraphSpec
 from motet.errors import MotetError
 from motet.files import write_whole
 from motet_train.models.codes import actions, codec, motion_codes
-from motet_train.models.control import angle_crbm, tdbn
+from motet_train.models.control import angle_crbm, matching, tdbn
 from motet_train.models.language import joint_embedding, language_to_motion, motion_to_language
 from motet_train.models.net import Net
 from motet_train.models.predict import predictor, systems
@@ -33,6 +33,7 @@ MODELS: Mapping[str, Callable[[Mapping[str, Any]], Net]] = {
     "motion-codec": codec.from_config,
     "motion-codes": motion_codes.from_config,
     "angle-crbm": angle_crbm.from_config,
+    "motion-matching": matching.from_config,
     "trajectory": predictor.from_config,
     **{name: partial(systems.stepwise, name) for name in systems.SYSTEMS},
 }

@@ -5,7 +5,9 @@ import click
 from motet_train.cli.train_codec import actions, codec, codes
 from motet_train.cli.train_control import crbm, tdbn
 from motet_train.cli.train_language import describe, generate, search
+from motet_train.cli.train_matching import matching
 from motet_train.cli.train_predict import predict
+from motet_train.cli.train_steered import steered
 from motet_train.cli.train_systems import COMMANDS
 
 
@@ -14,5 +16,5 @@ def train() -> None:
     """Train a model; the run goes into a new folder that evaluate and export take."""
 
 
-for command in (tdbn, crbm, describe, codec, actions, codes, generate, search, predict, *COMMANDS):
+for command in (matching, steered, tdbn, crbm, describe, codec, actions, codes, generate, search, predict, *COMMANDS):
     train.add_command(command)

@@ -1,0 +1,59 @@
+"""What motion matching is trained from: the table of rows, and the principal components of their poses."""
+
+import numpy as np
+import torch
+
+from motet.motion.rotations import Array
+from motet_train.data.matching_rows import MatchingRows, mirrored_poses
+from motet_train.models.codes.sixd_places import Tree
+from motet_train.models.control.matching import FINE, Matching
+
+SHORTEST = 0.05
+"""Metres: how far a bone that carries nothing counts as reaching."""
+
+MOST = 4000
+"""Poses that the components are found from."""
+
+
+@torch.no_grad()
+def take(net: Matching, rows: MatchingRows) -> None:
+    """Fill a net with rows: their table, and codes that are the principal components of poses and mirrored poses."""
+    mean, scale = (np.array(part) for part in (net.config.mean, net.config.scale))
+    features = np.clip(np.round((rows.features - mean) * scale * FINE), -127, 127)
+    rest = np.column_stack([rows.moves, rows.speed, rows.contacts])
+    columns, signs = mirrored_poses()
+    mean_pose = rows.poses.mean(axis=0)
+    middle = (mean_pose + mean_pose[columns] * signs) / 2
+    weights, off = _reach(net.config.tree), rows.poses - middle
+    halves = [(off + sign * off[:, columns] * signs) / 2 * weights for sign in (1, -1)]
+    axes = np.concatenate([_axes(half, n) for half, n in zip(halves, (net.config.even, net.config.odd), strict=True)])
+    values = (features, rest, rows.gaits, rows.left, middle, off * weights @ axes.T, axes / weights)
+    parts = (net.features, net.rest, net.shown, net.left, net.middle, net.codes, net.basis)
+    for part, value in zip(parts, values, strict=True):
+        part.copy_(torch.from_numpy(value))
+
+
+def _axes(poses: Array, count: int) -> Array:
+    """The first principal axes (count, P) of poses (N, P) about 0."""
+    _, _, axes = np.linalg.svd(poses[:: max(1, len(poses) // MOST)], full_matrices=False)
+    found: Array = axes[:count]
+    return found
+
+
+def _reach(tree: Tree) -> Array:
+    """How far each bone carries others, metres: by so much the numbers (P,) of its quaternion count."""
+    places = np.zeros((len(tree.parents), 3))
+    for joint, parent in enumerate(tree.parents):
+        if parent >= 0:
+            places[joint] = places[parent] + tree.offsets[joint]
+    far = [np.linalg.norm(places[_carried(tree, bone)] - places[bone], axis=1).max() for bone in tree.bones]
+    return np.append(np.repeat(np.maximum(far, SHORTEST), 4), 1.0)
+
+
+def _carried(tree: Tree, bone: int) -> list[int]:
+    """A bone and all joints that it carries."""
+    found = [bone]
+    for joint, parent in enumerate(tree.parents):
+        if parent in found:
+            found.append(joint)
+    return found
