@@ -20,9 +20,11 @@ from motet.models.generate import GenerateModel
 from motet.models.load import Model, build, load, load_as
 from motet.models.predict import PredictModel
 from motet.models.search import SearchModel
+from motet.models.steer import SteerModel
 from motet_train.cli.evaluate_language import by_subject, language_reports
 from motet_train.cli.evaluate_predict import predict_reports
 from motet_train.cli.evaluate_says import Best, says_reports
+from motet_train.cli.evaluate_steer import as_steered, steer_reports
 from motet_train.cli.train_options import unit_in
 from motet_train.data.clips import Clips, read_clips
 from motet_train.data.errors import DataError
@@ -30,6 +32,7 @@ from motet_train.evaluate.control.experiments import GOALS, control_report, stud
 from motet_train.evaluate.language.report import GOALS as LANGUAGE_GOALS
 from motet_train.evaluate.language.search import GOALS as SEARCH_GOALS
 from motet_train.evaluate.says.table import says_text
+from motet_train.evaluate.steer.report import steer_text
 from motet_train.evaluate.tables import Report, json_ready, report_table
 from motet_train.recipes.recipe import SETTINGS
 from motet_train.runs import MANIFEST, Run
@@ -41,7 +44,8 @@ from motet_train.settings import read_settings
 @click.option(
     "--data",
     type=Path,
-    help="Control: the clips. [default: those it was trained on] Describe, generate and search: the store. "
+    help="Control: the clips. [default: those it was trained on] Describe, generate, search and figures that "
+    "are steered: the store. "
     "Predict: text files of the protocol, or the store. With --says: a store or a folder or zip of motion files "
     "with a table of sentences, for the columns of real trials and of the look-up.",
 )
@@ -72,11 +76,13 @@ def evaluate(
 ) -> None:
     """Run the papers' experiments on MODELS: run folders, or names and paths of bundles.
 
-    Control: the thesis' experiments. Describe and generate: BLEU, floors, attributes, measures; with both, of the
-    same split, also the chain from sentence to motion and back. Predict: the protocol's Euler errors on its text files,
-    beside zero velocity and published rows, or distances in held out motion files. With --says, generate: the share of
-    motions that do what everyday prompts say, how good they are, whatever they show, and how near they are to their
-    prompts and to recorded motions in the space of a search model.
+    Control: the thesis' experiments. Figures that are steered: how well their feet stand, whether they go where they
+    are told, whether their poses stay whole whatever they are told, beside recordings. Describe and generate: BLEU,
+    floors, attributes, measures; with both, of the same split, also the chain from sentence to motion and back.
+    Predict: the protocol's Euler errors on its text files, beside zero velocity and published rows, or distances in
+    held out motion files. With --says, generate: the share of motions that do what everyday prompts say, how good they
+    are, whatever they show, and how near they are to their prompts and to recorded motions in the space of a search
+    model.
     """
     if says and save:
         raise click.UsageError("--says prints figures, and draws them with --plots; it does not go with --save")
@@ -120,17 +126,20 @@ def _measured(
     models: Mapping[str, Model], data: Path | None, plots: Path | None, unit: str | None
 ) -> tuple[dict[str, Any], str]:
     """The figures of each model, ready for JSON, and all of them as text."""
-    controls = {name: model for name, model in models.items() if isinstance(model, ControlModel)}
+    steered = {name: one for name, model in models.items() if (one := as_steered(model)) is not None}
+    controls = {name: m for name, m in models.items() if isinstance(m, ControlModel) and name not in steered}
     others = {
         name: model for name, model in models.items() if isinstance(model, DescribeModel | GenerateModel | SearchModel)
     }
     predicts = {name: model for name, model in models.items() if isinstance(model, PredictModel)}
-    if sum(map(bool, (controls, others, predicts))) > 1:
+    if sum(map(bool, (controls, others, predicts, steered))) > 1:
         raise click.UsageError("evaluate control, predict and language models separately: their data differ")
     if plots is not None:
         from motet_train.evaluate.figures import make_folder
 
         make_folder(plots)  # what cannot be written is said before hours of measuring
+    if steered:
+        return _steered(steered, data, plots)
     if predicts:
         return predict_reports(predicts, data, plots)
     reports = _control(controls, data, plots, unit) if controls else language_reports(others, data, plots)
@@ -139,6 +148,13 @@ def _measured(
         if (other := by_subject(others, name)) is not None:
             ready[name]["people_unseen"] = json_ready(reports[other])
     return ready, report_table(reports, GOALS if controls else {**LANGUAGE_GOALS, **SEARCH_GOALS})
+
+
+def _steered(models: Mapping[str, SteerModel], data: Path | None, plots: Path | None) -> tuple[dict[str, Any], str]:
+    if plots is not None:
+        raise click.UsageError("figures that are steered have no --plots")
+    reports = steer_reports(models, data)
+    return {name: json_ready(report) for name, report in reports.items()}, steer_text(reports)
 
 
 def _control(

@@ -37,14 +37,19 @@ def aligned(rows: Sequence[Sequence[str]], left: Sequence[int] = (0,)) -> str:
     return "\n".join(map(line, rows))
 
 
-def report_table(reports: Mapping[str, Report], goals: Goals) -> str:
-    """One line per figure that any report has, one column per report, and the goal beside those that have one."""
-    rows = [["", *short_names(list(reports)), ""]]
+def report_table(reports: Mapping[str, Report], goals: Goals, beside: Mapping[str, Report] | None = None) -> str:
+    """One line per figure that any report has, one column per report, and the goal beside those that have one.
+
+    beside: further columns, which need not reach goals.
+    """
+    others = beside or {}
+    rows = [["", *short_names(list(reports)), *others, ""]]
     for group, key in _names(reports):
         name, values = f"{group}.{key}", [report.get(group, {}).get(key) for report in reports.values()]
-        cells = ["" if value is None else f"{value:.4g}" for value in values]
-        rows.append([name, *cells, _goal(goals, name, [value for value in values if value is not None])])
-    return aligned(rows, left=(0, len(reports) + 1))
+        cells = [*values, *(report.get(group, {}).get(key) for report in others.values())]
+        shown = ["" if value is None else f"{value:.4g}" for value in cells]
+        rows.append([name, *shown, _goal(goals, name, [value for value in values if value is not None])])
+    return aligned(rows, left=(0, len(reports) + len(others) + 1))
 
 
 def short_names(names: Sequence[str]) -> list[str]:

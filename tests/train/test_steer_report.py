@@ -1,0 +1,192 @@
+"""The report of figures that are steered, of a model trained in seconds on two recordings; its command, its speed."""
+
+import json
+import warnings
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from codes_data import PREPARATION, trained
+
+from motet import to_humanoid
+from motet.bench import figures
+from motet.bundle.manifest import Manifest
+from motet.cli import main
+from motet.formats import read_motion
+from motet.models.load import build
+from motet.models.steer import SteerModel
+from motet.motion.humanoid import HUMANOID, sole_points
+from motet.motion.kinematics import global_transforms
+from motet.representation import named
+from motet_train.data import clips
+from motet_train.data.errors import DataError
+from motet_train.data.locomotion import Gait, recordings
+from motet_train.data.records import Record
+from motet_train.data.store import Store, prepare
+from motet_train.eager import eager_model
+from motet_train.evaluate.steer import following, standing
+from motet_train.evaluate.steer.report import Recorded, seldom, steer_report, steer_text
+from motet_train.evaluate.tables import report_table
+from motet_train.runs import Run
+
+GAITS = tuple(Gait(name, (name,), ("*",)) for name in ("walk", "run"))
+
+SETTINGS = """
+[training]
+steps = 2
+every = 2
+batch = 8
+[model]
+even = 6
+odd = 6
+"""
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
+    """A walk, and a run: the same, twice as fast."""
+    walk = read_motion(Path(clips.__file__).parent / "cmu" / "39_14.amc")
+    motions = {"walk": walk, "run": replace(walk, fps=240.0)}
+    found = [Record(name, "16", to_humanoid(motion).motion, (), (), action=name) for name, motion in motions.items()]
+    return prepare(iter(found), tmp_path_factory.mktemp("steer") / "store", PREPARATION)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def two_gaits() -> Any:
+    with pytest.MonkeyPatch.context() as patch:
+        for place in ("motet_train.recipes.matching", "motet_train.evaluate.steer.report"):
+            patch.setattr(f"{place}.read_gaits", lambda: GAITS)
+        yield
+
+
+@pytest.fixture(scope="module")
+def folder(store: Store, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the store is; and, trained from it, a run."""
+    place = tmp_path_factory.getbasetemp() / "steer0"
+    trained("matching", SETTINGS, place / "store", place / "run")
+    return place
+
+
+@pytest.fixture(scope="module")
+def model(folder: Path) -> SteerModel:
+    run = Run.load(folder / "run")
+    found = build(Manifest.from_json(run.manifest), run.torch_graphs())
+    assert isinstance(found, SteerModel)
+    return found
+
+
+@pytest.fixture(scope="module")
+def reports(model: SteerModel, store: Store) -> Any:
+    parts: list[str] = []
+    with pytest.MonkeyPatch.context() as patch, warnings.catch_warnings():
+        warnings.simplefilter("error")
+        patch.setattr(following, "PHASES", 1)
+        patch.setattr(following, "SETTLE", 0.2)
+        patch.setattr(standing, "SETTLE", 0.2)
+        patch.setattr(standing, "MEASURED", 2.0)
+        return steer_report(model, Recorded.of(store), parts.append, minutes=0.02, characters=3), parts
+
+
+def test_all_is_measured_beside_recordings_and_the_rival(reports: Any) -> None:
+    report, parts = reports
+    groups = ["walk", "run", "speed", "turn_walk", "turn_run", "aside", "random"]
+    kinds = [f"{gait}_{kind}" for gait in ("walk", "run") for kind in ("recorded", "held")]
+    assert list(report) == [*groups, *(f"{group}_seldom" for group in groups), *kinds, "random_held"]
+    assert parts[: len(groups)] == groups
+    assert parts[-2:] == ["walk_recorded", "run_recorded"]
+    for group in groups:
+        assert list(report[group]) == list(report[f"{group}_seldom"])
+    assert all(np.isfinite(value) for value in report["walk"].values())
+    # held feet slide less than those that were recorded
+    assert report["walk_held"]["slide_cm"] < report["walk_recorded"]["slide_cm"] < 5
+    assert report["walk"]["slide_cm"] < report["walk"]["free_slide_cm"]
+
+
+def test_the_table_has_a_column_of_each(reports: Any) -> None:
+    report, _ = reports
+    lines = steer_text({"runs/mine": report}).splitlines()
+    for head in ("mine", "as recorded", "feet held", "seldom searched"):
+        assert head in lines[0]
+    rows = {line.split()[0]: line.split() for line in lines[1:]}
+    assert rows["walk.slide_cm"][1:5] == [
+        f"{report[f'walk{kind}']['slide_cm']:.4g}" for kind in ("", "_recorded", "_held", "_seldom")
+    ]
+    assert rows["walk.toe_speed"][-2:] == ["<=", "0.15"]
+    assert not any("_held" in name or "_seldom" in name for name in rows)
+
+
+def test_columns_beside_need_not_reach_goals() -> None:
+    goals = {"a.x": (None, 1.0)}
+    text = report_table({"m": {"a": {"x": 0.5}}}, goals, {"other": {"a": {"x": 2.0}}})
+    assert text.splitlines()[1].split() == ["a.x", "0.5", "2", "<=", "1"]
+    assert "NOT REACHED" in report_table({"m": {"a": {"x": 2.0}}}, goals, {"other": {"a": {"x": 0.5}}})
+
+
+def test_the_rival_searches_seldom(model: SteerModel) -> None:
+    rival = seldom(model)
+    assert (model.matcher.every, rival.matcher.every) == (6, 30)
+    assert rival.matcher.reserve > 30
+    session = rival.start("walk")
+    session.control(speed=1.3)
+    rows = [session.tick() and float(session._playing.row[0]) for _ in range(90)]
+    assert np.count_nonzero(np.abs(np.diff(rows)) > 2) <= 3
+
+
+def test_recordings_come_with_their_feet_held_and_as_they_are(store: Store) -> None:
+    held, plain = (recordings(store, GAITS, held) for held in (True, False))
+    np.testing.assert_array_equal(plain[0].features.values, store.motion(0).values[1:-1])
+    assert 0 < np.abs(held[0].features.values - plain[0].features.values).max() < 0.5
+
+
+def test_what_does_not_fit_is_refused(model: SteerModel, store: Store, folder: Path) -> None:
+    with pytest.raises(DataError, match=r"root_sixd \(motet prepare --for codes\), not angles"):
+        Recorded.of(replace(store, representation="angles"))
+    recorded = Recorded.of(store)
+    other = build(replace(model.manifest, config={**model.manifest.config, "gaits": ["walk", "hop"]}), model.graphs)
+    assert isinstance(other, SteerModel)
+    with pytest.raises(DataError, match="has no 'run'"):
+        steer_report(other, recorded)
+    for more, said in (
+        ((), "--data: the store"),
+        (("--data", folder / "store", "--plots", folder / "p"), "no --plots"),
+    ):
+        result = CliRunner().invoke(main, ["evaluate", str(folder / "run"), *map(str, more)])
+        assert result.exit_code == 2
+        assert said in result.output
+
+
+def test_the_command_prints_and_saves(folder: Path, monkeypatch: pytest.MonkeyPatch, reports: Any) -> None:
+    def short(model: SteerModel, recorded: Recorded, told: Any) -> Any:
+        told("walk")
+        return reports[0]
+
+    monkeypatch.setattr("motet_train.cli.evaluate_steer.steer_report", short)
+    asked = ["evaluate", str(folder / "run"), "--data", str(folder / "store")]
+    result = CliRunner().invoke(main, [*asked, "--json", "--save"])
+    assert result.exit_code == 0, result.output
+    found = json.loads(result.stdout)
+    assert found["random"]["broken"] == reports[0]["random"]["broken"]
+    assert Run.load(folder / "run").manifest["quality"] == found
+    result = CliRunner().invoke(main, asked)
+    assert "seldom searched" in result.stdout
+    assert "walk.slide_cm" in result.stdout
+
+
+def test_bench_measures_a_tick_and_a_crowd(model: SteerModel) -> None:
+    names = ["tick", "tick_p99", "tick_locked", "tick_locked_p99", "crowd", "crowd_locked", "crowd_positions"]
+    for one in (model, eager_model(model.manifest, 1)):
+        found = figures(one, 0.001)
+        assert list(found) == [f"control.{name}" for name in names]
+        assert all(value > 0 for value, _ in found.values())
+        assert found["control.tick"][0] < found["control.tick_locked"][0]
+
+
+def test_soles_of_quaternions_are_those_of_matrices(store: Store) -> None:
+    recording, track = Recorded.of(store).held[0]
+    motion = named("root_sixd").motion(recording.features)
+    expected = sole_points(*global_transforms(motion))
+    np.testing.assert_allclose(track.soles[:, 0], expected, atol=1e-4)
+    assert motion.skeleton == HUMANOID

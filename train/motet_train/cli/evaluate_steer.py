@@ -1,0 +1,40 @@
+"""``motet evaluate`` of figures that are steered."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import cast
+
+import click
+from tqdm import tqdm
+
+from motet.models.control import ControlModel
+from motet.models.load import Model
+from motet.models.steer import SteerModel
+from motet_train.data.store import Store
+from motet_train.evaluate.steer.driven import Driven
+from motet_train.evaluate.steer.report import Recorded, steer_report
+from motet_train.evaluate.tables import Report
+
+
+def as_steered(model: Model) -> SteerModel | None:
+    """What is measured as a figure that is steered: a model of them, or what stands for it; None for all others."""
+    if isinstance(model, ControlModel) and Driven.fits(model):
+        return cast(SteerModel, Driven(model))
+    return model if isinstance(model, SteerModel) else None
+
+
+def steer_reports(models: Mapping[str, SteerModel], data: Path | None) -> dict[str, Report]:
+    """The report of each model, beside the recordings of a store."""
+    if data is None:
+        raise click.UsageError("figures that are steered need --data: the store that they were trained on")
+    recorded = Recorded.of(Store.open(data))
+    reports = {}
+    with tqdm(unit=" parts", disable=None, leave=False) as bar:
+        for name, model in models.items():
+
+            def told(part: str, name: str = name) -> None:
+                bar.set_description(f"{name}: {part}")
+                bar.update()
+
+            reports[name] = steer_report(model, recorded, told)
+    return reports

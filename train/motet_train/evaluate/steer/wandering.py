@@ -1,0 +1,211 @@
+"""Figures that are told anything at random, for minutes: whether their poses stay whole, and whether they go.
+
+Every .2 to 3 s a figure is told another gait, speed, direction and facing. What its joints do from tick to tick is
+held against what they do in the recordings that it plays (:class:`Limits`).
+"""
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motet.models.steer import SteerModel
+from motet.motion.humanoid import BONES, HUMANOID
+from motet.motion.rotations import Array
+from motet.motion.sides import partners_of
+from motet_train.evaluate.steer.track import Track
+
+EACH = (0.2, 3.0)
+"""Seconds from one change to the next."""
+
+STILL, ALONG = 0.15, 0.5
+"""The share of changes that ask to stand, and of those that ask to face where it goes."""
+
+LEAP = 1.1
+"""Times as far as in any recording: a joint that is moved farther in a tick, seen from the figure itself, leaps."""
+
+BESIDE = 0.05
+"""Metres: hips that are so much lower or higher than in any recording are broken."""
+
+UNDER = 0.03
+"""Metres: soles that are deeper are under the ground."""
+
+ASKED, WITHIN, SHARE = 0.4, 2.0, 1 / 3
+"""A figure freezes that was asked to go at more m/s for seconds, and went less than this share of it."""
+
+STIFF, STIFF_FOR = 0.01, 0.5
+"""Degrees a tick by which no joint turns, for seconds: such a figure freezes, too."""
+
+CHUNK = 30
+"""Ticks whose joints are looked at together."""
+
+Flags = NDArray[np.bool_]
+Numbers = NDArray[Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """The most of recordings, and of their mirror images. turn: (J,) degrees that bones turn by in a frame, the hips
+    seen from the facing. leap: (J',) metres that joints move in a frame, seen from the figure. low, high: of the hips.
+    """
+
+    turn: Array
+    leap: Array
+    low: float
+    high: float
+
+    @staticmethod
+    def of(tracks: list[Track]) -> "Limits":
+        """Those of recordings."""
+        turn = _either(np.max([turns(track).max(axis=(0, 1)) for track in tracks], axis=0), BONES)
+        leap = _either(np.max([leaps(track).max(axis=(0, 1)) for track in tracks], axis=0), HUMANOID.names)
+        heights = np.concatenate([track.height[:, 0] for track in tracks])
+        return Limits(turn, leap, float(heights.min()), float(heights.max()))
+
+
+def _either(values: Array, names: tuple[str, ...]) -> Array:
+    found: Array = np.maximum(values, values[list(partners_of(names))])
+    return found
+
+
+def turns(track: Track) -> Array:
+    """Degrees (T - 1, B, J) by which bones turn from frame to frame, seen from their parents."""
+    a, b = track.rotations[:-1].astype(np.float64), track.rotations[1:]
+    signs = np.where((a * b).sum(axis=-1, keepdims=True) < 0, -1, 1)
+    chord = np.linalg.norm(a - signs * b, axis=-1)
+    found: Array = np.degrees(4 * np.arcsin(np.minimum(chord / 2, 1)))
+    return found
+
+
+def leaps(track: Track) -> Array:
+    """Metres (T - 1, B, J') by which joints move from frame to frame, as the figures see it."""
+    found: Array = np.linalg.norm(np.diff(track.seen().places, axis=0), axis=-1)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Watch:
+    """What T ticks of B figures were: each array is (T, B) but ``ground`` (T, B, 3).
+
+    asked: m/s. since: ticks since the last change, 0 at the tick that follows it. gait: its number. finite: whether
+    all is. turn, bone: degrees that the bone turned which turned most, and which. leap, joint: how far the joint
+    moved that went the farthest beside its limit, as a share of that, and which. height: of the hips. lowest: of the
+    soles. All of turn and leap is 0 in the first tick.
+    """
+
+    ground: Numbers
+    asked: Numbers
+    since: Numbers
+    gait: Numbers
+    finite: Flags
+    turn: Numbers
+    bone: Numbers
+    leap: Numbers
+    joint: Numbers
+    height: Numbers
+    lowest: Numbers
+
+
+class _Teller:
+    """Tells B figures something else at random times."""
+
+    def __init__(self, model: SteerModel, characters: int, seed: int) -> None:
+        self.rng, self.fps, self.names = np.random.default_rng(seed), model.fps, np.array(model.gaits)
+        self.ranges = np.array([model.speeds[name] for name in model.gaits])
+        self.session = model.start(characters=characters)
+        self.left, self.since, self.gait = (np.zeros(characters, dtype=np.int64) for _ in range(3))
+        self.speed, self.direction, self.facing = (np.zeros(characters) for _ in range(3))
+
+    def tell(self) -> None:
+        """Before each tick."""
+        self.left -= 1
+        self.since += 1
+        who = np.flatnonzero(self.left < 0)
+        if not len(who):
+            return
+        rng, count = self.rng, len(who)
+        self.left[who], self.since[who] = np.round(rng.uniform(*EACH, count) * self.fps) - 1, 0
+        self.gait[who] = rng.integers(len(self.names), size=count)
+        low, high = self.ranges[self.gait[who]].T
+        self.speed[who] = np.where(rng.random(count) < STILL, 0.0, rng.uniform(low, high))
+        self.direction[who] = rng.uniform(-180, 180, count)
+        facing = rng.uniform(-180, 180, count)
+        self.facing[who] = np.where(rng.random(count) < ALONG, self.direction[who], facing)
+        gaits = self.names[self.gait].tolist()
+        self.session.control(gait=gaits, speed=self.speed, direction=self.direction, facing=self.facing)
+        self.speed = np.hypot(*self.session.told[:, :2].T)  # within what gaits can do that way
+
+
+def watched(model: SteerModel, limits: Limits, seconds: float, characters: int, seed: int = 1) -> Watch:
+    """What figures do that are told anything at random, with the foot lock."""
+    teller, fps = _Teller(model, characters, seed), model.fps
+    last, parts = [teller.session.tick()], []
+    for start in range(0, round(seconds * fps), CHUNK):
+        poses, asked = [], []
+        for _ in range(min(CHUNK, round(seconds * fps) - start)):
+            teller.tell()
+            poses.append(teller.session.tick())
+            asked.append((teller.speed.copy(), teller.since.copy(), teller.gait.copy()))
+        parts.append(_seen(Track.of([*last, *poses], fps), limits, *map(np.stack, zip(*asked, strict=True))))
+        last = poses[-1:]
+    return Watch(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Watch)))
+
+
+def _seen(track: Track, limits: Limits, asked: Array, since: Array, gait: Array) -> Watch:
+    """The watch of all frames of a track but the first."""
+    turned, moved, now = turns(track), leaps(track) / np.maximum(limits.leap, 1e-3), track[1:]
+    finite = np.isfinite(now.places).all(axis=(2, 3)) & np.isfinite(now.ground).all(axis=2)
+    return Watch(
+        ground=now.ground,
+        asked=asked.astype(np.float32),
+        since=since.astype(np.int32),
+        gait=gait.astype(np.uint8),
+        finite=np.asarray(finite),
+        turn=turned.max(axis=2).astype(np.float32),
+        bone=turned.argmax(axis=2).astype(np.uint8),
+        leap=moved.max(axis=2).astype(np.float32),
+        joint=moved.argmax(axis=2).astype(np.uint8),
+        height=now.height,
+        lowest=now.soles[..., 1].min(axis=2),
+    )
+
+
+def broken(watch: Watch, limits: Limits) -> Flags:
+    """Poses (T, B) that are not finite, or where a bone turned more in a tick than any does in a recording, or whose
+    hips are lower or higher than in any."""
+    inside = (watch.height >= limits.low - BESIDE) & (watch.height <= limits.high + BESIDE)
+    found: Flags = ~(watch.finite & (watch.turn <= limits.turn.max()) & inside)
+    return found
+
+
+def frozen(watch: Watch, fps: float) -> Flags:
+    """Ticks (T, B) at which a figure turns out to be frozen: it was told the same for :data:`WITHIN` seconds until
+    then, to go, and went too slowly along its path; or none of its joints has turned for :data:`STIFF_FOR`, for the
+    first time."""
+    ticks, stiff_for = round(WITHIN * fps), round(STIFF_FOR * fps)
+    steps = np.linalg.norm(np.diff(watch.ground[..., :2], axis=0, prepend=watch.ground[:1, :, :2]), axis=2)
+    path = np.cumsum(steps, axis=0, dtype=np.float64)
+    went = np.zeros_like(path)
+    went[ticks:] = path[ticks:] - path[:-ticks]
+    slow = (watch.since == ticks) & (watch.asked > ASKED) & (went / WITHIN < SHARE * watch.asked)
+    stiff = np.cumsum(watch.turn < STIFF, axis=0)
+    still = np.zeros_like(slow)
+    still[stiff_for:] = stiff[stiff_for:] - stiff[:-stiff_for] == stiff_for
+    still[1:] &= ~still[:-1]
+    found: Flags = slow | still
+    return found
+
+
+def wandering(model: SteerModel, limits: Limits, seconds: float, characters: int) -> dict[str, float]:
+    """Counts, all ticks of all figures: broken poses, freezes, leaps, soles under the ground; and the most of each."""
+    watch = watched(model, limits, seconds, characters)
+    return {
+        "broken": float(broken(watch, limits).sum()),
+        "frozen": float(frozen(watch, model.fps).sum()),
+        "leaps": float((watch.leap > LEAP).sum()),
+        "under_ground": float((watch.lowest < -UNDER).sum()),
+        "largest_turn": float(watch.turn.max()),
+        "largest_leap": float(watch.leap.max()),
+        "deepest_cm": 100 * float(max(0.0, -watch.lowest.min())),
+    }
