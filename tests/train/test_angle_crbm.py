@@ -42,7 +42,7 @@ def test_a_slow_rate_from_the_past_keeps_walking() -> None:
     run = train("walk", config=replace(AngleCRBMConfig(), iterations=10))
     study = study_of(ControlModel(Manifest.from_json(run.manifest), run.torch_graphs()), read_clips())
     assert study.run is None
-    assert set(experiments(study)) == {"cycle", "sync"}
+    assert set(experiments(study)) == {"cycle", "feet", "random", "sync"}
     figures = limit_cycle(study, seconds=30.0)
     assert figures["period_error"] < 0.05
     assert figures["drift"] < 0.005

@@ -25,9 +25,14 @@ def sequences() -> list[list[torch.Tensor]]:
     ]
 
 
+def controls(expansion: torch.Tensor) -> list[list[torch.Tensor]]:
+    """Those of labels: the same at all frames."""
+    return [[units.expand(len(one), -1) for one in found] for units, found in zip(expansion, sequences(), strict=True)]
+
+
 def test_windows_against_loops() -> None:
     expansion = torch.tensor([[1.0, 0.0, 0.0], [0.0, 1.0, 1.0]])
-    data = transitions(sequences(), expansion, taps=2, onsets=(1.0, 16.0))
+    data = transitions(sequences(), controls(expansion), taps=2, onsets=(1.0, 16.0))
     past, visible, control = [], [], []
     for label, found in enumerate(sequences()):
         for sequence in found:
@@ -41,8 +46,48 @@ def test_windows_against_loops() -> None:
     np.testing.assert_allclose(data.probabilities[8] / data.probabilities[11], 16, rtol=1e-5)
 
 
+def test_controls_are_those_of_the_frame_that_they_drive() -> None:
+    told = [[torch.arange(len(one))[:, None].float() for one in found] for found in sequences()]
+    data = transitions(sequences(), told, taps=2, onsets=(1.0, 1.0))
+    expected = [t for found in sequences() for one in found for t in range(2, len(one))]
+    assert data.control[:, 0].tolist() == expected
+
+
+def test_the_net_makes_the_end_of_its_past_itself() -> None:
+    """Against loops over rows; how many frames it makes is drawn, and all numbers of them are."""
+    told = [[torch.rand(len(one), 3, generator=torch.Generator().manual_seed(3)) for one in f] for f in sequences()]
+    data = transitions(sequences(), told, taps=2, onsets=(1.0, 1.0), own=2)
+    windows = [(g, i, t) for g, f in enumerate(sequences()) for i, one in enumerate(f) for t in range(4, len(one))]
+    crbm, generator = small_crbm(), torch.Generator().manual_seed(0)
+    layer = CRBMLayer(crbm, data, Learning(1), generator, clamped=True, recall=Past(own=2))
+    made = set()
+    for _ in range(20):
+        past, control = layer._own(data.past, data.control, 1.0)
+        first = sequences()[0][0]
+        number = next(n for n in range(3) if _close(past[0], _with_own(crbm, first, told[0][0], 4, n)))
+        made.add(number)
+        for row, (group, item, t) in enumerate(windows):
+            expected = _with_own(crbm, sequences()[group][item], told[group][item], t, number)
+            torch.testing.assert_close(past[row], expected)
+            torch.testing.assert_close(control[row], told[group][item][t])
+            torch.testing.assert_close(data.visible[row], sequences()[group][item][t])
+    assert made == {0, 1, 2}
+
+
+def _with_own(crbm: CRBM, frames: torch.Tensor, told: torch.Tensor, t: int, number: int) -> torch.Tensor:
+    found = list(frames[: t - number])
+    for at in range(t - number, t):
+        drive = torch.cat(found[-2:]) @ crbm.past_weight + told[at] @ crbm.hidden_weight + crbm.visible_bias
+        found.append(torch.sigmoid(drive))
+    return torch.cat(found[-2:])
+
+
+def _close(one: torch.Tensor, other: torch.Tensor) -> bool:
+    return bool(torch.allclose(one, other, atol=1e-5))
+
+
 def test_an_update_is_the_gradient_of_the_cross_entropy() -> None:
-    data = transitions(sequences(), torch.eye(2, 3), taps=2, onsets=(1.0, 1.0))
+    data = transitions(sequences(), controls(torch.eye(2, 3)), taps=2, onsets=(1.0, 1.0))
     crbm = small_crbm()
     past_weight, hidden_weight, bias = (
         p.detach().clone().requires_grad_() for p in (crbm.past_weight, crbm.hidden_weight, crbm.visible_bias)
@@ -66,7 +111,7 @@ def test_an_update_is_the_gradient_of_the_cross_entropy() -> None:
 
 @pytest.mark.parametrize("free", [0, 5])
 def test_clamping_free_units_and_more_steps_each_change_what_is_learned(free: int) -> None:
-    data = transitions(sequences(), torch.eye(2, 3), taps=2, onsets=(1.0, 1.0))
+    data = transitions(sequences(), controls(torch.eye(2, 3)), taps=2, onsets=(1.0, 1.0))
     results = {}
     for clamped, steps in ((True, 1), (False, 1), (True, 3)):
         crbm = small_crbm(free)

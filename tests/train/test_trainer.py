@@ -89,7 +89,10 @@ def control(restarts: int = 2, missed: Callable[[int], list[str]] | None = None)
     net = TDBN(TDBNConfig(rbm=lower, crbm=upper, restarts=restarts, tries=1, hidden_per_part=4), parts, 3)
     frames = [[torch.tensor(motion[::6].values).float() / 30 for motion in group] for group in clips.motions.values()]
     generator = torch.Generator().manual_seed(SEED)
-    stages, others = tdbn.stages(net, frames, (1.0, 1.0, 1.0), generator)
+    controls = [
+        [label.expand(len(one), -1) for one in group] for label, group in zip(torch.eye(3), frames, strict=True)
+    ]
+    stages, others = tdbn.stages(net, frames, controls, (1.0, 1.0, 1.0), generator)
     return DivergenceLearner(net, stages, generator, missed or (lambda enough: ["a", "b"]), others)
 
 
@@ -101,7 +104,7 @@ def baseline() -> DivergenceLearner:
 
 
 def _baseline(net: AngleCRBM, frames: list[list[Tensor]], generator: torch.Generator) -> Any:
-    stages, others = angle_crbm.stages(net, frames, (1.0,), generator)
+    stages, others = angle_crbm.stages(net, frames, [[torch.ones(40, 1)]], (1.0,), generator)
     return stages, generator, None, others
 
 

@@ -27,13 +27,15 @@ def body_parts(skeleton: Skeleton, channels: tuple[str, ...]) -> BodyParts:
     """Divide channels ("JOINT.rx") among the trunk and the limbs (thesis 4.1, figure 4.2).
 
     A limb begins at a joint of the left or the right side whose parent is in the middle. CMU's skeleton gives the
-    thesis' five parts: trunk with head, two legs, two arms.
+    thesis' five parts: trunk with head, two legs, two arms. Channels of no joint, which say where the root goes, are
+    the trunk's.
     """
     sides = sides_of(skeleton.names)
     limb_of = [TRUNK] * len(skeleton.joints)
     for i, joint in enumerate(skeleton.joints[1:], start=1):
         limb_of[i] = limb_of[joint.parent] if limb_of[joint.parent] != TRUNK or sides[i] == MIDDLE else joint.name
-    of_joint = [limb_of[skeleton.index(channel.rpartition(".")[0])] for channel in channels]
+    limbs = dict(zip(skeleton.names, limb_of, strict=True))
+    of_joint = [limbs.get(channel.rpartition(".")[0], TRUNK) for channel in channels]
     names = tuple(dict.fromkeys(of_joint))
     legs = [names.index(limb) for limb in _legs(skeleton, limb_of, sides) if limb in names]
     return BodyParts(names, np.array([names.index(limb) for limb in of_joint]), tuple(legs) if len(legs) == 2 else ())

@@ -11,6 +11,7 @@ from torch import Tensor
 from motet.bundle.manifest import Manifest
 from motet.models.control import ControlModel
 from motet.motion.rotations import Array
+from motet.motion.skeleton import Skeleton
 from motet.representation.contract import MotionContract, living
 from motet_train.data.body import body_parts
 from motet_train.data.clips import Clips
@@ -20,10 +21,11 @@ from motet_train.divergence import DivergenceLearner
 from motet_train.evaluate.control.experiments import missed_goals, study_of
 from motet_train.models.control import angle_crbm, tdbn
 from motet_train.models.control.angle_crbm import AngleCRBM, AngleCRBMConfig
-from motet_train.models.control.tdbn import TDBN, TDBNConfig
+from motet_train.models.control.contrastive import Stage
+from motet_train.models.control.tdbn import TDBN, Sequences, TDBNConfig
 from motet_train.recipes.recipe import Job, Recipe
 from motet_train.runs import Run
-from motet_train.trainer import Line, kept
+from motet_train.trainer import Line, Part, kept
 
 RECIPES = {
     "default": Recipe("control", "tdbn", "session", TDBNConfig()),
@@ -40,7 +42,7 @@ def train_control(clips: Clips, job: Job) -> Run:
     config = job.recipe.config
     found = clips.frames(config.fps)
     _check_lengths(found, config.taps)
-    net = _untrained(clips, config)
+    net = untrained(config, clips.skeleton, clips.channels, len(clips.labels))
     units = ("deg",) * len(clips.channels)
     mean, std = _statistics(found, units)
     net.measure_by(mean, std * config.sigma)
@@ -50,10 +52,9 @@ def train_control(clips: Clips, job: Job) -> Run:
     net.to(job.device)
     generator = torch.Generator(job.device).manual_seed(job.about.seed)
     given = [[frames.to(job.device) for frames in group] for group in _tensors(found)]
-    if isinstance(net, TDBN):
-        stages, others = tdbn.stages(net, given, onsets, generator)
-    else:
-        stages, others = angle_crbm.stages(net, given, onsets, generator)
+    labels = torch.eye(len(given), device=job.device)
+    controls = [[label.expand(len(frames), -1) for frames in group] for label, group in zip(labels, given, strict=True)]
+    stages, others = stages_of(net, given, controls, onsets, generator)
     learner = DivergenceLearner(net, stages, generator, _missed(net, manifest, clips, found), others)
 
     def more(log: Sequence[Line]) -> dict[str, Any]:
@@ -64,11 +65,20 @@ def train_control(clips: Clips, job: Job) -> Run:
     return job.run(net, learner, manifest, more)
 
 
-def _untrained(clips: Clips, config: TDBNConfig | AngleCRBMConfig) -> Net:
+def untrained(config: TDBNConfig | AngleCRBMConfig, skeleton: Skeleton, channels: tuple[str, ...], labels: int) -> Net:
+    """A net of the sizes that a figure's channels need."""
     if isinstance(config, AngleCRBMConfig):
-        return AngleCRBM(config, len(clips.channels), len(clips.labels))
-    parts = body_parts(clips.skeleton, clips.channels).of_channel.tolist()
-    return TDBN(config, parts, len(clips.labels))
+        return AngleCRBM(config, len(channels), labels)
+    return TDBN(config, body_parts(skeleton, channels).of_channel.tolist(), labels)
+
+
+def stages_of(
+    net: Net, sequences: Sequences, controls: Sequences, onsets: Sequence[float], generator: torch.Generator
+) -> tuple[list[Stage], Mapping[str, Part]]:
+    """How a net learns, and what else has a state; see :func:`motet_train.models.control.tdbn.stages`."""
+    if isinstance(net, TDBN):
+        return tdbn.stages(net, sequences, controls, onsets, generator)
+    return angle_crbm.stages(net, sequences, controls, onsets, generator)
 
 
 def _missed(
@@ -91,12 +101,16 @@ def _manifest(
     job: Job, clips: Clips, contract: MotionContract, net: Net, found: Mapping[str, list[Array]]
 ) -> dict[str, Any]:
     starts = {label: np.round(group[0][: net.taps], 6).tolist() for label, group in found.items()}
-    defaults = {"temperature": net.config.temperature}
+    control = {"labels": list(found), "starts": starts}
+    return job.manifest(contract, net.to_config(), defaults_of(net), clips.licence, control=control)
+
+
+def defaults_of(net: Net) -> dict[str, float]:
+    """How a session runs that is told nothing else."""
+    defaults: dict[str, float] = {"temperature": net.config.temperature}
     if isinstance(net, AngleCRBM):
         defaults["iterations"] = net.config.iterations
-    return job.manifest(
-        contract, net.to_config(), defaults, clips.licence, control={"labels": list(found), "starts": starts}
-    )
+    return defaults
 
 
 def reconstruction(net: Net, found: Mapping[str, Sequence[Array]], std: Array) -> float:

@@ -88,9 +88,13 @@ def from_config(config: Mapping[str, Any]) -> AngleCRBM:
 
 
 def stages(
-    net: AngleCRBM, sequences: Sequence[Sequence[Tensor]], onsets: Sequence[float], generator: torch.Generator
+    net: AngleCRBM,
+    sequences: Sequence[Sequence[Tensor]],
+    controls: Sequence[Sequence[Tensor]],
+    onsets: Sequence[float],
+    generator: torch.Generator,
 ) -> tuple[list[Stage], dict[str, Any]]:
-    """The CRBM learns on the sequences (T, D) of each label; nothing else has a state.
+    """The CRBM learns on the sequences (T, D) of each label, with control values (T, L); nothing else has a state.
 
     net.mean and net.scale must be set. onsets: see :func:`motet_train.models.control.crbm.transitions`.
     """
@@ -103,7 +107,8 @@ def stages(
 
     def layer() -> CRBMLayer:
         codes = [[net.encode(frames) for frames in found] for found in sequences]
-        data = transitions(codes, net.expansion, config.taps, onsets)
+        units = [[values @ net.expansion for values in found] for found in controls]
+        data = transitions(codes, units, config.taps, onsets)
         recall = Past(config.past_noise, config.past_rate / config.crbm.rate)
         return CRBMLayer(crbm, data, config.crbm, generator, clamped=True, recall=recall)
 

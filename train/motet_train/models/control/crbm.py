@@ -68,7 +68,10 @@ class CRBM(nn.Module):
 
 @dataclass(frozen=True, eq=False)
 class Transitions:
-    """What a CRBM learns from: past (N, K H), visible (N, H), control (N, C), and probabilities (N,) to draw each."""
+    """What a CRBM learns from: past (N, K H), visible (N, H), control (N, C), and probabilities (N,) to draw each.
+
+    Where the net makes some of its past itself, there are as many frames and controls more, before those.
+    """
 
     past: Tensor
     visible: Tensor
@@ -77,21 +80,27 @@ class Transitions:
 
 
 def transitions(
-    codes: Sequence[Sequence[Tensor]], expansion: Tensor, taps: int, onsets: Sequence[float]
+    codes: Sequence[Sequence[Tensor]],
+    controls: Sequence[Sequence[Tensor]],
+    taps: int,
+    onsets: Sequence[float],
+    own: int = 0,
 ) -> Transitions:
-    """Cut the sequences (T, H) of each label into windows of K past frames and the one after them.
+    """Cut the sequences (T, H) of each group, such as those of a label, into windows of K past frames and the next one.
 
-    expansion: (L, C), the control units of each label. onsets: for each label how many times as often the first
-    window of a sequence is drawn as its last, geometric between: a motion that ends has to be entered at its start.
+    controls: the control units (T, C) of each sequence's frames. onsets: for each group how many times as often the
+    first window of a sequence is drawn as its last, geometric between: a motion that ends has to be entered at its
+    start. own: how many frames more there are before, and how many controls, see :class:`Past`.
     """
-    cut = [torch.cat([sequence.unfold(0, taps + 1, 1) for sequence in found]).transpose(1, 2) for found in codes]
+    reach = taps + own
+    every = torch.cat([sequence.unfold(0, reach + 1, 1) for found in codes for sequence in found]).transpose(1, 2)
+    told = torch.cat([units[taps:].unfold(0, own + 1, 1) for found in controls for units in found])
     weights = [
-        torch.cat([onset ** torch.linspace(1, 0, len(sequence) - taps) for sequence in found])
+        torch.cat([onset ** torch.linspace(1, 0, len(sequence) - reach) for sequence in found])
         for onset, found in zip(onsets, codes, strict=True)
     ]
-    every = torch.cat(cut)
-    control = torch.cat([units.expand(len(part), -1) for units, part in zip(expansion, cut, strict=True)])
-    return Transitions(every[:, :taps].flatten(1), every[:, taps], control, balanced(weights))
+    control = told.transpose(1, 2).flatten(1)
+    return Transitions(every[:, :reach].flatten(1), every[:, reach], control, balanced(weights))
 
 
 @dataclass(frozen=True)
@@ -102,6 +111,9 @@ class Past:
     """Standard deviation of Gaussian noise on the past, so that the net learns the way back to its data."""
     rate: float = 1.0
     """Learning rate of the weights from the past to the visible units over that of the others."""
+    own: int = 0
+    """Of so many frames before the one that is learned, the net makes the last ones itself, any number of them, so
+    that it learns the way back from where it strays: as DAgger learns (Ross 2011)."""
 
 
 class CRBMLayer(Layer):
@@ -130,6 +142,8 @@ class CRBMLayer(Layer):
         crbm, recall, generator, climb = self.crbm, self.recall, self.generator, self.ascents
         if recall.noise:
             past = past + recall.noise * torch.randn(past.shape, generator=generator, device=past.device)
+        if recall.own:
+            past, control = self._own(past, control, epoch.temperature)
         free = _sampled_free(crbm, visible, past, epoch.temperature, generator)
         end, end_free = settle(crbm, past, control, free, self.learning.steps, epoch.temperature, generator)
         end_control = control if self.clamped else crbm.control(end, epoch.temperature)
@@ -141,6 +155,20 @@ class CRBMLayer(Layer):
         climb["hidden_bias"].mean(hidden - end_hidden, epoch)
         climb["visible_bias"].mean(visible - end, epoch)
         return visible - end
+
+    def _own(self, past: Tensor, control: Tensor, temperature: float) -> tuple[Tensor, Tensor]:
+        """A past (B, K H) that ends with frames of the net's own, and the control (B, C) of the frame after it."""
+        crbm, own = self.crbm, self.recall.own
+        told = control.view(len(control), own + 1, -1).unbind(1)
+        frames = past.view(len(past), -1, len(crbm.visible_bias))
+        start = int(torch.randint(own + 1, (1,), generator=self.generator, device=self.generator.device))
+        history = frames[:, start : start + frames.shape[1] - own]
+        for units in told[start:-1]:
+            before = history.flatten(1)
+            free = crbm.free(history[:, -1], before, temperature)
+            new = crbm.visible(crbm.drive(before, units), free, temperature)
+            history = torch.cat([history[:, 1:], new[:, None]], dim=1)
+        return history.flatten(1), told[-1]
 
 
 def settle(

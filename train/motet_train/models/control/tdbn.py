@@ -24,7 +24,7 @@ from motet_train.models.net import tuples
 from motet_train.models.normalised import normalised
 
 Sequences = Sequence[Sequence[Tensor]]
-"""For each label its sequences of frames (T, D)."""
+"""For each group, such as a label, its sequences of frames (T, D)."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,8 @@ class TDBNConfig:
     sigma: float = 0.38
     """Standard deviation of a Gaussian visible unit, in units of its channel's own: smaller codes say more."""
     past_noise: float = 0.3
+    own: int = 0
+    """See :class:`motet_train.models.control.crbm.Past`."""
     onset: float = 100.0
     """How many times as often the first window of a motion that ends is drawn as its last."""
     temperature: float = 0.38
@@ -123,9 +125,11 @@ def from_config(config: Mapping[str, Any]) -> TDBN:
 
 
 def stages(
-    net: TDBN, sequences: Sequences, onsets: Sequence[float], generator: torch.Generator
+    net: TDBN, sequences: Sequences, controls: Sequences, onsets: Sequence[float], generator: torch.Generator
 ) -> tuple[list[Stage], dict[str, RBM]]:
-    """RBM and CRBM learn one after the other on the sequences (T, D) of each label (thesis 3.3).
+    """RBM and CRBM learn one after the other on the sequences (T, D) of each group, such as a label's (thesis 3.3).
+
+    controls: the labels' values (T, L) at the frames of each sequence.
 
     The CRBM learns again and again with other random numbers: ``tries`` times on each of the ``restarts`` of the RBM,
     which are what else has a state. net.mean and net.scale must be set. onsets: see
@@ -148,8 +152,10 @@ def stages(
 
     def crbm() -> CRBMLayer:
         codes = [[net.encode(frames) for frames in found] for found in sequences]
-        data = transitions(codes, net.expansion, config.taps, onsets)
-        return CRBMLayer(net.crbm, data, config.crbm, generator, config.clamped, Past(config.past_noise))
+        past = Past(config.past_noise, own=config.own)
+        units = [[values @ net.expansion for values in found] for found in controls]
+        data = transitions(codes, units, config.taps, onsets, config.own)
+        return CRBMLayer(net.crbm, data, config.crbm, generator, config.clamped, past)
 
     first = Stage(config.rbm.epochs, lower, lambda: RBMLayer(rbms, frames, uniform, config.rbm, generator), whole=False)
     numbers = list(range(config.restarts)) * config.tries
