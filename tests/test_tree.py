@@ -27,7 +27,8 @@ ONE_WAY = {
     "motet.decode": ("motet.representation", "motet.models", "motet.formats", "motet.draw", "motet.cli"),
     "motet.formats": ("motet.bundle", "motet.decode", "motet.models", "motet.cli"),
     "motet.draw": ("motet.bundle", "motet.decode", "motet.models", "motet.formats", "motet.cli"),
-    "motet.models": ("motet.cli",),
+    "motet.models": ("motet.live", "motet.cli"),
+    "motet.live": ("motet.cli",),
     "motet_train": ("motet_export",),
     "motet_train.data": ("motet_train.models", "motet_train.recipes", "motet_train.evaluate", "motet_train.cli"),
     "motet_train.models": ("motet_train.recipes", "motet_train.evaluate", "motet_train.cli"),
@@ -72,7 +73,7 @@ def test_imports_run_one_way(package: str) -> None:
 @pytest.mark.parametrize(
     ("rooms", "without"),
     [
-        (("motet", "motet.cli"), (*HEAVY, "PIL", "tqdm")),
+        (("motet", "motet.cli"), (*HEAVY, "PIL", "tqdm", "websockets", "pythonosc")),
         (("motet_train.recipes", "motet_train.cli.train"), (*HEAVY[1:], "PIL")),
     ],
 )

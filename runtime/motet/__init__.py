@@ -1,6 +1,6 @@
 """motet: sequence models of human motion, run by numpy and onnxruntime.
 
-``motet.load("cmu-control")`` gives a model, ``motet.read`` and ``motet.write`` take motion files; geometry is in
+``motet.load("control")`` gives a model, ``motet.read`` and ``motet.write`` take motion files; geometry is in
 :mod:`motet.motion`. What happens on the way is logged by the logger "motet".
 """
 
@@ -13,6 +13,7 @@ from motet.bundle.session import SessionOptions
 from motet.errors import (
     BundleError,
     ControlError,
+    ControlWarning,
     DecodingError,
     FormatError,
     MotetError,
@@ -25,6 +26,7 @@ from motet.errors import (
 )
 from motet.formats import read_motion as read
 from motet.formats import write_motion as write
+from motet.live.page import live_page, write_live_page
 from motet.models.control import ControlModel, ControlSession, Snapshot
 from motet.models.describe import DescribeModel, Description, Part
 from motet.models.generate import Generated, GenerateModel
@@ -32,8 +34,11 @@ from motet.models.index import Hit, Index
 from motet.models.load import load, load_as
 from motet.models.predict import PredictModel, PredictSession
 from motet.models.search import SearchModel
+from motet.models.steer import SteerModel
+from motet.models.steer_session import SteerSession
 from motet.motion.joint_map import read_map
 from motet.motion.motion import Motion
+from motet.motion.pose import Pose
 from motet.motion.retarget import Humanoid, from_humanoid, to_humanoid
 
 __version__ = version("motet")
@@ -44,6 +49,7 @@ __all__ = [
     "ControlError",
     "ControlModel",
     "ControlSession",
+    "ControlWarning",
     "DecodingError",
     "DescribeModel",
     "Description",
@@ -58,17 +64,21 @@ __all__ = [
     "MotionError",
     "OutputError",
     "Part",
+    "Pose",
     "PredictModel",
     "PredictSession",
     "ScriptError",
     "SearchModel",
     "SessionOptions",
     "Snapshot",
+    "SteerModel",
+    "SteerSession",
     "TextError",
     "TextWarning",
     "UnitError",
     "from_humanoid",
     "list_bundles",
+    "live_page",
     "load",
     "load_as",
     "motion",
@@ -76,6 +86,7 @@ __all__ = [
     "read_map",
     "to_humanoid",
     "write",
+    "write_live_page",
 ]
 
 logging.getLogger("motet").addHandler(logging.NullHandler())

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from browser import CHROMIUM, Browser
 from figures import walker
 from test_retarget import SKELETONS
 
@@ -100,6 +101,20 @@ def test_what_cannot_be_shown_is_refused(tmp_path, motion, reason):
 def test_place_that_cannot_be_written(tmp_path):
     with pytest.raises(OutputError):
         html.write(tmp_path / "none" / "walk.html", walker())
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium")
+def test_the_page_plays_in_a_browser(tmp_path):
+    html.write(tmp_path / "walk.html", walker())
+    with Browser(tmp_path / "profile") as page:
+        page.open(tmp_path / "walk.html", ready="typeof state === 'object' && state.time > 0.1")
+        page.key(" ", " ", down=True)
+        page.value("setTheme(true)")
+        yaw, at = page.value("[view.yaw, state.time]")
+        page.key("KeyD", "d", down=True)
+        assert page.value("[view.yaw, state.time]") == [yaw + 5, at]
+        assert min(page.coloured()) > 300
+        assert page.errors == []
 
 
 def test_ground():

@@ -17,6 +17,7 @@ COMMANDS = {
     "generate": ("motet.cli.generate:generate", "", "Generate motions from sentences."),
     "predict": ("motet.cli.predict:predict", "", "Predict how motions continue."),
     "control": ("motet.cli.control:control", "", "Run a script such as 'walk 3s, run 3s'."),
+    "live": ("motet.cli.live:live", "", "Steer figures live: in a page, by a server, onto an avatar."),
     "search": ("motet.cli.search:search", "", "Find motions in a folder by a sentence or a motion."),
     "embed": ("motet.cli.embed:embed", "", "Write context vectors of motions or sentences."),
     "convert": ("motet.cli.convert:convert", "", "Convert motion files to other formats, rates, units."),
@@ -32,6 +33,7 @@ COMMANDS = {
 """Command -> where it is, the extra that it needs, and what it does."""
 
 NEEDS = {
+    "live": ("websockets", "pythonosc"),
     "train": ("torch", "tqdm"),
     "evaluate": ("torch", "tqdm", "matplotlib", "sklearn", "sacrebleu"),
     "export": ("torch", "tqdm", "onnx", "onnxscript"),

@@ -5,19 +5,15 @@ its points relative to the root as int16 (T, P, 3) in steps of ``step`` body hei
 bytes. A step is 0.0001 heights (0.2 mm of a person) unless a point is further than 3.2 heights from the root.
 """
 
-import json
 import math
-import re
 from base64 import b64encode
 from collections.abc import Sequence
-from html import escape
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
 
-from motet.draw.body import Bone
 from motet.draw.figure import figure_of
+from motet.draw.page import bone_data, filled, source
 from motet.errors import MotionError
 from motet.files import File, place_of, write_whole
 from motet.motion.motion import Motion
@@ -47,10 +43,7 @@ def write_many(file: File, motions: Sequence[Motion], names: Sequence[str], titl
 
 def page(figures: list[dict[str, Any]], title: str) -> str:
     """The HTML of the figures, each from :func:`figure_data`."""
-    data = json.dumps({"figures": figures}, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-    parts = {"TITLE": escape(title), "DATA": data}
-    template = (files("motet.draw") / "player.html").read_text(encoding="utf-8")
-    return re.sub(r"\{\{(TITLE|DATA)\}\}", lambda place: parts[place[1]], template)
+    return filled(source("motet.draw", "player.html"), title, {"figures": figures})
 
 
 def figure_data(motion: Motion, name: str, captions: Captions | None = None) -> dict[str, Any]:
@@ -64,16 +57,12 @@ def figure_data(motion: Motion, name: str, captions: Captions | None = None) -> 
         "fps": figure.fps,
         "frames": len(motion),
         "heading": figure.heading,
-        "bones": [_bone(bone) for bone in figure.bones],
+        "bones": [bone_data(bone) for bone in figure.bones],
         "captions": _checked(captions or ()),
         "step": step,
         "root": b64encode(root.tobytes()).decode(),
         "points": b64encode(np.round(relative / step).astype("<i2").tobytes()).decode(),
     }
-
-
-def _bone(bone: Bone) -> list[int | float | str]:
-    return [bone.start, bone.end, round(bone.start_radius, 4), round(bone.end_radius, 4), bone.side]
 
 
 def _checked(captions: Captions) -> list[list[float | str]]:

@@ -1,0 +1,153 @@
+"""What the server of live figures and its clients say to each other: JSON objects with a "type" (docs/live.md).
+
+A client tells; the server gives frames. Quaternions are (x, y, z, w); metres; y is up, a figure faces z at 0 degrees
+and x at 90.
+"""
+
+import json
+import warnings
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from motet.errors import ControlError, ControlWarning, MotetError, quoted
+from motet.models.steer import SteerModel
+from motet.models.steer_session import LARGEST
+from motet.motion.humanoid import BONES, HUMANOID
+from motet.motion.pose import Pose
+
+MOST = 16
+"""Characters of a client at most."""
+
+
+DIGITS = 5
+"""Decimals of the numbers in frames: hundredths of millimetres, thousandths of degrees."""
+
+NUMBERS = ("speed", "direction", "facing", "velocity", "places")
+"""What is a number, or a list of numbers or of lists of them."""
+
+KEYS = {
+    "control": ("gait", "speed", "direction", "facing", "velocity"),
+    "start": ("characters", "gait", "places", "hold_feet", "positions"),
+    "put": ("places",),
+    "push": ("velocity",),
+}
+"""Type of a client's message -> what may stand in it."""
+
+
+class ProtocolError(MotetError, ValueError):
+    """A message that is not one of the protocol."""
+
+
+class Puppets:
+    """The characters of one client. heard: how many of its messages they have obeyed. ticks: since they started."""
+
+    def __init__(self, model: SteerModel, characters: int = 1) -> None:
+        self.model, self.heard = model, 0
+        self._start({"characters": characters})
+
+    def hear(self, text: str | bytes) -> list[str]:
+        """Obey a message; what is to be said of it, such as a speed that was brought into its gait's range.
+
+        ProtocolError or ControlError for one that cannot be obeyed; nothing has changed then.
+        """
+        kind, given = parsed(text)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", ControlWarning)
+            if kind == "start":
+                self._start(given)
+            else:
+                getattr(self.session, kind)(**given)
+        self.heard += 1
+        return [str(warning.message) for warning in caught]
+
+    def _start(self, given: dict[str, Any]) -> None:
+        characters, positions = given.pop("characters", 1), given.pop("positions", False)
+        if not isinstance(characters, int) or isinstance(characters, bool) or not 1 <= characters <= MOST:
+            raise ControlError(f"characters: expected a whole number from 1 to {MOST}")
+        self.session = self.model.start(given.pop("gait", None), characters=characters, **given)
+        self.positions, self.ticks = positions, 0
+
+    def tick(self) -> Pose:
+        """The next pose."""
+        self.ticks += 1
+        return self.session.tick()
+
+    def frame(self, pose: Pose) -> str:
+        """The message that gives a pose."""
+        parts = {
+            "position": pose.place,
+            "rotation": pose.heading,
+            "height": pose.height,
+            "rotations": pose.rotations,
+            "contacts": pose.contacts,
+            **({"positions": pose.positions()} if self.positions else {}),
+        }
+        rows = {name: np.round(values.astype(np.float64), DIGITS).tolist() for name, values in parts.items()}
+        characters = [{name: values[i] for name, values in rows.items()} for i in range(len(pose))]
+        said = {"type": "frame", "tick": self.ticks, "time": round(self.ticks / self.model.fps, DIGITS)}
+        return packed({**said, "heard": self.heard, "characters": characters})
+
+
+def hello(model: SteerModel) -> str:
+    """The first message: gaits with their speeds in m/s (lowest, usual, highest), the rate, and the figure."""
+    speeds = {gait: [low, model.usual[gait], high] for gait, (low, high) in model.speeds.items()}
+    joints = [{"name": joint.name, "parent": joint.parent, "offset": list(joint.offset)} for joint in HUMANOID.joints]
+    return packed({"type": "hello", "fps": model.fps, "gaits": speeds, "bones": list(BONES), "joints": joints})
+
+
+def error(reason: object) -> str:
+    """The last message to a client that is dropped."""
+    return packed({"type": "error", "message": str(reason)})
+
+
+def note(said: str) -> str:
+    """A message about something that was obeyed otherwise than it was told."""
+    return packed({"type": "note", "message": said})
+
+
+def packed(message: Mapping[str, Any]) -> str:
+    """JSON as short as it can be."""
+    return json.dumps(message, separators=(",", ":"), allow_nan=False)
+
+
+def parsed(text: str | bytes) -> tuple[str, dict[str, Any]]:
+    """The type of a client's message and what it says, without what is null; ProtocolError for one that is none."""
+    if not isinstance(text, str):
+        raise ProtocolError("messages must be text, not binary")
+    try:
+        message = json.loads(text, parse_constant=_refuse)
+    except (ValueError, RecursionError) as fault:
+        raise ProtocolError(f"a message must be JSON: {fault}") from fault
+    kind = message.pop("type", None) if isinstance(message, dict) else None
+    if not isinstance(kind, str) or kind not in KEYS:
+        raise ProtocolError(f'a message must be an object whose "type" is one of {", ".join(KEYS)}')
+    given = {name: value for name, value in message.items() if value is not None}
+    for name, value in given.items():
+        _check(kind, name, value)
+    if kind in ("put", "push") and not given:
+        raise ProtocolError(f"{kind}: expected {KEYS[kind][0]}")
+    return kind, given
+
+
+def _refuse(constant: str) -> None:
+    raise ValueError(f"{constant} is no number")
+
+
+def _check(kind: str, name: str, value: Any) -> None:
+    if name not in KEYS[kind]:
+        raise ProtocolError(f"{kind}: {quoted(name)} is unknown; expected one of {', '.join(KEYS[kind])}")
+    if name in NUMBERS and not _numeric(value, depth=2):
+        raise ProtocolError(f"{kind}, {name}: expected numbers up to {LARGEST:g}, or lists of them")
+    one_for_each = kind == "control" and isinstance(value, list) and all(isinstance(gait, str) for gait in value)
+    if name == "gait" and not (isinstance(value, str) or one_for_each):
+        raise ProtocolError(f"{kind}, gait: expected the name of a gait")
+    if name in ("hold_feet", "positions") and not isinstance(value, bool):
+        raise ProtocolError(f"{kind}, {name}: expected true or false")
+
+
+def _numeric(value: Any, depth: int) -> bool:
+    if isinstance(value, list):
+        return depth > 0 and all(_numeric(part, depth - 1) for part in value)
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= LARGEST

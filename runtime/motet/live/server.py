@@ -1,0 +1,195 @@
+"""A server of live figures: every client has figures of its own, steers them, and gets their poses many times a second.
+
+It needs the library websockets, which the extra ``live`` installs. What is said is in :mod:`motet.live.protocol`.
+"""
+
+import asyncio
+import logging
+import re
+import socket
+from collections.abc import Callable, Sequence
+from typing import Self
+
+from motet.errors import MotetError, OutputError
+from motet.live import protocol
+from motet.live.protocol import ProtocolError, Puppets
+from motet.models.steer import SteerModel
+from motet.motion.pose import Pose
+
+try:
+    from websockets.asyncio.server import Server, ServerConnection, serve
+    from websockets.exceptions import ConnectionClosed
+    from websockets.typing import Origin
+except ImportError as error:
+    raise ImportError(
+        "motet.live.server needs websockets: install the extra with  pip install 'motet[live]'"
+    ) from error
+
+log = logging.getLogger(__name__)
+
+HOST, PORT = "127.0.0.1", 8765
+
+MAX_BYTES = 1 << 14
+"""Of a client's message."""
+
+MAX_CLIENTS = 32
+
+MAX_MESSAGES = 50
+"""Of a client between two ticks."""
+
+BUFFER = 1 << 16
+"""Bytes that wait for a client, in this process and again in the system; then it has STALL seconds to take some."""
+
+STALL = 2.0
+
+REFUSED, BUSY = 1008, 1013
+"""Codes with which a connection is closed: a rule was broken; too many clients."""
+
+LOCAL = re.compile(r"https?://(localhost|127\.0\.0\.1|\[::1\])(:\d+)?")
+"""Origins of web pages that may connect, next to programs, which have none."""
+
+
+class LiveServer:
+    """Listens while it is entered (``async with``).
+
+    characters: that a client has at first. rate: ticks a second, by default the model's, which is life's speed.
+    origins: of further web pages that may connect, such as "null" (a page that was opened as a file). stall: seconds
+    for which a client may take nothing. watch: called with each pose of the client that is here the longest.
+    OutputError where it cannot listen, ControlError for a number of characters that a client cannot have.
+    """
+
+    def __init__(  # noqa: PLR0913  settings, each of which has a default
+        self,
+        model: SteerModel,
+        host: str = HOST,
+        port: int = PORT,
+        *,
+        characters: int = 1,
+        rate: float | None = None,
+        origins: Sequence[str] = (),
+        stall: float = STALL,
+        watch: Callable[[Pose, float], None] | None = None,
+    ) -> None:
+        self.model, self.host, self.port, self.characters = model, host, port, characters
+        self.rate, self.stall, self.watch = rate or model.fps, stall, watch
+        Puppets(model, characters)  # refuses now what it would refuse every client
+        self._origins = [None, LOCAL, *map(Origin, origins)]
+        self._clients: list[Puppets] = []
+        self._server: Server | None = None
+
+    async def __aenter__(self) -> Self:
+        try:
+            self._server = await serve(
+                self._client,
+                self.host,
+                self.port,
+                origins=self._origins,
+                logger=log,
+                compression=None,
+                max_size=MAX_BYTES,
+                max_queue=16,
+                write_limit=BUFFER,
+                ping_interval=5,
+                ping_timeout=5,
+                close_timeout=1,
+            )
+        except OSError as fault:
+            raise OutputError(f"cannot listen on {self.host}:{self.port}: {fault.strerror or fault}") from fault
+        self.port = next(iter(self._server.sockets)).getsockname()[1]
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        assert self._server is not None
+        self._server.close()
+        await self._server.wait_closed()
+
+    async def _client(self, connection: ServerConnection) -> None:
+        """All of one client, until it goes or is dropped."""
+        if len(self._clients) >= MAX_CLIENTS:
+            await connection.close(BUSY, f"there are {MAX_CLIENTS} clients already")
+            return
+        _bound(connection)
+        puppets = Puppets(self.model, self.characters)
+        self._clients.append(puppets)
+        try:
+            await connection.send(protocol.hello(self.model))
+            reason = await self._until_fault(connection, puppets)
+        except ConnectionClosed:
+            return
+        finally:
+            self._clients.remove(puppets)
+        if isinstance(reason, MotetError):
+            log.warning("dropped a client: %s", reason)
+            await self._drop(connection, reason)
+
+    async def _until_fault(self, connection: ServerConnection, puppets: Puppets) -> BaseException | None:
+        """Tick and listen side by side; why one of the two came to an end."""
+        both = [asyncio.create_task(run(connection, puppets)) for run in (self._listen, self._tick)]
+        try:
+            done, _ = await asyncio.wait(both, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in both:
+                task.cancel()
+            await asyncio.gather(*both, return_exceptions=True)
+        faults = [task.exception() for task in done]
+        for fault in faults:
+            if fault and not isinstance(fault, MotetError | ConnectionClosed):
+                raise fault
+        return next((fault for fault in faults if isinstance(fault, MotetError)), None)
+
+    async def _listen(self, connection: ServerConnection, puppets: Puppets) -> None:
+        tick, count = 0, 0
+        async for text in connection:
+            tick, count = puppets.ticks, (count + 1 if tick == puppets.ticks else 1)
+            if count > MAX_MESSAGES:
+                raise ProtocolError(f"more than {MAX_MESSAGES} messages between two frames")
+            for said in puppets.hear(text):
+                await self._send(connection, protocol.note(said))
+
+    async def _tick(self, connection: ServerConnection, puppets: Puppets) -> None:
+        clock = asyncio.get_running_loop().time
+        due = clock()
+        while True:
+            pose = puppets.tick()
+            if self.watch and puppets is self._clients[0]:
+                self.watch(pose, puppets.ticks / self.model.fps)
+            await self._send(connection, puppets.frame(pose))
+            due = max(due + 1 / self.rate, clock() - 0.1)  # what is late is not made up for
+            await asyncio.sleep(due - clock())
+
+    async def _send(self, connection: ServerConnection, text: str) -> None:
+        try:
+            async with asyncio.timeout(self.stall):
+                await connection.send(text)
+        except TimeoutError:
+            raise ProtocolError(f"took no frames for {self.stall:g} s") from None
+
+    async def _drop(self, connection: ServerConnection, reason: MotetError) -> None:
+        """Say why, as far as the client still listens, and close."""
+        said = str(reason).encode()[:120].decode(errors="ignore")  # a frame that closes has room for 123 bytes
+        try:
+            async with asyncio.timeout(self.stall):
+                await connection.send(protocol.error(reason))
+                await connection.close(REFUSED, said)
+        except (TimeoutError, ConnectionClosed):
+            connection.transport.abort()
+
+
+def _bound(connection: ServerConnection) -> None:
+    """Let the system hold no more for a client than BUFFER."""
+    raw = connection.transport.get_extra_info("socket")
+    raw.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BUFFER)
+
+
+def run_server(server: LiveServer, ready: Callable[[], None] = lambda: None) -> None:
+    """Run a server until Ctrl-C; ``ready`` is called when it listens. OutputError where it cannot listen."""
+
+    async def running() -> None:
+        async with server:
+            ready()
+            await asyncio.Event().wait()
+
+    try:
+        asyncio.run(running())
+    except KeyboardInterrupt:
+        return

@@ -1,0 +1,117 @@
+"""A headless Chromium that tests drive by its debugging protocol, on pipes: pages, keys, expressions, pictures."""
+
+import base64
+import json
+import os
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any, Self
+
+CHROMIUM = next(
+    (found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None
+)
+OPTIONS = ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--remote-debugging-pipe")
+
+COLOURED = """(() => {
+  const canvas = document.querySelector("canvas"), counts = [0, 0];
+  const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+  for (let i = 0; i < data.length; i += 4) {
+    if (data[i] > data[i + 2] + 60) counts[0]++;
+    if (data[i + 2] > data[i] + 60) counts[1]++;
+  }
+  return counts;
+})()"""
+
+
+class Browser:
+    """One page of ``width`` by ``height`` pixels; use it with ``with``."""
+
+    def __init__(self, folder: Path, width: int = 960, height: int = 640) -> None:
+        assert CHROMIUM is not None
+        to_browser, self._write = os.pipe()
+        self._read, from_browser = os.pipe()
+
+        def connect() -> None:  # the browser reads its descriptor 3 and writes 4
+            first, second = os.dup(to_browser), os.dup(from_browser)
+            os.dup2(first, 3)
+            os.dup2(second, 4)
+
+        command = [CHROMIUM, *OPTIONS, f"--user-data-dir={folder}", f"--window-size={width},{height}", "about:blank"]
+        self._process = subprocess.Popen(
+            command,
+            close_fds=False,
+            preexec_fn=connect,  # noqa: PLW1509  there are no threads here
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        os.close(to_browser)
+        os.close(from_browser)
+        self._rest, self._count, self._session = b"", 0, ""
+        self.errors: list[str] = []
+
+    def __enter__(self) -> Self:
+        targets = self._call("Target.getTargets")["targetInfos"]
+        page = next(target["targetId"] for target in targets if target["type"] == "page")
+        self._session = self._call("Target.attachToTarget", targetId=page, flatten=True)["sessionId"]
+        self._call("Runtime.enable")
+        self._call("Page.enable")
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._process.kill()
+        self._process.wait()
+        os.close(self._write)
+        os.close(self._read)
+
+    def open(self, file: Path, ready: str) -> None:
+        """Open a file, and wait until the expression ``ready`` is true."""
+        self._call("Page.navigate", url=file.as_uri())
+        waiting = (
+            f"new Promise((done) => {{ const look = () => {ready} ? done(true) : setTimeout(look, 20); look(); }})"
+        )
+        assert self.value(waiting), self.errors
+
+    def value(self, expression: str) -> Any:
+        """What a JavaScript expression gives, as JSON; promises are awaited."""
+        found = self._call("Runtime.evaluate", expression=expression, awaitPromise=True, returnByValue=True)
+        assert "exceptionDetails" not in found, found["exceptionDetails"]
+        return found["result"].get("value")
+
+    def key(self, code: str, key: str, down: bool) -> None:
+        """Press or release a key by its code, such as "KeyW"."""
+        self._call("Input.dispatchKeyEvent", type="keyDown" if down else "keyUp", code=code, key=key)
+
+    def mouse(self, kind: str, x: float, y: float) -> None:
+        """A "mousePressed", "mouseMoved" or "mouseReleased" of the left button."""
+        self._call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
+
+    def coloured(self) -> list[int]:
+        """How many pixels of the first canvas have the colour of the left side, and of the right one."""
+        found: list[int] = self.value(COLOURED)
+        return found
+
+    def picture(self) -> bytes:
+        """The page as PNG."""
+        return base64.b64decode(self._call("Page.captureScreenshot", format="png")["data"])
+
+    def _call(self, method: str, **parameters: Any) -> dict[str, Any]:
+        self._count += 1
+        wanted = {"id": self._count, "method": method, "params": parameters}
+        text = json.dumps({**wanted, "sessionId": self._session} if self._session else wanted)
+        os.write(self._write, text.encode() + b"\0")
+        while (found := self._next()).get("id") != self._count:
+            if found.get("method") == "Runtime.exceptionThrown":
+                self.errors.append(json.dumps(found["params"]["exceptionDetails"]))
+        assert "error" not in found, found
+        result: dict[str, Any] = found["result"]
+        return result
+
+    def _next(self) -> dict[str, Any]:
+        while b"\0" not in self._rest:
+            part = os.read(self._read, 1 << 20)
+            assert part, "the browser has gone"
+            self._rest += part
+        message, _, self._rest = self._rest.partition(b"\0")
+        found: dict[str, Any] = json.loads(message)
+        return found

@@ -1,0 +1,212 @@
+import json
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from browser import CHROMIUM, Browser
+
+import motet
+from motet.draw.page import source
+from motet.errors import BundleError, ControlError, OutputError
+from motet.live.page import body_data, net_data
+from motet.models.steer import SteerModel
+from motet.motion.humanoid import HUMANOID
+
+NODE = shutil.which("node")
+PLAN = [("walk", 1.3, 0, 0), ("walk", 1.2, 80, 80), ("run", 3, 80, 80), ("run", 1.5, -120, -60), ("walk", 0, 0, -70)]
+"""Gait, m/s, direction and facing in degrees, for a second and a half each."""
+
+
+def test_a_page_needs_no_other_file(tmp_path: Path, steer_model: SteerModel) -> None:
+    motet.write_live_page(tmp_path / "live.html", steer_model, 2, title="a <b> </script>")
+    text = (tmp_path / "live.html").read_text(encoding="utf-8")
+    assert len(text) < 1_500_000
+    assert not re.search(r"https?:|//[a-z]+\.|@import|url\(|\ssrc=|\{\{", text)
+    assert "default-src 'none'" in text
+    assert "<title>a &lt;b&gt; &lt;/script&gt;</title>" in text
+    assert text.count("</script>") == 2
+    assert motet.live_page(steer_model) == motet.live_page(steer_model)
+
+
+def test_what_cannot_be_steered_is_refused(tmp_path: Path, steer_model: SteerModel) -> None:
+    for characters in (0, 9):
+        with pytest.raises(ControlError, match="1 to 8 characters"):
+            motet.write_live_page(tmp_path / "live.html", steer_model, characters)
+    with pytest.raises(BundleError, match="is not steered"):
+        motet.live_page(motet.load("cmu-control"))
+    graphs = {role: graph for role, graph in steer_model.graphs.items() if role != "pose"}
+    with pytest.raises(BundleError, match="graph 'pose'"):
+        motet.live_page(SteerModel(steer_model.manifest, graphs))
+    finer = SteerModel(steer_model.manifest, steer_model.graphs)
+    finer.matcher.table = replace(finer.matcher.table, features=finer.matcher.table.features + np.float32(0.01))
+    with pytest.raises(BundleError, match="no multiples of 1/16"):
+        motet.live_page(finer)
+    with pytest.raises(OutputError):
+        motet.write_live_page(tmp_path / "none" / "live.html", steer_model)
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_body_has_its_skull_on_its_neck() -> None:
+    body = body_data()
+    rest = HUMANOID.rest_positions + HUMANOID.offsets[0]
+    jaw, crown = rest[body["carrier"]] + np.array(body["skull"])
+    assert body["height"] == pytest.approx(1.7, abs=0.1)
+    assert HUMANOID.names[body["carrier"]] == "head"
+    assert rest[HUMANOID.index("neck")][1] < jaw[1] < crown[1] < body["height"] < crown[1] + 0.1
+    assert max(end for bone in body["bones"] for end in bone[:2]) == len(HUMANOID.names) + 1
+
+
+@pytest.mark.skipif(NODE is None, reason="there is no node")
+def test_the_script_of_the_page_does_what_python_does(steer_model: SteerModel) -> None:
+    session, controls, poses = steer_model.start(), [], []
+    for gait, speed, way, towards in PLAN:
+        session.control(gait=gait, speed=speed, direction=way, facing=towards)
+        x, z, facing = session.told[0].tolist()
+        told = {"x": x, "z": z, "facing": facing, "gait": steer_model.gaits.index(gait)}
+        controls += [told] * 45
+        poses += [session.tick() for _ in range(45)]
+    scripts = [source("motet.draw", "numbers.js"), source("motet.live", "loop.js")]
+    found = run_loop({"scripts": scripts, "net": net_data(steer_model), "controls": controls})
+    assert np.ptp([pose.ground[0, :2] for pose in poses], axis=0).min() > 1.5  # it goes somewhere
+    for ours, (pose, places) in zip(poses, zip(found["poses"], found["positions"], strict=True), strict=True):
+        np.testing.assert_allclose(places, ours.positions()[0], atol=1e-3)
+        cosine = np.abs((np.array(pose["rotations"]) * ours.rotations[0]).sum(axis=1))
+        assert np.degrees(2 * np.arccos(np.minimum(cosine, 1))).max() < 1
+        np.testing.assert_allclose(pose["contacts"], ours.contacts[0], atol=1e-4)
+        np.testing.assert_allclose(pose["ground"], ours.ground[0], atol=1e-3)
+
+
+def run_loop(given: dict[str, Any]) -> Any:
+    assert NODE is not None
+    command = [NODE, str(Path(__file__).with_name("live_loop.mjs"))]
+    done = subprocess.run(command, input=json.dumps(given), capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory, steer_model: SteerModel) -> Any:
+    """The page of three figures in a browser."""
+    if CHROMIUM is None:
+        pytest.skip("there is no Chromium")
+    folder = tmp_path_factory.mktemp("live")
+    motet.write_live_page(folder / "live.html", steer_model, 3)
+    with Browser(folder / "profile") as browser:
+        browser.open(folder / "live.html", ready="window.motet")
+        yield browser
+
+
+def ticks(page: Browser, count: int = 45) -> SimpleNamespace:
+    """Where the steered figure is, and how its speed is, after so many ticks with what is pressed."""
+    told = f"(() => {{ for (let n = 0; n < {count}; n++) motet.tick(motet.asked()); return motet.figures[0]; }})()"
+    figure = page.value(told)
+    return SimpleNamespace(place=np.array(figure["ground"][:2]), facing=figure["ground"][2], going=figure["going"][:2])
+
+
+def test_keys_steer_the_figure(page: Browser) -> None:
+    page.value("motet.state.pause = true")
+    away = np.radians(page.value("motet.view.yaw")) + np.pi
+    ahead, left = (np.array([np.sin(way), np.cos(way)]) for way in (away, away + np.pi / 2))
+    first = ticks(page)
+    assert np.hypot(*first.place) < 0.2  # nothing is pressed
+    page.key("KeyW", "w", down=True)
+    walked = ticks(page, 60)
+    assert 1.5 < (walked.place - first.place) @ ahead < 3
+    assert np.cos(walked.facing - away) > 0.9
+    page.key("ShiftLeft", "Shift", down=True)
+    assert (ticks(page, 60).place - walked.place) @ ahead > 3
+    page.key("ShiftLeft", "Shift", down=False)
+    page.key("KeyW", "w", down=False)
+    page.key("ArrowLeft", "ArrowLeft", down=True)
+    before = ticks(page, 60)
+    turned = ticks(page, 30)
+    assert (turned.place - before.place) @ left > 0.7
+    assert np.cos(turned.facing - away - np.pi / 2) > 0.9
+    page.key("ArrowLeft", "ArrowLeft", down=False)
+    stopped, later = ticks(page, 75), ticks(page, 30)
+    assert np.hypot(*stopped.going) < 0.02
+    assert np.hypot(*(later.place - stopped.place)) < 0.2  # it shifts its weight
+    assert page.errors == []
+
+
+RUNS = """new Promise((done) => {
+  const start = motet.figures[0].trail.length;
+  const look = () => (motet.figures[0].trail.length >= start + 10 ? done(true) : setTimeout(look, 10));
+  look();
+})"""
+
+
+def test_the_page_runs_and_draws(page: Browser) -> None:
+    page.value("motet.state.pause = false")
+    assert page.value(RUNS)
+    assert min(page.coloured()) > 300
+    assert page.picture().startswith(b"\x89PNG")
+
+
+def test_buttons_and_the_stick(page: Browser) -> None:
+    page.value("motet.state.pause = true")
+    assert page.value("[...document.querySelectorAll('button')].every((b) => b.textContent.trim() || b.ariaLabel)")
+    names = page.value("[...document.querySelectorAll('#gaits button')].map((b) => b.firstChild.textContent)")
+    assert [name.lower() for name in names] == page.value("motet.net.gaits")
+    page.key("Digit2", "2", down=True)
+    page.key("Digit2", "2", down=False)
+    assert page.value("[...document.querySelectorAll('#gaits button')].map((b) => b.ariaPressed)")[1] == "true"
+    page.value("document.querySelector('#others').value = 1, document.querySelector('#others').onchange()")
+    assert page.value("motet.figures.length") == 2
+    page.value("document.querySelector('#others').focus()")  # letters steer there, too
+    page.key("KeyS", "s", down=True)
+    assert page.value("Math.hypot(motet.asked().x, motet.asked().z)") > 1
+    page.key("KeyS", "s", down=False)
+    box = page.value("(({ x, y, width }) => [x, y, width])(document.querySelector('#stick').getBoundingClientRect())")
+    x, y = box[0] + box[2] / 2, box[1] + box[2] / 2
+    page.mouse("mousePressed", x, y)
+    page.mouse("mouseMoved", x, y - 0.4 * box[2])
+    pushed = page.value("motet.asked()")
+    page.mouse("mouseReleased", x, y)
+    usual = page.value("motet.net.speeds.run[1]")
+    assert np.hypot(pushed["x"], pushed["z"]) == pytest.approx(0.8 * usual, rel=0.05)
+    assert page.value("motet.asked()")["x"] == 0
+    assert page.errors == []
+
+
+GAMEPAD = """(async () => {
+  const given = (buttons, axes) => [{ mapping: "standard", axes, buttons: Array.from({ length: 17 }, (_, n) => (
+    { pressed: buttons.includes(n) })) }];
+  const frames = async (pads) => {
+    navigator.getGamepads = () => pads;
+    for (let n = 0; n < 3; n++) await new Promise(requestAnimationFrame);
+  };
+  document.querySelector("#gaits button").click();
+  await frames(given([], [0, 0.05, 0, 0]));
+  const yaw = motet.view.yaw, asked = [motet.asked()];
+  await frames(given([7], [0, -0.8, 1, 0]));
+  asked.push(motet.asked());
+  const turned = motet.view.yaw - yaw;
+  await frames(given([5], [0, 0, 0, 0]));
+  const gait = motet.state.gait;
+  await frames(given([], [1, 0, 0, 0]));
+  await frames([null]);
+  asked.push(motet.asked());
+  return { asked, turned, gait };
+})()"""
+"""A gamepad: first at rest, then its trigger and both sticks pushed, then a shoulder button; then it is gone."""
+
+
+def test_a_gamepad(page: Browser) -> None:
+    page.value("motet.state.pause = true")
+    found = page.value(GAMEPAD)
+    still, runs, gone = found["asked"]
+    speeds, gaits = page.value("motet.net.speeds"), page.value("motet.net.gaits")
+    assert (still["x"], still["z"], still["gait"]) == (0, 0, 0)
+    assert (gone["x"], gone["z"]) == (0, 0)
+    assert gaits[runs["gait"]] == "run"
+    assert np.hypot(runs["x"], runs["z"]) == pytest.approx(0.8 * speeds["run"][1])
+    assert found["turned"] < 0
+    assert found["gait"] == 1
+    assert page.errors == []

@@ -1,0 +1,280 @@
+import asyncio
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+import numpy as np
+import pytest
+
+from motet.errors import OutputError
+from motet.models.steer import SteerModel
+from motet.motion.humanoid import BONES, HUMANOID
+from motet.motion.pose import Pose
+
+pytest.importorskip("websockets", reason="the extra live is not installed")
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+
+from motet.live import server as server_module
+from motet.live.protocol import LARGEST, MOST
+from motet.live.server import MAX_BYTES, MAX_MESSAGES, LiveServer
+
+Message = dict[str, Any]
+
+
+def serving(model: SteerModel, scenario: Callable[[LiveServer], Coroutine[Any, Any, None]], **settings: Any) -> None:
+    """Run a scenario beside a server on a free port, five times as fast as life."""
+
+    async def both() -> None:
+        async with LiveServer(model, port=0, **{"rate": 150, **settings}) as server, asyncio.timeout(20):
+            await scenario(server)
+
+    asyncio.run(both())
+
+
+def client(server: LiveServer, **settings: Any) -> connect:
+    """A client that takes every frame, whether the test asks for it or not."""
+    return connect(f"ws://127.0.0.1:{server.port}", max_queue=None, **settings)
+
+
+async def told(connection: ClientConnection, kind: str, **given: Any) -> None:
+    await connection.send(json.dumps({"type": kind, **given}))
+
+
+async def next_of(
+    connection: ClientConnection, kind: str, wanted: Callable[[Message], bool] = lambda _: True
+) -> Message:
+    while True:
+        message: Message = json.loads(await connection.recv())
+        if message["type"] == kind and wanted(message):
+            return message
+
+
+async def frames(
+    connection: ClientConnection, count: int, wanted: Callable[[Message], bool] = lambda _: True
+) -> list[Message]:
+    return [await next_of(connection, "frame", wanted) for _ in range(count)]
+
+
+async def end_of(connection: ClientConnection) -> tuple[str, int | None, str]:
+    """The last message to a client that is dropped, and the code and reason with which it is."""
+    said = ""
+    try:
+        while True:
+            message = json.loads(await connection.recv())
+            said = message["message"] if message["type"] == "error" else said
+    except ConnectionClosed:
+        return said, connection.close_code, connection.close_reason or ""
+
+
+def check_same(character: Message, pose: Pose, row: int = 0) -> None:
+    for name, values in {
+        "position": pose.place,
+        "rotation": pose.heading,
+        "height": pose.height,
+        "rotations": pose.rotations,
+        "contacts": pose.contacts,
+    }.items():
+        np.testing.assert_allclose(character[name], values[row], atol=1e-5, err_msg=name)
+
+
+def test_frames_are_those_of_a_session(steer_model: SteerModel) -> None:
+    async def scenario(server: LiveServer) -> None:
+        async with client(server) as connection:
+            hello = json.loads(await connection.recv())
+            assert (hello["type"], hello["fps"], hello["bones"]) == ("hello", steer_model.fps, list(BONES))
+            slowest, fastest = steer_model.speeds["walk"]
+            assert hello["gaits"]["walk"] == [slowest, steer_model.usual["walk"], fastest]
+            assert [joint["name"] for joint in hello["joints"]] == list(HUMANOID.names)
+            before = await frames(connection, 3)
+            await told(connection, "control", gait="run", speed=2.5, direction=90)
+            after = await frames(connection, 40)
+        session = steer_model.start()
+        for number, frame in enumerate([*before, *after], start=1):
+            assert (frame["tick"], frame["time"]) == (number, pytest.approx(number / 30, abs=1e-5))
+            if frame["heard"] == 1:
+                session.control(gait="run", speed=2.5, direction=90)
+            check_same(frame["characters"][0], session.tick())
+        assert after[-1]["heard"] == 1
+
+    serving(steer_model, scenario)
+
+
+def test_many_characters_placed_put_and_pushed(steer_model: SteerModel) -> None:
+    async def scenario(server: LiveServer) -> None:
+        async with client(server) as connection:
+            places = [[0, 0, 0], [2, 0, 90]]
+            await told(connection, "start", characters=2, places=places, positions=True, hold_feet=False)
+            frame = await next_of(connection, "frame", lambda frame: frame["heard"] == 1)
+            session = steer_model.start(characters=2, places=places, hold_feet=False)
+            for _ in range(frame["tick"]):
+                pose = session.tick()
+            for row, character in enumerate(frame["characters"]):
+                check_same(character, pose, row)
+                np.testing.assert_allclose(character["positions"], pose.positions()[row], atol=1e-5)
+            await told(connection, "put", places=[[5, 5, 0], [-5, 5, 0]])
+            put = await next_of(connection, "frame", lambda frame: frame["heard"] == 2)
+            assert [character["position"][0] for character in put["characters"]] == [
+                pytest.approx(x, abs=0.3) for x in (5, -5)
+            ]
+            await told(connection, "push", velocity=[[4, 0], [0, 0]])
+            await next_of(connection, "frame", lambda frame: frame["heard"] == 3)
+            pushed = (await frames(connection, 30))[-1]["characters"]
+            assert pushed[0]["position"][0] > 5.1
+
+    serving(steer_model, scenario)
+
+
+def test_clients_do_not_touch_each_other(steer_model: SteerModel) -> None:
+    async def scenario(server: LiveServer) -> None:
+        async with client(server) as first, client(server) as second:
+            await told(first, "control", gait="run", speed=3)
+            assert (await frames(first, 60))[-1]["characters"][0]["position"][2] > 1
+            assert abs((await frames(second, 60))[-1]["characters"][0]["position"][2]) < 0.3
+            await second.send("rubbish")
+            await end_of(second)
+            assert len(await frames(first, 30)) == 30
+
+    serving(steer_model, scenario)
+
+
+@pytest.mark.parametrize(
+    ("junk", "said"),
+    [
+        ("walk", "must be JSON"),
+        ('{"type": "control", "speed": NaN}', "NaN is no number"),
+        ('{"type": "control", "speed": 1e999}', "expected numbers up to 1e+06"),
+        ('{"type": "control", "direction": 1e300}', "expected numbers up to 1e+06"),
+        ('{"type": "control", "speed": "fast"}', "control, speed: expected numbers"),
+        ('{"type": "control", "speed": true}', "control, speed: expected numbers"),
+        ('{"type": "control", "speed": [1, 2]}', "speed needs a number or one for each of 1 characters"),
+        ('{"type": "control", "velocity": [1, [2]]}', "a velocity needs x and z"),
+        ('{"type": "control", "velocity": [[[1, 2]]]}', "control, velocity: expected numbers"),
+        ('{"type": "control", "velocity": [1, 0], "speed": 1}', "give it or them"),
+        ('{"type": "control", "gait": "swim"}', "unknown gait 'swim'; expected one of walk, run"),
+        ('{"type": "control", "gait": 3}', "expected the name of a gait"),
+        ('{"type": "control", "sped": 3}', "'sped' is unknown; expected one of gait, speed"),
+        ('{"type": "dance"}', 'whose "type" is one of control, start, put, push'),
+        ("[1, 2]", 'whose "type" is one of control, start, put, push'),
+        ("[" * 5000, "must be JSON"),
+        ('{"type": "push"}', "push: expected velocity"),
+        ('{"type": "put", "places": [1, 2]}', "places need x, z and facing"),
+        (f'{{"type": "start", "characters": {MOST + 1}}}', f"a whole number from 1 to {MOST}"),
+        ('{"type": "start", "positions": 1}', "start, positions: expected true or false"),
+        (b"\x00\x01", "must be text, not binary"),
+    ],
+)
+def test_junk_is_told_why_and_dropped(steer_model: SteerModel, junk: str | bytes, said: str) -> None:
+    async def scenario(server: LiveServer) -> None:
+        async with client(server) as connection:
+            await connection.send(junk)
+            message, code, reason = await end_of(connection)
+            assert said in message
+            assert (code, reason) == (1008, message.encode()[:120].decode())
+
+    serving(steer_model, scenario)
+
+
+def test_what_is_too_much(steer_model: SteerModel, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def scenario(server: LiveServer) -> None:
+        async with client(server) as connection:
+            await connection.send(" " * (MAX_BYTES + 1))
+            assert (await end_of(connection))[1] == 1009
+        async with client(server) as connection:
+            for _ in range(20 * MAX_MESSAGES):
+                try:
+                    await connection.send('{"type": "control"}')
+                except ConnectionClosed:
+                    break
+            assert f"more than {MAX_MESSAGES} messages" in (await end_of(connection))[0]
+        monkeypatch.setattr(server_module, "MAX_CLIENTS", 1)
+        async with client(server) as first, client(server) as second:
+            assert (await end_of(second))[1:] == (1013, "there are 1 clients already")
+            assert len(await frames(first, 5)) == 5
+        with pytest.raises(InvalidStatus, match="403"):
+            await client(server, origin="https://elsewhere.example")
+        async with client(server, origin="http://localhost:8000") as connection:
+            await frames(connection, 1)
+
+    serving(steer_model, scenario)
+
+
+def test_a_client_that_stalls_is_dropped_and_others_go_on(steer_model: SteerModel) -> None:
+    async def scenario(server: LiveServer) -> None:
+        raw = socket.socket()
+        raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        raw.connect(("127.0.0.1", server.port))
+        asked = "GET / HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+        raw.sendall(f"{asked}Sec-WebSocket-Key: {'A' * 22}==\r\nSec-WebSocket-Version: 13\r\n\r\n".encode())
+        async with client(server) as connection:
+            await frames(connection, 1)
+            assert len(server._clients) == 2
+            while len(server._clients) == 2:
+                await frames(connection, 1)
+            assert len(await frames(connection, 30)) == 30
+        raw.close()
+
+    serving(steer_model, scenario, characters=MOST, stall=0.2, rate=60)
+
+
+def test_a_speed_out_of_range_is_noted(steer_model: SteerModel) -> None:
+    async def scenario(server: LiveServer) -> None:
+        async with client(server) as connection:
+            await told(connection, "control", gait="walk", speed=LARGEST)
+            note = await next_of(connection, "note")
+            assert "1e+06 m/s is out of what 'walk' can do" in note["message"]
+            await frames(connection, 2)
+
+    serving(steer_model, scenario)
+
+
+def test_who_watches_sees_the_first_client(steer_model: SteerModel) -> None:
+    seen: list[tuple[float, Pose]] = []
+
+    async def scenario(server: LiveServer) -> None:
+        async with client(server) as first, client(server) as second:
+            await told(second, "control", speed=1)
+            theirs = await frames(first, 20)
+            await frames(second, 5)
+            for frame, (seconds, pose) in zip(theirs, seen, strict=False):
+                assert frame["time"] == pytest.approx(seconds, abs=1e-5)
+                check_same(frame["characters"][0], pose)
+
+    serving(steer_model, scenario, watch=lambda pose, seconds: seen.append((seconds, pose)))
+    assert len(seen) >= 20
+
+
+def test_a_port_that_is_taken(steer_model: SteerModel) -> None:
+    async def scenario(server: LiveServer) -> None:
+        with pytest.raises(OutputError, match=rf"cannot listen on 127.0.0.1:{server.port}: .*in use"):
+            async with LiveServer(steer_model, port=server.port):
+                pass
+
+    serving(steer_model, scenario)
+
+
+def test_ctrl_c_ends_it(steer_model: SteerModel) -> None:
+    assert steer_model._source is not None
+    command = [sys.executable, "-m", "motet", "live", "--port", "0", "--bundle", str(steer_model._source[0])]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ
+    ) as process:
+        assert process.stderr is not None
+        listening = process.stderr.readline()
+        port = int(listening.split(";")[0].rpartition(":")[2])
+
+        async def visit() -> None:
+            async with connect(f"ws://127.0.0.1:{port}") as connection:
+                await frames(connection, 2)
+                process.send_signal(signal.SIGINT)
+                await end_of(connection)
+                assert connection.close_code == 1001
+
+        asyncio.run(visit())
+        out, err = process.communicate(timeout=10)
+    assert (process.returncode, out, err) == (0, "", "stopped\n")
