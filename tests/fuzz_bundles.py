@@ -34,6 +34,7 @@ from motet.bundle.bundle import Bundle, list_bundles
 from motet.errors import MotetError
 from motet.models.control import ControlModel
 from motet.models.load import load
+from motet.models.steer import SteerModel
 from motet.models.verify import verify
 
 Generator = np.random.Generator
@@ -196,6 +197,10 @@ def use(path: Path) -> None:
     model = load(path)
     if isinstance(model, ControlModel):
         model.start(variety=0.5).step()
+    elif isinstance(model, SteerModel):
+        session = model.start(characters=2)
+        session.control(speed=1.0, direction=[0, 90])
+        session.tick()
     else:
         encoder, rng = model.graphs[model.ROLES[0]], np.random.default_rng(0)
         feeds = {tensor.name: tensor.example(rng, 2) for tensor in encoder.spec.inputs}

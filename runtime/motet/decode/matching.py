@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from motet.bundle.graph import Arrays, Floats, Graph
 from motet.decode.loop import Loop
+from motet.errors import BundleError
 from motet.motion.quaternions import wrapped
 
 AHEAD = (1 / 3, 2 / 3, 1.0)
@@ -239,11 +240,14 @@ class Matcher:
 def tick(step: Graph, matcher: Matcher, playing: Playing, control: Floats, gait: Rows) -> Arrays:
     """One tick: "rotations" (B, J, 4), "height" (B, 1) and "contacts" (B, 2); ``playing`` goes on.
 
-    control: (B, 3) velocity over the ground along x and z, and facing. gait: (B,) which.
+    control: (B, 3) velocity over the ground along x and z, and facing. gait: (B,) which. BundleError where the step
+    plays beyond the table.
     """
     matcher.search(playing, control, gait)
     playing.row += playing.states["root"][:, 3]
     here = playing.row.astype(np.int64)
+    if here.min() < 0 or here.max() >= len(matcher.table.left) - 1:
+        raise BundleError("graph step: it plays beyond the rows of the table")
     recorded = matcher.table.frames[np.stack([here, here + 1], axis=1)]
     at = np.stack([playing.row - here, playing.side], axis=1, dtype=np.float32, casting="same_kind")
     outputs = step({"recorded": recorded, "at": at, "control": control, **playing.states})
