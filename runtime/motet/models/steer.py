@@ -52,11 +52,20 @@ class SteerModel(Controllable):
         rows = {"frames": "batch W", "features": "batch F", "gaits": "batch G", "left": "*batch"}
         self.bind("rows", {"row": "*batch"}, rows)
         self.bind("step", self.loop.inputs, self.loop.outputs)
+        codes = self.sizes["K"]
+        if self.sizes["W"] != codes + 6:
+            raise BundleError(f"manifest, graphs.rows: 'frames' has {self.sizes['W']} numbers, expected {codes + 6}")
+        for name, size in {"root": 4, "course": 6, "bend": 2 * codes}.items():
+            found = self.graphs["step"].spec.input(name).size(1)
+            if found != size:
+                raise BundleError(f"manifest, graphs.step: {name!r} has {found} numbers, expected {size}")
 
     def _matcher(self, config: Fields) -> Matcher:
         mean, scale = (np.array(config.numbers(name, FEATURES), dtype=np.float32) for name in ("mean", "scale"))
         table = Table.of(self.graphs["rows"], config.whole("rows", 100, 1 << 20), mean, scale)
         even, odd = (config.whole(name, 0, 1000) for name in ("even", "odd"))
+        if even + odd != self.sizes["K"]:
+            raise BundleError(f"manifest, config.even and odd: must be {self.sizes['K']} together, not {even + odd}")
         signs = np.repeat(np.array([1, -1], dtype=np.float32), [even, odd])
         how = config.fields("steering")
         springs = how.number("velocity"), how.number("facing")
