@@ -56,6 +56,25 @@ def export_run(run: Run, out: str | Path, int8: bool = False, half: bool = False
     return report
 
 
+def halve_bundle(bundle: Bundle, out: str | Path) -> dict[str, Any]:
+    """Write a bundle anew as ``out``, its weights rounded to 16 bits, and return what that changes in whole runs.
+
+    For bundles whose run is gone. Nothing else changes but the golden vectors, which are those of the new graphs; the
+    parity report says what the rounding makes of the runs, under "half".
+    """
+    check_place(out)
+    manifest = bundle.manifest
+    exact: dict[str, Graph] = {role: bundle.graph(role, SessionOptions()) for role in manifest.graphs}
+    files = {f"{role}.onnx": halved(bundle.read(entry.file), rounded=True) for role, entry in manifest.graphs.items()}
+    onnx = _sessions(files, exact)
+    changes = difference(manifest, onnx, exact)
+    files[FILE], golden = golden_vectors(manifest, onnx, examples(manifest, exact), int8=False)
+    graphs = {role: {"file": f"{role}.onnx", **graph.spec.to_json()} for role, graph in exact.items()}
+    report = {**manifest.parity, "weights": HALF, "half": changes}
+    write_bundle(out, {**manifest.source, "graphs": graphs, "golden": golden, "parity": report}, files)
+    return changes
+
+
 def _sessions(files: Mapping[str, bytes], torch: Mapping[str, Graph]) -> dict[str, Graph]:
     return {role: OnnxGraph(files[f"{role}.onnx"], graph.spec) for role, graph in torch.items()}
 

@@ -9,7 +9,7 @@ import click
 from motet.bundle.bundle import Bundle
 from motet.bundle.session import SessionOptions
 from motet.cli.options import session_options
-from motet_export.bundles import export_run, parity_of
+from motet_export.bundles import export_run, halve_bundle, parity_of
 from motet_train.runs import Run
 
 
@@ -19,7 +19,15 @@ from motet_train.runs import Run
 @click.option("--int8", is_flag=True, help="8-bit weights: a quarter of the size; reports changes.")
 @click.option("--half", is_flag=True, help="16-bit weights, computed with in 32 bits: half the size.")
 def export(run: Path, out: Path, int8: bool, half: bool) -> None:
-    """Export the training run RUN to ONNX as a bundle, if ONNX Runtime computes what torch does."""
+    """Export the training run RUN to ONNX as a bundle, if ONNX Runtime computes what torch does.
+
+    With --half, RUN may be a bundle, too: it is written anew with its weights rounded.
+    """
+    if half and run.suffix == ".zip":
+        for name, value in halve_bundle(Bundle.open(run), out).items():
+            click.echo(f"half {name:<20} {value:.3g}")
+        click.echo(str(out))
+        return
     report = export_run(Run.load(run), out, int8, half)
     click.echo(_lines(report))
     for name, value in report.get("int8", {}).items():

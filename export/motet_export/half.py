@@ -23,8 +23,11 @@ def round_weights(net: nn.Module) -> None:
             parameter.copy_(parameter.half().float())
 
 
-def halved(data: bytes) -> bytes:
-    """A graph whose weights are kept in 16 bits where that loses nothing; they are cast to 32 when it is loaded."""
+def halved(data: bytes, rounded: bool = False) -> bytes:
+    """A graph whose weights are kept in 16 bits where that loses nothing; they are cast to 32 when it is loaded.
+
+    rounded: keep them all so, where 16 bits reach as far as they do.
+    """
     model = onnx.load_from_string(data)
     graph = model.graph
     casts = []
@@ -32,8 +35,10 @@ def halved(data: bytes) -> bytes:
         if tensor.data_type != TensorProto.FLOAT or np.prod(tensor.dims) < LEAST:
             continue
         values = numpy_helper.to_array(tensor)
-        half = values.astype(np.float16)
-        if not np.array_equal(half.astype(np.float32), values):
+        with np.errstate(over="ignore"):
+            half = values.astype(np.float16)
+        kept = np.isfinite(half).all() if rounded else np.array_equal(half.astype(np.float32), values)
+        if not kept:
             continue
         name = tensor.name
         tensor.CopyFrom(numpy_helper.from_array(half, f"{name}.half"))

@@ -1,11 +1,19 @@
 """Weights in 16 bits: half the size, and the very same numbers out."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import torch
+from click.testing import CliRunner
 from torch import nn
 
+from motet.bundle.bundle import Bundle, list_bundles
 from motet.bundle.graph import GraphSpec, OnnxGraph, TensorSpec
+from motet.cli import main
+from motet.models.control import ControlModel
+from motet.models.load import load_as
+from motet.models.verify import verify
 from motet_export.exporter import export_graph
 from motet_export.half import halved, round_weights
 
@@ -41,3 +49,17 @@ def test_weights_that_would_lose_something_stay_as_they_are() -> None:
     torch.manual_seed(0)
     data = export_graph(Net(), SPEC, {"motet": "test"})
     assert len(halved(data)) > 0.9 * len(data)
+
+
+@pytest.mark.slow
+def test_a_bundle_is_written_anew_with_half_the_weights(tmp_path: Path) -> None:
+    exact = list_bundles()["cmu-control"]
+    done = CliRunner().invoke(main, ["export", str(exact), "--half", "-o", str(tmp_path / "half.zip")])
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "half.zip").stat().st_size < 0.62 * exact.stat().st_size
+    small = load_as(ControlModel, tmp_path / "half.zip")
+    assert small.manifest.parity["weights"] == "float16"
+    assert small.manifest.quality == load_as(ControlModel, exact).manifest.quality
+    frames = [model.run("walk 1s", smooth=False).values for model in (small, load_as(ControlModel, exact))]
+    assert 0 < np.abs(frames[0][:, 3:] - frames[1][:, 3:]).mean() < 0.5  # degrees
+    assert max(verify(Bundle.open(tmp_path / "half.zip")).errors.values()) == 0
