@@ -59,7 +59,10 @@ def load_as(kind: type[Kind], name_or_path: str | Path, options: SessionOptions 
     """As :func:`load`, for one verb: BundleError where the bundle is for another."""
     model = load(name_or_path, options)
     if not isinstance(model, kind):
-        raise BundleError(f"bundle {name_or_path} is for {model.VERB!r}; need one for {kind.VERB!r}")
+        need = f"need one for {kind.VERB!r}"
+        if model.VERB == kind.VERB:
+            need = f"its loop is {model.manifest.loop!r}; need one that is a {kind.__name__}, such as {kind.VERB!r}"
+        raise BundleError(f"bundle {name_or_path} is for {model.VERB!r}; {need}")
     return model
 
 
