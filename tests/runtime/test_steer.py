@@ -48,11 +48,12 @@ def test_each_of_a_crowd_moves_as_it_would_alone(model: SteerModel) -> None:
     crowd = model.start(characters=3)
     crowd.control(gait=["walk", "run", "walk"], speed=[1.0, 3.0, 1.5], direction=ways)
     together = [crowd.tick() for _ in range(60)]
-    alone = model.start("run")
-    alone.control(speed=3.0, direction=90)
+    alone = model.start()
+    alone.control(gait="run", speed=3.0, direction=90)
     own = [alone.tick() for _ in range(60)]
-    # searches of a crowd are spread over ticks, so that they differ by when a row is found
-    np.testing.assert_allclose(together[-1].ground[1, :2], own[-1].ground[0, :2], atol=0.5)
+    for crowded, single in zip(together, own, strict=True):
+        np.testing.assert_allclose(crowded.ground[1], single.ground[0], atol=1e-4)
+        np.testing.assert_allclose(crowded.rotations[1], single.rotations[0], atol=1e-4)
     again = model.start(characters=3)
     again.control(gait=["walk", "run", "walk"], speed=[1.0, 3.0, 1.5], direction=ways)
     for pose in together:
@@ -134,6 +135,26 @@ def test_it_is_pushed_put_and_bent(model: SteerModel) -> None:
     for _ in range(40):
         bent = session.tick()
     assert np.abs(bent.rotations - zombie.rotations).max() > distance
+
+
+def test_a_figure_that_is_put_elsewhere_leaves_earlier_poses_where_they_were(model: SteerModel) -> None:
+    session = model.start()
+    session.control(speed=1.4)
+    pose = session.advance(0.5)
+    before, place = session.tick(), pose.ground.copy()
+    ground = before.ground.copy()
+    session.put([50, 0, 90])
+    np.testing.assert_array_equal(before.ground, ground)
+    np.testing.assert_array_equal(pose.ground, place)
+    # nor does a display see it fly there
+    np.testing.assert_allclose(session.advance(0.01).ground[0], [50, 0, np.pi / 2], atol=0.1)
+
+
+def test_a_crowd_that_is_told_nothing_stands_as_one_does(model: SteerModel) -> None:
+    alone, crowd = model.start(), model.start(characters=8)
+    for _ in range(40):
+        one, all_of_them = alone.tick(), crowd.tick()
+    np.testing.assert_allclose(all_of_them.rotations, np.repeat(one.rotations, 8, axis=0), atol=1e-5)
 
 
 def test_it_goes_on_from_a_motion(model: SteerModel) -> None:

@@ -176,7 +176,8 @@ def test_the_command_prints_and_saves(folder: Path, monkeypatch: pytest.MonkeyPa
 
 
 def test_bench_measures_a_tick_and_a_crowd(model: SteerModel) -> None:
-    names = ["tick", "tick_p99", "tick_locked", "tick_locked_p99", "crowd", "crowd_locked", "crowd_positions"]
+    kinds = ("tick", "tick_locked", "crowd", "crowd_locked")
+    names = [*(f"{kind}{of}" for kind in kinds for of in ("", "_mean", "_p99")), "crowd_positions"]
     for one in (model, eager_model(model.manifest, 1)):
         found = figures(one, 0.001)
         assert list(found) == [f"control.{name}" for name in names]

@@ -121,7 +121,7 @@ class SteerModel(Controllable):
         }
         states["root"][:, 3] = 1  # played as fast as it was recorded
         side = np.ones(characters, dtype=np.float32)
-        due = np.arange(characters) % self.matcher.every  # searches are spread over ticks
+        due = np.zeros(characters, dtype=np.int64)  # the same for all: each moves as it would alone
         return Playing(np.full(characters, still, dtype=np.float32), side, due, states)
 
     def pose_of(self, motion: Motion) -> Pose:

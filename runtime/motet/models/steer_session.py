@@ -202,8 +202,11 @@ class SteerSession:
             raise ControlError(f"places need x, z and facing for each of {self.characters} characters") from error
         _check_size("places", wanted)
         wanted[:, 2] = wrapped(np.radians(wanted[:, 2]))
-        self._playing.states["root"][:, :3] = wanted
+        root = self._playing.states["root"].copy()  # the last pose shows the array itself
+        root[:, :3] = wanted
+        self._playing.states["root"] = root
         self._playing.states["course"][:, 4] = wanted[:, 2]
+        self._poses = None  # nothing lies between there and here
         self._control[:, 2] = wanted[:, 2]
         if self._lock is not None:
             self._lock = FootLock(self.characters, 1 / self.model.fps)

@@ -69,10 +69,6 @@ class Pose:
             turned[level] = quat_product(turned[parents], turned[level])
         return np.swapaxes(turned, 0, 1), np.swapaxes(places, 0, 1)
 
-    def only(self, rows: NDArray[np.intp]) -> "Pose":
-        """The pose of some of the characters."""
-        return Pose(self.ground[rows], self.rotations[rows], self.height[rows], self.contacts[rows])
-
     def towards(self, other: "Pose", part: float) -> "Pose":
         """The pose ``part`` of the way to another, which is near; for frame rates that are not the model's."""
         share = np.float32(part)
