@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from motet.bundle.graph import Floats
+from motet.motion.springs import damped
 
 WIDTH = 0.04  # s: the window's standard deviation
 REACH = 2  # standard deviations that the window reaches to both sides
@@ -113,7 +114,5 @@ def _window(fps: float) -> Floats:
 
 def _faded(fade: Fade, seconds: float) -> Fade | None:
     """A critically damped spring at rest at 0, so many seconds later (exact)."""
-    rise = (fade.speed + FADING * fade.offset) * np.float32(seconds)
-    left = np.float32(np.exp(-FADING * seconds))
-    after = Fade((fade.offset + rise) * left, (fade.speed - FADING * rise) * left)
+    after = Fade(*damped(fade.offset, fade.speed, FADING, seconds))
     return after if np.abs(after.offset).max() > FADED or np.abs(after.speed).max() > FADED else None

@@ -5,7 +5,6 @@ what has been taken out fades. Hip, knee and ankle follow (:mod:`motet.motion.tw
 how long a foot is going to stand, is :mod:`motet.motion.foot_hold`.
 """
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +14,7 @@ from motet.motion.humanoid import BONES, HUMANOID, LEFT_RIGHT, SOLE, sided
 from motet.motion.pose import Pose
 from motet.motion.quaternions import conjugate, quat_product, quat_rotated
 from motet.motion.rotations import rotmat_to_quat
+from motet.motion.springs import damped, damping_of
 from motet.motion.two_bone import Leg
 
 FADE = 0.06
@@ -74,9 +74,7 @@ class FootLock:
             self.soles = soles
         lowest = soles[..., 1].argmin(axis=2)[..., None, None]
         moved = np.take_along_axis(soles - self.soles, lowest, axis=2)[:, :, 0, ::2]
-        damping = 2 * math.log(2) / FADE
-        rest, left = self.drift + self.shift * damping, math.exp(-damping * self.dt)
-        faded, slower = left * (self.shift + rest * self.dt), left * (self.drift - rest * damping * self.dt)
+        faded, slower = damped(self.shift, self.drift, damping_of(FADE), self.dt)
         held = self.shift - moved
         stands = contacts[..., None] > 0.5
         stands &= np.linalg.norm(held, axis=-1, keepdims=True) < FARTHEST
