@@ -1,7 +1,8 @@
 """Forward kinematics: from the channels of a motion to rotations and positions of its joints."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from motet.motion.rotations import Array, euler_to_rotmat, frames_last, rotmats_
 from motet.motion.skeleton import Joint, Skeleton
 
 AXES = ("x", "y", "z")
+
+K = TypeVar("K")
 
 
 def skeleton_of(motion: Motion) -> Skeleton:
@@ -27,22 +30,35 @@ def local_rotations(motion: Motion, joints: Sequence[int] | None = None) -> Arra
     wanted = range(len(skeleton.joints)) if joints is None else joints
     columns = motion.rotation_columns()
     rotations = frames_last((len(motion), len(wanted), 3, 3))
-    for place, joint in enumerate(skeleton.joints[index] for index in wanted):
-        rotations[:, place] = _rotations_of(motion, joint, columns.get(joint.name, ()))
+    rotations[:] = np.eye(3)
+    named = [(place, skeleton.joints[index]) for place, index in enumerate(wanted)]
+    for order, alike in _by_order((place, joint) for place, joint in named if joint.name in columns).items():
+        places = [place for place, _ in alike]
+        turns = euler_to_rotmat(_angles(motion, [(joint, columns[joint.name]) for _, joint in alike]), order)
+        rotations[:, places] = turns
+        for place, joint in alike:
+            if any(joint.axis):
+                rotations[:, place] = product(product(joint.frame, rotations[:, place]), inverse(joint.frame))
     return rotations
 
 
-def _rotations_of(motion: Motion, joint: Joint, columns: Sequence[int]) -> Array:
-    """Local rotations (T, 3, 3) of one joint from the columns of its angles, (3, 3) where it has none."""
-    if not columns:
-        return np.eye(3)
-    angles = frames_last((len(motion), 3))
+def _by_order(joints: Iterable[tuple[K, Joint]]) -> dict[str, list[tuple[K, Joint]]]:
+    """Joints, each with something of its own, by the order of their angles: those of one order are turned at once."""
+    found: dict[str, list[tuple[K, Joint]]] = {}
+    for own, joint in joints:
+        found.setdefault(joint.order, []).append((own, joint))
+    return found
+
+
+def _angles(motion: Motion, joints: Sequence[tuple[Joint, Sequence[int]]]) -> Array:
+    """Angles (T, J, 3) in radians, each joint's in its order, from the columns of each; 0 where there is no channel."""
+    angles = frames_last((len(motion), len(joints), 3))
     angles[:] = 0.0
-    for column in columns:
-        axis = joint.order.index(motion.channels[column][-1])
-        angles[:, axis] = motion.values[:, column] * (2 * np.pi / TURN[motion.units[column]])
-    turns = euler_to_rotmat(angles, joint.order)
-    return product(product(joint.frame, turns), inverse(joint.frame)) if any(joint.axis) else turns
+    for place, (joint, columns) in enumerate(joints):
+        for column in columns:
+            axis = joint.order.index(motion.channels[column][-1])
+            angles[:, place, axis] = motion.values[:, column] * (2 * np.pi / TURN[motion.units[column]])
+    return angles
 
 
 def local_translations(motion: Motion) -> Array:
@@ -60,14 +76,17 @@ def local_translations(motion: Motion) -> Array:
 
 def global_transforms(motion: Motion) -> tuple[Array, Array]:
     """Rotations (T, J, 3, 3) and positions (T, J, 3) of every joint in the world, lengths in the skeleton's unit."""
-    skeleton = skeleton_of(motion)
-    rotations, positions = local_rotations(motion), local_translations(motion)
+    return chained(skeleton_of(motion), local_rotations(motion), local_translations(motion))
+
+
+def chained(skeleton: Skeleton, rotations: Array, translations: Array) -> tuple[Array, Array]:
+    """Rotations (T, J, 3, 3) and positions (T, J, 3) in the world, from those in each parent's frame, in place."""
     for level in skeleton.levels:
         parents = skeleton.parents[level]
         turned = rotations[:, parents]
-        positions[:, level] = positions[:, parents] + rotated(turned, positions[:, level])
+        translations[:, level] = translations[:, parents] + rotated(turned, translations[:, level])
         rotations[:, level] = product(turned, rotations[:, level])
-    return rotations, positions
+    return rotations, translations
 
 
 def positions(motion: Motion) -> Array:
@@ -80,11 +99,19 @@ def euler_of(rotations: Array, joint: Joint) -> Array:
 
     The angles do not leap from frame to frame; the first frame's middle angle is within a quarter turn.
     """
-    if any(joint.axis):
-        rotations = product(product(inverse(joint.frame), rotations), joint.frame)
-    angles = rotmats_to_euler(rotations, joint.order)
-    ordered: Array = angles[:, [joint.order.index(axis) for axis in AXES]]
-    return ordered
+    found: Array = _eulers_of([(rotations, joint)], joint.order)[:, 0]
+    return found
+
+
+def _eulers_of(joints: Sequence[tuple[Array, Joint]], order: str) -> Array:
+    """As :func:`euler_of` for joints of one order of angles, each with its rotations: (T, J, 3)."""
+    plain = [
+        product(product(inverse(joint.frame), rotations), joint.frame) if any(joint.axis) else rotations
+        for rotations, joint in joints
+    ]
+    angles = rotmats_to_euler(np.stack(plain, axis=1), order)
+    found: Array = angles[..., [order.index(axis) for axis in AXES]]
+    return found
 
 
 def with_channels(motion: Motion, names: tuple[str, ...], values: Array, units: tuple[str, ...]) -> Motion:
@@ -116,12 +143,14 @@ def posed(motion: Motion, rotations: Mapping[str, Array], translations: Mapping[
     """The motion in its channels with other local rotations (T, 3, 3) and translations (T, 3) of some joints, as
     :func:`continued` takes them."""
     skeleton, values = skeleton_of(motion), np.array(motion.values)
-    for name, columns in motion.rotation_columns().items():
-        if name in rotations:
-            angles = euler_of(rotations[name], skeleton.joints[skeleton.index(name)])
-            for column in columns:
+    columns = motion.rotation_columns()
+    turned = ((name, skeleton.joints[skeleton.index(name)]) for name in columns if name in rotations)
+    for order, alike in _by_order(turned).items():
+        angles = _eulers_of([(rotations[name], joint) for name, joint in alike], order)
+        for place, (name, _) in enumerate(alike):
+            for column in columns[name]:
                 axis = AXES.index(motion.channels[column][-1])
-                values[:, column] = angles[:, axis] * TURN[motion.units[column]] / (2 * np.pi)
+                values[:, column] = angles[:, place, axis] * TURN[motion.units[column]] / (2 * np.pi)
     for column, channel in enumerate(motion.channels):
         name, _, kind = channel.rpartition(".")
         if name in translations and kind in ("tx", "ty", "tz"):

@@ -56,6 +56,12 @@ def _other_joints(own: Skeleton, other: Skeleton) -> tuple[str, ...]:
     return tuple(found)
 
 
+@lru_cache(maxsize=256)
+def other_bones(own: Skeleton, other: Skeleton) -> str | None:
+    """Why the angles of any joint mean other poses in another skeleton, see :func:`other_bone`; None if none does."""
+    return next((reason for name in own.names if (reason := other_bone(own, other, name))), None)
+
+
 def other_bone(own: Skeleton, other: Skeleton, name: str) -> str | None:
     """Why a joint's angles mean other poses in another skeleton: its bone points elsewhere; None if they do not."""
     if name not in other.places:
