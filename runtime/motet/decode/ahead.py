@@ -100,7 +100,8 @@ def _run_on(run: Run, frames: Floats, histories: tuple[Floats, ...], count: int)
 
 def _mean(frames: Floats, fps: float) -> Floats:
     """The mean (B, D) of frames (2R + 1, B, D) by the window."""
-    mean: Floats = (_window(fps) @ frames.reshape(len(frames), -1)).reshape(frames.shape[1:])
+    # not as a product of matrices, which rounds a character by how many there are
+    mean: Floats = (_window(fps)[:, None, None] * frames).sum(axis=0)
     return mean
 
 

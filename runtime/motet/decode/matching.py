@@ -187,12 +187,12 @@ class Matcher:
         for kind in set(gait.tolist()):
             who = np.flatnonzero(gait == kind)
             rows, half, across, places = self.goals[kind]
-            costs = []
-            for features in (asked[who], asked[who][:, self.columns] * self.signs):
-                way, far = self._way(features)
-                costs.append(half + LAG * np.maximum(far[:, None] / 2 - way @ places.T, 0) - features @ across)
-            found = [each.argmin(axis=1) for each in costs]
-            least = [np.take_along_axis(c, at[:, None], axis=1)[:, 0] for c, at in zip(costs, found, strict=True)]
+            # both sides in one product: of a single row it would round differently from one among others
+            both = np.concatenate([asked[who], asked[who][:, self.columns] * self.signs])
+            way, far = self._way(both)
+            costs = half + LAG * np.maximum(far[:, None] / 2 - way @ places.T, 0) - both @ across
+            at = costs.argmin(axis=1)
+            found, least = np.split(at, 2), np.split(np.take_along_axis(costs, at[:, None], axis=1)[:, 0], 2)
             other = least[1] < least[0]
             row[who], cost[who] = rows[np.where(other, found[1], found[0])], np.minimum(*least)
             side[who] = np.where(other, -1, 1)
