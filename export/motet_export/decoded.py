@@ -13,6 +13,7 @@ from motet.bundle.manifest import Manifest
 from motet.errors import TextWarning
 from motet.models.control import ControlModel
 from motet.models.describe import DescribeModel
+from motet.models.fill import FillModel
 from motet.models.generate import GenerateModel
 from motet.models.language import LanguageModel
 from motet.models.load import build
@@ -22,7 +23,7 @@ from motet.models.steer import SteerModel
 from motet.models.text import MAX_WORDS, SPECIALS
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
-from motet_export.examples import walks
+from motet_export.examples import sides, walks
 
 Decoded = dict[str, NDArray[Any]]
 Runs = dict[str, Callable[[], tuple[Decoded, Decoded]]]
@@ -134,6 +135,17 @@ def _predicted(horizons: int, model: PredictModel) -> Decoded:
     return {"frames": contract.normalised(found)}
 
 
+def _fill(_: FillModel) -> Named:
+    return {"short": partial(_filled, 4), "longest": partial(_filled, None)}
+
+
+def _filled(frames: int | None, model: FillModel) -> Decoded:
+    """What fills a gap in each of eight random walks."""
+    rng = np.random.default_rng(3)
+    known = [sides(model.contract, rng, model.context) for _ in range(8)]
+    return {"frames": np.stack([model.frames_between(*one, frames or model.longest) for one in known])}
+
+
 def _search(_: SearchModel) -> Named:
     return {"vectors": lambda model: {"motions": model.embed(_motions(model)), "texts": _texts(model)}}
 
@@ -169,6 +181,7 @@ _RUNS: Mapping[str, Callable[..., Named]] = {
     "control": _control,
     "matching": _steer,
     "describe": _describe,
+    "fill": _fill,
     "generate": _generate,
     "predict": _predict,
     "search": _search,

@@ -12,6 +12,7 @@ from motet.bundle.graph import Arrays, Graph, GraphSpec
 from motet.bundle.manifest import Manifest
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
+from motet.representation.placed import placed_by_way
 
 LONGEST = 12
 """Of an axis other than the batch."""
@@ -95,3 +96,12 @@ def walks(contract: MotionContract, rng: np.random.Generator, rows: int, frames:
     steps = PACE * rng.normal(size=(rows, frames, len(contract.mean)))
     found: Array = contract.mean + contract.std * steps.cumsum(axis=1)
     return found.astype(np.float32)
+
+
+def sides(
+    contract: MotionContract, rng: np.random.Generator, frames: int
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Placed frames (frames, E) before a gap, and as many after it: both ends of a random walk in ``root_sixd``."""
+    walk = walks(contract, rng, 1, 2 * frames)[0].astype(np.float64)
+    past, after = np.split(placed_by_way(walk, contract.fps).astype(np.float32), 2)
+    return past, after

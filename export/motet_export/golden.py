@@ -12,6 +12,7 @@ from motet.decode.ancestral import noise_of
 from motet.decode.noise import Recording
 from motet.models.control import ControlModel
 from motet.models.describe import DescribeModel
+from motet.models.fill import FillModel
 from motet.models.generate import GenerateModel
 from motet.models.language import LanguageModel
 from motet.models.load import build
@@ -19,7 +20,7 @@ from motet.models.predict import PredictModel
 from motet.models.search import SearchModel
 from motet.models.steer import SteerModel
 from motet.models.text import SPECIALS
-from motet_export.examples import Examples, walks
+from motet_export.examples import Examples, sides, walks
 
 FILE = "golden.npz"
 
@@ -78,6 +79,12 @@ def _generate(model: GenerateModel, rng: np.random.Generator) -> Run:
     return given, {**settings, "text": text}
 
 
+def _fill(model: FillModel, rng: np.random.Generator) -> Run:
+    """Half a second between two parts of a random walk."""
+    past, after = sides(model.contract, rng, model.context)
+    return {"past": past, "after": after}, {"frames": round(model.fps / 2)}
+
+
 def _predict(model: PredictModel, rng: np.random.Generator) -> Run:
     """One frame more than the horizon, so that the encoder is asked again."""
     return {"frames": walks(model.contract, rng, 1, model.seed_frames)[0]}, {"frames": model.horizon + 1}
@@ -96,6 +103,7 @@ _RUNS: Mapping[str, Callable[..., Run]] = {
     "control": _control,
     "matching": _steer,
     "describe": _describe,
+    "fill": _fill,
     "generate": _generate,
     "predict": _predict,
     "search": _search,

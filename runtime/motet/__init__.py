@@ -29,6 +29,7 @@ from motet.formats import write_motion as write
 from motet.live.page import live_page, write_live_page
 from motet.models.control import ControlModel, ControlSession, Snapshot
 from motet.models.describe import DescribeModel, Description, Part
+from motet.models.fill import FillModel
 from motet.models.generate import Generated, GenerateModel
 from motet.models.index import Hit, Index
 from motet.models.load import load, load_as
@@ -53,6 +54,7 @@ __all__ = [
     "DecodingError",
     "DescribeModel",
     "Description",
+    "FillModel",
     "FormatError",
     "GenerateModel",
     "Generated",

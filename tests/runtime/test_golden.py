@@ -14,7 +14,7 @@ from motet.bundle.manifest import Golden
 from motet.errors import BundleError
 from motet.models.load import load
 
-NAMES = ["cmu-control", "cmu-generate", "describe", "generate", "predict"]
+NAMES = ["cmu-control", "cmu-generate", "describe", "fill", "generate", "predict"]
 
 
 def packed(arrays: Mapping[str, Any]) -> bytes:

@@ -17,6 +17,7 @@ from motet.errors import MotetError
 from motet.files import write_whole
 from motet_train.models.codes import actions, codec, motion_codes
 from motet_train.models.control import angle_crbm, matching, tdbn
+from motet_train.models.fill import filler
 from motet_train.models.language import joint_embedding, language_to_motion, motion_to_language
 from motet_train.models.net import Net
 from motet_train.models.predict import predictor, systems
@@ -34,6 +35,7 @@ MODELS: Mapping[str, Callable[[Mapping[str, Any]], Net]] = {
     "motion-codes": motion_codes.from_config,
     "angle-crbm": angle_crbm.from_config,
     "motion-matching": matching.from_config,
+    "gap-filler": filler.from_config,
     "trajectory": predictor.from_config,
     **{name: partial(systems.stepwise, name) for name in systems.SYSTEMS},
 }

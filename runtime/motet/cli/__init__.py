@@ -16,6 +16,8 @@ COMMANDS = {
     "describe": ("motet.cli.describe:describe", "", "Describe motions in ranked sentences."),
     "generate": ("motet.cli.generate:generate", "", "Generate motions from sentences."),
     "predict": ("motet.cli.predict:predict", "", "Predict how motions continue."),
+    "fill": ("motet.cli.fill:fill", "", "Fill gaps of motions, and close loops."),
+    "join": ("motet.cli.fill:join", "", "Join two motions by a transition."),
     "control": ("motet.cli.control:control", "", "Run a script such as 'walk 3s, run 3s'."),
     "live": ("motet.cli.live:live", "", "Steer figures live: in a page, by a server, onto an avatar."),
     "search": ("motet.cli.search:search", "", "Find motions in a folder by a sentence or a motion."),

@@ -13,16 +13,17 @@ from motet.models.base import BundleModel
 from motet.models.codes import CodesModel
 from motet.models.control import ControlModel
 from motet.models.describe import DescribeModel
+from motet.models.fill import FillModel
 from motet.models.generate import GenerateModel
 from motet.models.mixture import MixtureModel
 from motet.models.predict import PredictModel
 from motet.models.search import SearchModel
 from motet.models.steer import SteerModel
 
-Model = ControlModel | DescribeModel | GenerateModel | PredictModel | SearchModel | SteerModel
+Model = ControlModel | DescribeModel | FillModel | GenerateModel | PredictModel | SearchModel | SteerModel
 Kind = TypeVar("Kind", bound=BundleModel)
 
-_KINDS: tuple[type[Model], ...] = (ControlModel, DescribeModel, MixtureModel, PredictModel, SearchModel)
+_KINDS: tuple[type[Model], ...] = (ControlModel, DescribeModel, FillModel, MixtureModel, PredictModel, SearchModel)
 VERBS: dict[str, type[Model]] = {kind.VERB: kind for kind in _KINDS}
 """Verb of a bundle -> the class of its model, where the loop does not say another."""
 
@@ -36,6 +37,8 @@ def load(name_or_path: Literal["control"], options: SessionOptions | None = None
 def load(name_or_path: Literal["cmu-control"], options: SessionOptions | None = None) -> ControlModel: ...
 @overload
 def load(name_or_path: Literal["describe"], options: SessionOptions | None = None) -> DescribeModel: ...
+@overload
+def load(name_or_path: Literal["fill"], options: SessionOptions | None = None) -> FillModel: ...
 @overload
 def load(name_or_path: Literal["generate", "cmu-generate"], options: SessionOptions | None = None) -> GenerateModel: ...
 @overload

@@ -19,10 +19,11 @@ from motet.motion.kinematics import (
 )
 from motet.motion.mmm_figure import is_mmm
 from motet.motion.motion import Motion
+from motet.motion.products import inverse, product
 from motet.motion.retarget import from_humanoid, map_of, on_humanoid, to_humanoid
-from motet.motion.rotations import Array, rotmat_to_rotvec
+from motet.motion.rotations import Array, rotmat_to_rotvec, rotvec_to_rotmat
 from motet.motion.skeleton import Skeleton
-from motet.representation.figure import other_bone
+from motet.representation.figure import other_bones
 
 log = logging.getLogger(__name__)
 
@@ -42,7 +43,7 @@ def foreign(motion: Motion, skeleton: Skeleton, joints: Iterable[str]) -> str | 
     lacking = [name for name in joints if name not in own.places]
     if lacking:
         return f"the model's figure has joints that this motion lacks: {listed(lacking)}"
-    return next((reason for name in own.names if (reason := other_bone(own, skeleton, name))), None)
+    return other_bones(own, skeleton)
 
 
 def brought(motion: Motion, pose: Motion, reason: str) -> Motion:
@@ -93,6 +94,41 @@ def carried_back(following: Motion, figure: Motion, own: Motion) -> Motion | Non
     moved, places = local_translations(back), local_translations(last)[0]
     rotations = {name: turned[1:, i] @ turns[i] for i, name in enumerate(skeleton.names)}
     return continued(last, rotations, {n: places[i] + moved[1:, i] - moved[0, i] for i, n in enumerate(skeleton.names)})
+
+
+def carried_between(found: Motion, own: Motion, ends: Motion) -> Motion | None:
+    """What lies between two frames, on the skeleton and in the channels of a motion that was brought onto the humanoid.
+
+    found: (N + 2 frames) on the humanoid, at the motion's frame rate, both ends included; or already on the motion's
+    own skeleton. own: the motion, as it was brought there. ends: the two frames of it. Given back are the N frames.
+    Each joint keeps the turn by which it differs at the ends from what comes back, going from that of the one to that
+    of the other; so joints of which the humanoid says nothing go straight from one end to the other, and so do other
+    channels. None where the file has no skeleton, the motion's own world is another, or its channels do not say where
+    it goes.
+    """
+    if own.skeleton is None:
+        return None
+    skeleton = own.skeleton
+    back = found if found.skeleton == skeleton else from_humanoid(found, own)
+    turned, then = local_rotations(back), local_rotations(ends)
+    turns = product(inverse(turned[[0, -1]]), then)
+    carrier = next(name.rpartition(".")[0] for name in back.channels if name.endswith(".tx"))
+    if not {f"{carrier}.t{axis}" for axis in AXES} <= set(own.channels):
+        return None
+    if not all(_clean(turn, skeleton, carrier) for turn in turns):
+        return None
+    part = np.linspace(0, 1, len(found))[:, None]
+    between = rotmat_to_rotvec(product(inverse(turns[:1]), turns[1:])) * part[..., None]
+    rotations = product(turned, product(np.repeat(turns[:1], len(found), axis=0), rotvec_to_rotmat(between)))
+    moved = local_translations(back)
+    off = local_translations(ends) - moved[[0, -1]]
+    moved = moved + off[:1] + part[..., None] * (off[1:] - off[:1])
+    names = {name: joint for joint, name in enumerate(skeleton.names)}
+    whole = continued(ends[:1], *({n: all_[:, i] for n, i in names.items()} for all_ in (rotations, moved)))
+    others = [column for column, name in enumerate(own.channels) if name.rpartition(".")[0] not in names]
+    values = np.array(whole.values)
+    values[:, others] = (ends.values[:1] + part * (ends.values[1:] - ends.values[:1]))[:, others]
+    return replace(whole, values=values)[1:-1]
 
 
 def _clean(turns: Array, skeleton: Skeleton, carrier: str) -> bool:

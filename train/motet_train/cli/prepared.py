@@ -23,7 +23,7 @@ def prepared(data: Path, job: Job, **corpus: Any) -> Store:
     place = job.folder.with_name(f"{job.folder.name}-store")
     if (job.folder / CHECKPOINT).is_file():
         return Store.open(place)
-    verb = "codes" if job.recipe.loop == "codes" or job.recipe.verb == "control" else job.recipe.verb
+    verb = "codes" if job.recipe.loop == "codes" or job.recipe.verb in ("control", "fill") else job.recipe.verb
     if distributed.count() > 1:
         raise DataError(f"several processes need a prepared store: motet prepare {data} --for {verb} --out {place}")
     click.get_current_context().invoke(prepare, data=(data,), out=place, verb=verb, fps=None, **corpus)

@@ -4,6 +4,7 @@ import click
 
 from motet_train.cli.train_codec import actions, codec, codes
 from motet_train.cli.train_control import crbm, tdbn
+from motet_train.cli.train_fill import fill
 from motet_train.cli.train_language import describe, generate, search
 from motet_train.cli.train_matching import matching
 from motet_train.cli.train_predict import predict
@@ -16,5 +17,6 @@ def train() -> None:
     """Train a model; the run goes into a new folder that evaluate and export take."""
 
 
-for command in (matching, steered, tdbn, crbm, describe, codec, actions, codes, generate, search, predict, *COMMANDS):
+CONTROL = (matching, steered, tdbn, crbm)
+for command in (*CONTROL, describe, codec, actions, codes, generate, search, predict, fill, *COMMANDS):
     train.add_command(command)

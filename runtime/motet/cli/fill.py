@@ -1,0 +1,115 @@
+"""``motet fill`` and ``motet join``: gaps of motions, loops, and transitions between two."""
+
+import re
+from pathlib import Path
+
+import click
+
+from motet.bundle.session import SessionOptions
+from motet.cli.options import session_options
+from motet.cli.reading import Read, Tries, like_option, naming, out_option, places, read_options
+from motet.errors import quoted
+from motet.formats import write_motion
+from motet.formats.character import Character
+from motet.models.fill import JOIN_SECONDS, LOOP_SECONDS, FillModel
+from motet.models.gaps import Gap
+from motet.models.load import load_as
+from motet.motion.motion import Motion
+
+bundle_option = click.option("--bundle", default="fill", show_default=True, help="Name or path of a bundle.")
+
+
+NUMBER = r"\s*([-+]?(?:\d+\.?\d*|\.\d+))\s*"
+
+
+def _gaps(context: click.Context, option: click.Parameter, texts: tuple[str, ...]) -> tuple[Gap, ...]:
+    """What ``--gap`` gives, as two numbers each."""
+    found = [re.fullmatch(f"{NUMBER}:{NUMBER}", text) for text in texts]
+    for text, parts in zip(texts, found, strict=True):
+        if parts is None:
+            raise click.BadParameter(f"{quoted(text)} is no gap: give its start and stop in seconds, such as 1.0:2.0")
+    return tuple((float(parts[1]), float(parts[2])) for parts in found if parts is not None)
+
+
+@click.command()
+@click.argument("sources", nargs=-1, required=True, type=Path, metavar="MOTION...")
+@out_option
+@click.option(
+    "--gap",
+    "gaps",
+    multiple=True,
+    callback=_gaps,
+    metavar="START:STOP",
+    help="Seconds to fill, from the first frame that is replaced to the first that stays; may be given several times.",
+)
+@click.option("--loop", is_flag=True, help="Add a transition from the end to the start instead.")
+@click.option("--seconds", type=float, help=f"With --loop: how long it takes. [default: {LOOP_SECONDS}]")
+@bundle_option
+@like_option
+@session_options
+@read_options
+def fill(
+    sources: tuple[Path, ...],
+    out: Path,
+    gaps: tuple[Gap, ...],
+    loop: bool,
+    seconds: float | None,
+    bundle: str,
+    like: Character | None,
+    session: SessionOptions,
+    read: Read,
+) -> None:
+    """Fill gaps of motion files, or close them to loops; all other frames stay as they are.
+
+    What a file has in its gaps is not looked at. It may be of any human figure and at any frame rate. With several
+    files OUT holds {name} for their names, or the results are numbered: out-1.bvh, out-2.bvh, ...
+    """
+    if loop == bool(gaps) or (seconds is not None and not loop):
+        raise click.UsageError("give --gap START:STOP, once or several times, or --loop, with --seconds if you like")
+    outs = places(out, [source.stem for source in sources])
+    model, tries = load_as(FillModel, bundle, session), Tries()
+    for source, place in zip(sources, outs, strict=True):
+        with tries.of(source):
+            motion = read(source)
+            if loop:
+                found = model.looped(motion, seconds=LOOP_SECONDS if seconds is None else seconds)
+            else:
+                found = model.fill(motion, gaps)
+            write_motion(place, found, like=like)
+            _say(place, found)
+    tries.finish()
+
+
+@click.command()
+@click.argument("first", type=Path)
+@click.argument("second", type=Path)
+@out_option
+@click.option("--seconds", type=float, default=JOIN_SECONDS, show_default=True, help="How long the transition takes.")
+@bundle_option
+@like_option
+@session_options
+@read_options
+def join(
+    first: Path,
+    second: Path,
+    out: Path,
+    seconds: float,
+    bundle: str,
+    like: Character | None,
+    session: SessionOptions,
+    read: Read,
+) -> None:
+    """Join the motion files FIRST and SECOND by a transition.
+
+    SECOND is set down where FIRST leads, facing as it does, and brought to its frame rate and figure.
+    """
+    model = load_as(FillModel, bundle, session)
+    one, other = read(first), read(second)
+    with naming(f"{first} and {second}"):
+        found = model.join(one, other, seconds=seconds)
+    write_motion(out, found, like=like)
+    _say(out, found)
+
+
+def _say(place: Path, found: Motion) -> None:
+    click.echo(f"{place}: {len(found)} frames at {found.fps:g} fps, {found.duration:g} s")

@@ -1,0 +1,199 @@
+"""Fill: what happens in a gap of a motion, between two motions, or from the end of one to its start."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from motet.bundle.graph import Arrays, Graph
+from motet.bundle.manifest import Manifest
+from motet.errors import BundleError, MotionError
+from motet.models.base import BundleModel
+from motet.models.gaps import Gap, at_own_rate, log_elsewhere, spans_of
+from motet.motion.follow import alike, following
+from motet.motion.humanoid import HUMANOID
+from motet.motion.motion import Motion
+from motet.motion.retarget import on_humanoid
+from motet.motion.rotations import Array
+from motet.representation.foreign import carried_between
+from motet.representation.placed import CHANNELS, bridge, placed, pose_of, put_at, seen_from, unplaced
+from motet.representation.root_sixd import facing
+
+SEEN = 5.0
+"""Seconds before and after a gap by which a figure is brought to the humanoid: where its ground is, how it stands."""
+
+JOIN_SECONDS, LOOP_SECONDS = 1.0, 0.5
+"""How long transitions take by default: between two motions, and from the end of one to its start."""
+
+
+@dataclass(frozen=True)
+class Sides:
+    """What is known about a gap, at the model's frame rate. own: both sides, as the figure has them; figure: the same
+    on the humanoid. past: (P, E) placed frames before the gap, the last of them right before it. after: (A, E)."""
+
+    own: Motion
+    figure: Motion
+    past: Array
+    after: Array
+
+
+class FillModel(BundleModel):
+    """A model that fills gaps of motions; any number of threads share it.
+
+    graphs: "filler" (past, plain, after -> filled), of placed frames (:mod:`motet.representation.placed`) of the
+        humanoid. Its loop gives "context", the frames it sees before and after a gap, "least", how many it needs, and
+        "longest", the frames of the longest gap, all at the model's frame rate.
+    """
+
+    VERB = "fill"
+    ROLES = ("filler",)
+
+    def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph]) -> None:
+        super().__init__(manifest, graphs)
+        if self.contract.skeleton != HUMANOID:
+            raise BundleError("manifest, motion.skeleton: a model that fills gaps needs motet's humanoid")
+        self.sizes["E"] = CHANNELS
+        filled = "batch gap E"
+        self.bind("filler", {"past": "batch before E", "plain": filled, "after": "batch behind E"}, {"filled": filled})
+        self.context, self.least, self.longest = (int(self.defaults[key]) for key in ("context", "least", "longest"))
+
+    @property
+    def seconds(self) -> float:
+        """How long a gap may be."""
+        return self.longest / self.fps
+
+    def fill(self, motion: Motion, gaps: Sequence[Gap]) -> Motion:
+        """The motion with what may have happened in its gaps; what is there in their frames is not looked at.
+
+        gaps: (start, stop) in seconds: frames from ``start`` on, up to and without that at ``stop``, are replaced. All
+            others stay as they are, to the bit, and so do channels, units, figure and frame rate. A motion of a figure
+            whose own world or channels do not allow that comes on the humanoid at the model's rate, which is logged.
+        MotionError, with what would be right, for gaps that are empty, longer than :attr:`seconds`, not within the
+        motion, that overlap, or with fewer than :attr:`least` frames at the model's rate before or after them; and for
+        a figure that is no human's.
+        """
+        spans = spans_of(motion, gaps, self.seconds)
+        result = motion
+        for number, (start, stop) in enumerate(spans):
+            end = spans[number + 1][0] if number + 1 < len(spans) else len(motion)
+            new = self._between(result[:start], result[stop:end], stop - start)
+            if new is None:
+                log_elsewhere()
+                return self.fill(self._on_humanoid(motion), gaps)
+            values = np.array(result.values)
+            values[start:stop] = new.values
+            result = replace(result, values=values)
+        return result
+
+    def join(self, first: Motion, second: Motion, *, seconds: float = JOIN_SECONDS) -> Motion:
+        """One motion, a transition of so many seconds, and another motion, which is set down where the first leads.
+
+        The second is turned to face as the first does at its end, and begins ahead of it by the mean of both their
+        velocities. It is brought to the first's frame rate and figure where it has others, which is logged. The frames
+        of the first stay as they are, to the bit; for figures where that is not possible see :meth:`fill`.
+        MotionError for seconds that are not positive or more than :attr:`seconds`, and as :meth:`fill`.
+        """
+        before, new, after = self._joined(first, second, seconds)
+        return replace(before, values=np.concatenate([before.values, new.values, after.values]))
+
+    def looped(self, motion: Motion, *, seconds: float = LOOP_SECONDS) -> Motion:
+        """The motion and a transition of so many seconds to its own start: its last frame is one before its first pose.
+
+        The place on the ground and the heading go on, by the same from each repetition to the next. Errors as
+        :meth:`join`. Where a part of the motion repeats as it is, :func:`motet.motion.looped` finds it.
+        """
+        before, new, _ = self._joined(motion, motion, seconds)
+        return replace(before, values=np.concatenate([before.values, new.values]))
+
+    def frames_between(self, past: ArrayLike, after: ArrayLike, frames: int, pace: float = 1.0) -> Array:
+        """Placed frames (P, E) and (A, E) to the ``frames`` (frames, E) float64 between them, all in one world.
+
+        pace: frames at the model's rate from one of them to the next, about 1. Only the nearest :attr:`context` frames
+        are looked at. MotionError for too few frames, another number of channels, or more than twice
+        :attr:`longest` frames to fill.
+        """
+        known = [np.asarray(part, dtype=np.float64) for part in (past, after)]
+        for part, name in zip(known, ("before", "after"), strict=True):
+            if part.ndim != 2 or part.shape[1] != self.sizes["E"] or len(part) < self.least:
+                need = f"at least {self.least} frames of {self.sizes['E']} channels {name} it"
+                raise MotionError(f"a gap needs {need}, not {part.shape}")
+            if not np.isfinite(part).all():
+                raise MotionError("frames must be finite numbers")
+        if not 0 <= frames <= 2 * self.longest:
+            raise MotionError(f"0 to {2 * self.longest} frames can be filled at once, not {frames}")
+        pose = pose_of(known[0][-1])
+        past, after = seen_from(known[0][-self.context :], pose), seen_from(known[1][: self.context], pose)
+        plain = bridge(past, after, frames, pace)
+        if not frames:
+            return plain
+        rows = (one[None].astype(np.float32) for one in (past, plain, after))
+        filled: Array = put_at(self.loop.run(self.graphs["filler"], *rows)[0], pose)
+        return filled
+
+    def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
+        """Placed frames "past" (P, E) and "after" (A, E), and the number of "frames" of the settings, to "filled"."""
+        count = int(settings["frames"])
+        if not 1 <= count <= self.longest:
+            raise BundleError(f"golden vectors fill a gap of 1 to {self.longest} frames, not {count}")
+        return {"filled": self.frames_between(given["past"], given["after"], count)}
+
+    def _joined(self, first: Motion, second: Motion, seconds: float) -> tuple[Motion, Motion, Motion]:
+        """The first motion, what is between, and the second set down; all in the channels of the first."""
+        if not 0 < seconds <= self.seconds:
+            raise MotionError(f"a transition takes more than 0 and at most {self.seconds:g} seconds, not {seconds:g}")
+        if None in (first.skeleton, second.skeleton) or not self._in_its_world(first):
+            return self._elsewhere(first, second, seconds)
+        count = max(1, round(seconds * first.fps))
+        other = second if second is first else alike(second, first)
+        known = self._sides(first, other)
+        ends = len(known.past)
+        turn = float(facing(known.figure[:ends])[-1] - facing(known.figure[ends:])[0])
+        after = following(other, first, (count + 1) / first.fps, turn)
+        new = None if after is None else self._between(first, after, count)
+        if after is None or new is None:
+            return self._elsewhere(first, second, seconds)
+        return first, new, after
+
+    def _in_its_world(self, motion: Motion) -> bool:
+        """Whether a motion's figure stands in its own world as in the model's, and can be set down there."""
+        part = motion[-round(SEEN * motion.fps) :].continuous().resample(self.fps, to_end=True)
+        ends = replace(part, values=part.values[[0, -1]] if len(part) else part.values)
+        return carried_between(on_humanoid(part), part, ends) is not None
+
+    def _elsewhere(self, first: Motion, second: Motion, seconds: float) -> tuple[Motion, Motion, Motion]:
+        """As :meth:`_joined`, on the humanoid."""
+        log_elsewhere()
+        return self._joined(self._on_humanoid(first), self._on_humanoid(second), seconds)
+
+    def _between(self, before: Motion, after: Motion, count: int) -> Motion | None:
+        """What is between two parts of a motion, so many frames at its own rate, in its channels; None where it cannot
+        be put onto its figure."""
+        known = self._sides(before, after)
+        span = (count + 1) * self.fps / before.fps
+        knots = max(0, round(span) - 1)
+        new = self.frames_between(known.past, known.after, knots, span / (knots + 1))
+        frames = at_own_rate(known.past, new, known.after, count)
+        ends = replace(before, values=np.concatenate([before.values[-1:], after.values[:1]]))
+        like = replace(known.figure[:1], fps=before.fps)
+        return carried_between(unplaced(frames, like), known.own, ends)
+
+    def _sides(self, before: Motion, after: Motion) -> Sides:
+        """What is known about a gap; MotionError where it is too little."""
+        seen = round(SEEN * before.fps)
+        parts = (
+            before[-seen:].continuous().resample(self.fps, to_end=True),
+            after[:seen].continuous().resample(self.fps),
+        )
+        for part, given, name in zip(parts, (before, after), ("before", "after"), strict=True):
+            if len(part) < self.least:
+                need = f"at least {self.least / self.fps:.2g} s of motion ({self.least} frames at {self.fps:g} fps)"
+                raise MotionError(f"a gap needs {need} {name} it, and there are {given.duration:.2g} s")
+        own = replace(parts[0], values=np.concatenate([part.values for part in parts]))
+        figure = on_humanoid(own)
+        return Sides(own, figure, *np.split(placed(figure), [len(parts[0])]))
+
+    def _on_humanoid(self, motion: Motion) -> Motion:
+        """A motion on the humanoid, at the model's rate."""
+        return on_humanoid(motion.continuous().resample(self.fps))

@@ -1,0 +1,160 @@
+"""Frames of the humanoid placed in the world: where its hips are, and two axes of every bone, the hips among them.
+
+What stands between two poses is told best from one of them: placed frames are turned and moved over the ground as a
+whole (:func:`seen_from`), and know no smoothed facing, which near a gap would tell of what lies in it.
+
+Letters in shapes: T frames, K bones, E = 3 + 6 K channels: the hips' x, y and z in metres, and for each bone where its
+x and its y axis point in its parent's frame (:mod:`motet.representation.root_sixd`), for the hips in the world.
+"""
+
+import numpy as np
+
+from motet.motion.humanoid import BONES
+from motet.motion.kinematics import AXES, continued, local_rotations, skeleton_of
+from motet.motion.motion import Motion
+from motet.motion.products import inverse, product
+from motet.motion.rotations import Array, rotmat_to_rotvec, rotvec_to_rotmat
+from motet.motion.sides import partners_of
+from motet.representation.base import FrameMirror
+from motet.representation.root_sixd import KINDS, ROOT_SIXD, SIGNS, sixd_to_rotmat
+
+PLACE = 3
+"""Channels of the root's place, before all axes."""
+
+CHANNELS = PLACE + 6 * len(BONES)
+"""E."""
+
+STEPS = 3
+"""Frames over which the hips' velocity at either end of a gap is taken."""
+
+
+def placed(motion: Motion) -> Array:
+    """A motion on the humanoid as placed frames (T, E); MotionError where it does not say where the hips are."""
+    skeleton = skeleton_of(motion)
+    turned = local_rotations(motion, [skeleton.index(name) for name in BONES])
+    root = motion.select(tuple(f"{BONES[0]}.t{axis}" for axis in AXES), ("m",) * 3).values
+    return np.column_stack([root, rotmat_to_sixd(np.ascontiguousarray(turned)).reshape(len(motion), -1)])
+
+
+def placed_by_way(frames: Array, fps: float) -> Array:
+    """Frames (..., T, 4 + 6 K) of ``root_sixd`` as placed frames (..., T, E), the first at the origin, facing z."""
+    steps = frames[..., :PLACE] / fps
+    steps[..., :1, :] = 0
+    forward, left, turn = np.moveaxis(steps, -1, 0)
+    now = np.cumsum(turn, axis=-1)
+    sin, cos = np.sin(now - turn), np.cos(now - turn)
+    x, z = (np.cumsum(step, axis=-1) for step in (forward * sin + left * cos, forward * cos - left * sin))
+    found = np.empty((*frames.shape[:-1], frames.shape[-1] - 1))
+    found[..., 0], found[..., 1], found[..., 2] = x, frames[..., PLACE], z
+    found[..., PLACE:] = frames[..., len(ROOT_SIXD) :]
+    _turn(found[..., PLACE : PLACE + 6], now)
+    return found
+
+
+def pose_of(frames: Array) -> Array:
+    """Where a figure is and how it faces: (..., 3), x, z and the angle in radians, of placed frames (..., E).
+
+    The angle is that of the turn about the vertical axis after which the root is tilted, as that of
+    :func:`motet.representation.root_sixd.facing`, but of one frame alone.
+    """
+    hips = sixd_to_rotmat(frames[..., PLACE : PLACE + 6])
+    angle = np.arctan2(hips[..., 0, 2] - hips[..., 2, 0], hips[..., 0, 0] + hips[..., 2, 2])
+    return np.stack([frames[..., 0], frames[..., 2], angle], axis=-1)
+
+
+def seen_from(frames: Array, pose: Array) -> Array:
+    """Placed frames (..., T, E) as they are seen from poses (..., 3), which come to the origin and face z."""
+    found = np.array(frames, dtype=np.float64)
+    found[..., 0] -= pose[..., None, 0]
+    found[..., 2] -= pose[..., None, 1]
+    return _turned(found, -pose[..., None, 2])
+
+
+def put_at(frames: Array, pose: Array) -> Array:
+    """The inverse of :func:`seen_from`: frames whose origin comes to poses (..., 3)."""
+    found = _turned(np.array(frames, dtype=np.float64), pose[..., None, 2])
+    found[..., 0] += pose[..., None, 0]
+    found[..., 2] += pose[..., None, 1]
+    return found
+
+
+def bridge(past: Array, after: Array, count: int, pace: float = 1.0) -> Array:
+    """A plain way (..., count, E) from the last of placed frames (..., P, E) to the first of (..., A, E).
+
+    Joints turn the shortest way at an even speed (slerp); the root goes on a cubic Hermite curve that leaves and
+    arrives with the velocities it has there. pace: frames of the gap in one of the frames given.
+    """
+    part = (np.arange(1, count + 1) / (count + 1))[:, None]
+    start, end = past[..., -1:, :], after[..., :1, :]
+    leaves, arrives = (_speed(past[..., -STEPS - 1 :, :]), _speed(after[..., : STEPS + 1, :]))
+    span = (count + 1) * pace
+    found = np.empty((*past.shape[:-2], count, past.shape[-1]))
+    found[..., :PLACE] = (
+        (1 + 2 * part) * (1 - part) ** 2 * start[..., :PLACE]
+        + part * (1 - part) ** 2 * span * leaves
+        + part**2 * (3 - 2 * part) * end[..., :PLACE]
+        - part**2 * (1 - part) * span * arrives
+    )
+    one, other = (_rotations(frames) for frames in (start, end))
+    turns = rotmat_to_rotvec(product(inverse(one), other)) * part[..., None]
+    axes = rotmat_to_sixd(np.matmul(one, rotvec_to_rotmat(turns)))
+    found[..., PLACE:] = axes.reshape(*found.shape[:-1], found.shape[-1] - PLACE)
+    return found
+
+
+def straight(past: Array, after: Array, count: int) -> Array:
+    """As :func:`bridge`, the root on a line at an even speed: the plainest interpolation."""
+    part = (np.arange(1, count + 1) / (count + 1))[:, None]
+    found = bridge(past, after, count)
+    start, end = past[..., -1:, :PLACE], after[..., :1, :PLACE]
+    found[..., :PLACE] = start + part * (end - start)
+    return found
+
+
+def _speed(frames: Array) -> Array:
+    """Metres a frame (..., 1, 3) that the root moves in frames (..., S, E), 0 where there is only one."""
+    steps = max(1, frames.shape[-2] - 1)
+    found: Array = (frames[..., -1:, :PLACE] - frames[..., :1, :PLACE]) / steps
+    return found
+
+
+def unplaced(frames: Array, after: Motion) -> Motion:
+    """Placed frames (T, E) as what follows a motion on the humanoid, in its channels."""
+    turned = _rotations(frames)
+    rotations = {name: turned[:, place] for place, name in enumerate(BONES)}
+    return continued(after[-1:], rotations, {BONES[0]: frames[:, :PLACE]})
+
+
+def mirror() -> FrameMirror:
+    """How placed frames are mirrored, in the plane x = 0."""
+    columns, signs = np.arange(CHANNELS), np.ones(CHANNELS, dtype=np.float32)
+    signs[0] = -1
+    for bone, partner in enumerate(partners_of(BONES)):
+        own, other = (np.arange(len(KINDS)) + PLACE + len(KINDS) * one for one in (bone, partner))
+        columns[own], signs[own] = other, SIGNS
+    return FrameMirror(columns, signs)
+
+
+def rotmat_to_sixd(matrices: Array) -> Array:
+    """Matrices (..., 3, 3) to two axes (..., 6): :func:`motet.representation.root_sixd.sixd_to_rotmat` undone."""
+    axes: Array = np.swapaxes(matrices[..., :2], -1, -2)
+    return axes.reshape(*matrices.shape[:-2], 6)
+
+
+def _rotations(frames: Array) -> Array:
+    """Local rotations (..., K, 3, 3) of placed frames (..., E)."""
+    return sixd_to_rotmat(frames[..., PLACE:].reshape(*frames.shape[:-1], len(BONES), 6))
+
+
+def _turned(frames: Array, angle: Array) -> Array:
+    """The frames (..., T, E), changed in place, turned about the world's vertical axis by angles (..., T)."""
+    _turn(frames[..., :PLACE], angle)
+    _turn(frames[..., PLACE : PLACE + 6], angle)
+    return frames
+
+
+def _turn(vectors: Array, angle: Array) -> None:
+    """Turn vectors (..., 3 N), which lie one after the other, in place."""
+    sin, cos = np.sin(angle)[..., None], np.cos(angle)[..., None]
+    x, z = np.array(vectors[..., 0::3]), np.array(vectors[..., 2::3])
+    vectors[..., 0::3], vectors[..., 2::3] = x * cos + z * sin, z * cos - x * sin

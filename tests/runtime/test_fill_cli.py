@@ -1,0 +1,116 @@
+"""``motet fill`` and ``motet join`` with the shipped bundle, as a user meets them."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import check_refused, run
+from figures import WRITTEN
+
+import motet
+from motet.formats import read_motion
+from motet.models.fill import FillModel
+from motet.motion import Motion, positions
+
+WALK, RUN = "39_14.amc", "09_07.amc"
+
+
+@pytest.fixture(scope="module")
+def walk(clips: Path) -> Motion:
+    return read_motion(clips / WALK)
+
+
+@pytest.fixture(scope="module")
+def model() -> FillModel:
+    return motet.load("fill")
+
+
+def error(found: Motion, truth: Motion) -> float:
+    """Metres that joints are away from the truth, in the second from 1 to 2."""
+    assert truth.skeleton is not None
+    part = slice(round(truth.fps), round(2 * truth.fps))
+    off = np.linalg.norm(positions(found)[part] - positions(truth)[part], axis=-1)
+    return float(off.mean()) * truth.skeleton.unit_factor(1.0)
+
+
+def test_a_second_of_a_walk_is_filled_better_than_by_interpolation(model: FillModel, walk: Motion) -> None:
+    """Nobody who trained the net has walked as this trial: its person is not among those of the training."""
+    start, stop = 120, 240
+    part = np.linspace(0, 1, stop - start + 2)[1:-1, None]
+    whole = walk.continuous()
+    values = np.array(whole.values)
+    values[start:stop] = values[start - 1] + part * (values[stop] - values[start - 1])
+    lines = Motion(values, whole.channels, whole.units, whole.fps, whole.skeleton)
+    filled = model.fill(walk, [(1.0, 2.0)])
+    assert error(filled, walk) < 0.5 * error(lines, walk)
+    assert error(filled, walk) < 0.06
+
+
+def test_the_command_gives_what_the_library_gives(model: FillModel, walk: Motion, tmp_path: Path, clips: Path) -> None:
+    out = tmp_path / "out.npz"
+    result = run("fill", clips / WALK, "--gap", "2.0:2.5", "--gap", "1:1.5", "-o", out)
+    assert (result.exit_code, result.stdout) == (0, f"{out}: 399 frames at 120 fps, 3.325 s\n")
+    np.testing.assert_array_equal(read_motion(out).values, model.fill(walk, [(1.0, 1.5), (2.0, 2.5)]).values)
+    assert run("fill", clips / WALK, "--loop", "--seconds", 0.3, "-o", out).exit_code == 0
+    np.testing.assert_array_equal(read_motion(out).values, model.looped(walk, seconds=0.3).values)
+    assert run("fill", clips / WALK, "--loop", "-o", out).exit_code == 0
+    np.testing.assert_array_equal(read_motion(out).values, model.looped(walk).values)
+    assert run("join", clips / WALK, clips / WALK, "-o", out).exit_code == 0
+    np.testing.assert_array_equal(read_motion(out).values, model.join(walk, walk).values)
+
+
+@pytest.mark.parametrize("extension", WRITTEN)
+def test_fill_writes_every_format(tmp_path: Path, clips: Path, extension: str) -> None:
+    out = tmp_path / f"out{extension}"
+    assert run("fill", clips / WALK, "--gap", "1:1.5", "-o", out).exit_code == 0
+    assert out.stat().st_size > 500
+
+
+def test_several_files_are_filled_and_what_fails_is_named(tmp_path: Path, clips: Path) -> None:
+    result = run("fill", clips / WALK, clips / RUN, "--gap", "1:1.5", "-o", tmp_path / "{name}.npz")
+    assert result.exit_code == 1
+    assert "09_07.amc: the gap 1:1.5 s is not within the motion of 1.15 s" in result.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["39_14.npz"]
+
+
+def test_joining_another_figure_says_so(tmp_path: Path, clips: Path) -> None:
+    result = run("join", clips / WALK, clips / RUN, "--seconds", 0.5, "-o", tmp_path / "out.bvh")
+    assert result.exit_code == 0
+    assert "motet: the second motion is of another figure: put on that of the first" in result.stderr
+
+
+@pytest.mark.parametrize("text", ["1.0", "1-2", "a:b", "1:2:3", "", "nan:1", "1:inf", ":"])
+def test_a_gap_that_is_none(tmp_path: Path, clips: Path, text: str) -> None:
+    result = run("fill", clips / WALK, "--gap", text, "-o", tmp_path / "out.npz")
+    check_refused(result, "is no gap: give its start and stop in seconds, such as 1.0:2.0", tmp_path)
+
+
+@pytest.mark.parametrize(
+    "options", [(), ("--gap", "1:2", "--loop"), ("--gap", "1:2", "--seconds", 1), ("--seconds", 0.5)]
+)
+def test_either_gaps_or_a_loop(tmp_path: Path, clips: Path, options: tuple[object, ...]) -> None:
+    result = run("fill", clips / WALK, *options, "-o", tmp_path / "out.npz")
+    check_refused(result, "give --gap START:STOP, once or several times, or --loop", tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("gap", "said"), [("0:1", "at the very start"), ("3:3.325", "at the very end"), ("2:1", "is empty")]
+)
+def test_gaps_that_a_file_does_not_have(tmp_path: Path, clips: Path, gap: str, said: str) -> None:
+    result = run("fill", clips / WALK, "--gap", gap, "-o", tmp_path / "out.npz")
+    check_refused(result, said, tmp_path, code=1)
+
+
+@pytest.mark.parametrize("seconds", [0, -1, 5])
+def test_transitions_that_are_none(tmp_path: Path, clips: Path, seconds: float) -> None:
+    said = "a transition takes more than 0 and at most 2 seconds"
+    check_refused(
+        run("join", clips / WALK, clips / RUN, "--seconds", seconds, "-o", tmp_path / "o.npz"), said, tmp_path
+    )
+    looped = run("fill", clips / WALK, "--loop", "--seconds", seconds, "-o", tmp_path / "o.npz")
+    check_refused(looped, said, tmp_path, code=1)
+
+
+def test_a_bundle_of_another_verb_is_refused(tmp_path: Path, clips: Path) -> None:
+    result = run("join", clips / WALK, clips / RUN, "--bundle", "predict", "-o", tmp_path / "o.npz")
+    check_refused(result, "bundle predict is for 'predict'; need one for 'fill'", tmp_path)

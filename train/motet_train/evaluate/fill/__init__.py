@@ -1,0 +1,1 @@
+"""How well gaps of motions are filled."""

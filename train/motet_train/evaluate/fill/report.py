@@ -1,0 +1,182 @@
+"""Gaps cut into trials of people never seen: how far what fills them is from what was there, how feet stand and how
+sharply joints move, of a model and of plain ways through."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from motet.models.fill import FillModel
+from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, sided
+from motet.motion.rotations import Array
+from motet.representation.placed import PLACE, bridge, placed_by_way, straight
+from motet_train.data.errors import DataError
+from motet_train.data.split import split
+from motet_train.data.store import Store
+from motet_train.evaluate.tables import Report, aligned
+from motet_train.models.codes.sixd_places import SixdPlaces, tree_of
+
+SECONDS = (0.5, 1.0, 2.0)
+"""Of the gaps."""
+
+FEET = [HUMANOID.index(sided(side, part)) for side in LEFT_RIGHT for part in ("Foot", "Toes")]
+
+STANDING, LOW = 0.2, 0.15
+"""Metres a second and metres: a joint of the feet that was slower and lower stands."""
+
+GOING = 0.5
+"""Metres a second that the hips go over the ground, from one end of a gap to the other, of a figure on its way."""
+
+MARGIN = 3
+"""Frames before and after a gap whose joints are looked at with it, so that joins count."""
+
+GOAL = 0.5
+"""Of the error of interpolation, at a gap of a second."""
+
+FLOORS = {"hermite": "curved root", "interpolation": "interpolation", "standing": "standing"}
+"""Plain ways, and what the table calls them: joints by slerp and the root on a cubic Hermite curve, or on a line; and
+the last frame held."""
+
+Fill = Callable[[Array, Array, int], Array]
+
+
+@dataclass(frozen=True)
+class Window:
+    """Placed frames before a gap, in it and after it: (P, E), (N, E), (A, E)."""
+
+    past: Array
+    truth: Array
+    after: Array
+
+
+def fill_reports(models: Mapping[str, FillModel], store: Store, told: Callable[[str], object]) -> dict[str, Report]:
+    """The figures of models on the test part of a store in ``root_sixd``; DataError for another store.
+
+    Of each gap, "gap_0.5" and so on: joints' mean distance in the world "cm", and in gaps where the figure is on its
+    way (:data:`GOING`) "cm_going", the speed of feet that stood "slide" in cm a second, "jerk" over the recorded; each
+    of the model as it is, of :data:`FLOORS` with their names behind, and of the recording. told: what is measured next.
+    """
+    if store.representation != "root_sixd":
+        raise DataError(f"gaps are measured in root_sixd (motet prepare --for codes), not in {store.representation}")
+    joints = SixdPlaces(tree_of(store.contract((0,))))
+    reports: dict[str, Report] = {}
+    for name, model in models.items():
+        told(name)
+        report: Report = {}
+        for seconds in SECONDS:
+            frames = round(seconds * model.fps)
+            windows = list(_windows(model, store, frames))
+            if not windows:
+                raise DataError(f"no test trial is long enough for a gap of {seconds:g} s")
+            systems: dict[str, Fill] = {"": model.frames_between, **_floors()}
+            report[f"gap_{seconds:g}"] = _figures(joints, systems, windows, model.fps)
+        reports[name] = report
+    return reports
+
+
+def _windows(model: FillModel, store: Store, frames: int) -> Iterator[Window]:
+    """Gaps side by side in the trials that the model did not see."""
+    by = str(model.manifest.training.get("split", {}).get("by", "subject"))
+    context = model.context
+    for record in split(store.records, 0, by).test:
+        sequence = np.array(store.sequence(record), np.float64)
+        placed = placed_by_way(sequence, store.fps)
+        for start in range(context, len(placed) - context - frames + 1, frames):
+            stop = start + frames
+            yield Window(placed[start - context : start], placed[start:stop], placed[stop : stop + context])
+
+
+def _floors() -> dict[str, Fill]:
+    return {"hermite": bridge, "interpolation": straight, "standing": _standing}
+
+
+def _standing(past: Array, after: Array, count: int) -> Array:
+    return np.repeat(past[-1:], count, axis=0)
+
+
+def _figures(joints: SixdPlaces, systems: Mapping[str, Fill], windows: list[Window], fps: float) -> dict[str, float]:
+    true = _places(joints, windows, [one.truth for one in windows])
+    feet = true[:, :, FEET]
+    slow = np.linalg.norm(np.diff(feet, axis=1), axis=-1) * fps < STANDING
+    stands = slow & (feet[:, 1:, :, 1] < LOW)
+    ways = np.array([np.linalg.norm((one.after[0] - one.past[-1])[[0, 2]]) for one in windows])
+    going = ways * fps / (len(windows[0].truth) + 1) > GOING
+    found: dict[str, float] = {
+        "gaps": len(windows),
+        "gaps_going": int(going.sum()),
+        "jerk_recorded": _jerk(true) * fps**3,
+    }
+    for name, fill in systems.items():
+        places = _places(joints, windows, [fill(one.past, one.after, len(one.truth)) for one in windows])
+        off = np.linalg.norm(places - true, axis=-1)[:, MARGIN:-MARGIN]
+        tail = f"_{name}" if name else ""
+        found[f"cm{tail}"] = 100 * float(off.mean())
+        found[f"cm_going{tail}"] = 100 * float(off[going].mean()) if going.any() else float("nan")
+        found[f"slide{tail}"] = _slide(places, stands, fps)
+        found[f"jerk{tail}"] = _jerk(places) / _jerk(true)
+    found["slide_recorded"] = _slide(true, stands, fps)
+    found["of_interpolation"] = found["cm"] / found["cm_interpolation"]
+    found["of_interpolation_going"] = found["cm_going"] / found["cm_going_interpolation"]
+    return found
+
+
+def _places(joints: SixdPlaces, windows: list[Window], filled: list[Array]) -> Array:
+    """Joints (W, MARGIN + N + MARGIN, J, 3) in metres."""
+    rows = [
+        np.concatenate([one.past[-MARGIN:], gap, one.after[:MARGIN]]) for one, gap in zip(windows, filled, strict=True)
+    ]
+    frames = torch.from_numpy(np.stack(rows).astype(np.float32))
+    with torch.inference_mode():
+        found: Array = (joints(frames[..., PLACE:]) + frames[..., None, :PLACE]).numpy().astype(np.float64)
+    return found
+
+
+def _slide(places: Array, stands: NDArray[np.bool_], fps: float) -> float:
+    """Centimetres a second over the ground of feet while those recorded stand."""
+    over = np.linalg.norm(np.diff(places[:, :, FEET], axis=1)[..., [0, 2]], axis=-1)
+    return 100 * fps * float(over[stands].mean()) if stands.any() else float("nan")
+
+
+def _jerk(places: Array) -> float:
+    """The mean length of the third difference of joints, metres per frame cubed."""
+    return float(np.linalg.norm(np.diff(places, n=3, axis=1), axis=-1).mean())
+
+
+def fill_text(reports: Mapping[str, Report]) -> str:
+    """The figures as a table for each measure."""
+    titles = {
+        "cm": "joints' mean error, cm",
+        "cm_going": f"the same, where the hips go {GOING:g} m/s and more",
+        "slide": "speed of feet that stand, cm/s",
+        "jerk": "jerk over recorded",
+    }
+    first = next(iter(reports.values()))
+    rows = [["gap", *(f"{seconds:g} s" for seconds in SECONDS)]]
+    for title, key in (("gaps measured", "gaps"), ("of them where the hips go", "gaps_going")):
+        rows.append([title, *(f"{first[_key(seconds)][key]:.0f}" for seconds in SECONDS)])
+    for measure, title in titles.items():
+        rows.append([title])
+        rows += [_row(name, report, measure) for name, report in reports.items()]
+        rows += [_row(title, first, f"{measure}_{name}") for name, title in FLOORS.items()]
+        if measure == "slide":
+            rows.append(_row("recorded", first, "slide_recorded"))
+    rows.append(["over interpolation's error"])
+    rows += [[*_row(name, report, "of_interpolation"), _goal(report)] for name, report in reports.items()]
+    rows.append(["the same, where the hips go"])
+    rows += [_row(name, report, "of_interpolation_going") for name, report in reports.items()]
+    return aligned(rows)
+
+
+def _row(name: str, report: Report, key: str) -> list[str]:
+    return [name, *(f"{report[_key(seconds)][key]:.2f}" for seconds in SECONDS)]
+
+
+def _goal(report: Report) -> str:
+    reached = report[_key(1.0)]["of_interpolation"] <= GOAL
+    return f"goal at 1 s: <= {GOAL:g}" + ("" if reached else "  NOT REACHED")
+
+
+def _key(seconds: float) -> str:
+    return f"gap_{seconds:g}"

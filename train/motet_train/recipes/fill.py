@@ -1,0 +1,173 @@
+"""The recipe of the net that fills gaps, and its training from a store."""
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, sided
+from motet.motion.rotations import Array
+from motet.representation.contract import MotionContract
+from motet.representation.placed import CHANNELS
+from motet_train.data.batches import frame_mirror
+from motet_train.data.errors import DataError
+from motet_train.data.gap_windows import GapWindow, GapWindows
+from motet_train.data.split import split
+from motet_train.data.store import Store
+from motet_train.descent import GradientLearner, Term, Terms, Training
+from motet_train.models.codes.sixd_places import tree_of
+from motet_train.models.fill.filler import Filler, FillerConfig
+from motet_train.recipes.recipe import Job, Recipe
+from motet_train.runs import Run
+
+FEET = tuple(sided(side, part) for side in LEFT_RIGHT for part in ("Foot", "Toes"))
+
+STANDING = 0.2
+"""Metres a second: a joint of the feet that was slower stands."""
+
+ROTATIONS, SPEEDS, SLIDE = 0.05, 0.1, 0.1
+"""Weights of the losses of axes (in standard deviations), of joints' speeds and of feet that slide (m/s), beside that
+of joints' places (m)."""
+
+SEEN = (0.25, 0.5, 1.0)
+"""Of the longest gap: those by which the log tells how good the net is."""
+
+
+@dataclass(frozen=True)
+class FillVisits:
+    """context: the most frames that are seen before and after a gap; least: the fewest; whole: the share of windows in
+    which all are. gaps: the shortest and the longest. feet: how many times their places count."""
+
+    context: int = 20
+    least: int = 4
+    whole: float = 0.7
+    gaps: tuple[int, int] = (3, 60)
+    feet: float = 2.0
+
+
+DEFAULT = Recipe(
+    "fill",
+    "gap-filler",
+    "between",
+    FillerConfig(0),
+    ("channels", "tree"),
+    Training(
+        steps=6000,
+        every=250,
+        batch=32,
+        optimiser="muon",
+        learning_rate=4e-3,
+        weight_decay=0.01,
+        warm_up=100,
+        cosine=True,
+        clip=1.0,
+        average=0.998,
+        keep="last",
+        precision="bfloat16",
+    ),
+    FillVisits(),
+)
+
+RECIPES = {"default": DEFAULT}
+
+
+def train_fill(store: Store, job: Job, data: str = "", by: str = "subject") -> Run:
+    """Train on a store in ``root_sixd``, see :meth:`motet_train.recipes.recipe.Job.run`."""
+    recipe, training, visits = job.recipe, job.recipe.training, job.recipe.visits
+    assert training is not None
+    if store.representation != "root_sixd":
+        raise DataError(f"gaps are filled in root_sixd (motet prepare --for codes), not {store.representation}")
+    if store.skeleton != HUMANOID:
+        raise DataError(
+            "gaps are filled on the humanoid (motet prepare --for codes --figure humanoid), not on another figure"
+        )
+    parts = split(store.records, 0, by)
+    contract = store.contract(parts.train)
+    longest = 2 * visits.context + visits.gaps[1]
+    train, validation = (
+        GapWindows(store, part, longest, frame_mirror(contract)) for part in (parts.train, parts.validation)
+    )
+    torch.manual_seed(job.about.seed)
+    net = _untrained(recipe, contract, train).to(job.device)
+    weights = _weights(contract, visits.feet).to(job.device)
+
+    def batches(rng: np.random.Generator) -> Iterator[GapWindow]:
+        yield train.draw(training.batch, _sizes(visits, rng), rng)
+
+    rng = np.random.default_rng(0)
+    counts = [max(1, round(part * visits.gaps[1])) for part in SEEN]
+    seen = [validation.draw(256, (visits.context, count, visits.context), rng).to(job.device) for count in counts]
+
+    def validate() -> dict[str, float]:
+        return _measured(kept, seen)
+
+    learner = GradientLearner(net, training, lambda drawn: _loss(net, drawn, weights, store.fps), batches, validate)
+    assert isinstance(learner.kept, Filler)
+    kept: Filler = learner.kept
+    about: dict[str, Any] = {
+        "data": {"name": data, "motions": len(store.records)},
+        "split": {"by": by, "train": len(parts.train)},
+    }
+    defaults = {"context": visits.context, "least": visits.least, "longest": visits.gaps[1]}
+    return job.run(kept, learner, job.manifest(contract, asdict(net.config), defaults, None, about))
+
+
+def _sizes(visits: FillVisits, rng: np.random.Generator) -> tuple[int, int, int]:
+    """Frames before, in and after the gap of the next batch."""
+    count = int(rng.integers(visits.gaps[0], visits.gaps[1] + 1))
+    if rng.random() < visits.whole:
+        return visits.context, count, visits.context
+    before, after = rng.integers(visits.least, visits.context + 1, size=2).tolist()
+    return before, count, after
+
+
+def _untrained(recipe: Recipe, contract: MotionContract, windows: GapWindows) -> Filler:
+    """A net that knows how frames lie about a gap, from some windows."""
+    assert contract.skeleton is not None
+    net = Filler(recipe.sized(channels=CHANNELS, tree=tree_of(contract)))
+    context, (_, longest) = recipe.visits.context, recipe.visits.gaps
+    some = windows.draw(1024, (context, longest // 2, context), np.random.default_rng(0))
+    frames = torch.cat([some.past, some.truth, some.after], dim=1).flatten(0, 1).numpy().astype(np.float64)
+    net.measure_by(frames.mean(axis=0), np.maximum(frames.std(axis=0), 0.02))
+    return net
+
+
+def _weights(contract: MotionContract, feet: float) -> Tensor:
+    """How much each joint's place counts (J,)."""
+    assert contract.skeleton is not None
+    found: Array = np.array([feet if name.startswith(FEET) else 1.0 for name in contract.skeleton.names])
+    return torch.from_numpy(found / found.mean()).float()
+
+
+def _loss(net: Filler, window: GapWindow, weights: Tensor, fps: float) -> Terms:
+    frames = net.once(window.past, window.plain, window.after).float()
+    off = functional.smooth_l1_loss(frames / net.scale, window.truth / net.scale, beta=0.2)
+    with torch.autocast(frames.device.type, enabled=False):
+        # one frame on each side, so that the joins count
+        found, true = (
+            net.joints(torch.cat([window.past[:, -1:], one, window.after[:, :1]], dim=1))
+            for one in (frames, window.truth)
+        )
+        places = ((found - true).square().sum(-1) + 1e-8).sqrt() * weights
+        speeds, was = found.diff(dim=1) * fps, true.diff(dim=1) * fps
+        unlike = ((speeds - was).square().sum(-1) + 1e-4).sqrt() * weights
+        stands = (was.norm(dim=-1) < STANDING) & (weights > 1)
+        slide = (speeds.square().sum(-1) + 1e-4).sqrt() * stands
+    total = places.mean() + ROTATIONS * off + SPEEDS * unlike.mean() + SLIDE * slide.mean()
+    return (Term(total, len(window)),)
+
+
+@torch.no_grad()
+def _measured(net: Filler, seen: list[GapWindow]) -> dict[str, float]:
+    """Of people never seen: the mean distance in cm of joints from where they were; of the plain way, too."""
+    found: dict[str, float] = {}
+    counts = [window.truth.shape[1] for window in seen]
+    for count, window in zip(counts, seen, strict=True):
+        true = net.joints(window.truth)
+        for name, frames in (("", net(window.past, window.plain, window.after)), ("plain_", window.plain)):
+            found[f"{name}{count}"] = round(100 * float((net.joints(frames) - true).norm(dim=-1).mean()), 3)
+    return {"validation": round(float(np.mean([found[str(count)] for count in counts])), 4), **found}
