@@ -18,12 +18,14 @@ from motet.models.base import BundleModel
 from motet.models.codes import CodesModel
 from motet.models.control import ControlModel
 from motet.models.describe import DescribeModel
+from motet.models.fill import FillModel
 from motet.models.generate import GenerateModel
 from motet.models.predict import PredictModel
 from motet.models.search import SearchModel
 from motet.models.steer import SteerModel
 from motet.models.steer_session import SteerSession
 from motet.models.text import EOS, SPECIALS
+from motet.representation.placed import placed
 
 BATCHES = (64, 256, 512, 1024, 2048, 4096)
 """Numbers of characters to find the best batch among."""
@@ -206,14 +208,30 @@ def codes_figures(model: CodesModel, text: str, seconds: float) -> Figures:
 
 
 def predict_figures(model: PredictModel, seconds: float) -> Figures:
-    """The first frame after a new one, and one of a whole horizon, for one figure; figures' horizons a second."""
+    """The first frame after a new one, one of a whole horizon, and a horizon of a motion on the model's figure, for one
+    figure; figures' horizons a second."""
     size = (512, model.seed_frames, len(model.contract.channels))
     seeds = np.random.default_rng(0).normal(model.contract.mean, model.contract.std, size).astype(np.float32)
     horizon = _milliseconds(lambda: model.next_frames(seeds[:1]), seconds)
+    motion = model.contract.motion(np.tile(seeds[0], (10, 1)))
     return {
         "predict.first_frame": (1e3 * _milliseconds(lambda: model.next_frames(seeds[:1], 1), seconds), "us"),
         "predict.frame": (1e3 * horizon / model.horizon, "us"),
+        "predict.motion": (_milliseconds(lambda: model.predict(motion), seconds), "ms"),
         "predict.horizons": (len(seeds) / _milliseconds(lambda: model.next_frames(seeds), seconds) * 1e3, "figures/s"),
+    }
+
+
+def fill_figures(model: FillModel, seconds: float) -> Figures:
+    """The frames of a gap of a second, between placed frames, and in a motion of five on the model's own figure."""
+    count, rng = round(model.fps), np.random.default_rng(0)
+    steps = model.contract.std * rng.normal(size=(5 * count, len(model.contract.channels)))
+    motion = model.contract.motion(model.contract.mean + 0.1 * steps.cumsum(axis=0), plant=False)
+    frames = placed(motion)
+    past, after = frames[: 2 * count], frames[3 * count :]
+    return {
+        "fill.second": (_milliseconds(lambda: model.frames_between(past, after, count), seconds), "ms"),
+        "fill.motion": (_milliseconds(lambda: model.fill(motion, [(2.0, 3.0)]), seconds), "ms"),
     }
 
 
@@ -233,6 +251,7 @@ def search_figures(model: SearchModel, seconds: float) -> Figures:
 _FIGURES: Mapping[str, Callable[[Any, float], Figures]] = {
     "control": control_figures,
     "describe": describe_figures,
+    "fill": fill_figures,
     "generate": generate_figures,
     "predict": predict_figures,
     "search": search_figures,

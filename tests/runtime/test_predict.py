@@ -202,3 +202,21 @@ def test_the_root_faces_where_it_faced() -> None:
     assert np.linalg.norm(other_step, axis=1) == pytest.approx(np.linalg.norm(step, axis=1), abs=1e-3)
     turn = axis_to_rotmat("y", np.radians(90.0))
     np.testing.assert_allclose(local_rotations(other)[:, 0], turn @ local_rotations(found)[:, 0], atol=1e-5)
+
+
+def test_what_knows_its_errors_tells_them_in_centimetres() -> None:
+    motion = circle()
+    model = model_of(motion)
+    assert not model.knows_errors
+    with pytest.raises(DecodingError, match="does not know its errors"):
+        model.expected_errors(motion)
+    sizes = {"L": SEED, "N": HORIZON, "C": len(motion.channels)}
+    told = spec({"frames": "batch L C"}, {"error": "batch N"}, sizes)
+    graph = FakeGraph(told, lambda frames: (np.abs(frames[:, -1, :1]) * np.arange(1, HORIZON + 1),))
+    sure = PredictModel(model.manifest, {**model.graphs, "error": graph})
+    expected = 100 * np.abs(motion.values[-1, 0]) * np.arange(1, HORIZON + 1)
+    np.testing.assert_allclose(sure.expected_errors(motion), expected, rtol=1e-6)
+    np.testing.assert_array_equal(sure.expected_errors([motion[:-1], motion])[1], sure.expected_errors(motion))
+    wrong = spec({"frames": "batch L C"}, {"error": "batch N"}, {**sizes, "N": HORIZON + 1})
+    with pytest.raises(BundleError, match="4 errors of a horizon of 3"):
+        PredictModel(model.manifest, {**model.graphs, "error": FakeGraph(wrong, lambda frames: (frames,))})

@@ -1,16 +1,26 @@
 """``motet predict``: how motions continue."""
 
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import click
 
 from motet.bundle.session import SessionOptions
 from motet.cli.options import session_options
-from motet.cli.reading import Read, Tries, like_option, out_option, places, read_options, say_resampled
+from motet.cli.reading import Read, Tries, bar, like_option, out_option, places, read_options, say_resampled
+from motet.errors import MotionError
 from motet.formats import write_motion
 from motet.formats.character import Character
+from motet.models.codes import CodesModel
 from motet.models.load import load_as
-from motet.models.predict import PredictModel
+from motet.models.predict import MAX_SAMPLES, PredictModel
+from motet.motion.motion import Motion
+
+NOBODY = "none"
+"""What ``--beyond`` says where the predictor goes on by itself."""
 
 
 @click.command()
@@ -19,34 +29,123 @@ from motet.models.predict import PredictModel
 @click.option("--bundle", default="predict", show_default=True, help="Name or path of a bundle.")
 @click.option("--frames", type=click.IntRange(1, 100_000), help="Frames to predict. [default: the bundle's horizon]")
 @click.option("--append", is_flag=True, help="Write the motion too, then the prediction.")
+@click.option("--samples", type=click.IntRange(1, MAX_SAMPLES), help="Write so many different futures of each motion.")
+@click.option(
+    "--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed; later samples use seed + 1, ..."
+)
+@click.option(
+    "--beyond",
+    default="generate",
+    show_default=True,
+    metavar="BUNDLE",
+    help=f"What goes on after the horizon, and gives samples; {NOBODY}: the predictor itself, until it dies away.",
+)
 @like_option
 @session_options
 @read_options
+@click.option("--json", "as_json", is_flag=True, help="Print a list with input and samples of each motion.")
 def predict(
     sources: tuple[Path, ...],
     out: Path,
     bundle: str,
     frames: int | None,
     append: bool,
+    samples: int | None,
+    seed: int,
+    beyond: str,
     like: Character | None,
+    as_json: bool,
     session: SessionOptions,
     read: Read,
 ) -> None:
     """Continue motion files from their last frames, and write the predictions.
 
     A file may be of any human figure, and is continued on its own skeleton, at the bundle's frame rate. With several
-    files OUT holds {name} for their names, or the results are numbered: out-1.bvh, out-2.bvh, ...
+    files or samples OUT holds {name} for their names, or the results are numbered: out-1.bvh, out-2.bvh, ...
+
+    More frames than the bundle's horizon come from a bundle that writes codes (--beyond): walks walk on, runs run.
+    With --samples all frames do, and the futures differ as far as the motion leaves it open.
     """
-    outs = places(out, [source.stem for source in sources])
-    model, tries, rates = load_as(PredictModel, bundle, session), Tries(), []
-    for source, place in zip(sources, outs, strict=True):
+    outs = places(out, [name for source in sources for name in _names(source, samples)])
+    model, tries, rates, rows = load_as(PredictModel, bundle, session), Tries(), list[float](), list[dict[str, Any]]()
+    asked = Asked(model, frames or model.horizon, append, samples, seed)
+    writer = asked.writer(beyond, session)
+    for number, source in enumerate(sources):
         with tries.of(source):
             motion = read(source)
-            found = model.predict(motion, frames=frames, append=append)
-            write_motion(place, found, like=like)
+            own = outs[number * (samples or 1) :][: samples or 1]
+            said = _written(asked, asked.futures(motion, writer), own, like)
+            rows.append({"input": str(source), **said, "beyond": writer and beyond, **asked.expected(motion, writer)})
             rates.append(motion.fps)
-            start = len(found) - (frames or model.horizon)
-            said = f", predicted from {start / found.fps:.3g} s on (frame {start}, counted from 0)" if append else ""
-            click.echo(f"{place}: {len(found)} frames at {found.fps:g} fps, {found.duration:g} s{said}")
+            if not as_json:
+                click.echo("\n".join(_lines(rows[-1], append)))
+    if as_json and rows:
+        click.echo(json.dumps(rows))
     say_resampled(rates, model.fps)
     tries.finish()
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is asked of each motion."""
+
+    model: PredictModel
+    frames: int
+    append: bool
+    samples: int | None
+    seed: int
+
+    def writer(self, beyond: str, session: SessionOptions) -> CodesModel | None:
+        """What goes on after the horizon, where more is asked than a predictor gives by itself."""
+        if beyond == NOBODY and self.samples is not None:
+            raise click.UsageError(f"a predictor has one future: --samples does not go with --beyond {NOBODY}")
+        more = self.samples is not None or self.frames > self.model.horizon
+        return load_as(CodesModel, beyond, session) if more and beyond != NOBODY else None
+
+    def expected(self, motion: Motion, writer: CodesModel | None) -> dict[str, list[float]]:
+        """How far off the frames of the predictor may be, where it knows: not those that a writer gives."""
+        if not self.model.knows_errors or self.samples is not None:
+            return {}
+        own = min(self.frames, self.model.horizon if writer is None else self.model.sure)
+        return {"expected_error_cm": [round(float(off), 2) for off in self.model.expected_errors(motion)[:own]]}
+
+    def futures(self, motion: Motion, writer: CodesModel | None) -> list[Motion]:
+        """The futures of a motion, one where no number of samples is asked. writer: what goes on after the horizon."""
+        if writer is None:
+            return [self.model.predict(motion, frames=self.frames, append=self.append)]
+        try:
+            return self._beyond(motion, writer)
+        except MotionError as error:
+            raise MotionError(f"{error} (--beyond {NOBODY} goes on with the predictor alone)") from error
+
+    def _beyond(self, motion: Motion, writer: CodesModel) -> list[Motion]:
+        frames, append, seed = self.frames, self.append, self.seed
+        with bar("drawing") as progress:
+            if self.samples is None:
+                return [self.model.predict(motion, frames=frames, append=append, beyond=writer, seed=seed)]
+            return self.model.futures(
+                motion, frames=frames, append=append, beyond=writer, seed=seed, samples=self.samples, progress=progress
+            )
+
+
+def _names(source: Path, samples: int | None) -> list[str]:
+    """The names of a file's results."""
+    several = samples is not None and samples > 1
+    return [f"{source.stem}-{i + 1}" for i in range(samples or 1)] if several else [source.stem]
+
+
+def _written(asked: Asked, found: Sequence[Motion], outs: Sequence[Path], like: Character | None) -> dict[str, Any]:
+    """Write the futures of a motion; what is said of them."""
+    for future, place in zip(found, outs, strict=True):
+        write_motion(place, future, like=like)
+    first = found[0]
+    samples = [{"output": str(place), "seed": asked.seed + i} for i, place in enumerate(outs)]
+    size = {"fps": first.fps, "frames": len(first), "seconds": first.duration, "start": len(first) - asked.frames}
+    return {**size, "samples": samples}
+
+
+def _lines(row: dict[str, Any], append: bool) -> Iterator[str]:
+    start = row["start"]
+    said = f", predicted from {start / row['fps']:.3g} s on (frame {start}, counted from 0)" if append else ""
+    for sample in row["samples"]:
+        yield f"{sample['output']}: {row['frames']} frames at {row['fps']:g} fps, {row['seconds']:g} s{said}"

@@ -118,7 +118,7 @@ class CodesModel(GenerateModel):
         longest = self.steps(settings["seconds"] or settings["max_seconds"])
         found = draw_codes(self._writer(each, settings), actions, longest, exactly=settings["seconds"] > 0)
         last = round(settings["seconds"] * self.fps) or None
-        samples = [Sample(self._frames_of(codes)[:last], None) for codes in found]
+        samples = [Sample(self.frames_of(codes)[:last], None) for codes in found]
         return [samples[start : start + count] for start in range(0, len(samples), count)]
 
     def story(
@@ -230,7 +230,7 @@ class CodesModel(GenerateModel):
         """How many steps of codes last so long, at least one."""
         return max(1, math.ceil(seconds * self.fps / self.sight.hop - 1e-9))
 
-    def _frames_of(self, codes: Ids) -> Array:
+    def frames_of(self, codes: Ids) -> Array:
         """Frames (T, D) in the contract's units of steps of codes (N, P), from the origin."""
         return Unrolled(self.graphs["decoder"], self.sight, self.fps, codes[:0]).all(codes)
 
@@ -238,13 +238,20 @@ class CodesModel(GenerateModel):
         """What makes frames of codes, at the start or after a motion on the model's figure."""
         if figure is None:
             return Unrolled(self.graphs["decoder"], self.sight, self.fps)
+        frames = self.last_frames(figure)
+        return Unrolled(self.graphs["decoder"], self.sight, self.fps, self.codes_of(frames), frames[-1])
+
+    def last_frames(self, figure: Motion) -> Array:
+        """The last seconds (T, D), whole steps of codes, of a motion on the model's figure, in the contract's units.
+
+        MotionError where it is too short to go on with.
+        """
         frames = self.contract.frames(figure)[-self.steps(CONTEXT) * self.sight.hop :]
         if len(frames) < 2 * self.sight.hop:
             raise MotionError(
                 f"a motion of {len(frames)} frames is too short to go on with: {2 * self.sight.hop} are needed"
             )
-        codes = self.codes_of(frames[len(frames) % self.sight.hop :])
-        return Unrolled(self.graphs["decoder"], self.sight, self.fps, codes, frames[-1])
+        return frames[len(frames) % self.sight.hop :]
 
     def _figure(self, motion: Motion) -> Motion:
         """A motion on the model's figure at the model's frame rate, its last frame kept."""
@@ -256,10 +263,10 @@ class CodesModel(GenerateModel):
         steps = frames.reshape(-1, self.sight.hop, frames.shape[1]).astype(np.float32)
         body = self.graphs["tokens"]({"frames": np.stack([steps, steps])})["codes"][0]
         facing, x, z = way(np.concatenate([frames[:, :3], frames[-1:, :3]]) / self.fps)
-        moves, _ = nearest_moves(np.stack([x, z, facing], axis=-1)[:: self.sight.hop], self._book())
+        moves, _ = nearest_moves(np.stack([x, z, facing], axis=-1)[:: self.sight.hop], self.book())
         return np.concatenate([moves[:, None], body], axis=1)
 
-    def _book(self) -> Array:
+    def book(self) -> Array:
         """The moves (K, 3) that codes stand for."""
         codes = np.zeros((2, self.moves, self.sizes["P"]), dtype=np.int64)
         codes[..., 0] = np.arange(self.moves)

@@ -14,20 +14,30 @@ from motet.bundle.signature import bind
 from motet.decode.rollout import two_rows
 from motet.errors import BundleError, DecodingError, MotionError
 from motet.models.base import BundleModel
+from motet.models.beyond import carried_on, futures, together
+from motet.models.generate import GenerateModel
 from motet.models.progress import Progress, silent
+from motet.models.seeds import seeds_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
-from motet.representation.foreign import carried_back
 
 MAX_FRAMES, MAX_GOLDEN = 100_000, 1000
 """Of one prediction, which is in memory as a whole; and of one among the golden vectors."""
+
+SURE = 0.5
+"""Seconds that are the predictor's where a writer goes on beyond the horizon: later it is sure of too little, and what
+it predicts begins to die away."""
+
+MAX_SAMPLES = 100
+"""Futures that are drawn at once."""
 
 
 class PredictModel(BundleModel):
     """A model that continues motions; any number of sessions and threads share it.
 
     graphs: "encoder" (frames (B, L, C) -> what the step takes first) and "step" (-> frame (B, C), and what it takes
-        next). After ``horizon`` frames, its default, a prediction continues from its own last frames.
+        next). After ``horizon`` frames, its default, a prediction continues from its own last frames. Some have "error"
+        (frames (B, L, C) -> error (B, N) in metres), how far off the frames of a horizon are likely to be.
     """
 
     VERB = "predict"
@@ -39,14 +49,42 @@ class PredictModel(BundleModel):
         self.bind("encoder", {"frames": "batch L D"}, {})
         bind("step", step, self.loop.inputs, self.loop.outputs, self.sizes, given=encoder.outputs)
         self.seed_frames = self.sizes["L"]
+        if self.knows_errors:
+            self.bind("error", {"frames": "batch L D"}, {"error": "batch N"})
+            if self.sizes["N"] != self.horizon:
+                raise BundleError(f"graph error: it tells {self.sizes['N']} errors of a horizon of {self.horizon}")
+
+    @property
+    def sure(self) -> int:
+        """How many frames are the predictor's where a writer goes on beyond the horizon."""
+        return min(self.horizon, round(SURE * self.fps))
+
+    @property
+    def knows_errors(self) -> bool:
+        """Whether :meth:`expected_errors` can tell anything."""
+        return "error" in self.graphs
 
     @overload
     def predict(
-        self, motions: Motion, *, frames: int | None = None, append: bool = False, progress: Progress = ...
+        self,
+        motions: Motion,
+        *,
+        frames: int | None = None,
+        append: bool = False,
+        progress: Progress = ...,
+        beyond: GenerateModel | None = None,
+        seed: int = 0,
     ) -> Motion: ...
     @overload
     def predict(
-        self, motions: Sequence[Motion], *, frames: int | None = None, append: bool = False, progress: Progress = ...
+        self,
+        motions: Sequence[Motion],
+        *,
+        frames: int | None = None,
+        append: bool = False,
+        progress: Progress = ...,
+        beyond: GenerateModel | None = None,
+        seed: int = 0,
     ) -> list[Motion]: ...
     def predict(
         self,
@@ -55,6 +93,8 @@ class PredictModel(BundleModel):
         frames: int | None = None,
         append: bool = False,
         progress: Progress = silent,
+        beyond: GenerateModel | None = None,
+        seed: int = 0,
     ) -> Motion | list[Motion]:
         """The ``frames`` (as many as the horizon by default) that follow a motion, at the model's frame rate.
 
@@ -65,9 +105,16 @@ class PredictModel(BundleModel):
         frame is kept.
         append: give the motion, resampled, and what follows it.
         progress: called with the number of motions done and of all.
+        beyond: a model that writes codes, as ``motet.load("generate")``, which goes on where more frames than
+            the horizon are asked, alive and at the motion's pace (docs/alive.md): the first SURE seconds are the
+            predictor's, with feet that stand, what follows the writer's. By default the predictor goes on from its own
+            last frames, and its motion dies away. seed: of what the writer draws; the same for each motion.
         Several motions are carried on in one batch, each as it would be alone. MotionError for a motion that is too
-        short, lacks channels of the model, or is of a figure that is no human's.
+        short, lacks channels of the model, or is of a figure that is no human's; DecodingError for a number of frames
+        out of range, and where ``beyond`` does not write codes.
         """
+        if beyond is not None and frames is not None and frames > self.horizon:
+            return self._beyond(motions, checked(frames), append, progress, beyond, seed)
         given = [motions] if isinstance(motions, Motion) else list(motions)
         seeds = [self._seed(motion) for motion in given]
         found: list[Motion] = []
@@ -77,6 +124,50 @@ class PredictModel(BundleModel):
             found += [self._carried_on(*one[:2], new, append) for one, new in zip(part, following, strict=True)]
             progress(len(found), len(given))
         return found[0] if isinstance(motions, Motion) else found
+
+    def _beyond(
+        self,
+        motions: Motion | Sequence[Motion],
+        frames: int,
+        append: bool,
+        progress: Progress,
+        writer: GenerateModel,
+        seed: int,
+    ) -> Motion | list[Motion]:
+        """See :meth:`predict`: more frames than the horizon, all but the first by a writer."""
+        given, found = [motions] if isinstance(motions, Motion) else list(motions), list[Motion]()
+        seeds = seeds_of(seed, 1, DecodingError)
+        for motion in given:
+            start = self.predict(motion, frames=self.sure, append=True)
+            ((following, before),) = futures(writer, start, frames, seeds, predicted=self.sure / self.fps)
+            found.append(together(before, following) if append else following)
+            progress(len(found), len(given))
+        return found[0] if isinstance(motions, Motion) else found
+
+    def futures(
+        self,
+        motion: Motion,
+        *,
+        beyond: GenerateModel,
+        samples: int = 1,
+        frames: int | None = None,
+        append: bool = False,
+        seed: int = 0,
+        progress: Progress = silent,
+    ) -> list[Motion]:
+        """So many different futures of a motion, each of ``frames`` frames (as many as the horizon by default).
+
+        beyond: a model that writes codes, as ``motet.load("generate")``. From the first frame on they are what it draws
+        (docs/alive.md): they differ as far as the future is open, where :meth:`predict` begins with what is likeliest
+        on average. Sample i is what seed + i gives alone. append, channels and errors: as :meth:`predict`; progress:
+        called with the number of samples done and of all. DecodingError for other than 1 to MAX_SAMPLES samples.
+        """
+        if not 1 <= samples <= MAX_SAMPLES:
+            raise DecodingError(f"1 to {MAX_SAMPLES} samples can be drawn, not {samples}")
+        count, seeds = checked(self.horizon if frames is None else frames), seeds_of(seed, samples, DecodingError)
+        whole = motion if motion.fps == self.fps else motion.continuous().resample(self.fps, to_end=True)
+        found = futures(beyond, whole, count, seeds, progress)
+        return [together(before, following) if append else following for following, before in found]
 
     def _seed(self, motion: Motion) -> tuple[Motion, Motion, Array]:
         """The motion at the model's frame rate, the same on the model's figure, and its last frames (L, C)."""
@@ -89,13 +180,8 @@ class PredictModel(BundleModel):
         return whole, figure, frames[-self.seed_frames :]
 
     def _carried_on(self, whole: Motion, figure: Motion, frames: Floats, append: bool) -> Motion:
-        following, before = self.contract.motion(frames, after=figure, plant=False), figure
-        if figure is not whole and (back := carried_back(following, figure, whole)) is not None:
-            following, before = back, whole
-        if not append:
-            return following
-        before = before.select(following.channels, following.units)
-        return replace(following, values=np.concatenate([before.values, following.values]))
+        following, before = carried_on(self.contract, frames, whole, figure)
+        return together(before, following) if append else following
 
     def next_frames(self, seeds: ArrayLike, frames: int | None = None) -> Floats:
         """Seed frames (B, L, C) in the contract's channels, to the next frames (B, frames, C) float32.
@@ -104,9 +190,7 @@ class PredictModel(BundleModel):
         DecodingError for a number of frames out of range, MotionError for seeds of another shape.
         """
         given = np.asarray(seeds, dtype=np.float32)
-        count = self.horizon if frames is None else frames
-        if not 1 <= count <= MAX_FRAMES:
-            raise DecodingError(f"1 to {MAX_FRAMES} frames can be predicted, not {count}")
+        count = checked(self.horizon if frames is None else frames)
         shape = (self.seed_frames, len(self.contract.channels))
         if given.ndim != 3 or given.shape[1:] != shape:
             raise MotionError(
@@ -117,6 +201,22 @@ class PredictModel(BundleModel):
         rows = two_rows(np.arange(len(given)))
         found: Floats = self.loop.run(self.graphs["encoder"], self.graphs["step"], given[rows], count, self.horizon)
         return found[: len(given)]
+
+    def expected_errors(self, motions: Motion | Sequence[Motion]) -> Floats:
+        """How far from where they will be the joints of each predicted frame are expected to be, in centimetres.
+
+        (horizon,) for a motion, (B, horizon) for several: the mean over the joints of the model's figure, in the world,
+        as it is for people that the model was not trained on. Errors as :meth:`predict`, and DecodingError for a model
+        that does not know.
+        """
+        if not self.knows_errors:
+            raise DecodingError(f"{self!r} does not know its errors: it has no graph for them")
+        given = [motions] if isinstance(motions, Motion) else list(motions)
+        seeds = np.zeros((len(given), self.seed_frames, len(self.contract.channels)), dtype=np.float32)
+        seeds[:] = [self._seed(motion)[2] for motion in given]
+        rows = two_rows(np.arange(len(given)))
+        found = 100 * self.graphs["error"]({"frames": seeds[rows]})["error"][: len(given)]
+        return found[0] if isinstance(motions, Motion) else found
 
     def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
         """Seed frames (L, C) and the number of "frames" of the settings to the next frames (frames, C)."""
@@ -134,6 +234,13 @@ class PredictModel(BundleModel):
         if start is None:
             start = self.contract.features(np.empty((0, len(self.contract.channels))))
         return PredictSession(self, start)
+
+
+def checked(frames: int) -> int:
+    """The number of frames to predict; DecodingError where it is out of range."""
+    if not 1 <= frames <= MAX_FRAMES:
+        raise DecodingError(f"1 to {MAX_FRAMES} frames can be predicted, not {frames}")
+    return frames
 
 
 class PredictSession:

@@ -161,14 +161,15 @@ def _between(times: list[NDArray[np.intp]], values: list[Array], frames: int, bl
 def _lift(depth: Array, fps: float) -> Array:
     """Heights (T,), without kinks, by which what is ``depth`` (T,) under the ground comes out of it."""
     reach = max(1, round(SOFT * fps))
-    deepest = np.max(_windows(np.maximum(depth, 0), reach), axis=1)
+    deepest = np.max(windows(np.maximum(depth, 0), reach), axis=1)
     # a mean over the window in which each is the deepest is as high as the one in the middle
     bell = np.hanning(2 * reach + 3)[1:-1]
-    found: Array = _windows(deepest, reach) @ (bell / bell.sum())
+    found: Array = windows(deepest, reach) @ (bell / bell.sum())
     return found
 
 
-def _windows(values: Array, reach: int) -> Array:
+def windows(values: Array, reach: int) -> Array:
+    """Values (T,) with ``reach`` before and as many after each, (T, 2 reach + 1); those at the ends go on."""
     return np.lib.stride_tricks.sliding_window_view(np.pad(values, reach, mode="edge"), 2 * reach + 1)
 
 
