@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from numpy.typing import NDArray
 from predict_manifest import predict_manifest
 
 from motet.bundle.manifest import Manifest
@@ -31,11 +32,14 @@ def run() -> Run:
         frames=6,
         polynomials=4,
         hidden=12,
+        doubts=True,
     )
     net = Predictor(config)
     with torch.no_grad():
         for parameter in net.parameters():
             parameter.add_(0.1 * torch.randn_like(parameter))
+    assert net.doubt is not None
+    net.doubt.weight.uniform_(-0.5, 0.5)
     return Run({**predict_manifest("trajectory", 3, 6), "config": vars(config)}, net)
 
 
@@ -52,3 +56,14 @@ def test_the_bundle_predicts_what_torch_predicts(run: Run, tmp_path: Path) -> No
     found = bundle.predict(motion, append=True)
     assert (len(found), found.channels) == (16, motion.channels)
     np.testing.assert_allclose(found.values[10:], bundle.next_frames(seeds[:1])[0], atol=1e-6)
+    errors = bundle.expected_errors([bundle.contract.features(seed) for seed in seeds])
+    np.testing.assert_allclose(errors, 100 * net_errors(run, seeds), rtol=1e-4)
+    np.testing.assert_array_equal(bundle.expected_errors(motion), errors[0])
+
+
+@torch.no_grad()
+def net_errors(run: Run, seeds: NDArray[np.float64]) -> NDArray[np.float32]:
+    """What torch expects, in metres."""
+    assert isinstance(run.model, Predictor)
+    found: NDArray[np.float32] = run.model.expected(torch.from_numpy(seeds.astype(np.float32))).numpy()
+    return found

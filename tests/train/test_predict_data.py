@@ -5,18 +5,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 from scipy.spatial.transform import Rotation
 
 from motet.errors import FormatError
 from motet.formats import read_motion
 from motet.motion.humanoid import HUMANOID
+from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.mirror import mirror
 from motet.motion.motion import Motion
 from motet.motion.rotations import continuous_rotvec, rotmat_to_euler, rotmat_to_rotvec, rotvec_to_rotmat
+from motet.motion.skeleton import END_SUFFIX
+from motet.representation import named
+from motet.representation.contract import MotionContract
 from motet_train.data.clips import CMU_FOLDER
 from motet_train.data.errors import DataError
 from motet_train.data.expmap_files import CMU_LAYOUT, H36M_LAYOUT, Scaling, is_expmap, parse, read_expmap, scaling_of
-from motet_train.data.predict_data import expmap_material, store_material
+from motet_train.data.predict_data import Material, expmap_material, store_material
 from motet_train.data.preparation import FULL, VECTORS, Preparation
 from motet_train.data.records import Record
 from motet_train.data.split import split
@@ -35,6 +40,7 @@ from motet_train.evaluate.predict.protocol import (
     windows,
     zero_velocity,
 )
+from motet_train.models.predict.places import VectorPlaces
 
 
 def write_files(folder: Path, frames: int = 200, actions: tuple[str, ...] = ("walking", "running")) -> Path:
@@ -206,8 +212,10 @@ def test_motions_are_held_out_by_person_or_by_chance(tmp_path: Path) -> None:
     names = [entry.name for entry in store.records]
     for by in ("subject", "trial"):
         about = store_material(store, "x", by).about
-        assert (about["split"], about["files"]) == (by, 11)
-        assert about["test"] == [names[i] for i in split(store.records, 0, by).test]
+        assert (about["split"], about["files"]) == (by, 10)
+        parts = split(store.records, 0, by)
+        for part in ("test", "validation"):
+            assert about[part] == [names[i] for i in getattr(parts, part)]
     alone = replace(store, records=tuple(replace(entry, subject="one") for entry in store.records))
     with pytest.raises(DataError, match="12 motions of 1 subjects are too few"):
         store_material(alone, "x")
@@ -217,7 +225,8 @@ def test_motions_become_sequences_of_the_humanoid_at_30_fps(tmp_path: Path) -> N
     walk = read_motion(CMU_FOLDER / "39_14.amc")[:120]
     material = store_material(of_people(tmp_path, walk), "x")
     assert (material.contract.fps, material.contract.skeleton) == (30.0, HUMANOID)
-    assert [len(sequence) for sequence in material.sequences] == [30] * 4 * 11
+    assert [len(sequence) for sequence in material.sequences] == [30] * 4 * 10
+    assert [len(sequence) for sequence in material.validation] == [30] * 4
     mirrored = material.contract.mirror
     np.testing.assert_array_equal(mirrored.columns, material.mirrored)
     np.testing.assert_array_equal(mirrored.signs, material.signs)
@@ -251,6 +260,46 @@ def test_what_is_trained_does_not_leap_and_is_what_inference_sees(tmp_path: Path
         asked = rotmat_to_rotvec(rotvec_to_rotmat(phase[first : first + 10, hand - 2 : hand + 1].astype(np.float64)))
         expected = continuous_rotvec(asked[:, None])[:, 0]
         np.testing.assert_allclose(window[:10, hand - 2 : hand + 1], expected, atol=1e-3)
+
+
+def test_velocities_are_those_of_the_motion_that_is_played_faster() -> None:
+    place = np.cos(0.05 * np.arange(400)) + 0.02 * np.arange(400)
+    velocity = 30 * np.diff(place, prepend=place[0])  # since the frame before
+    frames = np.column_stack([place, velocity]).astype(np.float32)
+    contract = MotionContract("angles", ("a", "b"), ("m", "m/s"), 30.0, np.zeros(2), np.ones(2), None)
+    windows = Windows(Material(contract, [frames], np.ones(1), 1, (0, 1), rates=(1,)), 20, warp=0.4)
+    drawn = windows.draw(50, np.random.default_rng(0))
+    np.testing.assert_allclose(30 * drawn[..., 0].diff(dim=1), drawn[:, 1:, 1], atol=0.04)
+    assert drawn[:, 0].unique(dim=0).shape[0] == 50
+    assert 30 * drawn[..., 0].diff(dim=1).abs().max() > 2.3  # at its own speed it is 2.1 at most
+
+
+def test_places_are_those_of_the_runtime(tmp_path: Path) -> None:
+    store = of_people(tmp_path, read_motion(CMU_FOLDER / "02_06.amc")[:400])
+    motion = store.motion(0)
+    expected = positions(named(store.representation).motion(motion))
+    frames = torch.from_numpy(motion.values.astype(np.float32))[None].clone()
+    frames[:, 0, :3] = 0  # the first frame's steps lead there from a frame that is not known
+    skeleton = skeleton_of(motion)
+    joints = [i for i, name in enumerate(skeleton.names) if not name.endswith(END_SUFFIX)]
+    found = VectorPlaces(store.contract([0]))(frames)[0]
+    np.testing.assert_allclose(found, expected[:, joints], atol=2e-5)
+
+
+def test_windows_along_motions_are_all_there_are(tmp_path: Path) -> None:
+    material = store_material(of_people(tmp_path, spun(), preparation=replace(VECTORS, humanoid=False)), "x")
+    windows = Windows(material, 20, seed=10)
+    found = windows.along(material.validation[:1], 7)
+    assert len(found) == len(range(0, len(material.validation[0]) - 19, 7))
+    for number, window in enumerate(found):
+        cut = material.validation[0][7 * number : 7 * number + 20]
+        np.testing.assert_array_equal(window[:, :6], cut[:, :6])
+        hand = [material.contract.channels.index(f"lhand.{kind}") for kind in ("ex", "ey", "ez")]
+        assert window[9, hand].norm() <= np.pi + 1e-5
+        one, other = (rotvec_to_rotmat(np.asarray(part[:, hand], np.float64)) for part in (window, cut))
+        np.testing.assert_allclose(one, other, atol=1e-5)
+    with pytest.raises(DataError, match="held out are all shorter"):
+        windows.along([material.validation[0][:19]], 7)
 
 
 def test_zero_velocity_is_the_published_one(shared: Path) -> None:

@@ -17,9 +17,11 @@ from motet.models.predict import PredictModel
 from motet_train.data.clips import CMU_FOLDER
 from motet_train.data.expmap_files import CMU_ACTIONS, read_expmap
 from motet_train.data.predict_data import expmap_material
-from motet_train.evaluate.predict.curves import FEW, MEAN, ZERO, complete, curves
+from motet_train.evaluate.predict.curves import FEW, MEAN, complete, curves
+from motet_train.evaluate.predict.floors import ZERO
 from motet_train.evaluate.predict.published_h36m import CONV
 from motet_train.manifest import About
+from motet_train.models.predict.doubt import LEAST, SIGNS, Doubt, Signs
 from motet_train.models.predict.predictor import Predictor, PredictorConfig
 from motet_train.recipes.predict import DEFAULT, train_predict
 from motet_train.recipes.recipe import Job
@@ -48,7 +50,7 @@ def stirred(config: PredictorConfig) -> Predictor:
     return net.eval()
 
 
-def test_the_shipped_size_is_small() -> None:
+def test_the_protocols_size_is_small() -> None:
     net = Predictor(PredictorConfig(117, tuple(range(70)), held=6))
     assert sum(parameter.numel() for parameter in net.parameters()) == 318_405
 
@@ -105,7 +107,8 @@ def test_train_and_evaluate_from_the_command_line(tmp_path: Path) -> None:
     assert f"published: {CONV}" in shown.stdout
     assert (tmp_path / "plots" / "predict-error.png").stat().st_size > 1000
     found = json.loads(run("evaluate", out, "--data", data, "--json", "--save").stdout)
-    assert set(found) == {"windows_8", "windows_256", "rotation", "zero_velocity"}
+    floors = {"zero_velocity", "constant_velocity", "damped_velocity"}
+    assert set(found) == {"windows_8", "windows_256", "rotation", *floors}
     assert list(found["windows_8"]["walking"]) == [f"frame_{n}" for n in (1, 3, 7, 9, 13, 24)]
     assert Run.load(out).manifest["quality"] == found
 
@@ -128,13 +131,26 @@ def test_motion_files_are_trained_on_and_measured_in_centimetres(
     assert trained.exit_code == 0, trained.output
     manifest = Run.load(out).manifest
     assert (manifest["licence"]["data"], len(manifest["training"]["data"]["test"])) == ("free", 1)
-    assert (manifest["training"]["recipe"]["warp"], manifest["training"]["recipe"]["mirror"]) == (0.0, 0.5)
+    recipe = manifest["training"]["recipe"]
+    assert (recipe["warp"], recipe["reverse"], recipe["mirror"]) == (0.15, 0.0, 0.5)
+    net = Run.load(out).model
+    assert isinstance(net, Predictor)
+    assert net.doubt is not None
+    assert (net.doubt.bias != 0).all()
+    model = PredictModel(Manifest.from_json(manifest), Run.load(out).torch_graphs())
+    expected = model.expected_errors([walk, walk[:200]])
+    assert expected.shape == (2, 25)
+    assert (expected > 0).all()
+    np.testing.assert_allclose(expected[1], model.expected_errors(walk[:200]), rtol=1e-3)
     store = tmp_path / "run-store"
     found = json.loads(run("evaluate", out, "--data", store, "--json", "--plots", tmp_path / "plots").stdout)
     still = found["zero_velocity"]["place_cm"]
     assert 60 < still["frame_24"] < 130  # a walk at 1.4 m/s, after .83 s
     assert still["frame_1"] < still["frame_24"]
     assert found["zero_velocity"]["pose_cm"]["frame_24"] < still["frame_24"]
+    assert found["constant_velocity"]["place_cm"]["frame_1"] < still["frame_1"]
+    assert found["damped_velocity_of_joints"]["place_cm"]["frame_24"] < still["frame_24"]
+    assert found["kinds"]["everything else"]["place_cm"] == found["place_cm"]  # nothing is said of these files
     names = sorted(path.name for path in (tmp_path / "plots").iterdir())
     assert names == sorted(["predict-distance.png", f"predict-{manifest['training']['data']['test'][0]}.png"])
     shown = run("evaluate", out, "--data", store).stdout
@@ -173,3 +189,25 @@ def test_bad_input_is_refused(tmp_path: Path, arguments: list[str], said: str) -
     result = run(*(argument.format(**places) for argument in arguments))
     assert (result.exit_code, said in result.stderr) == (2, True), result.output
     assert not places["out"].exists()
+
+
+def test_doubt_finds_the_law_that_errors_follow() -> None:
+    torch.manual_seed(0)
+    logarithms = torch.randn(4000, 3, SIGNS) * torch.tensor([1.0, 0.5, 2.0, 1.0, 0.1, 1.0]) - 2
+    weight, bias = torch.tensor([0.5, 0, -0.2, 0.3, 0, 0.1]), torch.tensor([-3.0, -2.5, -2.0])
+    mean = torch.exp((logarithms * weight).sum(-1) + bias)
+    doubt = Doubt(3)
+    doubt.fit(logarithms, mean * torch.empty(4000, 3).exponential_())
+    found = doubt(logarithms)
+    assert float((found / mean).log().abs().mean()) < 0.08
+    np.testing.assert_allclose(found.mean(0), mean.mean(0), rtol=0.08)
+
+
+def test_signs_grow_with_what_they_are_signs_of() -> None:
+    seed, steps = torch.randn(5, 10, 4), torch.randn(5, 3, 4)
+    alike = Signs(seed, steps, steps).logarithms()
+    faster = Signs(2 * seed, steps, steps).logarithms()
+    apart = Signs(seed, steps, steps + 1.0).logarithms()
+    assert (faster > alike).sum(dim=(0, 1)).tolist() == [15, 15, 15, 0, 0, 0]
+    assert (apart > alike).sum(dim=(0, 1)).tolist() == [0, 0, 0, 0, 15, 0]
+    torch.testing.assert_close(apart[..., 4], torch.full((5, 3), float(np.log(1 + LEAST))), atol=1e-3, rtol=0)

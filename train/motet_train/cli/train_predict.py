@@ -16,6 +16,16 @@ from motet_train.recipes.predict import RECIPES, train_predict
 from motet_train.recipes.recipe import Job
 from motet_train.runs import Run
 
+AUGMENTATION = (
+    click.option("--warp", type=click.FloatRange(0), help="Windows are up to exp(this) times as fast or slow."),
+    click.option("--reverse", type=click.FloatRange(0, 1), help="Share of the windows that are played backwards."),
+    click.option("--mirror", type=click.FloatRange(0, 1), help="Share of the windows that are mirrored."),
+    click.option(
+        "--average", type=click.FloatRange(0, 1, max_open=True), help="Of a running mean of weights; 0: none."
+    ),
+)
+"""How the windows vary and what is kept; each one's default is the preset's."""
+
 
 @train_command(
     "predict",
@@ -34,6 +44,7 @@ from motet_train.runs import Run
         help="How motion files are held out: by chance, or all of a person. [default: subject]",
     ),
     click.option("--steps", type=click.IntRange(1), help="[default: the preset's]"),
+    *AUGMENTATION,
 )
 def predict(job: Job, data: Path, by: str | None, **corpus: Any) -> Run:
     """Train a predictor: a net that continues a motion from its last frames.

@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from motet_train.cli.train_options import train_command
-from motet_train.cli.train_predict import read_expmap_files
+from motet_train.cli.train_predict import AUGMENTATION, read_expmap_files
 from motet_train.data.predict_data import expmap_material, validation_files
 from motet_train.evaluate.predict.protocol import WINDOW
 from motet_train.recipes.recipe import Job
@@ -19,6 +19,7 @@ OPTIONS = (
     click.option("--steps", type=click.IntRange(1), help="[default: the preset's]"),
     click.option("--batch", type=click.IntRange(1), help="Windows in a batch. [default: the preset's]"),
     click.option("--learning-rate", type=click.FloatRange(0, min_open=True), help="[default: the preset's]"),
+    *AUGMENTATION,
     click.option("--all-files", is_flag=True, help="Hold out no training file; validate on windows of all of them."),
 )
 

@@ -26,9 +26,9 @@ class Material:
     """Sequences (T, C) float32 at ``stride`` times the contract's frame rate, and how often each is visited.
 
     contract: its mean and std are those of training. kept: columns that vary, of which the first ``held`` are not
-    predicted. mirrored, signs: see PredictorConfig. poses: whether all channels are poses, which can be played
-    backwards and faster or slower; velocities cannot. about: what the manifest says of the data. validation: sequences
-    that were held out. layout: of text files.
+    predicted. mirrored, signs: see PredictorConfig. rates: columns that are velocities, which are faster where a motion
+    is played faster; with them it cannot be played backwards. about: what the manifest says of the data. validation:
+    sequences that were held out. layout: of text files.
     """
 
     contract: MotionContract
@@ -36,10 +36,10 @@ class Material:
     chances: Array
     stride: int
     kept: tuple[int, ...]
-    poses: bool
     held: int = 0
     mirrored: tuple[int, ...] = ()
     signs: tuple[float, ...] = ()
+    rates: tuple[int, ...] = ()
     licence: str | None = None
     about: dict[str, Any] = field(default_factory=dict)
     validation: Sequence[NDArray[np.float32]] = ()
@@ -70,7 +70,6 @@ def expmap_material(corpus: ExpmapCorpus, kept_back: Sequence[str] = ()) -> Mate
         chances,
         STRIDE,
         scaling.kept,
-        poses=True,
         held=held,
         mirrored=mirrored,
         signs=signs,
@@ -132,28 +131,39 @@ def _mirrored_columns(layout: Layout) -> tuple[tuple[int, ...], tuple[float, ...
 def store_material(store: Store, name: str, by: str = "subject") -> Material:
     """The motions of a store that was prepared for predictors, all phases, without the test motions.
 
-    name: the store's. by: which those are, see :func:`motet_train.data.split.split`.
+    name: the store's. by: which those are, and those for validation, see :func:`motet_train.data.split.split`.
     """
     if store.representation != VECTORS.representation:
         raise DataError(f"{name} is a store of {store.representation}: prepare it with --for predict")
-    test = split(store.records, 0, by).test
-    train = [record for record in range(len(store.records)) if record not in set(test)]
-    contract = store.contract(train)
-    spans = [span for record in train for span in store.records[record].spans]
-    lengths = np.array([stop - start for start, stop in spans], dtype=np.float64)
+    parts = split(store.records, 0, by)
+    contract = store.contract(parts.train)
+    sequences = _spans(store, parts.train)
+    lengths = np.array([len(frames) for frames in sequences], dtype=np.float64)
     mirrored, signs = _mirrored(contract)
-    names = {"skipped": [item.name for item in store.skipped], "test": [store.records[record].name for record in test]}
+    named = {part: [store.records[record].name for record in getattr(parts, part)] for part in ("validation", "test")}
     return Material(
         contract,
-        [store.frames[start:stop] for start, stop in spans],
+        sequences,
         lengths / lengths.sum(),
         1,
         tuple(int(column) for column in np.flatnonzero(contract.std)),
-        poses=False,
         mirrored=mirrored,
         signs=signs,
-        about={"name": name, "files": len(train), "split": by, **names},
+        rates=tuple(column for column, unit in enumerate(contract.units) if unit.endswith("/s")),
+        about={
+            "name": name,
+            "files": len(parts.train),
+            "split": by,
+            "skipped": [item.name for item in store.skipped],
+            **named,
+        },
+        validation=_spans(store, parts.validation),
     )
+
+
+def _spans(store: Store, records: Sequence[int]) -> list[NDArray[np.float32]]:
+    """The frames of some records, of all phases."""
+    return [store.frames[start:stop] for record in records for start, stop in store.records[record].spans]
 
 
 def _mirrored(contract: MotionContract) -> tuple[tuple[int, ...], tuple[float, ...]]:

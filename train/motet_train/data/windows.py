@@ -1,9 +1,11 @@
 """Windows of motions to train predictors on, drawn afresh for each batch."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from motet.representation.root_vectors import KINDS, joints_of
@@ -52,12 +54,25 @@ class Windows:
         if not self.warp:
             speed, start = np.full(batch, float(self.material.stride)), np.floor(start)
         windows = self._interpolated(which, start[:, None] + speed[:, None] * np.arange(self.frames))
+        faster = torch.from_numpy((speed / self.material.stride).astype(np.float32))
+        windows[..., self.material.rates] *= faster[:, None, None]
         backwards = _some(rng, batch, self.reverse)
         windows = torch.where(backwards, windows.flip(1), windows)
         if self.mirror:
             windows = torch.where(_some(rng, batch, self.mirror), windows[..., self.columns] * self.signs, windows)
+        return self._anchored(windows)
+
+    def along(self, sequences: Sequence[NDArray[np.float32]], apart: int) -> Tensor:
+        """Windows (W, T, C) all along sequences (T, C) at the contract's frame rate, as they are, every ``apart``
+        frames; DataError where all are too short."""
+        starts = [(one, start) for one in sequences for start in range(0, len(one) - self.frames + 1, apart)]
+        if not starts:
+            raise DataError(f"the motions held out are all shorter than a window of {self.frames} frames")
+        return self._anchored(torch.from_numpy(np.stack([one[start : start + self.frames] for one, start in starts])))
+
+    def _anchored(self, windows: Tensor) -> Tensor:
         if self.seed is not None and self.maps:
-            maps = windows[..., self.maps].reshape(batch, self.frames, -1, 3)
+            maps = windows[..., self.maps].reshape(*windows.shape[:2], -1, 3)
             windows[..., self.maps] = anchored(maps, self.seed - 1).flatten(2)
         return windows
 

@@ -28,6 +28,10 @@ class Visits:
     mirror: float = 0.0
 
 
+AUGMENTED = Visits(warp=0.15, reverse=0.3, mirror=0.5)
+"""Of every predictor that is trained on poses, motet's own and those it is compared with."""
+
+
 @dataclass(frozen=True)
 class Recipe:
     """What is trained, and how.

@@ -9,6 +9,7 @@ from torch.nn import functional
 from motet.motion.skeleton import END_SUFFIX
 from motet.representation.contract import MotionContract
 from motet.representation.root_sixd import KINDS
+from motet_train.models.tree import levels
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ class SixdPlaces(nn.Module):
         super().__init__()
         self.register_buffer("offsets", torch.tensor(tree.offsets), persistent=False)
         self.bones, self.parents = list(tree.bones), tree.parents
-        self.levels = _levels(tree.parents)
+        self.levels = levels(tree.parents)
 
     def forward(self, sixd: Tensor) -> Tensor:
         """Axes (..., 6 K) of the K bones to places (..., J, 3) in metres from the root, in the frame of the facing."""
@@ -63,14 +64,6 @@ class SixdPlaces(nn.Module):
             for place, joint in enumerate(level):
                 places[joint] = places[self.parents[joint]] + moved[..., place, :]
         return torch.stack(places, dim=-2)
-
-
-def _levels(parents: tuple[int, ...]) -> list[list[int]]:
-    """The joints but the root, those of one depth together."""
-    depth = [0] * len(parents)
-    for joint, parent in enumerate(parents):
-        depth[joint] = depth[parent] + 1 if parent >= 0 else 0
-    return [[joint for joint in range(len(parents)) if depth[joint] == level] for level in range(1, max(depth) + 1)]
 
 
 def _known(rotation: Tensor | None) -> Tensor:

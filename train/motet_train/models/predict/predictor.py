@@ -18,8 +18,9 @@ from torch import Tensor, nn
 from torch.nn.functional import gelu
 
 from motet.bundle.graph import GraphSpec, TensorSpec
-from motet_train.models.net import Net, tuples
+from motet_train.models.net import Net, Part, tuples
 from motet_train.models.normalised import normalised
+from motet_train.models.predict.doubt import Doubt, Signs
 
 GAIN = 3.0
 """Differences of normalised frames are multiplied by it, so that they vary about as much as poses do."""
@@ -27,11 +28,12 @@ GAIN = 3.0
 
 @dataclass(frozen=True)
 class PredictorConfig:
-    """What varies in the data, and sizes of the net; the default sizes are those of the shipped recipe.
+    """What varies in the data, and sizes of the net; the default sizes are those that suit the protocol's text files.
 
     channels: C. kept: the channels that vary, the root's first. held: how many of these are seen, relative to the last
     frame, but not predicted. mirrored, signs: channel c of a mirrored frame is channel ``mirrored[c]`` times
-    ``signs[c]``; empty where left and right are not known.
+    ``signs[c]``; empty where left and right are not known. doubts: whether it knows its errors
+    (:class:`motet_train.models.predict.doubt.Doubt`).
     """
 
     channels: int
@@ -46,6 +48,7 @@ class PredictorConfig:
     hidden: int = 184
     blocks: int = 2
     dropout: float = 0.3
+    doubts: bool = False
 
 
 def from_config(data: Mapping[str, Any]) -> "Predictor":
@@ -128,11 +131,13 @@ class Predictor(Net):
     placing: Tensor
     mirrored: Tensor
     signs: Tensor
+    doubt: Doubt | None
 
     def __init__(self, config: PredictorConfig) -> None:
         super().__init__(len(config.kept))
         self.config = config
         self.trajectory = Trajectory(config)
+        self.doubt = Doubt(config.frames) if config.doubts else None
         kept, channels = list(config.kept), config.channels
         self.register_buffer("kept", torch.tensor(kept), persistent=False)
         self.register_buffer("relative", (torch.arange(len(kept)) < config.held).float(), persistent=False)
@@ -142,11 +147,14 @@ class Predictor(Net):
 
     def plain(self, frames: Tensor) -> Tensor:
         """Frames (B, L, C) to the next (B, N, C), without the mirror image: what is trained."""
-        seen = frames[:, -self.config.seed_frames :, self.kept]
-        z = normalised(seen - self.relative * seen[:, -1:], self.mean, self.scale)
-        steps = self.trajectory(z) * self.scale[self.config.held :]
+        steps = self.trajectory(self._seen(frames)) * self.scale[self.config.held :]
         predicted: Tensor = frames[:, -1:] + steps @ self.placing
         return predicted
+
+    def _seen(self, frames: Tensor) -> Tensor:
+        """Frames (B, L, C) as normalised seed frames (B, L, D)."""
+        seen = frames[:, -self.config.seed_frames :, self.kept]
+        return normalised(seen - self.relative * seen[:, -1:], self.mean, self.scale)
 
     def mirror(self, frames: Tensor) -> Tensor:
         """Frames (B, T, C) with left and right exchanged."""
@@ -156,21 +164,45 @@ class Predictor(Net):
         """Frames (B, L, C) to the next (B, N, C): the mean of the two ways of looking at them."""
         if not self.config.mirrored:
             return self.plain(frames)
+        one, other = self._both(frames)
+        return (one + other) / 2
+
+    def _both(self, frames: Tensor) -> tuple[Tensor, Tensor]:
+        """What follows (B, N, C) by the frames, and by their mirror image, mirrored back."""
         # rows and their mirror images in one batch, side by side
         found = self.plain(torch.stack([frames, self.mirror(frames)], dim=1).flatten(0, 1))
         both = found.reshape(-1, 2, self.config.frames, self.config.channels)
-        mean: Tensor = (both[:, 0] + self.mirror(both[:, 1])) / 2
-        return mean
+        return both[:, 0], self.mirror(both[:, 1])
+
+    def expected(self, frames: Tensor) -> Tensor:
+        """Frames (B, L, C) to the error (B, N) in metres that is to be expected of what follows."""
+        assert self.doubt is not None
+        found: Tensor = self.doubt(self.judged_by(frames))
+        return found
+
+    def judged_by(self, frames: Tensor) -> Tensor:
+        """Frames (B, L, C) to the signs (B, N, S) of :class:`motet_train.models.predict.doubt.Signs`."""
+        moved = self.kept[self.config.held :]
+        one, other = self._both(frames)
+        one, other = ((found - frames[:, -1:])[..., moved] / self.scale[self.config.held :] for found in (one, other))
+        return Signs(self._seen(frames)[..., self.config.held :], (one + other) / 2, other).logarithms()
 
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
-        """The encoder and the step, each with its contract."""
+        """The encoder and the step, each with its contract; and where it knows its errors, what tells them."""
         channels = self.config.channels
         frames = TensorSpec("frames", ("batch", self.config.seed_frames, channels))
         coming, left = (
             TensorSpec(name, ("batch", self.config.frames, channels)) for name in ("trajectory", "next_trajectory")
         )
         step = GraphSpec((coming,), (TensorSpec("frame", ("batch", channels)), left), {coming.name: left.name})
-        return {"encoder": (self, GraphSpec((frames,), (coming,))), "step": (Step(), step)}
+        found: dict[str, tuple[nn.Module, GraphSpec]] = {
+            "encoder": (self, GraphSpec((frames,), (coming,))),
+            "step": (Step(), step),
+        }
+        if self.doubt is not None:
+            error = TensorSpec("error", ("batch", self.config.frames))
+            found["error"] = Part(self, self.expected), GraphSpec((frames,), (error,))
+        return found
 
 
 class Step(nn.Module):
