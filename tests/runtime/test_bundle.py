@@ -10,9 +10,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 from motet.bundle.bundle import FORMAT, Bundle, list_bundles, write_bundle, zip_bytes
 from motet.bundle.session import SessionOptions
+from motet.cli import main
 from motet.errors import BundleError, OutputError
 from motet.models.load import VERBS, kind_of, load
 from motet.models.verify import verify
@@ -120,7 +122,7 @@ NAN, HUGE = float("nan"), 10**400
         ("motion.skeleton.joints.3.offset", [0, 0], "offset: must hold 3 numbers"),
         ("motion.skeleton.joints", [], "motion.skeleton.joints: must be a skeleton with the joints of all channels"),
         ("motion.skeleton.metres_per_unit", -1, "metres_per_unit: must be a number between 1e-06"),
-        ("verb", "swim", "verb: 'swim' is unknown; expected one of control, describe, generate, predict"),
+        ("verb", "swim", "verb: 'swim' is unknown; expected one of control, describe, fill, generate, predict"),
         ("verb", ["swim"], "verb: must be a string"),
         ("verb", "describe", "loop: 'session' does not describe|text: is missing|beam"),
         ("loop", None, "loop: is missing"),
@@ -322,6 +324,17 @@ def test_a_bundle_is_written_whole_or_not_at_all(folder: Path, tmp_path: Path) -
     assert sorted(path.name for path in tmp_path.iterdir()) == ["bundle", "new"]
     assert (tmp_path / "new" / "manifest.json").read_bytes() == (folder / "manifest.json").read_bytes()
     assert zip_bytes({"a": b"1", "b": b"2"}, b"m") == zip_bytes({"b": b"2", "a": b"1"}, b"m")
+
+
+def test_long_figures_are_shown_as_json_alone(folder: Path) -> None:
+    figures = {"place_cm": {"frame_1": 0.75}, "kinds": {"boxing": {"windows": 77}}}
+    edit(folder, lambda manifest: manifest.update(quality=figures))
+    shown, whole = (
+        CliRunner().invoke(main, ["bundle", "info", str(folder), *more]).stdout for more in ([], ["--json"])
+    )
+    assert "frame_1: 0.75" in shown
+    assert "boxing" not in shown
+    assert json.loads(whole)["quality"] == figures
 
 
 @pytest.mark.parametrize("threads", [0, -1, 257, 10_000, True, 1.5])

@@ -25,8 +25,9 @@ from motet_train.data.expmap_files import CMU_LAYOUT, H36M_LAYOUT, ExpmapCorpus,
 from motet_train.data.predict_data import expmap_material
 from motet_train.evaluate.predict import published
 from motet_train.evaluate.predict.ablations import ablated, ablation_table
-from motet_train.evaluate.predict.costs import cost_table
-from motet_train.evaluate.predict.curves import COUNTS, MANY, MEAN, ZERO, Curves
+from motet_train.evaluate.predict.costs import cost_table, harness_table
+from motet_train.evaluate.predict.curves import COUNTS, MANY, MEAN, Curves, spreads_of
+from motet_train.evaluate.predict.floors import CONSTANT, DAMPED, ZERO
 from motet_train.evaluate.predict.plots import _looks
 from motet_train.evaluate.predict.protocol import windows
 from motet_train.evaluate.predict.protocol_table import protocol_table
@@ -144,7 +145,8 @@ def test_published_rows_stand_under_ours() -> None:
     measured, averages = many.split("average of all 8 actions")
     assert "published" not in measured
     assert line(averages, "published: LTD").endswith("   0.25   0.39   0.68   0.79          1.33")
-    assert line(averages, "goal  ").endswith("   0.26   0.40   0.68   0.78          1.25")
+    assert line(blocks[1], "goal  ").endswith("   0.26   0.39   0.67   0.78          1.20")
+    assert line(measured, "goal  ").endswith("   0.25   0.39   0.64   0.74          1.10")
     assert len({len(one) for one in few.splitlines() if "." in one}) == 1
 
 
@@ -200,9 +202,50 @@ def test_costs_are_those_of_the_manifests() -> None:
     assert line(text, "old").split() == ["old", "12,345", "M,", "CPU"]
 
 
+def test_training_is_that_of_the_manifests() -> None:
+    recipe = {"warp": 0.15, "reverse": 0.3, "mirror": 0.5, "average": 0.99, "learning_rate": 0.001, "keep": "best"}
+    models = {f"c-{n}": manifest(n, recipe=recipe) for n in (0, 1, 2)} | {"old": manifest(None)}
+    for n in range(3):
+        training = models[f"c-{n}"].manifest.training
+        training |= {"data": {"files": 27, "validation": ["a", "b"]}, "steps": 500, "kept_step": 300 + 100 * n}
+    text = harness_table(models, seed_groups(models))
+    cells = ["0-2", "27", "2", "0.15", "0.3", "0.5", "0.99", "0.001", "500", "300-500", "best"]
+    assert line(text, "c (3 seeds)").split()[3:] == cells
+    assert line(text, "old").split() == ["old"]  # what is not said is left out
+
+
+def test_spreads_stand_behind_means_of_several_seeds() -> None:
+    models = {"c-0": manifest(0), "c-1": manifest(1), "d": manifest(0, window=5)}
+    found = constant(**{ZERO: 0.5, "c-0": 0.25, "c-1": 0.375, "d": 1.0})
+    rows = seed_groups(models)
+    means = {kind: pooled(systems, rows) for kind, systems in found.items()}
+    text = protocol_table(
+        means, ExpmapCorpus(CMU_LAYOUT, {}, {action: {} for action in FIVE}, ()), spreads_of(found, rows)
+    )
+    assert line(text, "c (2 seeds)").split("seeds)")[1].split() == ["0.31", "[.12]"] * 6
+    assert line(text, "d ").split() == ["d", *["1.00"] * 6]
+    assert line(text, "zero velocity").split() == ["zero", "velocity", *["0.50"] * 6]
+    assert "largest seed's minus the smallest's" in text
+    ends = {name: line(text, name).index(cell) for name, cell in (("c (2", "0.31"), ("d ", "1.00"), ("zero", "0.50"))}
+    assert len(set(ends.values())) == 1  # means stand under each other
+
+
+def test_the_head_says_which_files_are_missing() -> None:
+    gone = ("train/washwindow/washwindow_2.txt", "train/washwindow/washwindow_1.txt", "test/soccer/soccer_1.txt")
+    test = {action: {} for action in (*FIVE, "washwindow") if action != "soccer"}
+    found: Curves = {kind: {ZERO: {part: np.ones(25) for part in (*test, MEAN)}} for kind in COUNTS}
+    head = protocol_table(found, ExpmapCorpus(CMU_LAYOUT, {}, test, gone)).splitlines()
+    assert head[0] == "3 of 48 files are missing: washwindow (2 of 5 training), soccer (1 of 1 test)"
+    assert head[1] == "means are those of the actions with all their files"
+    assert "mean of basketball, jumping, running, walking" in head
+    whole = protocol_table(found, ExpmapCorpus(CMU_LAYOUT, {}, test, ()))
+    assert whole.startswith("output frame")
+
+
 def test_twenty_systems_look_different() -> None:
-    looks = _looks([ZERO, *(str(n) for n in range(20))])
-    assert len({(look["color"], look.get("linestyle")) for look in looks.values()}) == 21
+    looks = _looks([ZERO, CONSTANT, DAMPED, *(str(n) for n in range(20))])
+    assert len({(look["color"], look.get("linestyle")) for look in looks.values()}) == 23
+    assert {looks[floor]["color"] for floor in (ZERO, CONSTANT, DAMPED)} == {"0.6"}
 
 
 def test_places_are_those_of_the_motion() -> None:
@@ -263,7 +306,9 @@ def test_all_runs_are_evaluated_at_once(tmp_path: Path) -> None:
     assert line(text, "none-0")
     assert json.loads(json.dumps(found)) == found
     assert set(found) == {*map(str, runs), "grouped"}
-    assert set(found[str(runs[0])]) == {"windows_8", "windows_256", "rotation", "zero_velocity"}
+    floors = {"zero_velocity", "constant_velocity", "damped_velocity"}
+    assert set(found[str(runs[0])]) == {"windows_8", "windows_256", "rotation", *floors}
+    assert "* Eight windows: " in text
     (title, grouped), *others = found["grouped"].items()
     assert (title, others, grouped["runs"]) == ("conv (2 seeds)", [], [str(run) for run in runs[:2]])
     one, other = (found[str(run)]["windows_8"]["running"]["frame_9"] for run in runs[:2])

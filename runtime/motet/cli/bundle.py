@@ -14,6 +14,9 @@ from motet.models.verify import verify as verify_bundle
 NOT_STATED = "not stated"
 """What is said of a licence that is null."""
 
+LONG = ("starts", "kinds")
+"""Parts of a manifest that are shown with --json alone."""
+
 _NAME = click.argument("name")
 
 
@@ -55,7 +58,7 @@ def info(name: str, as_json: bool) -> None:
     for key in ("control", "defaults", "licence", "training", "quality", "parity"):
         if values := manifest.source.get(key):
             click.echo(f"\n{key}")
-            _tree({k: v for k, v in values.items() if k != "starts"})
+            _tree({k: v for k, v in values.items() if k not in LONG})
 
 
 def _tree(values: dict[str, Any], indent: str = "  ") -> None:

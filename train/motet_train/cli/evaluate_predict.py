@@ -1,29 +1,30 @@
 """``motet evaluate`` of models that predict."""
 
-from collections.abc import Callable, Mapping, Sequence
+import shlex
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import partial
+from os.path import relpath
 from pathlib import Path
-from typing import Any
 
 import click
 from tqdm import tqdm
 
+from motet.files import check_place, write_whole
 from motet.formats import read_motion
-from motet.models.predict import PredictModel
 from motet.motion.kinematics import skeleton_of
-from motet.motion.motion import Motion
+from motet_train.cli.evaluate_mocap import mocap_reports
 from motet_train.data.clips import CMU_FOLDER
 from motet_train.data.expmap_files import CMU_LAYOUT, ExpmapCorpus, is_expmap, read_expmap
 from motet_train.data.predict_data import STRIDE
-from motet_train.data.store import Store
-from motet_train.evaluate.predict import curves, mocap, strips
-from motet_train.evaluate.predict.ablations import ablated, ablation_table
-from motet_train.evaluate.predict.costs import cost_table
-from motet_train.evaluate.predict.protocol_table import protocol_table
-from motet_train.evaluate.predict.seed_groups import SeedGroup, pooled, seed_groups, spread
-
-STRIPS = 3
-"""Trials of motion files, about, of which stick figures are drawn."""
+from motet_train.evaluate.predict import curves, strips
+from motet_train.evaluate.predict.commands import run_words, shown
+from motet_train.evaluate.predict.page import Surroundings, page, sentences
+from motet_train.evaluate.predict.results import Models, Ready, Results, results_json, results_of, results_text
+from motet_train.evaluate.predict.seed_groups import drawn
+from motet_train.evaluate.predict.sentences import Figures
+from motet_train.evaluate.predict.text_floors import TEXT_FLOORS
+from motet_train.runs import MANIFEST
 
 DRAWN = ("running", "jumping")
 """Actions of the text files of which stick figures are drawn (Li et al. 2018, figure 5)."""
@@ -31,97 +32,87 @@ DRAWN = ("running", "jumping")
 BONES = "39_14.amc"
 """The trial whose skeleton they have: the text files do not hold one."""
 
-Models = Mapping[str, PredictModel]
-Ready = dict[str, dict[str, Any]]
-Result = tuple[Ready, str]
-"""The figures of each model, ready for JSON, see :func:`_ready`, and the table."""
+ERRORS = "predict-error"
+"""The name of the figure of errors over time."""
 
 
-def predict_reports(models: Models, data: Path | None, plots: Path | None) -> Result:
-    """By the protocol where ``data`` has its text files, else the joints' distances in trials that were held out.
+@dataclass(frozen=True)
+class PageOptions:
+    """Where the page of results goes, and the folder of runs that are its ablations, with these."""
 
-    Runs that differ in their seed alone are one row of the table.
+    path: Path
+    folder: Path | None = None
+    ablations: Models = field(default_factory=dict)
+
+
+def predict_reports(
+    models: Models, data: Path | None, plots: Path | None, options: PageOptions | None = None
+) -> tuple[Ready, str]:
+    """The figures of each model, ready for JSON, and the tables.
+
+    By the protocol where ``data`` has its text files, else the joints' distances in trials that were held out. Runs
+    that differ in their seed alone are one row of the table. options: of the page of the protocol's results, if that is
+    to be written.
     """
     if data is None:
         raise click.UsageError("predictors need --data: text files of the protocol, or the store they were trained on")
-    return _protocol(models, data, plots) if is_expmap(data) else _mocap(models, data, plots)
+    if is_expmap(data):
+        return _protocol(models, data, plots, options)
+    if options is not None:
+        raise click.UsageError("--page is of the protocol's results: it needs --data with text files")
+    return mocap_reports(models, data, plots)
 
 
-def _protocol(models: Models, data: Path, plots: Path | None) -> Result:
-    corpus, groups = read_expmap(data), seed_groups(models)
+def _protocol(models: Models, data: Path, plots: Path | None, options: PageOptions | None) -> tuple[Ready, str]:
+    if options is not None:
+        check_place(options.path)  # what cannot be written is said before hours of measuring
+    corpus = read_expmap(data)
     if corpus.missing:
         click.echo(f"motet: {data} lacks {len(corpus.missing)} files: {', '.join(corpus.missing)}", err=True)
-    with tqdm(total=len(curves.COUNTS) * (1 + len(models)), unit=" systems", disable=None, leave=False) as bar:
-        found = curves.curves(models, corpus, lambda name: bar.update())
-    shown, apart = curves.by_group(found, groups), curves.by_group(found, groups, spread)
-    if plots is not None:
-        _draw_protocol(_drawn(models, groups), corpus, shown, plots)
-    parts = [protocol_table(shown, corpus), cost_table(models, groups)]
-    if said := ablated(models, groups):
-        parts.append(ablation_table(shown, said))
-    runs, means, spreads = (partial(curves.to_json, errors) for errors in (found, shown, apart))
-    return _ready(models, groups, runs, means, spreads), "\n\n".join(parts)
+    results = _measured(models, corpus)
+    pictures = {} if plots is None else _draw(results, plots)
+    if options is not None:
+        ablations = _measured(options.ablations, corpus) if options.ablations else None
+        around = Surroundings(_command(models, data, plots, options), _beside(pictures, options.path))
+        write_whole(options.path, page(results, around, ablations))
+    text = [results_text(results), *(f"* {line}" for line in sentences(Figures(results)))]
+    return results_json(results), "\n".join([text[0], "", *text[1:]])
 
 
-def _draw_protocol(models: Models, corpus: ExpmapCorpus, shown: curves.Curves, plots: Path) -> None:
+def _measured(models: Models, corpus: ExpmapCorpus) -> Results:
+    total = len(curves.COUNTS) * (len(TEXT_FLOORS) + len(models))
+    with tqdm(total=total, unit=" systems", disable=None, leave=False) as bar:
+        return results_of(models, corpus, lambda name: bar.update())
+
+
+def _command(models: Models, data: Path, plots: Path | None, options: PageOptions) -> str:
+    """The command that writes the page."""
+    parents = {Path(name).parent for name in models}
+    runs = [path.parent.name for path in parents.pop().glob(f"*/{MANIFEST}")] if len(parents) == 1 else []
+    words = ["motet", "evaluate", *run_words(list(models), runs), "--data", str(data)]
+    places = {"--ablations": options.folder, "--plots": plots, "--page": options.path}
+    words += [word for option, path in places.items() if path is not None for word in (option, str(path))]
+    return shown(shlex.join(words))
+
+
+def _beside(pictures: Mapping[str, Path], path: Path) -> dict[str, str]:
+    """The pictures by title, as the page says where they are."""
+    return {title: Path(relpath(picture, path.parent)).as_posix() for title, picture in pictures.items()}
+
+
+def _draw(results: Results, plots: Path) -> dict[str, Path]:
+    """Draw; title -> file."""
     from motet_train.evaluate.figures import save
     from motet_train.evaluate.predict.plots import error_over_time, strips_drawing
 
-    many = shown[curves.MANY]
-    errors = {action: {name: many[name][action] for name in many} for action in many[curves.ZERO]}
-    drawings = {"predict-error": partial(error_over_time, errors, corpus.layout.fps / STRIDE, "Euler error")}
+    many, corpus = results.means[curves.MANY], results.corpus
+    errors = {action: {name: many[name][action] for name in many} for action in (*results.actions, curves.MEAN)}
+    drawings = {ERRORS: partial(error_over_time, errors, corpus.layout.fps / STRIDE, "Euler error")}
+    titles = {ERRORS: "Error over time"}
     if corpus.layout is CMU_LAYOUT:  # of Human3.6M's figure there are no bones
         skeleton = skeleton_of(read_motion(CMU_FOLDER / BONES))
         for action in (action for action in DRAWN if action in corpus.test):
-            drawn = strips.strips(models, corpus, action, skeleton)
-            drawings[f"predict-{action}"] = partial(strips_drawing, drawn, skeleton, strips.GIVEN)
-    save(drawings, plots)
-
-
-def _mocap(models: Models, data: Path, plots: Path | None) -> Result:
-    first, groups = next(iter(models.values())), seed_groups(models)
-    trials = mocap.held_out(first, Store.open(data))
-    found = mocap.distances(models, list(trials.values()))
-    shown, apart = pooled(found, groups), pooled(found, groups, spread)
-    if plots is not None:
-        _draw_mocap(_drawn(models, groups), trials, shown, plots)
-    runs, means, spreads = (partial(mocap.to_json, distances) for distances in (found, shown, apart))
-    text = f"{mocap.distance_table(shown, first.fps)}\n\n{cost_table(models, groups)}"
-    return _ready(models, groups, runs, means, spreads), text
-
-
-def _draw_mocap(models: Models, trials: Mapping[str, Motion], shown: mocap.Distances, plots: Path) -> None:
-    from motet_train.evaluate.figures import save
-    from motet_train.evaluate.predict.plots import error_over_time, strips_drawing
-
-    first = next(iter(models.values()))
-    errors = {measure: {name: shown[name][measure] for name in shown} for measure in shown[curves.ZERO]}
-    drawings = {"predict-distance": partial(error_over_time, errors, first.fps, "cm")}
-    for name in list(trials)[:: max(1, len(trials) // STRIPS)]:
-        drawn = mocap.strips(models, trials[name], every=3)
-        drawings[f"predict-{name}"] = partial(strips_drawing, drawn, skeleton_of(trials[name]))
-    save(drawings, plots)
-
-
-def _drawn(models: Models, groups: Sequence[SeedGroup]) -> Models:
-    """The first run of each group: a mean of poses is none."""
-    return {group.runs[0]: models[group.runs[0]] for group in groups}
-
-
-Figures = Callable[[str], dict[str, Any]]
-
-
-def _ready(models: Models, groups: Sequence[SeedGroup], runs: Figures, means: Figures, spreads: Figures) -> Ready:
-    """The figures of each run and, under "zero_velocity", of the baseline.
-
-    Of several models also "grouped": title of each group of several runs -> their names as "runs", the figures of their
-    mean, and as "spread" the largest minus the smallest.
-    """
-    ready: Ready = {name: {**runs(name), "zero_velocity": runs(curves.ZERO)} for name in models}
-    if len(models) > 1:
-        ready["grouped"] = {
-            group.title: {"runs": list(group.runs), **means(group.title), "spread": spreads(group.title)}
-            for group in groups
-            if len(group.runs) > 1
-        }
-    return ready
+            poses = strips.strips(drawn(results.models, results.groups), corpus, action, skeleton)
+            drawings[f"predict-{action}"] = partial(strips_drawing, poses, skeleton, strips.GIVEN)
+            titles[f"predict-{action}"] = f"{action.capitalize()}: the truth, and what each predicts"
+    return dict(zip(titles.values(), save(drawings, plots), strict=True))

@@ -6,10 +6,9 @@ from typing import Any
 from motet.bundle.manifest import Manifest
 from motet.models.predict import PredictModel
 from motet_train.evaluate.predict.curves import COUNTS, MEAN, Curves
-from motet_train.evaluate.predict.protocol_table import error_row, frame_heads
+from motet_train.evaluate.predict.error_rows import ErrorRows
 from motet_train.evaluate.predict.published import FRAMES
 from motet_train.evaluate.predict.seed_groups import SeedGroup
-from motet_train.evaluate.tables import aligned
 
 MODEL = "convseq2seq"
 
@@ -29,12 +28,17 @@ def ablated(models: Mapping[str, PredictModel], groups: Sequence[SeedGroup]) -> 
     if len(ours) < 2:
         return {}
     first, *others = ours
-    given = _settings(models[first.runs[0]].manifest)
+    given = models[first.runs[0]].manifest
     said = {first.title: f"{first.title}, as it is"}
     for group in others:
-        words = _differing(given, _settings(models[group.runs[0]].manifest))
+        words = difference(given, models[group.runs[0]].manifest)
         said[group.title] = f"{words}{group.count}" if words else group.title
     return said
+
+
+def difference(first: Manifest, other: Manifest) -> str:
+    """How the second's settings differ from the first's, in words; "" where they do not."""
+    return _differing(_settings(first), _settings(other))
 
 
 def _settings(manifest: Manifest) -> dict[str, Any]:
@@ -55,10 +59,13 @@ def _said(name: str, value: Any) -> str:
     return WORDS.get((name, value), f"{name.replace('_', ' ')} {value}")
 
 
-def ablation_table(found: Curves, said: Mapping[str, str]) -> str:
+def ablation_table(found: Curves, said: Mapping[str, str], spreads: Curves | None = None) -> str:
     """The means of such rows as text, at the frames that papers report, on few windows and on many."""
-    rows = [*frame_heads(FRAMES)]
+    beside = spreads or {}
+    rows = ErrorRows(any(beside.values()), FRAMES)
     for kind, count in COUNTS.items():
-        rows.append((f"ablations, mean of the actions, {count} windows of each",))
-        rows += [error_row(words, found[kind][title][MEAN], FRAMES) for title, words in said.items()]
-    return aligned(rows)
+        rows.title(f"ablations, mean of the actions, {count} windows of each")
+        for title, words in said.items():
+            more = beside.get(kind, {}).get(title)
+            rows.add(words, found[kind][title][MEAN], None if more is None else more[MEAN])
+    return rows.text()

@@ -1,4 +1,4 @@
-"""The figures of the protocol: of each model and the zero-velocity baseline, for each action and on average."""
+"""The figures of the protocol: of each model and the floors, for each action and on average."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -15,9 +15,9 @@ from motet_train.evaluate.predict.protocol import (
     errors,
     predictions,
     rotation_errors,
-    zero_velocity,
 )
-from motet_train.evaluate.predict.seed_groups import SeedGroup, mean, pooled
+from motet_train.evaluate.predict.seed_groups import SeedGroup, mean, pooled, spread
+from motet_train.evaluate.predict.text_floors import text_floors
 
 COUNTS = {"windows_8": 8, "windows_256": 256}
 """Windows of each action: as many as papers take, and enough for a figure without much noise."""
@@ -26,7 +26,6 @@ FEW, MANY = COUNTS
 ROTATION = "rotation"
 """Of the many windows, not the Euler error but :func:`rotation_errors`."""
 
-ZERO = "zero velocity"
 MEAN = "mean"
 
 Curves = dict[str, dict[str, dict[str, Array]]]
@@ -36,7 +35,7 @@ Curves = dict[str, dict[str, dict[str, Array]]]
 def curves(
     models: Mapping[str, PredictModel], corpus: ExpmapCorpus, progress: Callable[[str], object] = lambda name: None
 ) -> Curves:
-    """The errors of all systems. The mean is that of the actions that are :func:`complete`.
+    """The errors of all systems, floors first. The mean is that of the actions that are :func:`complete`.
 
     progress: is told each system that has been measured, once for each of :data:`COUNTS`.
     DataError where there is no test file, or a model is not one of this corpus.
@@ -45,7 +44,7 @@ def curves(
         raise DataError("none of the test files was found")
     scaling = scaling_of(corpus.train)
     test = {action: list(files.values()) for action, files in corpus.test.items()}
-    systems: dict[str, Continuation] = {ZERO: zero_velocity}
+    systems = text_floors(corpus)
     systems |= {name: predictor(name, model, corpus) for name, model in models.items()}
     found: Curves = {FEW: {}, MANY: {}, ROTATION: {}}
     for name, system in systems.items():
@@ -82,6 +81,14 @@ def predictor(name: str, model: PredictModel, corpus: ExpmapCorpus) -> Continuat
 def by_group(found: Curves, groups: Sequence[SeedGroup], how: Callable[[Sequence[Array]], Array] = mean) -> Curves:
     """The same with groups in place of runs, see :func:`motet_train.evaluate.predict.seed_groups.pooled`."""
     return {kind: pooled(systems, groups, how) for kind, systems in found.items()}
+
+
+def spreads_of(found: Curves, groups: Sequence[SeedGroup]) -> Curves:
+    """The largest minus the smallest error of each group of several seeds, by its title."""
+    several = [group for group in groups if len(group.runs) > 1]
+    titles = {group.title for group in several}
+    everything = by_group(found, several, spread)
+    return {kind: {name: systems[name] for name in systems if name in titles} for kind, systems in everything.items()}
 
 
 def to_json(found: Curves, name: str) -> dict[str, dict[str, dict[str, float]]]:

@@ -1,20 +1,21 @@
 """Predictions of recorded motions: how far each joint is from where it really was, in trials that were held out."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
 from motet.models.predict import PredictModel
-from motet.motion.kinematics import positions, skeleton_of
+from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.representation import named
 from motet_train.data.errors import DataError
-from motet_train.data.store import Store
-from motet_train.evaluate.predict.curves import ZERO
+from motet_train.data.store import Entry, Store
+from motet_train.evaluate.predict import mocap_floors
+from motet_train.evaluate.predict.mocap_floors import Decays, Windows, apart, places
 from motet_train.evaluate.predict.protocol import REPORTED
-from motet_train.evaluate.predict.protocol_table import error_row, frame_heads
-from motet_train.evaluate.tables import Report, aligned
+from motet_train.evaluate.tables import Report
 
 Distances = dict[str, dict[str, Array]]
 """System -> measure -> mean distance (N,) in centimetres at each predicted frame."""
@@ -23,47 +24,74 @@ PLACE, POSE = "place_cm", "pose_cm"
 """Of joints in the world, and of joints relative to the root's place."""
 
 
-def held_out(model: PredictModel, store: Store) -> dict[str, Motion]:
-    """By name the motions of a store that the model did not see in training; DataError where none of them is there."""
-    test = set(model.manifest.training.get("data", {}).get("test", ()))
-    found = {entry.name: number for number, entry in enumerate(store.records) if entry.name in test}
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """The distances of all systems in each window, floors first, and the window's recording by name.
+
+    distances: system -> measure -> (W, N) in centimetres. seeds: the frames given, of each window.
+    """
+
+    names: tuple[str, ...]
+    distances: Mapping[str, Mapping[str, Array]]
+    seeds: tuple[Motion, ...]
+
+    def mean(self, among: Collection[str] | None = None) -> Distances:
+        """The mean over all windows, or over those of some recordings; DataError where these have none."""
+        picked = self.windows(among)
+        if not len(picked):
+            raise DataError("these recordings have no window")
+        return {
+            name: {measure: values[picked].mean(axis=0) for measure, values in measures.items()}
+            for name, measures in self.distances.items()
+        }
+
+    def windows(self, among: Collection[str] | None = None) -> Array:
+        """The numbers of the windows of some recordings, or of all."""
+        return np.array([n for n, name in enumerate(self.names) if among is None or name in among], dtype=np.intp)
+
+
+def held_out(models: Mapping[str, PredictModel], store: Store) -> dict[Entry, Motion]:
+    """The records of a store that all models held out, and their motions; DataError where none of them is there."""
+    tests = [set(model.manifest.training.get("data", {}).get("test", ())) for model in models.values()]
+    test = set.intersection(*tests)
+    found = {entry: number for number, entry in enumerate(store.records) if entry.name in test}
     if not found:
         raise DataError("none of the trials held out in training was found")
     playable = named(store.representation).motion
-    return {name: playable(store.motion(number)) for name, number in found.items()}
+    return {entry: playable(store.motion(number)) for entry, number in found.items()}
 
 
-def distances(models: Mapping[str, PredictModel], motions: Sequence[Motion]) -> Distances:
-    """The mean over windows that begin every ``horizon`` frames, of all systems, zero velocity first.
+def chosen_decays(models: Mapping[str, PredictModel], store: Store) -> Decays:
+    """The decays of damped velocity, from the motions that no model holds out for its test."""
+    first = next(iter(models.values()))
+    test = {name for model in models.values() for name in model.manifest.training.get("data", {}).get("test", ())}
+    return mocap_floors.chosen(store, sorted(test), first.fps, first.horizon)
+
+
+def measured(models: Mapping[str, PredictModel], motions: Mapping[str, Motion], decays: Decays) -> Measured:
+    """All systems in the windows that begin every ``horizon`` frames, floors first.
 
     Models must have the same frame rate, seed and horizon; DataError where the motions are too short.
     """
     first = next(iter(models.values()))
-    found: dict[str, list[tuple[Array, Array]]] = {ZERO: [], **{name: [] for name in models}}
-    for motion in motions:
-        whole = motion.resample(first.fps, to_end=True)
-        for start in range(0, len(whole) - first.seed_frames - first.horizon + 1, first.horizon):
-            seed = whole[start : start + first.seed_frames]
-            truth = _places(whole[start + first.seed_frames :][: first.horizon])
-            found[ZERO].append(_distance(_places(seed)[-1:], truth))
-            for name, model in models.items():
-                found[name].append(_distance(_places(model.predict(seed, frames=first.horizon)), truth))
-    if not found[ZERO]:
-        raise DataError(f"the motions are shorter than {first.seed_frames + first.horizon} frames at the model's rate")
-    means = {name: np.mean(windows, axis=0) for name, windows in found.items()}
-    return {name: {PLACE: mean[0], POSE: mean[1]} for name, mean in means.items()}
-
-
-def _places(motion: Motion) -> Array:
-    """Positions (T, J, 3) in centimetres."""
-    return positions(motion) * skeleton_of(motion).unit_factor(0.01)
-
-
-def _distance(found: Array, truth: Array) -> tuple[Array, Array]:
-    """Mean distances (T,) of joints in the world and relative to the root."""
-    relative = (found - found[:, :1]) - (truth - truth[:, :1])
-    world: Array = np.linalg.norm(found - truth, axis=-1).mean(axis=-1)
-    return world, np.linalg.norm(relative, axis=-1).mean(axis=-1)
+    given, horizon = first.seed_frames, first.horizon
+    whole = {name: motion.resample(first.fps, to_end=True) for name, motion in motions.items()}
+    cut = [
+        (name, motion[start : start + given + horizon])
+        for name, motion in whole.items()
+        for start in range(0, len(motion) - given - horizon + 1, horizon)
+    ]
+    if not cut:
+        raise DataError(f"the motions are shorter than {given + horizon} frames at the model's rate")
+    windows, seeds = Windows.of([window for _, window in cut], horizon), [window[:given] for _, window in cut]
+    found = mocap_floors.floors(windows, decays)
+    for name, model in models.items():
+        found[name] = np.stack([places(one) for one in model.predict(seeds, frames=horizon)])
+    distances = {
+        name: dict(zip((PLACE, POSE), apart(predicted, windows.truth), strict=True))
+        for name, predicted in found.items()
+    }
+    return Measured(tuple(name for name, _ in cut), distances, tuple(seeds))
 
 
 def strips(models: Mapping[str, PredictModel], motion: Motion, every: int) -> dict[str, Array]:
@@ -83,14 +111,6 @@ def strips(models: Mapping[str, PredictModel], motion: Motion, every: int) -> di
 def _in_place(points: Array) -> Array:
     result: Array = points - points[:, :1] * [1, 0, 1]
     return result
-
-
-def distance_table(found: Distances, fps: float) -> str:
-    """The distances as text, one block for each measure."""
-    rows = [*frame_heads(), ("milliseconds", *(f"{(frame + 1) / fps * 1000:.0f}" for frame in REPORTED))]
-    for measure, title in ((PLACE, "joints in the world, cm"), (POSE, "joints relative to the root, cm")):
-        rows += [(title,), *(error_row(name, values[measure], digits=1) for name, values in found.items())]
-    return aligned(rows)
 
 
 def to_json(found: Distances, name: str) -> Report:

@@ -73,7 +73,11 @@ def windows(motion: Array, count: int = 8) -> Array:
 
 def window_errors(predicted: Array, truth: Array) -> Array:
     """Euler error (W, 25) of predicted frames (W, 25, C) against whole windows (W, 75, C)."""
-    angles = euler_frames(truth)
+    return euler_errors(predicted, euler_frames(truth))
+
+
+def euler_errors(predicted: Array, angles: Array) -> Array:
+    """As :func:`window_errors`, against windows (W, 75, C) whose frames are Euler angles, :func:`euler_frames`."""
     counted = angles.std(axis=1, keepdims=True) > CONSTANT
     difference = np.where(counted, euler_frames(predicted) - angles[:, SEED_FRAMES:], 0.0)
     error: Array = np.linalg.norm(difference, axis=-1)
@@ -116,5 +120,5 @@ def errors(found: Predictions, measure: Callable[[Array, Array], Array] = window
 
 
 def zero_velocity(seed: Array) -> Array:
-    """The last seed frame, held: the baseline (W, 25, C) that every learned predictor has to beat."""
+    """The last seed frame, held (W, 25, C): the floor that papers have."""
     return np.repeat(seed[:, -1:], OUTPUT_FRAMES, axis=1)

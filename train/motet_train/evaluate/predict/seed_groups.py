@@ -101,3 +101,8 @@ def pooled(
         parts = errors[group.runs[0]]
         found[group.title] = {part: how([errors[name][part] for name in group.runs]) for part in parts}
     return found
+
+
+def drawn(models: Mapping[str, PredictModel], groups: Sequence[SeedGroup]) -> dict[str, PredictModel]:
+    """The first run of each group: a mean of poses is none."""
+    return {group.runs[0]: models[group.runs[0]] for group in groups}
