@@ -105,11 +105,11 @@ def euler_of(rotations: Array, joint: Joint) -> Array:
 
 def _eulers_of(joints: Sequence[tuple[Array, Joint]], order: str) -> Array:
     """As :func:`euler_of` for joints of one order of angles, each with its rotations: (T, J, 3)."""
-    plain = [
-        product(product(inverse(joint.frame), rotations), joint.frame) if any(joint.axis) else rotations
-        for rotations, joint in joints
-    ]
-    angles = rotmats_to_euler(np.stack(plain, axis=1), order)
+    plain = frames_last((len(joints[0][0]), len(joints), 3, 3))
+    for place, (rotations, joint) in enumerate(joints):
+        turned = any(joint.axis)
+        plain[:, place] = product(product(inverse(joint.frame), rotations), joint.frame) if turned else rotations
+    angles = rotmats_to_euler(plain, order)
     found: Array = angles[..., [order.index(axis) for axis in AXES]]
     return found
 
