@@ -77,9 +77,10 @@ def test_within_the_horizon_a_writer_changes_nothing_and_at_first_little(walk: M
     alone = predictor().predict(walk, frames=25)
     np.testing.assert_array_equal(predictor().predict(walk, frames=25, beyond=writer()).values, alone.values)
     longer = predictor().predict([walk], frames=40, beyond=writer())[0]
-    off = np.linalg.norm(metres(longer)[:15] - metres(alone)[:15], axis=-1)
-    assert off[:, 0].max() < 0.05  # the root is the predictor's but for its height, the feet are held
-    assert off.mean() < 0.05
+    off = metres(longer)[:15] - metres(alone)[:15]
+    assert np.abs(off[:, 0, [0, 2]]).max() < 0.002  # the root is the predictor's but for its height, the feet are held
+    assert np.linalg.norm(off[:, 0], axis=-1).max() < 0.03
+    assert np.linalg.norm(off, axis=-1).mean() < 0.02
 
 
 def test_samples_differ_and_each_is_what_its_seed_gives_alone(walk: Motion) -> None:

@@ -18,12 +18,11 @@ from motet.representation.placed import (
     placed_by_way,
     pose_of,
     put_at,
-    rotmat_to_sixd,
     seen_from,
     straight,
     unplaced,
 )
-from motet.representation.root_sixd import sixd_to_rotmat
+from motet.representation.root_sixd import rotmat_to_sixd, sixd_to_rotmat
 
 
 def dancer(frames: int = 40, seed: int = 0) -> Motion:

@@ -22,6 +22,8 @@ from motet.motion.rotations import Array
 from motet.motion.springs import damped, damping_of
 from motet.representation.contract import MotionContract
 from motet.representation.foreign import carried_back
+from motet.representation.root_block import last_place
+from motet.representation.root_sixd import facing, in_world
 
 LOOKED_AT = 2.0
 """Seconds of a motion's end whose pace is kept."""
@@ -48,7 +50,8 @@ class Follower:
 
     writer: the model whose codes go on. own: the motion at the writer's frame rate; figure: the same on the writer's
     figure. given, predicted: (T, D) frames of its last seconds and (P, D) of what was predicted of what follows, in the
-    writer's units, together whole steps of codes. pace: to be kept.
+    writer's units, together whole steps of codes. pace: to be kept. pose: x, z and facing (3,) at the motion's end, the
+    facing as it is with what was predicted: it is smoothed over time, and alone it would lead another way.
     """
 
     writer: CodesModel
@@ -57,6 +60,7 @@ class Follower:
     given: Array
     predicted: Array
     pace: Pace
+    pose: Array
 
     @staticmethod
     def of(writer: CodesModel, motion: Motion, predicted: float = 0.0) -> "Follower":
@@ -72,12 +76,15 @@ class Follower:
             raise MotionError(f"a motion of {len(whole)} frames, so many of them predicted, is too short to go on with")
         pace = Pace.of(frames[max(0, end - round(LOOKED_AT * writer.fps)) : end, :RATES], writer.fps)
         own = len(whole) - len(frames) + end
-        return Follower(writer, whole[:own], figure[:own], frames[:end], frames[end:], pace)
+        place = last_place(figure[:own])
+        pose = np.array([place[0], place[2], facing(figure)[own - 1]])
+        return Follower(writer, whole[:own], figure[:own], frames[:end], frames[end:], pace, pose)
 
     def follow(self, count: int, seed: int) -> tuple[Motion, Motion]:
-        """So many frames that follow, the same for the same seed, and the motion before them: :func:`carried_on`."""
+        """So many frames that follow, the same for the same seed, and the motion before them: :func:`brought_back`."""
         frames = np.concatenate([self.predicted, self.drawn(count - len(self.predicted), seed)])
-        return carried_on(self.writer.contract, self.held(frames), self.own, self.figure)
+        following, _ = in_world(self.writer.contract.features(self.held(frames)), self.figure, self.pose)
+        return brought_back(following, self.own, self.figure)
 
     def drawn(self, count: int, seed: int) -> Array:
         """Frames (count, D) after those predicted, in the writer's units, joined without a leap."""
@@ -196,10 +203,14 @@ def paced(frames: Array, pace: Pace, fps: float) -> Array:
 def carried_on(contract: MotionContract, frames: ArrayLike, own: Motion, figure: Motion) -> tuple[Motion, Motion]:
     """Frames (T, D) that follow a motion as a motion, and that motion as it is to be put before them.
 
-    own: the motion at the contract's frame rate. figure: the same on the contract's figure, on which both are where the
-    frames cannot be brought to the motion's own.
+    own: the motion at the contract's frame rate. figure: the same on the contract's figure.
     """
-    following = contract.motion(frames, after=figure, plant=False)
+    return brought_back(contract.motion(frames, after=figure, plant=False), own, figure)
+
+
+def brought_back(following: Motion, own: Motion, figure: Motion) -> tuple[Motion, Motion]:
+    """What follows on the contract's figure, and the motion before it: both the motion's own, or where that is not
+    possible on that figure. Arguments as :func:`carried_on`."""
     if figure is not own and (back := carried_back(following, figure, own)) is not None:
         return back, own
     return following, figure

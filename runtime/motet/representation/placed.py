@@ -16,7 +16,7 @@ from motet.motion.products import inverse, product
 from motet.motion.rotations import Array, rotmat_to_rotvec, rotvec_to_rotmat
 from motet.motion.sides import partners_of
 from motet.representation.base import FrameMirror
-from motet.representation.root_sixd import KINDS, ROOT_SIXD, SIGNS, sixd_to_rotmat
+from motet.representation.root_sixd import KINDS, ROOT_SIXD, SIGNS, rotmat_to_sixd, sixd_to_rotmat
 
 PLACE = 3
 """Channels of the root's place, before all axes."""
@@ -133,12 +133,6 @@ def mirror() -> FrameMirror:
         own, other = (np.arange(len(KINDS)) + PLACE + len(KINDS) * one for one in (bone, partner))
         columns[own], signs[own] = other, SIGNS
     return FrameMirror(columns, signs)
-
-
-def rotmat_to_sixd(matrices: Array) -> Array:
-    """Matrices (..., 3, 3) to two axes (..., 6): :func:`motet.representation.root_sixd.sixd_to_rotmat` undone."""
-    axes: Array = np.swapaxes(matrices[..., :2], -1, -2)
-    return axes.reshape(*matrices.shape[:-2], 6)
 
 
 def _rotations(frames: Array) -> Array:

@@ -111,7 +111,7 @@ def to_sixd(motion: Motion) -> Motion:
     angles = facing(motion)
     rotations[:, 0] = product(axis_to_rotmat("y", -angles), rotations[:, 0])
     places = motion.select(tuple(f"{skeleton.names[0]}.t{axis}" for axis in AXES), ("m",) * 3).values
-    axes = np.swapaxes(rotations[..., :2], 2, 3).reshape(len(motion), -1)
+    axes = rotmat_to_sixd(rotations).reshape(len(motion), -1)
     values = np.column_stack([ground_velocities(places, angles, motion.fps), places[:, 1], axes])
     names = tuple(f"{skeleton.names[joint]}.{kind}" for joint in joints for kind in KINDS)
     return replace(motion, values=values, channels=ROOT_SIXD + names, units=ROOT_SIXD_UNITS + ("1",) * len(names))
@@ -151,3 +151,9 @@ def sixd_to_rotmat(sixd: Array) -> Array:
     y = y - (x * y).sum(axis=-1, keepdims=True) * x
     y = y / np.maximum(np.linalg.norm(y, axis=-1, keepdims=True), 1e-9)
     return np.stack([x, y, np.cross(x, y)], axis=-1)
+
+
+def rotmat_to_sixd(matrices: Array) -> Array:
+    """Matrices (..., 3, 3) to two axes (..., 6): :func:`sixd_to_rotmat` undone."""
+    axes: Array = np.swapaxes(matrices[..., :2], -1, -2)
+    return axes.reshape(*matrices.shape[:-2], 6)
