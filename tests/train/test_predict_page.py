@@ -18,7 +18,7 @@ from motet_train.evaluate.predict.ablations import ablated, ablation_table
 from motet_train.evaluate.predict.commands import run_words, shown, training_commands
 from motet_train.evaluate.predict.curves import FEW, MANY, MEAN, ROTATION, Curves
 from motet_train.evaluate.predict.floors import CONSTANT, DAMPED, ZERO
-from motet_train.evaluate.predict.page import SYSTEMS, Surroundings, page, sentences
+from motet_train.evaluate.predict.page import Surroundings, page, sentences
 from motet_train.evaluate.predict.protocol import REPORTED
 from motet_train.evaluate.predict.protocol_table import means_table
 from motet_train.evaluate.predict.published import FRAMES
@@ -28,7 +28,6 @@ from motet_train.evaluate.predict.sentences import Figures, beside_floors, besid
 from motet_train.evaluate.predict.text_floors import TEXT_FLOORS
 from motet_train.evaluate.predict.training_sentences import training_sentences
 from motet_train.evaluate.predict.words import at, listed
-from motet_train.recipes.systems import TITLES
 
 CORPUS = ExpmapCorpus(CMU_LAYOUT, {}, {action: {} for action in FIVE}, ("train/washwindow/washwindow_1.txt",))
 KINDS = (FEW, MANY, ROTATION)
@@ -295,7 +294,6 @@ def test_the_page_has_all_its_parts_and_its_pictures() -> None:
     for sentence in (*sentences(Figures(found)), *training_sentences(Figures(found))):
         assert f"* {sentence}" in joined
     assert max(len(row) for row in text.split("```")[::2] for row in row.splitlines()) <= 120
-    assert {name: words for name, words in SYSTEMS.items() if name != "trajectory"} == dict(TITLES)
 
 
 def test_the_page_is_written_by_a_command(tmp_path: Path) -> None:

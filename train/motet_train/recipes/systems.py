@@ -63,16 +63,6 @@ RECIPES: Mapping[str, Mapping[str, Recipe]] = {
 }
 """Model -> name of a preset -> recipe."""
 
-TITLES = {
-    "convseq2seq": "the convolutional sequence-to-sequence model (Li et al. 2018)",
-    "rrnn": "the residual recurrent net (Martinez et al. 2017)",
-    "erd": "the encoder-recurrent-decoder (Fragkiadaki et al. 2015)",
-    "lstm-3lr": "three LSTMs between linear maps (Fragkiadaki et al. 2015)",
-    "srnn": "the structural RNN (Jain et al. 2016)",
-    "lstm-ae": "the LSTMs with a denoising autoencoder (Ghosh et al. 2017)",
-}
-"""Model -> how help calls it."""
-
 
 def sized(recipe: Recipe, material: Material) -> Any:
     """The system's configuration for the material; DataError where it needs columns that are not known."""

@@ -14,6 +14,7 @@ from motet_train.evaluate.predict.results import Results
 from motet_train.evaluate.predict.sentences import Figures, beside_floors, beside_goals, beside_papers, smallest
 from motet_train.evaluate.predict.training_sentences import training_sentences
 from motet_train.evaluate.predict.words import listed
+from motet_train.models.predict.systems import TITLES
 
 CORPORA = {"cmu-expmap": "CMU's motions", "h36m-expmap": "Human3.6M"}
 
@@ -22,15 +23,7 @@ Predictors on {corpus}, beside the rows that papers published, and beside floors
 is that of [predict.md](predict.md): fifty frames in, 25 out, Euler error. This page was written by the last of these
 commands; its tables and the sentences under them are computed from what was measured."""
 
-SYSTEMS = {
-    "trajectory": "motet's own predictor",
-    "convseq2seq": "the convolutional sequence-to-sequence model (Li et al. 2018)",
-    "rrnn": "the residual recurrent net (Martinez et al. 2017)",
-    "erd": "the encoder-recurrent-decoder (Fragkiadaki et al. 2015)",
-    "lstm-3lr": "three LSTMs between linear maps (Fragkiadaki et al. 2015)",
-    "srnn": "the structural RNN (Jain et al. 2016)",
-    "lstm-ae": "the LSTMs with a denoising autoencoder (Ghosh et al. 2017)",
-}
+SYSTEMS = {"trajectory": "motet's own predictor", **TITLES}
 """Model -> what it is."""
 
 READING = """\

@@ -17,6 +17,16 @@ SYSTEMS: Mapping[str, tuple[type[Any], type[Any]]] = {
 }
 """Name -> the system and its configuration, a dataclass."""
 
+TITLES = {
+    "convseq2seq": "the convolutional sequence-to-sequence model (Li et al. 2018)",
+    "rrnn": "the residual recurrent net (Martinez et al. 2017)",
+    "erd": "the encoder-recurrent-decoder (Fragkiadaki et al. 2015)",
+    "lstm-3lr": "three LSTMs between linear maps (Fragkiadaki et al. 2015)",
+    "srnn": "the structural RNN (Jain et al. 2016)",
+    "lstm-ae": "the LSTMs with a denoising autoencoder (Ghosh et al. 2017)",
+}
+"""Model -> how help calls it."""
+
 
 def stepwise(name: str, config: Mapping[str, Any]) -> Stepwise:
     """The net of a configuration as it stands in a manifest."""
