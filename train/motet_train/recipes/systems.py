@@ -56,10 +56,10 @@ RECIPES: Mapping[str, Mapping[str, Recipe]] = {
         "code": _recipe("convseq2seq", convseq2seq.Config(0, dropout=(0.2, 0.2, 0.5), own=0.95), CODE),
     },
     "rrnn": {"default": _recipe("rrnn", rrnn.Config(0), RESIDUAL)},
-    "erd": {"default": _recipe("erd", lstm_3lr.ERDConfig(0), replace(TAUGHT, steps=1100))},
-    "lstm-3lr": {"default": _recipe("lstm-3lr", lstm_3lr.Config(0), replace(TAUGHT, steps=800))},
+    "erd": {"default": _recipe("erd", lstm_3lr.ERDConfig(0), replace(TAUGHT, steps=900))},
+    "lstm-3lr": {"default": _recipe("lstm-3lr", lstm_3lr.Config(0), replace(TAUGHT, steps=700))},
     "srnn": {"default": _recipe("srnn", srnn.Config(0, ()), replace(TAUGHT, steps=650, learning_rate=3e-3))},
-    "lstm-ae": {"default": _recipe("lstm-ae", lstm_ae.Config(0), replace(TAUGHT, steps=750))},
+    "lstm-ae": {"default": _recipe("lstm-ae", lstm_ae.Config(0), replace(TAUGHT, steps=600))},
 }
 """Model -> name of a preset -> recipe."""
 
