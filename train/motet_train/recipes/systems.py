@@ -23,7 +23,7 @@ from motet_train.recipes.recipe import AUGMENTED, Job, Recipe
 from motet_train.runs import Run
 from motet_train.trainer import Part
 
-VALIDATION_WINDOWS = 32
+VALIDATION_WINDOWS = 8
 """Of each validation sequence, evenly spaced."""
 
 CODE = Training(steps=20_000, every=500, learning_rate=5e-5, decay=(0.99, 10_000), l2=0.0005, adversary=0.01)
@@ -59,7 +59,7 @@ RECIPES: Mapping[str, Mapping[str, Recipe]] = {
     "erd": {"default": _recipe("erd", lstm_3lr.ERDConfig(0), replace(TAUGHT, steps=900))},
     "lstm-3lr": {"default": _recipe("lstm-3lr", lstm_3lr.Config(0), replace(TAUGHT, steps=700))},
     "srnn": {"default": _recipe("srnn", srnn.Config(0, ()), replace(TAUGHT, steps=650, learning_rate=3e-3))},
-    "lstm-ae": {"default": _recipe("lstm-ae", lstm_ae.Config(0), replace(TAUGHT, steps=600))},
+    "lstm-ae": {"default": _recipe("lstm-ae", lstm_ae.Config(0), replace(TAUGHT, steps=450))},
 }
 """Model -> name of a preset -> recipe."""
 
