@@ -59,7 +59,7 @@ RECIPES: Mapping[str, Mapping[str, Recipe]] = {
     "erd": {"default": _recipe("erd", lstm_3lr.ERDConfig(0), replace(TAUGHT, steps=900))},
     "lstm-3lr": {"default": _recipe("lstm-3lr", lstm_3lr.Config(0), replace(TAUGHT, steps=700))},
     "srnn": {"default": _recipe("srnn", srnn.Config(0, ()), replace(TAUGHT, steps=650, learning_rate=3e-3))},
-    "lstm-ae": {"default": _recipe("lstm-ae", lstm_ae.Config(0), replace(TAUGHT, steps=450))},
+    "lstm-ae": {"default": _recipe("lstm-ae", lstm_ae.Config(0), replace(TAUGHT, steps=750))},
 }
 """Model -> name of a preset -> recipe."""
 
