@@ -19,7 +19,8 @@ def training_commands(results: Results) -> list[str]:
         trainings = [results.models[run].manifest.training for run in group.runs]
         seeds = [str(training["seed"]) for training in trainings[1:] if "seed" in training]
         if command := str(trainings[0].get("command", "")):
-            lines.append(shown(command, f"seeds {', '.join(seeds)} too" if seeds else ""))
+            more = f"seed{'s' if len(seeds) > 1 else ''} {', '.join(seeds)} too"
+            lines.append(shown(command, more if seeds else ""))
     return lines
 
 
