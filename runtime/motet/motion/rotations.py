@@ -186,7 +186,8 @@ def rotmat_to_rotvec(matrix: Array) -> Array:
     """Matrices (..., 3, 3) to rotation vectors (..., 3) of at most half a turn."""
     quat = rotmat_to_quat(matrix)
     sin_half = np.linalg.norm(quat[..., :3], axis=-1, keepdims=True)
-    half = np.arctan2(sin_half, quat[..., 3:])
+    # old numpy takes a strided array that ends beside the result's memory for one with it, and rounds otherwise
+    half = np.arctan2(sin_half, np.ascontiguousarray(quat[..., 3:]))
     scale = np.where(sin_half > 1e-12, 2 * half / np.where(sin_half > 1e-12, sin_half, 1.0), 2.0)
     vector: Array = quat[..., :3] * scale
     return vector

@@ -31,5 +31,5 @@ def twist(rotations: Array, axis: Array) -> Array:
     if length == 0.0:
         return np.broadcast_to(np.eye(3), rotations.shape)
     quats, along = rotmat_to_quat(rotations), axis / length
-    angles = 2 * np.arctan2(quats[..., :3] @ along, quats[..., 3])
+    angles = 2 * np.arctan2(quats[..., :3] @ along, np.ascontiguousarray(quats[..., 3]))
     return rotvec_to_rotmat(angles[..., None] * along)
