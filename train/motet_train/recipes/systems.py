@@ -40,8 +40,8 @@ RESIDUAL = Training(steps=3000, every=250, falling=0.5, clip=5.0, average=AVERAG
 """Clipped as in Martinez et al. 2017; after 1,500 steps Adam is off by .62 on held-out files, and their SGD by .88."""
 
 TAUGHT = Training(every=100, falling=0.5, clip=25.0, average=AVERAGE)
-"""Of nets that are taught the next frame: the clipping is that of Jain et al. 2016, who took SGD and more steps. Each
-trains for about as long as the convolutional one."""
+"""Of nets that are taught the next frame: the clipping is that of Jain et al. 2016, who took SGD and more steps. How
+many each takes here is set by time, not by an error."""
 
 
 def _recipe(model: str, config: Any, training: Training) -> Recipe:

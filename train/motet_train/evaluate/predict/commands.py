@@ -19,8 +19,8 @@ def training_commands(results: Results) -> list[str]:
         trainings = [results.models[run].manifest.training for run in group.runs]
         seeds = [str(training["seed"]) for training in trainings[1:] if "seed" in training]
         if command := str(trainings[0].get("command", "")):
-            more = f"seed{'s' if len(seeds) > 1 else ''} {', '.join(seeds)} too"
-            lines.append(shown(command, more if seeds else ""))
+            many = "s" if len(seeds) > 1 else ""
+            lines.append(shown(command, f"seed{many} {', '.join(seeds)} too" if seeds else ""))
     return lines
 
 
