@@ -4,13 +4,13 @@ import numpy as np
 
 from motet.motion.kinematics import AXES, euler_of, local_rotations, skeleton_of, with_channels
 from motet.motion.motion import TURN, Motion
-from motet.motion.rotations import Array, axis_to_rotmat
+from motet.motion.rotations import Array, angle_of, axis_to_rotmat
 
 
 def heading(motion: Motion) -> Array:
     """Angle (T,) in radians about the vertical y axis that the root faces, unwrapped over time; 0 is along z."""
     forward = local_rotations(motion, [0])[:, 0, :, 2]
-    return np.unwrap(np.arctan2(*np.ascontiguousarray(forward.T[[0, 2]])))
+    return np.unwrap(angle_of(forward[:, 0], forward[:, 2]))
 
 
 def without_heading(motion: Motion) -> Motion:

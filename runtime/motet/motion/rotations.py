@@ -25,6 +25,15 @@ def frames_last(shape: tuple[int, ...]) -> Array:
     return np.empty(shape[::-1]).T
 
 
+def angle_of(sine: Array, cosine: Array) -> Array:
+    """``np.arctan2``, rounded alike wherever the arrays lie in memory.
+
+    Old numpy takes a strided array that ends beside the result's memory for one with it, and rounds otherwise.
+    """
+    found: Array = np.arctan2(np.array(sine, order="K"), np.array(cosine, order="K"))
+    return found
+
+
 def axis_to_rotmat(axis: str, angle: Array) -> Array:
     """Rotation matrices (..., 3, 3) about one coordinate axis ("x", "y" or "z") by ``angle`` (...)."""
     i = _AXES[axis]
@@ -64,12 +73,12 @@ def rotmat_to_euler(matrix: Array, order: str) -> Array:
     sign = _handedness(order)
     cos_middle = np.sqrt(matrix[..., i, i] ** 2 + matrix[..., i, j] ** 2)
     angles = frames_last((*matrix.shape[:-2], 3))
-    angles[..., 0] = np.arctan2(-sign * matrix[..., j, k], matrix[..., k, k])
-    angles[..., 1] = np.arctan2(sign * matrix[..., i, k], cos_middle)
-    angles[..., 2] = np.arctan2(-sign * matrix[..., i, j], matrix[..., i, i])
+    angles[..., 0] = angle_of(-sign * matrix[..., j, k], matrix[..., k, k])
+    angles[..., 1] = angle_of(sign * matrix[..., i, k], cos_middle)
+    angles[..., 2] = angle_of(-sign * matrix[..., i, j], matrix[..., i, i])
     locked = cos_middle < LOCKED
     if locked.any():
-        angles[locked, 0] = np.arctan2(sign * matrix[locked, k, j], matrix[locked, j, j])
+        angles[locked, 0] = angle_of(sign * matrix[locked, k, j], matrix[locked, j, j])
         angles[locked, 2] = 0.0
     return angles
 
@@ -186,8 +195,7 @@ def rotmat_to_rotvec(matrix: Array) -> Array:
     """Matrices (..., 3, 3) to rotation vectors (..., 3) of at most half a turn."""
     quat = rotmat_to_quat(matrix)
     sin_half = np.linalg.norm(quat[..., :3], axis=-1, keepdims=True)
-    # old numpy takes a strided array that ends beside the result's memory for one with it, and rounds otherwise
-    half = np.arctan2(sin_half, np.ascontiguousarray(quat[..., 3:]))
+    half = angle_of(sin_half, quat[..., 3:])
     scale = np.where(sin_half > 1e-12, 2 * half / np.where(sin_half > 1e-12, sin_half, 1.0), 2.0)
     vector: Array = quat[..., :3] * scale
     return vector

@@ -3,7 +3,7 @@
 import numpy as np
 
 from motet.motion.products import inverse, product
-from motet.motion.rotations import Array, rotmat_to_quat, rotmat_to_rotvec, rotvec_to_rotmat
+from motet.motion.rotations import Array, angle_of, rotmat_to_quat, rotmat_to_rotvec, rotvec_to_rotmat
 
 
 def spread(chain: Array, count: int) -> Array:
@@ -31,5 +31,5 @@ def twist(rotations: Array, axis: Array) -> Array:
     if length == 0.0:
         return np.broadcast_to(np.eye(3), rotations.shape)
     quats, along = rotmat_to_quat(rotations), axis / length
-    angles = 2 * np.arctan2(quats[..., :3] @ along, np.ascontiguousarray(quats[..., 3]))
+    angles = 2 * angle_of(quats[..., :3] @ along, quats[..., 3])
     return rotvec_to_rotmat(angles[..., None] * along)
