@@ -41,8 +41,8 @@ RESIDUAL = Training(steps=3000, every=250, falling=0.5, clip=5.0, average=AVERAG
 
 TAUGHT = Training(every=100, falling=0.5, clip=25.0, average=AVERAGE)
 """Of nets that are taught the next frame: the clipping is that of Jain et al. 2016, who took SGD and more steps. How
-many each takes here was set by time; twice as many make the error on held-out files smaller by seven per cent at most,
-see docs/predict.md."""
+many each takes here was set by time; with twice as many, which three of them were tried with, the error on held-out
+files is smaller by seven per cent at most, see docs/predict.md."""
 
 
 def _recipe(model: str, config: Any, training: Training) -> Recipe:
