@@ -26,7 +26,7 @@ def frames_last(shape: tuple[int, ...]) -> Array:
 
 
 def angle_of(sine: Array, cosine: Array) -> Array:
-    """``np.arctan2``, rounded alike wherever the arrays lie in memory.
+    """Angles (...) in radians of sines and cosines (...): ``np.arctan2``, rounded alike wherever these lie in memory.
 
     Old numpy takes a strided array that ends beside the result's memory for one with it, and rounds otherwise.
     """
