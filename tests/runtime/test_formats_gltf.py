@@ -1,4 +1,5 @@
 import json
+import os
 import struct
 from io import BytesIO
 from pathlib import Path
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 
 from motet.errors import FormatError, MotionError
-from motet.formats import glb, gltf, read_motion, vrma
+from motet.formats import glb, gltf, gltf_data, read_motion, vrma
 from motet.motion.humanoid import BONES, HUMANOID, REST
 from motet.motion.kinematics import global_transforms, positions, skeleton_of
 from motet.motion.mixamo import MIXAMO
@@ -207,11 +208,77 @@ def test_a_file_object_is_read_and_its_buffer_must_be_in_it(tmp_path: Path) -> N
     content = (tmp_path / "a.glb").read_bytes()
     np.testing.assert_array_equal(gltf.read(BytesIO(content)).values, gltf.read(tmp_path / "a.glb").values)
     beside = write_gltf(tmp_path / "b.gltf", *parts(tmp_path / "a.glb"))
-    with pytest.raises(FormatError, match=r"its buffer 'b.bin' is another file: give the path"):
+    np.testing.assert_array_equal(gltf.read(beside).values, gltf.read(tmp_path / "a.glb").values)
+    with pytest.raises(FormatError, match=r"its buffer 'b.bin' is another file, which is read only for a .gltf"):
         gltf.read(BytesIO(beside.read_bytes()))
     beside.with_suffix(".bin").unlink()
-    with pytest.raises(FormatError, match=r"b.gltf: its buffer 'b.bin' beside it: no such file"):
+    with pytest.raises(FormatError, match=r"b.gltf: its buffer 'b.bin' is not a file in its folder"):
         gltf.read(beside)
+
+
+@pytest.mark.parametrize("extension", [".gltf", ".glb", ".vrm", ".vrma"])
+@pytest.mark.parametrize("way", ["absolute", "../", "%2e%2e%2f", "..%2F", "link", "sub/../../", "folder", "pipe"])
+def test_a_buffer_is_no_file_outside_of_the_folder(tmp_path: Path, way: str, extension: str) -> None:
+    glb.write(tmp_path / "a.glb", moving())
+    document, binary = parts(tmp_path / "a.glb")
+    secret, inside = tmp_path / "secret.bin", tmp_path / "inside"
+    secret.write_bytes(binary)
+    (inside / "sub").mkdir(parents=True)
+    (inside / "link").symlink_to(secret)
+    os.mkfifo(inside / "pipe")
+    uri = {"absolute": str(secret), "link": "link", "folder": "sub", "pipe": "pipe"}.get(way, f"{way}secret.bin")
+    document["buffers"] = [{"byteLength": len(binary), "uri": uri}]
+    file = inside / f"a{extension}"
+    file.write_bytes(json.dumps(document).encode() if extension == ".gltf" else glb.container(document, b""))
+    with pytest.raises(FormatError, match=r"is not a file in its folder|is read only for a \.gltf"):
+        read_motion(file)
+
+
+def test_of_a_buffer_no_more_is_read_than_it_declares(tmp_path: Path) -> None:
+    glb.write(tmp_path / "a.glb", moving())
+    document, binary = parts(tmp_path / "a.glb")
+    file = write_gltf(tmp_path / "b.gltf", document, binary)
+    (tmp_path / "b.bin").write_bytes(binary + b"secret")
+    assert gltf_data.parse(file).buffers == (binary,)
+    document["buffers"][0]["byteLength"] = 100
+    file.write_text(json.dumps(document))
+    assert gltf_data.parse(file).buffers == (binary[:100],)
+    document["buffers"] *= 2 * gltf_data.MAX_BYTES // 100
+    file.write_text(json.dumps(document))
+    with pytest.raises(FormatError, match="over 536870912 bytes together"):
+        gltf_data.parse(file)
+
+
+def test_a_file_of_many_alike_nodes_is_read_in_time_that_grows_with_it(tmp_path: Path) -> None:
+    nodes: list[dict[str, Any]] = [{"name": "x", "children": [i + 1]} for i in range(1_999)] + [{"name": "x"}]
+    document = {"asset": {"version": "2.0"}, "nodes": nodes, "skins": [{"joints": list(range(2_000))}]}
+    (tmp_path / "deep.gltf").write_text(json.dumps(document))
+    motion = gltf.read(tmp_path / "deep.gltf")
+    assert motion.skeleton is not None
+    assert motion.skeleton.names[-1] == "x_2000"
+    nodes *= 20
+    (tmp_path / "deep.gltf").write_text(json.dumps(document))
+    with pytest.raises(FormatError, match="it has 40000 nodes"):
+        gltf.read(tmp_path / "deep.gltf")
+
+
+def test_arrays_that_overlap_are_refused(tmp_path: Path) -> None:
+    document, binary = parts(twisted_glb(tmp_path))
+    animation, accessors = document["animations"][0], document["accessors"]
+    sampler, channel = animation["samplers"][0], animation["channels"][0]
+    own = range(len(accessors), len(accessors) + 2_000)  # an accessor for each sampler, all of the same place
+    accessors += [accessors[sampler["output"]]] * len(own)
+    animation["samplers"] = [sampler | {"output": index} for index in own]
+    animation["channels"] = [channel | {"sampler": index} for index in range(len(own))]
+    with pytest.raises(FormatError, match="its arrays overlap"):
+        gltf.read(write_gltf(tmp_path / "many.gltf", document, binary))
+
+
+def test_a_name_that_is_no_text_is_refused(tmp_path: Path) -> None:
+    document, binary = parts(twisted_glb(tmp_path))
+    document["nodes"][0]["name"] = 64
+    with pytest.raises(FormatError, match="the name of node 0 is not text"):
+        gltf.read(write_gltf(tmp_path / "number.gltf", document, binary))
 
 
 def test_an_animation_without_end_is_refused(tmp_path: Path) -> None:
@@ -221,3 +288,6 @@ def test_an_animation_without_end_is_refused(tmp_path: Path) -> None:
     binary = binary[:start] + struct.pack("<f", 1e9) + binary[start + 4 :]
     with pytest.raises(FormatError, match=r"1e\+09 s at 24 fps are too many frames"):
         gltf.read(write_gltf(tmp_path / "long.gltf", document, binary))
+    binary = binary[:start] + struct.pack("<f", 1e5) + binary[start + 4 :]  # within reason, but for its 30 kB
+    with pytest.raises(FormatError, match="100000 s at 24 fps are too many frames"):
+        gltf.read(write_gltf(tmp_path / "sparse.gltf", document, binary))

@@ -8,7 +8,6 @@ taken out: every angle 0 is that pose, whatever the nodes' own axes. Scales of n
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ from motet.errors import FormatError, MotionError
 from motet.files import File, place_of
 from motet.formats.character import Character
 from motet.formats.gltf_data import Gltf, parse
+from motet.formats.lines import Names
 from motet.motion.humanoid import BONES, REQUIRED
 from motet.motion.joint_map import JointMap, check_map
 from motet.motion.motion import Motion
@@ -31,6 +31,9 @@ FPS = 30.0
 
 MAX_VALUES = 10**7
 """Frames times nodes: an hour at 30 frames a second of a figure of 90 nodes."""
+
+FREE_VALUES = 10**6
+"""Frames times nodes of a file of any size; a file of more has a byte for each, so that a small one stays cheap."""
 
 SPARSE = 0.1
 """Keys further apart than this many seconds do not tell a frame rate."""
@@ -122,17 +125,8 @@ def _map(path: Path, skeleton: Skeleton, humanoid: dict[str, int]) -> JointMap:
 def _named(gltf: Gltf, joints: _Nodes) -> list[str]:
     """The joints' names, those of VRM for the bones of its humanoid; another joint of such a name gets another."""
     bones = {node: bone for bone, node in gltf.humanoid().items() if bone in BONES}
-    taken = list(bones.values())
-    names: list[str] = []
-    for node, name in zip(joints.nodes, joints.names, strict=True):
-        names.append(bones[node] if node in bones else _free(name, [*taken, *names]))
-    return names
-
-
-def _free(name: str, taken: list[str]) -> str:
-    """A name, with a number behind it where it is taken."""
-    numbered = (f"{name}_{number}" for number in count(2))
-    return next(candidate for candidate in chain([name], numbered) if candidate not in taken)
+    given = Names(bones.values())
+    return [bones.get(node) or given.unique(name) for node, name in zip(joints.nodes, joints.names, strict=True)]
 
 
 def _skeleton(path: Path, joints: _Nodes, names: list[str], offsets: list[Array]) -> Skeleton:
@@ -153,21 +147,13 @@ def _joints(path: Path, gltf: Gltf) -> _Nodes:
     parents, order = gltf.parents, gltf.order
     if not wanted <= set(range(len(parents))):
         raise FormatError(path, f"joints that are no nodes: {sorted(wanted - set(range(len(parents))))}")
-    chains = [gltf.above(node) for node in wanted]
-    shared = [node for node in chains[0] if all(node in chain for chain in chains)]
-    if not shared:
-        raise FormatError(path, "its joints are in several trees: expected the skeleton of one figure")
-    kept = {node for chain in chains for node in chain[: chain.index(shared[0]) + 1]}
-    ends = {node for node in order if parents[node] in kept and _is_end(gltf.objects("nodes")[node])}
-    order = tuple(node for node in order if node in kept | ends)
-    names: list[str] = []
-    for node in order:
-        names.append(_free(gltf.objects("nodes")[node].get("name") or f"node{node}", names))
-    return _Nodes(
-        order,
-        tuple(order.index(parents[node]) if node != shared[0] else -1 for node in order),
-        tuple(names),
-    )
+    branch = gltf.branch(wanted)
+    inside = set(branch)
+    ends = {node for node in order if parents[node] in inside and _is_end(gltf.objects("nodes")[node])}
+    kept = tuple(node for node in order if node in inside | ends)
+    at, given = {node: i for i, node in enumerate(kept)}, Names()
+    names = tuple(given.unique(gltf.name(node)) for node in kept)
+    return _Nodes(kept, tuple(at.get(parents[node], -1) for node in kept), names)
 
 
 def _is_end(node: dict[str, Any]) -> bool:
@@ -212,24 +198,24 @@ def _tracks(path: Path, gltf: Gltf) -> tuple[dict[tuple[int, str], Array], float
     if not animations:
         return {}, FPS
     samplers = animations[0].get("samplers", [])
-    keys = []
+    keys = {}
     for channel in animations[0].get("channels", []):
         node, name = channel["target"].get("node"), channel["target"].get("path")
         if node is not None and name in PATHS:
             sampler = samplers[channel["sampler"]]
             times, values = gltf.array(sampler["input"]), gltf.array(sampler["output"])
-            keys.append(((node, name), times.reshape(-1), values, sampler.get("interpolation", "LINEAR")))
-    if not keys or not all(len(times) for _, times, _, _ in keys):
+            keys[node, name] = times.reshape(-1), values, sampler.get("interpolation", "LINEAR")
+    if not keys or not all(len(times) for times, _, _ in keys.values()):
         raise FormatError(path, "its animation moves no nodes: expected tracks of rotation or translation")
-    start, end = min(times[0] for _, times, _, _ in keys), max(times[-1] for _, times, _, _ in keys)
-    steps = min((float(np.median(np.diff(times))) for _, times, _, _ in keys if len(times) > 1), default=0.0)
+    start, end = min(times[0] for times, _, _ in keys.values()), max(times[-1] for times, _, _ in keys.values())
+    steps = min((float(np.median(np.diff(times))) for times, _, _ in keys.values() if len(times) > 1), default=0.0)
     rate = 1 / steps if 0 < steps < SPARSE else FPS
     fps = float(round(rate)) if abs(rate - round(rate)) < 0.01 * rate else rate
     count = (end - start) * fps + 1
-    if not count * len(gltf.objects("nodes")) < MAX_VALUES:
+    if not count * len(gltf.objects("nodes")) < min(MAX_VALUES, FREE_VALUES + gltf.size):
         raise FormatError(path, f"{end - start:g} s at {fps:g} fps are too many frames")
     frames = start + np.arange(round(count)) / fps
-    return {place: _sampled(times, values, kind, frames, place[1]) for place, times, values, kind in keys}, fps
+    return {place: _sampled(*key, frames, place[1]) for place, key in keys.items()}, fps
 
 
 def _sampled(times: Array, values: Array, kind: str, frames: Array, name: str) -> Array:

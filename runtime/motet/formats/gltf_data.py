@@ -3,7 +3,7 @@
 import base64
 import json
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,12 @@ SHAPES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 UNREADABLE = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 """Extensions by which arrays of animations are packed."""
 
+MAX_NODES = 20_000
+"""Nodes of a file; a figure has some hundreds."""
+
+MAX_BYTES = 2**29
+"""Bytes of all buffers of a file together."""
+
 
 @dataclass(frozen=True)
 class Gltf:
@@ -32,6 +38,12 @@ class Gltf:
     path: Path
     document: dict[str, Any]
     buffers: tuple[bytes, ...]
+    _arrays: dict[int, Array] = field(default_factory=dict)
+
+    @cached_property
+    def size(self) -> int:
+        """Bytes of all buffers together."""
+        return sum(map(len, self.buffers))
 
     def objects(self, name: str) -> list[dict[str, Any]]:
         """One of the file's lists of objects, empty where it has none."""
@@ -62,12 +74,19 @@ class Gltf:
             raise FormatError(self.path, "its nodes are not a tree: some of them form a ring")
         return tuple(order)
 
-    def above(self, node: int) -> list[int]:
-        """A node and all that it hangs on, upwards."""
-        chain = [node]
-        while self.parents[chain[-1]] >= 0:
-            chain.append(self.parents[chain[-1]])
-        return chain
+    def branch(self, wanted: set[int]) -> tuple[int, ...]:
+        """Nodes and what lies between them, each after its parent; the first is the lowest that all hang on.
+
+        FormatError where they hang on none together.
+        """
+        below = [int(node in wanted) for node in range(len(self.parents))]
+        for node in reversed(self.order):
+            if self.parents[node] >= 0:
+                below[self.parents[node]] += below[node]
+        shared = [node for node in self.order if below[node] == len(wanted)]
+        if not shared:
+            raise FormatError(self.path, "its joints are in several trees: expected the skeleton of one figure")
+        return (shared[-1], *(node for node in self.order if 0 < below[node] < len(wanted) or node in wanted))
 
     def humanoid(self) -> dict[str, int]:
         """The bones that VRM 0, VRM 1 or VRM Animation names, with their nodes; empty where there are none."""
@@ -81,6 +100,13 @@ class Gltf:
                 return {bone: value["node"] for bone, value in bones.items()}
         return {}
 
+    def name(self, node: int) -> str:
+        """A node's name, made from its number where it has none; FormatError where it is not text."""
+        name = self.objects("nodes")[node].get("name") or f"node{node}"
+        if not isinstance(name, str):
+            raise FormatError(self.path, f"the name of node {node} is not text")
+        return name
+
     def local(self, node: int) -> tuple[Array, Array, Array]:
         """Translation (3), rotation as a quaternion (4) with the scalar last, and scale (3) of a node at rest."""
         found = self.objects("nodes")[node]
@@ -93,7 +119,16 @@ class Gltf:
         return move, turn, scale
 
     def array(self, index: int) -> Array:
-        """The numbers (N, ...) of an accessor; FormatError where it does not lie in the file."""
+        """The numbers (N, ...) of an accessor, which are not to be changed; FormatError where it is not in the file."""
+        if index not in self._arrays:
+            values = self._decoded(index)
+            values.setflags(write=False)
+            if sum(array.size for array in self._arrays.values()) + values.size > self.size:
+                raise FormatError(self.path, "its arrays overlap: they hold more numbers than the file has bytes")
+            self._arrays[index] = values
+        return self._arrays[index]
+
+    def _decoded(self, index: int) -> Array:
         try:
             accessor = self.objects("accessors")[index]
             kind, width, count = COMPONENTS[accessor["componentType"]], SHAPES[accessor["type"]], accessor["count"]
@@ -140,8 +175,10 @@ def parse(file: File) -> Gltf:
     packed = [name for name in UNREADABLE if name in document.get("extensionsRequired", [])]
     if packed:
         raise FormatError(path, f"its arrays are packed by {packed[0]}: export without compression")
-    buffers = [_buffer(path, buffer, binary) for buffer in document.get("buffers", [])]
-    return Gltf(path, document, tuple(buffers))
+    if len(document.get("nodes", [])) > MAX_NODES:
+        raise FormatError(path, f"it has {len(document['nodes'])} nodes: expected at most {MAX_NODES}")
+    beside = path.parent if isinstance(file, str | Path) and content[:4] != b"glTF" else None
+    return Gltf(path, document, _buffers(path, document.get("buffers", []), binary, beside))
 
 
 def _chunks(path: Path, content: bytes) -> tuple[bytes, bytes]:
@@ -159,16 +196,31 @@ def _chunks(path: Path, content: bytes) -> tuple[bytes, bytes]:
     return found[b"JSON"], found.get(b"BIN\0", b"")
 
 
-def _buffer(path: Path, buffer: dict[str, Any], binary: bytes) -> bytes:
+def _buffers(path: Path, buffers: list[dict[str, Any]], binary: bytes, beside: Path | None) -> tuple[bytes, ...]:
+    """The content of each buffer, as much as it declares; that of files in the folder ``beside`` only where given."""
+    sizes = [buffer["byteLength"] for buffer in buffers]
+    if not all(isinstance(size, int) and size >= 0 for size in sizes) or sum(sizes) > MAX_BYTES:
+        raise FormatError(path, f"its buffers declare sizes that are none, or over {MAX_BYTES} bytes together")
+    return tuple(_buffer(path, buffer, binary, beside)[:size] for buffer, size in zip(buffers, sizes, strict=True))
+
+
+def _buffer(path: Path, buffer: dict[str, Any], binary: bytes, beside: Path | None) -> bytes:
     uri = buffer.get("uri")
     if uri is None:
         return binary
     if uri.startswith("data:"):
         return base64.b64decode(uri.partition(",")[2])
-    place = path.parent / unquote(uri)
-    if not path.is_file():
-        raise FormatError(path, f"its buffer {quoted(uri)} is another file: give the path, or save it as .glb")
+    if beside is None:
+        raise FormatError(path, f"its buffer {quoted(uri)} is another file, which is read only for a .gltf at a path")
+    place = beside / unquote(uri)
     try:
-        return read_bytes(place)
-    except FormatError as error:
-        raise FormatError(path, f"its buffer {quoted(uri)} beside it: {error.reason}") from error
+        if not place.resolve().is_relative_to(beside.resolve()) or place.is_symlink() or not place.is_file():
+            raise FormatError(path, f"its buffer {quoted(uri)} is not a file in its folder")
+        with place.open("rb") as opened:
+            return opened.read(buffer["byteLength"])
+    except (OSError, ValueError) as error:
+        raise (
+            error
+            if isinstance(error, FormatError)
+            else FormatError(path, f"its buffer {quoted(uri)} cannot be read: {error}")
+        ) from error
