@@ -24,7 +24,7 @@ from motet.models.search import SearchModel
 from motet.models.steer import SteerModel
 from motet_train.cli.evaluate_fill import fill_figures
 from motet_train.cli.evaluate_language import by_subject, language_reports
-from motet_train.cli.evaluate_predict import PageOptions, predict_reports
+from motet_train.cli.evaluate_predict import predict_reports
 from motet_train.cli.evaluate_says import Best, says_reports
 from motet_train.cli.evaluate_steer import as_steered, steer_reports
 from motet_train.cli.train_options import unit_in
@@ -63,10 +63,6 @@ from motet_train.settings import read_settings
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one nested object with stable keys.")
 @click.option("--plots", type=Path, help="Folder for the figures of the papers.")
-@click.option(
-    "--page", type=Path, help="Predict, by the protocol: write the page of results, Markdown, with what the tables say."
-)
-@click.option("--ablations", type=Path, help="With --page: folder of runs of the convolutional predictor to be beside.")
 @unit_in
 @session_options
 @click.option("--save", is_flag=True, help="Save the figures in each run, to be exported with it.")
@@ -77,8 +73,6 @@ def evaluate(
     search: str,
     as_json: bool,
     plots: Path | None,
-    page: Path | None,
-    ablations: Path | None,
     unit_in: str | None,
     save: bool,
     session: SessionOptions,
@@ -89,14 +83,13 @@ def evaluate(
     are told, whether their poses stay whole whatever they are told, beside recordings. Describe and generate: BLEU,
     floors, attributes, measures; with both, of the same split, also the chain from sentence to motion and back.
     Fill: how far joints are from where they were in gaps of trials, beside interpolation. Predict: the protocol's Euler
-    errors on its text files, beside floors and published rows, with a page of them as Markdown (--page), or distances
-    in held out motion files, by kinds of motions. With --says, generate: the share of motions that do what everyday
+    errors on its text files, beside floors and published rows, or distances in held out motion files, by kinds of
+    motions. With --says, generate: the share of motions that do what everyday
     prompts say, how good they are, whatever they show, and how near they are to their prompts and to recorded motions
     in the space of a search model.
     """
-    if says and (save or page):
-        other = "--save" if save else "--page"
-        raise click.UsageError(f"--says prints figures, and draws them with --plots; it does not go with {other}")
+    if says and save:
+        raise click.UsageError("--says prints figures, and draws them with --plots; it does not go with --save")
     torch.set_num_threads(1)
     runs = {name: Run.load(Path(name)) for name in models if (Path(name) / MANIFEST).is_file()}
     if save and (bundles := [name for name in models if name not in runs]):
@@ -105,7 +98,7 @@ def evaluate(
     ready, text = (
         _says(loaded, data, unit_in, load_as(SearchModel, search, session), plots)
         if says
-        else _measured(loaded, data, plots, unit_in, _page(page, ablations))
+        else _measured(loaded, data, plots, unit_in)
     )
     for name in runs if save else ():
         Run({**runs[name].manifest, "quality": ready[name]}, runs[name].model).save(Path(name))
@@ -133,28 +126,8 @@ def _says(
     return {name: json_ready(report) for name, report in reports.items()}, says_text(reports)
 
 
-def _page(page: Path | None, folder: Path | None) -> PageOptions | None:
-    """The page to write, and the runs of the folder of ablations."""
-    if page is None and folder is not None:
-        raise click.UsageError("--ablations are for the page: give --page")
-    if page is None:
-        return None
-    places = [] if folder is None else sorted(path.parent for path in folder.glob(f"*/{MANIFEST}"))
-    if folder is not None and not places:
-        raise click.UsageError(f"{folder} has no runs")
-    found = {str(place): _model(Run.load(place)) for place in places}
-    others = [name for name, model in found.items() if not isinstance(model, PredictModel)]
-    if others:
-        raise click.UsageError(f"--ablations are predictors; {', '.join(others)} is none")
-    return PageOptions(page, folder, {name: model for name, model in found.items() if isinstance(model, PredictModel)})
-
-
 def _measured(
-    models: Mapping[str, Model],
-    data: Path | None,
-    plots: Path | None,
-    unit: str | None,
-    page: PageOptions | None = None,
+    models: Mapping[str, Model], data: Path | None, plots: Path | None, unit: str | None
 ) -> tuple[dict[str, Any], str]:
     """The figures of each model, ready for JSON, and all of them as text."""
     steered = {name: one for name, model in models.items() if (one := as_steered(model)) is not None}
@@ -166,8 +139,6 @@ def _measured(
     fills = {name: model for name, model in models.items() if isinstance(model, FillModel)}
     if sum(map(bool, (controls, others, predicts, steered, fills))) > 1:
         raise click.UsageError("evaluate control, fill, predict and language models separately: their data differ")
-    if page is not None and not predicts:
-        raise click.UsageError("--page is of predictors")
     if plots is not None:
         from motet_train.evaluate.figures import make_folder
 
@@ -175,7 +146,7 @@ def _measured(
     if steered:
         return _steered(steered, data, plots)
     if predicts:
-        return predict_reports(predicts, data, plots, page)
+        return predict_reports(predicts, data, plots)
     if fills:
         return _filled(fills, data, plots)
     reports = _control(controls, data, plots, unit) if controls else language_reports(others, data, plots)

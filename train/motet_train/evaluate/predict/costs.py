@@ -9,8 +9,7 @@ from motet.models.predict import PredictModel
 from motet_train.evaluate.predict.seed_groups import SeedGroup
 from motet_train.evaluate.tables import aligned
 
-AVERAGE = "average"
-AUGMENTATION = ("warp", "reverse", "mirror", AVERAGE)
+AUGMENTATION = ("warp", "reverse", "mirror", "average")
 """What varies the windows (:class:`motet_train.data.windows.Windows`), and the running mean of the weights."""
 
 
@@ -23,7 +22,7 @@ def harness_table(models: Mapping[str, PredictModel], groups: Sequence[SeedGroup
     rows = [("", "seeds", "files", "held out", *AUGMENTATION, "rate", "steps", "kept", "by")]
     for group in groups:
         trainings = [models[name].manifest.training for name in group.runs]
-        recipe, data = harness_of(trainings[0])
+        recipe, data = trainings[0].get("recipe", {}), trainings[0].get("data", {})
         steps, kept = (_range([one[key] for one in trainings if key in one]) for key in ("steps", "kept_step"))
         shown = [_said(recipe.get(key)) for key in (*AUGMENTATION, "learning_rate")]
         seeds = _range([one["seed"] for one in trainings if "seed" in one])
@@ -32,11 +31,6 @@ def harness_table(models: Mapping[str, PredictModel], groups: Sequence[SeedGroup
             (f"  {group.title}", seeds, _said(data.get("files")), held, *shown, steps, kept, recipe.get("keep", ""))
         )
     return aligned(rows)
-
-
-def harness_of(training: Mapping[str, Any]) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
-    """The recipe of a manifest's training, and what it says of the data."""
-    return training.get("recipe", {}), training.get("data", {})
 
 
 def _said(value: Any) -> str:

@@ -38,27 +38,6 @@ def protocol_table(found: Curves, corpus: ExpmapCorpus, spreads: Curves | None =
     return "\n".join([*missing(corpus), rows.text()])
 
 
-def means_table(found: Curves, corpus: ExpmapCorpus, spreads: Curves | None = None) -> str:
-    """The same with the means alone."""
-    rows = _headed(corpus, spreads or {})
-    for kind in found:
-        rows.title()
-        rows.title(TITLES[kind])
-        _block(rows, found, corpus, spreads or {}, (kind, MEAN))
-    _averages(rows, corpus)
-    return rows.text()
-
-
-def actions_table(found: Curves, corpus: ExpmapCorpus, spreads: Curves | None = None, kind: str = FEW) -> str:
-    """The same with the actions alone, of one kind of windows."""
-    rows = _headed(corpus, spreads or {})
-    rows.title(TITLES[kind])
-    for action in next(iter(found[kind].values())):
-        if action != MEAN:
-            _block(rows, found, corpus, spreads or {}, (kind, action))
-    return rows.text()
-
-
 def missing(corpus: ExpmapCorpus) -> list[str]:
     """Lines that say which files the corpus lacks, and what follows; none where it lacks none."""
     if not corpus.missing:

@@ -9,7 +9,7 @@ from motet.models.predict import PredictModel
 from motet_train.data.expmap_files import ExpmapCorpus
 from motet_train.evaluate.predict.ablations import ablated, ablation_table
 from motet_train.evaluate.predict.costs import cost_table, harness_table
-from motet_train.evaluate.predict.curves import FEW, MEAN, Curves, by_group, curves, spreads_of, to_json
+from motet_train.evaluate.predict.curves import FEW, Curves, by_group, curves, spreads_of, to_json
 from motet_train.evaluate.predict.floors import FLOORS, key
 from motet_train.evaluate.predict.protocol_table import protocol_table
 from motet_train.evaluate.predict.seed_groups import SeedGroup, seed_groups
@@ -30,21 +30,6 @@ class Results:
     runs: Curves
     means: Curves
     spreads: Curves
-
-    @property
-    def systems(self) -> list[str]:
-        """Rows of the table, floors first."""
-        return list(self.means[FEW])
-
-    @property
-    def floors(self) -> list[str]:
-        """Those among them."""
-        return [name for name in self.systems if name in FLOORS]
-
-    @property
-    def actions(self) -> list[str]:
-        """What is measured one by one."""
-        return [action for action in next(iter(self.means[FEW].values())) if action != MEAN]
 
 
 def results_of(models: Models, corpus: ExpmapCorpus, progress: Callable[[str], object] = lambda name: None) -> Results:
@@ -71,7 +56,7 @@ def results_text(results: Results) -> str:
 def results_json(results: Results) -> Ready:
     """See :func:`ready`."""
     figures = (partial(to_json, found) for found in (results.runs, results.means, results.spreads))
-    return ready(results.models, results.groups, results.floors, *figures)
+    return ready(results.models, results.groups, [name for name in results.means[FEW] if name in FLOORS], *figures)
 
 
 def ready(
