@@ -24,6 +24,7 @@ from motet.errors import (
     TextWarning,
     UnitError,
 )
+from motet.formats import clips
 from motet.formats import read_motion as read
 from motet.formats import write_motion as write
 from motet.live.page import live_page, write_live_page
@@ -78,6 +79,7 @@ __all__ = [
     "TextError",
     "TextWarning",
     "UnitError",
+    "clips",
     "from_humanoid",
     "list_bundles",
     "live_page",

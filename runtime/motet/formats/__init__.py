@@ -1,8 +1,10 @@
 """Files of motion: one record per format, chosen by the extension.
 
 A format's module has ``read(file, **options) -> Motion``, ``write(file, motion)`` or both, where a file is a path or a
-file object of bytes; both raise motet's errors and leave nothing half-written. To add a format, write its module and
-add its record to :data:`FORMATS`: help texts, the table of docs/formats.md and the lists of corpora are made from it.
+file object of bytes; both raise motet's errors and leave nothing half-written. One whose files hold several motions has
+``clips(file)``, which gives their names, and "clip" among the options of its ``read``. To add a format, write its
+module and add its record to :data:`FORMATS`: help texts, the table of docs/formats.md and the lists of corpora are made
+from it.
 """
 
 import logging
@@ -18,6 +20,7 @@ import numpy as np
 from motet.errors import FormatError, MotionError, OutputError
 from motet.files import File, check_place, place_of
 from motet.formats.character import Character, put_onto
+from motet.formats.clips import Clip, split_clip
 from motet.motion.motion import Motion
 from motet.motion.skeleton import Skeleton
 from motet.motion.units import metres
@@ -51,6 +54,11 @@ class Format:
         found: Callable[..., Motion] = import_module(f"motet.formats.{self.reader}").read
         return found
 
+    def clips(self) -> Callable[[File], tuple[str, ...]]:
+        """The function that names the clips of a file."""
+        found: Callable[[File], tuple[str, ...]] = import_module(f"motet.formats.{self.reader}").clips
+        return found
+
     def write(self) -> Callable[[File, Motion], None]:
         """The function that writes it."""
         found: Callable[[File, Motion], None] = import_module(f"motet.formats.{self.writer}").write
@@ -60,8 +68,8 @@ class Format:
 _AMC = "everything; AMC has no frame rate: 120 unless motet wrote another into a comment, or `fps=` says it"
 _GIF = "a picture that moves; needs Pillow: `pip install 'motet[plot]'`"
 _NPZ = "everything, to the last bit; of AMASS the body's joints"
-_GLB = "a skeleton and the first animation; written with a body, for viewers and engines"
-_CHARACTER = "a skeleton and the first animation, or the pose that it rests in"
+_GLB = "a skeleton and its animations, each a clip; written with a body, for viewers and engines"
+_CHARACTER = "a skeleton and its animations, each a clip, or the pose that it rests in"
 _VRMA = "the humanoid: a motion of another human figure is brought to it ([humanoid.md](humanoid.md))"
 
 FORMATS = (
@@ -70,10 +78,10 @@ FORMATS = (
     Format(".npz", "motet's own; AMASS", _NPZ, "npz", "npz", mocap=True),
     Format(".csv", "table", "values, units and frame rate, no skeleton", "csv", "csv"),
     Format(".xml", "MMM of KIT", "angles and root; the skeleton is not in the file", "mmm"),
-    Format(".glb", "glTF 2.0", _GLB, "gltf", "glb", mocap=True),
-    Format(".gltf", "glTF 2.0, as text", _CHARACTER, "gltf"),
-    Format(".vrm", "VRM avatar", _CHARACTER, "gltf"),
-    Format(".vrma", "VRM Animation", _VRMA, "gltf", "vrma", mocap=True),
+    Format(".glb", "glTF 2.0", _GLB, "gltf", "glb", options=("clip",), mocap=True),
+    Format(".gltf", "glTF 2.0, as text", _CHARACTER, "gltf", options=("clip",)),
+    Format(".vrm", "VRM avatar", _CHARACTER, "gltf", options=("clip",)),
+    Format(".vrma", "VRM Animation", _VRMA, "gltf", "vrma", options=("clip",), mocap=True),
     Format(".html", "web page", "a page with a player: orbit, play, scrub, no network", writer="html"),
     Format(".gif", "picture", _GIF, writer="gif", needs="PIL"),
 )
@@ -99,20 +107,24 @@ def read_motion(
     asf: str | Path | None = None,
     unit: str | float | None = None,
     partial: bool = False,
+    clip: Clip = None,
     format: str | None = None,
 ) -> Motion:
-    """Read a motion file, or a file object of bytes.
+    """Read a motion file, or a file object of bytes; "file.glb#Walk" is the clip Walk of file.glb.
 
     fps: the frame rate where the format has none, which is AMC.
     asf: the skeleton of an AMC file; by default it is looked for beside it.
     unit: the length unit where the file does not say its own: "m", "cm", "mm", "inch" or a number of metres.
     partial: take the complete frames of a truncated AMC or BVH file, which is refused otherwise.
+    clip: which motion of a file that holds several: a name as :func:`clips` has them, or a number from 1; by default
+        the first, with a word in the log where there are others.
     format: the extension, such as "bvh", where it is not the path's; a file object needs it.
     FormatError for an unknown extension, a missing file, one that is not a motion, and an option that the format does
     not take or the file contradicts.
     """
+    file, named = split_clip(file, READABLE)
     kind, path = _format(file, format, READABLE, "read"), place_of(file)
-    given = {"fps": fps, "asf": asf, "partial": partial or None}
+    given = {"fps": fps, "asf": asf, "partial": partial or None, "clip": named if clip is None else clip}
     options = {name: value for name, value in given.items() if value is not None}
     for name in options.keys() - set(kind.options):
         takers = " ".join(known.extension for known in FORMATS if name in known.options)
@@ -126,6 +138,16 @@ def read_motion(
         raise
     except MotionError as error:
         raise FormatError(path, str(error)) from error
+
+
+def clips(file: File, *, format: str | None = None) -> tuple[str, ...]:
+    """The names of the motions that a file holds, each as ``clip`` of :func:`read_motion` takes it.
+
+    None of them twice; empty where the format has one motion to a file, or the file none. format: as of
+    :func:`read_motion`. FormatError for an unknown extension, or for a damaged file of a format that has clips.
+    """
+    kind = _format(file, format, READABLE, "read")
+    return kind.clips()(file) if "clip" in kind.options else ()
 
 
 def read_character(file: File) -> Character:

@@ -74,19 +74,28 @@ class Gltf:
             raise FormatError(self.path, "its nodes are not a tree: some of them form a ring")
         return tuple(order)
 
-    def branch(self, wanted: set[int]) -> tuple[int, ...]:
-        """Nodes and what lies between them, each after its parent; the first is the lowest that all hang on.
+    @cached_property
+    def places(self) -> dict[int, int]:
+        """For each node its place in :attr:`order`."""
+        return {node: place for place, node in enumerate(self.order)}
 
-        FormatError where they hang on none together.
-        """
+    @cached_property
+    def roots(self) -> dict[int, int]:
+        """For each node the root of its tree."""
+        roots: dict[int, int] = {}
+        for node in self.order:
+            roots[node] = roots.get(self.parents[node], node)
+        return roots
+
+    def branch(self, wanted: set[int]) -> tuple[int, ...]:
+        """Nodes of one tree and what lies between them, each after its parent; the first is the lowest that all
+        hang on."""
         below = [int(node in wanted) for node in range(len(self.parents))]
         for node in reversed(self.order):
             if self.parents[node] >= 0:
                 below[self.parents[node]] += below[node]
-        shared = [node for node in self.order if below[node] == len(wanted)]
-        if not shared:
-            raise FormatError(self.path, "its joints are in several trees: expected the skeleton of one figure")
-        return (shared[-1], *(node for node in self.order if 0 < below[node] < len(wanted) or node in wanted))
+        top = [node for node in self.order if below[node] == len(wanted)][-1]
+        return (top, *(node for node in self.order if 0 < below[node] < len(wanted) or node in wanted))
 
     def humanoid(self) -> dict[str, int]:
         """The bones that VRM 0, VRM 1 or VRM Animation names, with their nodes; empty where there are none."""

@@ -1,0 +1,71 @@
+"""From nodes in the world to a motion: what the readers of scene files (glTF, FBX) share.
+
+A motion's skeleton rests in the pose that the file's nodes rest in, with all rotations taken out: every angle 0 is that
+pose, whatever the nodes' own axes.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from motet.errors import FormatError, MotionError
+from motet.motion.motion import Motion
+from motet.motion.products import inverse, product, rotated
+from motet.motion.rotations import Array
+from motet.motion.skeleton import Joint, Skeleton
+from motet.motion.world_rotations import motion_of
+
+STILL = 1e-4
+"""A joint stays at its offset where it is nowhere further from it than this part of the figure's height."""
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Joints in the world: rotations (T, J, 3, 3), without scale, and positions (T, J, 3)."""
+
+    turns: Array
+    places: Array
+
+    def of(self, joints: Sequence[int]) -> "Poses":
+        """Those of some joints."""
+        return Poses(self.turns[:, list(joints)], self.places[:, list(joints)])
+
+
+def motion_of_nodes(
+    path: Path, names: list[str], parents: tuple[int, ...], rest: Poses, poses: Poses, fps: float, metres: float | None
+) -> Motion:
+    """The motion of joints, each after its parent (-1 for the root, the first), from their poses (T) and at rest (1).
+
+    metres: the length of the positions' unit. Channels: three angles in "deg" for each joint, the translation of the
+    root and of joints that move in "length". FormatError where the joints are no skeleton.
+    """
+    at_rest = rest.places[0]
+    offsets = [at_rest[i] - at_rest[parent] if parent >= 0 else at_rest[i] for i, parent in enumerate(parents)]
+    skeleton = skeleton_of_nodes(path, names, parents, offsets, metres)
+    turned = product(poses.turns, inverse(rest.turns[0]))
+    return motion_of(skeleton, turned, _moved(skeleton, turned, poses.places), fps)
+
+
+def skeleton_of_nodes(
+    path: Path, names: list[str], parents: tuple[int, ...], offsets: list[Array], metres: float | None
+) -> Skeleton:
+    """The skeleton of joints with offsets (3,) from their parents; FormatError where it is none."""
+    triples = [(float(x), float(y), float(z)) for x, y, z in offsets]
+    made = [Joint(*joint) for joint in zip(names, parents, triples, strict=True)]
+    try:
+        return Skeleton(tuple(made), metres_per_unit=metres)
+    except MotionError as error:
+        raise FormatError(path, str(error)) from error
+
+
+def _moved(skeleton: Skeleton, turned: Array, places: Array) -> dict[int, Array]:
+    """Translations (T, 3) in their parents' frames: of the root, and of joints that do not stay at their offset."""
+    moved = {0: places[:, 0]}
+    for i, joint in enumerate(skeleton.joints[1:], start=1):
+        from_parent = places[:, i] - places[:, joint.parent]
+        local = rotated(inverse(turned[:, joint.parent]), from_parent)
+        if np.abs(local - joint.offset).max(initial=0.0) > STILL * max(skeleton.height, 1e-9):
+            moved[i] = local
+    return moved
