@@ -95,7 +95,7 @@ def function() -> onnx.ModelProto:
     return found
 
 
-@pytest.mark.parametrize("build", [plain, constant, conditional, scan, loop, function])
+@pytest.mark.parametrize("build", [plain, constant, conditional, scan, function])
 def test_data_outside_is_refused_wherever_it_hides(
     build: Callable[[], onnx.ModelProto], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -115,6 +115,11 @@ def test_data_outside_is_refused_wherever_it_hides(
         tensor.CopyFrom(numpy_helper.from_array(SECRET, tensor.name))
     if build is not function:
         check_graph(found.SerializeToString())
+
+
+def test_a_loop_is_refused() -> None:
+    with pytest.raises(BundleError, match="node 'again' may never end"):
+        check_graph(loop().SerializeToString())
 
 
 def _tensors(graph: onnx.GraphProto) -> list[TensorProto]:

@@ -69,8 +69,8 @@ def remembered(seed: int = 2, motions: int = 6, steps: int = 7) -> list[tuple[in
     return [(number % ACTIONS, np.concatenate([codes, last])) for number, codes in enumerate(drawn)]
 
 
-def memory_graph(motions: list[tuple[int, Array]]) -> tuple[FakeGraph, int]:
-    """The graph that holds some motions, and how many steps these are."""
+def memory_graph(motions: list[tuple[int, Array]]) -> tuple[FakeGraph, int, int, list[int]]:
+    """The graph that holds some motions, how many steps these are, and of how many actions and up to which codes."""
     codes = np.concatenate([codes for _, codes in motions])
     action = np.concatenate([np.full(len(codes), action) for action, codes in motions])
     age = np.concatenate([np.arange(len(codes)) for _, codes in motions])
@@ -79,7 +79,8 @@ def memory_graph(motions: list[tuple[int, Array]]) -> tuple[FakeGraph, int]:
         return codes[row], numbers_of(codes[row]), action[row], age[row]
 
     given = {"codes": "*batch P", "numbers": "batch L", "action": "*batch", "age": "*batch"}
-    return FakeGraph(spec({"row": "*batch"}, given, {"P": PARTS, "L": NUMBERS}), run), len(codes)
+    graph = FakeGraph(spec({"row": "*batch"}, given, {"P": PARTS, "L": NUMBERS}), run)
+    return graph, len(codes), ACTIONS, [END, *[BODY - 1] * GROUPS]
 
 
 def source(sharpness: float = 1.0, ending: float = 0.0) -> Source:

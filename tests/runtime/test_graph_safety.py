@@ -7,7 +7,7 @@ import pytest
 from wire import EXTERNAL, doubling, field, graph, model, node, tensor, varint
 
 from motet.bundle.graph import GraphSpec, OnnxGraph, TensorSpec
-from motet.bundle.graph_safety import MAX_FIELDS, check_graph
+from motet.bundle.graph_safety import MAX_FIELDS, MAX_TEXT, check_graph
 from motet.errors import BundleError
 
 SPEC = GraphSpec((TensorSpec("x", ("batch", 3)),), (TensorSpec("y", ("batch", 3)),))
@@ -17,6 +17,13 @@ TWICE = node("Mul", ["x", "w"], ["y"])
 def test_a_graph_by_hand_runs() -> None:
     found = OnnxGraph(doubling(), SPEC)({"x": np.ones((2, 3), np.float32)})
     np.testing.assert_array_equal(found["y"], np.full((2, 3), 2.0))
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_outputs_that_are_not_finite_are_refused(value: float) -> None:
+    lying = OnnxGraph(doubling(weight=tensor("w", values=np.full(3, value, np.float32).tobytes())), SPEC)
+    with pytest.raises(BundleError, match="the graph's output 'y' is not finite"):
+        lying({"x": np.ones((2, 3), np.float32)})
 
 
 def body(inner: bytes, number: int = 6) -> bytes:
@@ -58,6 +65,10 @@ def body(inner: bytes, number: int = 6) -> bytes:
         (doubling() + field(7, 1), "a number where a message belongs"),
         (doubling(field(7, b"\xff")), "is not UTF-8"),
         (bytes(1000), "impossible number"),
+        (model(graph([node("Loop", ["n", "c", "x"], ["y"])], [])), "node 'the_Loop' may never end"),
+        (doubling(body(graph([node("Loop", ["n", "c", "x"], ["y"])], []))), "node 'the_Loop' may never end"),
+        (doubling() + field(6, "a" * (MAX_TEXT + 1)), "the graph has a text of 1048577 bytes"),
+        (doubling(weight=tensor("w", field(12, "a" * (MAX_TEXT + 1)))), "'w' has a text of 1048577 bytes"),
         (b"\x12\x06abORTM" + doubling(), "ONNX Runtime's own format"),
     ],
 )

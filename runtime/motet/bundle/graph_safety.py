@@ -3,7 +3,8 @@
 ONNX Runtime opens the files that a tensor's ``external_data`` names, also where it is given a model as bytes: some
 versions only below the working directory, older ones anywhere. So this walks the whole protocol buffer, with every
 graph in the attributes of If, Loop and Scan, and refuses data outside of the file, operators that ONNX does not define,
-functions, and all fields of ONNX's messages that it does not know.
+functions, and all fields of ONNX's messages that it does not know. Loop is refused, too, since nothing bounds how often
+it goes round; Scan takes as many steps as the tensor that it walks has.
 """
 
 from typing import NamedTuple
@@ -14,8 +15,8 @@ from motet.errors import BundleError
 DOMAINS = ("", "ai.onnx")
 """Of operators: ONNX's own. Quantised graphs need no other (MatMulInteger, DynamicQuantizeLinear)."""
 
-MAX_DEPTH, MAX_FIELDS = 64, 500_000
-"""Messages within messages, and fields of a whole graph."""
+MAX_DEPTH, MAX_FIELDS, MAX_TEXT = 64, 100_000, 1 << 20
+"""Messages within messages, fields of a whole graph, and bytes of a field that is no tensor's data."""
 
 
 class Message(NamedTuple):
@@ -49,6 +50,8 @@ _REFUSED = {
     ("model", 25): "holds functions",
 }
 _LOCATION = 14  # of a tensor's data: 0 is in the file
+_DATA = frozenset({4, 5, 6, 7, 9, 10, 11})  # fields of a tensor
+_OPERATOR = 4  # of a node
 
 
 def check_graph(model: bytes) -> None:
@@ -82,6 +85,15 @@ def _fault(kind: str, number: int, value: Value) -> str | None:
         return "has its data in another file" if value != 0 else None
     if number not in MESSAGES[kind].plain:
         return f"has the unknown field {number}"
+    if not isinstance(value, int) and len(value) > MAX_TEXT and (kind != "tensor" or number not in _DATA):
+        return f"has a text of {len(value)} bytes; at most {MAX_TEXT} are read"
+    return _fault_of_name(kind, number, value)
+
+
+def _fault_of_name(kind: str, number: int, value: Value) -> str | None:
+    """What is wrong with the name of an operator, or of a domain of operators."""
+    if (kind, number) == ("node", _OPERATOR) and _text(value) == "Loop":
+        return "may never end; unroll it, or use Scan"
     if number == MESSAGES[kind].domain and (domain := _text(value)) not in DOMAINS:
         return f"needs operators of the domain {domain[:60]!r}; only ONNX's own are allowed"
     return None

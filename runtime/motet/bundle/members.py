@@ -12,8 +12,8 @@ from typing import BinaryIO, Protocol
 
 from motet.errors import BundleError
 
-MAX_FILES, MAX_SIZE, MAX_TOTAL = 64, 1 << 30, 2 << 30
-"""Files of a bundle, and bytes of one and of all."""
+MAX_FILES, MAX_SIZE = 64, 256 << 20
+"""Files of a bundle, and bytes of all of them together."""
 
 MAX_RATIO, FREE = 100, 1 << 20
 """A file of a zip that unpacks to more than ``FREE`` bytes has at most so many times its packed size. Weights hardly
@@ -114,10 +114,8 @@ def _check_entry(info: zipfile.ZipInfo) -> None:
 def _check(sizes: Mapping[str, int]) -> None:
     if len(sizes) > MAX_FILES:
         raise BundleError(f"it holds {len(sizes)} files; a bundle has at most {MAX_FILES}")
-    for name, size in sizes.items():
+    for name in sizes:
         if not NAME.fullmatch(name):
             raise BundleError(f"{name[:80]!r} is not a plain file name")
-        if size > MAX_SIZE:
-            raise BundleError(f"{name!r} is larger than {MAX_SIZE} bytes")
-    if sum(sizes.values()) > MAX_TOTAL:
-        raise BundleError(f"its files are larger than {MAX_TOTAL} bytes together")
+    if sum(sizes.values()) > MAX_SIZE:
+        raise BundleError(f"its files are larger than {MAX_SIZE} bytes together")

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.bundle.graph import Arrays, Floats, Graph
+from motet.bundle.graph import Arrays, Floats, Graph, rows_of
 from motet.decode.loop import Loop
 from motet.errors import BundleError
 from motet.motion.quaternions import wrapped
@@ -87,8 +87,8 @@ class Table:
 
     @staticmethod
     def of(graph: Graph, count: int, mean: Floats, scale: Floats) -> "Table":
-        """What a graph "rows" holds: row (N,) -> frames, features, gaits, left."""
-        found = graph({"row": np.arange(count, dtype=np.int64)})
+        """What a graph "rows" holds: row (N,) -> frames, features, gaits, left; BundleError as :func:`rows_of`."""
+        found = rows_of(graph, count, {"gaits": (0, 1), "left": (0, count - 1 - np.arange(count))})
         return Table(found["frames"], found["features"], found["gaits"], found["left"], mean, scale)
 
 

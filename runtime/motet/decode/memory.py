@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.bundle.graph import Graph
+from motet.bundle.graph import Graph, Ranges, rows_of
 from motet.decode.rollout import Ids
 
 PAST = (1.0, 0.5, 0.25)
@@ -43,15 +43,19 @@ class Memory:
     rows: dict[int, Ids]
 
     @staticmethod
-    def of(graph: Graph, count: int) -> "Memory":
-        """What a graph "memory" holds: row (M,) -> codes (M, P), numbers (M, L), action and age (M,)."""
-        found = graph({"row": np.arange(count, dtype=np.int64)})
-        ages, actions, numbers = found["age"], found["action"], found["numbers"]
+    def of(graph: Graph, count: int, actions: int, largest: Sequence[int]) -> "Memory":
+        """What a graph "memory" holds: row (M,) -> codes (M, P), numbers (M, L), action and age (M,).
+
+        actions: how many there are. largest: of each part the largest code (P,). BundleError as :func:`rows_of`.
+        """
+        ranges: Ranges = {"action": (0, actions - 1), "age": (0, np.arange(count)), "codes": (0, largest)}
+        found = rows_of(graph, count, ranges)
+        ages, done, numbers = found["age"], found["action"], found["numbers"]
         # before the first step a figure is taken to have stood in it
         before = [np.arange(count) - np.minimum(ages, back) for back in range(1, len(PAST) + 1)]
         keys = np.concatenate([np.sqrt(w) * numbers[at] for w, at in zip(PAST, before, strict=True)], axis=1)
-        order = np.argsort(actions, kind="stable")
-        names, starts = np.unique(actions[order], return_index=True)
+        order = np.argsort(done, kind="stable")
+        names, starts = np.unique(done[order], return_index=True)
         rows = dict(zip(names.tolist(), np.split(order, starts[1:]), strict=True))
         return Memory(found["codes"], keys.astype(np.float32), ages, _parts(ages), rows)
 

@@ -70,12 +70,15 @@ class CodesModel(GenerateModel):
         super().__init__(manifest, graphs)
         codec = Fields(manifest.config, "config").fields("codec")
         self.moves, self.sizes["T"] = codec.whole("moves", 1, 1 << 15), codec.whole("hop", 1, 100)
-        ahead = [int(one) for one in codec.numbers("ahead", len(codec.items("ahead")))]
+        ahead = codec.items("ahead")
+        if len(ahead) > 100 or any(one not in (0, 1) for one in ahead):
+            raise codec.fault("0 or 1 for each of at most 100 layers", ahead, "ahead")
         back = sum(2 - one for one in ahead) + math.ceil(FINE / self.sizes["T"])
         self.sight = Sight(back, sum(ahead), self.sizes["T"])
         self._bind()
         count = Fields(manifest.config, "config").whole("remembered", 1, 1 << 20)
-        memory = Memory.of(graphs["memory"], count)
+        largest = [self.moves, *[self.sizes["K"] - 1] * self.sizes["B"]]
+        memory = Memory.of(graphs["memory"], count, self.sizes["A"], largest)
         self.source = Source(graphs["step"], graphs["part"], self.moves, self.sizes["A"], memory)
         self.known = Known.read(Fields(manifest.source), self.sizes["A"], self.vocabulary.rules)
 

@@ -17,6 +17,9 @@ CONFIDENT = 0.4
 DOUBT = 0.25
 """The power by which the probability of the likeliest action counts: sentences share actions, so it is often low."""
 
+ROUNDING = 0.01
+"""By which a log-probability may be above 0."""
+
 NEAREST = 3
 """Known sentences that are named."""
 
@@ -58,11 +61,14 @@ class Known:
         return Known(tuple(entry.text("sentence") for entry in entries), rare, rules)
 
     def understood(self, sentence: str, context: Floats) -> Understood:
-        """What a sentence is taken for, by the log-probabilities (A,) of actions."""
+        """What a sentence is taken for, by the log-probabilities (A,) of actions; BundleError where they are none."""
         asked, unheard = set(self.rules.words(sentence)), math.log(1 + len(self.sentences))
         heard = sum(self.rare.get(word, 0.0) for word in asked)
         share = heard / (sum(self.rare.get(word, unheard) for word in asked) or 1.0)
         order = np.argsort(-context, kind="stable")
         nearest = dict.fromkeys(self.sentences[action] for action in order)
-        confidence = share * math.exp(float(context[order[0]])) ** DOUBT
+        likeliest = float(context[order[0]])
+        if likeliest > ROUNDING:
+            raise BundleError(f"graph encoder: its context holds {likeliest:g}, which is no log-probability")
+        confidence = share * math.exp(likeliest) ** DOUBT
         return Understood(confidence, tuple(nearest)[:NEAREST])

@@ -19,7 +19,10 @@ from motet.motion.humanoid import BONES
 from motet.motion.motion import Motion
 from motet.motion.pose import Pose
 from motet.motion.rotations import rotmat_to_quat
-from motet.representation.root_sixd import joint_rotations
+from motet.representation.root_sixd import KINDS, ROOT_SIXD, joint_rotations
+
+CHANNELS = (*ROOT_SIXD, *(f"{bone}.{kind}" for bone in BONES for kind in KINDS))
+"""In the order of a pose's numbers."""
 
 
 class SteerModel(Controllable):
@@ -43,6 +46,8 @@ class SteerModel(Controllable):
             gait: (low, high) for gait, (low, _, high, _, _) in zip(self.gaits, speeds.tolist(), strict=True)
         }
         self.usual = dict(zip(self.gaits, speeds[:, 1].tolist(), strict=True))
+        if self.contract.channels != CHANNELS:
+            raise BundleError("manifest, motion.channels: must be those of the humanoid, in its order")
         self.sizes |= {"G": len(self.gaits), "F": FEATURES, "J": len(BONES)}
         self._bind()
         self.matcher = self._matcher(config)
@@ -61,14 +66,15 @@ class SteerModel(Controllable):
                 raise BundleError(f"manifest, graphs.step: {name!r} has {found} numbers, expected {size}")
 
     def _matcher(self, config: Fields) -> Matcher:
-        mean, scale = (np.array(config.numbers(name, FEATURES), dtype=np.float32) for name in ("mean", "scale"))
-        table = Table.of(self.graphs["rows"], config.whole("rows", 100, 1 << 20), mean, scale)
+        mean, scale = config.numbers("mean", FEATURES), config.numbers("scale", FEATURES, low=1e-6)
+        count = config.whole("rows", 100, 1 << 20)
+        table = Table.of(self.graphs["rows"], count, mean.astype(np.float32), scale.astype(np.float32))
         even, odd = (config.whole(name, 0, 1000) for name in ("even", "odd"))
         if even + odd != self.sizes["K"]:
             raise BundleError(f"manifest, config.even and odd: must be {self.sizes['K']} together, not {even + odd}")
         signs = np.repeat(np.array([1, -1], dtype=np.float32), [even, odd])
         how = config.fields("steering")
-        springs = how.number("velocity"), how.number("facing")
+        springs = how.number("velocity", 0.01, 10), how.number("facing", 0.01, 10)
         fastest = how.numbers("rates", 2)[1]
         found = Matcher(table, signs, self.fps, config.whole("every", 1, 60), fastest, springs)
         for gait, (rows, *_) in zip(self.gaits, found.goals, strict=True):

@@ -17,7 +17,6 @@ from motet.motion.motion import Motion
 from motet.motion.pose import Pose
 from motet.motion.quaternions import wrapped
 from motet.motion.rotations import Array, quat_to_rotmat
-from motet.representation.root_sixd import ROOT_SIXD
 
 if TYPE_CHECKING:
     from motet.models.steer import SteerModel
@@ -261,7 +260,6 @@ class SteerSession:
         height = np.stack([pose.height for pose in poses], axis=1)[..., None]
         quats = np.stack([pose.rotations for pose in poses], axis=1).astype(np.float64)
         axes = np.swapaxes(quat_to_rotmat(quats)[..., :2], -1, -2).reshape(*height.shape[:2], -1)
-        assert self.model.contract.channels[: len(ROOT_SIXD)] == ROOT_SIXD
         found: Array = np.concatenate([block, height, axes], axis=-1)
         return found
 
