@@ -2,6 +2,8 @@
 
 import re
 import shlex
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -43,8 +45,13 @@ def test_python_blocks_run_one_after_the_other(page: str, folder: Path) -> None:
         exec(compile(block, f"{page}, Python block {number}", "exec"), namespace)
 
 
-def test_the_readme_has_python_blocks() -> None:
-    assert blocks(PAGES["README.md"].read_text(), "python")
+def test_the_readmes_python_type_checks_strictly(tmp_path: Path) -> None:
+    found = blocks(PAGES["README.md"].read_text(), "python")
+    assert found
+    (tmp_path / "readme.py").write_text("\n".join(found))
+    checked = [sys.executable, "-m", "mypy", "--strict", str(tmp_path / "readme.py")]
+    done = subprocess.run(checked, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
 
 
 @pytest.mark.parametrize("page", PAGES)

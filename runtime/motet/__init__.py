@@ -28,16 +28,19 @@ from motet.formats import clips
 from motet.formats import read_motion as read
 from motet.formats import write_motion as write
 from motet.live.page import live_page, write_live_page
+from motet.models.codes import CodesModel, Passage, Story
 from motet.models.control import ControlModel, ControlSession, Snapshot
 from motet.models.describe import DescribeModel, Description, Part
 from motet.models.fill import FillModel
 from motet.models.generate import Generated, GenerateModel
 from motet.models.index import Hit, Index
+from motet.models.known import Understood
 from motet.models.load import load, load_as
+from motet.models.mixture import MixtureModel
 from motet.models.predict import PredictModel, PredictSession
 from motet.models.search import SearchModel
 from motet.models.steer import SteerModel
-from motet.models.steer_session import SteerSession
+from motet.models.steer_session import SteerSession, SteerSnapshot
 from motet.motion.joint_map import read_map
 from motet.motion.motion import Motion
 from motet.motion.pose import Pose
@@ -48,6 +51,7 @@ __version__ = version("motet")
 __all__ = [
     "Bundle",
     "BundleError",
+    "CodesModel",
     "ControlError",
     "ControlModel",
     "ControlSession",
@@ -62,11 +66,13 @@ __all__ = [
     "Hit",
     "Humanoid",
     "Index",
+    "MixtureModel",
     "MotetError",
     "Motion",
     "MotionError",
     "OutputError",
     "Part",
+    "Passage",
     "Pose",
     "PredictModel",
     "PredictSession",
@@ -76,8 +82,11 @@ __all__ = [
     "Snapshot",
     "SteerModel",
     "SteerSession",
+    "SteerSnapshot",
+    "Story",
     "TextError",
     "TextWarning",
+    "Understood",
     "UnitError",
     "clips",
     "from_humanoid",

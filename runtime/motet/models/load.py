@@ -1,8 +1,8 @@
 """Loading a model: from a bundle's name or path to the model of its verb."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Literal, TypeVar, overload
+from typing import Literal, TypeVar, cast, overload
 
 from motet.bundle.bundle import Bundle
 from motet.bundle.graph import Graph
@@ -40,7 +40,9 @@ def load(name_or_path: Literal["describe"], options: SessionOptions | None = Non
 @overload
 def load(name_or_path: Literal["fill"], options: SessionOptions | None = None) -> FillModel: ...
 @overload
-def load(name_or_path: Literal["generate", "cmu-generate"], options: SessionOptions | None = None) -> GenerateModel: ...
+def load(name_or_path: Literal["generate"], options: SessionOptions | None = None) -> CodesModel: ...
+@overload
+def load(name_or_path: Literal["cmu-generate"], options: SessionOptions | None = None) -> MixtureModel: ...
 @overload
 def load(name_or_path: Literal["predict"], options: SessionOptions | None = None) -> PredictModel: ...
 @overload
@@ -58,15 +60,18 @@ def load(name_or_path: str | Path, options: SessionOptions | None = None) -> Mod
         return kind_of(bundle.manifest).load(bundle, options)
 
 
-def load_as(kind: type[Kind], name_or_path: str | Path, options: SessionOptions | None = None) -> Kind:
-    """As :func:`load`, for one verb: BundleError where the bundle is for another."""
-    model = load(name_or_path, options)
-    if not isinstance(model, kind):
-        need = f"need one for {kind.VERB!r}"
-        if model.VERB == kind.VERB:
-            need = f"its loop is {model.manifest.loop!r}; need one that is a {kind.__name__}, such as {kind.VERB!r}"
+def load_as(kind: Callable[..., Kind], name_or_path: str | Path, options: SessionOptions | None = None) -> Kind:
+    """Like :func:`load`, for one class of models, perhaps an abstract one: BundleError where the bundle is for another.
+
+    kind: the class; typed as a callable, since checkers take no abstract class for a ``type``.
+    """
+    wanted, model = cast(type[BundleModel], kind), load(name_or_path, options)
+    if not isinstance(model, wanted):
+        need = f"need one for {wanted.VERB!r}"
+        if model.VERB == wanted.VERB:
+            need = f"its loop is {model.manifest.loop!r}; need one that is a {wanted.__name__}, such as {wanted.VERB!r}"
         raise BundleError(f"bundle {name_or_path} is for {model.VERB!r}; {need}")
-    return model
+    return cast(Kind, model)
 
 
 def build(manifest: Manifest, graphs: Mapping[str, Graph]) -> Model:
