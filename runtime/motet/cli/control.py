@@ -8,9 +8,9 @@ import click
 from motet.bundle.session import SessionOptions
 from motet.cli.notes import noted
 from motet.cli.options import session_options
-from motet.cli.reading import Read, like_option, naming, out_option, read_options
+from motet.cli.reading import Read, naming, out_option, read_options
+from motet.cli.writing import Output, size, write_options
 from motet.formats import check_writable, write_motion
-from motet.formats.character import Character, put_onto
 from motet.formats.html import write as write_html
 from motet.models.controllable import Controllable
 from motet.models.load import load_as
@@ -33,9 +33,6 @@ from motet.models.load import load_as
     help="Sampling temperature of models that draw; lower is more deterministic.  [default: the bundle's]",
 )
 @click.option(
-    "--in-place", is_flag=True, default=None, help="Leave the root in place, of models whose feet say where they go."
-)
-@click.option(
     "--loose-feet", "hold_feet", flag_value=False, default=None, help="Do not hold feet to the ground as they stand."
 )
 @click.option(
@@ -45,7 +42,7 @@ from motet.models.load import load_as
     default=None,
     help="Show the frames of a net that trembles as they are.",
 )
-@like_option
+@write_options
 @session_options
 @read_options
 def control(
@@ -53,7 +50,7 @@ def control(
     out: Path,
     bundle: str,
     start: str | None,
-    like: Character | None,
+    output: Output,
     session: SessionOptions,
     read: Read,
     **settings: Any,
@@ -70,9 +67,9 @@ def control(
     with naming(start), noted():
         first = read(Path(start)) if start and Path(start).suffix else start
         motion = model.run(script, first, **{name: value for name, value in settings.items() if value is not None})
-    motion = put_onto(motion, like) if like else motion
+    motion = output.shaped(motion)
     if out.suffix.lower() == ".html":
         write_html(out, motion, captions=captions, title=script)
     else:
         write_motion(out, motion)
-    click.echo(f"{out}: {len(motion)} frames at {motion.fps:g} fps, {motion.duration:g} s")
+    click.echo(f"{out}: {size(len(motion), motion.fps)}")

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import click
 
-from motet.cli.reading import FPS, Read, Tries, like_option, places, read_options
+from motet.cli.reading import Read, Tries, places, read_options
+from motet.cli.writing import Output, size, write_options
 from motet.formats import READS, WRITES, write_motion
-from motet.formats.character import Character, put_onto
 from motet.motion.foot_hold import hold_feet as feet_held
 from motet.motion.joint_map import read_map
 from motet.motion.kinematics import skeleton_of
@@ -32,7 +32,6 @@ log = logging.getLogger(__name__)
 )
 @click.argument("files", nargs=-1, required=True, type=Path, metavar="IN... [OUT]")
 @click.option("-o", "--out", type=Path, help="File to write. [default: the second of two files]")
-@click.option("--fps", type=FPS, help="Resample to this frame rate.")
 @click.option("--from", "start", type=click.FloatRange(0), default=0.0, help="Cut: seconds from the start.")
 @click.option("--to", "stop", type=click.FloatRange(0, min_open=True), help="Cut: seconds to stop at.")
 @click.option("--mirror", is_flag=True, help="Swap left and right.")
@@ -43,12 +42,11 @@ log = logging.getLogger(__name__)
 )
 @click.option("--hold-feet", is_flag=True, help="Keep feet that stand from sliding; implies --humanoid.")
 @click.option("--loop", is_flag=True, help="Cut to what plays in a circle without a leap, as strides of a walk.")
-@like_option
+@write_options
 @read_options
 def convert(
     files: Sequence[Path],
     out: Path | None,
-    fps: float | None,
     start: float,
     stop: float | None,
     mirror: bool,
@@ -57,7 +55,7 @@ def convert(
     map_file: Path | None,
     hold_feet: bool,
     loop: bool,
-    like: Character | None,
+    output: Output,
     read: Read,
 ) -> None:
     """Convert motion files."""
@@ -72,12 +70,11 @@ def convert(
             if humanoid or map_file or hold_feet:
                 motion = _to_humanoid(motion, map_file)
             motion = feet_held(motion) if hold_feet else motion
-            motion = put_onto(motion, like) if like else motion
+            motion = output.shaped(motion)
             motion = motion.scaled(METRES[unit]) if unit else motion
-            motion = motion.resample(fps) if fps else motion
             motion = looped(motion) if loop else motion
             write_motion(place, mirrored(motion) if mirror else motion)
-            click.echo(f"{place}: {len(motion)} frames at {motion.fps:g} fps, {motion.duration:g} s")
+            click.echo(f"{place}: {size(len(motion), motion.fps)}")
     tries.finish()
 
 

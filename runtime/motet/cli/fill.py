@@ -7,14 +7,12 @@ import click
 
 from motet.bundle.session import SessionOptions
 from motet.cli.options import session_options
-from motet.cli.reading import Read, Tries, like_option, naming, out_option, places, read_options
+from motet.cli.reading import Read, Tries, naming, out_option, places, read_options
+from motet.cli.writing import Output, size, write_options
 from motet.errors import quoted
-from motet.formats import write_motion
-from motet.formats.character import Character
 from motet.models.fill import JOIN_SECONDS, LOOP_SECONDS, FillModel
 from motet.models.gaps import Gap
 from motet.models.load import load_as
-from motet.motion.motion import Motion
 
 bundle_option = click.option("--bundle", default="fill", show_default=True, help="Name or path of a bundle.")
 
@@ -45,7 +43,7 @@ def _gaps(context: click.Context, option: click.Parameter, texts: tuple[str, ...
 @click.option("--loop", is_flag=True, help="Add a transition from the end to the start instead.")
 @click.option("--seconds", type=float, help=f"With --loop: how long it takes. [default: {LOOP_SECONDS}]")
 @bundle_option
-@like_option
+@write_options
 @session_options
 @read_options
 def fill(
@@ -55,7 +53,7 @@ def fill(
     loop: bool,
     seconds: float | None,
     bundle: str,
-    like: Character | None,
+    output: Output,
     session: SessionOptions,
     read: Read,
 ) -> None:
@@ -75,8 +73,8 @@ def fill(
                 found = model.looped(motion, seconds=LOOP_SECONDS if seconds is None else seconds)
             else:
                 found = model.fill(motion, gaps)
-            write_motion(place, found, like=like)
-            _say(place, found)
+            found = output.write(place, found)
+            click.echo(f"{place}: {size(len(found), found.fps)}")
     tries.finish()
 
 
@@ -86,7 +84,7 @@ def fill(
 @out_option
 @click.option("--seconds", type=float, default=JOIN_SECONDS, show_default=True, help="How long the transition takes.")
 @bundle_option
-@like_option
+@write_options
 @session_options
 @read_options
 def join(
@@ -95,7 +93,7 @@ def join(
     out: Path,
     seconds: float,
     bundle: str,
-    like: Character | None,
+    output: Output,
     session: SessionOptions,
     read: Read,
 ) -> None:
@@ -107,9 +105,5 @@ def join(
     one, other = read(first), read(second)
     with naming(f"{first} and {second}"):
         found = model.join(one, other, seconds=seconds)
-    write_motion(out, found, like=like)
-    _say(out, found)
-
-
-def _say(place: Path, found: Motion) -> None:
-    click.echo(f"{place}: {len(found)} frames at {found.fps:g} fps, {found.duration:g} s")
+    found = output.write(out, found)
+    click.echo(f"{out}: {size(len(found), found.fps)}")

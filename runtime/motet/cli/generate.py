@@ -12,9 +12,9 @@ import click
 from motet.bundle.session import SessionOptions
 from motet.cli.notes import noted
 from motet.cli.options import session_options
-from motet.cli.reading import FPS, Tries, bar, like_option, naming, out_option, places
-from motet.formats import check_writable, read_motion, write_motion
-from motet.formats.character import Character
+from motet.cli.reading import Tries, bar, naming, out_option, places
+from motet.cli.writing import Output, size, write_options
+from motet.formats import check_writable, read_motion
 from motet.models.codes import CodesModel, Story
 from motet.models.generate import PLAYED, Generated, GenerateModel
 from motet.models.load import load_as
@@ -40,7 +40,6 @@ from motet.motion.looping import looped
 @click.option(
     "--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed; later texts use seed + 1, ..."
 )
-@click.option("--fps", type=FPS, default=PLAYED, show_default=True, help="Frame rate to write.")
 @click.option("--no-plant", is_flag=True, help="Skip foot planting: the figure moves as drawn.")
 @click.option("--all", "every", is_flag=True, help="Write all hypotheses, not only the best.")
 @click.option("--story", is_flag=True, help="One motion for all texts, one after the other.")
@@ -48,18 +47,17 @@ from motet.motion.looping import looped
 @click.option("--stand", type=click.Choice(["start", "end", "both"]), help="Start or end in standing.")
 @click.option("--loop", is_flag=True, help="Write the part that plays in a circle without a leap.")
 @click.option("--strict", is_flag=True, help="Refuse a text of which the model knows only a part.")
-@like_option
+@write_options
 @session_options
 @click.option("--json", "as_json", is_flag=True, help="Print a list with input and hypotheses of each text.")
 def generate(
     texts: tuple[str, ...],
     out: Path,
     bundle: str,
-    fps: float,
     no_plant: bool,
     every: bool,
     seed: int,
-    like: Character | None,
+    output: Output,
     story: bool,
     after: Path | None,
     stand: str | None,
@@ -79,7 +77,7 @@ def generate(
     tries = Tries()
     asked = tries.usable(model, texts)
     given = {"strict": strict, **settings}
-    shown = partial(_written, fps=fps, plant=not no_plant, loop=loop, like=like)
+    shown = partial(_written, plant=not no_plant, loop=loop, output=output)
     with noted():
         if story or after is not None or stand is not None:
             groups = [asked] if story and asked else [[index] for index in asked]
@@ -145,23 +143,19 @@ def _rows(
     return rows
 
 
-def _written(
-    result: Generated, place: Path, fps: float, plant: bool, loop: bool, like: Character | None
-) -> dict[str, Any]:
-    motion = result.playable(fps, plant)
-    motion = looped(motion) if loop else motion
-    write_motion(place, motion, like=like)
-    size = {"frames": len(motion), "fps": motion.fps, "seconds": motion.duration}
+def _written(result: Generated, place: Path, plant: bool, loop: bool, output: Output) -> dict[str, Any]:
+    motion = result.playable(output.fps or PLAYED, plant)
+    motion = output.write(place, looped(motion) if loop else motion)
+    facts = {"frames": len(motion), "fps": motion.fps, "seconds": motion.duration}
     passages = {"passages": list(map(asdict, result.passages))} if isinstance(result, Story) else {}
-    return {"output": str(place), "log_likelihood": result.log_likelihood, **size, **passages}
+    return {"output": str(place), "log_likelihood": result.log_likelihood, **facts, **passages}
 
 
 def _lines(rows: list[dict[str, Any]]) -> Iterator[str]:
     for row in rows:
         for found in row["hypotheses"]:
-            size = f"{found['frames']} frames at {found['fps']:g} fps, {found['seconds']:.3g} s"
             likelihood = found["log_likelihood"]
             score = "" if likelihood is None else f", log-likelihood {likelihood:.1f}"
-            yield f"{found['output']}: {size}{score}: {row['input']}"
+            yield f"{found['output']}: {size(found['frames'], found['fps'])}{score}: {row['input']}"
             for passage in found.get("passages", ()):
                 yield f"  {passage['start']:.1f}-{passage['stop']:.1f} s {passage['text']}"

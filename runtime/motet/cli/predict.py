@@ -10,10 +10,9 @@ import click
 
 from motet.bundle.session import SessionOptions
 from motet.cli.options import session_options
-from motet.cli.reading import Read, Tries, bar, like_option, out_option, places, read_options, say_resampled
+from motet.cli.reading import Read, Tries, bar, out_option, places, read_options, say_resampled
+from motet.cli.writing import Output, size, write_options
 from motet.errors import MotionError
-from motet.formats import write_motion
-from motet.formats.character import Character
 from motet.models.codes import CodesModel
 from motet.models.load import load_as
 from motet.models.predict import MAX_SAMPLES, PredictModel
@@ -40,7 +39,7 @@ NOBODY = "none"
     metavar="BUNDLE",
     help=f"What goes on after the horizon, and gives samples; {NOBODY}: the predictor itself, until it dies away.",
 )
-@like_option
+@write_options
 @session_options
 @read_options
 @click.option("--json", "as_json", is_flag=True, help="Print a list with input and samples of each motion.")
@@ -53,7 +52,7 @@ def predict(
     samples: int | None,
     seed: int,
     beyond: str,
-    like: Character | None,
+    output: Output,
     as_json: bool,
     session: SessionOptions,
     read: Read,
@@ -74,7 +73,7 @@ def predict(
         with tries.of(source):
             motion = read(source)
             own = outs[number * (samples or 1) :][: samples or 1]
-            said = _written(asked, asked.futures(motion, writer), own, like)
+            said = _written(asked, asked.futures(motion, writer), own, output)
             rows.append({"input": str(source), **said, "beyond": writer and beyond, **asked.expected(motion, writer)})
             rates.append(motion.fps)
             if not as_json:
@@ -134,18 +133,17 @@ def _names(source: Path, samples: int | None) -> list[str]:
     return [f"{source.stem}-{i + 1}" for i in range(samples or 1)] if several else [source.stem]
 
 
-def _written(asked: Asked, found: Sequence[Motion], outs: Sequence[Path], like: Character | None) -> dict[str, Any]:
+def _written(asked: Asked, found: Sequence[Motion], outs: Sequence[Path], output: Output) -> dict[str, Any]:
     """Write the futures of a motion; what is said of them."""
-    for future, place in zip(found, outs, strict=True):
-        write_motion(place, future, like=like)
-    first = found[0]
+    start = (len(found[0]) - asked.frames) / found[0].fps
+    first, *_ = [output.write(place, future) for future, place in zip(found, outs, strict=True)]
     samples = [{"output": str(place), "seed": asked.seed + i} for i, place in enumerate(outs)]
-    size = {"fps": first.fps, "frames": len(first), "seconds": first.duration, "start": len(first) - asked.frames}
-    return {**size, "samples": samples}
+    facts = {"fps": first.fps, "frames": len(first), "seconds": first.duration, "start": round(start * first.fps)}
+    return {**facts, "samples": samples}
 
 
 def _lines(row: dict[str, Any], append: bool) -> Iterator[str]:
     start = row["start"]
     said = f", predicted from {start / row['fps']:.3g} s on (frame {start}, counted from 0)" if append else ""
     for sample in row["samples"]:
-        yield f"{sample['output']}: {row['frames']} frames at {row['fps']:g} fps, {row['seconds']:g} s{said}"
+        yield f"{sample['output']}: {size(row['frames'], row['fps'])}{said}"

@@ -10,8 +10,9 @@ from typing import Any
 
 import click
 
+from motet.cli.writing import FPS
 from motet.errors import MotetError, MotionError, UnitError, quoted
-from motet.formats import FORMATS, WRITABLE, check_writable, read_character, read_motion
+from motet.formats import FORMATS, WRITABLE, check_writable, read_motion
 from motet.models.language import LanguageModel
 from motet.models.progress import Progress, silent
 from motet.motion.motion import Motion
@@ -21,9 +22,6 @@ log = logging.getLogger(__name__)
 
 Read = Callable[[Path], Motion]
 
-FPS = click.FloatRange(0, 10_000, min_open=True)
-"""Frame rates that a motion is resampled to."""
-
 unit_option = click.option(
     "--unit-in", type=click.Choice(list(METRES)), help="Length unit of files that do not state theirs."
 )
@@ -31,23 +29,6 @@ unit_option = click.option(
 out_option = click.option(
     "-o", "--out", required=True, type=Path, help=f"File to write; its extension is the format: {' '.join(WRITABLE)}."
 )
-
-
-def like_option(command: Callable[..., None]) -> Callable[..., None]:
-    """Gives a command ``like``, the character that ``--like`` names, or None; it is read before long work starts."""
-
-    @click.option(
-        "--like",
-        "like",
-        type=Path,
-        metavar="CHARACTER",
-        help="Put the result on the skeleton of this file (.bvh, .glb, .vrm, ...).",
-    )
-    @functools.wraps(command)
-    def with_character(like: Path | None, **options: Any) -> None:
-        command(like=None if like is None else read_character(like), **options)
-
-    return with_character
 
 
 def read_options(command: Callable[..., None]) -> Callable[..., None]:

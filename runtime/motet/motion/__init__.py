@@ -4,6 +4,7 @@ from motet.motion.feet import feet_of, ground_of, has_feet
 from motet.motion.foot_hold import hold_feet
 from motet.motion.heading import heading, without_heading
 from motet.motion.humanoid import HUMANOID
+from motet.motion.in_place import in_place
 from motet.motion.joint_map import JointMap, read_map
 from motet.motion.kinematics import global_transforms, local_rotations, local_translations, positions
 from motet.motion.looping import looped
@@ -31,6 +32,7 @@ __all__ = [
     "has_feet",
     "heading",
     "hold_feet",
+    "in_place",
     "lateral_axis",
     "lay_root_path",
     "local_rotations",
