@@ -85,6 +85,7 @@ def test_a_skeleton_is_recognised_and_its_left_hand_goes_up(name: str) -> None:
     assert humanoid.convention == CONVENTIONS[name]
     assert humanoid.confidence > 0.9
     assert 0.7 < (humanoid.leg or 0) < 1.0
+    assert 1.5 < (humanoid.height or 0) < 2.0
     place = places_of(humanoid)
     assert place["head"][0, 1] > 0.5
     assert place["leftFoot"][0, 1] < -0.8
@@ -96,6 +97,13 @@ def test_a_skeleton_is_recognised_and_its_left_hand_goes_up(name: str) -> None:
     for side in ("left", "right"):
         bent = place[f"{side}Hand"] - place[f"{side}LowerArm"]
         assert bent[3, 2] - bent[0, 2] > 0.1
+
+
+def test_a_figure_is_as_tall_as_its_bones_are_long() -> None:
+    found = to_humanoid(dancing(3))
+    assert (found.unit, found.height) == (1.0, pytest.approx(1.70))
+    small = to_humanoid(replace(dancing(3), skeleton=replace(HUMANOID, metres_per_unit=0.5)))
+    assert (small.unit, small.height) == (0.5, pytest.approx(0.85))
 
 
 @pytest.mark.parametrize("name", CONVENTIONS)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from motet.errors import MotionError, listed
-from motet.motion.humanoid import LEFT_RIGHT, LEG, sided
+from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, LEG, REST, SPINE, leg_length, sided
 from motet.motion.joint_map import NEEDED, JointMap
 from motet.motion.rest_pose import Aims, direction, legs_up, to_left, trunk_up, unit
 from motet.motion.rotations import Array
@@ -71,6 +71,25 @@ def unit_of(skeleton: Skeleton, leg: float) -> Unit:
     if guess is None:
         return Unit(None, "unit not known: the figure is taken to be an adult's size")
     return Unit(UNITS[guess], f"unit taken to be {guess} from the length of the legs, {leg * UNITS[guess]:.2f} m")
+
+
+def height_of(skeleton: Skeleton, joint_map: JointMap, leg: float) -> float:
+    """Height of a figure that stands straight, in the skeleton's unit: of legs and back as they are long, and of what
+    joints do not tell, soles and crown, as the humanoid's."""
+    top = "head" if "head" in joint_map.joints else "neck" if joint_map.neck else SPINE[-1]
+    joint = joint_map.joints.get("head", (*joint_map.spine, *joint_map.neck)[-1])
+    own = _back(skeleton, joint_map.carrier(skeleton), joint)
+    usual = _back(HUMANOID, 0, HUMANOID.index(top))
+    return leg + own + (float(REST[:, 1].max()) - leg_length() - usual) * leg / leg_length()
+
+
+def _back(skeleton: Skeleton, hips: int, joint: int) -> float:
+    """How far a joint is from the hips, along the bones."""
+    length = 0.0
+    while joint != hips:
+        length += float(np.linalg.norm(skeleton.offsets[joint]))
+        joint = skeleton.joints[joint].parent
+    return length
 
 
 def _guess(leg: float) -> str | None:

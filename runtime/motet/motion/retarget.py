@@ -12,7 +12,7 @@ import numpy as np
 
 from motet.errors import MotionError
 from motet.motion import fitting, humanoid
-from motet.motion.figure_checks import check_frames, unit_of
+from motet.motion.figure_checks import check_frames, height_of, unit_of
 from motet.motion.fitting import Fitted, fit, upright
 from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, NECK, PARENTS, SPINE, leg_length, sided
 from motet.motion.joint_map import JointMap
@@ -44,7 +44,9 @@ class Humanoid:
     joints: bone -> the names of the joints that it was taken from.
     convention: the convention of the joints' names, "by the tree", or the name of the user's map.
     confidence: from 0 to 1, how sure it is that every joint was taken for what it is.
+    unit: metres of one unit of the file's lengths, as it says or as the legs tell; None where it is not known.
     leg: metres of the figure's thigh and shin together, None where its unit is not known.
+    height: about how tall the figure stands, in metres, None where its unit is not known.
     notes: sentences about what was assumed.
     """
 
@@ -52,7 +54,9 @@ class Humanoid:
     joints: dict[str, tuple[str, ...]]
     convention: str
     confidence: float
+    unit: float | None
     leg: float | None
+    height: float | None
     notes: tuple[str, ...]
 
     @property
@@ -95,7 +99,9 @@ def to_humanoid(motion: Motion, joint_map: JointMap | None = None) -> Humanoid:
         joint_map.names(skeleton),
         joint_map.convention,
         round(joint_map.confidence * fitted.confidence, 2),
+        unit.metres,
         None if unit.metres is None else fitted.leg * unit.metres,
+        None if unit.metres is None else height_of(skeleton, joint_map, fitted.leg) * unit.metres,
         tuple(notes),
     )
 
