@@ -23,9 +23,9 @@ from motet.models.describe import DescribeModel
 from motet.models.language import MAX_SECONDS
 from motet.motion.humanoid import BONES, HUMANOID
 from motet.motion.kinematics import global_transforms
-from motet.motion.mixamo import MIXAMO
 from motet.motion.motion import Motion
 from motet.motion.retarget import from_humanoid, to_humanoid
+from motet.motion.rigs import MIXAMO
 
 ARCHIVES = ("cmu-asfamc.zip", "cmu-asfamc-more.zip", "cmu-bvh.zip", "cmu-bvh-more.zip", "accad-bvh.zip")
 

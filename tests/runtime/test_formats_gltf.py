@@ -12,9 +12,9 @@ from motet.errors import FormatError, MotionError
 from motet.formats import glb, gltf, gltf_data, read_motion, vrma
 from motet.motion.humanoid import BONES, HUMANOID, REST
 from motet.motion.kinematics import global_transforms, positions, skeleton_of
-from motet.motion.mixamo import MIXAMO
 from motet.motion.motion import Motion
 from motet.motion.retarget import from_humanoid, to_humanoid
+from motet.motion.rigs import MIXAMO
 from motet.motion.rotations import Array, quat_to_rotmat, rotmat_to_quat
 
 SKELETONS = Path(__file__).parent / "skeletons"

@@ -10,8 +10,9 @@ import click
 
 from motet.formats import read_character, write_motion
 from motet.formats.character import Character, put_onto
-from motet.motion.in_place import in_place
 from motet.motion.motion import Motion
+from motet.motion.rigs import RIGS
+from motet.motion.root_motion import in_place
 
 FPS = click.FloatRange(0, 10_000, min_open=True)
 """Frame rates that a motion is resampled to."""
@@ -46,7 +47,7 @@ def write_options(command: Callable[..., None]) -> Callable[..., None]:
         "like",
         type=Path,
         metavar="CHARACTER",
-        help="Put the result on the skeleton of this file (.bvh, .glb, .vrm, ...).",
+        help=f"Put the result on the skeleton of this file (.bvh, .glb, .vrm, ...), or of a rig: {', '.join(RIGS)}.",
     )
     @click.option("--fps", type=FPS, help="Frame rate to write, such as 24, 25, 30 or 60. [default: the result's own]")
     @click.option("--in-place", is_flag=True, help="Take out the way over the ground; height and turns stay.")

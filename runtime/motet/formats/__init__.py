@@ -22,6 +22,7 @@ from motet.files import File, check_place, place_of
 from motet.formats.character import Character, put_onto
 from motet.formats.clips import Clip, split_clip
 from motet.motion.motion import Motion
+from motet.motion.rigs import rig
 from motet.motion.skeleton import Skeleton
 from motet.motion.units import metres
 
@@ -153,8 +154,11 @@ def clips(file: File, *, format: str | None = None) -> tuple[str, ...]:
 def read_character(file: File) -> Character:
     """Read a skeleton to put motions onto: of glTF and VRM files as their nodes have it, of others that of the motion.
 
-    FormatError as :func:`read_motion`.
+    The name of a rig out of :data:`motet.motion.rigs.RIGS`, such as "mixamo", gives that rig where there is no such
+    file. FormatError as :func:`read_motion`.
     """
+    if isinstance(file, str | Path) and not Path(file).suffix and not Path(file).exists():
+        return _character(_rig(Path(file)))
     if _format(file, None, READABLE, "read").reader != "gltf":
         return Character(read_motion(file))
     from motet.formats import gltf
@@ -167,8 +171,8 @@ def write_motion(
 ) -> None:
     """Write a motion in the format of the path's extension, or in ``format``, which a file object needs.
 
-    like: a character whose skeleton the motion is put onto: a file of it (.bvh, .glb, .vrm, ...), a motion of it, or
-        its skeleton.
+    like: a character whose skeleton the motion is put onto: a file of it (.bvh, .glb, .vrm, ...), a motion of it,
+        its skeleton, or the name of a rig ("mixamo", "rigify", "unity", "unreal").
     FormatError, MotionError or OutputError if that is not possible; nothing is written then.
     """
     check_writable(file, format)
@@ -204,6 +208,13 @@ def _character(like: File | Character | Motion | Skeleton) -> Character:
     if isinstance(like, Motion):
         return Character(like)
     return like if isinstance(like, Character) else read_character(like)
+
+
+def _rig(name: Path) -> Skeleton:
+    try:
+        return rig(str(name))
+    except MotionError as error:
+        raise FormatError(name, f"no such file, and {error}") from error
 
 
 def _in_unit(path: Path, motion: Motion, unit: float) -> Motion:

@@ -6,6 +6,7 @@ from motet.errors import MotionError
 from motet.motion.joint_map import JointMap
 from motet.motion.motion import Motion
 from motet.motion.retarget import from_humanoid, on_humanoid
+from motet.motion.root_motion import travel_on_root
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,7 @@ def put_onto(motion: Motion, character: Character) -> Motion:
         return motion
     humanoid = on_humanoid(motion)
     try:
-        return from_humanoid(humanoid, character.rest, character.joint_map)
+        found = from_humanoid(humanoid, character.rest, character.joint_map)
     except MotionError as error:
         raise MotionError(f"the character cannot take a motion: {error}") from error
+    return travel_on_root(found, character.joint_map)

@@ -4,14 +4,14 @@ from motet.motion.feet import feet_of, ground_of, has_feet
 from motet.motion.foot_hold import hold_feet
 from motet.motion.heading import heading, without_heading
 from motet.motion.humanoid import HUMANOID
-from motet.motion.in_place import in_place
 from motet.motion.joint_map import JointMap, read_map
 from motet.motion.kinematics import global_transforms, local_rotations, local_translations, positions
 from motet.motion.looping import looped
 from motet.motion.mirror import lateral_axis, mirror
-from motet.motion.mixamo import MIXAMO
 from motet.motion.motion import UNITS, Motion
 from motet.motion.retarget import Humanoid, from_humanoid, to_humanoid
+from motet.motion.rigs import MIXAMO, rig
+from motet.motion.root_motion import in_place
 from motet.motion.root_path import lay_root_path
 from motet.motion.sides import partners_of, sides_of
 from motet.motion.skeleton import Joint, Skeleton
@@ -42,6 +42,7 @@ __all__ = [
     "partners_of",
     "positions",
     "read_map",
+    "rig",
     "sides_of",
     "to_humanoid",
     "without_heading",

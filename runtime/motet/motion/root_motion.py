@@ -1,16 +1,20 @@
-"""Motions in place: without the way over the ground, as engines want clips of figures that their code moves."""
+"""The way over the ground: taken out, for figures that an engine's own code moves, or laid on a root at the floor."""
 
 import numpy as np
 
 from motet.errors import MotionError
 from motet.motion.fitting import fit, upright
-from motet.motion.kinematics import AXES, global_transforms, posed, skeleton_of
+from motet.motion.joint_map import JointMap
+from motet.motion.kinematics import AXES, global_transforms, local_translations, posed, skeleton_of, with_channels
 from motet.motion.motion import Motion
 from motet.motion.products import inverse, rotated
 from motet.motion.retarget import map_of
 from motet.motion.rotations import Array
 
 Y = np.array([0.0, 1.0, 0.0])
+
+AT_FLOOR = 0.3
+"""Of the figure's height: a root this far below what carries legs and back rests at the floor."""
 
 
 def in_place(motion: Motion) -> Motion:
@@ -29,6 +33,25 @@ def in_place(motion: Motion) -> Motion:
         if any(f"{skeleton.names[joint]}.t{axis}" in motion.channels for axis in AXES):
             motion = _over_origin(motion, joint, up)
     return motion
+
+
+def travel_on_root(motion: Motion, joint_map: JointMap | None = None) -> Motion:
+    """The motion with its way over the ground on the root, where that rests at the floor and carries the hips.
+
+    So Unreal and Godot take it for root motion; turns stay with the hips. Any other motion comes back as it is.
+    MotionError for what is no human figure.
+    """
+    skeleton = skeleton_of(motion)
+    joint = (joint_map or map_of(motion)).carrier(skeleton)
+    if float(np.linalg.norm(skeleton.rest_positions[joint])) < AT_FLOOR * skeleton.height:
+        return motion
+    moves = local_translations(motion)[:, [0, joint]]
+    rotations, places = global_transforms(motion)
+    way = (places[:, joint] - places[:, 0]) * (1 - Y)
+    moves[:, 0] += way
+    moves[:, 1] -= rotated(inverse(rotations[:, skeleton.joints[joint].parent]), way)
+    names = tuple(f"{skeleton.names[i]}.t{axis}" for i in (0, joint) for axis in AXES)
+    return with_channels(motion, names, moves.reshape(len(motion), 6), ("length",) * 6)
 
 
 def _over_origin(motion: Motion, joint: int, up: Array) -> Motion:
