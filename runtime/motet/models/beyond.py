@@ -211,9 +211,14 @@ def carried_on(contract: MotionContract, frames: ArrayLike, own: Motion, figure:
 def brought_back(following: Motion, own: Motion, figure: Motion) -> tuple[Motion, Motion]:
     """What follows on the contract's figure, and the motion before it: both the motion's own, or where that is not
     possible on that figure. Arguments as :func:`carried_on`."""
-    if figure is not own and (back := carried_back(following, figure, own)) is not None:
+    if not _same_joints(own, figure) and (back := carried_back(following, figure, own)) is not None:
         return back, own
     return following, figure
+
+
+def _same_joints(own: Motion, figure: Motion) -> bool:
+    """Whether a motion was taken as it is, with no more than its length unit found."""
+    return figure is own or (own.skeleton and own.skeleton.joints) == (figure.skeleton and figure.skeleton.joints)
 
 
 def together(before: Motion, following: Motion) -> Motion:

@@ -15,7 +15,7 @@ from motet.motion.skeleton import Skeleton
 from motet.representation import named
 from motet.representation.base import FrameMirror, phases
 from motet.representation.figure import in_joints_of
-from motet.representation.foreign import brought, foreign
+from motet.representation.foreign import brought, foreign, in_known_unit
 
 LIMIT = 50.0
 """Standard deviations: z is clipped to this, in the nets' graphs too. Of 256 of CMU's trials one frame in a thousand
@@ -80,7 +80,8 @@ class MotionContract:
         return next(sequences(self.representation, self.on_figure(motion), self.fps, self._like)).values
 
     def on_figure(self, motion: Motion) -> Motion:
-        """A motion of any human figure on the contract's skeleton; as it is where it has the joints or channels.
+        """A motion of any human figure on the contract's skeleton; as it is where it has the joints or channels, with
+        the length unit that its skeleton tells where the file does not.
 
         One that is brought there comes at the contract's frame rate where its own is higher, beginning with its first
         frame; joints of which the humanoid says nothing, such as thumbs, stand as they do on average. MotionError, with
@@ -90,7 +91,7 @@ class MotionContract:
             return motion
         reason = foreign(motion, self.skeleton, self._joints)
         if reason is None:
-            return motion
+            return in_known_unit(motion, self.skeleton)
         if named(self.representation).required and not any(channel.endswith(".tx") for channel in motion.channels):
             raise MotionError("this motion lacks the root's tx, ty and tz: it does not say where the figure goes")
         slower = motion.continuous().resample(self.fps) if motion.fps > self.fps else motion

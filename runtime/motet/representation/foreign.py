@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from motet.errors import MotionError, listed
+from motet.motion.figure_checks import leg_of, unit_of
 from motet.motion.humanoid import HUMANOID
 from motet.motion.kinematics import (
     AXES,
@@ -20,6 +21,7 @@ from motet.motion.kinematics import (
 from motet.motion.mmm_figure import is_mmm
 from motet.motion.motion import Motion
 from motet.motion.products import inverse, product
+from motet.motion.rest_pose import aims_of
 from motet.motion.retarget import from_humanoid, map_of, on_humanoid, to_humanoid
 from motet.motion.rotations import Array, rotmat_to_rotvec, rotvec_to_rotmat
 from motet.motion.skeleton import Skeleton
@@ -29,6 +31,9 @@ log = logging.getLogger(__name__)
 
 AT_REST = 1e-6
 """Degrees of rounding."""
+
+ROUNDED = 1e-5
+"""Of a figure's height: what files round lengths to."""
 
 CLEAN = 1.0
 """Degrees by which hips that were brought to the humanoid and back may be turned: more, and the figure's own world is
@@ -44,6 +49,30 @@ def foreign(motion: Motion, skeleton: Skeleton, joints: Iterable[str]) -> str | 
     if lacking:
         return f"the model's figure has joints that this motion lacks: {listed(lacking)}"
     return other_bones(own, skeleton)
+
+
+def in_known_unit(motion: Motion, figure: Skeleton) -> Motion:
+    """A motion whose file does not say its length unit in the one that its skeleton tells: that of a figure with the
+    same bones, or else by the length of its legs; as it is where neither tells."""
+    own = motion.skeleton
+    if own is None or own.metres_per_unit is not None:
+        return motion
+    if figure.metres_per_unit is not None and _same_bones(own, figure):
+        return motion.with_unit(figure.metres_per_unit)
+    try:
+        joint_map = map_of(motion)
+        unit = unit_of(own, leg_of(own, joint_map, aims_of(own, joint_map), own.rest_positions))
+    except MotionError:  # it is no human's
+        return motion
+    log.info("%s", unit.note)
+    return motion if unit.metres is None else motion.with_unit(unit.metres)
+
+
+def _same_bones(own: Skeleton, figure: Skeleton) -> bool:
+    """Whether the joints that both skeletons have are as far from their parents, but for what a file rounds."""
+    shared = [name for name in own.names[1:] if name in figure.places]
+    apart = [own.offsets[own.places[name]] - figure.offsets[figure.places[name]] for name in shared]
+    return bool(shared) and float(np.abs(apart).max()) < ROUNDED * figure.height
 
 
 def brought(motion: Motion, pose: Motion, reason: str) -> Motion:
