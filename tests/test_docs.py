@@ -9,9 +9,12 @@ from pathlib import Path
 
 import click
 import pytest
+from click.testing import CliRunner
 
 from motet.cli import main
 from motet.formats import read_motion, write_motion
+from motet.models.load import load_as
+from motet.models.steer import SteerModel
 
 ROOT = Path(__file__).parents[1]
 PAGES = {path.relative_to(ROOT).as_posix(): path for path in (*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"))}
@@ -24,18 +27,25 @@ def blocks(text: str, language: str) -> list[str]:
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A working directory in which the folders of the repository are to be found, and the files that pages name."""
+def clone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working directory with the folders of the repository, and one for what is written."""
     for place in ROOT.iterdir():
-        if place.is_dir() and not place.name.startswith("."):
+        if place.is_dir() and place.name != "out" and not place.name.startswith("."):
             (tmp_path / place.name).symlink_to(place)
+    (tmp_path / "out").mkdir()
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def folder(clone: Path) -> Path:
+    """The same with the files that pages only name."""
     for name, trial in CLIPS.items():
         motion = read_motion(ROOT / f"train/motet_train/data/cmu/{trial}.amc")
         for extension in ("amc", "bvh", "npz"):
-            write_motion(tmp_path / f"{name}.{extension}", motion)
-    (tmp_path / "character.bvh").symlink_to(ROOT / "tests/runtime/skeletons/mixamo.bvh")
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+            write_motion(clone / f"{name}.{extension}", motion)
+    (clone / "character.bvh").symlink_to(ROOT / "tests/runtime/skeletons/mixamo.bvh")
+    return clone
 
 
 @pytest.mark.parametrize("page", [page for page, path in PAGES.items() if blocks(path.read_text(), "python")])
@@ -98,6 +108,25 @@ def test_commands_exist_with_their_options(page: str) -> None:
             check(line, whole)
         except (AssertionError, click.ClickException) as error:
             raise AssertionError(f"{line!r}: {error}") from error
+
+
+def test_the_readmes_commands_run_in_their_order(clone: Path) -> None:
+    """What one command reads an earlier one has written, but for KIT's recordings, which are not in the repository."""
+    lines = list(commands(PAGES["README.md"].read_text()))
+    runnable = [line for line in lines if "kit" not in line]
+    assert len(runnable) == len(lines) - 2
+    for line in runnable:
+        words = shlex.split(line)[1:]
+        result = CliRunner().invoke(main, words)
+        assert (line, result.exit_code, result.stderr) == (line, 0, "")
+        assert "-o" not in words or (clone / words[words.index("-o") + 1]).stat().st_size > 0
+
+
+def test_the_speeds_of_the_servers_first_message_are_the_models() -> None:
+    model = load_as(SteerModel, "control")
+    slowest, fastest = model.speeds["walk"]
+    said = f'"walk": [{slowest:.2f}, {model.usual["walk"]:.2f}, {fastest:.2f}]'
+    assert said in PAGES["docs/live.md"].read_text()
 
 
 def test_the_readme_names_commands_and_wrong_ones_are_found() -> None:
