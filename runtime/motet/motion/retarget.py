@@ -13,6 +13,7 @@ import numpy as np
 from motet.errors import MotionError
 from motet.motion import fitting, humanoid
 from motet.motion.figure_checks import check_frames, height_of, unit_of
+from motet.motion.fingers import relaxed
 from motet.motion.fitting import Fitted, fit, upright
 from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, NECK, PARENTS, SPINE, leg_length, sided
 from motet.motion.joint_map import JointMap
@@ -156,9 +157,10 @@ def from_humanoid(motion: Motion, like: Motion | Skeleton, joint_map: JointMap |
 
     like: the skeleton; where its rest pose is not a standing body, a motion of it, whose frames then tell how its
         joints stand.
-    joint_map: as for :func:`to_humanoid`. Joints that are no bones keep their rest. The path is scaled by the ratio of
-    the legs' lengths and the feet stay on the ground. Returns the translation of the hips in "length" and three angles
-    in "deg" for each joint; the skeleton knows its unit where the legs' length tells it.
+    joint_map: as for :func:`to_humanoid`. Joints that are no bones keep their rest, but fingers bend as in a relaxed
+    hand. The path is scaled by the ratio of the legs' lengths and the feet stay on the ground. Returns the translation
+    of the hips in "length" and three angles in "deg" for each joint; the skeleton knows its unit where the legs' length
+    tells it.
     MotionError for a motion that is not the humanoid's, or a skeleton that is no human's.
     """
     if motion.skeleton != HUMANOID:
@@ -167,6 +169,7 @@ def from_humanoid(motion: Motion, like: Motion | Skeleton, joint_map: JointMap |
     joint_map = joint_map or map_of(example)
     fitted = fit(skeleton_of(example), joint_map, *global_transforms(example))
     skeleton, still = _still(example, fitted)
+    still = relaxed(skeleton, still, joint_map)
     skeleton = replace(skeleton, metres_per_unit=unit_of(skeleton, fitted.leg).metres)
     source, places = global_transforms(motion)
     turned = _figure_rotations(source, fitted, skeleton, still)
