@@ -76,7 +76,7 @@ def check_map(skeleton: Skeleton, joint_map: JointMap) -> JointMap:
         raise MotionError(missing_reason(missing, joint_map.joints))
     hips = joint_map.joints["hips"]
     # the joint that carries the legs may hang beside the back, below what carries both
-    limbs = {"back": joint_map.spine, "neck": (joint_map.spine[-1], *joint_map.neck)}
+    limbs = {"back": joint_map.spine, "neck": (joint_map.spine[0], *joint_map.neck)}
     for side in LEFT_RIGHT:
         for limb, first, parts in (("leg", hips, LEG), ("arm", joint_map.spine[0], ARM)):
             bones = [sided(side, part) for part in parts]

@@ -22,6 +22,11 @@ from motet.motion.humanoid import LEFT_RIGHT, sided
 from motet.motion.joint_map import JointMap, Triple, check_map, missing_bones, missing_reason, one_sided
 from motet.motion.skeleton import Skeleton
 
+
+class HalfKnownError(MotionError):
+    """Names of a convention that lack needed bones or are out of order: the tree may tell more."""
+
+
 CHAINS = ("spine", "neck")
 TRUNK = ("hips", "head", *CHAINS)
 
@@ -120,8 +125,8 @@ def plain_names(names: Sequence[str], prefixes: Sequence[str] = ()) -> list[str]
 def map_by_names(skeleton: Skeleton) -> JointMap | None:
     """The map by the convention that fits best, None where none does.
 
-    MotionError where a convention fits but for bones that are missing, where the one that knows most of the names
-    lacks bones of one side only, or where two joints are the hips.
+    HalfKnownError where a convention fits but for bones that are missing or out of order; MotionError where the one
+    that knows most of the names lacks bones of one side only, or where two joints are the hips.
     """
     matches = [_match(convention, skeleton) for convention in conventions()]
     fullest = max(matches, key=Match.fit)
@@ -129,13 +134,17 @@ def map_by_names(skeleton: Skeleton) -> JointMap | None:
     best = fullest if one_sided(fullest.missing, fullest.joints) else max(whole, key=Match.fit, default=fullest)
     if best.missing:
         if len(best.joints) >= 6 and best.known > 0.5 * len(skeleton.names):
-            raise MotionError(missing_reason(best.missing, best.joints))
+            told = one_sided(best.missing, best.joints)
+            raise (MotionError if told else HalfKnownError)(missing_reason(best.missing, best.joints))
         return None
     confidence = round(1.0 - 0.3 * best.absent / (best.absent + best.known), 2)
     found = JointMap(
         best.joints, best.chains["spine"], best.chains["neck"], best.title, confidence, best.rest, best.axes
     )
-    return check_map(skeleton, found)
+    try:
+        return check_map(skeleton, found)
+    except MotionError as error:
+        raise HalfKnownError(str(error)) from error
 
 
 def _match(convention: Convention, skeleton: Skeleton) -> Match:

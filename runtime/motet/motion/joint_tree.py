@@ -168,14 +168,17 @@ def _legs(tree: _Tree, fork: _Fork) -> list[dict[str, int]]:
 
 
 def _arms(tree: _Tree, fork: _Fork) -> list[dict[str, int]]:
-    """Clavicles, upper arms, forearms and hands: the hand is where fingers fork or begins them; the elbow halves."""
+    """Clavicles, upper arms, forearms and hands: the hand is where fingers fork or begins them; the elbow halves.
+
+    An arm that ends in one long bone has no joint for the hand: its tip is the wrist."""
     paths, places = _pair(tree, fork)
     forks = [k for k, joint in enumerate(paths[0]) if k >= 2 and len(tree.skeleton.children[joint]) >= 2]
     count = len(places) - 1
-    hands = forks[:1] or [k for k in range(2, count) if 1 - places[k] / places[-1] <= FINGERS]
+    hands = forks[:1] or [k for k in range(2, count) if 1 - places[k] / places[-1] <= FINGERS] or [count]
     choices = [(start, elbow, hand) for hand in hands for start, elbow in combinations(range(hand), 2)]
     start, elbow, hand = min(choices, key=lambda choice: _unlike(places, *choice))
-    parts = {"UpperArm": start, "LowerArm": elbow, "Hand": hand} | ({"Shoulder": 0} if start else {})
+    parts = {"UpperArm": start, "LowerArm": elbow} | ({"Shoulder": 0} if start else {})
+    parts |= {"Hand": hand} if hand < count else {}
     return [{part: path[k] for part, k in parts.items()} for path in paths]
 
 
@@ -183,7 +186,7 @@ def _unlike(places: list[float], start: int, middle: int, end: int) -> float:
     """How far two bones are from being of one length and most of the limb; a short piece does not begin a bone."""
     upper, lower = places[middle] - places[start], places[end] - places[middle]
     whole, first = upper + lower, places[start + 1] - places[start]
-    return abs(upper - lower) / whole - 0.1 * whole / places[-1] if first > PIECE * whole else np.inf
+    return abs(upper - lower) / whole - 0.1 * whole / places[-1] if first > PIECE * whole > 0 else np.inf
 
 
 def _neck(tree: _Tree, arms: _Fork) -> tuple[tuple[int, ...], int | None]:

@@ -17,7 +17,7 @@ from motet.motion.fingers import relaxed
 from motet.motion.fitting import Fitted, fit, upright
 from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, NECK, PARENTS, SPINE, leg_length, sided
 from motet.motion.joint_map import JointMap
-from motet.motion.joint_names import map_by_names
+from motet.motion.joint_names import HalfKnownError, map_by_names
 from motet.motion.joint_tree import BY_THE_TREE, map_by_tree
 from motet.motion.kinematics import global_transforms, local_rotations, local_translations, skeleton_of
 from motet.motion.mmm_figure import is_mmm, with_figure
@@ -68,8 +68,18 @@ class Humanoid:
 
 
 def map_of(motion: Motion) -> JointMap:
-    """Which joint of the motion's skeleton is which bone: by names, else by the tree; MotionError if it is no human."""
-    return map_by_names(skeleton_of(motion)) or map_by_tree(motion)
+    """Which joint of the motion's skeleton is which bone: by names, else by the tree; MotionError if it is no human.
+
+    Where names fit in part, and the tree does not tell either, the error says which bones the names lack.
+    """
+    skeleton = skeleton_of(motion)
+    try:
+        return map_by_names(skeleton) or map_by_tree(motion)
+    except HalfKnownError as half:
+        try:
+            return map_by_tree(motion)
+        except MotionError:
+            raise half from None
 
 
 def to_humanoid(motion: Motion, joint_map: JointMap | None = None) -> Humanoid:
