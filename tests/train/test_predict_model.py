@@ -143,7 +143,7 @@ def test_motion_files_are_trained_on_and_measured_in_centimetres(
     assert (expected > 0).all()
     np.testing.assert_allclose(expected[1], model.expected_errors(walk[:200]), rtol=1e-3)
     store = tmp_path / "run-store"
-    found = json.loads(run("evaluate", out, "--data", store, "--json", "--plots", tmp_path / "plots").stdout)
+    found = json.loads(run("evaluate", out, "--data", data, "--json", "--plots", tmp_path / "plots").stdout)
     still = found["zero_velocity"]["place_cm"]
     assert 60 < still["frame_24"] < 130  # a walk at 1.4 m/s, after .83 s
     assert still["frame_1"] < still["frame_24"]

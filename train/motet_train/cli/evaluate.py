@@ -2,7 +2,7 @@
 
 import json
 import shlex
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -27,9 +27,11 @@ from motet_train.cli.evaluate_language import by_subject, language_reports
 from motet_train.cli.evaluate_predict import predict_reports
 from motet_train.cli.evaluate_says import Best, says_reports
 from motet_train.cli.evaluate_steer import as_steered, steer_reports
+from motet_train.cli.prepared import store_beside
 from motet_train.cli.train_options import unit_in
 from motet_train.data.clips import Clips, read_clips
 from motet_train.data.errors import DataError
+from motet_train.data.store import INDEX
 from motet_train.evaluate.control.experiments import GOALS, control_report, study_of
 from motet_train.evaluate.fill.report import fill_text
 from motet_train.evaluate.language.report import GOALS as LANGUAGE_GOALS
@@ -48,7 +50,7 @@ from motet_train.settings import read_settings
     "--data",
     type=Path,
     help="Control: the clips. [default: those it was trained on] Describe, generate, search and figures that "
-    "are steered, fill: the store. "
+    "are steered, fill: the store. [default: that of the run] "
     "Predict: text files of the protocol, or the store. With --says: a store or a folder or zip of motion files "
     "with a table of sentences, for the columns of real trials and of the look-up.",
 )
@@ -98,11 +100,21 @@ def evaluate(
     ready, text = (
         _says(loaded, data, unit_in, load_as(SearchModel, search, session), plots)
         if says
-        else _measured(loaded, data, plots, unit_in)
+        else _measured(loaded, _own_store(runs, data), plots, unit_in)
     )
     for name in runs if save else ():
         Run({**runs[name].manifest, "quality": ready[name]}, runs[name].model).save(Path(name))
     click.echo(json.dumps(ready[models[0]] if len(models) == 1 else ready) if as_json else text)
+
+
+def _own_store(runs: Iterable[str], data: Path | None) -> Path | None:
+    """The store that was prepared of the corpus that training was given, where that or nothing is given here."""
+    for run in map(Path, runs):
+        corpus = _given(run, "")
+        asked = data is None or (corpus is not None and data.resolve() == corpus.resolve())
+        if asked and (store_beside(run) / INDEX).is_file():
+            return store_beside(run)
+    return data
 
 
 def _model(run: Run) -> Model:

@@ -20,7 +20,7 @@ def prepared(data: Path, job: Job, **corpus: Any) -> Store:
     """
     if (data / INDEX).is_file():
         return Store.open(data)
-    place = job.folder.with_name(f"{job.folder.name}-store")
+    place = store_beside(job.folder)
     if (job.folder / CHECKPOINT).is_file():
         return Store.open(place)
     verb = "codes" if job.recipe.loop == "codes" or job.recipe.verb in ("control", "fill") else job.recipe.verb
@@ -28,3 +28,8 @@ def prepared(data: Path, job: Job, **corpus: Any) -> Store:
         raise DataError(f"several processes need a prepared store: motet prepare {data} --for {verb} --out {place}")
     click.get_current_context().invoke(prepare, data=(data,), out=place, verb=verb, fps=None, **corpus)
     return Store.open(place)
+
+
+def store_beside(run: Path) -> Path:
+    """Where the store of a run is that was given a corpus."""
+    return run.with_name(f"{run.name}-store")
