@@ -164,7 +164,6 @@ def test_bench_describes_a_file_and_says_where_it_ran(clips: Path) -> None:
             ["convert", "{clips}/39_14.amc", "{out}/a.bvh", "--from", "1", "--to", "1.001"],
             "no frame from 1 to 1.001",
         ),
-        (1, ["convert", "{clips}/39_14.amc", "{out}/a.bvh", "--unit-in", "cm"], "according to the file, not 0.01 m"),
         (1, ["convert", "{clips}/39_14.amc", "{out}/a.bvh", "--fps-in", "nan"], "cannot have nan frames"),
         (1, ["convert", "{clips}/39_14.amc", "{out}/a.bvh", "--asf", "none.asf"], "none.asf: no such file"),
         (2, ["control", *CMU, "walk 0.001s", "-o", "{out}/a.bvh"], "less than one frame"),

@@ -82,6 +82,20 @@ def test_predict_carries_several_motions_on_as_it_does_each(clips: Path) -> None
         np.testing.assert_array_equal(one.values, model.predict(motion, frames=4).values)
 
 
+def test_a_unit_for_a_mixed_folder_loses_no_file(tmp_path: Path, clips: Path) -> None:
+    metres = motet.to_humanoid(motet.read(clips / WALK)).motion
+    centimetres = metres.scaled(0.01)
+    motet.write(tmp_path / "metres.glb", metres)
+    motet.write(tmp_path / "centimetres.bvh", centimetres)
+    motet.write(tmp_path / "centimetres.glb", motet.read(tmp_path / "centimetres.bvh"))  # which does not say its unit
+    files = [clips / WALK, *sorted(tmp_path.iterdir())]
+    result = run("describe", *files, "--unit-in", "cm", "--beams", 1, "--json")
+    assert (result.exit_code, result.stderr) == (0, "")
+    _, *rows = json.loads(result.stdout)
+    texts = {row["hypotheses"][0]["text"] for row in rows}
+    assert (len(rows), len(texts)) == (3, 1)
+
+
 def test_the_frame_rate_and_the_skeleton_of_an_amc_can_be_told(tmp_path: Path, clips: Path) -> None:
     skeleton = tmp_path / "skeleton.asf"
     skeleton.write_bytes((clips / WALK).with_suffix(".asf").read_bytes())

@@ -1,6 +1,7 @@
 """``motet search`` over a small model whose graphs are numpy."""
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
@@ -31,7 +32,7 @@ def test_search_prints_what_the_index_finds(folder: Path, tmp_path: Path) -> Non
     assert (result.exit_code, result.stderr) == (0, "")
     wanted = Index.open(folder, search_model()).search("a person walks", 3)
     rows = json.loads(result.stdout)
-    assert rows == [{"path": str(h.path), "start": h.start, "stop": h.stop, "score": h.score} for h in wanted]
+    assert rows == [{**asdict(hit), "path": str(hit.path)} for hit in wanted]
     lines = run("search", "a person walks", folder).stdout.splitlines()
     assert lines == [f"{hit.score:6.2f}  {hit.path}  0.0 to 2.0 s" for hit in wanted[:2]]
     assert run("search", "a person walks", tmp_path / "kept.npz").stdout.splitlines() == lines

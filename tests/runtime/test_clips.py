@@ -55,7 +55,7 @@ def test_without_a_clip_it_is_the_first_and_the_log_says_so(tmp_path: Path, capl
     with caplog.at_level(logging.INFO, "motet"):
         assert len(motet.read(path)) == 9
     assert [record.message for record in caplog.records] == [
-        f"{path}: the first of 2 clips is taken, 'Walk'",
+        f"{path}: of 2 clips the first is taken, 'Walk'; the next is a.glb#Run",
         f"{path}: its clips are 'Walk', 'Run'",
     ]
     caplog.clear()

@@ -74,10 +74,10 @@ def test_a_unit_is_told_where_the_file_does_not_say_it(tmp_path: Path) -> None:
     assert read_motion(tmp_path / "a.bvh", unit="cm").skeleton.metres_per_unit == 0.01
     assert read_motion(tmp_path / "a.bvh", unit=0.5).skeleton.metres_per_unit == 0.5
     write_motion(tmp_path / "b.npz", walker(metres_per_unit=0.01))
-    assert read_motion(tmp_path / "b.npz", unit="cm").skeleton.metres_per_unit == 0.01
+    for unit in ("cm", "m"):  # what the file says counts
+        assert read_motion(tmp_path / "b.npz", unit=unit).skeleton.metres_per_unit == 0.01
     write_motion(tmp_path / "c.csv", walker())
     for name, unit, said in (
-        ("b.npz", "m", "b.npz: its length unit is 0.01 m according to the file, not 1 m as given"),
         ("c.csv", "m", "no skeleton, so it has no unit of length"),
         ("a.bvh", "mile", r"a.bvh: expected a length unit \(m, cm"),
         ("a.bvh", 0, "number of metres, not 0"),
@@ -85,6 +85,28 @@ def test_a_unit_is_told_where_the_file_does_not_say_it(tmp_path: Path) -> None:
     ):
         with pytest.raises(FormatError, match=said):
             read_motion(tmp_path / name, unit=unit)
+
+
+@pytest.mark.parametrize(
+    ("height", "unit", "expected"),
+    [
+        (170.0, None, 1.0),
+        (170.0, "cm", 0.01),
+        (67.0, "inch", 0.0254),
+        (30.0, "cm", 0.01),  # a toy
+        (1.7, "cm", 1.0),  # in metres, as it says
+        (1.7, 0.9144, 0.9144),
+        (0.1, "inch", 0.0254),
+    ],
+)
+def test_a_unit_counts_for_gltf_where_its_metre_is_no_better(
+    height: float, unit: str | float | None, expected: float, tmp_path: Path
+) -> None:
+    motion = walker(metres_per_unit=None)
+    figure = walker(metres_per_unit=None, scale=height / motion.skeleton.height)
+    write_motion(tmp_path / "a.glb", figure)
+    read = read_motion(tmp_path / "a.glb", unit=unit)
+    assert (read.skeleton.metres_per_unit, read.skeleton.height) == (expected, pytest.approx(height))
 
 
 def test_options_that_a_format_does_not_take_are_refused(tmp_path: Path) -> None:

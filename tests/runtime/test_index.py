@@ -38,9 +38,9 @@ def reads(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The names of the files that an index reads."""
     found: list[str] = []
 
-    def noted(path: Path, unit: str | float | None = None) -> object:
+    def noted(path: Path, unit: str | float | None = None, clip: str | None = None) -> object:
         found.append(path.name)
-        return read_motion(path, unit=unit)
+        return read_motion(path, unit=unit, clip=clip)
 
     monkeypatch.setattr(indexing, "read_motion", noted)
     return found

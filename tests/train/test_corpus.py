@@ -9,6 +9,8 @@ import pytest
 from kit_zip import JOINTS, mmm_xml, write_kit_zip
 
 from motet.formats import read_motion, write_motion
+from motet.formats.glb import container
+from motet.formats.gltf_data import parse
 from motet.formats.mmm import read
 from motet_train.data.archive import Archive
 from motet_train.data.clips import CMU_FOLDER
@@ -179,10 +181,28 @@ def test_a_length_unit_can_be_given(tmp_path: Path) -> None:
     assert [skeleton and skeleton.metres_per_unit for skeleton in skeletons] == [None, 0.01, 0.5]
 
 
-def test_a_length_unit_that_contradicts_the_file_is_refused(own: Path) -> None:
-    records, skipped = of(read_corpus(own, unit="m"))
-    assert not records
-    assert all("m according to the file, not 1 m as given" in skipped[name] for name in ("02_06", "09_07", "stroll"))
+def test_a_length_unit_is_that_of_files_which_do_not_say_theirs(own: Path) -> None:
+    told, plain = (of(read_corpus(own, unit=unit))[0] for unit in ("m", None))
+    assert {name: record.motion.skeleton for name, record in told.items()} == {
+        name: record.motion.skeleton for name, record in plain.items()
+    }
+
+
+def test_each_clip_of_a_file_is_a_motion_of_its_own(tmp_path: Path) -> None:
+    path = tmp_path / "many.glb"
+    write_motion(path, read_motion(CMU_FOLDER / "09_07.amc"))
+    gltf = parse(path)
+    walk, *_ = gltf.document["animations"]
+    document = gltf.document | {"animations": [walk | {"name": "Run"}, walk | {"name": "Jump/1"}]}
+    path.write_bytes(container(document, gltf.buffers[0]))
+    table(tmp_path / "texts.tsv", "many#Run\tA person runs.", "many#Jump/1\tA person jumps.", "many\tNobody.")
+    for corpus in (tmp_path, zipped(tmp_path)):
+        records, skipped = of(read_corpus(corpus))
+        assert {name: record.sentences for name, record in records.items()} == {
+            "many#Run": ("A person runs.",),
+            "many#Jump/1": ("A person jumps.",),
+        }
+        assert skipped == {"many": "no motion file of this name"}
 
 
 @pytest.mark.parametrize(

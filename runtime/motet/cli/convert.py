@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from motet.cli.reading import Read, Tries, places, read_options
+from motet.cli.reading import Read, Source, Tries, places, read_options
 from motet.cli.writing import Output, size, write_options
 from motet.formats import READS, WRITES, write_motion
 from motet.motion.foot_hold import hold_feet as feet_held
@@ -26,6 +26,7 @@ log = logging.getLogger(__name__)
     help=f"""Convert motion files; the extensions give the formats: IN OUT, or IN... -o OUT.
 
     With several files OUT holds {{name}} for their names, as in -o 'bvh/{{name}}.bvh', or the results are numbered.
+    IN.glb#Walk is the clip Walk of a file of several, and --clip all takes each: --clip all -o 'bvh/{{clip}}.bvh'.
 
     Reads {READS}; writes {WRITES}.
     """
@@ -63,8 +64,8 @@ def convert(
         if len(files) != 2:
             raise click.UsageError("give IN and OUT, or several files and -o OUT")
         *files, out = files
-    outs, tries = places(out, [file.stem for file in files]), Tries()
-    for source, place in zip(files, outs, strict=True):
+    sources, tries = read.sources(files), Tries()
+    for source, place in zip(sources, places(out, sources), strict=True):
         with tries.of(source):
             motion = _cut(read(source), start, stop)
             if humanoid or map_file or hold_feet:
@@ -84,13 +85,18 @@ def convert(
 @read_options
 def view(sources: tuple[Path, ...], out: Path | None, read: Read) -> None:
     """Write a self-contained page that plays each motion file, and print its path."""
-    tries, names = Tries(), [source.stem for source in sources]
-    pages = places(out, names) if out else [Path(tempfile.mkdtemp(prefix="motet-")) / f"{name}.html" for name in names]
-    for source, page in zip(sources, pages, strict=True):
+    tries, given = Tries(), read.sources(sources)
+    pages = places(out, given) if out else [_new_page(source) for source in given]
+    for source, page in zip(given, pages, strict=True):
         with tries.of(source):
             write_motion(page, read(source))
             click.echo(str(page))
     tries.finish()
+
+
+def _new_page(source: Source) -> Path:
+    name = source.name if source.clip is None else source.label
+    return Path(tempfile.mkdtemp(prefix="motet-")) / f"{name}.html"
 
 
 def _to_humanoid(motion: Motion, map_file: Path | None) -> Motion:

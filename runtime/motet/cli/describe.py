@@ -9,7 +9,7 @@ import click
 
 from motet.bundle.session import SessionOptions
 from motet.cli.options import session_options
-from motet.cli.reading import Read, Tries, bar, read_options, say_resampled
+from motet.cli.reading import Read, Source, Tries, bar, read_options, say_resampled
 from motet.formats import READS
 from motet.models.describe import DescribeModel, Description, Part
 from motet.models.load import load_as
@@ -20,7 +20,8 @@ from motet.models.load import load_as
     well it agrees with all sentences drawn (0 to 1). A sentence after "?" is one that the model is not sure of.
 
     All files are described in one batch, motions over 30 s in windows; with --timeline, motions of any length are cut
-    where what is done changes. Any human figure will do. Reads {READS}.
+    where what is done changes. Any human figure will do. Of a file of several clips all are described, or the one of
+    --clip or MOTION.glb#CLIP. Reads {READS}.
     """
 )
 @click.argument("motions", nargs=-1, required=True, type=Path, metavar="MOTION...")
@@ -49,16 +50,17 @@ def describe(
     if timeline and (beams, draws) != (None, None):
         raise click.UsageError("--timeline gives one sentence for each part: it goes with neither --beams nor --draws")
     model, tries = load_as(DescribeModel, bundle, session), Tries()
+    sources = read.sources(motions, every=True)
     if timeline:
-        _timelines(model, motions, read, tries, as_json)
+        _timelines(model, sources, read, tries, as_json)
     else:
-        _hypotheses(model, motions, read, tries, beams, draws, as_json)
+        _hypotheses(model, sources, read, tries, beams, draws, as_json)
     tries.finish()
 
 
 def _hypotheses(
     model: DescribeModel,
-    motions: Sequence[Path],
+    sources: Sequence[Source],
     read: Read,
     tries: Tries,
     beams: int | None,
@@ -66,33 +68,33 @@ def _hypotheses(
     as_json: bool,
 ) -> None:
     rows, parts, rates = [], [], []
-    for path in motions:
-        with tries.of(path):
-            motion = read(path)
+    for source in sources:
+        with tries.of(source):
+            motion = read(source)
             windows = [(start, part.duration, model.prepared(part)) for start, part in model.windows(motion)]
             rates.append(motion.fps)
-            rows += [{"input": str(path), "start": start, "stop": start + length} for start, length, _ in windows]
+            rows += [{"input": str(source), "start": start, "stop": start + length} for start, length, _ in windows]
             parts += [part for *_, part in windows]
     say_resampled(rates, model.fps)
     with bar("describing") as progress:
         found = model.describe(parts, beams, draws, progress=progress)
-    _print(rows, found, as_json, several=len(motions) > 1)
+    _print(rows, found, as_json, several=len(sources) > 1)
 
 
-def _timelines(model: DescribeModel, motions: Sequence[Path], read: Read, tries: Tries, as_json: bool) -> None:
+def _timelines(model: DescribeModel, sources: Sequence[Source], read: Read, tries: Tries, as_json: bool) -> None:
     found: list[tuple[str, list[Part]]] = []
     rates = []
-    for path in motions:
-        with tries.of(path), bar(path.name) as progress:
-            motion = read(path)
-            found.append((str(path), model.timeline(motion, progress=progress)))
+    for source in sources:
+        with tries.of(source), bar(source.name) as progress:
+            motion = read(source)
+            found.append((str(source), model.timeline(motion, progress=progress)))
             rates.append(motion.fps)
     say_resampled(rates, model.fps)
     if as_json:
         click.echo(json.dumps([{"input": name, **part.to_json()} for name, parts in found for part in parts]))
         return
     for name, parts in found:
-        if len(motions) > 1:
+        if len(sources) > 1:
             click.echo(name)
         for part in parts:
             click.echo(f"{part.start:.1f}-{part.stop:.1f} s  {_told(part)}")

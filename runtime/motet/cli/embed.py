@@ -1,6 +1,7 @@
 """``motet embed``: context vectors of motions and of sentences."""
 
 import io
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from motet.bundle.session import SessionOptions
 from motet.cli.notes import noted
 from motet.cli.options import session_options
-from motet.cli.reading import Read, Tries, read_options, say_resampled
+from motet.cli.reading import Read, Source, Tries, read_options, say_resampled
 from motet.files import check_place, write_whole
 from motet.models.describe import DescribeModel
 from motet.models.generate import GenerateModel
@@ -44,7 +45,7 @@ def embed(
     check_place(out)
     tries = Tries()
     if motions:
-        vectors = _of_motions(load_as(DescribeModel, bundle or "describe", session), motions, read, tries)
+        vectors = _of_motions(load_as(DescribeModel, bundle or "describe", session), read.sources(motions), read, tries)
     else:
         model = load_as(GenerateModel, bundle or "generate", session)
         with noted():
@@ -57,11 +58,11 @@ def embed(
     tries.finish()
 
 
-def _of_motions(model: DescribeModel, paths: tuple[Path, ...], read: Read, tries: Tries) -> NDArray[np.float32]:
+def _of_motions(model: DescribeModel, sources: Sequence[Source], read: Read, tries: Tries) -> NDArray[np.float32]:
     prepared, rates = [], []
-    for path in paths:
-        with tries.of(path):
-            motion = read(path)
+    for source in sources:
+        with tries.of(source):
+            motion = read(source)
             prepared.append(model.prepared(motion))
             rates.append(motion.fps)
     say_resampled(rates, model.fps)

@@ -60,13 +60,14 @@ def fill(
     """Fill gaps of motion files, or close them to loops; all other frames stay as they are.
 
     What a file has in its gaps is not looked at. It may be of any human figure and at any frame rate. With several
-    files OUT holds {name} for their names, or the results are numbered: out-1.bvh, out-2.bvh, ...
+    files OUT holds {name} or {clip} for their names, or the results are numbered: out-1.bvh, out-2.bvh, ...
     """
     if loop == bool(gaps) or (seconds is not None and not loop):
         raise click.UsageError("give --gap START:STOP, once or several times, or --loop, with --seconds if you like")
-    outs = places(out, [source.stem for source in sources])
+    given = read.sources(sources)
+    outs = places(out, given)
     model, tries = load_as(FillModel, bundle, session), Tries()
-    for source, place in zip(sources, outs, strict=True):
+    for source, place in zip(given, outs, strict=True):
         with tries.of(source):
             motion = read(source)
             if loop:

@@ -60,16 +60,17 @@ def predict(
     """Continue motion files from their last frames, and write the predictions.
 
     A file may be of any human figure, and is continued on its own skeleton, at the bundle's frame rate. With several
-    files or samples OUT holds {name} for their names, or the results are numbered: out-1.bvh, out-2.bvh, ...
+    files or samples OUT holds {name} or {clip} for their names, or the results are numbered: out-1.bvh, out-2.bvh, ...
 
     More frames than the bundle's horizon come from a bundle that writes codes (--beyond): walks walk on, runs run.
     With --samples all frames do, and the futures differ as far as the motion leaves it open.
     """
-    outs = places(out, [name for source in sources for name in _names(source, samples)])
+    given = read.sources(sources)
+    outs = places(out, given, samples or 1)
     model, tries, rates, rows = load_as(PredictModel, bundle, session), Tries(), list[float](), list[dict[str, Any]]()
     asked = Asked(model, frames or model.horizon, append, samples, seed)
     writer = asked.writer(beyond, session)
-    for number, source in enumerate(sources):
+    for number, source in enumerate(given):
         with tries.of(source):
             motion = read(source)
             own = outs[number * (samples or 1) :][: samples or 1]
@@ -125,12 +126,6 @@ class Asked:
             return self.model.futures(
                 motion, frames=frames, append=append, beyond=writer, seed=seed, samples=self.samples, progress=progress
             )
-
-
-def _names(source: Path, samples: int | None) -> list[str]:
-    """The names of a file's results."""
-    several = samples is not None and samples > 1
-    return [f"{source.stem}-{i + 1}" for i in range(samples or 1)] if several else [source.stem]
 
 
 def _written(asked: Asked, found: Sequence[Motion], outs: Sequence[Path], output: Output) -> dict[str, Any]:

@@ -2,9 +2,11 @@
 
 import functools
 import logging
+import re
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +14,10 @@ import click
 
 from motet.cli.writing import FPS
 from motet.errors import MotetError, MotionError, UnitError, quoted
-from motet.formats import FORMATS, WRITABLE, check_writable, read_motion
+from motet.files import place_of
+from motet.formats import FORMATS, READABLE, WRITABLE, check_writable, clips, read_motion
+from motet.formats.clips import MARK, chosen, split_clip
+from motet.formats.lines import plain_names
 from motet.models.language import LanguageModel
 from motet.models.progress import Progress, silent
 from motet.motion.motion import Motion
@@ -20,7 +25,75 @@ from motet.motion.units import METRES
 
 log = logging.getLogger(__name__)
 
-Read = Callable[[Path], Motion]
+ALL = "all"
+"""What ``--clip`` says for every clip of a file."""
+
+UNFIT = r'[<>:"/\\|?*#\x00-\x1f]|^[. ]|[. ]$'
+"""What the name of a file cannot have, on one system or another."""
+
+FIELDS = r"\{(name|clip)\}"
+"""What stands in OUT for what a result is of."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """A motion file, and which clip of it; None for the first."""
+
+    path: Path
+    clip: str | None = None
+
+    def __str__(self) -> str:
+        return str(self.path) if self.clip is None else f"{self.path}{MARK}{self.clip}"
+
+    @property
+    def name(self) -> str:
+        """What stands for ``{name}`` in the names of results."""
+        return self.path.stem
+
+    @property
+    def label(self) -> str:
+        """What stands for ``{clip}``: the clip's name, as a file name can have it, or the file's where it has none."""
+        try:
+            names = clips(self.path)
+            index = chosen(self.path, names, 1 if self.clip is None else self.clip)
+        except MotetError:
+            return self.name
+        return plain_names(names, UNFIT)[index]
+
+
+@dataclass(frozen=True)
+class Read:
+    """Reads motion files as the options of a command say. clip: a name, a number or "all", where none is in a path."""
+
+    options: Mapping[str, Any]
+    clip: str | None
+
+    def __call__(self, given: Path | Source) -> Motion:
+        """The motion of a file, of one clip of it; FormatError as :func:`motet.read`."""
+        source = given if isinstance(given, Source) else self._only(given)
+        return read_motion(source.path, clip=source.clip, **self.options)
+
+    def sources(self, given: Sequence[Path], every: bool = False) -> list[Source]:
+        """What files hold, as ``--clip`` says or their own names (a.glb#Walk). every: all clips where nothing does."""
+        return [source for path in given for source in self._of(path, every)]
+
+    def _of(self, given: Path, every: bool) -> list[Source]:
+        file, named = split_clip(given, READABLE)
+        path, asked = place_of(file), ALL if every and self.clip is None else self.clip
+        if named is not None or asked != ALL:
+            return [Source(path, asked if named is None else named)]
+        try:
+            names = clips(path)
+        except MotetError:  # it is said when the file is read
+            names = ()
+        return [Source(path, name) for name in names] if len(names) > 1 else [Source(path)]
+
+    def _only(self, given: Path) -> Source:
+        first, *others = self._of(given, every=False)
+        if others:
+            raise click.UsageError(f"one motion is wanted here, and {given} holds {len(others) + 1} clips: name one")
+        return first
+
 
 unit_option = click.option(
     "--unit-in", type=click.Choice(list(METRES)), help="Length unit of files that do not state theirs."
@@ -39,13 +112,15 @@ def read_options(command: Callable[..., None]) -> Callable[..., None]:
     @click.option(
         "--asf", type=Path, help=f"Skeleton of the files ({_takers('asf')}). [default: looked for beside them]"
     )
+    @click.option("--clip", metavar="NAME|N|all", help=f"Clip of files of several ({_takers('clip')}).")
     @click.option(
         "--partial", is_flag=True, help=f"Take the complete frames of truncated files ({_takers('partial')})."
     )
     @functools.wraps(command)
-    def with_read(unit_in: str | None, fps_in: float | None, asf: Path | None, partial: bool, **options: Any) -> None:
-        read = functools.partial(read_motion, unit=unit_in, fps=fps_in, asf=asf, partial=partial)
-        command(read=read, **options)
+    def with_read(
+        unit_in: str | None, fps_in: float | None, asf: Path | None, partial: bool, clip: str | None, **options: Any
+    ) -> None:
+        command(read=Read({"unit": unit_in, "fps": fps_in, "asf": asf, "partial": partial}, clip), **options)
 
     return with_read
 
@@ -61,7 +136,7 @@ class Tries:
         self.failed = 0
 
     @contextmanager
-    def of(self, given: Path | str) -> Iterator[None]:
+    def of(self, given: Source | Path | str) -> Iterator[None]:
         """What is done for one file or text; motet's own errors end only this."""
         try:
             yield
@@ -69,7 +144,7 @@ class Tries:
             self.failed += 1
             click.echo(f"motet: {_named(given, error)}", err=True)
 
-    def done(self, given: Path | str, work: Callable[[], object]) -> bool:
+    def done(self, given: Source | Path | str, work: Callable[[], object]) -> bool:
         """Whether work for one file or text ended without an error of motet's own."""
         before = self.failed
         with self.of(given):
@@ -100,9 +175,10 @@ def naming(path: Path | str | None) -> Iterator[None]:
         raise error if path is None else MotionError(_named(path, error)) from error
 
 
-def _named(path: Path | str, error: MotetError) -> str:
+def _named(given: Source | Path | str, error: MotetError) -> str:
     hint = " (--unit-in)" if isinstance(error, UnitError) else ""
-    return f"{error}{hint}" if str(path) in str(error) else f"{path}: {error}{hint}"
+    text = str(error).removeprefix(f"{given.path}: ") if isinstance(given, Source) else str(error)
+    return f"{text}{hint}" if str(given) in text else f"{given}: {text}{hint}"
 
 
 @contextmanager
@@ -120,19 +196,37 @@ def bar(label: str) -> Iterator[Progress]:
         yield progress
 
 
-def places(out: Path, names: Sequence[str]) -> list[Path]:
-    """Where results go: each ``names`` instead of ``{name}`` in OUT, or several numbered: out-1.bvh, out-2.bvh, ..."""
-    if "{name}" in str(out):
-        found = [Path(str(out).replace("{name}", name)) for name in names]
-    elif len(names) == 1:
-        found = [out]
+def places(out: Path, sources: Sequence[Source | str], samples: int = 1) -> list[Path]:
+    """Where results go: by ``{name}`` and ``{clip}`` in OUT, or several numbered: out-1.bvh, out-2.bvh, ...
+
+    samples: how many results each source has, one after the other, which are numbered in any case.
+    """
+    if re.search(FIELDS, str(out)):
+        found = [place for source in sources for place in _numbered(_place(out, source), samples)]
     else:
-        found = [out.with_name(f"{out.stem}-{i}{out.suffix}") for i in range(1, len(names) + 1)]
+        found = _numbered(out, len(sources) * samples)
     if len(set(found)) < len(found):
-        raise click.UsageError("several inputs have the same name: number the results with an OUT without {name}")
+        raise click.UsageError(
+            "several results have the same name: give an OUT with {name} and, for clips, {clip}, or without both"
+        )
     for place in found:
         check_writable(place)
     return found
+
+
+def _numbered(place: Path, count: int) -> list[Path]:
+    if count == 1:
+        return [place]
+    return [place.with_name(f"{place.stem}-{i}{place.suffix}") for i in range(1, count + 1)]
+
+
+def _place(out: Path, source: Source | str) -> Path:
+    def named(found: re.Match[str]) -> str:
+        if isinstance(source, str):
+            return source
+        return source.name if found[1] == "name" else source.label
+
+    return Path(re.sub(FIELDS, named, str(out)))
 
 
 def say_resampled(rates: Sequence[float], fps: float) -> None:

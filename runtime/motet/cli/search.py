@@ -13,7 +13,7 @@ from motet.cli.notes import noted
 from motet.cli.options import session_options
 from motet.cli.reading import bar, unit_option
 from motet.errors import TextWarning
-from motet.formats import READABLE, read_motion
+from motet.formats import names_motion, read_motion
 from motet.models.index import NAME, Hit, Index
 from motet.models.load import load_as
 from motet.models.search import SearchModel
@@ -27,7 +27,7 @@ from motet.models.search import SearchModel
 @click.option("--index", "file", type=Path, help=f"File to keep the vectors in. [default: {NAME} in FOLDER]")
 @unit_option
 @session_options
-@click.option("--json", "as_json", is_flag=True, help="Print a list with path, start, stop and score of each.")
+@click.option("--json", "as_json", is_flag=True, help="Print a list with path, clip, start, stop and score of each.")
 def search(
     query: str,
     folder: Path,
@@ -40,11 +40,12 @@ def search(
 ) -> None:
     """Find the motions in FOLDER that are nearest to QUERY, a sentence or a motion file; FOLDER may be an index file.
 
-    Each is printed with how near it is (1 is the same) and the seconds in which it is so. The first search reads and
-    embeds all motion files, and later ones those that are new or have changed.
+    Each is printed with how near it is (1 is the same) and the seconds in which it is so; of files of several clips,
+    each clip is a motion of its own. The first search reads and embeds all motion files, and later ones those that are
+    new or have changed.
     """
     model = load_as(SearchModel, bundle, session)
-    motion = read_motion(query, unit=unit_in) if Path(query).suffix.lower() in READABLE else None
+    motion = read_motion(query, unit=unit_in) if names_motion(query) else None
     if motion is None:
         with noted():
             model.ids(query)  # refused before all motions are read
@@ -63,4 +64,4 @@ def _print(hits: list[Hit], as_json: bool) -> None:
         click.echo(json.dumps([{**asdict(hit), "path": str(hit.path)} for hit in hits]))
         return
     for hit in hits:
-        click.echo(f"{hit.score:6.2f}  {hit.path}  {hit.start:.1f} to {hit.stop:.1f} s")
+        click.echo(f"{hit.score:6.2f}  {hit.place}  {hit.start:.1f} to {hit.stop:.1f} s")

@@ -38,6 +38,7 @@ class Format:
         where it is not read or not written.
     options: the keyword arguments of its ``read``.
     mocap: whether a file holds motion and skeleton, which the files of a corpus must.
+    loose: whether its unit of length is a convention that not all files keep to.
     needs: the package that writing takes, out of the extra "plot".
     """
 
@@ -48,6 +49,7 @@ class Format:
     writer: str = ""
     options: tuple[str, ...] = ()
     mocap: bool = False
+    loose: bool = False
     needs: str = ""
 
     def read(self) -> Callable[..., Motion]:
@@ -79,10 +81,10 @@ FORMATS = (
     Format(".npz", "motet's own; AMASS", _NPZ, "npz", "npz", mocap=True),
     Format(".csv", "table", "values, units and frame rate, no skeleton", "csv", "csv"),
     Format(".xml", "MMM of KIT", "angles and root; the skeleton is not in the file", "mmm"),
-    Format(".glb", "glTF 2.0", _GLB, "gltf", "glb", options=("clip",), mocap=True),
-    Format(".gltf", "glTF 2.0, as text", _CHARACTER, "gltf", options=("clip",)),
-    Format(".vrm", "VRM avatar", _CHARACTER, "gltf", options=("clip",)),
-    Format(".vrma", "VRM Animation", _VRMA, "gltf", "vrma", options=("clip",), mocap=True),
+    Format(".glb", "glTF 2.0", _GLB, "gltf", "glb", options=("clip",), mocap=True, loose=True),
+    Format(".gltf", "glTF 2.0, as text", _CHARACTER, "gltf", options=("clip",), loose=True),
+    Format(".vrm", "VRM avatar", _CHARACTER, "gltf", options=("clip",), loose=True),
+    Format(".vrma", "VRM Animation", _VRMA, "gltf", "vrma", options=("clip",), mocap=True, loose=True),
     Format(".html", "web page", "a page with a player: orbit, play, scrub, no network", writer="html"),
     Format(".gif", "picture", _GIF, writer="gif", needs="PIL"),
 )
@@ -96,9 +98,14 @@ OTHERS = {
 READABLE = tuple(kind.extension for kind in FORMATS if kind.reader)
 WRITABLE = tuple(kind.extension for kind in FORMATS if kind.writer)
 MOCAP = tuple(kind.extension for kind in FORMATS if kind.mocap)
+CLIPPED = tuple(kind.extension for kind in FORMATS if "clip" in kind.options)
 READS = ", ".join(f"{kind.extension} ({kind.name})" for kind in FORMATS if kind.reader)
 WRITES = ", ".join(f"{kind.extension} ({kind.name})" for kind in FORMATS if kind.writer)
 """The formats as help texts list them."""
+
+
+HUMAN_HEIGHT = (0.5, 3.0)
+"""Metres from the sole to the top of the skull, or from hand to hand, that a figure of a human's size has."""
 
 
 def read_motion(
@@ -115,7 +122,8 @@ def read_motion(
 
     fps: the frame rate where the format has none, which is AMC.
     asf: the skeleton of an AMC file; by default it is looked for beside it.
-    unit: the length unit where the file does not say its own: "m", "cm", "mm", "inch" or a number of metres.
+    unit: the length unit where the file does not say its own: "m", "cm", "mm", "inch" or a number of metres. Of glTF,
+        whose metre is a convention, it is taken unless the figure is of a human's size in metres and not in that unit.
     partial: take the complete frames of a truncated AMC or BVH file, which is refused otherwise.
     clip: which motion of a file that holds several: a name as :func:`clips` has them, or a number from 1; by default
         the first, with a word in the log where there are others.
@@ -134,7 +142,7 @@ def read_motion(
         with np.errstate(over="ignore", invalid="ignore"):  # what gets infinite is refused by Motion
             motion = kind.read()(file, **options)
         log.debug("read %s: %r", path, motion)
-        return motion if unit is None else _in_unit(path, motion, metres(unit))
+        return motion if unit is None else _in_unit(path, motion, metres(unit), kind.loose)
     except FormatError:
         raise
     except MotionError as error:
@@ -149,6 +157,11 @@ def clips(file: File, *, format: str | None = None) -> tuple[str, ...]:
     """
     kind = _format(file, format, READABLE, "read")
     return kind.clips()(file) if "clip" in kind.options else ()
+
+
+def names_motion(text: str) -> bool:
+    """Whether a text is the name of a motion file, by its extension; with a clip or without."""
+    return place_of(split_clip(text, READABLE)[0]).suffix.lower() in READABLE
 
 
 def read_character(file: File) -> Character:
@@ -217,11 +230,17 @@ def _rig(name: Path) -> Skeleton:
         raise FormatError(name, f"no such file, and {error}") from error
 
 
-def _in_unit(path: Path, motion: Motion, unit: float) -> Motion:
-    """The motion with the length unit that its file does not say, or says alike."""
+def _in_unit(path: Path, motion: Motion, unit: float, loose: bool) -> Motion:
+    """The motion with the length unit that its file does not say. loose: or says by convention."""
     if motion.skeleton is None:
         raise FormatError(path, "it has no skeleton, so it has no unit of length")
-    said = motion.skeleton.metres_per_unit
-    if said is not None and not math.isclose(said, unit, rel_tol=1e-6):
-        raise FormatError(path, f"its length unit is {said:.6g} m according to the file, not {unit:.6g} m as given")
-    return motion.with_unit(unit) if said is None else motion
+    said, height = motion.skeleton.metres_per_unit, motion.skeleton.height
+    if said is None or (loose and (_human(height * unit) or not _human(height * said))):
+        return motion.with_unit(unit)
+    if not math.isclose(said, unit, rel_tol=1e-6):
+        log.info("%s: its length unit is %.6g m according to the file, not %.6g m as given", path, said, unit)
+    return motion
+
+
+def _human(height: float) -> bool:
+    return HUMAN_HEIGHT[0] <= height <= HUMAN_HEIGHT[1]

@@ -39,7 +39,8 @@ def chosen(path: Path, names: Sequence[str], clip: Clip) -> int:
     """
     if clip is None:
         if len(names) > 1:
-            log.warning("%s: the first of %d clips is taken, %s", path, len(names), quoted(names[0]))
+            said = "%s: of %d clips the first is taken, %s; the next is %s%s%s"
+            log.warning(said, path, len(names), quoted(names[0]), path.name, MARK, names[1])
             log.info("%s: its clips are %s", path, ", ".join(map(quoted, names)))
         return 0
     if isinstance(clip, str) and _tidy(clip) in names:

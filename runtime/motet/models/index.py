@@ -10,7 +10,7 @@ import json
 import logging
 import zipfile
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,8 @@ import numpy as np
 from motet.bundle.graph import Floats
 from motet.errors import FormatError, MotetError, MotionError, OutputError, UnitError
 from motet.files import write_whole
-from motet.formats import MOCAP, read_motion
+from motet.formats import MOCAP, clips, read_motion
+from motet.formats.clips import MARK
 from motet.formats.npy import array
 from motet.models.progress import Progress, silent
 from motet.models.search import SearchModel
@@ -31,7 +32,7 @@ log = logging.getLogger(__name__)
 NAME = ".motet-search.npz"
 """The file of a folder's index, in the folder."""
 
-VERSION = 1
+VERSION = 2
 """Of what is in the file."""
 
 WINDOW = 10.0
@@ -40,23 +41,41 @@ WINDOW = 10.0
 
 @dataclass(frozen=True)
 class Hit:
-    """A motion file, the seconds in which it shows what was asked for, and how near that is: 1 is the same."""
+    """A motion file, the seconds in which it shows what was asked for, and how near that is: 1 is the same.
+
+    clip: which motion of a file that holds several; else empty.
+    """
 
     path: Path
     start: float
     stop: float
     score: float
+    clip: str = ""
+
+    @property
+    def place(self) -> str:
+        """The path, with the clip if there is one, as :func:`motet.read` takes it."""
+        return f"{self.path}{MARK}{self.clip}" if self.clip else str(self.path)
 
 
 @dataclass(frozen=True)
 class Member:
-    """A motion file of the folder, by its path within it; windows: (start, stop) in seconds; fault: why it has none."""
+    """A motion file of the folder, by its path within it, or a clip of one that holds several.
+
+    windows: (start, stop) in seconds; fault: why it has none.
+    """
 
     path: str
     size: int
     changed: int
     windows: tuple[tuple[float, float], ...] = ()
     fault: str = ""
+    clip: str = ""
+
+    @property
+    def name(self) -> str:
+        """The path, with the clip if there is one."""
+        return f"{self.path}{MARK}{self.clip}" if self.clip else self.path
 
 
 class Index:
@@ -119,10 +138,10 @@ class Index:
     @property
     def failed(self) -> dict[Path, str]:
         """The motion files that cannot be found by any question, and why."""
-        return {self.folder / member.path: member.fault for member in self.members if member.fault}
+        return {self.folder / member.name: member.fault for member in self.members if member.fault}
 
     def search(self, query: str | Motion, count: int | None = None) -> list[Hit]:
-        """The ``count`` files that are nearest to a sentence or a motion, best first, each with its best window.
+        """The ``count`` files or clips nearest to a sentence or a motion, best first, each with its best window.
 
         count: the bundle's by default. TextError for a sentence without a known word, MotionError for a motion that
         the model cannot take, DecodingError for a count that is not between 1 and 1,000.
@@ -132,8 +151,9 @@ class Index:
         found: dict[str, Hit] = {}
         for row in self.model.loop.run(scores, len(scores)):
             member, start, stop = self._windows[row]
-            if member.path not in found:
-                found[member.path] = Hit(self.folder / member.path, start, stop, float(scores[row]))
+            if member.name not in found:
+                place = self.folder / member.path
+                found[member.name] = Hit(place, start, stop, float(scores[row]), member.clip)
             if len(found) == wanted:
                 break
         return list(found.values())
@@ -159,7 +179,7 @@ def _renewed(
     folder: Path, model: SearchModel, before: Index | None, unit: str | float | None, progress: Progress
 ) -> Index:
     """The index of a folder as it is now, with what is known already of files that did not change."""
-    known = {} if before is None else dict(_by_member(before))
+    known = {} if before is None else _by_file(before)
     usable = known if before is not None and before.unit == unit else {}
     paths = sorted(_motion_files(folder))
     if not paths:
@@ -167,21 +187,25 @@ def _renewed(
     members, vectors = [], []
     for done, path in enumerate(paths, start=1):
         state = path.stat()
-        member = Member(path.relative_to(folder).as_posix(), state.st_size, state.st_mtime_ns)
-        was = usable.get((member.path, member.size, member.changed))
-        now, rows = was or _embedded(path, member, model, unit)
-        members.append(now)
-        vectors.append(rows)
+        file = Member(path.relative_to(folder).as_posix(), state.st_size, state.st_mtime_ns)
+        was = usable.get((file.path, file.size, file.changed))
+        for member, rows in was or _embedded_clips(path, file, model, unit):
+            members.append(member)
+            vectors.append(rows)
         progress(done, len(paths))
     gone = {path for path, _, _ in known} - {member.path for member in members}
     return Index(model, folder, members, np.concatenate(vectors), [folder / path for path in sorted(gone)], unit)
 
 
-def _by_member(index: Index) -> Iterator[tuple[tuple[str, int, int], tuple[Member, Floats]]]:
+def _by_file(index: Index) -> dict[tuple[str, int, int], list[tuple[Member, Floats]]]:
+    """For each motion file, with its size and time of change, its members and their vectors."""
+    found: dict[tuple[str, int, int], list[tuple[Member, Floats]]] = {}
     stop = 0
     for member in index.members:
         start, stop = stop, stop + len(member.windows)
-        yield (member.path, member.size, member.changed), (member, index.vectors[start:stop])
+        file = member.path, member.size, member.changed
+        found.setdefault(file, []).append((member, index.vectors[start:stop]))
+    return found
 
 
 def _motion_files(folder: Path) -> Iterator[Path]:
@@ -192,18 +216,30 @@ def _motion_files(folder: Path) -> Iterator[Path]:
             yield path
 
 
+def _embedded_clips(
+    path: Path, file: Member, model: SearchModel, unit: str | float | None
+) -> list[tuple[Member, Floats]]:
+    """The members of a motion file, one for each clip, with their vectors."""
+    try:
+        names = clips(path)
+    except MotetError:  # it is said when the file is read
+        names = ()
+    found = [replace(file, clip=name) for name in names] if len(names) > 1 else [file]
+    return [_embedded(path, member, model, unit) for member in found]
+
+
 def _embedded(path: Path, member: Member, model: SearchModel, unit: str | float | None) -> tuple[Member, Floats]:
     """A member with its windows, and their vectors; or with the reason why it has none."""
     size = model.sizes["E"]
     try:
-        parts = model.windows(read_motion(path, unit=unit), WINDOW)
+        parts = model.windows(read_motion(path, unit=unit, clip=member.clip or None), WINDOW)
         vectors = model.embed([part for _, part in parts])
     except MotetError as error:
         hint = " (Index.open's unit, --unit-in)" if isinstance(error, UnitError) else ""
         fault = str(error).removeprefix(f"{path}: ") + hint
-        return Member(member.path, member.size, member.changed, (), fault), np.empty((0, size), np.float32)
+        return replace(member, fault=fault), np.empty((0, size), np.float32)
     windows = tuple((start, start + part.duration) for start, part in parts)
-    return Member(member.path, member.size, member.changed, windows), vectors
+    return replace(member, windows=windows), vectors
 
 
 def _keep(index: Index, file: Path, needed: bool) -> None:
@@ -248,4 +284,5 @@ def _read(file: Path, model: SearchModel) -> Index:
 
 def _member(data: dict[str, Any]) -> Member:
     windows = tuple((float(start), float(stop)) for start, stop in data["windows"])
-    return Member(str(data["path"]), int(data["size"]), int(data["changed"]), windows, str(data["fault"]))
+    size, changed, fault, clip = int(data["size"]), int(data["changed"]), str(data["fault"]), str(data["clip"])
+    return Member(str(data["path"]), size, changed, windows, fault, clip)

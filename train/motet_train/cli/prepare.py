@@ -57,9 +57,10 @@ def prepare(
     """Prepare the corpus DATA once: folders or zips of motions with sentences become a store to train on.
 
     DATA is the KIT Motion-Language data, or motion files .amc (with .asf) .bvh .npz .glb .vrma with a
-    tab-separated table of the columns clip and sentence, which predict does not need. Of two files of one name that of
-    the later DATA counts. Every human figure is brought to the humanoid. A motion that cannot be used is named and
-    skipped; longer than 30 s, it is cut into pieces, which share its sentences.
+    tab-separated table of the columns clip and sentence, which predict does not need; a clip of a file of several is
+    called FILE#CLIP there. Of two files of one name that of the later DATA counts. Every human figure is brought to the
+    humanoid. A motion that cannot be used is named and skipped; longer than 30 s, it is cut into pieces, which share
+    its sentences.
     """
     who = () if people is None else read_people(people)
     corpus = read_corpus(data, sentences, who, unit_in, described=verb != "predict")

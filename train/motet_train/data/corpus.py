@@ -4,7 +4,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from motet.formats import MOCAP, read_motion
+from motet.formats import CLIPPED, MOCAP, clips, read_motion
+from motet.formats.clips import MARK
 from motet_train.data import kit
 from motet_train.data.archive import BROKEN, Archive
 from motet_train.data.errors import DataError
@@ -30,7 +31,7 @@ class Corpus:
     unit: str | float | None = None
 
     def __len__(self) -> int:
-        """The number of motion files: each gives one Record or Skipped."""
+        """The number of motion files: each gives one Record or Skipped, or one for each of its clips."""
         return len(self.names)
 
     def __iter__(self) -> Iterator[Record | Skipped]:
@@ -83,6 +84,7 @@ def recordings(
 ) -> Iterator[Record | Skipped]:
     """The motion of each file of an archive, one of each clip's name; Skipped where it cannot be read or used.
 
+    A file of several motions gives each by the file's name and its own: "people#Walk".
     unit: the length unit of files that do not state theirs, as in :func:`motet.read`. table: what is said of each clip,
     without which a motion is skipped, as is a clip without a motion; by default all motions are given, without
     sentences. A clip's subject is what the table says, or else what ``people`` say.
@@ -91,36 +93,51 @@ def recordings(
         if name.lower().endswith(".asf"):
             archive.place(name)  # the reader of an AMC file looks for its skeleton near it
     seen: set[str] = set()
-    for file in motion_files(archive):
-        clip = _clip(file, table or {})
+    for file, own in _motions(archive):
+        clip = _clip(file, own, table or {})
         said = Described() if table is None else table.get(clip)
         if said is None:
             yield Skipped(clip, "no sentence")
         elif clip in seen:
             yield Skipped(clip, f"a second motion of this name: {file}")
         else:
-            yield _record(archive, file, said, person(people, clip), clip, unit)
+            yield _record(archive, file, own, said, person(people, clip), clip, unit)
         seen.add(clip)
     yield from (Skipped(clip, "no motion file of this name") for clip in table or () if clip not in seen)
 
 
+def _motions(archive: Archive) -> Iterator[tuple[str, str | None]]:
+    """The motion files of an archive; one of several motions with the name of each."""
+    for file in motion_files(archive):
+        names = _clips(archive, file) if PurePosixPath(file).suffix.lower() in CLIPPED else ()
+        yield from ((file, name) for name in (names if len(names) > 1 else (None,)))
+
+
+def _clips(archive: Archive, file: str) -> tuple[str, ...]:
+    try:
+        with archive.opened(file) as place:
+            return clips(place)
+    except BROKEN:  # it is said when the file is read
+        return ()
+
+
 def _record(
-    archive: Archive, file: str, said: Described, who: Person, clip: str, unit: str | float | None
+    archive: Archive, file: str, own: str | None, said: Described, who: Person, clip: str, unit: str | float | None
 ) -> Record | Skipped:
     try:
         with archive.opened(file) as place:
-            motion = read_motion(place, unit=unit)
+            motion = read_motion(place, unit=unit, clip=own)
         subject = said.subject or who.subject
         return Record(clip, subject, motion, tuple(said.sentences), tuple(said.unseen), who.take, said.action)
     except BROKEN as error:
         return Skipped(clip, archive.reason(error))
 
 
-def _clip(file: str, table: Mapping[str, Described]) -> str:
-    """The name of a motion file in the table: its path without the extension, or else its stem."""
-    path = PurePosixPath(file)
-    whole = path.with_suffix("").as_posix()
-    return whole if whole in table else path.stem
+def _clip(file: str, own: str | None, table: Mapping[str, Described]) -> str:
+    """The name of a motion in the table: its file's path without the extension, or else its stem; and its own name."""
+    path, behind = PurePosixPath(file), "" if own is None else f"{MARK}{own}"
+    whole = path.with_suffix("").as_posix() + behind
+    return whole if whole in table else path.stem + behind
 
 
 def _only_table(path: Path) -> Path:
