@@ -49,7 +49,7 @@ def test_a_second_of_a_walk_is_filled_better_than_by_interpolation(model: FillMo
 def test_the_command_gives_what_the_library_gives(model: FillModel, walk: Motion, tmp_path: Path, clips: Path) -> None:
     out = tmp_path / "out.npz"
     result = run("fill", clips / WALK, "--gap", "2.0:2.5", "--gap", "1:1.5", "-o", out)
-    assert (result.exit_code, result.stdout) == (0, f"{out}: 399 frames at 120 fps, 3.325 s\n")
+    assert (result.exit_code, result.stdout) == (0, f"{out}: 399 frames at 120 fps, 3.33 s\n")
     np.testing.assert_array_equal(read_motion(out).values, model.fill(walk, [(1.0, 1.5), (2.0, 2.5)]).values)
     assert run("fill", clips / WALK, "--loop", "--seconds", 0.3, "-o", out).exit_code == 0
     np.testing.assert_array_equal(read_motion(out).values, model.looped(walk, seconds=0.3).values)
