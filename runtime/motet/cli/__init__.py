@@ -5,6 +5,7 @@ import importlib.util
 import logging
 import os
 import sys
+from difflib import get_close_matches
 from typing import Any
 
 import click
@@ -44,16 +45,30 @@ NEEDS = {
 
 
 class Commands(click.Group):
-    """A group that imports a command only when it is called, and lists those that can run here."""
+    """A group that imports a command only when it is called, and says which of them need an extra."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """The commands whose extra is installed."""
         return [name for name, (_, extra, _) in COMMANDS.items() if not missing(extra)]
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """List the commands without importing them."""
+        """List the commands without importing them, and those whose extra is missing with the extra."""
+        here = self.list_commands(ctx)
         with formatter.section("Commands"):
-            formatter.write_dl([(name, COMMANDS[name][2]) for name in self.list_commands(ctx)])
+            formatter.write_dl([(name, COMMANDS[name][2]) for name in here])
+        others = [(name, f"{line} [{extra}]") for name, (_, extra, line) in COMMANDS.items() if name not in here]
+        if others:
+            with formatter.section("Commands of extras, installed with  pip install 'motet[EXTRA]'"):
+                formatter.write_dl(others)
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """The command that is called; one that is nearly spelt like another is refused with its name."""
+        near = get_close_matches(args[0], COMMANDS, 1)
+        if near and args[0] not in COMMANDS and not ctx.resilient_parsing:
+            ctx.fail(f"No such command {args[0]!r}. Did you mean {near[0]!r}?")
+        return super().resolve_command(ctx, args)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Import one command; a clear refusal where its extra is not installed."""
@@ -69,12 +84,14 @@ class Commands(click.Group):
         return command
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run a command; motet's own errors become one message on stderr and exit code 2."""
+        """Run a command; motet's own errors become one message on stderr and exit code 2, Ctrl-C becomes code 130."""
         try:
             return super().invoke(ctx)
         except MotetError as error:
             click.echo(f"motet: {error}", err=True)
             sys.exit(2)
+        except KeyboardInterrupt:
+            sys.exit(130)
 
     def main(self, *args: Any, **kwargs: Any) -> Any:
         """Run as a program; results that cannot be printed, as on a full disk, are one message and exit code 1."""
