@@ -73,8 +73,8 @@ FIGURES: dict[str, tuple[Callable[[], Motion], str]] = {
 }
 """Name -> the figure, and what is said of it."""
 
-NO_CHARACTER = {name: case for name, case in FIGURES.items() if name != "knees forwards"}
-"""The same without what is wrong in the frames alone, of which a character needs none."""
+NO_CHARACTER = {name: case for name, case in FIGURES.items() if name not in ("knees forwards", "a giant")}
+"""The same without what is wrong in the frames alone, of which a character needs none; and it may be of any size."""
 
 MAPS = {
     '{"hips": "Hipz"}': "map.json: hips: the skeleton has no joint 'Hipz'; it has mixamorig:Hips, mixamorig:Spine,",

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from motet.errors import FormatError, MotionError
-from motet.formats import glb, gltf, gltf_data, read_motion, vrma
-from motet.motion.humanoid import BONES, HUMANOID, REST
+from motet.formats import glb, gltf, gltf_data, read_character, read_motion, vrma
+from motet.motion.humanoid import BONES, HUMANOID, REST, ground_under, sole_points
 from motet.motion.kinematics import global_transforms, positions, skeleton_of
 from motet.motion.motion import Motion
-from motet.motion.retarget import from_humanoid, to_humanoid
+from motet.motion.retarget import from_humanoid, grounded, to_humanoid
 from motet.motion.rigs import MIXAMO
 from motet.motion.rotations import Array, quat_to_rotmat, rotmat_to_quat
 
@@ -71,7 +71,10 @@ def test_vrma_holds_the_bones_of_the_humanoid(tmp_path: Path) -> None:
     assert not any("scale" in node or "rotation" in node for node in document["nodes"])
     moved = [c["target"]["node"] for c in document["animations"][0]["channels"] if c["target"]["path"] == "translation"]
     assert moved == [0]
-    np.testing.assert_allclose(in_order(gltf.read(tmp_path / "a.vrma")), in_order(moving()), atol=1e-6)
+    written = gltf.read(tmp_path / "a.vrma")
+    np.testing.assert_allclose(in_order(written), in_order(grounded(moving())), atol=1e-6)
+    lowest = sole_points(*global_transforms(to_humanoid(written).motion))
+    assert ground_under(lowest) == pytest.approx(0, abs=1e-6)
 
 
 def test_vrma_takes_any_human_figure(tmp_path: Path) -> None:
@@ -108,14 +111,14 @@ def test_an_avatar_with_rest_rotations_of_its_own_moves_as_the_humanoid(tmp_path
     still = gltf.read(avatar)
     assert len(still) == 1
     np.testing.assert_allclose(in_order(still, list(BONES))[0], REST[BONE_INDICES], atol=1e-6)
-    character = gltf.read_character(avatar)
+    character = read_character(avatar)
     motion = moving()
     out = from_humanoid(motion, character.rest, character.joint_map)
     assert out.skeleton is not None
     assert out.skeleton.names[0] == "J_0"
     place, expected = in_order(out, [f"J_{i}" for i in BONE_INDICES]), in_order(motion, list(BONES))
     np.testing.assert_allclose(place - place[:1, :1], expected - expected[:1, :1], atol=2e-6)
-    # the angles are those of the file's nodes: at rest they give the nodes' own rotations back
+    # every angle 0 is the pose that the nodes rest in
     rest = from_humanoid(to_humanoid(still).motion, character.rest, character.joint_map)
     np.testing.assert_allclose(global_transforms(rest)[0], global_transforms(character.rest)[0], atol=1e-6)
 

@@ -9,7 +9,7 @@ from it.
 
 import logging
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
@@ -103,6 +103,9 @@ READS = ", ".join(f"{kind.extension} ({kind.name})" for kind in FORMATS if kind.
 WRITES = ", ".join(f"{kind.extension} ({kind.name})" for kind in FORMATS if kind.writer)
 """The formats as help texts list them."""
 
+ONTO = (".glb", ".vrm")
+"""What a character with its mesh and new animations is written as."""
+
 
 HUMAN_HEIGHT = (0.5, 3.0)
 """Metres from the sole to the top of the skull, or from hand to hand, that a figure of a human's size has."""
@@ -174,29 +177,70 @@ def read_character(file: File) -> Character:
         return _character(_rig(Path(file)))
     if _format(file, None, READABLE, "read").reader != "gltf":
         return Character(read_motion(file))
-    from motet.formats import gltf
+    from motet.formats import gltf_character
 
-    return gltf.read_character(file)
+    return gltf_character.read_character(file)
 
 
 def write_motion(
-    file: File, motion: Motion, *, format: str | None = None, like: File | Character | Motion | Skeleton | None = None
+    file: File,
+    motion: Motion | Mapping[str, Motion],
+    *,
+    format: str | None = None,
+    like: File | Character | Motion | Skeleton | None = None,
+    onto: File | Character | None = None,
 ) -> None:
     """Write a motion in the format of the path's extension, or in ``format``, which a file object needs.
 
     like: a character whose skeleton the motion is put onto: a file of it (.bvh, .glb, .vrm, ...), a motion of it,
         its skeleton, or the name of a rig ("mixamo", "rigify", "unity", "unreal").
+    onto: the .glb or .vrm of a character, which is written with its mesh and materials and the motion, or several by
+        the names of their clips, as animations in it.
     FormatError, MotionError or OutputError if that is not possible; nothing is written then.
     """
+    if onto is not None:
+        write_onto(file, motion if isinstance(motion, Mapping) else {"motion": motion}, onto, format=format)
+    elif isinstance(motion, Mapping):
+        raise MotionError("several motions are written into one file with onto= and a character's .glb or .vrm only")
+    else:
+        check_writable(file, format)
+        character = None if like is None else _character(like)
+        write_on(file, motion if character is None else put_onto(motion, character), character, format=format)
+
+
+def write_on(file: File, motion: Motion, character: Character | None, *, format: str | None = None) -> None:
+    """Write a motion as :func:`write_motion` does, which is on the character's skeleton already where one is given."""
     check_writable(file, format)
-    motion = motion if like is None else put_onto(motion, _character(like))
-    with np.errstate(over="ignore", invalid="ignore"):  # writers refuse what is too large by themselves
-        _format(file, format, WRITABLE, "write").write()(file, motion)
-
-
-def check_writable(file: File, format: str | None = None) -> None:
-    """Refuse a place that cannot be written to, or an unknown extension, before long work starts."""
     kind = _format(file, format, WRITABLE, "write")
+    with np.errstate(over="ignore", invalid="ignore"):  # writers refuse what is too large by themselves
+        if character and character.nodes and kind.writer == "glb":
+            from motet.formats import gltf_onto
+
+            gltf_onto.write_clip(file, _metres(motion), character.nodes)
+        else:
+            kind.write()(file, motion)
+
+
+def write_onto(file: File, motions: Mapping[str, Motion], onto: File | Character, *, format: str | None = None) -> None:
+    """Write a character with motions by their names, as :func:`write_motion` does."""
+    check_writable(file, format, ONTO)
+    character = onto if isinstance(onto, Character) else read_character(onto)
+    if character.nodes is None:
+        raise MotionError(f"the character has no mesh to write: expected a file of it, one of {' '.join(ONTO)}")
+    from motet.formats import gltf_onto
+
+    put = {name: _metres(put_onto(motion, character)) for name, motion in motions.items()}
+    with np.errstate(over="ignore", invalid="ignore"):
+        gltf_onto.write_onto(file, put, character.nodes)
+
+
+def _metres(motion: Motion) -> Motion:
+    return motion if motion.skeleton is None or motion.skeleton.metres_per_unit == 1 else motion.scaled(1.0)
+
+
+def check_writable(file: File, format: str | None = None, allowed: tuple[str, ...] = WRITABLE) -> None:
+    """Refuse a place that cannot be written to, or an extension that is not allowed, before long work starts."""
+    kind = _format(file, format, allowed, "write")
     if kind.needs and find_spec(kind.needs) is None:
         reason = (
             f"{kind.extension} files need the package {kind.needs}: install the extra with  pip install 'motet[plot]'"

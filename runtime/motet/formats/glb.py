@@ -8,6 +8,7 @@ in a skin, by which viewers and Blender know them as bones.
 
 import json
 import struct
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -34,12 +35,13 @@ AROUND = 10
 
 
 class Buffer:
-    """The binary part of the file: arrays put in, each as an accessor with its own view."""
+    """The binary part of a file: arrays put in, each as an accessor with its own view, after those of ``document``."""
 
-    def __init__(self) -> None:
-        self.content = bytearray()
-        self.views: list[dict[str, Any]] = []
-        self.accessors: list[dict[str, Any]] = []
+    def __init__(self, document: Mapping[str, Any] | None = None, content: bytes = b"") -> None:
+        document = document or {}
+        self.content = bytearray(content + bytes(-len(content) % 4))
+        self.views: list[dict[str, Any]] = list(document.get("bufferViews", []))
+        self.accessors: list[dict[str, Any]] = list(document.get("accessors", []))
 
     def add(self, values: NDArray[Any], kind: int = FLOAT, target: int = 0, **more: Any) -> int:
         """Index of the new accessor of values (N, ...) of a component type, for a use in a mesh or none."""
@@ -61,6 +63,14 @@ class Buffer:
         least, greatest = single.min(axis=0).tolist(), single.max(axis=0).tolist()
         return self.add(values, FLOAT, target, min=least, max=greatest)
 
+    def parts(self) -> dict[str, Any]:
+        """What a document says of its binary part."""
+        return {
+            "bufferViews": self.views,
+            "accessors": self.accessors,
+            "buffers": [{"byteLength": len(self.content)}],
+        }
+
 
 def write(file: File, motion: Motion) -> None:
     """Write a motion; MotionError for one without skeleton or frames, OutputError if the file cannot be written."""
@@ -73,22 +83,28 @@ def write(file: File, motion: Motion) -> None:
     buffer = Buffer()
     joints = len(skeleton.joints)
     document = {
-        "asset": {"version": "2.0", "generator": "motet", "extras": _facts(motion, skeleton)},
+        "asset": {"version": "2.0", "generator": "motet", "extras": facts(motion, skeleton)},
         "scene": 0,
         "scenes": [{"nodes": [0, joints]}],
         "nodes": [*joint_nodes(skeleton), {"name": "body", "mesh": 0, "skin": 0}],
-        "animations": [animation(buffer, motion, skeleton)],
+        "animations": [animation(buffer, "motion", motion, joint_tracks(motion, skeleton))],
         "skins": [_skin(buffer, skeleton)],
-        "meshes": [{"name": "body", "primitives": [_body(buffer, skeleton)]}],
-        "materials": [{"name": "body", "pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 0.6}}],
-        "bufferViews": buffer.views,
-        "accessors": buffer.accessors,
-        "buffers": [{"byteLength": len(buffer.content)}],
+        **drawn(buffer, skeleton),
+        **buffer.parts(),
     }
     write_whole(file, container(document, bytes(buffer.content)))
 
 
-def _facts(motion: Motion, skeleton: Skeleton) -> dict[str, Any]:
+def drawn(buffer: Buffer, skeleton: Skeleton) -> dict[str, Any]:
+    """The mesh of a body, for the file's first skin, and its material."""
+    return {
+        "meshes": [{"name": "body", "primitives": [_body(buffer, skeleton)]}],
+        "materials": [{"name": "body", "pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 0.6}}],
+    }
+
+
+def facts(motion: Motion, skeleton: Skeleton) -> dict[str, Any]:
+    """What a file says of its motion beside what glTF has words for."""
     return {"fps": motion.fps, "frames": len(motion), "length_unit": "m" if skeleton.metres_per_unit else "unknown"}
 
 
@@ -109,19 +125,28 @@ def joint_nodes(skeleton: Skeleton) -> list[dict[str, Any]]:
     return nodes
 
 
-def animation(buffer: Buffer, motion: Motion, skeleton: Skeleton) -> dict[str, Any]:
-    """The animation of the joints' nodes, the first of all nodes; its arrays go into the buffer."""
-    times = buffer.add_bounded(np.arange(len(motion)) / motion.fps)
-    turns, moves = _continuous(rotmat_to_quat(local_rotations(motion))), local_translations(motion)
-    samplers: list[dict[str, Any]] = []
-    channels: list[dict[str, Any]] = []
+Track = tuple[int, str, Array]
+"""A node's index, "rotation" or "translation", and quaternions (T, 4) or places (T, 3)."""
+
+
+def joint_tracks(motion: Motion, skeleton: Skeleton) -> Iterator[Track]:
+    """The tracks of the joints' nodes, the first of all nodes: of those that turn or move, and of the root always."""
+    turns, moves = rotmat_to_quat(local_rotations(motion)), local_translations(motion)
     for i, joint in enumerate(skeleton.joints):
         tracks = {"rotation": (turns[:, i], [0, 0, 0, 1]), "translation": (moves[:, i], joint.offset)}
-        for name, (track, rest) in tracks.items():
-            if i == 0 or np.any(track != rest):
-                channels.append({"sampler": len(samplers), "target": {"node": i, "path": name}})
-                samplers.append({"input": times, "output": buffer.add(track), "interpolation": "LINEAR"})
-    return {"name": "motion", "channels": channels, "samplers": samplers}
+        yield from ((i, path, track) for path, (track, rest) in tracks.items() if i == 0 or np.any(track != rest))
+
+
+def animation(buffer: Buffer, name: str, motion: Motion, tracks: Iterable[Track]) -> dict[str, Any]:
+    """The animation of tracks at the motion's frames; its arrays go into the buffer."""
+    times = buffer.add_bounded(np.arange(len(motion)) / motion.fps)
+    samplers: list[dict[str, Any]] = []
+    channels: list[dict[str, Any]] = []
+    for node, path, track in tracks:
+        channels.append({"sampler": len(samplers), "target": {"node": node, "path": path}})
+        values = _continuous(track) if path == "rotation" else track
+        samplers.append({"input": times, "output": buffer.add(values), "interpolation": "LINEAR"})
+    return {"name": name, "channels": channels, "samplers": samplers}
 
 
 def _continuous(quats: Array) -> Array:

@@ -13,20 +13,16 @@ import numpy as np
 
 from motet.errors import FormatError, MotionError
 from motet.files import File, place_of
-from motet.formats.character import Character
 from motet.formats.clips import Clip, chosen, clip_names
 from motet.formats.gltf_data import Gltf, parse
 from motet.formats.gltf_figures import Figure, above, figure_of, figures, likeliest
 from motet.formats.gltf_tracks import FPS, Tracks, moved, tracks
 from motet.formats.lines import Names
-from motet.formats.nodes import Poses, motion_of_nodes, skeleton_of_nodes
-from motet.motion.humanoid import BONES, REQUIRED
-from motet.motion.joint_map import JointMap, check_map
+from motet.formats.nodes import Poses, motion_of_nodes
+from motet.motion.humanoid import BONES
 from motet.motion.motion import Motion
 from motet.motion.products import product, rotated
-from motet.motion.rotations import Array, frames_last, quat_to_rotmat
-from motet.motion.skeleton import Skeleton
-from motet.motion.world_rotations import motion_of
+from motet.motion.rotations import frames_last, quat_to_rotmat
 
 
 def read(file: File, clip: Clip = None) -> Motion:
@@ -35,18 +31,18 @@ def read(file: File, clip: Clip = None) -> Motion:
     Bones of a VRM humanoid get VRM's names, other joints keep theirs. Channels: three angles in "deg" for each joint,
     the translation of the root and of joints that move in "length". FormatError names what the file lacks.
     """
-    with _broken(place_of(file)):
+    with broken(place_of(file)):
         return _read(_parsed(file), clip)
 
 
 def clips(file: File) -> tuple[str, ...]:
     """The names of the animations that move a figure, in the file's order; FormatError as :func:`read`."""
-    with _broken(place_of(file)):
+    with broken(place_of(file)):
         return _parsed(file).names
 
 
 @contextmanager
-def _broken(path: Path) -> Iterator[None]:
+def broken(path: Path) -> Iterator[None]:
     """What a file holds in the wrong place or type, as a FormatError."""
     try:
         yield
@@ -86,40 +82,6 @@ def _read(scene: _Scene, clip: Clip) -> Motion:
     rest, poses = _world(gltf, {}, 1), _world(gltf, values, len(next(iter(values.values()), np.zeros(1))))
     rest, poses = rest.of(figure.nodes), poses.of(figure.nodes)
     return motion_of_nodes(gltf.path, _named(gltf, figure), figure.parents, rest, poses, fps, metres=1.0)
-
-
-def read_character(file: File) -> Character:
-    """Read a character's skeleton for :func:`motet.motion.retarget.from_humanoid`; FormatError as :func:`read`."""
-    path = place_of(file)
-    with _broken(path):
-        return _character(path, parse(file))
-
-
-def _character(path: Path, gltf: Gltf) -> Character:
-    all_moved = set().union(*map(moved, gltf.objects("animations")))
-    figure = figure_of(gltf, likeliest(gltf, figures(gltf, all_moved), all_moved))
-    world = _world(gltf, {}, 1).of(figure.nodes)
-    turns, places = world.turns[0], world.places[0]
-    locals_: list[Array] = [places[0]]
-    for i, parent in enumerate(figure.parents[1:], start=1):
-        locals_.append(turns[parent].T @ (places[i] - places[parent]))
-    skeleton = skeleton_of_nodes(path, list(figure.names), figure.parents, locals_, metres=1.0)
-    rest = motion_of(skeleton, world.turns, {0: world.places[:, 0]}, FPS)
-    humanoid = {bone: figure.nodes.index(node) for bone, node in gltf.humanoid().items() if node in figure.nodes}
-    return Character(rest, _map(path, skeleton, humanoid) if humanoid else None)
-
-
-def _map(path: Path, skeleton: Skeleton, humanoid: dict[str, int]) -> JointMap:
-    missing = [bone for bone in REQUIRED if bone not in humanoid]
-    if missing:
-        raise FormatError(path, f"its VRM humanoid lacks bones that VRM requires: {', '.join(missing)}")
-    spine = tuple(humanoid[bone] for bone in ("spine", "chest", "upperChest") if bone in humanoid)
-    neck = tuple(humanoid[bone] for bone in ("neck",) if bone in humanoid)
-    joints = {bone: humanoid[bone] for bone in BONES if bone in humanoid and humanoid[bone] not in (*spine, *neck)}
-    try:
-        return check_map(skeleton, JointMap(joints, spine, neck, "VRM humanoid", 1.0))
-    except MotionError as error:
-        raise FormatError(path, str(error)) from error
 
 
 def _named(gltf: Gltf, joints: Figure) -> list[str]:

@@ -8,10 +8,10 @@ from typing import Any
 
 from motet.errors import MotionError
 from motet.files import File, write_whole
-from motet.formats.glb import Buffer, animation, container, joint_nodes
+from motet.formats.glb import Buffer, animation, container, joint_nodes, joint_tracks
 from motet.motion.humanoid import BONES, HUMANOID
 from motet.motion.motion import Motion
-from motet.motion.retarget import on_humanoid
+from motet.motion.retarget import grounded, on_humanoid
 
 EXTENSION = "VRMC_vrm_animation"
 
@@ -23,7 +23,7 @@ def write(file: File, motion: Motion) -> None:
     """
     if not len(motion):
         raise MotionError("this motion has no frames: a VRM animation cannot be without any")
-    motion = on_humanoid(motion)
+    motion = grounded(on_humanoid(motion))
     buffer = Buffer()
     document: dict[str, Any] = {
         "asset": {"version": "2.0", "generator": "motet"},
@@ -32,10 +32,8 @@ def write(file: File, motion: Motion) -> None:
         "scene": 0,
         "scenes": [{"nodes": [0]}],
         "nodes": joint_nodes(HUMANOID),
-        "animations": [animation(buffer, motion, HUMANOID)],
-        "bufferViews": buffer.views,
-        "accessors": buffer.accessors,
-        "buffers": [{"byteLength": len(buffer.content)}],
+        "animations": [animation(buffer, "motion", motion, joint_tracks(motion, HUMANOID))],
+        **buffer.parts(),
     }
     write_whole(file, container(document, bytes(buffer.content)))
 

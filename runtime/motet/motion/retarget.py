@@ -6,6 +6,7 @@ lacks stays at rest. Paths are scaled by the lengths of the legs and laid so tha
 """
 
 import logging
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,7 +25,7 @@ from motet.motion.mmm_figure import is_mmm, with_figure
 from motet.motion.motion import Motion
 from motet.motion.products import inverse, product, rotated
 from motet.motion.rest_pose import middle
-from motet.motion.rotations import Array, frames_last
+from motet.motion.rotations import Array, angle_of, axis_to_rotmat, frames_last
 from motet.motion.skeleton import END_SUFFIX, Skeleton
 from motet.motion.spread import spread, twist
 from motet.motion.world_rotations import motion_of, places_of
@@ -33,6 +34,9 @@ log = logging.getLogger(__name__)
 
 SURE = 0.75
 """Confidence from which on what was found needs no warning: less has a skeleton whose names do not even tell sides."""
+
+NEAR = 0.1
+"""Metres that a motion of the humanoid may float or sink by mistake."""
 
 HIPS = [HUMANOID.index(sided(side, "UpperLeg")) for side in LEFT_RIGHT]
 
@@ -127,6 +131,17 @@ def on_humanoid(motion: Motion) -> Motion:
     return found.motion
 
 
+def grounded(motion: Motion) -> Motion:
+    """A motion of the humanoid laid on the ground, as :func:`to_humanoid` lays others, where it floats or sinks a
+    little, as motions of models may; one that is further than :data:`NEAR` from the ground stays as it is."""
+    if "hips.ty" not in motion.channels:
+        return motion
+    ground = humanoid.ground_under(humanoid.sole_points(*global_transforms(motion)))
+    values = np.array(motion.values)
+    values[:, motion.channels.index("hips.ty")] -= ground if abs(ground) < NEAR else 0.0
+    return replace(motion, values=values)
+
+
 def _humanoid_rotations(rotations: Array, fitted: Fitted) -> Array:
     """Rotations in the world (T, J, 3, 3) of the humanoid's joints, from those of the figure's."""
     joint_map, aligned = fitted.joint_map, fitted.aligned
@@ -162,15 +177,24 @@ def _on_humanoid(turned: Array, legs: Array, fps: float) -> Motion:
     return motion_of(HUMANOID, turned, {0: root}, fps)
 
 
-def from_humanoid(motion: Motion, like: Motion | Skeleton, joint_map: JointMap | None = None) -> Motion:
+def from_humanoid(
+    motion: Motion,
+    like: Motion | Skeleton,
+    joint_map: JointMap | None = None,
+    *,
+    skin: Mapping[int, Array] | None = None,
+    ahead: bool = False,
+) -> Motion:
     """Put a motion of the humanoid onto another human skeleton, with its names, rest pose and proportions.
 
     like: the skeleton; where its rest pose is not a standing body, a motion of it, whose frames then tell how its
         joints stand.
     joint_map: as for :func:`to_humanoid`. Joints that are no bones keep their rest, but fingers bend as in a relaxed
     hand. The path is scaled by the ratio of the legs' lengths and the feet stay on the ground. Returns the translation
-    of the hips in "length" and three angles in "deg" for each joint; the skeleton knows its unit where the legs' length
-    tells it.
+    of the hips in "length" and three angles in "deg" for each joint; the skeleton knows its unit where it did, of
+    whatever size it is, or where the legs' length tells it.
+    skin: joint -> points (P, 3) of the figure's mesh, from the joint where every angle is 0; those of the feet are the
+        soles that stand on the ground. ahead: the motion's z becomes the way that the figure faces at rest.
     MotionError for a motion that is not the humanoid's, or a skeleton that is no human's.
     """
     if motion.skeleton != HUMANOID:
@@ -180,21 +204,56 @@ def from_humanoid(motion: Motion, like: Motion | Skeleton, joint_map: JointMap |
     fitted = fit(skeleton_of(example), joint_map, *global_transforms(example))
     skeleton, still = _still(example, fitted)
     still = relaxed(skeleton, still, joint_map)
-    skeleton = replace(skeleton, metres_per_unit=unit_of(skeleton, fitted.leg).metres)
+    if skeleton.metres_per_unit is None:
+        skeleton = replace(skeleton, metres_per_unit=unit_of(skeleton, fitted.leg).metres)
     source, places = global_transforms(motion)
+    if ahead:
+        front = _front(fitted)
+        source, places = product(front, source), rotated(front, places)
     turned = _figure_rotations(source, fitted, skeleton, still)
+    carrier = joint_map.carrier(skeleton)
+    moved = _moved(fitted, skeleton, (source, places), turned, skin or {})
+    return motion_of(skeleton, turned, {carrier: moved}, motion.fps)
+
+
+def _moved(
+    fitted: Fitted, skeleton: Skeleton, source: tuple[Array, Array], turned: Array, skin: Mapping[int, Array]
+) -> Array:
+    """Translations (T, 3) of a figure's carrier in its parent's frame, from rotations and positions of the humanoid's
+    joints and its own rotations (T, J, 3, 3): its path is scaled, its feet are as high over the ground."""
+    scale, joint_map = fitted.leg / leg_length(), fitted.joint_map
     figure = places_of(skeleton, turned)
-    scale = fitted.leg / leg_length()
-    moved = places[:, HIPS].mean(axis=1) * scale - middle(figure, joint_map, "UpperLeg")
-    bones = {bone: source[:, HUMANOID.index(bone)] for bone in fitted.heights}
-    soles = fitting.sole_points(fitted, bones, figure + moved[:, None])
-    moved[:, 1] += scale * humanoid.ground_under(humanoid.sole_points(source, places)) - humanoid.ground_under(soles)
+    moved: Array = source[1][:, HIPS].mean(axis=1) * scale - middle(figure, joint_map, "UpperLeg")
+    soles = _soles(fitted, skeleton, source[0], (turned, figure + moved[:, None]), skin)
+    moved[:, 1] += scale * humanoid.ground_under(humanoid.sole_points(*source)) - humanoid.ground_under(soles)
     carrier = joint_map.carrier(skeleton)
     if carrier:
         above = skeleton.joints[carrier].parent
         from_above = figure[:, carrier] + moved - figure[:, above] - skeleton.offsets[0]
         moved = rotated(inverse(turned[:, above]), from_above)
-    return motion_of(skeleton, turned, {carrier: moved}, motion.fps)
+    return moved
+
+
+def _front(fitted: Fitted) -> Array:
+    """The turn (3, 3) about y from z to where a figure faces at rest; none where it faces up or down."""
+    x, _, z = fitted.aligned[fitted.joint_map.joints["hips"]][:, 2]
+    return axis_to_rotmat("y", angle_of(x, z)) if np.hypot(x, z) > 0.5 else np.eye(3)
+
+
+def _soles(
+    fitted: Fitted, skeleton: Skeleton, source: Array, figure: tuple[Array, Array], skin: Mapping[int, Array]
+) -> Array:
+    """Points (T, P, 3) of the soles of a figure, from its rotations and positions: of its mesh, else as they are
+    measured on the humanoid, whose rotations are ``source``."""
+    turned, places = figure
+    feet = [fitted.joint_map.joints[sided(side, "Foot")] for side in LEFT_RIGHT]
+    own = [joint for foot in feet for joint in skeleton.subtree(skeleton.names[foot]) if joint in skin]
+    if own:
+        return np.concatenate(
+            [places[:, joint, None] + rotated(turned[:, joint, None], skin[joint]) for joint in own], 1
+        )
+    bones = {bone: source[:, HUMANOID.index(bone)] for bone in fitted.heights}
+    return fitting.sole_points(fitted, bones, places)
 
 
 def _still(example: Motion, fitted: Fitted) -> tuple[Skeleton, Array]:

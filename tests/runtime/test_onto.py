@@ -1,0 +1,174 @@
+"""Clips for a character's own nodes, and characters with clips in them, played by kinematics that are not motet's."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from gltf_player import Array, Played
+from small_character import QUARTER, TEXTURE, Node, character, packed
+from test_retarget import dancing
+
+import motet
+from motet.errors import FormatError, MotionError
+from motet.motion.humanoid import HUMANOID, LEFT_RIGHT
+from motet.motion.rigs import MIXAMO
+
+SCALE: Node = {"scale": [0.01] * 3}
+TURN: Node = {"rotation": [QUARTER, 0, 0, QUARTER]}
+BACK: Node = {"rotation": [-QUARTER, 0, 0, QUARTER]}
+MATRIX: Node = {"matrix": [0, 0, -2, 0, 0, 2, 0, 0, 2, 0, 0, 0, 5, 1, -3, 1]}
+
+ABOVE = {
+    "nothing": [],
+    "scale": [SCALE],
+    "turn": [TURN],
+    "scale and turn": [SCALE | TURN],
+    "turned back": [BACK | SCALE],
+    "two nodes, one a matrix": [MATRIX, SCALE | TURN | {"translation": [0.3, -1, 2]}],
+}
+
+LIMBS = [("UpLeg", "Leg"), ("Leg", "Foot"), ("Arm", "ForeArm"), ("ForeArm", "Hand")]
+
+
+def walk() -> motet.Motion:
+    """The humanoid on its feet while all its joints move, with its soles on the ground."""
+    motion = dancing()
+    soles = motet.motion.humanoid.sole_points(*motet.motion.global_transforms(motion))
+    values = np.array(motion.values)
+    values[:, motion.channels.index("hips.ty")] -= motet.motion.humanoid.ground_under(soles)
+    return motet.Motion(values, motion.channels, motion.units, motion.fps, HUMANOID)
+
+
+def directions(places: Array, names: list[str]) -> Array:
+    """Of the bones of both arms and legs, (T, 8, 3)."""
+    pairs = [[names.index(f"mixamorig:{s.capitalize()}{part}") for part in limb] for s in LEFT_RIGHT for limb in LIMBS]
+    bones = np.stack([places[:, end] - places[:, start] for start, end in pairs], axis=1)
+    unit: Array = bones / np.linalg.norm(bones, axis=-1, keepdims=True)
+    return unit
+
+
+def check(played: Played, motion: motet.Motion, size: float = 1.0, backwards: bool = False) -> None:
+    """The played character does what the humanoid does, on its own soles."""
+    names = list(MIXAMO.names)
+    front = np.array([-1, 1, -1]) if backwards else np.ones(3)
+    places, human = played.places(*names) * front, motet.motion.positions(motion)
+    np.testing.assert_allclose(directions(places, names), directions(human, names), atol=2e-4)
+    np.testing.assert_allclose(places[:, 0] - places[0, 0], size * (human[:, 0] - human[0, 0]), atol=2e-4 * size)
+    lowest = played.skin(len(played.names) - 1)[..., 1].min(axis=1)
+    assert np.percentile(lowest, 5) == pytest.approx(0, abs=1e-3 * size)
+
+
+@pytest.mark.parametrize("above", ABOVE.values(), ids=ABOVE)
+def test_a_clip_plays_by_the_names_of_the_characters_nodes(tmp_path: Path, above: list[Node]) -> None:
+    avatar, motion = character(tmp_path / "avatar.glb", above), walk()
+    motet.write(tmp_path / "clip.glb", motion, like=avatar)
+    clip = Played(tmp_path / "clip.glb")
+    check(Played(avatar).play(clip.clip()), motion)
+    assert sorted(clip.names) == sorted(Played(avatar).names)
+    # at rest, and by itself, the clip is the character, too
+    names = MIXAMO.names
+    np.testing.assert_allclose(Played(tmp_path / "clip.glb").places(*names), Played(avatar).places(*names), atol=1e-6)
+    check_body(clip.play(clip.clip()))
+
+
+def check_body(clip: Played) -> None:
+    """The body that is drawn in the mesh's place goes with the joints."""
+    corners, joints = clip.skin(len(clip.names) - 1)[::10], clip.places(*MIXAMO.names)[::10]
+    assert np.linalg.norm(corners[:, :, None] - joints[:, None], axis=-1).min(axis=-1).max() < 0.25
+
+
+@pytest.mark.parametrize("above", ABOVE.values(), ids=ABOVE)
+def test_the_character_itself_has_the_clip(tmp_path: Path, above: list[Node]) -> None:
+    avatar, motion = character(tmp_path / "avatar.glb", above), walk()
+    motet.write(tmp_path / "out.glb", motion, onto=avatar)
+    out = Played(tmp_path / "out.glb")
+    check(out.play(out.clip()), motion)
+    for animation in out.document["animations"]:  # a node with a matrix cannot be animated
+        assert not any("matrix" in out.document["nodes"][c["target"]["node"]] for c in animation["channels"])
+
+
+@pytest.mark.parametrize("size", [0.18, 1.3, 38.0])
+def test_characters_of_any_size(tmp_path: Path, size: float) -> None:
+    avatar, motion = character(tmp_path / "avatar.glb", [SCALE], size), walk()
+    motet.write(tmp_path / "clip.glb", motion, like=avatar)
+    check(Played(avatar).play(Played(tmp_path / "clip.glb").clip()), motion, size)
+    motet.write(tmp_path / "out.glb", motion, onto=avatar)
+    out = Played(tmp_path / "out.glb")
+    check(out.play(out.clip()), motion, size)
+
+
+def test_a_character_goes_ahead_as_it_faces(tmp_path: Path) -> None:
+    avatar, motion = character(tmp_path / "avatar.glb", [BACK | SCALE], backwards=True), walk()
+    motet.write(tmp_path / "clip.glb", motion, like=avatar)
+    check(Played(avatar).play(Played(tmp_path / "clip.glb").clip()), motion, backwards=True)
+
+
+def test_without_a_mesh_the_soles_are_told_by_the_joints(tmp_path: Path) -> None:
+    motion = walk()
+    for meshed in (True, False):
+        avatar = character(tmp_path / "avatar.glb", meshed=meshed)
+        motet.write(tmp_path / f"{meshed}.glb", motion, like=avatar)
+    with_mesh, without = (Played(tmp_path / f"{meshed}.glb") for meshed in (True, False))
+    hips = [clip.play(clip.clip()).places("mixamorig:Hips")[:, 0] for clip in (with_mesh, without)]
+    apart = hips[0] - hips[1]
+    np.testing.assert_allclose(apart - apart[0], 0, atol=1e-5)
+    assert apart[0, 1] == pytest.approx(0.03, abs=0.015)  # the mesh's soles are 3 cm thicker
+
+
+def test_all_else_in_the_file_stays(tmp_path: Path) -> None:
+    avatar = character(tmp_path / "avatar.glb", [MATRIX, SCALE | TURN])
+    motions = {"a person walks": walk(), "stays": walk()[:1], "日本/語": walk()[::2]}
+    motet.write(tmp_path / "out.glb", motions, onto=avatar)
+    before, after = Played(avatar), Played(tmp_path / "out.glb")
+    named = [animation["name"] for animation in after.document["animations"]]
+    assert named == ["a person walks", "stays", "日本/語", "old"]
+    assert after.binary.startswith(before.binary[: before.document["buffers"][0]["byteLength"]])
+    assert TEXTURE in after.binary
+    changed = {"animations", "accessors", "bufferViews", "buffers"}
+    for key in before.document.keys() - changed:
+        assert after.document[key] == before.document[key], key
+    for key in ("accessors", "bufferViews"):
+        assert after.document[key][: len(before.document[key])] == before.document[key]
+    assert after.document["animations"][-1] == before.document["animations"][0]
+    assert motet.clips(tmp_path / "out.glb") == tuple(named)
+
+
+def test_a_clip_of_the_same_name_takes_the_place_of_the_old_one(tmp_path: Path) -> None:
+    avatar = character(tmp_path / "avatar.glb")
+    motet.write(tmp_path / "out.glb", {"old": walk()}, onto=avatar)
+    assert motet.clips(tmp_path / "out.glb") == ("old",)
+    motet.write(tmp_path / "out.glb", {"more": walk()}, onto=tmp_path / "out.glb")
+    assert motet.clips(tmp_path / "out.glb") == ("more", "old")
+
+
+def test_a_motion_of_the_characters_own_goes_back_onto_it(tmp_path: Path) -> None:
+    avatar, motion = character(tmp_path / "avatar.glb", [SCALE | TURN]), walk()
+    motet.write(tmp_path / "out.glb", motion, onto=avatar)
+    own = motet.read(tmp_path / "out.glb")
+    motet.write(tmp_path / "again.glb", own, onto=avatar)
+    first, again = (Played(tmp_path / name) for name in ("out.glb", "again.glb"))
+    np.testing.assert_allclose(again.play(again.clip()).worlds, first.play(first.clip()).worlds, atol=1e-5)
+
+
+def test_what_is_no_character_is_refused(tmp_path: Path) -> None:
+    avatar, motion, out = character(tmp_path / "avatar.glb"), walk(), tmp_path / "out.glb"
+    document = Played(avatar).document
+    (tmp_path / "apart.glb").write_bytes(packed(document | {"images": [{"uri": "skin.png"}]}, Played(avatar).binary))
+    flat = [dict(node) for node in document["nodes"]]
+    flat[0]["scale"] = [0, 0, 0]
+    (tmp_path / "flat.glb").write_bytes(packed(document | {"nodes": flat}, Played(avatar).binary))
+    for onto, place, error, said in (
+        (tmp_path / "apart.glb", out, FormatError, "apart.glb: parts of this character are other files"),
+        (tmp_path / "flat.glb", out, FormatError, "flat.glb: .*scale 0"),
+        (Path(__file__).parent / "skeletons" / "mixamo.bvh", out, MotionError, "no mesh"),
+        (avatar, tmp_path / "out.vrm", FormatError, "avatar.glb: it is no VRM avatar"),
+        (avatar, tmp_path / "out.bvh", FormatError, "cannot write files of type '.bvh'; expected one of .glb .vrm"),
+        (tmp_path / "none.glb", out, FormatError, "none.glb: no such file"),
+    ):
+        with pytest.raises(error, match=said):
+            motet.write(place, motion, onto=onto)
+        assert not place.exists()
+    with pytest.raises(MotionError, match="no frames"):
+        motet.write(out, motion[:0], onto=avatar)
+    with pytest.raises(MotionError, match="onto="):
+        motet.write(out, {"a": motion})
