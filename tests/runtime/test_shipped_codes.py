@@ -8,6 +8,8 @@ import pytest
 from command_line import run
 
 import motet
+from motet.decode.codes import WINDOW, Drawing, Writer, drawn_steps
+from motet.decode.unrolled import Unrolled
 from motet.errors import DecodingError, MotionError, TextError, TextWarning
 from motet.models.codes import CodesModel
 from motet.motion.kinematics import positions
@@ -49,6 +51,32 @@ def test_a_stream_gives_the_motion_in_pieces_at_once(model: CodesModel) -> None:
     pieces = [positions(piece) for piece in model.stream([WALK, JUMP], seconds=2, seed=1)]
     assert len(pieces) > 20
     np.testing.assert_allclose(np.concatenate(pieces), whole, atol=1e-9)
+
+
+def test_a_writer_looks_back_at_a_window_of_steps(model: CodesModel) -> None:
+    """What it has seen is what it sees: the twin gives the graph the last steps' keys and values, and no others."""
+    assert model.manifest.training["recipe"]["window"] == WINDOW
+    drawing, noise = Drawing(1.0, 1.0, 0.9, 1.5), [np.random.default_rng(3)]
+    writer = Writer(model.source, noise, drawing)
+    past, last = np.zeros((2, 3, 6, 0, 64), np.float32), [[model.moves + 1, 0, 0, 0]] * 2
+    for age in range(WINDOW + 20):
+        told = {"codes": np.array(last), "action": np.array([7, model.source.nobody]), "age": np.full(2, age)}
+        past = model.graphs["step"]({**told, "past": past[:, :, :, -WINDOW:]})["next_past"]
+        writer.age[:] = age
+        last = [writer.draw(np.array([7]), ends=False)[0].tolist()] * 2
+        np.testing.assert_array_equal(writer.state["past"], past[:, :, :, -WINDOW:])
+
+
+def test_a_stream_may_last(model: CodesModel) -> None:
+    """It keeps no more after a while than at first."""
+    unrolled = Unrolled(model.graphs["decoder"], model.sight, model.fps)
+    steps = list(drawn_steps(model._writer([np.random.Generator(np.random.PCG64(1))], model.defaults), 7, 130, True))
+    pieces = []
+    for step in steps:
+        pieces.append(unrolled.push(step))
+        assert len(unrolled.codes) <= model.sight.back + model.sight.ahead + 1
+    pieces.append(unrolled.finish())
+    np.testing.assert_array_equal(np.concatenate(pieces), model.frames_of(np.array(steps)))
 
 
 def test_a_story_goes_on_without_a_leap_and_says_what_is_when(model: CodesModel) -> None:

@@ -7,7 +7,7 @@ an action is followed can be raised by classifier-free guidance (Ho and Salimans
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,10 @@ from motet.decode.loop import Loop, Setting
 from motet.decode.memory import PAST, Memory
 from motet.decode.noise import Noise
 from motet.decode.rollout import Ids, Scores, advance, zero_state
+
+WINDOW = 64
+"""Steps that a writer looks back at most, those of the windows that writers are trained on: a stream may last for ever.
+"""
 
 
 class Drawing(NamedTuple):
@@ -109,7 +113,8 @@ class Writer:
         self._before = self.last, self.state, self.recent, self.age
         told = np.concatenate([actions, np.full(len(actions), self.source.nobody)]).astype(np.int64)
         inputs = {"codes": self.last, "action": told, "age": np.tile(self.age, 2)}
-        outputs, self.state = advance(self.source.step, self.state, inputs)
+        outputs, state = advance(self.source.step, self.state, inputs)
+        self.state = {name: lately(array, self.source.step, name) for name, array in state.items()}
         if self.last[0, 0] != self.source.nothing:
             self.recent = [outputs["numbers"][: len(actions)], *self.recent][: len(PAST)]
         known: Floats = outputs["known"]
@@ -158,6 +163,14 @@ class Writer:
         self.noise, self.age = [self.noise[row] for row in rows], self.age[rows]
         self.recent = [numbers[rows] for numbers in self.recent]
         self.last, self.state = self.last[both], {name: array[both] for name, array in self.state.items()}
+
+
+def lately(array: NDArray[Any], step: Graph, name: str) -> NDArray[Any]:
+    """A state, of one that grows the last WINDOW steps: attention falls with the distance in time."""
+    sizes = step.spec.start_shape(name)
+    if 0 not in sizes or array.shape[1 + sizes.index(0)] <= WINDOW:
+        return array
+    return np.ascontiguousarray(np.take(array, range(-WINDOW, 0), axis=1 + sizes.index(0)))
 
 
 def nucleus(log_weights: Scores, uniform: Scores, temperature: Scores | float, top_p: float) -> Ids:

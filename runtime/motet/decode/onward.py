@@ -25,9 +25,6 @@ ROWS, ACTIONS = 12, 4
 MOMENT = 0.8
 """Seconds of it."""
 
-AGAIN = 32
-"""Steps after which a writer is begun again, with as many steps before it: writers remember all that they drew."""
-
 PAST, FADING = 12, 0.85
 """Last steps by which it is found what a motion shows, and how much each counts of the one after it."""
 
@@ -104,14 +101,10 @@ def onward(source: Source, drawing: Drawing, ground: Ground, shown: Shown, steps
     actions, ages = _drawn(*weighed, np.random.Generator(np.random.PCG64(seed)))
     noise: list[Noise] = [np.random.Generator(np.random.PCG64([seed, row])) for row in range(ROWS)]
     rows, moment = np.arange(ROWS) % len(actions), max(1, round(MOMENT / ground.seconds))
-    found, begun = np.empty((0, source.parts), dtype=np.int64), 0
+    found = np.empty((0, source.parts), dtype=np.int64)
     writer = _begun(source, drawing, noise, given)
     writer.age, told = ages[rows], actions[rows]
     while len(found) < steps:
-        if len(found) - begun >= AGAIN:
-            age, begun = writer.age, len(found)
-            writer = _begun(source, drawing, noise, found[-AGAIN:])
-            writer.age = age
         drawn = np.stack([writer.draw(told, ends=False) for _ in range(moment)])
         best = int(_off(ground, found, drawn, pace).argmin())
         found = np.concatenate([found, drawn[:, best]])

@@ -55,7 +55,10 @@ class Unrolled:
     def push(self, step: Ids) -> Array:
         """Frames (T, D) that a further step settles; none at first."""
         self.codes.append(step)
-        return self._settled(len(self.codes) - self.sight.ahead)
+        found = self._settled(len(self.codes) - self.sight.ahead)
+        over = max(0, self.count - self.sight.back)  # out of sight
+        self.codes, self.count = self.codes[over:], self.count - over
+        return found
 
     def all(self, steps: Ids) -> Array:
         """The frames of steps (N, P) with nothing following."""
