@@ -44,6 +44,8 @@ def test_the_search_finds_what_looking_at_every_row_finds(table: Table, matcher:
         assert (row, side) == min(found, key=found.__getitem__)
         assert cost + float((wanted**2).sum()) / 2 == pytest.approx(min(found.values()), rel=1e-3)
     np.testing.assert_allclose(matcher.cost_at(asked, rows, sides), costs, atol=1e-3)
+    for one, found in enumerate(zip(rows, sides, costs, strict=True)):
+        assert [part[0] for part in matcher.best(asked[one : one + 1], gait[one : one + 1])] == list(found)
 
 
 def test_a_mirror_image_of_a_mirror_image_is_the_row(matcher: Matcher, table: Table) -> None:

@@ -50,6 +50,10 @@ BEHIND, BEFORE = 20, 5
 EVERY = 2
 """Of so many rows one may be jumped to: the others are 1 / 30 s away from it."""
 
+LANES = 8
+"""The step computes a multiple of so many characters: sines are computed several at once, and those left over round
+otherwise."""
+
 Rows = NDArray[np.int64]
 
 
@@ -184,18 +188,13 @@ class Matcher:
     def best(self, asked: Floats, gait: Rows) -> tuple[Rows, Floats, Floats]:
         """The row (B,), its side (B,) and its cost (B,) for features (B, F) and a gait (B,)."""
         row, side, cost = np.empty(len(gait), np.int64), np.empty(len(gait), np.float32), np.empty_like(asked[:, 0])
-        for kind in set(gait.tolist()):
-            who = np.flatnonzero(gait == kind)
+        for one, kind in enumerate(gait.tolist()):  # each by itself: how a product rounds depends on how many rows it has
             rows, half, across, places = self.goals[kind]
-            # both sides in one product: of a single row it would round differently from one among others
-            both = np.concatenate([asked[who], asked[who][:, self.columns] * self.signs])
+            both = np.stack([asked[one], asked[one, self.columns] * self.signs])
             way, far = self._way(both)
             costs = half + LAG * np.maximum(far[:, None] / 2 - way @ places.T, 0) - both @ across
-            at = costs.argmin(axis=1)
-            found, least = np.split(at, 2), np.split(np.take_along_axis(costs, at[:, None], axis=1)[:, 0], 2)
-            other = least[1] < least[0]
-            row[who], cost[who] = rows[np.where(other, found[1], found[0])], np.minimum(*least)
-            side[who] = np.where(other, -1, 1)
+            other, at = divmod(int(costs.argmin()), len(rows))
+            row[one], side[one], cost[one] = rows[at], (1, -1)[other], costs[other, at]
         return row, side, cost
 
     def cost_at(self, asked: Floats, rows: Rows, side: Floats) -> Floats:
@@ -250,7 +249,9 @@ def tick(step: Graph, matcher: Matcher, playing: Playing, control: Floats, gait:
         raise BundleError("graph step: it plays beyond the rows of the table")
     recorded = matcher.table.frames[np.stack([here, here + 1], axis=1)]
     at = np.stack([playing.row - here, playing.side], axis=1, dtype=np.float32, casting="same_kind")
-    outputs = step({"recorded": recorded, "at": at, "control": control, **playing.states})
+    whole = np.resize(np.arange(len(here)), -(-len(here) // LANES) * LANES)
+    feeds = {"recorded": recorded, "at": at, "control": control, **playing.states}
+    outputs = {name: found[: len(here)] for name, found in step({k: v[whole] for k, v in feeds.items()}).items()}
     playing.states = {name: outputs[source] for name, source in step.spec.feedback.items()}
     return outputs
 
