@@ -5,7 +5,9 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Coroutine
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -22,7 +24,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from motet.live import server as server_module
 from motet.live.protocol import LARGEST, MOST
-from motet.live.server import MAX_BYTES, MAX_MESSAGES, LiveServer
+from motet.live.server import BUFFER, MAX_BYTES, MAX_CONTROLS, MAX_MESSAGES, LiveServer
 
 Message = dict[str, Any]
 
@@ -164,6 +166,9 @@ def test_clients_do_not_touch_each_other(steer_model: SteerModel) -> None:
         ("[" * 5000, "must be JSON"),
         ('{"type": "push"}', "push: expected velocity"),
         ('{"type": "put", "places": [1, 2]}', "places need x, z and facing"),
+        ('{"type": "put", "places": [[1]]}', "places need x, z and facing"),
+        ('{"type": "put", "places": [1000001, 0, 0]}', "put, places: expected numbers up to 1e+06"),
+        ('{"type": "push", "velocity": [[1]]}', "a velocity needs x and z"),
         (f'{{"type": "start", "characters": {MOST + 1}}}', f"a whole number from 1 to {MOST}"),
         ('{"type": "start", "positions": 1}', "start, positions: expected true or false"),
         (b"\x00\x01", "must be text, not binary"),
@@ -194,8 +199,18 @@ def test_what_is_too_much(steer_model: SteerModel, monkeypatch: pytest.MonkeyPat
             assert f"more than {MAX_MESSAGES} messages" in (await end_of(connection))[0]
         monkeypatch.setattr(server_module, "MAX_CLIENTS", 1)
         async with client(server) as first, client(server) as second:
-            assert (await end_of(second))[1:] == (1013, "there are 1 clients already")
+            assert (await end_of(second))[1:] == (1013, "there are 1 clients already, of 1 figures")
             assert len(await frames(first, 5)) == 5
+        monkeypatch.undo()
+        monkeypatch.setattr(server_module, "MAX_FIGURES", 3)
+        async with client(server) as first, client(server) as second:
+            await frames(second, 1)
+            await told(first, "start", characters=2)
+            async with client(server) as third:
+                assert (await end_of(third))[1:] == (1013, "there are 2 clients already, of 3 figures")
+            await told(first, "start", characters=3)
+            assert (await end_of(first))[0] == "all clients together may have 3 figures"
+            assert len(await frames(second, 5)) == 5
         with pytest.raises(InvalidStatus, match="403"):
             await client(server, origin="https://elsewhere.example")
         async with client(server, origin="http://localhost:8000") as connection:
@@ -204,13 +219,96 @@ def test_what_is_too_much(steer_model: SteerModel, monkeypatch: pytest.MonkeyPat
     serving(steer_model, scenario)
 
 
+def raw_client(server: LiveServer) -> socket.socket:
+    """A client that does nothing by itself."""
+    raw = socket.socket()
+    raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    raw.connect(("127.0.0.1", server.port))
+    asked = "GET / HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+    raw.sendall(f"{asked}Sec-WebSocket-Key: {'A' * 22}==\r\nSec-WebSocket-Version: 13\r\n\r\n".encode())
+    return raw
+
+
+@pytest.mark.parametrize("head", [b"\x89", b"\x8a", b"\x00"], ids=["pings", "pongs", "parts of messages"])
+def test_a_flood_of_what_is_no_message_is_cut_off(
+    steer_model: SteerModel, head: bytes, caplog: pytest.LogCaptureFixture
+) -> None:
+    flood = head + b"\x80\0\0\0\0"
+
+    async def scenario(server: LiveServer) -> None:
+        async with client(server) as connection:
+            raw = raw_client(server)
+            raw.setblocking(False)
+            while len(server._clients) < 2:
+                await frames(connection, 1)
+            text = b"" if head != b"\x00" else b"\x01\x80\0\0\0\0"  # a message begins
+            await asyncio.get_running_loop().sock_sendall(raw, text + flood * MAX_CONTROLS)
+            await frames(connection, 5)
+            assert len(server._clients) == 2
+            with suppress(OSError):
+                await asyncio.get_running_loop().sock_sendall(raw, flood * 100_000)
+            while len(server._clients) == 2:
+                await frames(connection, 1)
+            assert len(await frames(connection, 30)) == 30
+            raw.close()
+
+    serving(steer_model, scenario)
+    said = [record.message for record in caplog.records if record.name == "motet.live.server"]
+    assert said == [f"dropped a client: more than {MAX_CONTROLS} pings, pongs and parts of messages in a second"]
+
+
+def test_a_client_that_answers_no_pings_is_dropped(steer_model: SteerModel, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server_module, "PING", 0.2)
+
+    async def scenario(server: LiveServer) -> None:
+        raw = raw_client(server)
+        raw.setblocking(False)
+        got = b"frames"
+        async with asyncio.timeout(5):
+            while got:  # it takes all, but says nothing
+                got = await asyncio.get_running_loop().sock_recv(raw, 1 << 16)
+        raw.close()
+
+    serving(steer_model, scenario)
+
+
+def test_what_waits_for_a_client_is_bounded_and_not_packed(steer_model: SteerModel) -> None:
+    async def scenario(server: LiveServer) -> None:
+        async with client(server, compression="deflate") as connection:
+            await frames(connection, 1)
+            assert connection.protocol.extensions == []
+            assert server._server is not None
+            (own,) = server._server.connections
+            bound = own.transport.get_extra_info("socket").getsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF)
+            assert bound in {BUFFER, 2 * BUFFER}  # Linux doubles what it is told
+
+    serving(steer_model, scenario)
+
+
+def test_late_frames_are_not_made_up_for(steer_model: SteerModel) -> None:
+    stops = [1.0]
+
+    def stop_once(pose: Pose, seconds: float) -> None:
+        if seconds > 0.1 and stops:
+            time.sleep(stops.pop())
+
+    async def scenario(server: LiveServer) -> None:
+        async with client(server) as connection:
+            while stops:
+                await frames(connection, 1)
+            clock = asyncio.get_running_loop().time
+            stop, count = clock() + 0.4, 0
+            while clock() < stop:
+                await frames(connection, 1)
+                count += 1
+            assert count <= 14  # eight in time, and a few of the last tenth of a second; 28 with those of the stop
+
+    serving(steer_model, scenario, rate=20, watch=stop_once)
+
+
 def test_a_client_that_stalls_is_dropped_and_others_go_on(steer_model: SteerModel) -> None:
     async def scenario(server: LiveServer) -> None:
-        raw = socket.socket()
-        raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-        raw.connect(("127.0.0.1", server.port))
-        asked = "GET / HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-        raw.sendall(f"{asked}Sec-WebSocket-Key: {'A' * 22}==\r\nSec-WebSocket-Version: 13\r\n\r\n".encode())
+        raw = raw_client(server)
         async with client(server) as connection:
             await frames(connection, 1)
             assert len(server._clients) == 2
@@ -260,6 +358,7 @@ def test_a_port_that_is_taken(steer_model: SteerModel) -> None:
 
 def test_ctrl_c_ends_it(steer_model: SteerModel) -> None:
     assert steer_model._source is not None
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # background jobs of a shell ignore it, and their children
     command = [sys.executable, "-m", "motet", "live", "--port", "0", "--bundle", str(steer_model._source[0])]
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ
@@ -269,12 +368,15 @@ def test_ctrl_c_ends_it(steer_model: SteerModel) -> None:
         port = int(listening.split(";")[0].rpartition(":")[2])
 
         async def visit() -> None:
-            async with connect(f"ws://127.0.0.1:{port}") as connection:
+            async with asyncio.timeout(20), connect(f"ws://127.0.0.1:{port}") as connection:
                 await frames(connection, 2)
                 process.send_signal(signal.SIGINT)
                 await end_of(connection)
                 assert connection.close_code == 1001
 
-        asyncio.run(visit())
-        out, err = process.communicate(timeout=10)
+        try:
+            asyncio.run(visit())
+            out, err = process.communicate(timeout=10)
+        finally:
+            process.kill()
     assert (process.returncode, out, err) == (0, "", "stopped\n")

@@ -19,6 +19,8 @@ from motet.motion.pose import Pose
 try:
     from websockets.asyncio.server import Server, ServerConnection, serve
     from websockets.exceptions import ConnectionClosed
+    from websockets.frames import Frame, Opcode
+    from websockets.protocol import Event
     from websockets.typing import Origin
 except ImportError as error:
     raise ImportError(
@@ -34,8 +36,20 @@ MAX_BYTES = 1 << 14
 
 MAX_CLIENTS = 32
 
+MAX_FIGURES = 64
+"""Of all clients together: about as many as one core moves 30 times a second."""
+
 MAX_MESSAGES = 50
 """Of a client between two ticks."""
+
+MAX_CONTROLS = 50
+"""Frames of a client in a second that are no messages: pings, pongs, and parts of messages."""
+
+READ = 1 << 12
+"""Bytes of a client that are looked at before others have their turn, as far as it breaks a rule with them."""
+
+PING = 5
+"""Seconds after which a client is pinged, and in which it has to answer."""
 
 BUFFER = 1 << 16
 """Bytes that wait for a client, in this process and again in the system; then it has STALL seconds to take some."""
@@ -47,6 +61,29 @@ REFUSED, BUSY = 1008, 1013
 
 LOCAL = re.compile(r"https?://(localhost|127\.0\.0\.1|\[::1\])(:\d+)?")
 """Origins of web pages that may connect, next to programs, which have none."""
+
+
+class Connection(ServerConnection):
+    """One that is cut off where its client sends too many frames that are no messages: they are answered unread."""
+
+    controls, since = 0, 0.0
+
+    def data_received(self, data: bytes) -> None:
+        """See the class."""
+        for start in range(0, len(data), READ):
+            if not self.transport.is_closing():
+                super().data_received(data[start : start + READ])
+
+    def process_event(self, event: Event) -> None:
+        """See the class."""
+        super().process_event(event)
+        if not isinstance(event, Frame) or event.opcode in (Opcode.TEXT, Opcode.BINARY):
+            return
+        now = self.loop.time()
+        self.controls, self.since = (self.controls + 1, self.since) if now < self.since + 1 else (1, now)
+        if self.controls > MAX_CONTROLS and not self.transport.is_closing():
+            log.warning("dropped a client: more than %d pings, pongs and parts of messages in a second", MAX_CONTROLS)
+            self.transport.abort()
 
 
 class LiveServer:
@@ -89,9 +126,10 @@ class LiveServer:
                 max_size=MAX_BYTES,
                 max_queue=16,
                 write_limit=BUFFER,
-                ping_interval=5,
-                ping_timeout=5,
+                ping_interval=PING,
+                ping_timeout=PING,
                 close_timeout=1,
+                create_connection=Connection,
             )
         except OSError as fault:
             raise OutputError(f"cannot listen on {self.host}:{self.port}: {fault.strerror or fault}") from fault
@@ -105,8 +143,10 @@ class LiveServer:
 
     async def _client(self, connection: ServerConnection) -> None:
         """All of one client, until it goes or is dropped."""
-        if len(self._clients) >= MAX_CLIENTS:
-            await connection.close(BUSY, f"there are {MAX_CLIENTS} clients already")
+        if len(self._clients) >= MAX_CLIENTS or self._figures() + self.characters > MAX_FIGURES:
+            await connection.close(
+                BUSY, f"there are {len(self._clients)} clients already, of {self._figures()} figures"
+            )
             return
         _bound(connection)
         puppets = Puppets(self.model, self.characters)
@@ -121,6 +161,9 @@ class LiveServer:
         if isinstance(reason, MotetError):
             log.warning("dropped a client: %s", reason)
             await self._drop(connection, reason)
+
+    def _figures(self) -> int:
+        return sum(puppets.session.characters for puppets in self._clients)
 
     async def _until_fault(self, connection: ServerConnection, puppets: Puppets) -> BaseException | None:
         """Tick and listen side by side; why one of the two came to an end."""
@@ -143,7 +186,10 @@ class LiveServer:
             tick, count = puppets.ticks, (count + 1 if tick == puppets.ticks else 1)
             if count > MAX_MESSAGES:
                 raise ProtocolError(f"more than {MAX_MESSAGES} messages between two frames")
-            for said in puppets.hear(text):
+            notes = puppets.hear(text)
+            if self._figures() > MAX_FIGURES:
+                raise ProtocolError(f"all clients together may have {MAX_FIGURES} figures")
+            for said in notes:
                 await self._send(connection, protocol.note(said))
 
     async def _tick(self, connection: ServerConnection, puppets: Puppets) -> None:
@@ -183,6 +229,7 @@ def _bound(connection: ServerConnection) -> None:
 
 def run_server(server: LiveServer, ready: Callable[[], None] = lambda: None) -> None:
     """Run a server until Ctrl-C; ``ready`` is called when it listens. OutputError where it cannot listen."""
+    logging.getLogger("asyncio").setLevel(logging.ERROR)  # it warns at each byte for a client that is gone
 
     async def running() -> None:
         async with server:

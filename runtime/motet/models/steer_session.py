@@ -116,11 +116,7 @@ class SteerSession:
         self._control, self._gait = control.astype(np.float32), gait
 
     def _of_velocity(self, velocity: ArrayLike, way: Array) -> tuple[Array, Array]:
-        try:
-            x, z = np.broadcast_to(np.asarray(velocity, dtype=np.float64), (self.characters, 2)).T
-        except (TypeError, ValueError) as error:
-            raise ControlError(f"a velocity needs x and z, for all or for each of {self.characters}") from error
-        _check_size("a velocity", np.stack([x, z]))
+        x, z = self._rows("a velocity needs x and z", velocity, 2).T
         pace = np.hypot(x, z)
         return pace, np.where(pace > 0, np.arctan2(x, z), way)
 
@@ -131,6 +127,17 @@ class SteerSession:
             raise ControlError(f"{name} needs a number or one for each of {self.characters} characters") from error
         _check_size(name, found)
         return found
+
+    def _rows(self, needed: str, values: ArrayLike, columns: int) -> Array:
+        """Numbers (columns,) or (characters, columns) as a new (characters, columns)."""
+        try:
+            found = np.array(values, dtype=np.float64)
+            if found.shape not in ((columns,), (self.characters, columns)):
+                raise ValueError(found.shape)
+        except (TypeError, ValueError) as error:
+            raise ControlError(f"{needed}, for all or for each of {self.characters} characters") from error
+        _check_size(needed.partition(" need")[0], found)
+        return np.array(np.broadcast_to(found, (self.characters, columns)))
 
     def _gaits(self, names: str | Sequence[str]) -> Rows:
         each = [names] * self.characters if isinstance(names, str) else list(names)
@@ -195,11 +202,7 @@ class SteerSession:
 
     def put(self, places: ArrayLike) -> None:
         """Set the characters down elsewhere: (3,) or (characters, 3) x and z in metres, facing in degrees."""
-        try:
-            wanted = np.array(np.broadcast_to(np.asarray(places, dtype=np.float64), (self.characters, 3)))
-        except (TypeError, ValueError) as error:
-            raise ControlError(f"places need x, z and facing for each of {self.characters} characters") from error
-        _check_size("places", wanted)
+        wanted = self._rows("places need x, z and facing", places, 3)
         wanted[:, 2] = wrapped(np.radians(wanted[:, 2]))
         root = self._playing.states["root"].copy()  # the last pose shows the array itself
         root[:, :3] = wanted
