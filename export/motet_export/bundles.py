@@ -28,10 +28,12 @@ def export_run(run: Run, out: str | Path, int8: bool = False, half: bool = False
     """Export a training run as the bundle ``out`` (a .zip or a new folder) and return the parity report.
 
     Nothing is written where a graph does not export or a rung of the parity ladder fails (ExportError).
-    int8: quantise the graphs after that; the report then has "int8", the difference that it makes.
-    half: round the run's weights to 16 bits before that, and keep them so.
+    int8: keep weights in 8 bits after that; the report then has "int8", the difference that it makes.
+    half: round the run's weights to 16 bits before that, and keep them so. ExportError for both.
     """
     check_place(out)
+    if int8 and half:
+        raise ExportError("weights are kept in 8 bits or in 16: export with --int8 or with --half")
     if half:
         round_weights(run.model)
     manifest, modules, torch = Manifest.from_json(run.manifest), run.graphs(), run.torch_graphs()
@@ -50,7 +52,7 @@ def export_run(run: Run, out: str | Path, int8: bool = False, half: bool = False
         files, exact = {name: quantised(data) for name, data in files.items()}, onnx
         onnx = _sessions(files, torch)
         report["int8"] = difference(manifest, onnx, exact)
-    files[FILE], golden = golden_vectors(manifest, onnx, examples(manifest, torch), int8)
+    files[FILE], golden = golden_vectors(manifest, onnx, examples(manifest, torch))
     graphs = {role: {"file": f"{role}.onnx", **spec.to_json()} for role, (_, spec) in modules.items()}
     write_bundle(out, {**run.manifest, "graphs": graphs, "golden": golden, "parity": report}, files)
     return report
@@ -68,7 +70,7 @@ def halve_bundle(bundle: Bundle, out: str | Path) -> dict[str, Any]:
     files = {f"{role}.onnx": halved(bundle.read(entry.file), rounded=True) for role, entry in manifest.graphs.items()}
     onnx = _sessions(files, exact)
     changes = difference(manifest, onnx, exact)
-    files[FILE], golden = golden_vectors(manifest, onnx, examples(manifest, exact), int8=False)
+    files[FILE], golden = golden_vectors(manifest, onnx, examples(manifest, exact))
     graphs = {role: {"file": f"{role}.onnx", **graph.spec.to_json()} for role, graph in exact.items()}
     report = {**manifest.parity, "weights": HALF, "half": changes}
     write_bundle(out, {**manifest.source, "graphs": graphs, "golden": golden, "parity": report}, files)

@@ -27,21 +27,18 @@ FILE = "golden.npz"
 ROWS, FRAMES, TICKS = 2, 20, 12
 """Of the inputs of a graph; of a motion that is described; of a control track."""
 
-INT8_TOLERANCE = 0.1
-"""Products of 8 bits are rounded differently from one kind of processor to the next."""
-
 Run = tuple[Arrays, dict[str, Any]]
 """The inputs of a whole run, and its settings."""
 
 
 def golden_vectors(
-    manifest: Manifest, graphs: Mapping[str, Graph], draws: Mapping[str, Examples], int8: bool
+    manifest: Manifest, graphs: Mapping[str, Graph], draws: Mapping[str, Examples]
 ) -> tuple[bytes, dict[str, Any]]:
     """The file of golden vectors, and what the manifest says of it."""
     rng, model = np.random.default_rng(5), build(manifest, graphs)
     feeds = {role: draws[role](rng, ROWS) for role in graphs}
     given, settings = _RUNS.get(manifest.loop, _RUNS[manifest.verb])(model, rng)
-    entry = {"file": FILE, "tolerance": INT8_TOLERANCE if int8 else TOLERANCE, "run": settings}
+    entry = {"file": FILE, "tolerance": TOLERANCE, "run": settings}
     return vectors(model, feeds, given, settings), entry
 
 

@@ -1,40 +1,22 @@
 """8-bit weights: a bundle of a quarter of the size, and what that changes in complete runs."""
 
-import logging
-import tempfile
 from collections.abc import Mapping
-from pathlib import Path
 
 import numpy as np
-import onnx
-from onnxruntime.quantization import QuantType, quantize_dynamic
 
-from motet.bundle.graph import Graph
+from motet.bundle.graph import Floats, Graph
 from motet.bundle.manifest import Manifest
 from motet_export.decoded import whole_runs
-from motet_export.exporter import self_contained
-
-OPERATORS = ["MatMul", "Gemm", "Gather"]
-"""Products, and the look-up of word vectors."""
+from motet_export.weights import Small, stored
 
 
 def quantised(model: bytes) -> bytes:
-    """An exported graph with weights of products in int8; what goes into a product is quantised as it comes."""
-    proto = onnx.load_from_string(model)
-    metadata = {entry.key: entry.value for entry in proto.metadata_props}
-    del proto.graph.value_info[:]  # the quantiser turns weights round, and the shapes noted here would contradict it
-    logging.getLogger().addFilter(_without_advice)  # that each graph be pre-processed, which the exporter did
-    try:
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / "int8.onnx"
-            # a scan's body is a graph within the graph; without the notes on shapes some types are not found
-            options = {"EnableSubgraph": True, "DefaultTensorType": onnx.TensorProto.FLOAT}
-            quantize_dynamic(
-                proto, path, op_types_to_quantize=OPERATORS, weight_type=QuantType.QInt8, extra_options=options
-            )
-            return self_contained(onnx.load(path), {**metadata, "weights": "int8"})
-    finally:
-        logging.getLogger().removeFilter(_without_advice)
+    """An exported graph whose matrices are kept in int8, each row with a scale of its own.
+
+    Products stay in float32: those of 8 bits saturate on processors without VNNI, so a bundle would say other things
+    on other machines, and what a row of a batch gives would depend on the others.
+    """
+    return stored(model, _rows, weights="int8")
 
 
 def difference(manifest: Manifest, int8: Mapping[str, Graph], exact: Mapping[str, Graph]) -> dict[str, float]:
@@ -57,5 +39,10 @@ def difference(manifest: Manifest, int8: Mapping[str, Graph], exact: Mapping[str
     return report
 
 
-def _without_advice(record: logging.LogRecord) -> bool:
-    return "pre-processing before quantization" not in record.getMessage()
+def _rows(values: Floats) -> Small | None:
+    """Every row over its largest number; vectors, such as biases and the scales of channels, stay as they are."""
+    if values.squeeze().ndim < 2 or not np.isfinite(values).all():
+        return None
+    scale = np.abs(values).max(axis=-1, keepdims=True) / np.float32(127)
+    scale[scale == 0] = 1
+    return np.rint(values / scale).astype(np.int8), scale

@@ -175,6 +175,9 @@ def test_weights_of_8_bits_load_and_their_difference_is_noted(
     bundle = Bundle.open(tmp_path / "int8.zip")
     assert bundle.manifest.parity["int8"] == report["int8"]
     assert 0 < report["int8"]["scores.score"] < 0.05
-    assert all(b"MatMulInteger" in bundle.read(f"{role}.onnx") for role in bundle.manifest.graphs)
+    assert all(b"MatMulInteger" not in bundle.read(f"{role}.onnx") for role in bundle.manifest.graphs)
+    assert max(verify(bundle).errors.values()) < 1e-5
     with pytest.raises(ExportError, match="8-bit"):
         parity_of(run(verb), bundle)
+    with pytest.raises(ExportError, match="--int8 or with --half"):
+        export_run(run(verb), tmp_path / "both.zip", int8=True, half=True)
