@@ -45,7 +45,7 @@ def test_the_shipped_bundles_are_whole_and_give_their_golden_vectors() -> None:
         roles = kind_of(bundle.manifest).ROLES
         assert {*(f"{role}.onnx" for role in roles), "golden.npz"} <= set(found.files)
         assert {*roles, "run"} <= found.errors.keys()
-        assert max(found.errors.values()) < found.tolerance
+        assert max(found.errors.values()) < 1e-4  # on every processor
         assert found.providers == ("CPUExecutionProvider",)
 
 

@@ -135,6 +135,13 @@ def test_each_chunk_is_told_once_unless_asked_to_be_quiet(tmp_path: Path) -> Non
     assert [line.count("epoch 3 of 3: loss") for line in (loud.output, quiet.output)] == [1, 0]
 
 
+def test_a_line_comes_soon_where_a_chunk_is_long(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("motet_train.progress.SOON", -1.0)
+    (tmp_path / "small.toml").write_text(SMALL["crbm"])
+    said = motet("train", "crbm", "--config", tmp_path / "small.toml", "--out", tmp_path / "a").output
+    assert [said.count(f"epoch {done} of 3: loss") for done in (1, 2, 3)] == [1, 0, 1]
+
+
 def test_the_command_line_wins_over_the_file(data: dict[str, tuple[object, ...]], tmp_path: Path) -> None:
     (tmp_path / "small.toml").write_text(SMALL["predict"] + "batch = 3\n")
     out = tmp_path / "a"

@@ -12,6 +12,7 @@ from motet_train.data.errors import DataError
 from motet_train.data.expmap_files import CMU_LAYOUT, H36M_LAYOUT
 from motet_train.models.predict.noise import noise_at, noisy
 from motet_train.models.predict.srnn import SRNN, Config, parts_of
+from motet_train.precision import has_bfloat16
 
 Array = NDArray[np.float64]
 TINY = Config(9, ((8, 0, 4), (1, 2), (5, 6), (3,), (7,)), linear=6, units=5, narrow=4)
@@ -161,10 +162,15 @@ def test_the_loss_is_of_next_frames_and_noisy_in_training_only() -> None:
     net.progress(1.0)
     assert net.loss(windows, 4) == clean
     assert net.train().loss(windows, 4) != clean
+
+
+@pytest.mark.skipif(not has_bfloat16("cpu"), reason="this processor has no products in bfloat16")
+def test_the_loss_in_mixed_precision_is_about_the_same() -> None:
+    net, windows = made().eval(), torch.randn(2, 6, 9)
     with torch.autocast("cpu", torch.bfloat16):
-        mixed = net.eval().loss(windows, 4)
+        mixed = net.loss(windows, 4)
     assert mixed.dtype == torch.float32
-    assert abs(mixed - clean) < 0.02
+    assert abs(mixed - net.loss(windows, 4)) < 0.02
 
 
 def test_training_learns_a_repeated_motion() -> None:

@@ -1,7 +1,9 @@
 """The progress of a training: a bar on a terminal, elsewhere a line for each chunk; and TensorBoard."""
 
 import logging
+import math
 import sys
+import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Protocol
@@ -12,6 +14,9 @@ from motet_train import distributed
 from motet_train.runs import RunError
 
 log = logging.getLogger("motet.train")
+
+SOON = 10.0
+"""Seconds after which a line is said, as a chunk may take many minutes."""
 
 
 class Watcher(Protocol):
@@ -38,7 +43,7 @@ SILENT = Silent()
 
 
 class Shown:
-    """A bar with loss, speed and remaining time; where nobody watches, a line for each chunk.
+    """A bar with loss, speed and remaining time; where nobody watches, a line soon and one for each chunk.
 
     The lines are logged by "motet.train"; with ``motet --quiet`` there are neither.
     boards: the folder for TensorBoard; RunError where that is not installed.
@@ -49,12 +54,16 @@ class Shown:
         self.writer = _writer(boards) if boards is not None and distributed.rank() == 0 else None
         self.bar: tqdm[Any] | None = None
         self.done = 0
+        self.due = time.monotonic() + SOON
 
     def step(self, done: int, total: int, unit: str, loss: float) -> None:
-        """Move the bar."""
+        """Move the bar; say the first line."""
         if self.bar is None:
             self.done = done - 1
             self.bar = tqdm(total=total, initial=self.done, unit=f" {unit}s", disable=not self.watched)
+        if time.monotonic() > self.due:
+            self.due = math.inf
+            self._say("%s %d of %d: loss %.5g", unit, done, total, loss)
         self.bar.set_postfix(loss=f"{loss:.4g}", refresh=False)
         self.bar.update(done - (unit == "epoch") - self.bar.n)  # an epoch is done after its last step
 
@@ -64,13 +73,17 @@ class Shown:
         if self.writer is not None:
             for key, value in figures.items():
                 self.writer.add_scalar(key, value, line[unit])
-        if distributed.rank() == 0 and not self.watched:
+        if not self.watched:
             left = figures["seconds"] / (line[unit] - self.done) * (total - line[unit])
             said = ", ".join(f"{key.replace('_', ' ')} {value:.5g}" for key, value in figures.items())
-            log.info("%s %d of %d: %s, %.0f s left", unit, line[unit], total, said, left)
+            self._say("%s %d of %d: %s, %.0f s left", unit, line[unit], total, said, left)
         if self.bar is not None:
             self.bar.update(line[unit] - self.bar.n)
-        self.done = line[unit]
+        self.done, self.due = line[unit], math.inf
+
+    def _say(self, line: str, *values: object) -> None:
+        if distributed.rank() == 0 and not self.watched:
+            log.info(line, *values)
 
     def close(self) -> None:
         """Leave the terminal and the files in order."""

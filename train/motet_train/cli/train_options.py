@@ -18,6 +18,7 @@ from motet.motion.units import METRES
 from motet_train import distributed
 from motet_train.data.errors import DataError
 from motet_train.manifest import About
+from motet_train.precision import for_device
 from motet_train.progress import Shown, log
 from motet_train.recipes.recipe import SETTINGS, Job, Recipe
 from motet_train.runs import MANIFEST, WEIGHTS, Run
@@ -50,7 +51,11 @@ OPTIONS = (
     click.option("-o", "--out", type=Path, required=True, help="Folder to write; must not exist."),
     click.option("--seed", type=click.IntRange(0), default=0, show_default=True),
     click.option("--device", type=click.Choice(["cpu", "cuda"]), default="cpu", show_default=True),
-    click.option("--precision", type=click.Choice(["float32", "bfloat16"]), help="Precision of matrix products."),
+    click.option(
+        "--precision",
+        type=click.Choice(["float32", "bfloat16"]),
+        help="Precision of matrix products; float32 where the device has no bfloat16.",
+    ),
     click.option("--threads", type=click.IntRange(1), default=1, show_default=True),
     click.option("--resume", is_flag=True, help="Continue the run in --out, by the same command."),
     click.option("--tensorboard", is_flag=True, help="Write the log for TensorBoard, too."),
@@ -108,7 +113,6 @@ def _train(
     out: Path = shared["out"]
     licences = shared["licence"], shared["data_licence"]
     about = About(shared["name"] or out.name, shlex.join(["motet", *sys.argv[1:]]), shared["seed"], *licences)
-    settings = to_toml(_kept(context, {**shared, **own}), recipe)
     # a line for each chunk without --verbose, too; none with --quiet
     log.setLevel(logging.INFO if logging.getLogger("motet").isEnabledFor(logging.WARNING) else logging.NOTSET)
     with (
@@ -116,6 +120,8 @@ def _train(
         _folder(out, shared["resume"]),
         closing(Shown(out / BOARDS if shared["tensorboard"] else None)) as progress,
     ):
+        recipe = for_device(recipe, device)
+        settings = to_toml(_kept(context, {**shared, **own}), recipe)
         run = function(Job(recipe, about, out, device, progress, settings), **own)
         if distributed.rank() == 0:
             click.echo(_summary(out, run.manifest["training"]))

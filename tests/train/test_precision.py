@@ -1,0 +1,62 @@
+"""bfloat16 only where the processor has it: what the system says of it, and what a command then does and writes."""
+
+import json
+import os
+import platform
+from pathlib import Path
+
+import pytest
+import torch
+from click.testing import CliRunner, Result
+from test_predict_data import write_files
+
+from motet.cli import main
+from motet_train.precision import has_bfloat16
+from motet_train.settings import read_settings
+
+CPUINFO = Path("/proc/cpuinfo")
+
+
+@pytest.mark.skipif(
+    platform.machine() != "x86_64" or not CPUINFO.exists(), reason="where Linux says what an x86 processor has"
+)
+def test_the_answer_is_the_systems_but_where_torch_is_held_down() -> None:
+    held_down = "ONEDNN_MAX_CPU_ISA" in os.environ
+    assert has_bfloat16("cpu") == ("avx512_bf16" in CPUINFO.read_text().split() and not held_down)
+
+
+@pytest.mark.skipif(not has_bfloat16("cpu"), reason="this processor has no products in bfloat16")
+def test_where_it_is_yes_a_recurrent_layer_runs() -> None:
+    layer, x = torch.nn.LSTM(8, 8), torch.randn(5, 2, 8)
+    with torch.autocast("cpu", torch.bfloat16):
+        found = layer(x)[0]
+    found.float().sum().backward()
+    torch.testing.assert_close(found.float(), layer(x)[0], atol=0.02, rtol=0.05)
+
+
+def test_what_torch_does_not_answer_is_a_no(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(torch.ops, "mkldnn", None)
+    assert not has_bfloat16("cpu")
+
+
+def trained(out: Path, files: Path, *more: object) -> Result:
+    small = ("--steps", 2, "--config", files.parent / "small.toml")
+    given = ("train", "predict", "--data", files, *small, "--precision", "bfloat16", "--out", out, *more)
+    return CliRunner().invoke(main, [str(argument) for argument in given])
+
+
+@pytest.mark.parametrize(("has", "used"), [(False, "float32"), (True, "bfloat16")])
+def test_a_run_says_and_records_what_it_is_trained_in(
+    has: bool, used: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    files, out = write_files(tmp_path / "files", actions=("walking",)), tmp_path / "run"
+    (tmp_path / "small.toml").write_text("[model]\nhidden = 8\n")
+    monkeypatch.setattr("motet_train.precision.has_bfloat16", lambda device: has)
+    result = trained(out, files)
+    assert result.exit_code == 0, result.output
+    assert result.output.count("cpu has no products in bfloat16: training in float32") == (not has)
+    assert json.loads((out / "run.json").read_text())["training"]["recipe"]["precision"] == used
+    assert read_settings(out / "run.toml")[1]["training"]["precision"] == used
+    monkeypatch.setattr("motet_train.precision.has_bfloat16", lambda device: not has)
+    other = trained(out, files, "--resume")
+    assert (other.exit_code, "other settings, so cannot be resumed: precision" in other.output) == (2, True)
