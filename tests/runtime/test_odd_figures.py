@@ -8,15 +8,18 @@ from test_retarget import angles_between, dancing, skeleton_file
 
 from motet.errors import MotionError
 from motet.formats.writable import with_names
+from motet.motion.humanoid import HUMANOID
 from motet.motion.kinematics import global_transforms, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.retarget import from_humanoid, to_humanoid
 from motet.motion.skeleton import Joint, Skeleton
 
 
-def apart(one: Motion, other: Motion) -> float:
-    """The largest angle in degrees between the rotations in the world of two motions of the humanoid."""
-    return float(np.degrees(angles_between(global_transforms(one)[0], global_transforms(other)[0]).max()))
+def apart(one: Motion, other: Motion, but: tuple[str, ...] = ("!",)) -> float:
+    """The largest angle in degrees between the rotations in the world of two motions of the humanoid, but of some."""
+    angles = np.degrees(angles_between(global_transforms(one)[0], global_transforms(other)[0]))
+    kept = [i for i, name in enumerate(HUMANOID.names) if not name.endswith(but)]
+    return float(angles[:, kept].max())
 
 
 def renamed(motion: Motion, **names: str) -> Motion:
@@ -25,6 +28,91 @@ def renamed(motion: Motion, **names: str) -> Motion:
     for old, new in names.items():
         found = [name.replace(old, new) for name in found]
     return with_names(motion, found)
+
+
+def nameless(motion: Motion) -> Motion:
+    return with_names(motion, [f"b{i}{'_end' * n.endswith('_end')}" for i, n in enumerate(skeleton_of(motion).names)])
+
+
+def posed(height: float, **turns: tuple[float, float, float]) -> Motion:
+    """Some frames of the humanoid in one pose: bone -> degrees about x, y and z; "Foot" is both feet."""
+    motion = dancing(4)
+    values = np.zeros_like(motion.values)
+    values[:, 1] = height
+    for bone, angles in turns.items():
+        sides = ("left", "right") if bone[0].isupper() else ("",)
+        for side in sides:
+            for axis, angle in zip("xyz", angles, strict=True):
+                mirrored = side == "right" and axis != "x"
+                values[:, motion.channels.index(f"{side}{bone}.r{axis}")] = -angle if mirrored else angle
+    values[2] += 0.5  # no two frames are quite the same
+    return replace(motion, values=values)
+
+
+ON_THE_FLOOR = {
+    "crawls": posed(
+        0.4, hips=(80, 0, 0), UpperLeg=(-80, 0, 0), LowerLeg=(90, 0, 0), Foot=(60, 0, 0), UpperArm=(0, -80, 0)
+    ),
+    "kneels": posed(0.3, UpperLeg=(-70, 0, 0), LowerLeg=(140, 0, 0), Foot=(50, 0, 0), UpperArm=(0, 0, -80)),
+    "lies": posed(0.1, hips=(-90, 0, 0), UpperArm=(0, 0, -80)),
+    "meditates": posed(0.1, UpperLeg=(-95, 40, 20), LowerLeg=(125, 0, 0), Foot=(0, 0, 30), UpperArm=(0, 0, -70)),
+    "sits up": posed(0.1, hips=(-50, 0, 0), spine=(40, 0, 0), UpperLeg=(-60, 0, 0), LowerLeg=(110, 0, 0)),
+    "sits folded": posed(0.1, hips=(60, 0, 0), spine=(30, 0, 0), UpperLeg=(-150, 0, 0), LowerLeg=(10, 0, 0)),
+}
+
+
+@pytest.mark.parametrize("pose", ON_THE_FLOOR)
+@pytest.mark.parametrize("named", [True, False])
+def test_people_on_the_floor_come_in(pose: str, named: bool) -> None:
+    motion = from_humanoid(ON_THE_FLOOR[pose], skeleton_file("mixamo"))
+    found = to_humanoid(motion if named else nameless(motion))
+    # a hand's direction is that of all its fingers where nothing tells the thumb
+    assert apart(found.motion, ON_THE_FLOOR[pose], ("!",) if named else ("Hand", "Hand_end")) < 1e-3
+
+
+def test_one_who_sits_all_through_a_file_of_a_skeleton_that_rests_in_no_bodys_pose_is_no_beast() -> None:
+    motion = from_humanoid(ON_THE_FLOOR["sits folded"], skeleton_file("lafan1"))
+    assert apart(to_humanoid(motion).motion, ON_THE_FLOOR["sits folded"]) < 1e-3
+
+
+def beast(upright: bool) -> Motion:
+    """Hind legs of six bones and fore legs of four that zigzag, a tail, and a trunk along the ground or upright."""
+    rise, reach = (0.6, 0.2) if upright else (0.05, 0.3)
+    joints = [Joint("root", -1, (0.0, 1.0, 0.0))]
+    for name in ("back1", "back2", "back3"):
+        joints.append(Joint(name, len(joints) - 1, (0.0, rise / 3, reach)))
+    joints += [
+        Joint("neck", 3, (0.0, 0.3, 0.2)),
+        Joint("skull", 4, (0.0, 0.1, 0.1)),
+        Joint("snout", 5, (0.0, 0.0, 0.2)),
+    ]
+    joints += [
+        Joint("tail1", 0, (0.0, 0.0, -0.3)),
+        Joint("tail2", 7, (0.0, -0.1, -0.4)),
+        Joint("tail3", 8, (0.0, -0.1, -0.4)),
+    ]
+    hind = [
+        (0.18, 0.0, -0.34),
+        (0.08, -0.35, 0.28),
+        (0.03, -0.2, -0.25),
+        (0.02, -0.24, 0.11),
+        (0.01, -0.11, 0.04),
+        (0.0, -0.01, 0.13),
+        (0.0, 0.0, 0.13),
+    ]
+    fore = [(0.15, 0.1, -0.2), (0.1, -0.25, 0.2), (0.1, -0.2, 0.0), (0.02, -0.12, 0.05), (0.0, -0.02, 0.1)]
+    for side, sign in (("_l", 1), ("_r", -1)):
+        for limb, start, offsets in (("hind", 0, hind), ("fore", 3, fore)):
+            joints.append(Joint(f"{limb}0{side}", start, (0.07 * sign, 0.0, 0.1)))
+            for i, (x, y, z) in enumerate(offsets, start=1):
+                joints.append(Joint(f"{limb}{i}{side}", len(joints) - 1, (sign * x, y, z)))
+    return Motion(np.zeros((5, 0)), (), (), 30.0, Skeleton(tuple(joints), 1.0))
+
+
+@pytest.mark.parametrize("upright", [True, False])
+def test_beasts_have_more_bones_in_a_leg_than_people(upright: bool) -> None:
+    with pytest.raises(MotionError, match="a human's bones are straight"):
+        to_humanoid(beast(upright))
 
 
 def test_where_half_of_the_names_are_known_the_tree_tells_the_rest() -> None:

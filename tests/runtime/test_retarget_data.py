@@ -4,7 +4,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motet.formats import read_motion
+from motet.errors import MotionError
+from motet.formats import clips, read_motion
 from motet.motion.humanoid import HUMANOID
 from motet.motion.joint_names import map_by_names
 from motet.motion.kinematics import global_transforms
@@ -29,6 +30,19 @@ def test_trials_of_two_forms_agree_on_the_humanoid(cmu: Path, trials: dict[str, 
     apart, limbs = agreement(read_motion(trials["49_05"]), read_motion(cmu / "amc" / "49_05.amc"), 1)
     assert apart < 0.1
     assert max(limbs.values()) < 0.01
+
+
+def test_every_clip_of_a_person_comes_in_and_none_of_a_beast(shared: Path) -> None:
+    figures = shared / "figures"
+    if not figures.is_dir():
+        pytest.skip("needs ../shared/data/figures")
+    for name in ("horse", "kaiju"):
+        path = figures / f"{name}-animations.glb"
+        for clip in clips(path):
+            with pytest.raises(MotionError, match="bones are straight"):
+                to_humanoid(read_motion(path, clip=clip))
+    for clip in clips(figures / "many-clips.glb"):
+        assert to_humanoid(read_motion(figures / "many-clips.glb", clip=clip)).confidence > 0.9
 
 
 def test_every_skeleton_of_the_data_is_known(trials: dict[str, Path]) -> None:

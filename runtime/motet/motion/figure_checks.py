@@ -6,7 +6,7 @@ import numpy as np
 
 from motet.errors import MotionError, listed
 from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, LEG, REST, SPINE, leg_length, sided
-from motet.motion.joint_map import NEEDED, JointMap
+from motet.motion.joint_map import BY_THE_TREE, NEEDED, JointMap
 from motet.motion.rest_pose import Aims, direction, legs_up, to_left, trunk_up, unit
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
@@ -98,39 +98,45 @@ def _guess(leg: float) -> str | None:
     return min(likely, key=lambda name: near[name], default=None)
 
 
-def check_frames(positions: Array, joint_map: JointMap, aims: Aims) -> None:
-    """Refuse frames (T, J, 3) that no human's body goes through: four legs, inside out, or with knees the other way."""
-    if not len(positions):
-        return
-    upright = np.sum(trunk_up(positions, joint_map) * legs_up(positions, joint_map), axis=-1)
-    if np.quantile(upright, 0.95) < 0.3:
+def check_stance(positions: Array, joint_map: JointMap) -> None:
+    """Refuse frames (T, J, 3) of a figure on four legs: asked where its rest pose is not a standing body.
+
+    A human who sits all through a file has the trunk beside the legs, too; names that are known tell one who sits
+    upright from an animal.
+    """
+    trunk = trunk_up(positions, joint_map)
+    beside = np.quantile(np.sum(trunk * legs_up(positions, joint_map), axis=-1), 0.95) < 0.3
+    sits = joint_map.convention != BY_THE_TREE and np.median(trunk[:, 1]) > 0.5
+    if beside and not sits:
         raise MotionError(
             "the trunk never stands above the legs: this looks like a figure on four legs, not like a human's; "
             "where joints were mistaken, give a map"
         )
-    left = unit(to_left(positions, joint_map, "UpperLeg"))
-    forward = np.cross(left, legs_up(positions, joint_map))
-    feet = [sided(side, "Foot") for side in LEFT_RIGHT if aims[sided(side, "Foot")]]
-    toes = [np.sum(forward * unit(direction(positions, joint_map.joints[bone], aims[bone])), axis=-1) for bone in feet]
+
+
+def check_frames(positions: Array, joint_map: JointMap, aims: Aims, hinges: dict[str, Array]) -> None:
+    """Refuse frames (T, J, 3) that no human's body goes through: inside out, with feet or knees the other way.
+
+    hinges: of each side the axis (T, 3) about which the knee bends, to the left, however the thigh is turned. A knee
+    bends the wrong way where the pelvis says so, too: recorded thighs can be twisted by much.
+    """
+    toes, wrong, bent = [], 0, 0
+    left = to_left(positions, joint_map, "UpperLeg")
+    for side, hinge in hinges.items():
+        bones = [bone for bone in (sided(side, part) for part in LEG[:3]) if aims[bone]]
+        thigh, shin, *foot = (unit(direction(positions, joint_map.joints[bone], aims[bone])) for bone in bones)
+        toes += [np.sum(np.cross(hinge, -shin) * along, axis=-1) for along in foot]
+        bend = np.cross(thigh, shin)
+        is_bent = np.linalg.norm(bend, axis=-1) > BENT
+        bent += int(is_bent.sum())
+        wrong += int((is_bent & (np.sum(bend * hinge, axis=-1) < 0) & (np.sum(bend * left, axis=-1) < 0)).sum())
     if toes and np.median(toes) < -0.3:
         raise MotionError(
             "the feet point backwards: left and right are swapped, or the frames turn inside out: name the joints in a "
             "map, or export the file anew"
         )
-    if _wrong_knees(positions, joint_map, aims, left) > 0.6:
+    if bent >= 0.1 * len(positions) and wrong > 0.6 * bent:
         raise MotionError(
             "the knees bend forwards: the frames turn inside out (a wrong order of rotations?), or this is no human: "
             "export the file anew"
         )
-
-
-def _wrong_knees(positions: Array, joint_map: JointMap, aims: Aims, left: Array) -> float:
-    """The part of the frames with a bent knee in which it bends the wrong way; 0 where hardly any knee is bent."""
-    wrong, bent = 0, 0
-    for bones in ([sided(side, part) for part in LEG[:2]] for side in LEFT_RIGHT):
-        thigh, shin = (unit(direction(positions, joint_map.joints[bone], aims[bone])) for bone in bones)
-        hinge = np.cross(thigh, shin)
-        is_bent = np.linalg.norm(hinge, axis=-1) > BENT
-        bent += int(is_bent.sum())
-        wrong += int((np.sum(hinge * left, axis=-1)[is_bent] < 0).sum())
-    return wrong / bent if bent >= 0.1 * len(positions) else 0.0

@@ -6,7 +6,7 @@ import numpy as np
 
 from motet.errors import MotionError
 from motet.motion.calibrate import alignments_of_frames, axes_agree
-from motet.motion.figure_checks import check_frames, leg_of
+from motet.motion.figure_checks import check_frames, check_stance, leg_of
 from motet.motion.humanoid import LEFT_RIGHT, SOLE, leg_length, sided
 from motet.motion.joint_map import JointMap
 from motet.motion.products import rotated
@@ -19,6 +19,7 @@ from motet.motion.rest_pose import (
     direction,
     humanoid_direction,
     swing,
+    to_left,
     trunk_up,
     unit,
 )
@@ -76,7 +77,9 @@ def fit(skeleton: Skeleton, joint_map: JointMap, rotations: Array, places: Array
     if len(places) < 2 and not known:
         raise MotionError("the rest pose is not a standing body: give a motion of this skeleton, whose frames show how")
     if not known:
-        check_frames(places, joint_map, aims)
+        left = unit(to_left(places, joint_map, "UpperLeg"))
+        check_stance(places, joint_map)
+        check_frames(places, joint_map, aims, dict.fromkeys(LEFT_RIGHT, left))
     aligned = alignments_of_frames(rotations, places, joint_map, aims)
     hips, carrier = joint_map.joints["hips"], joint_map.carrier(skeleton)
     aligned[carrier] = rotations[0, carrier].T @ rotations[0, hips] @ aligned[hips]

@@ -26,6 +26,10 @@ KEYS = tuple(bone for bone in BONES if bone not in (*SPINE[1:], *NECK[:1]))
 """What a map can name, besides "neck": the joints of the back all go by the name "spine"."""
 
 
+BY_THE_TREE = "by the tree"
+"""What stands for a convention where none was found."""
+
+
 @dataclass(frozen=True)
 class JointMap:
     """The joints of a skeleton that are bones of the humanoid.

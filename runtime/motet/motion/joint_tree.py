@@ -6,13 +6,13 @@ limb lies when the feet point forward.
 """
 
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 
 from motet.errors import MotionError
 from motet.motion.humanoid import ARM, LEFT_RIGHT, LEG, sided
-from motet.motion.joint_map import JointMap, check_map
+from motet.motion.joint_map import BY_THE_TREE, JointMap, check_map
 from motet.motion.kinematics import local_translations, positions, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rest_pose import unit
@@ -32,8 +32,9 @@ FINGERS = 0.35
 PIECE = 0.15
 """A bone begins with at least this part of its limb: hips and buttocks often have a short one before the thigh."""
 
-BY_THE_TREE = "by the tree"
-"""What stands for a convention where none was found."""
+STRAIGHT = 1.1
+"""A bone that has joints within it, as those that take its twist, is at most this times as long as its ends are apart.
+Limbs of beasts have more bones than a human's: what would be one bone is bent."""
 
 CONFIDENCE = {True: 0.8, False: 0.6}
 """How sure a map is with left and right from names, and without."""
@@ -88,17 +89,37 @@ def map_by_tree(motion: Motion) -> JointMap:
     joints = {"hips": legs.joint}
     frames = positions(motion) if len(motion) else skeleton.rest_positions[None]
     leg_pair, arm_pair = _legs(tree, legs), _arms(tree, arms)
-    to_left = _to_left(frames, leg_pair, tree)
+    # legs that are folded or crossed do not tell sides, as they do at rest where the figure stands there
+    shown = skeleton.rest_positions[None] if _stands(skeleton.rest_positions, leg_pair, arms) else frames
+    to_left = _to_left(shown, leg_pair, tree)
     named = False
     for pair, parts, first in ((leg_pair, LEG, "UpperLeg"), (arm_pair, ARM, "UpperArm")):
-        left_first, by_name = _left_first(skeleton, frames, to_left, [limb[first] for limb in pair])
+        left_first, by_name = _left_first(skeleton, shown, to_left, [limb[first] for limb in pair])
         named = named or by_name
         for side, limb in zip(LEFT_RIGHT, pair if left_first else pair[::-1], strict=True):
             joints |= {sided(side, part): limb[part] for part in parts if part in limb}
     neck, head = _neck(tree, arms)
     joints |= {} if head is None else {"head": head}
+    _check_straight(skeleton, frames, joints)
     found = JointMap(joints, tuple(shared[::-1]), neck, BY_THE_TREE, CONFIDENCE[named])
     return check_map(skeleton, found)
+
+
+def _check_straight(skeleton: Skeleton, frames: Array, joints: dict[str, int]) -> None:
+    """Refuse limbs whose bones are not straight from joint to joint in most frames (T, J, 3)."""
+    pairs = [
+        (sided(side, one), sided(side, next_))
+        for side in LEFT_RIGHT
+        for one, next_ in (*pairwise(LEG[:3]), *pairwise(ARM[1:]))
+    ]
+    for upper, lower in ((joints[one], joints[next_]) for one, next_ in pairs if next_ in joints):
+        within = [lower]
+        while within[-1] != upper:
+            within.append(skeleton.joints[within[-1]].parent)
+        pieces = sum(np.linalg.norm(frames[:, one] - frames[:, next_], axis=-1) for one, next_ in pairwise(within))
+        if np.median(pieces) > STRAIGHT * np.median(np.linalg.norm(frames[:, upper] - frames[:, lower], axis=-1)):
+            bent = f"this one is bent between {skeleton.names[upper]!r} and {skeleton.names[lower]!r}"
+            raise MotionError(f"a human's bones are straight, {bent}: where it is a human all the same, give a map")
 
 
 def _translations(motion: Motion, skeleton: Skeleton) -> Array:
@@ -199,6 +220,15 @@ def _neck(tree: _Tree, arms: _Fork) -> tuple[tuple[int, ...], int | None]:
     named = [k for k, joint in enumerate(path) if "head" in tree.skeleton.names[joint].lower()]
     head = named[0] if named else min(1, len(path) - 1)
     return tuple(path[:head]), path[head]
+
+
+def _stands(pose: Array, legs: list[dict[str, int]], arms: _Fork) -> bool:
+    """Whether in a pose (J, 3) both legs are straight, and the arms above them."""
+    thighs, shins = (
+        unit(np.array([pose[leg[one]] - pose[leg[next_]] for leg in legs])) for one, next_ in pairwise(LEG[:3])
+    )
+    trunk = unit(pose[list(arms.limbs)].mean(axis=0) - pose[[leg["UpperLeg"] for leg in legs]].mean(axis=0))
+    return bool(min(*(thighs @ trunk), *(shins @ trunk)) > 0.75)
 
 
 def _to_left(frames: Array, legs: list[dict[str, int]], tree: _Tree) -> Array:

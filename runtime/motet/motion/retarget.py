@@ -17,9 +17,9 @@ from motet.motion.figure_checks import check_frames, height_of, unit_of
 from motet.motion.fingers import relaxed
 from motet.motion.fitting import Fitted, fit, upright
 from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, NECK, PARENTS, SPINE, leg_length, sided
-from motet.motion.joint_map import JointMap
+from motet.motion.joint_map import BY_THE_TREE, JointMap
 from motet.motion.joint_names import HalfKnownError, map_by_names
-from motet.motion.joint_tree import BY_THE_TREE, map_by_tree
+from motet.motion.joint_tree import map_by_tree
 from motet.motion.kinematics import global_transforms, local_rotations, local_translations, skeleton_of
 from motet.motion.mmm_figure import is_mmm, with_figure
 from motet.motion.motion import Motion
@@ -100,7 +100,7 @@ def to_humanoid(motion: Motion, joint_map: JointMap | None = None) -> Humanoid:
     joint_map = joint_map or map_of(motion)
     rotations, places = global_transforms(motion)
     fitted = fit(skeleton, joint_map, rotations, places)
-    check_frames(places, joint_map, fitted.aims)
+    check_frames(places, joint_map, fitted.aims, _hinges(rotations, fitted))
     unit, turn = unit_of(skeleton, fitted.leg), upright(fitted, places)
     turned = product(turn, _humanoid_rotations(rotations, fitted))
     legs = middle(places, joint_map, "UpperLeg") @ turn.T * (leg_length() / fitted.leg)
@@ -140,6 +140,12 @@ def grounded(motion: Motion) -> Motion:
     values = np.array(motion.values)
     values[:, motion.channels.index("hips.ty")] -= ground if abs(ground) < NEAR else 0.0
     return replace(motion, values=values)
+
+
+def _hinges(rotations: Array, fitted: Fitted) -> dict[str, Array]:
+    """Of each side the axis (T, 3) about which the knee bends, to the left: that of the thigh."""
+    thighs = {side: fitted.joint_map.joints[sided(side, "UpperLeg")] for side in LEFT_RIGHT}
+    return {side: rotated(rotations[:, i], fitted.aligned[i][:, 0]) for side, i in thighs.items()}
 
 
 def _humanoid_rotations(rotations: Array, fitted: Fitted) -> Array:
