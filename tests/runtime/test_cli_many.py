@@ -166,3 +166,21 @@ def test_a_fault_of_a_file_is_not_said_of_the_output(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr("motet.cli.bundle.list_bundles", fail)
     with pytest.raises(FileNotFoundError, match=r"lost\.zip"):
         main.main(["bundle", "list"])
+
+
+def test_no_result_is_written_over_what_is_read(tmp_path: Path, clips: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("a.npz", "b.npz"):
+        motet.write(name, motet.read(clips / WALK)[:60])
+    content = Path("a.npz").read_bytes()
+    for command in (
+        ("convert", "a.npz", tmp_path / "a.npz"),
+        ("convert", "b.npz", "a.npz", "-o", "{name}.npz"),
+        ("predict", "a.npz", "-o", "./a.npz", "--append"),
+        ("fill", "a.npz", "--gap", ".2:.3", "-o", "a.npz"),
+        ("join", "b.npz", "a.npz", "-o", "a.npz"),
+    ):
+        result = run(*command)
+        assert result.exit_code == 2
+        assert ".npz is read, so it is not written over: name another file for the result" in result.stderr
+    assert Path("a.npz").read_bytes() == content

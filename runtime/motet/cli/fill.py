@@ -7,7 +7,7 @@ import click
 
 from motet.bundle.session import SessionOptions
 from motet.cli.options import session_options
-from motet.cli.reading import Read, Tries, naming, out_option, places, read_options
+from motet.cli.reading import Read, Tries, naming, out_option, places, read_options, spare
 from motet.cli.writing import Output, size, write_options
 from motet.errors import quoted
 from motet.models.fill import JOIN_SECONDS, LOOP_SECONDS, FillModel
@@ -102,6 +102,7 @@ def join(
 
     SECOND is set down where FIRST leads, facing as it does, and brought to its frame rate and figure.
     """
+    spare(out, first, second)
     model = load_as(FillModel, bundle, session)
     one, other = read(first), read(second)
     with naming(f"{first} and {second}"):

@@ -211,7 +211,14 @@ def places(out: Path, sources: Sequence[Source | str], samples: int = 1) -> list
         )
     for place in found:
         check_writable(place)
+        spare(place, *(source.path for source in sources if isinstance(source, Source)))
     return found
+
+
+def spare(place: Path, *sources: Path) -> None:
+    """Refuse a result that would take the place of a file that it is made from."""
+    if place.resolve() in {source.resolve() for source in sources}:
+        raise click.UsageError(f"{place} is read, so it is not written over: name another file for the result")
 
 
 def _numbered(place: Path, count: int) -> list[Path]:
