@@ -18,7 +18,9 @@ def write_clips(path: Path, clips: Sequence[tuple[str, Motion]], skin: bool = Tr
     """A GLB of one figure with several named motions."""
     buffer, skeleton = glb.Buffer(), skeleton_of(clips[0][1])
     document: dict[str, Any] = {"asset": {"version": "2.0"}, "nodes": glb.joint_nodes(skeleton)}
-    document["animations"] = [glb.animation(buffer, motion, skeleton) | {"name": name} for name, motion in clips]
+    document["animations"] = [
+        glb.animation(buffer, name, motion, glb.joint_tracks(motion, skeleton)) for name, motion in clips
+    ]
     document |= {"skins": [{"joints": list(range(len(skeleton.joints)))}]} if skin else {}
     document |= {"bufferViews": buffer.views, "accessors": buffer.accessors}
     return write_document(path, document, bytes(buffer.content))
