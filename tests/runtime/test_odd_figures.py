@@ -11,8 +11,11 @@ from motet.formats.writable import with_names
 from motet.motion.humanoid import HUMANOID
 from motet.motion.kinematics import global_transforms, skeleton_of
 from motet.motion.motion import Motion
+from motet.motion.products import product
 from motet.motion.retarget import from_humanoid, to_humanoid
+from motet.motion.rotations import Array
 from motet.motion.skeleton import Joint, Skeleton
+from motet.motion.world_rotations import motion_of
 
 
 def apart(one: Motion, other: Motion, but: tuple[str, ...] = ("!",)) -> float:
@@ -159,3 +162,58 @@ def test_an_arm_may_end_in_the_wrist() -> None:
     found = to_humanoid(Motion(np.zeros((2, 0)), (), (), 30.0, Skeleton(tuple(joints), 1.0)))
     assert found.joints["leftLowerArm"] == ("l_g",)
     assert "leftHand" not in found.joints
+
+
+def lying_world(motion: Motion, turn: Array) -> Motion:
+    """The frames of a motion in a world that is turned about, the skeleton's rest as it was."""
+    skeleton = skeleton_of(motion)
+    rotations, places = global_transforms(motion)
+    return motion_of(skeleton, product(turn, rotations), {0: places[:, 0] @ turn.T}, motion.fps)
+
+
+Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+
+
+@pytest.mark.parametrize("name", ["mixamo", "rokoko"])
+def test_frames_with_z_up_on_a_rest_pose_with_y_up_are_turned_upright(name: str) -> None:
+    motion = from_humanoid(dancing(), skeleton_file(name))
+    found = to_humanoid(lying_world(motion, Z_UP))
+    assert found.notes[-1] == "turned upright: the frames stand along z, the rest pose along y"
+    assert apart(found.motion, to_humanoid(motion).motion) < 1e-3
+    path, expected = (global_transforms(m)[1][:, 0] for m in (found.motion, to_humanoid(motion).motion))
+    np.testing.assert_allclose(path - path[0], expected - expected[0], atol=1e-6)
+
+
+def test_one_who_lies_or_falls_is_not_turned_upright() -> None:
+    lies = to_humanoid(from_humanoid(ON_THE_FLOOR["lies"], skeleton_file("mixamo")))
+    assert apart(lies.motion, ON_THE_FLOOR["lies"]) < 1e-3
+    assert "lies along z in most frames" in lies.notes[-1]
+    walk = dancing(30, turns=0.0)
+    values = np.concatenate([walk.values, np.repeat(lies.motion.values[:1], 60, axis=0)])
+    values[30:, :3] = [walk.values[-1, 0], 0.1, walk.values[-1, 2]]
+    falls = replace(walk, values=values)
+    assert apart(to_humanoid(from_humanoid(falls, skeleton_file("mixamo"))).motion, falls) < 1e-3
+
+
+def test_a_pelvis_that_is_turned_below_its_joint_is_turned_as_the_legs_lie() -> None:
+    """The turn is in the joints of the legs and of the back that hang on the hips, these stand still."""
+    like = skeleton_file("mixamo")
+    skeleton = skeleton_of(like)
+    dance = dancing()
+    motion = from_humanoid(dance, like)
+    rotations = global_transforms(motion)[0]
+    limbs = skeleton.children[0]
+    carriers = [Joint(f"{skeleton.names[k]}Joint", 0, (0.0, 0.0, 0.0)) for k in limbs]
+    joints = [skeleton.joints[0], *carriers]
+    for i, joint in enumerate(skeleton.joints[1:], start=1):
+        joints.append(replace(joint, parent=joint.parent + len(carriers) if joint.parent else 1 + limbs.index(i)))
+    still = np.broadcast_to(np.eye(3), rotations[:, :1].shape)
+    turned = np.concatenate([still, *[rotations[:, :1]] * len(carriers), rotations[:, 1:]], axis=1)
+    places = global_transforms(motion)[1][:, 0]
+    found = to_humanoid(motion_of(Skeleton(tuple(joints), skeleton.metres_per_unit), turned, {0: places}, motion.fps))
+    assert any("the pelvis is turned as they lie" in note for note in found.notes)
+    hips = HUMANOID.index("hips")
+    left, expected = (global_transforms(m)[0][:, hips, :, 0] for m in (found.motion, dance))
+    assert np.degrees(np.arccos(np.clip(np.sum(left * expected, axis=-1), -1, 1))).max() < 0.01
+    others = tuple(name for name in HUMANOID.names if "Arm" not in name and "Leg" not in name)
+    assert apart(found.motion, dance, others) < 1e-3

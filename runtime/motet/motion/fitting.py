@@ -18,9 +18,7 @@ from motet.motion.rest_pose import (
     body_frame,
     direction,
     humanoid_direction,
-    swing,
     to_left,
-    trunk_up,
     unit,
 )
 from motet.motion.rotations import Array
@@ -28,6 +26,9 @@ from motet.motion.skeleton import Skeleton
 
 ALONG = 0.96
 """Cosine above which a bone counts as standing as in a T-pose."""
+
+TWISTED = 30.0
+"""Degrees from which on the hips' joint does not tell how the pelvis is turned: the joints of the legs do."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ class Fitted:
     leg: length of thigh and shin in the skeleton's unit.
     heights: of the joints of feet and toes over the sole, in the skeleton's unit.
     up: where y points (3,) in the rest pose, None where that was not used.
-    at_rest: whether the rest pose was used.
+    pelvis: whether the joint of the hips turns with the legs' joints; else these tell how the pelvis is turned.
     """
 
     joint_map: JointMap
@@ -47,8 +48,9 @@ class Fitted:
     leg: float
     heights: dict[str, float]
     up: Array | None
+    pelvis: bool
     confidence: float
-    note: str | None
+    notes: tuple[str, ...]
 
     @property
     def at_rest(self) -> bool:
@@ -58,6 +60,26 @@ class Fitted:
 
 def fit(skeleton: Skeleton, joint_map: JointMap, rotations: Array, places: Array) -> Fitted:
     """Measure a figure, from rotations (T, J, 3, 3) and positions (T, J, 3) of its frames; MotionError if it cannot."""
+    fitted = _fit(skeleton, joint_map, rotations, places)
+    apart = _legs_apart(rotations, places, fitted)
+    if apart <= TWISTED:
+        return fitted
+    hips = skeleton.names[joint_map.joints["hips"]]
+    note = f"the legs' joints lie {apart:.0f} degrees off the turn of {hips!r}: the pelvis is turned as they lie"
+    return replace(fitted, pelvis=False, notes=(*fitted.notes, note))
+
+
+def _legs_apart(rotations: Array, places: Array, fitted: Fitted) -> float:
+    """Degrees between the left of the hips and where the left leg's joint lies from the right one's, the median."""
+    if not len(places):
+        return 0.0
+    hips = fitted.joint_map.joints["hips"]
+    left = rotated(rotations[:, hips], fitted.aligned[hips][:, 0])
+    cosine = np.sum(left * unit(to_left(places, fitted.joint_map, "UpperLeg")), axis=-1)
+    return float(np.degrees(np.arccos(np.clip(np.median(cosine), -1, 1))))
+
+
+def _fit(skeleton: Skeleton, joint_map: JointMap, rotations: Array, places: Array) -> Fitted:
     aims = aims_of(skeleton, joint_map)
     leg = leg_of(skeleton, joint_map, aims, places[0] if len(places) else skeleton.rest_positions)
     still = np.tile(np.eye(3), (len(skeleton.joints), 1, 1))
@@ -65,7 +87,7 @@ def fit(skeleton: Skeleton, joint_map: JointMap, rotations: Array, places: Array
     if body is not None:
         aligned = alignments_of_pose(skeleton, (still, skeleton.rest_positions), body, joint_map, aims)
         heights = _heights(skeleton, joint_map, leg, skeleton.rest_positions @ body[:, 1])
-        return Fitted(joint_map, aims, aligned, leg, heights, body[:, 1], 1.0, None)
+        return Fitted(joint_map, aims, aligned, leg, heights, body[:, 1], True, 1.0, ())
     known = bool(len(places)) and axes_agree(rotations, places, joint_map, aims)
     joint_map = joint_map if known else replace(joint_map, axes={})
     first = body_frame(places[0], joint_map, aims, exact=True) if len(places) and not known else None
@@ -73,7 +95,7 @@ def fit(skeleton: Skeleton, joint_map: JointMap, rotations: Array, places: Array
         aligned = alignments_of_pose(skeleton, (rotations[0], places[0]), first, joint_map, aims)
         heights = _heights(skeleton, joint_map, leg, places[0] @ first[:, 1])
         note = "the rest pose is not a standing body: the first frame's pose was used in its place"
-        return Fitted(joint_map, aims, aligned, leg, heights, None, 0.95, note)
+        return Fitted(joint_map, aims, aligned, leg, heights, None, True, 0.95, (note,))
     if len(places) < 2 and not known:
         raise MotionError("the rest pose is not a standing body: give a motion of this skeleton, whose frames show how")
     if not known:
@@ -86,7 +108,7 @@ def fit(skeleton: Skeleton, joint_map: JointMap, rotations: Array, places: Array
     heights = _heights(skeleton, joint_map, leg, None)
     how = "known by the convention" if known else "found from the frames"
     note = f"the rest pose is not a standing body: how the joints stand was {how}"
-    return Fitted(joint_map, aims, aligned, leg, heights, None, 0.95 if known else 0.85, note)
+    return Fitted(joint_map, aims, aligned, leg, heights, None, True, 0.95 if known else 0.85, (note,))
 
 
 def _is_t_pose(pose: Array, body: Array, joint_map: JointMap, aims: Aims) -> bool:
@@ -122,15 +144,3 @@ def sole_points(fitted: Fitted, turned: dict[str, Array], places: Array) -> Arra
                 + rotated(turned[bone], np.array([x * scale, -height, z * scale]))
             )
     return np.stack(points, axis=1)
-
-
-def upright(fitted: Fitted, places: Array) -> Array:
-    """The rotation (3, 3) of the world that makes y point up; the identity where it does or where nothing tells.
-
-    The figure stands along another axis where the rest pose and most frames (T, J, 3) say so: a body that lies down
-    does so in its frames alone, and one that is turned upright by its root does at rest alone.
-    """
-    if fitted.up is None or fitted.up[1] > 0.5:
-        return np.eye(3)
-    stands = float(np.median(trunk_up(places, fitted.joint_map) @ fitted.up)) > 0.7
-    return swing(fitted.up, np.array([0.0, 1.0, 0.0])) if stands else np.eye(3)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.errors import MotionError
-from motet.motion.fitting import Fitted, fit, sole_points, upright
+from motet.motion.fitting import Fitted, fit, sole_points
 from motet.motion.humanoid import GROUND, HUMANOID, LEFT_RIGHT, ground_under, leg_length, sided
 from motet.motion.kinematics import AXES, euler_of, global_transforms, skeleton_of, with_channels
 from motet.motion.motion import TURN, Motion
@@ -23,6 +23,7 @@ from motet.motion.root_path import GENERATED, TREMBLE, smoothed
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
 from motet.motion.two_bone import Leg
+from motet.motion.upright import upright
 
 LOW = (0.02, 0.05)  # m above the ground: a point of the sole touches it surely, and not at all
 SLOW = (0.3, 0.9)  # m/s over the ground: it stands surely, and not at all
@@ -55,7 +56,7 @@ def hold_feet(motion: Motion, trembling: bool = False) -> Motion:
     skeleton, joint_map = skeleton_of(motion), map_of(motion)
     rotations, places = global_transforms(motion)
     fitted = fit(skeleton, joint_map, rotations, places)
-    if not np.array_equal(upright(fitted, places), np.eye(3)):
+    if not np.array_equal(upright(fitted, places).turn, np.eye(3)):
         raise MotionError("this figure does not stand along y: turn it upright by to_humanoid")
     soles = _soles(skeleton, fitted, rotations, places)
     places = places * (leg_length() / fitted.leg)

@@ -15,7 +15,7 @@ from motet.errors import MotionError
 from motet.motion import fitting, humanoid
 from motet.motion.figure_checks import check_frames, height_of, unit_of
 from motet.motion.fingers import relaxed
-from motet.motion.fitting import Fitted, fit, upright
+from motet.motion.fitting import Fitted, fit
 from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, NECK, PARENTS, SPINE, leg_length, sided
 from motet.motion.joint_map import BY_THE_TREE, JointMap
 from motet.motion.joint_names import HalfKnownError, map_by_names
@@ -24,10 +24,11 @@ from motet.motion.kinematics import global_transforms, local_rotations, local_tr
 from motet.motion.mmm_figure import is_mmm, with_figure
 from motet.motion.motion import Motion
 from motet.motion.products import inverse, product, rotated
-from motet.motion.rest_pose import middle
+from motet.motion.rest_pose import middle, swing, to_left
 from motet.motion.rotations import Array, angle_of, axis_to_rotmat, frames_last
 from motet.motion.skeleton import END_SUFFIX, Skeleton
 from motet.motion.spread import spread, twist
+from motet.motion.upright import upright
 from motet.motion.world_rotations import motion_of, places_of
 
 log = logging.getLogger(__name__)
@@ -91,7 +92,8 @@ def to_humanoid(motion: Motion, joint_map: JointMap | None = None) -> Humanoid:
 
     joint_map: which joint is which bone, as :func:`motet.motion.joint_map.read_map` reads it; found where not given.
     The path is scaled by the ratio of the legs' lengths, and the soles' lowest points are laid on y = 0 at their 5th
-    percentile. A file with z up is turned upright. MotionError, with the reason, for a figure that is no human's.
+    percentile. A file with z up, or whose frames alone have it, is turned upright. MotionError, with the reason, for a
+    figure that is no human's.
     """
     motion = with_figure(motion) if is_mmm(motion) else motion
     skeleton = skeleton_of(motion)
@@ -101,14 +103,12 @@ def to_humanoid(motion: Motion, joint_map: JointMap | None = None) -> Humanoid:
     rotations, places = global_transforms(motion)
     fitted = fit(skeleton, joint_map, rotations, places)
     check_frames(places, joint_map, fitted.aims, _hinges(rotations, fitted))
-    unit, turn = unit_of(skeleton, fitted.leg), upright(fitted, places)
-    turned = product(turn, _humanoid_rotations(rotations, fitted))
-    legs = middle(places, joint_map, "UpperLeg") @ turn.T * (leg_length() / fitted.leg)
-    notes = [note for note in (fitted.note, unit.note) if note]
+    unit, up = unit_of(skeleton, fitted.leg), upright(fitted, places)
+    turned = product(up.turn, _humanoid_rotations(rotations, places, fitted))
+    legs = middle(places, joint_map, "UpperLeg") @ up.turn.T * (leg_length() / fitted.leg)
+    notes = [note for note in (*fitted.notes, unit.note, up.note) if note]
     if joint_map.joints["hips"]:
         notes.append(f"the joint {skeleton.names[0]!r} above the hips is folded in")
-    if not np.array_equal(turn, np.eye(3)):
-        notes.append("turned upright: the figure does not stand along y")
     return Humanoid(
         _on_humanoid(turned, legs, motion.fps),
         joint_map.names(skeleton),
@@ -148,10 +148,14 @@ def _hinges(rotations: Array, fitted: Fitted) -> dict[str, Array]:
     return {side: rotated(rotations[:, i], fitted.aligned[i][:, 0]) for side, i in thighs.items()}
 
 
-def _humanoid_rotations(rotations: Array, fitted: Fitted) -> Array:
-    """Rotations in the world (T, J, 3, 3) of the humanoid's joints, from those of the figure's."""
+def _humanoid_rotations(rotations: Array, places: Array, fitted: Fitted) -> Array:
+    """Rotations in the world (T, J, 3, 3) of the humanoid's joints, from those (T, J, 3, 3) and the positions
+    (T, J, 3) of the figure's."""
     joint_map, aligned = fitted.joint_map, fitted.aligned
     turned = {bone: product(rotations[:, i], aligned[i]) for bone, i in joint_map.joints.items()}
+    if not fitted.pelvis:
+        to_legs = swing(turned["hips"][:, :, 0], to_left(places, joint_map, "UpperLeg"))
+        turned["hips"] = product(to_legs, turned["hips"])
     chains = (joint_map.spine, joint_map.neck)
     spine, neck = ([product(rotations[:, i], aligned[i]) for i in chain] for chain in chains)
     neck += [turned["head"]] if "head" in turned else []

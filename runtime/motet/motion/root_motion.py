@@ -3,13 +3,14 @@
 import numpy as np
 
 from motet.errors import MotionError
-from motet.motion.fitting import fit, upright
+from motet.motion.fitting import fit
 from motet.motion.joint_map import JointMap
 from motet.motion.kinematics import AXES, global_transforms, local_translations, posed, skeleton_of, with_channels
 from motet.motion.motion import Motion
 from motet.motion.products import inverse, rotated
 from motet.motion.retarget import map_of
 from motet.motion.rotations import Array
+from motet.motion.upright import upright
 
 Y = np.array([0.0, 1.0, 0.0])
 
@@ -70,7 +71,7 @@ def _carrier(motion: Motion) -> tuple[int, Array]:
     skeleton = skeleton_of(motion)
     try:
         joint_map, transforms = map_of(motion), global_transforms(motion)
-        turn = upright(fit(skeleton, joint_map, *transforms), transforms[1])
+        turn = upright(fit(skeleton, joint_map, *transforms), transforms[1]).turn
     except MotionError:
         return 0, Y
     return joint_map.carrier(skeleton), turn.T @ Y
