@@ -11,11 +11,11 @@ import pytest
 from motet.errors import FormatError, MotionError
 from motet.formats import glb, gltf, gltf_data, read_character, read_motion, vrma
 from motet.motion.humanoid import BONES, HUMANOID, REST, ground_under, sole_points
-from motet.motion.kinematics import global_transforms, positions, skeleton_of
+from motet.motion.kinematics import global_transforms, local_rotations, positions, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.retarget import from_humanoid, grounded, to_humanoid
 from motet.motion.rigs import MIXAMO
-from motet.motion.rotations import Array, quat_to_rotmat, rotmat_to_quat
+from motet.motion.rotations import Array, quat_to_rotmat, rotmat_to_quat, rotmat_to_rotvec
 
 SKELETONS = Path(__file__).parent / "skeletons"
 
@@ -66,12 +66,18 @@ def test_vrma_holds_the_bones_of_the_humanoid(tmp_path: Path) -> None:
     extension = document["extensions"]["VRMC_vrm_animation"]
     assert extension["specVersion"] == "1.0"
     bones = {bone: document["nodes"][place["node"]] for bone, place in extension["humanoid"]["humanBones"].items()}
-    assert {bone: node["name"] for bone, node in bones.items()} == {bone: bone for bone in BONES}
+    fingers = vrma.SKELETON.names[len(HUMANOID.names) :]
+    assert len(fingers) == 30
+    assert {bone: node["name"] for bone, node in bones.items()} == {bone: bone for bone in (*BONES, *fingers)}
     assert bones["hips"]["translation"] == [0.0, 0.98, 0.0]
     assert not any("scale" in node or "rotation" in node for node in document["nodes"])
     moved = [c["target"]["node"] for c in document["animations"][0]["channels"] if c["target"]["path"] == "translation"]
     assert moved == [0]
     written = gltf.read(tmp_path / "a.vrma")
+    turns = local_rotations(written)[:, [written.skeleton.index(bone) for bone in fingers]]
+    bends = np.degrees(np.linalg.norm(rotmat_to_rotvec(turns), axis=-1))
+    assert np.ptp(bends, axis=0).max() < 1e-4
+    assert 5 < bends.min() < bends.max() < 35
     np.testing.assert_allclose(in_order(written), in_order(grounded(moving())), atol=1e-6)
     lowest = sole_points(*global_transforms(to_humanoid(written).motion))
     assert ground_under(lowest) == pytest.approx(0, abs=1e-6)

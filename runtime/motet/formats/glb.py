@@ -126,7 +126,7 @@ def joint_nodes(skeleton: Skeleton) -> list[dict[str, Any]]:
 
 
 Track = tuple[int, str, Array]
-"""A node's index, "rotation" or "translation", and quaternions (T, 4) or places (T, 3)."""
+"""A node's index, "rotation" or "translation", and quaternions (T, 4) or places (T, 3), T of 1 for what never moves."""
 
 
 def joint_tracks(motion: Motion, skeleton: Skeleton) -> Iterator[Track]:
@@ -138,14 +138,16 @@ def joint_tracks(motion: Motion, skeleton: Skeleton) -> Iterator[Track]:
 
 
 def animation(buffer: Buffer, name: str, motion: Motion, tracks: Iterable[Track]) -> dict[str, Any]:
-    """The animation of tracks at the motion's frames; its arrays go into the buffer."""
-    times = buffer.add_bounded(np.arange(len(motion)) / motion.fps)
+    """The animation of tracks from the motion's first frame on; its arrays go into the buffer."""
+    times = {len(motion): buffer.add_bounded(np.arange(len(motion)) / motion.fps)}
     samplers: list[dict[str, Any]] = []
     channels: list[dict[str, Any]] = []
     for node, path, track in tracks:
         channels.append({"sampler": len(samplers), "target": {"node": node, "path": path}})
         values = _continuous(track) if path == "rotation" else track
-        samplers.append({"input": times, "output": buffer.add(values), "interpolation": "LINEAR"})
+        if len(track) not in times:
+            times[len(track)] = buffer.add_bounded(np.arange(len(track)) / motion.fps)
+        samplers.append({"input": times[len(track)], "output": buffer.add(values), "interpolation": "LINEAR"})
     return {"name": name, "channels": channels, "samplers": samplers}
 
 

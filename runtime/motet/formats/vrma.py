@@ -1,19 +1,52 @@
 """VRM Animation (.vrma): a GLB whose nodes are the humanoid in a VRM T-pose, with the extension VRMC_vrm_animation 1.0.
 
 Every bone has its rotation, the hips alone their translation; players turn both to their avatar's rest pose and scale
-the path by the height of its hips.
+the path by the height of its hips. The fingers are those of a relaxed hand.
 """
 
+from collections.abc import Iterator
 from typing import Any
+
+import numpy as np
 
 from motet.errors import MotionError
 from motet.files import File, write_whole
-from motet.formats.glb import Buffer, animation, container, joint_nodes, joint_tracks
-from motet.motion.humanoid import BONES, HUMANOID
+from motet.formats.glb import Buffer, Track, animation, container, joint_nodes, joint_tracks
+from motet.motion.fingers import relaxed
+from motet.motion.humanoid import BONES, HUMANOID, LEFT_RIGHT, sided
 from motet.motion.motion import Motion
 from motet.motion.retarget import grounded, on_humanoid
+from motet.motion.rotations import rotmat_to_quat
+from motet.motion.skeleton import Joint, Skeleton
 
 EXTENSION = "VRMC_vrm_animation"
+
+THUMB, FINGER = ("Metacarpal", "Proximal", "Distal"), ("Proximal", "Intermediate", "Distal")
+"""What VRM calls the joints of the thumb, and of other fingers."""
+
+FINGERS = {
+    "Thumb": ((0.025, -0.01, 0.025), (0.035, -0.005, 0.02), (0.025, -0.005, 0.015)),
+    "Index": ((0.09, 0.0, 0.03), (0.04, 0.0, 0.0), (0.025, 0.0, 0.0)),
+    "Middle": ((0.09, 0.0, 0.01), (0.045, 0.0, 0.0), (0.03, 0.0, 0.0)),
+    "Ring": ((0.09, 0.0, -0.01), (0.04, 0.0, 0.0), (0.025, 0.0, 0.0)),
+    "Little": ((0.09, 0.0, -0.03), (0.03, 0.0, 0.0), (0.02, 0.0, 0.0)),
+}
+"""Finger -> offsets of its joints from the ones before, in metres, in the left hand; the right one mirrors it."""
+
+
+def _with_fingers() -> Skeleton:
+    joints = list(HUMANOID.joints)
+    for side, sign in zip(LEFT_RIGHT, (1.0, -1.0), strict=True):
+        for finger, offsets in FINGERS.items():
+            parent = HUMANOID.index(sided(side, "Hand"))
+            for part, (x, y, z) in zip(THUMB if finger == "Thumb" else FINGER, offsets, strict=True):
+                joints.append(Joint(sided(side, finger + part), parent, (sign * x, y, z)))
+                parent = len(joints) - 1
+    return Skeleton(tuple(joints), metres_per_unit=1.0)
+
+
+SKELETON = _with_fingers()
+"""The humanoid with the fingers of VRM's."""
 
 
 def write(file: File, motion: Motion) -> None:
@@ -31,12 +64,21 @@ def write(file: File, motion: Motion) -> None:
         "extensions": {EXTENSION: {"specVersion": "1.0", "humanoid": {"humanBones": _bones()}}},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
-        "nodes": joint_nodes(HUMANOID),
-        "animations": [animation(buffer, "motion", motion, joint_tracks(motion, HUMANOID))],
+        "nodes": joint_nodes(SKELETON),
+        "animations": [animation(buffer, "motion", motion, (*joint_tracks(motion, HUMANOID), *_fingers()))],
         **buffer.parts(),
     }
     write_whole(file, container(document, bytes(buffer.content)))
 
 
 def _bones() -> dict[str, dict[str, int]]:
-    return {bone: {"node": HUMANOID.index(bone)} for bone in BONES}
+    fingers = SKELETON.names[len(HUMANOID.names) :]
+    return {bone: {"node": SKELETON.index(bone)} for bone in (*BONES, *fingers)}
+
+
+def _fingers() -> Iterator[Track]:
+    """The tracks of a relaxed hand's fingers, each of one frame."""
+    still = np.broadcast_to(np.eye(3), (len(SKELETON.names), 3, 3))
+    turned = relaxed(SKELETON, still, SKELETON.places)
+    for joint in range(len(HUMANOID.names), len(SKELETON.names)):
+        yield joint, "rotation", rotmat_to_quat(turned[joint : joint + 1])

@@ -6,13 +6,12 @@ What is bent at rest already counts.
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import pairwise
 
 import numpy as np
 
 from motet.motion.humanoid import LEFT_RIGHT, sided
-from motet.motion.joint_map import JointMap
 from motet.motion.kinematics import chained
 from motet.motion.rest_pose import unit
 from motet.motion.rotations import Array, rotvec_to_rotmat
@@ -31,12 +30,15 @@ Chains = dict[str, list[int]]
 """A finger out of :data:`FINGERS` -> its joints, from the knuckle on."""
 
 
-def relaxed(skeleton: Skeleton, still: Array, joint_map: JointMap) -> Array:
-    """Local rotations (J, 3, 3) of a pose with its hands relaxed; those of hands without such fingers stay."""
+def relaxed(skeleton: Skeleton, still: Array, bones: Mapping[str, int]) -> Array:
+    """Local rotations (J, 3, 3) of a pose with its hands relaxed; those of hands without such fingers stay.
+
+    bones: of the humanoid's bones the joints; "leftHand" and "rightHand" count.
+    """
     turns, places = chained(skeleton, still[None].copy(), skeleton.offsets[None].copy())
     bent = still.copy()
     for side, sign in zip(LEFT_RIGHT, (-1.0, 1.0), strict=True):
-        hand = joint_map.joints.get(sided(side, "Hand"))
+        hand = bones.get(sided(side, "Hand"))
         chains = {} if hand is None else _chains(skeleton, hand)
         knuckles = {finger: places[0, joints[0]] for finger, joints in chains.items() if finger != "thumb"}
         if hand is None or "index" not in knuckles or len(knuckles) < 2:
@@ -46,10 +48,10 @@ def relaxed(skeleton: Skeleton, still: Array, joint_map: JointMap) -> Array:
         palm = unit(sign * np.cross(along, across))
         for finger, joints in chains.items():
             thumb = finger == "thumb"
-            bones = _bones(places[0], joints)
-            start = bones[0] if thumb else along
+            pointing = _bones(places[0], joints)
+            start = pointing[0] if thumb else along
             axis = np.cross(start, palm + across if thumb else palm)
-            for joint, turn in zip(joints, _bends([start, *bones], axis, FINGERS[finger]), strict=False):
+            for joint, turn in zip(joints, _bends([start, *pointing], axis, FINGERS[finger]), strict=False):
                 bent[joint] = bent[joint] @ rotvec_to_rotmat(turns[0, joint].T @ turn)
     return bent
 

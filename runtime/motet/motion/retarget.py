@@ -213,7 +213,7 @@ def from_humanoid(
     joint_map = joint_map or map_of(example)
     fitted = fit(skeleton_of(example), joint_map, *global_transforms(example))
     skeleton, still = _still(example, fitted)
-    still = relaxed(skeleton, still, joint_map)
+    still = relaxed(skeleton, still, joint_map.joints)
     if skeleton.metres_per_unit is None:
         skeleton = replace(skeleton, metres_per_unit=unit_of(skeleton, fitted.leg).metres)
     source, places = global_transforms(motion)
