@@ -115,6 +115,23 @@ def test_a_prediction_goes_on_on_the_files_own_skeleton(predictor: PredictModel,
     np.testing.assert_array_equal(whole.values[:-20], seed.values)
 
 
+@pytest.mark.parametrize("convention", ["mixamo", "bandai-namco", "lafan1"])
+def test_a_stream_measures_a_figure_once_and_predicts_as_without_it(
+    predictor: PredictModel, walk: Motion, convention: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    like = motet.read(SKELETONS / f"{convention}.bvh")
+    own = motet.from_humanoid(motet.to_humanoid(walk).motion, like)
+    session = predictor.stream(own[:200])
+    with caplog.at_level(logging.INFO, "motet"):
+        for end in (201, 202, 240):
+            session.push(own.values[end - 1 : end] if end < 240 else own.values[202:240])
+            found = session.predict(10)
+            kept = own[max(0, end - 45) : end]  # as much as the session keeps
+            np.testing.assert_allclose(found.values, predictor.predict(kept, frames=10).values, atol=1e-6)
+    said = [record for record in caplog.records if "brought to the humanoid" in record.getMessage()]
+    assert len(said) == 1 + 3  # the session's, and those without one
+
+
 def test_joints_that_no_model_knows_stay_as_they_are(predictor: PredictModel, mixamo: Motion) -> None:
     skeleton = mixamo.skeleton
     assert skeleton is not None

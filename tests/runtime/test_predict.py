@@ -181,7 +181,7 @@ def test_what_does_not_fit_is_refused() -> None:
     with pytest.raises(MotionError, match=r"hips\.tx"):
         model.predict(whole.select(whole.channels[3:]))
     with pytest.raises(MotionError, match=r"metres_per_unit"):
-        model.predict(replace(whole, skeleton=replace(walker(metres_per_unit=None).skeleton)))
+        model.predict(replace(whole, skeleton=walker(metres_per_unit=None, scale=0.3).skeleton))
     with pytest.raises(DecodingError, match="not 0"):
         model.predict(whole, frames=0)
     with pytest.raises(MotionError, match="finite"):

@@ -18,6 +18,7 @@ from motet.motion.foot_hold import hold_feet, windows
 from motet.motion.humanoid import HUMANOID
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
+from motet.motion.retarget import Figure
 from motet.motion.rotations import Array
 from motet.motion.springs import damped, damping_of
 from motet.representation.contract import MotionContract
@@ -200,18 +201,23 @@ def paced(frames: Array, pace: Pace, fps: float) -> Array:
     return found
 
 
-def carried_on(contract: MotionContract, frames: ArrayLike, own: Motion, figure: Motion) -> tuple[Motion, Motion]:
+def carried_on(
+    contract: MotionContract, frames: ArrayLike, own: Motion, figure: Motion, measured: Figure | None = None
+) -> tuple[Motion, Motion]:
     """Frames (T, D) that follow a motion as a motion, and that motion as it is to be put before them.
 
-    own: the motion at the contract's frame rate. figure: the same on the contract's figure.
+    own: the motion at the contract's frame rate. figure: the same on the contract's figure. measured: the motion's
+    figure, where it is known already.
     """
-    return brought_back(contract.motion(frames, after=figure, plant=False), own, figure)
+    return brought_back(contract.motion(frames, after=figure, plant=False), own, figure, measured)
 
 
-def brought_back(following: Motion, own: Motion, figure: Motion) -> tuple[Motion, Motion]:
+def brought_back(
+    following: Motion, own: Motion, figure: Motion, measured: Figure | None = None
+) -> tuple[Motion, Motion]:
     """What follows on the contract's figure, and the motion before it: both the motion's own, or where that is not
     possible on that figure. Arguments as :func:`carried_on`."""
-    if not _same_joints(own, figure) and (back := carried_back(following, figure, own)) is not None:
+    if not _same_joints(own, figure) and (back := carried_back(following, figure, own, measured)) is not None:
         return back, own
     return following, figure
 

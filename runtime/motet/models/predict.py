@@ -19,6 +19,7 @@ from motet.models.generate import GenerateModel
 from motet.models.progress import Progress, silent
 from motet.models.seeds import seeds_of
 from motet.motion.motion import Motion
+from motet.motion.retarget import Figure
 from motet.motion.rotations import Array
 
 MAX_FRAMES, MAX_GOLDEN = 100_000, 1000
@@ -169,10 +170,15 @@ class PredictModel(BundleModel):
         found = futures(beyond, whole, count, seeds, progress)
         return [together(before, following) if append else following for following, before in found]
 
-    def _seed(self, motion: Motion) -> tuple[Motion, Motion, Array]:
+    def following(self, motion: Motion, frames: int | None, measured: Figure | None) -> Motion:
+        """As :meth:`predict`, of a figure that the contract has measured already."""
+        whole, figure, last = self._seed(motion, measured)
+        return carried_on(self.contract, self.next_frames([last], frames)[0], whole, figure, measured)[0]
+
+    def _seed(self, motion: Motion, measured: Figure | None = None) -> tuple[Motion, Motion, Array]:
         """The motion at the model's frame rate, the same on the model's figure, and its last frames (L, C)."""
         whole = motion if motion.fps == self.fps else motion.continuous().resample(self.fps, to_end=True)
-        figure = self.contract.on_figure(whole)
+        figure = self.contract.on_figure(whole, measured)
         frames = self.contract.frames(figure[max(0, len(whole) - self.seed_frames - 1) :])
         if len(frames) < self.seed_frames:
             limit = f"the model needs {self.seed_frames} frames at {self.fps:g} fps"
@@ -244,12 +250,17 @@ def checked(frames: int) -> int:
 
 
 class PredictSession:
-    """A growing motion: push new frames, predict the next. Keeps only the frames that the model uses."""
+    """A growing motion: push new frames, predict the next. Keeps only the frames that the model uses.
+
+    Another figure than the model's is measured once, at the first prediction, by the frames so far.
+    """
 
     def __init__(self, model: PredictModel, start: Motion) -> None:
         self.model = model
         self._kept = math.ceil((model.seed_frames + 1) * start.fps / model.fps) + 1
         self._motion = start[-self._kept :]
+        self._measured: Figure | None = None
+        self._known = False
 
     def push(self, frames: ArrayLike) -> None:
         """The next frame (D,), or several (T, D); MotionError where they do not fit, and then nothing has changed."""
@@ -264,4 +275,6 @@ class PredictSession:
 
     def predict(self, frames: int | None = None) -> Motion:
         """As :meth:`PredictModel.predict`, after all that was pushed so far."""
-        return self.model.predict(self._motion, frames=frames)
+        if not self._known:
+            self._measured, self._known = self.model.contract.measured(self._motion), True
+        return self.model.following(self._motion, frames, self._measured)

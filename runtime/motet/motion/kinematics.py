@@ -35,10 +35,7 @@ def local_rotations(motion: Motion, joints: Sequence[int] | None = None) -> Arra
     for order, alike in _by_order((place, joint) for place, joint in named if joint.name in columns).items():
         places = [place for place, _ in alike]
         turns = euler_to_rotmat(_angles(motion, [(joint, columns[joint.name]) for _, joint in alike]), order)
-        rotations[:, places] = turns
-        for place, joint in alike:
-            if any(joint.axis):
-                rotations[:, place] = product(product(joint.frame, rotations[:, place]), inverse(joint.frame))
+        rotations[:, places] = _about_axes(turns, [joint for _, joint in alike])
     return rotations
 
 
@@ -54,10 +51,10 @@ def _angles(motion: Motion, joints: Sequence[tuple[Joint, Sequence[int]]]) -> Ar
     """Angles (T, J, 3) in radians, each joint's in its order, from the columns of each; 0 where there is no channel."""
     angles = frames_last((len(motion), len(joints), 3))
     angles[:] = 0.0
-    for place, (joint, columns) in enumerate(joints):
-        for column in columns:
-            axis = joint.order.index(motion.channels[column][-1])
-            angles[:, place, axis] = motion.values[:, column] * (2 * np.pi / TURN[motion.units[column]])
+    found = [(place, joint, column) for place, (joint, columns) in enumerate(joints) for column in columns]
+    places, _, taken = (list(part) for part in zip(*found, strict=True))
+    axes = [joint.order.index(motion.channels[column][-1]) for _, joint, column in found]
+    angles[:, places, axes] = motion.values[:, taken] * [2 * np.pi / TURN[motion.units[column]] for column in taken]
     return angles
 
 
@@ -99,19 +96,34 @@ def euler_of(rotations: Array, joint: Joint) -> Array:
 
     The angles do not leap from frame to frame; the first frame's middle angle is within a quarter turn.
     """
-    found: Array = _eulers_of([(rotations, joint)], joint.order)[:, 0]
-    return found
+    return eulers_of(rotations[:, None], [joint])[:, 0]
 
 
-def _eulers_of(joints: Sequence[tuple[Array, Joint]], order: str) -> Array:
-    """As :func:`euler_of` for joints of one order of angles, each with its rotations: (T, J, 3)."""
-    plain = frames_last((len(joints[0][0]), len(joints), 3, 3))
-    for place, (rotations, joint) in enumerate(joints):
-        turned = any(joint.axis)
-        plain[:, place] = product(product(inverse(joint.frame), rotations), joint.frame) if turned else rotations
-    angles = rotmats_to_euler(plain, order)
-    found: Array = angles[..., [order.index(axis) for axis in AXES]]
-    return found
+def eulers_of(rotations: Array, joints: Sequence[Joint]) -> Array:
+    """As :func:`euler_of` for several joints with their local rotations (T, J, 3, 3): (T, J, 3)."""
+    angles = frames_last(rotations.shape[:-1])
+    for order, alike in _by_order(enumerate(joints)).items():
+        places = [place for place, _ in alike]
+        plain = _about_axes(rotations[:, places], [joint for _, joint in alike], back=True)
+        angles[:, places] = rotmats_to_euler(plain, order)[..., [order.index(axis) for axis in AXES]]
+    return angles
+
+
+def _about_axes(turns: Array, joints: Sequence[Joint], back: bool = False) -> Array:
+    """C M C^T (T, J, 3, 3) of each joint's turns M, or M of these."""
+    own = [place for place, joint in enumerate(joints) if any(joint.axis)]
+    if own:
+        frames = np.array([joints[place].frame.T if back else joints[place].frame for place in own])
+        turns[:, own] = product(product(frames, turns[:, own]), inverse(frames))
+    return turns
+
+
+def side_by_side(rotations: Sequence[Array], frames: int) -> Array:
+    """Rotations (T, J, 3, 3) of joints from those of each (T, 3, 3)."""
+    stacked = frames_last((frames, len(rotations), 3, 3))
+    for i, of_one in enumerate(rotations):
+        stacked[:, i] = of_one
+    return stacked
 
 
 def with_channels(motion: Motion, names: tuple[str, ...], values: Array, units: tuple[str, ...]) -> Motion:
@@ -144,13 +156,13 @@ def posed(motion: Motion, rotations: Mapping[str, Array], translations: Mapping[
     :func:`continued` takes them."""
     skeleton, values = skeleton_of(motion), np.array(motion.values)
     columns = motion.rotation_columns()
-    turned = ((name, skeleton.joints[skeleton.index(name)]) for name in columns if name in rotations)
-    for order, alike in _by_order(turned).items():
-        angles = _eulers_of([(rotations[name], joint) for name, joint in alike], order)
-        for place, (name, _) in enumerate(alike):
-            for column in columns[name]:
-                axis = AXES.index(motion.channels[column][-1])
-                values[:, column] = angles[:, place, axis] * TURN[motion.units[column]] / (2 * np.pi)
+    turned = [name for name in columns if name in rotations]
+    joints = [skeleton.joints[skeleton.index(name)] for name in turned]
+    angles = eulers_of(side_by_side([rotations[name] for name in turned], len(motion)), joints)
+    places = [place for place, name in enumerate(turned) for _ in columns[name]]
+    taken = [column for name in turned for column in columns[name]]
+    axes = [AXES.index(motion.channels[column][-1]) for column in taken]
+    values[:, taken] = angles[:, places, axes] * [TURN[motion.units[column]] for column in taken] / (2 * np.pi)
     for column, channel in enumerate(motion.channels):
         name, _, kind = channel.rpartition(".")
         if name in translations and kind in ("tx", "ty", "tz"):

@@ -8,6 +8,7 @@ lacks stays at rest. Paths are scaled by the lengths of the legs and laid so tha
 import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, NECK, PARENTS, SPINE, le
 from motet.motion.joint_map import BY_THE_TREE, JointMap
 from motet.motion.joint_names import HalfKnownError, map_by_names
 from motet.motion.joint_tree import map_by_tree
-from motet.motion.kinematics import global_transforms, local_rotations, local_translations, skeleton_of
+from motet.motion.kinematics import global_transforms, local_rotations, local_translations, side_by_side, skeleton_of
 from motet.motion.mmm_figure import is_mmm, with_figure
 from motet.motion.motion import Motion
 from motet.motion.products import inverse, product, rotated
@@ -42,6 +43,37 @@ NEAR = 0.1
 HIPS = [HUMANOID.index(sided(side, "UpperLeg")) for side in LEFT_RIGHT]
 
 
+@dataclass(frozen=True, eq=False)
+class Figure:
+    """A skeleton measured against the humanoid once, by :func:`to_humanoid`, for any number of its motions.
+
+    first: one frame of it. turn: (3, 3) stands the world of its files upright.
+    """
+
+    fitted: Fitted
+    first: Motion
+    turn: Array
+
+    def brought(self, motion: Motion) -> Motion:
+        """Another motion of the skeleton on the humanoid."""
+        return self.stood(*global_transforms(motion), motion.fps)
+
+    def stood(self, rotations: Array, places: Array, fps: float) -> Motion:
+        """The humanoid's motion, from rotations (T, J, 3, 3) and positions (T, J, 3) of the skeleton's joints."""
+        turned = product(self.turn, _humanoid_rotations(rotations, places, self.fitted))
+        legs = middle(places, self.fitted.joint_map, "UpperLeg") @ self.turn.T * (leg_length() / self.fitted.leg)
+        return _on_humanoid(turned, legs, fps)
+
+    @cached_property
+    def posture(self) -> tuple[Skeleton, Array]:
+        """The skeleton with its unit, where that is known, and local rotations (J, 3, 3) of joints that are no bones:
+        at rest, or as in the first frame, but for fingers, which bend as in a relaxed hand."""
+        skeleton, still = _still(self.first, self.fitted)
+        if skeleton.metres_per_unit is None:
+            skeleton = replace(skeleton, metres_per_unit=unit_of(skeleton, self.fitted.leg).metres)
+        return skeleton, relaxed(skeleton, still, self.fitted.joint_map.joints)
+
+
 @dataclass(frozen=True)
 class Humanoid:
     """A motion brought to the humanoid, and what was found on the way.
@@ -54,6 +86,7 @@ class Humanoid:
     leg: metres of the figure's thigh and shin together, None where its unit is not known.
     height: about how tall the figure stands, in metres, None where its unit is not known.
     notes: sentences about what was assumed.
+    figure: the skeleton as it was measured.
     """
 
     motion: Motion
@@ -64,6 +97,7 @@ class Humanoid:
     leg: float | None
     height: float | None
     notes: tuple[str, ...]
+    figure: Figure
 
     @property
     def summary(self) -> str:
@@ -104,13 +138,12 @@ def to_humanoid(motion: Motion, joint_map: JointMap | None = None) -> Humanoid:
     fitted = fit(skeleton, joint_map, rotations, places)
     check_frames(places, joint_map, fitted.aims, _hinges(rotations, fitted))
     unit, up = unit_of(skeleton, fitted.leg), upright(fitted, places)
-    turned = product(up.turn, _humanoid_rotations(rotations, places, fitted))
-    legs = middle(places, joint_map, "UpperLeg") @ up.turn.T * (leg_length() / fitted.leg)
+    figure = Figure(fitted, motion[:1], up.turn)
     notes = [note for note in (*fitted.notes, unit.note, up.note) if note]
     if joint_map.joints["hips"]:
         notes.append(f"the joint {skeleton.names[0]!r} above the hips is folded in")
     return Humanoid(
-        _on_humanoid(turned, legs, motion.fps),
+        figure.stood(rotations, places, motion.fps),
         joint_map.names(skeleton),
         joint_map.convention,
         round(joint_map.confidence * fitted.confidence, 2),
@@ -118,17 +151,20 @@ def to_humanoid(motion: Motion, joint_map: JointMap | None = None) -> Humanoid:
         None if unit.metres is None else fitted.leg * unit.metres,
         None if unit.metres is None else height_of(skeleton, joint_map, fitted.leg) * unit.metres,
         tuple(notes),
+        figure,
     )
 
 
 def on_humanoid(motion: Motion) -> Motion:
     """The motion of :func:`to_humanoid`, or the motion itself if it is the humanoid's; what is found is logged."""
-    if motion.skeleton == HUMANOID:
-        return motion
-    found = to_humanoid(motion)
+    return motion if motion.skeleton == HUMANOID else logged(to_humanoid(motion)).motion
+
+
+def logged(found: Humanoid) -> Humanoid:
+    """What was found, which is logged."""
     level = logging.INFO if found.confidence >= SURE else logging.WARNING
     log.log(level, "brought to the humanoid: %s", found.summary)
-    return found.motion
+    return found
 
 
 def grounded(motion: Motion) -> Motion:
@@ -151,32 +187,23 @@ def _hinges(rotations: Array, fitted: Fitted) -> dict[str, Array]:
 def _humanoid_rotations(rotations: Array, places: Array, fitted: Fitted) -> Array:
     """Rotations in the world (T, J, 3, 3) of the humanoid's joints, from those (T, J, 3, 3) and the positions
     (T, J, 3) of the figure's."""
-    joint_map, aligned = fitted.joint_map, fitted.aligned
-    turned = {bone: product(rotations[:, i], aligned[i]) for bone, i in joint_map.joints.items()}
+    joint_map, own = fitted.joint_map, product(rotations, fitted.aligned)
+    turned = {bone: own[:, joint] for bone, joint in joint_map.joints.items()}
     if not fitted.pelvis:
         to_legs = swing(turned["hips"][:, :, 0], to_left(places, joint_map, "UpperLeg"))
         turned["hips"] = product(to_legs, turned["hips"])
-    chains = (joint_map.spine, joint_map.neck)
-    spine, neck = ([product(rotations[:, i], aligned[i]) for i in chain] for chain in chains)
+    spine, neck = ([own[:, joint] for joint in chain] for chain in (joint_map.spine, joint_map.neck))
     neck += [turned["head"]] if "head" in turned else []
     turned |= _shared_out([turned["hips"], *spine], SPINE)
     turned |= _shared_out([spine[-1], *neck], NECK) if neck else {}
     for bone, parent in PARENTS.items():
         turned.setdefault(bone, turned[parent])
-    return _side_by_side([turned[name.removesuffix(END_SUFFIX)] for name in HUMANOID.names])
+    return side_by_side([turned[name.removesuffix(END_SUFFIX)] for name in HUMANOID.names], len(rotations))
 
 
 def _shared_out(chain: list[Array], names: tuple[str, ...]) -> dict[str, Array]:
-    shared = spread(_side_by_side(chain), len(names))
+    shared = spread(side_by_side(chain, len(chain[0])), len(names))
     return {name: shared[:, i] for i, name in enumerate(names)}
-
-
-def _side_by_side(rotations: list[Array]) -> Array:
-    """Rotations (T, J, 3, 3) of joints from those of each (T, 3, 3)."""
-    stacked = frames_last((len(rotations[0]), len(rotations), 3, 3))
-    for i, of_one in enumerate(rotations):
-        stacked[:, i] = of_one
-    return stacked
 
 
 def _on_humanoid(turned: Array, legs: Array, fps: float) -> Motion:
@@ -189,7 +216,7 @@ def _on_humanoid(turned: Array, legs: Array, fps: float) -> Motion:
 
 def from_humanoid(
     motion: Motion,
-    like: Motion | Skeleton,
+    like: Motion | Skeleton | Figure,
     joint_map: JointMap | None = None,
     *,
     skin: Mapping[int, Array] | None = None,
@@ -198,7 +225,7 @@ def from_humanoid(
     """Put a motion of the humanoid onto another human skeleton, with its names, rest pose and proportions.
 
     like: the skeleton; where its rest pose is not a standing body, a motion of it, whose frames then tell how its
-        joints stand.
+        joints stand; or it as it was measured already (:attr:`Humanoid.figure`).
     joint_map: as for :func:`to_humanoid`. Joints that are no bones keep their rest, but fingers bend as in a relaxed
     hand. The path is scaled by the ratio of the legs' lengths and the feet stay on the ground. Returns the translation
     of the hips in "length" and three angles in "deg" for each joint; the skeleton knows its unit where it did, of
@@ -207,23 +234,33 @@ def from_humanoid(
         soles that stand on the ground. ahead: the motion's z becomes the way that the figure faces at rest.
     MotionError for a motion that is not the humanoid's, or a skeleton that is no human's.
     """
+    figure = like if isinstance(like, Figure) else figure_like(like, joint_map)
+    turned, moved = poses_on(figure, motion, skin, ahead)
+    return motion_of(figure.posture[0], turned, moved, motion.fps)
+
+
+def poses_on(
+    figure: Figure, motion: Motion, skin: Mapping[int, Array] | None = None, ahead: bool = False
+) -> tuple[Array, dict[int, Array]]:
+    """What :func:`from_humanoid` makes a motion of: rotations (T, J, 3, 3) of a figure's joints in the world, and
+    translations (T, 3) in its parent's frame of the one that carries it."""
     if motion.skeleton != HUMANOID:
         raise MotionError("this motion is not on the humanoid: bring it there by to_humanoid first")
-    example = like if isinstance(like, Motion) else Motion(np.zeros((1, 0)), (), (), motion.fps, like)
-    joint_map = joint_map or map_of(example)
-    fitted = fit(skeleton_of(example), joint_map, *global_transforms(example))
-    skeleton, still = _still(example, fitted)
-    still = relaxed(skeleton, still, joint_map.joints)
-    if skeleton.metres_per_unit is None:
-        skeleton = replace(skeleton, metres_per_unit=unit_of(skeleton, fitted.leg).metres)
+    fitted, (skeleton, still) = figure.fitted, figure.posture
     source, places = global_transforms(motion)
     if ahead:
         front = _front(fitted)
         source, places = product(front, source), rotated(front, places)
     turned = _figure_rotations(source, fitted, skeleton, still)
-    carrier = joint_map.carrier(skeleton)
-    moved = _moved(fitted, skeleton, (source, places), turned, skin or {})
-    return motion_of(skeleton, turned, {carrier: moved}, motion.fps)
+    carrier = fitted.joint_map.carrier(skeleton)
+    return turned, {carrier: _moved(fitted, skeleton, (source, places), turned, skin or {})}
+
+
+def figure_like(like: Motion | Skeleton, joint_map: JointMap | None = None) -> Figure:
+    """A figure to put motions onto, as :func:`from_humanoid` takes it, measured for several of them."""
+    example = like if isinstance(like, Motion) else Motion(np.zeros((1, 0)), (), (), 1.0, like)
+    fitted = fit(skeleton_of(example), joint_map or map_of(example), *global_transforms(example))
+    return Figure(fitted, example[:1], np.eye(3))
 
 
 def _moved(
@@ -292,17 +329,17 @@ def _figure_rotations(source: Array, fitted: Fitted, skeleton: Skeleton, still: 
     # a joint between forearm and hand, as CMU's wrists, takes the hand's twist
     hands = {joint_map.joints.get(sided(side, "Hand")) for side in LEFT_RIGHT} - {None}
     turned = frames_last((len(source), len(skeleton.joints), 3, 3))
+    bones = list(wanted)
+    turned[:, bones] = product(side_by_side(list(wanted.values()), len(source)), inverse(fitted.aligned[bones]))
     for i, joint in enumerate(skeleton.joints):
-        if i in wanted:
-            turned[:, i] = product(wanted[i], fitted.aligned[i].T)
-        else:
+        if i not in wanted:
             turned[:, i] = product(turned[:, joint.parent], still[i]) if i else still[0]
             hand = next((k for k in skeleton.children[i] if k in hands), None)
             if hand is not None:
-                to_hand = product(inverse(turned[:, i]), product(wanted[hand], fitted.aligned[hand].T))
+                to_hand = product(inverse(turned[:, i]), turned[:, hand])
                 turned[:, i] = product(turned[:, i], twist(to_hand, skeleton.offsets[hand]))
     return turned
 
 
 def _chain(chain: list[Array], count: int) -> list[Array]:
-    return list(np.moveaxis(spread(_side_by_side(chain), count), 1, 0)) if count else []
+    return list(np.moveaxis(spread(side_by_side(chain, len(chain[0])), count), 1, 0)) if count else []

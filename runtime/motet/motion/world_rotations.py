@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from motet.motion.kinematics import AXES, euler_of
+from motet.motion.kinematics import AXES, eulers_of
 from motet.motion.motion import Motion
 from motet.motion.products import inverse, product, rotated
 from motet.motion.rotations import Array, frames_last
@@ -19,18 +19,26 @@ def places_of(skeleton: Skeleton, turned: Array) -> Array:
     return places
 
 
+def local_of(skeleton: Skeleton, turned: Array) -> Array:
+    """Rotations (T, J, 3, 3) of joints in their parents' frames, from those in the world."""
+    local = turned.copy(order="K")
+    local[:, 1:] = product(inverse(turned[:, skeleton.parents[1:]]), turned[:, 1:])
+    return local
+
+
 def motion_of(skeleton: Skeleton, turned: Array, moved: dict[int, Array], fps: float) -> Motion:
     """The motion of rotations in the world (T, J, 3, 3) and of translations (T, 3) of some joints in their parents'
     frames: all in "deg" and "length", with angles that do not leap."""
+    kept = [i for i, j in enumerate(skeleton.joints) if skeleton.children[i] or not j.name.endswith(END_SUFFIX)]
+    angles = np.degrees(eulers_of(local_of(skeleton, turned)[:, kept], [skeleton.joints[i] for i in kept]))
     names: list[str] = []
     values: list[Array] = []
     for i, joint in enumerate(skeleton.joints):
         if i in moved:
             names += [f"{joint.name}.t{axis}" for axis in AXES]
             values.append(moved[i])
-        if skeleton.children[i] or not joint.name.endswith(END_SUFFIX):
-            local = product(inverse(turned[:, joint.parent]), turned[:, i]) if i else turned[:, i]
+        if i in kept:
             names += [f"{joint.name}.r{axis}" for axis in AXES]
-            values.append(np.degrees(euler_of(local, joint)))
+            values.append(angles[:, kept.index(i)])
     units = tuple("deg" if name[-2] == "r" else "length" for name in names)
     return Motion(np.concatenate(values, axis=1), tuple(names), units, fps, skeleton)

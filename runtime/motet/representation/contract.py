@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from motet.errors import MotionError
 from motet.motion.motion import Motion
+from motet.motion.retarget import Figure, logged, to_humanoid
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
 from motet.representation import named
@@ -79,15 +80,16 @@ class MotionContract:
         """
         return next(sequences(self.representation, self.on_figure(motion), self.fps, self._like)).values
 
-    def on_figure(self, motion: Motion) -> Motion:
+    def on_figure(self, motion: Motion, measured: Figure | None = None) -> Motion:
         """A motion of any human figure on the contract's skeleton; as it is where it has the joints or channels, with
         the length unit that its skeleton tells where the file does not.
 
         One that is brought there comes at the contract's frame rate where its own is higher, beginning with its first
         frame; joints of which the humanoid says nothing, such as thumbs, stand as they do on average. MotionError, with
         the reason, where that cannot be done.
+        measured: its figure as :meth:`measured` finds it, where more than one motion of it is brought.
         """
-        if self.skeleton is None or set(self.channels) <= set(motion.channels):
+        if self.skeleton is None or self._is_features(motion):
             return motion
         reason = foreign(motion, self.skeleton, self._joints)
         if reason is None:
@@ -95,7 +97,22 @@ class MotionContract:
         if named(self.representation).required and not any(channel.endswith(".tx") for channel in motion.channels):
             raise MotionError("this motion lacks the root's tx, ty and tz: it does not say where the figure goes")
         slower = motion.continuous().resample(self.fps) if motion.fps > self.fps else motion
-        return brought(slower, self.motion(self.mean[None], plant=False), reason)
+        return brought(slower, self._average, reason, measured)
+
+    def measured(self, motion: Motion) -> Figure | None:
+        """The figure of a motion that :meth:`on_figure` brings to the humanoid, measured for more of it; None of one
+        that is taken as it is. MotionError as there."""
+        if self.skeleton is None or self._is_features(motion) or not foreign(motion, self.skeleton, self._joints):
+            return None
+        return logged(to_humanoid(motion)).figure
+
+    def _is_features(self, motion: Motion) -> bool:
+        return set(self.channels) <= set(motion.channels)
+
+    @cached_property
+    def _average(self) -> Motion:
+        """One frame: the pose of the mean."""
+        return self.motion(self.mean[None], plant=False)
 
     @cached_property
     def _joints(self) -> tuple[str, ...]:

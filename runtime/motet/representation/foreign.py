@@ -22,9 +22,10 @@ from motet.motion.mmm_figure import is_mmm
 from motet.motion.motion import Motion
 from motet.motion.products import inverse, product
 from motet.motion.rest_pose import aims_of
-from motet.motion.retarget import from_humanoid, map_of, on_humanoid, to_humanoid
+from motet.motion.retarget import Figure, figure_like, from_humanoid, map_of, on_humanoid, poses_on
 from motet.motion.rotations import Array, rotmat_to_rotvec, rotvec_to_rotmat
 from motet.motion.skeleton import Skeleton
+from motet.motion.world_rotations import local_of
 from motet.representation.figure import other_bones
 
 log = logging.getLogger(__name__)
@@ -75,15 +76,16 @@ def _same_bones(own: Skeleton, figure: Skeleton) -> bool:
     return bool(shared) and float(np.abs(apart).max()) < ROUNDED * figure.height
 
 
-def brought(motion: Motion, pose: Motion, reason: str) -> Motion:
+def brought(motion: Motion, pose: Motion, reason: str, measured: Figure | None = None) -> Motion:
     """A motion of another human figure on the figure of a pose.
 
     pose: one frame; joints of which the humanoid says nothing, such as thumbs, stand as in it.
     reason: why the motion is not taken as it is, for the MotionError where one of the figures is no human's.
+    measured: the motion's figure, where it is known already.
     """
     skeleton = skeleton_of(pose)
     try:
-        found = on_humanoid(motion)
+        found = measured.brought(motion) if measured else on_humanoid(motion)
         if skeleton == HUMANOID:
             return found
         found = from_humanoid(found, skeleton)
@@ -100,29 +102,32 @@ def brought(motion: Motion, pose: Motion, reason: str) -> Motion:
     return found
 
 
-def carried_back(following: Motion, figure: Motion, own: Motion) -> Motion | None:
+def carried_back(following: Motion, figure: Motion, own: Motion, measured: Figure | None = None) -> Motion | None:
     """What follows a motion that was brought onto a model's figure, on the motion's own skeleton and in its channels.
 
     following: on the model's figure, from the end of ``figure`` on; figure: ``own``, brought there; all at one frame
-    rate. It begins where ``own`` ends: each joint keeps the turn by which it differs there from what comes back, and
-    joints of which the humanoid says nothing stay as they are. None, which is logged, where the file has no skeleton or
-    no channels for the path, or the figure's own world is another than the model's.
+    rate. measured: the figure of ``own``, where it is known already. What comes back begins where ``own`` ends: each
+    joint keeps the turn by which it differs there, and joints of which the humanoid says nothing stay as they are.
+    None, which is logged, where the file has no skeleton or no channels for the path, or the figure's own world is
+    another than the model's.
     """
     if own.skeleton is None:
         log.info("the prediction stays on the model's figure: the file has no skeleton")
         return None
     last, skeleton = own[-1:], own.skeleton
     both = np.concatenate([figure.values[-1:], following.select(figure.channels, figure.units).values])
-    back = from_humanoid(to_humanoid(replace(figure, values=both)).motion, own)
-    turned, then = local_rotations(back), local_rotations(last)[0]
-    turns = np.swapaxes(turned[0], -1, -2) @ then
-    carrier = next(name.rpartition(".")[0] for name in back.channels if name.endswith(".tx"))
+    world, moved = poses_on(measured or figure_like(own), on_humanoid(replace(figure, values=both)))
+    turned, then = local_of(skeleton, world), local_rotations(last)[0]
+    turns = product(inverse(turned[0]), then)
+    ((joint, path),) = moved.items()
+    carrier = skeleton.names[joint]
     if not _clean(turns, skeleton, carrier) or not {f"{carrier}.t{axis}" for axis in "xyz"} <= set(own.channels):
         log.info("the prediction stays on the model's figure: the file's own turns or moves its hips in another way")
         return None
-    moved, places = local_translations(back), local_translations(last)[0]
-    rotations = {name: turned[1:, i] @ turns[i] for i, name in enumerate(skeleton.names)}
-    return continued(last, rotations, {n: places[i] + moved[1:, i] - moved[0, i] for i, n in enumerate(skeleton.names)})
+    places, rotations = local_translations(last)[0], product(turned[1:], turns)
+    paths = {name: np.repeat(places[i : i + 1], len(following), axis=0) for i, name in enumerate(skeleton.names)}
+    paths[carrier] = places[joint] + path[1:] - path[0]
+    return continued(last, {name: rotations[:, i] for i, name in enumerate(skeleton.names)}, paths)
 
 
 def carried_between(found: Motion, own: Motion, ends: Motion) -> Motion | None:
