@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import check_refused, run
+from small_character import character
 from test_retarget import SKELETONS
 
 import motet
@@ -84,6 +85,62 @@ def test_results_are_put_onto_a_character(tmp_path: Path, clips: Path) -> None:
     other = tmp_path / "other.html"
     assert run("control", "walk .5s", "-o", other).exit_code == 0
     assert page.read_text() != other.read_text()
+
+
+def test_generate_writes_a_character_with_a_clip_for_each_sentence(tmp_path: Path) -> None:
+    avatar, out = character(tmp_path / "avatar.glb", [{"scale": [0.01] * 3}]), tmp_path / "out.glb"
+    texts = ("a person walks", "a person jumps", "a person jumps")
+    result = run("generate", *texts, "--max-seconds", 2, "--onto", avatar, "-o", out)
+    assert result.exit_code == 0
+    assert result.stdout.count("out.glb: ") == 3
+    assert motet.clips(out) == ("a person walks", "a person jumps", "a person jumps_2", "old")
+    found = motet.load("generate").generate(texts, seed=[0, 1, 2], max_seconds=2)
+    names = motet.clips(out)[:3]
+    motions = {name: best.motion for name, (best, *_) in zip(names, found, strict=True)}
+    motet.write(tmp_path / "library.glb", motions, onto=avatar)
+    assert (tmp_path / "library.glb").read_bytes() == out.read_bytes()
+    assert (
+        run("generate", *texts[:2], "--max-seconds", 2, "--onto", avatar, "-o", tmp_path / "{name}.glb").exit_code == 0
+    )
+    assert [motet.clips(tmp_path / f"{n}.glb")[0] for n in (1, 2)] == list(texts[:2])
+
+
+def test_convert_writes_a_character_with_a_clip_for_each_file(tmp_path: Path) -> None:
+    avatar, out = character(tmp_path / "avatar.glb"), tmp_path / "out.glb"
+    sources = (SKELETONS / "rokoko.bvh", f"{avatar}#old", SKELETONS / "unreal.bvh", tmp_path / "none.bvh")
+    result = run("convert", *sources, "--unit", "cm", "--mirror", "--onto", avatar, "-o", out)
+    assert result.exit_code == 1
+    assert "none.bvh: no such file" in result.stderr
+    assert motet.clips(out) == ("rokoko", "old", "unreal")
+    assert run("convert", SKELETONS / "rokoko.bvh", "--onto", avatar, "-o", tmp_path / "{name}.glb").exit_code == 0
+    assert motet.clips(tmp_path / "rokoko.glb") == ("rokoko", "old")
+
+
+def test_every_command_writes_a_character(tmp_path: Path, clips: Path) -> None:
+    avatar, source = character(tmp_path / "avatar.glb"), clips / "39_14.amc"
+    for name, command in {
+        "39_14": ("predict", source, "--frames", 5),
+        "39_14 ": ("fill", source, "--gap", "1:1.5"),
+        "39_14 39_14": ("join", source, source),
+        "walk .5s": ("control", "walk .5s"),
+    }.items():
+        out = tmp_path / f"{command[0]}.glb"
+        assert run(*command, "-o", out, "--onto", avatar).exit_code == 0
+        assert motet.clips(out) == (name.strip(), "old")
+
+
+def test_what_cannot_be_written_onto_is_said_before_work(tmp_path: Path) -> None:
+    avatar, out = character(tmp_path / "avatar.glb"), tmp_path / "out"
+    out.mkdir()
+    for options, said in (
+        (("--onto", avatar, "-o", out / "a.bvh"), "cannot write files of type '.bvh'; expected one of .glb .vrm"),
+        (("--onto", "mixamo", "-o", out / "a.glb"), "--onto takes a character with its mesh (.glb .vrm)"),
+        (("--onto", avatar, "--like", avatar, "-o", out / "a.glb"), "give one of the two"),
+        (("--onto", tmp_path / "none.glb", "-o", out / "a.glb"), "none.glb: no such file"),
+        (("--onto", avatar, "-o", out / "a.vrm"), "avatar.glb: it is no VRM avatar: write it to a .glb"),
+        (("--onto", avatar, "-o", avatar), "avatar.glb is read, so it is not written over: name another file"),
+    ):
+        check_refused(run("control", "walk .5s", *options), said, out)
 
 
 def test_generate_writes_vrm_animation(tmp_path: Path) -> None:

@@ -10,7 +10,6 @@ from motet.cli.notes import noted
 from motet.cli.options import session_options
 from motet.cli.reading import Read, naming, out_option, read_options
 from motet.cli.writing import Output, size, write_options
-from motet.formats import check_writable, write_motion
 from motet.formats.html import write as write_html
 from motet.models.controllable import Controllable
 from motet.models.load import load_as
@@ -61,7 +60,7 @@ def control(
     1.4"), a way ("backwards", "left", "right") and a turn in degrees ("turn left 90").
     With --bundle cmu-control: a label and seconds; a ramp "walk>run 5s"; a mix "walk*.3+run*.7 2s".
     """
-    check_writable(out)
+    output.check(out)
     model = load_as(Controllable, bundle, session)
     captions = model.captions(script)
     with naming(start), noted():
@@ -71,5 +70,6 @@ def control(
     if out.suffix.lower() == ".html":
         write_html(out, motion, captions=captions, title=script)
     else:
-        write_motion(out, motion)
+        output.save(out, motion, script)
+        output.finish()
     click.echo(f"{out}: {size(len(motion), motion.fps)}")

@@ -65,7 +65,7 @@ def convert(
             raise click.UsageError("give IN and OUT, or several files and -o OUT")
         *files, out = files
     sources, tries = read.sources(files), Tries()
-    for source, place in zip(sources, places(out, sources), strict=True):
+    for source, place in zip(sources, places(out, sources, output=output), strict=True):
         with tries.of(source):
             motion = _cut(read(source), start, stop)
             if humanoid or map_file or hold_feet:
@@ -74,8 +74,9 @@ def convert(
             motion = output.shaped(motion)
             motion = motion.scaled(METRES[unit]) if unit else motion
             motion = looped(motion) if loop else motion
-            write_motion(place, mirrored(motion) if mirror else motion)
+            output.save(place, mirrored(motion) if mirror else motion, source.title)
             click.echo(f"{place}: {size(len(motion), motion.fps)}")
+    output.finish()
     tries.finish()
 
 

@@ -7,8 +7,8 @@ import click
 
 from motet.bundle.session import SessionOptions
 from motet.cli.options import session_options
-from motet.cli.reading import Read, Tries, naming, out_option, places, read_options, spare
-from motet.cli.writing import Output, size, write_options
+from motet.cli.reading import Read, Tries, naming, out_option, places, read_options
+from motet.cli.writing import Output, size, spare, write_options
 from motet.errors import quoted
 from motet.models.fill import JOIN_SECONDS, LOOP_SECONDS, FillModel
 from motet.models.gaps import Gap
@@ -65,7 +65,7 @@ def fill(
     if loop == bool(gaps) or (seconds is not None and not loop):
         raise click.UsageError("give --gap START:STOP, once or several times, or --loop, with --seconds if you like")
     given = read.sources(sources)
-    outs = places(out, given)
+    outs = places(out, given, output=output)
     model, tries = load_as(FillModel, bundle, session), Tries()
     for source, place in zip(given, outs, strict=True):
         with tries.of(source):
@@ -74,8 +74,9 @@ def fill(
                 found = model.looped(motion, seconds=LOOP_SECONDS if seconds is None else seconds)
             else:
                 found = model.fill(motion, gaps)
-            found = output.write(place, found)
+            found = output.write(place, found, source.title)
             click.echo(f"{place}: {size(len(found), found.fps)}")
+    output.finish()
     tries.finish()
 
 
@@ -107,5 +108,6 @@ def join(
     one, other = read(first), read(second)
     with naming(f"{first} and {second}"):
         found = model.join(one, other, seconds=seconds)
-    found = output.write(out, found)
+    found = output.write(out, found, f"{first.stem} {second.stem}")
+    output.finish()
     click.echo(f"{out}: {size(len(found), found.fps)}")

@@ -14,7 +14,7 @@ from motet.cli.notes import noted
 from motet.cli.options import session_options
 from motet.cli.reading import Tries, bar, naming, out_option, places
 from motet.cli.writing import Output, size, write_options
-from motet.formats import check_writable, read_motion
+from motet.formats import read_motion
 from motet.models.codes import CodesModel, Story
 from motet.models.generate import PLAYED, Generated, GenerateModel
 from motet.models.load import load_as
@@ -72,7 +72,7 @@ def generate(
     With several texts, or --all, the files are numbered: out-1.bvh, out-2.bvh, ... A text that cannot be used has none.
     With --story the texts become one motion, each taking over from the one before.
     """
-    check_writable(out)
+    output.check(out)
     model = load_as(GenerateModel, bundle, session)
     tries = Tries()
     asked = tries.usable(model, texts)
@@ -84,7 +84,9 @@ def generate(
             found = list(_stories(tries, model, texts, groups, {"after": after, "stand": stand, "seed": seed, **given}))
         else:
             found = _motions(tries, model, texts, asked, seed, given)
-    rows = _rows(tries, found, out, 1 if story else len(texts), every, shown)
+    outs = partial(places, out, output=output)
+    rows = _rows(tries, found, outs, 1 if story else len(texts), every, shown)
+    output.finish()
     if rows:
         click.echo(json.dumps(rows) if as_json else "\n".join(_lines(rows)))
     tries.finish()
@@ -127,25 +129,25 @@ def _stories(
 def _rows(
     tries: Tries,
     found: list[Found],
-    out: Path,
+    placed: Callable[[list[str]], list[Path]],
     inputs: int,
     every: bool,
-    shown: Callable[[Generated, Path], dict[str, Any]],
+    shown: Callable[[Generated, Path, str], dict[str, Any]],
 ) -> list[dict[str, Any]]:
     """Write the motions of each input; what is said of those that could be written."""
     count = max((len(results) for *_, results in found), default=1) if every else 1
-    outs = places(out, [str(number + 1) for number in range(count * inputs)])
+    outs = placed([str(number + 1) for number in range(count * inputs)])
     rows = []
     for index, text, results in found:
         pairs = zip(results[:count], outs[count * index :], strict=False)
         with tries.of(text):
-            rows.append({"input": text, "hypotheses": [shown(result, place) for result, place in pairs]})
+            rows.append({"input": text, "hypotheses": [shown(result, place, text) for result, place in pairs]})
     return rows
 
 
-def _written(result: Generated, place: Path, plant: bool, loop: bool, output: Output) -> dict[str, Any]:
+def _written(result: Generated, place: Path, text: str, plant: bool, loop: bool, output: Output) -> dict[str, Any]:
     motion = result.playable(output.fps or PLAYED, plant)
-    motion = output.write(place, looped(motion) if loop else motion)
+    motion = output.write(place, looped(motion) if loop else motion, text)
     facts = {"frames": len(motion), "fps": motion.fps, "seconds": motion.duration}
     passages = {"passages": list(map(asdict, result.passages))} if isinstance(result, Story) else {}
     return {"output": str(place), "log_likelihood": result.log_likelihood, **facts, **passages}

@@ -66,19 +66,19 @@ def predict(
     With --samples all frames do, and the futures differ as far as the motion leaves it open.
     """
     given = read.sources(sources)
-    outs = places(out, given, samples or 1)
+    outs = places(out, given, samples or 1, output)
     model, tries, rates, rows = load_as(PredictModel, bundle, session), Tries(), list[float](), list[dict[str, Any]]()
     asked = Asked(model, frames or model.horizon, append, samples, seed)
     writer = asked.writer(beyond, session)
     for number, source in enumerate(given):
         with tries.of(source):
             motion = read(source)
-            own = outs[number * (samples or 1) :][: samples or 1]
-            said = _written(asked, asked.futures(motion, writer), own, output)
+            said = _written(asked, asked.futures(motion, writer), outs[number * (samples or 1) :], source.title, output)
             rows.append({"input": str(source), **said, "beyond": writer and beyond, **asked.expected(motion, writer)})
             rates.append(motion.fps)
             if not as_json:
                 click.echo("\n".join(_lines(rows[-1], append)))
+    output.finish()
     if as_json and rows:
         click.echo(json.dumps(rows))
     say_resampled(rates, model.fps)
@@ -128,11 +128,11 @@ class Asked:
             )
 
 
-def _written(asked: Asked, found: Sequence[Motion], outs: Sequence[Path], output: Output) -> dict[str, Any]:
+def _written(asked: Asked, found: Sequence[Motion], outs: Sequence[Path], name: str, output: Output) -> dict[str, Any]:
     """Write the futures of a motion; what is said of them."""
     start = (len(found[0]) - asked.frames) / found[0].fps
-    first, *_ = [output.write(place, future) for future, place in zip(found, outs, strict=True)]
-    samples = [{"output": str(place), "seed": asked.seed + i} for i, place in enumerate(outs)]
+    first, *_ = [output.write(place, future, name) for future, place in zip(found, outs, strict=False)]
+    samples = [{"output": str(place), "seed": asked.seed + i} for i, place in enumerate(outs[: len(found)])]
     facts = {"fps": first.fps, "frames": len(first), "seconds": first.duration, "start": round(start * first.fps)}
     return {**facts, "samples": samples}
 

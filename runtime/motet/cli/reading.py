@@ -12,7 +12,7 @@ from typing import Any
 
 import click
 
-from motet.cli.writing import FPS
+from motet.cli.writing import FPS, Output, spare
 from motet.errors import MotetError, MotionError, UnitError, quoted
 from motet.files import place_of
 from motet.formats import FORMATS, READABLE, WRITABLE, check_writable, clips, read_motion
@@ -53,12 +53,22 @@ class Source:
     @property
     def label(self) -> str:
         """What stands for ``{clip}``: the clip's name, as a file name can have it, or the file's where it has none."""
+        names, index = self._clips()
+        return plain_names(names, UNFIT)[index]
+
+    @property
+    def title(self) -> str:
+        """What its result is called as a clip: the clip's name where one was asked for, else the file's."""
+        names, index = self._clips()
+        return self.name if self.clip is None else names[index]
+
+    def _clips(self) -> tuple[tuple[str, ...], int]:
+        """The names of the file's clips, its own where it has none, and which of them it is."""
         try:
             names = clips(self.path)
-            index = chosen(self.path, names, 1 if self.clip is None else self.clip)
+            return names, chosen(self.path, names, 1 if self.clip is None else self.clip)
         except MotetError:
-            return self.name
-        return plain_names(names, UNFIT)[index]
+            return (self.name,), 0
 
 
 @dataclass(frozen=True)
@@ -196,29 +206,26 @@ def bar(label: str) -> Iterator[Progress]:
         yield progress
 
 
-def places(out: Path, sources: Sequence[Source | str], samples: int = 1) -> list[Path]:
+def places(out: Path, sources: Sequence[Source | str], samples: int = 1, output: Output | None = None) -> list[Path]:
     """Where results go: by ``{name}`` and ``{clip}`` in OUT, or several numbered: out-1.bvh, out-2.bvh, ...
 
     samples: how many results each source has, one after the other, which are numbered in any case.
+    output: how they are written; a character takes all that go to one place.
     """
-    if re.search(FIELDS, str(out)):
+    if output and output.onto:
+        found = [_place(out, source) for source in sources for _ in range(samples)]
+    elif re.search(FIELDS, str(out)):
         found = [place for source in sources for place in _numbered(_place(out, source), samples)]
     else:
         found = _numbered(out, len(sources) * samples)
-    if len(set(found)) < len(found):
+    if len(set(found)) < len(found) and not (output and output.onto):
         raise click.UsageError(
             "several results have the same name: give an OUT with {name} and, for clips, {clip}, or without both"
         )
     for place in found:
-        check_writable(place)
+        output.check(place) if output else check_writable(place)
         spare(place, *(source.path for source in sources if isinstance(source, Source)))
     return found
-
-
-def spare(place: Path, *sources: Path) -> None:
-    """Refuse a result that would take the place of a file that it is made from."""
-    if place.resolve() in {source.resolve() for source in sources}:
-        raise click.UsageError(f"{place} is read, so it is not written over: name another file for the result")
 
 
 def _numbered(place: Path, count: int) -> list[Path]:

@@ -2,14 +2,15 @@
 
 import functools
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import click
 
-from motet.formats import read_character, write_motion
+from motet.formats import ONTO, WRITABLE, check_writable, read_character, write_all_on, write_on
 from motet.formats.character import Character, put_onto
+from motet.formats.lines import Names
 from motet.motion.motion import Motion
 from motet.motion.rigs import RIGS
 from motet.motion.root_motion import in_place
@@ -20,42 +21,84 @@ FPS = click.FloatRange(0, 10_000, min_open=True)
 
 @dataclass(frozen=True)
 class Output:
-    """How results are written: on a character or their own figure, at this frame rate or their own, in place or not."""
+    """How results are written: on a character or their own figure, at this frame rate or their own, in place or not.
 
-    like: Character | None
+    onto: the file of the character where it is written itself, with all results of a place as clips, in the end.
+    """
+
+    character: Character | None
     fps: float | None
     in_place: bool
+    onto: Path | None = None
+    _clips: dict[Path, dict[str, Motion]] = field(default_factory=dict)
+
+    def check(self, place: Path) -> None:
+        """Refuse a place that cannot be written to, or an extension that does not fit, before long work starts."""
+        check_writable(place, allowed=ONTO if self.onto else WRITABLE)
+        spare(place, *([self.onto] if self.onto else []))
 
     def shaped(self, motion: Motion) -> Motion:
         """The motion as it is to be written."""
-        motion = put_onto(motion, self.like) if self.like else motion
+        motion = put_onto(motion, self.character) if self.character else motion
         motion = motion.resample(self.fps) if self.fps else motion
         return in_place(motion) if self.in_place else motion
 
-    def write(self, place: Path, motion: Motion) -> Motion:
+    def save(self, place: Path, motion: Motion, name: str) -> None:
+        """Write a motion that is shaped, or keep it for :meth:`finish` as a clip of this name, or one like it."""
+        if self.onto:
+            clips = self._clips.setdefault(place, {})
+            clips[Names(clips).unique(name)] = motion
+        else:
+            write_on(place, motion, self.character)
+
+    def write(self, place: Path, motion: Motion, name: str) -> Motion:
         """Write a motion, and give what was written."""
         motion = self.shaped(motion)
-        write_motion(place, motion)
+        self.save(place, motion, name)
         return motion
+
+    def finish(self) -> None:
+        """Write the characters with their clips."""
+        for place, clips in self._clips.items():
+            if self.character:
+                write_all_on(place, clips, self.character)
 
 
 def write_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Gives a command ``output``, as ``--like``, ``--fps`` and ``--in-place`` say; a character is read at once."""
+    """Gives a command ``output``, as ``--like``, ``--onto``, ``--fps`` and ``--in-place`` say; a character is read at
+    once. The command calls its :meth:`Output.finish` in the end."""
 
     @click.option(
         "--like",
-        "like",
         type=Path,
         metavar="CHARACTER",
         help=f"Put the result on the skeleton of this file (.bvh, .glb, .vrm, ...), or of a rig: {', '.join(RIGS)}.",
     )
+    @click.option(
+        "--onto",
+        type=Path,
+        metavar="CHARACTER",
+        help=f"Write this character ({' '.join(ONTO)}) with mesh and materials, and the results as clips in it.",
+    )
     @click.option("--fps", type=FPS, help="Frame rate to write, such as 24, 25, 30 or 60. [default: the result's own]")
     @click.option("--in-place", is_flag=True, help="Take out the way over the ground; height and turns stay.")
     @functools.wraps(command)
-    def with_output(like: Path | None, fps: float | None, in_place: bool, **options: Any) -> None:
-        command(output=Output(None if like is None else read_character(like), fps, in_place), **options)
+    def with_output(like: Path | None, onto: Path | None, fps: float | None, in_place: bool, **options: Any) -> None:
+        if like and onto:
+            raise click.UsageError("--like writes motions alone, --onto the character with them: give one of the two")
+        given = onto or like
+        character = None if given is None else read_character(given)
+        if onto and character and character.nodes is None:
+            raise click.UsageError(f"--onto takes a character with its mesh ({' '.join(ONTO)}), which {onto} is not")
+        command(output=Output(character, fps, in_place, onto), **options)
 
     return with_output
+
+
+def spare(place: Path, *sources: Path) -> None:
+    """Refuse a result that would take the place of a file that it is made from."""
+    if place.resolve() in {source.resolve() for source in sources}:
+        raise click.UsageError(f"{place} is read, so it is not written over: name another file for the result")
 
 
 def size(frames: int, fps: float) -> str:

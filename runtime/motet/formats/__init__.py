@@ -225,13 +225,17 @@ def write_onto(file: File, motions: Mapping[str, Motion], onto: File | Character
     """Write a character with motions by their names, as :func:`write_motion` does."""
     check_writable(file, format, ONTO)
     character = onto if isinstance(onto, Character) else read_character(onto)
+    write_all_on(file, {name: put_onto(motion, character) for name, motion in motions.items()}, character)
+
+
+def write_all_on(file: File, motions: Mapping[str, Motion], character: Character) -> None:
+    """Write a character with motions that are on its skeleton already."""
     if character.nodes is None:
         raise MotionError(f"the character has no mesh to write: expected a file of it, one of {' '.join(ONTO)}")
     from motet.formats import gltf_onto
 
-    put = {name: _metres(put_onto(motion, character)) for name, motion in motions.items()}
     with np.errstate(over="ignore", invalid="ignore"):
-        gltf_onto.write_onto(file, put, character.nodes)
+        gltf_onto.write_onto(file, {name: _metres(motion) for name, motion in motions.items()}, character.nodes)
 
 
 def _metres(motion: Motion) -> Motion:
