@@ -13,6 +13,7 @@ import numpy as np
 
 from motet.errors import FormatError, quoted
 from motet.files import File, place_of
+from motet.formats.gltf_packed import MAX_UNPACKED, packing, unpacked
 from motet.formats.lines import read_bytes
 from motet.motion.rotations import Array, rotmat_to_quat
 
@@ -20,9 +21,6 @@ COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5
 """glTF's numbers for types of numbers."""
 
 SHAPES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
-
-UNREADABLE = ("EXT_meshopt_compression", "KHR_meshopt_compression")
-"""Extensions by which arrays of animations are packed."""
 
 MAX_NODES = 20_000
 """Nodes of a file; a figure has some hundreds."""
@@ -39,11 +37,12 @@ class Gltf:
     document: dict[str, Any]
     buffers: tuple[bytes, ...]
     _arrays: dict[int, Array] = field(default_factory=dict)
+    _unpacked: dict[int, bytes] = field(default_factory=dict)
 
-    @cached_property
+    @property
     def size(self) -> int:
-        """Bytes of all buffers together."""
-        return sum(map(len, self.buffers))
+        """Bytes of all buffers together, and of what was unpacked of them."""
+        return sum(map(len, (*self.buffers, *self._unpacked.values())))
 
     def objects(self, name: str) -> list[dict[str, Any]]:
         """One of the file's lists of objects, empty where it has none."""
@@ -143,11 +142,9 @@ class Gltf:
             kind, width, count = COMPONENTS[accessor["componentType"]], SHAPES[accessor["type"]], accessor["count"]
             if "bufferView" not in accessor or "sparse" in accessor:
                 raise FormatError(self.path, f"accessor {index} is sparse: export it without compression")
-            view = self.objects("bufferViews")[accessor["bufferView"]]
             size = np.dtype(kind).itemsize * width
-            stride = view.get("byteStride", size)
-            start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
-            content = self.buffers[view["buffer"]]
+            content, start, stride = self._view(accessor["bufferView"])
+            start, stride = start + accessor.get("byteOffset", 0), stride or size
             if (
                 count < 0
                 or start < 0
@@ -169,6 +166,17 @@ class Gltf:
             raise FormatError(self.path, f"accessor {index} holds numbers that are not finite")
         return values
 
+    def _view(self, index: int) -> tuple[bytes, int, int]:
+        """A buffer, where a view of it starts, and the bytes from one element to the next; 0 where they are dense."""
+        view = self.objects("bufferViews")[index]
+        packed = packing(view)
+        if packed is None:
+            return self.buffers[view["buffer"]], view.get("byteOffset", 0), view.get("byteStride", 0)
+        if index not in self._unpacked:
+            room = MAX_UNPACKED - sum(map(len, self._unpacked.values()))
+            self._unpacked[index] = unpacked(self.path, packed, self.buffers, room)
+        return self._unpacked[index], 0, packed["byteStride"]
+
 
 def parse(file: File) -> Gltf:
     """Read a file's parts; FormatError for one that is not glTF 2.0, is truncated, or lacks its buffers."""
@@ -181,9 +189,6 @@ def parse(file: File) -> Gltf:
         raise FormatError(path, f"not a glTF file: {str(error)[:200]}") from error
     if not str(version).startswith("2."):
         raise FormatError(path, f"glTF of version {str(version)[:20]}: expected 2.0")
-    packed = [name for name in UNREADABLE if name in document.get("extensionsRequired", [])]
-    if packed:
-        raise FormatError(path, f"its arrays are packed by {packed[0]}: export without compression")
     if len(document.get("nodes", [])) > MAX_NODES:
         raise FormatError(path, f"it has {len(document['nodes'])} nodes: expected at most {MAX_NODES}")
     beside = path.parent if isinstance(file, str | Path) and content[:4] != b"glTF" else None

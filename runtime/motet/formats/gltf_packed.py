@@ -1,0 +1,46 @@
+"""Parts of glTF buffers that meshoptimizer packed, by EXT_meshopt_compression or KHR_meshopt_compression."""
+
+from collections.abc import Mapping
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from motet.errors import FormatError
+
+EXTENSIONS = ("EXT_meshopt_compression", "KHR_meshopt_compression")
+
+MAX_RATIO = 1024
+"""Bytes that one packed byte can stand for: a block of 256 equal bytes takes two bits."""
+
+MAX_UNPACKED = 2**25
+"""Bytes that all parts together may hold: a key each frame for 12 minutes of a figure of 90 joints at 60 a second."""
+
+
+def packing(view: Mapping[str, Any]) -> Mapping[str, Any] | None:
+    """What an extension says of how a view of a buffer is packed; None where it is not."""
+    found = view.get("extensions", {})
+    return next((found[name] for name in EXTENSIONS if name in found), None)
+
+
+def unpacked(path: Path, packed: Mapping[str, Any], buffers: tuple[bytes, ...], room: int) -> bytes:
+    """The bytes of a packed view, at most ``room``; FormatError where it is damaged, or the extra is not installed."""
+    if find_spec("meshopt") is None:
+        raise FormatError(
+            path,
+            "its animations are packed by meshoptimizer: install the extra with  pip install 'motet[meshopt]', or "
+            "unpack the file with  npx gltfpack -i IN.glb -o OUT.glb -noq -kn -ac",
+        )
+    start, length = packed.get("byteOffset", 0), packed["byteLength"]
+    count, stride = packed["count"], packed["byteStride"]
+    content = buffers[packed["buffer"]][start : start + length]
+    if not 0 <= start <= start + length or len(content) < length:
+        raise FormatError(path, "a packed part reaches beyond its buffer: the file is truncated")
+    if not (count > 0 and stride > 0 and count * stride <= min(room, MAX_RATIO * length)):
+        raise FormatError(path, f"a packed part of {length} bytes cannot hold {count} times {stride} of them")
+    decode = import_module("meshopt").decode_gltf_buffer
+    try:
+        found: bytes = decode(content, count, stride, packed["mode"], packed.get("filter")).tobytes()
+    except (ValueError, TypeError) as error:
+        raise FormatError(path, f"a packed part is broken: {str(error)[:200]}") from error
+    return found
