@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from motet.errors import MotionError
-from motet.motion.humanoid import ARM, HUMANOID, LEFT_RIGHT, LEG, REST, SPINE, sided
+from motet.motion.humanoid import ARM, HUMANOID, LEFT_RIGHT, LEG, NECK, REST, SPINE, sided
 from motet.motion.rotations import Array
 from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
 
@@ -35,8 +35,8 @@ def _skeleton(content: dict[str, Any], rig: dict[str, Any]) -> Skeleton:
     known, place = content["joints"], dict(zip(HUMANOID.names, REST, strict=True))
     tree: list[tuple[str, str, Array]] = [(rig["root"], "", np.zeros(3))] if "root" in rig else []
     above = rig.get("root", "")
-    back = np.linspace(place["spine"], place["upperChest"], len(known["spine"]))
-    neck = np.linspace(place["neck"], place["head"], len(known["neck"]) + 1)[:-1]
+    back = _shared_out([place[bone] for bone in ("hips", *SPINE)], len(known["spine"]))
+    neck = _shared_out([place[bone] for bone in (SPINE[-1], *NECK)], len(known["neck"]) + 1)[:-1]
     names = [known["hips"][0], *known["spine"], *known["neck"]]
     for name, at in zip(names, [place["hips"], *back, *neck], strict=True):
         tree.append((name, above, at))
@@ -49,6 +49,12 @@ def _skeleton(content: dict[str, Any], rig: dict[str, Any]) -> Skeleton:
         if joint.name not in (*SPINE, "neck"):
             tree.append((called[joint.name], called[HUMANOID.names[joint.parent]], place[joint.name]))
     return _joined(tree, rig.get("prefix", ""), rig["unit"])
+
+
+def _shared_out(chain: list[Array], count: int) -> list[Array]:
+    """Places (3,) of the joints of another chain, as far up as the turns that :mod:`motet.motion.spread` gives them."""
+    up = np.arange(1, count + 1) * (len(chain) - 1) / count
+    return list(np.stack([np.interp(up, range(len(chain)), along) for along in np.transpose(chain)], axis=1))
 
 
 def _joined(tree: list[tuple[str, str, Array]], prefix: str, unit: float) -> Skeleton:
