@@ -93,3 +93,13 @@ def test_predict_says_where_the_prediction_starts_at_another_rate(tmp_path: Path
     ]
     assert "predicted from 3 s on (frame 90, " in said[0]
     assert "predicted from 3 s on (frame 180, " in said[1]
+
+
+def test_travel_gives_a_clip_in_place_its_way_back(tmp_path: Path, clips: Path) -> None:
+    walk = motet.to_humanoid(motet.read(clips / "39_14.amc")).motion
+    motet.write(tmp_path / "in.npz", in_place(walk))
+    assert run("convert", tmp_path / "in.npz", tmp_path / "out.npz", "--travel").exit_code == 0
+    found, expected = (positions(motion)[:, 0] for motion in (motet.read(tmp_path / "out.npz"), walk))
+    np.testing.assert_array_equal(found[:, 1], expected[:, 1])
+    went, should = (places[-1] - places[0] for places in (found, expected))
+    assert np.linalg.norm(went - should) < 0.08 * np.linalg.norm(should)

@@ -17,6 +17,7 @@ from motet.motion.looping import looped
 from motet.motion.mirror import mirror as mirrored
 from motet.motion.motion import Motion
 from motet.motion.retarget import to_humanoid
+from motet.motion.root_path import lay_root_path
 from motet.motion.units import METRES
 
 log = logging.getLogger(__name__)
@@ -41,6 +42,7 @@ log = logging.getLogger(__name__)
 @click.option(
     "--map", "map_file", type=Path, metavar="FILE", help="Which joint of IN is which bone, as JSON; implies --humanoid."
 )
+@click.option("--travel", is_flag=True, help="Lay the way over the ground that the feet tell, of a clip in place.")
 @click.option("--hold-feet", is_flag=True, help="Keep feet that stand from sliding; implies --humanoid.")
 @click.option("--loop", is_flag=True, help="Cut to what plays in a circle without a leap, as strides of a walk.")
 @write_options
@@ -54,6 +56,7 @@ def convert(
     unit: str | None,
     humanoid: bool,
     map_file: Path | None,
+    travel: bool,
     hold_feet: bool,
     loop: bool,
     output: Output,
@@ -70,6 +73,7 @@ def convert(
             motion = _cut(read(source), start, stop)
             if humanoid or map_file or hold_feet:
                 motion = _to_humanoid(motion, map_file)
+            motion = lay_root_path(motion, keep_height=True) if travel else motion
             motion = feet_held(motion) if hold_feet else motion
             motion = output.shaped(motion)
             motion = motion.scaled(METRES[unit]) if unit else motion

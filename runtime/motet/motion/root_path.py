@@ -39,7 +39,10 @@ ROUNDS = 10
 
 
 def lay_root_path(
-    motion: Motion, feet: tuple[Sequence[str], Sequence[str]] | None = None, tremble: float = TREMBLE
+    motion: Motion,
+    feet: tuple[Sequence[str], Sequence[str]] | None = None,
+    tremble: float = TREMBLE,
+    keep_height: bool = False,
 ) -> Motion:
     """The motion with root channels tx, ty, tz in "length" units, found from the feet's contact with the ground.
 
@@ -49,6 +52,7 @@ def lay_root_path(
         and right. MotionError for a motion without skeleton or one without such joints.
     tremble: seconds over which the feet are smoothed; recorded motions need little, generated ones GENERATED, and 0
         smooths nothing.
+    keep_height: leave y as it is, as of a motion in place whose height is right.
     """
     if not 0 <= tremble < np.inf:
         raise MotionError(f"feet are smoothed over 0 or more seconds, not {tremble}")
@@ -62,7 +66,7 @@ def lay_root_path(
     velocity = (
         velocity_by_feet(plane, points[..., 1] + height[:, None], motion.fps) if len(motion) > 1 else np.zeros((0, 2))
     )
-    return led_along(motion, velocity, height, metres)
+    return led_along(motion, velocity, places[:, 0, 1] * metres if keep_height else height, metres)
 
 
 def led_along(motion: Motion, velocity: Array, height: Array, metres: float) -> Motion:
