@@ -39,6 +39,12 @@ def with_byte(content, place, value):
     return content[:place] + bytes([value]) + content[place + 1 :]
 
 
+def with_size(content, size):
+    """A zip whose directory announces so many bytes of its first file, unpacked."""
+    place = content.index(b"PK\1\2") + 24
+    return content[:place] + size.to_bytes(4, "little") + content[place + 4 :]
+
+
 WHOLE = {
     "values": np.zeros((2, 1)),
     "channels": np.array(["a"]),
@@ -80,6 +86,13 @@ def test_npz_refuses_what_is_no_motion(tmp_path, name):
     with pytest.raises(FormatError) as error:
         npz.read(path)
     assert error.value.path == path
+
+
+def test_an_array_that_would_not_fit_into_memory_is_not_unpacked(tmp_path):
+    path = tmp_path / "b.npz"
+    path.write_bytes(with_size(savez(**WHOLE), 2**29 + 1))
+    with pytest.raises(FormatError, match="has 536870913 bytes, and at most 536870912 are read"):
+        npz.read(path)
 
 
 @pytest.mark.parametrize("motion", [walker(), walker()[:0], AWKWARD])

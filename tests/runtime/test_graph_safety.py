@@ -3,11 +3,13 @@
 from pathlib import Path
 
 import numpy as np
+import onnxruntime
 import pytest
 from wire import EXTERNAL, doubling, field, graph, model, node, tensor, varint
 
 from motet.bundle.graph import GraphSpec, OnnxGraph, TensorSpec
 from motet.bundle.graph_safety import MAX_FIELDS, MAX_TEXT, check_graph
+from motet.bundle.session import SessionOptions
 from motet.errors import BundleError
 
 SPEC = GraphSpec((TensorSpec("x", ("batch", 3)),), (TensorSpec("y", ("batch", 3)),))
@@ -79,6 +81,19 @@ def test_what_reaches_outside_is_refused(
     monkeypatch.chdir(tmp_path)  # where ONNX Runtime would find what the graph names
     with pytest.raises(BundleError, match=reason):
         OnnxGraph(bad, SPEC)
+
+
+def test_a_session_takes_no_model_but_onnx(tmp_path: Path) -> None:
+    """ONNX Runtime would find out the format by itself, and take its own, which nothing has checked."""
+    options = onnxruntime.SessionOptions()
+    options.optimized_model_filepath = str(tmp_path / "own")
+    options.add_session_config_entry("session.save_model_format", "ORT")
+    onnxruntime.InferenceSession(doubling(), options, ["CPUExecutionProvider"])
+    own = (tmp_path / "own").read_bytes()
+    assert own[4:8] == b"ORTM"
+    onnxruntime.InferenceSession(own, providers=["CPUExecutionProvider"])
+    with pytest.raises(Exception, match="(?i)protobuf parsing failed"):
+        SessionOptions().session(own)
 
 
 def test_nesting_and_size_are_bounded() -> None:

@@ -75,6 +75,18 @@ def test_the_left_is_at_minus_x(steer_model: SteerModel) -> None:
     assert bones["LeftUpperArm"][0] < 0 < bones["RightUpperArm"][0]
 
 
+def test_a_pose_for_which_the_system_has_no_room_is_lost(
+    steer_model: SteerModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sender = Sender("127.0.0.1", 39539)
+
+    def full(_: object) -> None:
+        raise BlockingIOError(11, "Resource temporarily unavailable")
+
+    monkeypatch.setattr(sender._client, "send", full)
+    sender.send(steer_model.start().tick(), 0.0)
+
+
 def test_what_cannot_be_sent(steer_model: SteerModel) -> None:
     with pytest.raises(OutputError, match="cannot send to no such place:39539"):
         Sender("no such place", 39539)

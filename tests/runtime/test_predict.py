@@ -145,6 +145,17 @@ def test_a_stream_gives_what_the_whole_motion_gives() -> None:
     with pytest.raises(MotionError, match=r"shape \(3,\) does not fit 24 channels"):
         session.push([1.0, 2.0, 3.0])
     np.testing.assert_allclose(session.predict(5).values, model.predict(whole[:70], frames=5).values, atol=1e-3)
+    kept = repr(session)
+    session.push(np.tile(whole.values, (10, 1)))
+    assert repr(session) == kept  # it says how many frames are kept
+
+
+def test_golden_vectors_are_no_endless_run() -> None:
+    model = model_of(to_joint_vectors(circle()))
+    seed = {"frames": model.contract.frames(to_joint_vectors(circle()))[-model.seed_frames :]}
+    assert len(model.replay(seed, {"frames": 1000})["frames"]) == 1000
+    with pytest.raises(BundleError, match="at most 1000 frames, not 1001"):
+        model.replay(seed, {"frames": 1001})
 
 
 def test_a_stream_without_a_start_takes_the_contracts_channels() -> None:

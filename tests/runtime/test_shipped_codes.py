@@ -105,6 +105,7 @@ def test_a_figure_stands_where_that_is_asked(model: CodesModel) -> None:
 
 def test_it_says_what_it_does_not_know(model: CodesModel) -> None:
     assert model.understood(WALK).confident
+    assert not model.understood("a person plays tennis").confident  # .28
     strange = "a person repairs the violin of an astronaut"
     found = model.understood(strange)
     assert not found.confident

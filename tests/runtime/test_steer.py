@@ -67,11 +67,12 @@ def test_a_snapshot_comes_back_to_the_same_bits(model: SteerModel) -> None:
     first = [session.tick() for _ in range(20)]
     session.control(gait="run", speed=3)
     session.tick()
-    session.restore(snapshot)
-    for pose in first:
-        again = session.tick()
-        np.testing.assert_array_equal(again.rotations, pose.rotations)
-        np.testing.assert_array_equal(again.ground, pose.ground)
+    for _ in range(2):  # what goes on leaves the snapshot as it is
+        session.restore(snapshot)
+        for pose in first:
+            again = session.tick()
+            np.testing.assert_array_equal(again.rotations, pose.rotations)
+            np.testing.assert_array_equal(again.ground, pose.ground)
     with pytest.raises(ControlError, match="2 characters does not fit 1"):
         model.start().restore(snapshot)
 

@@ -188,9 +188,8 @@ class Matcher:
     def best(self, asked: Floats, gait: Rows) -> tuple[Rows, Floats, Floats]:
         """The row (B,), its side (B,) and its cost (B,) for features (B, F) and a gait (B,)."""
         row, side, cost = np.empty(len(gait), np.int64), np.empty(len(gait), np.float32), np.empty_like(asked[:, 0])
-        for one, kind in enumerate(
-            gait.tolist()
-        ):  # each by itself: how a product rounds depends on how many rows it has
+        # each by itself: how a product rounds depends on how many rows it has
+        for one, kind in enumerate(gait.tolist()):
             rows, half, across, places = self.goals[kind]
             both = np.stack([asked[one], asked[one, self.columns] * self.signs])
             way, far = self._way(both)
