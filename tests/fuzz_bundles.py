@@ -1,72 +1,71 @@
 """Mutated bundles: whatever is altered, only motet's own errors come out, soon and in little memory.
 
-    python tests/fuzz_bundles.py --count 5000 [--seed N] [--seconds 2] [--megabytes 500]
+    python tests/fuzz_bundles.py --count 5000 [--seed N] [--first N] [--seconds 2] [--megabytes 500]
 
-The bundles that come with motet are altered in five ways: bytes of the zip, values and keys of the manifest, bytes of a
-graph, its weights moved out of it, and bytes of golden vectors; in all but the first the manifest lists the hashes of
-what is there, as who makes a bundle on purpose would. Each is loaded, verified, and one step of its model is run, in
-worker processes whose memory is limited; a worker that dies counts as a failure, too. Failures are kept in a folder.
+The bundles that come with motet are altered in six ways: bytes of the zip, values and keys of the manifest, bytes of a
+graph, its weights moved out of it, what one of its outputs says, and bytes of golden vectors; in all but the first the
+manifest lists the hashes of what is there, as who makes a bundle on purpose would. Each is loaded, asked for all that
+its verb can do, and verified.
 """
 
-import argparse
-import copy
 import hashlib
 import io
 import json
-import multiprocessing
-import os
-import re
-import resource
 import sys
-import tempfile
-import time
-import traceback
 import zipfile
-from collections import Counter
-from collections.abc import Callable
-from multiprocessing.connection import Connection
+from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
+from unittest.mock import patch
 
 import numpy as np
+from fuzzing import Files, Generator, Mutant, altered, damaged, fuzz, options
 
+import motet
 from motet.bundle.bundle import Bundle, list_bundles
-from motet.errors import MotetError
-from motet.models.control import ControlModel
-from motet.models.load import load
-from motet.models.steer import SteerModel
+from motet.bundle.protobuf import Value, fields
+from motet.bundle.session import SessionOptions
+from motet.models.codes import CodesModel
 from motet.models.verify import verify
+from motet.motion.motion import Motion
 
-Generator = np.random.Generator
-Files = dict[str, bytes]
+CLIP = Path(__file__).parents[1] / "train" / "motet_train" / "data" / "cmu" / "39_14.amc"
 
-NASTY: list[Any] = [
-    None, True, False, 0, 1, -1, 2, 255, 1 << 31, 1 << 63, 10**30, 0.5, -0.5, 1e9, 1e30, 1e308, 1e-320, "", "x", "0",
-    "batch", "../x", "\x00", "x" * 5000, [], {}, [None], [[]], {"x": 1}, [1e9] * 3, ["batch", 1], [0] * 1000,
-]  # fmt: skip
-"""What stands in the place of a value of the manifest. 10**400 and NaN are in tests/runtime/test_bundle.py."""
+LIES: dict[str, list[tuple[float, float]]] = {
+    "float32": [
+        *((0, value) for value in (np.nan, np.inf, -np.inf, 3e38, -3e38, 1e9, 1, 0, -1)),
+        *((factor, 0) for factor in (-1, 1e-30, 1e6, 1e30)),
+    ],
+    "int64": [
+        *((0, value) for value in (-1, 0, 1, 1 << 20, 1 << 40, 1 << 62, -(1 << 62))),
+        *((1, value) for value in (-1, 1)),
+        *((factor, 0) for factor in (-1, 1000)),
+    ],
+}
+"""By what an output is multiplied, and what is added then."""
+
+Change = Callable[[Generator, dict[str, Any], Files], str]
 
 
-class Found(NamedTuple):
-    """What became of a bundle: "runs", the name of motet's error, or what is a failure; seconds, peak megabytes."""
-
-    outcome: str
-    seconds: float
-    megabytes: float
-    detail: str = ""
-
-
-def mutate(rng: Generator, zips: dict[str, bytes]) -> tuple[str, bytes]:
-    """A mutated bundle: how it was made, and its zip."""
+def mutate(rng: Generator) -> Mutant:
+    """A mutated bundle."""
+    zips = shipped()
     name = str(rng.choice(sorted(zips)))
-    kind = str(rng.choice(list(_KINDS), p=[0.15, 0.5, 0.2, 0.05, 0.1]))
+    kind = str(rng.choice(list(_KINDS), p=[0.1, 0.4, 0.15, 0.05, 0.2, 0.1]))
     if kind == "zip":
-        return f"{name}, zip", _damaged(rng, zips[name])
+        return f"{name}, zip", {"mutated.zip": damaged(rng, zips[name])}
     with zipfile.ZipFile(io.BytesIO(zips[name])) as archive:
         files = {member: archive.read(member) for member in archive.namelist()}
     manifest = json.loads(files.pop("manifest.json"))
     said = _KINDS[kind](rng, manifest, files)
-    return f"{name}, {kind}: {said}", _zipped(manifest, files)
+    return f"{name}, {kind}: {said}", {"mutated.zip": _zipped(manifest, files)}
+
+
+@cache
+def shipped() -> dict[str, bytes]:
+    """The bundles that come with motet."""
+    return {name: path.read_bytes() for name, path in list_bundles().items()}
 
 
 def _zipped(manifest: dict[str, Any], files: Files) -> bytes:
@@ -83,69 +82,13 @@ def _zipped(manifest: dict[str, Any], files: Files) -> bytes:
     return buffer.getvalue()
 
 
-def _damaged(rng: Generator, data: bytes) -> bytes:
-    """Bytes with a few of them flipped, overwritten, cut out, doubled or cut off; near the start and end more often."""
-    found = bytearray(data)
-    for _ in range(int(rng.integers(1, 5))):
-        spread = len(found) if rng.random() < 0.5 else min(len(found), 400)
-        place = int(rng.integers(max(1, spread)))
-        place = len(found) - 1 - place if rng.random() < 0.5 else place
-        kind, size = rng.integers(5), int(rng.integers(1, 40))
-        if kind == 0 and found:
-            found[place] ^= 1 << int(rng.integers(8))
-        elif kind == 1:
-            found[place : place + size] = rng.bytes(size)
-        elif kind == 2:
-            del found[place : place + size]
-        elif kind == 3:
-            found[place:place] = found[place : place + size]
-        elif rng.random() < 0.2:
-            del found[place:]
-    return bytes(found)
-
-
 def _in_manifest(rng: Generator, manifest: dict[str, Any], files: Files) -> str:
-    """One to three values replaced, removed, doubled or scaled, wherever they are in the manifest."""
-    said = []
-    for _ in range(int(rng.integers(1, 4))):
-        places = _places(manifest, rng)
-        holder, key, path = places[int(rng.integers(len(places)))]
-        kind = rng.integers(5)
-        if kind <= 1:
-            holder[key] = copy.deepcopy(NASTY[int(rng.integers(len(NASTY)))])
-        elif kind == 2:
-            del holder[key]
-        elif kind == 3 and isinstance(holder, list):
-            holder.insert(key, copy.deepcopy(holder[key]))
-        elif isinstance(holder[key], int | float) and not isinstance(holder[key], bool):
-            holder[key] = holder[key] * float(rng.choice([-1, 1e-6, 3, 1e4])) if rng.random() < 0.5 else holder[key] + 1
-        else:
-            holder[key] = str(holder[key])[:100] if rng.random() < 0.5 else [holder[key]]
-        said.append(path)
-    return ", ".join(said)
-
-
-def _places(top: dict[str, Any], rng: Generator) -> list[tuple[Any, Any, str]]:
-    """All places of an object that a reader looks at, and of long lists three."""
-    found: list[tuple[Any, Any, str]] = []
-    waiting: list[tuple[Any, str]] = [(top, "")]
-    while waiting:
-        value, path = waiting.pop()
-        keys: list[Any] = list(value) if isinstance(value, dict) else list(range(len(value)))
-        if isinstance(value, list) and len(keys) > 3:
-            keys = sorted(int(i) for i in rng.choice(keys, 3, replace=False))
-        for key in keys:
-            if path == "" and key in {"training", "quality", "parity", "config"} and rng.random() < 0.9:
-                continue
-            found.append((value, key, f"{path}.{key}"))
-            if isinstance(value[key], dict | list):
-                waiting.append((value[key], f"{path}.{key}"))
-    return found
+    return altered(rng, manifest, seldom={"training", "quality", "parity", "config", "actions"})
 
 
 def _in_graph(rng: Generator, manifest: dict[str, Any], files: Files) -> str:
     name = str(rng.choice([file for file in files if file.endswith(".onnx")]))
-    files[name] = _damaged(rng, files[name])
+    files[name] = damaged(rng, files[name])
     return name
 
 
@@ -160,19 +103,71 @@ def _outside(rng: Generator, manifest: dict[str, Any], files: Files) -> str:
     return f"{name} reads {place}"
 
 
+def _lie(rng: Generator, manifest: dict[str, Any], files: Files) -> str:
+    """An output says something else."""
+    roles = manifest["graphs"]
+    entry = roles[str(rng.choice(sorted(roles)))]
+    output = entry["outputs"][int(rng.integers(len(entry["outputs"])))]
+    factor, more = LIES[output["dtype"]][int(rng.integers(len(LIES[output["dtype"]])))]
+    files[entry["file"]] = lying(files[entry["file"]], output["name"], np.dtype(output["dtype"]), factor, more)
+    return f"{entry['file']} {output['name']} times {factor:g} plus {more:g}"
+
+
+def lying(model: bytes, output: str, dtype: np.dtype[Any], factor: float, more: float) -> bytes:
+    """An ONNX model one of whose outputs is multiplied, and has something added."""
+    name, true = output.encode(), b"fuzz.true"
+
+    def renamed(tensor: bytes) -> bytes:
+        return true if tensor == name else tensor
+
+    def constant(called: bytes, value: float) -> bytes:
+        kind = b"\x10\x01" if dtype.kind == "f" else b"\x10\x07"
+        return _field(5, kind + _field(8, called) + _field(9, np.array(value, dtype).tobytes()))
+
+    def node(operator: bytes, one: bytes, other: bytes, found: bytes) -> bytes:
+        return _field(1, _field(1, one) + _field(1, other) + _field(2, found) + _field(4, operator))
+
+    def of_graph(graph: bytes) -> bytes:
+        more_nodes = node(b"Mul", true, b"fuzz.factor", b"fuzz.scaled") + node(
+            b"Add", b"fuzz.scaled", b"fuzz.more", name
+        )
+        old = _changed(graph, 1, lambda one: _changed(_changed(one, 1, renamed), 2, renamed))
+        return old + more_nodes + constant(b"fuzz.factor", factor) + constant(b"fuzz.more", more)
+
+    return _changed(model, 7, of_graph)
+
+
+def _changed(message: bytes, number: int, change: Callable[[bytes], bytes]) -> bytes:
+    """A message of protocol buffers, without numbers of fixed size, in which fields of one number are changed."""
+    parts: list[tuple[int, Value]] = list(fields(memoryview(message)))
+    return b"".join(
+        _varint(at << 3) + _varint(value)
+        if isinstance(value, int)
+        else _field(at, change(bytes(value)) if at == number else bytes(value))
+        for at, value in parts
+    )
+
+
 def _field(number: int, data: bytes) -> bytes:
-    return bytes([number << 3 | 2, len(data)]) + data
+    return _varint(number << 3 | 2) + _varint(len(data)) + data
+
+
+def _varint(value: int) -> bytes:
+    head = b""
+    while value > 127:
+        head, value = head + bytes([value & 127 | 128]), value >> 7
+    return head + bytes([value])
 
 
 def _in_golden(rng: Generator, manifest: dict[str, Any], files: Files) -> str:
     """Bytes of the .npz, or of one array with the zip around it made right."""
     if rng.random() < 0.3:
-        files["golden.npz"] = _damaged(rng, files["golden.npz"])
+        files["golden.npz"] = damaged(rng, files["golden.npz"])
         return "bytes"
     with zipfile.ZipFile(io.BytesIO(files["golden.npz"])) as archive:
         arrays = {name: archive.read(name) for name in archive.namelist()}
     name = str(rng.choice(sorted(arrays)))
-    arrays[name] = _damaged(rng, arrays[name])
+    arrays[name] = damaged(rng, arrays[name])
     if rng.random() < 0.2:
         del arrays[str(rng.choice(sorted(arrays)))]
     buffer = io.BytesIO()
@@ -183,134 +178,90 @@ def _in_golden(rng: Generator, manifest: dict[str, Any], files: Files) -> str:
     return name
 
 
-_KINDS: dict[str, Callable[[Generator, dict[str, Any], Files], str]] = {
+_KINDS: dict[str, Change] = {
     "zip": lambda rng, manifest, files: "",
     "manifest": _in_manifest,
     "graph": _in_graph,
     "outside": _outside,
+    "lie": _lie,
     "golden": _in_golden,
 }
 
 
+def steps(path: Path) -> Iterator[Callable[[], object]]:
+    """Load a bundle and ask for all that its verb can do; verify it."""
+    yield lambda: _with_sessions_kept(lambda: use(path))
+    yield lambda: _with_sessions_kept(lambda: verify(Bundle.open(path)))
+
+
 def use(path: Path) -> None:
-    """Load a bundle, run one step of its model, and verify it."""
-    model = load(path)
-    if isinstance(model, ControlModel):
-        model.start(variety=0.5).step()
-    elif isinstance(model, SteerModel):
+    """Load a bundle and ask for all that its verb can do."""
+    model, given = motet.load(path), motion()
+    if isinstance(model, motet.SteerModel):
         session = model.start(characters=2)
         session.control(speed=1.0, direction=[0, 90])
-        session.tick()
+        for _ in range(20):
+            session.tick()
+        model.run(f"{model.gaits[0]} .3s", start=given)
+        motet.write_live_page(io.BytesIO(), model)
+    elif isinstance(model, motet.ControlModel):
+        model.start(variety=0.5).step()
+        model.run(f"{model.labels[0]} .2s")
+    elif isinstance(model, CodesModel):
+        model.story(["a person walks", "a person sits"], seconds=0.4, after=given)
+        model.generate("a person walks", memory=1.0, seconds=0.5)
+        next(model.stream("a person walks", seconds=1.0))
+    elif isinstance(model, motet.GenerateModel):
+        for found in model.generate("a person walks", max_seconds=0.3, hypotheses=2, candidates=2):
+            motet.write(io.BytesIO(), found.motion, format="bvh")
+    elif isinstance(model, motet.PredictModel):
+        model.predict(given, frames=30)
+        if model.knows_errors:
+            model.expected_errors(given)
+    elif isinstance(model, motet.FillModel):
+        model.fill(given, [(1.0, 1.3)])
+    elif isinstance(model, motet.SearchModel):
+        model.embed(given)
+        model.embed_text("a person walks")
     else:
-        encoder, rng = model.graphs[model.ROLES[0]], np.random.default_rng(0)
-        feeds = {tensor.name: tensor.example(rng, 2) for tensor in encoder.spec.inputs}
-        encoder({**feeds, **({"lengths": np.ones(2, np.int64)} if "lengths" in feeds else {})})
-    verify(Bundle.open(path))
+        model.describe(given)
+        model.timeline(given)
 
 
-def try_bundle(path: Path) -> Found:
-    """Use a bundle; what came of it, in how long, and at what peak of memory."""
-    started, detail = time.perf_counter(), ""
-    try:
-        use(path)
-        outcome = "runs"
-    except MotetError as error:
-        outcome, detail = type(error).__name__, str(error)
-    except BaseException:
-        outcome, detail = "FOREIGN", traceback.format_exc()
-    seconds = time.perf_counter() - started
-    return Found(outcome, seconds, peak_megabytes(), detail)
+@cache
+def motion() -> Motion:
+    """What is described, predicted, continued."""
+    return motet.read(CLIP)[:300]
 
 
-def peak_megabytes() -> float:
-    """The most memory that this process has held: not ``ru_maxrss``, which starts with that of the parent."""
-    status = Path("/proc/self/status").read_text()
-    return int(re.search(r"VmHWM:\s+(\d+) kB", status)[1]) / 1024  # type: ignore[index]
+def _with_sessions_kept(run: Callable[[], None]) -> None:
+    """Run something while the sessions of graphs that nobody altered are made once."""
+    with patch.object(SessionOptions, "session", _session):
+        run()
 
 
-def _work(pipe: Connection, limit: int) -> None:
-    """A worker: bundles' paths in, what was found out. Its own size counts, so what is found is above that of motet."""
-    resource.setrlimit(resource.RLIMIT_AS, (limit << 20, limit << 20))
-    os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
-    while True:
-        pipe.send(try_bundle(pipe.recv()))
+@cache
+def _whole() -> frozenset[bytes]:
+    """The hashes of the graphs that come with motet."""
+    found = set()
+    for data in shipped().values():
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            found |= {hashlib.sha256(archive.read(name)).digest() for name in archive.namelist()}
+    return frozenset(found)
 
 
-class Worker:
-    """A process that tries bundles, one after the other, and is replaced when it dies or takes too long."""
-
-    def __init__(self, address_space: int, patience: float) -> None:
-        self._limit, self._patience = address_space, patience
-        self._start()
-
-    def _start(self) -> None:
-        context = multiprocessing.get_context("spawn")
-        self._pipe, other = context.Pipe()
-        self._process = context.Process(target=_work, args=(other, self._limit), daemon=True)
-        self._process.start()
-        other.close()
-
-    def run(self, path: Path) -> Found:
-        """What becomes of a bundle; "DIED" or "HANGS" where the worker did not live to say so."""
-        self._pipe.send(path)
-        try:
-            if self._pipe.poll(self._patience):
-                found: Found = self._pipe.recv()
-                return found
-            outcome = Found("HANGS", self._patience, 0)
-        except EOFError:
-            self._process.join()
-            outcome = Found("DIED", 0, 0, f"exit code {self._process.exitcode}")
-        self.close()
-        self._start()
-        return outcome
-
-    def close(self) -> None:
-        """End the process."""
-        self._process.kill()
-        self._process.join()
+def _session(self: SessionOptions, model: bytes) -> Any:
+    whole = hashlib.sha256(model).digest() in _whole()
+    return _kept(model) if whole else _real(self, model)
 
 
-def failure(found: Found, seconds: float, megabytes: float) -> str | None:
-    """Why a bundle's end is a failure; None where it is none."""
-    if found.outcome in {"FOREIGN", "DIED", "HANGS"}:
-        return found.outcome
-    if found.seconds > seconds:
-        return f"{found.seconds:.1f} s"
-    return f"{found.megabytes:.0f} MB" if found.megabytes > megabytes else None
+_real = SessionOptions.session
 
 
-def main() -> int:
-    """The command; its exit code is 1 where a bundle failed."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--count", type=int, default=5000)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--seconds", type=float, default=2.0, help="longest time of one bundle")
-    parser.add_argument("--megabytes", type=float, default=500.0, help="largest peak of a worker's resident memory")
-    parser.add_argument("--keep", type=Path, default=Path(tempfile.gettempdir()) / "motet-fuzz", help="of failures")
-    given = parser.parse_args()
-    zips = {name: path.read_bytes() for name, path in list_bundles().items()}
-    outcomes: Counter[str] = Counter()
-    failures, slowest, largest, started = 0, 0.0, 0.0, time.perf_counter()
-    worker = Worker(address_space=4096, patience=10 * given.seconds)
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "mutated.zip"
-        for number in range(given.count):
-            how, data = mutate(np.random.default_rng([given.seed, number]), zips)
-            path.write_bytes(data)
-            found = worker.run(path)
-            outcomes[found.outcome] += 1
-            slowest, largest = max(slowest, found.seconds), max(largest, found.megabytes)
-            if (reason := failure(found, given.seconds, given.megabytes)) is not None:
-                failures += 1
-                given.keep.mkdir(parents=True, exist_ok=True)
-                (given.keep / f"{given.seed}-{number}.zip").write_bytes(data)
-                print(f"FAILED {given.seed}-{number} ({how}): {reason}\n{found.detail}", flush=True)
-    worker.close()
-    print(f"{given.count} bundles in {time.perf_counter() - started:.0f} s: {dict(outcomes.most_common())}")
-    print(f"slowest {slowest:.2f} s, largest {largest:.0f} MB, failures {failures}")
-    return 1 if failures else 0
+@cache
+def _kept(model: bytes) -> Any:
+    return _real(SessionOptions(), model)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(fuzz(options(__doc__).parse_args(), mutate, steps))

@@ -1,26 +1,35 @@
-"""The short run of tests/fuzz_bundles.py: the same bundles every time."""
+"""The short runs of tests/fuzz_bundles.py and tests/fuzz_motions.py: the same mutants every time."""
 
 from pathlib import Path
 
+import fuzz_bundles
+import fuzz_motions
 import numpy as np
-from fuzz_bundles import Found, Worker, failure, mutate
+import pytest
+from fuzzing import Found, Steps, Worker, failure, put
 
-from motet.bundle.bundle import list_bundles
-
-COUNT, SECONDS, MEGABYTES = 80, 2.0, 500.0
+SECONDS, MEGABYTES = 2.0, 500.0
 
 
-def test_mutated_bundles_give_motets_own_errors_soon_and_in_little_memory(tmp_path: Path) -> None:
-    zips = {name: path.read_bytes() for name, path in list_bundles().items()}
-    worker, outcomes = Worker(address_space=4096, patience=60), set()
-    for number in range(COUNT):
-        how, data = mutate(np.random.default_rng([1, number]), zips)
-        (tmp_path / "mutated.zip").write_bytes(data)
-        found = worker.run(tmp_path / "mutated.zip")
+@pytest.mark.parametrize(
+    ("mutate", "steps", "count", "expected"),
+    [
+        (fuzz_bundles.mutate, fuzz_bundles.steps, 80, {"BundleError", "runs"}),
+        (fuzz_motions.mutants(fuzz_motions.own_files()), fuzz_motions.steps, 150, {"FormatError", "runs"}),
+    ],
+    ids=["bundles", "motions"],
+)
+def test_mutants_give_motets_own_errors_soon_and_in_little_memory(
+    mutate: fuzz_motions.Mutate, steps: Steps, count: int, expected: set[str], tmp_path: Path
+) -> None:
+    worker, outcomes = Worker(steps, address_space=4096, patience=60), set()
+    for number in range(count):
+        how, files = mutate(np.random.default_rng([1, number]))
+        found = worker.run(put(tmp_path / "mutant", files))
         assert failure(found, 10 * SECONDS, MEGABYTES) is None, (number, how, found)  # the machine may be busy
         outcomes.add(found.outcome)
     worker.close()
-    assert outcomes >= {"BundleError", "runs"}
+    assert outcomes >= expected
 
 
 def test_what_is_a_failure() -> None:

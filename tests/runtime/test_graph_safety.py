@@ -92,7 +92,7 @@ def test_a_session_takes_no_model_but_onnx(tmp_path: Path) -> None:
     own = (tmp_path / "own").read_bytes()
     assert own[4:8] == b"ORTM"
     onnxruntime.InferenceSession(own, providers=["CPUExecutionProvider"])
-    with pytest.raises(Exception, match="(?i)protobuf parsing failed"):
+    with pytest.raises(Exception, match=r"(?i)protobuf parsing failed"):
         SessionOptions().session(own)
 
 
