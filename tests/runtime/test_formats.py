@@ -38,7 +38,7 @@ def test_every_format_has_the_functions_that_its_record_says() -> None:
     for kind in FORMATS:
         assert callable(kind.read()) if kind.reader else kind.writer
         assert not kind.writer or (kind.needs and find_spec(kind.needs) is None) or callable(kind.write())
-    assert set(MOCAP) <= set(READABLE) & set(WRITABLE)
+    assert set(MOCAP) <= set(READABLE)
 
 
 @pytest.mark.parametrize("extension", ["bvh", "npz", "csv", "glb"])
@@ -132,7 +132,6 @@ def test_places_that_are_no_files_are_named(tmp_path: Path) -> None:
         ("a.bvh/b.bvh", "no such file"),
         ("a.txt", "cannot read files of type '.txt'; expected one of .amc .bvh .npz .csv .xml"),
         ("a.c3d", r"cannot read files of type '.c3d', which hold markers and no skeleton: .* expected one of .amc"),
-        ("a.fbx", "cannot read files of type '.fbx': export glTF or BVH from the program that made them; expected"),
     ):
         with pytest.raises(FormatError, match=said):
             read_motion(tmp_path / name)
@@ -199,7 +198,11 @@ def as_text(glb: bytes) -> bytes:
     return json.dumps(document).encode()
 
 
-@pytest.mark.parametrize("name", [*(f"a{extension}" for extension in READABLE), "amass.npz"])
+PARSED = [extension for extension in READABLE if extension != ".fbx"]
+"""The formats that motet parses by itself."""
+
+
+@pytest.mark.parametrize("name", [*(f"a{extension}" for extension in PARSED), "amass.npz"])
 def test_damaged_files_give_a_motion_or_an_error_of_motet(tmp_path: Path, name: str) -> None:
     path, rng, slowest = tmp_path / name, random.Random(name.removeprefix("a")), 0.0
     sample(path)

@@ -73,6 +73,7 @@ _GIF = "a picture that moves; needs Pillow: `pip install 'motet[plot]'`"
 _NPZ = "everything, to the last bit; of AMASS the body's joints"
 _GLB = "a skeleton and its animations, each a clip; written with a body, for viewers and engines"
 _CHARACTER = "a skeleton and its animations, each a clip, or the pose that it rests in"
+_FBX = "a skeleton and its takes, each a clip; needs ufbx: `pip install 'motet[fbx]'`"
 _VRMA = "the humanoid: a motion of another human figure is brought to it ([humanoid.md](humanoid.md))"
 
 FORMATS = (
@@ -85,13 +86,16 @@ FORMATS = (
     Format(".gltf", "glTF 2.0, as text", _CHARACTER, "gltf", options=("clip",), loose=True),
     Format(".vrm", "VRM avatar", _CHARACTER, "gltf", options=("clip",), loose=True),
     Format(".vrma", "VRM Animation", _VRMA, "gltf", "vrma", options=("clip",), mocap=True, loose=True),
+    Format(".fbx", "FBX", _FBX, "fbx", options=("clip",), mocap=True, loose=True),
     Format(".html", "web page", "a page with a player: orbit, play, scrub, no network", writer="html"),
     Format(".gif", "picture", _GIF, writer="gif", needs="PIL"),
 )
 
+CHARACTERS = {"gltf": "gltf_character", "fbx": "fbx"}
+"""For readers of files whose nodes have axes of their own the modules that read these, by ``read_character``."""
+
 OTHERS = {
     ".c3d": ", which hold markers and no skeleton: solve them for one first, with the program that recorded them",
-    ".fbx": ": export glTF or BVH from the program that made them",
 }
 """What is known of other types of motion files: it is said when they are refused."""
 
@@ -168,18 +172,18 @@ def names_motion(text: str) -> bool:
 
 
 def read_character(file: File) -> Character:
-    """Read a skeleton to put motions onto: of glTF and VRM files as their nodes have it, of others that of the motion.
+    """Read a skeleton to put motions onto: of glTF, VRM and FBX as their nodes have it, of others that of the motion.
 
     The name of a rig out of :data:`motet.motion.rigs.RIGS`, such as "mixamo", gives that rig where there is no such
     file. FormatError as :func:`read_motion`.
     """
     if isinstance(file, str | Path) and not Path(file).suffix and not Path(file).exists():
         return _character(_rig(Path(file)))
-    if _format(file, None, READABLE, "read").reader != "gltf":
+    reader = _format(file, None, READABLE, "read").reader
+    if reader not in CHARACTERS:
         return Character(read_motion(file))
-    from motet.formats import gltf_character
-
-    return gltf_character.read_character(file)
+    found: Character = import_module(f"motet.formats.{CHARACTERS[reader]}").read_character(file)
+    return found
 
 
 def write_motion(

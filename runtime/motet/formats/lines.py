@@ -13,18 +13,30 @@ MAX_FPS = 1e6
 MIN_FPS = 1e-3
 
 
-def read_bytes(file: File) -> bytes:
-    """All bytes of a file or file object; FormatError if there is no such file or it cannot be read."""
+def read_bytes(file: File, most: int | None = None) -> bytes:
+    """All bytes of a file or file object; FormatError if there is no such file or it cannot be read.
+
+    most: FormatError for more bytes than this, before they are read.
+    """
     path = place_of(file)
     try:
         if not isinstance(file, str | Path):
-            return file.read()
+            content = file.read() if most is None else file.read(most + 1)
+            if most is not None and len(content) > most:
+                raise _too_large(path, most)
+            return content
         if not path.is_file():
             missing = "a link that leads nowhere" if path.is_symlink() else "no such file"
             raise FormatError(path, "it is not a file" if path.exists() else missing)
+        if most is not None and path.stat().st_size > most:
+            raise _too_large(path, most)
         return path.read_bytes()
     except OSError as error:
         raise FormatError(path, f"cannot be read: {error.strerror}") from error
+
+
+def _too_large(path: Path, most: int) -> FormatError:
+    return FormatError(path, f"it is too large: expected at most {most} bytes")
 
 
 def read_text(file: File) -> str:

@@ -1,0 +1,296 @@
+"""A program of its own: FBX on standard input, its skeleton and one of its takes as glTF on standard output.
+
+    python -P fbx_to_gltf.py NUMBER
+
+Takes are those that move a bone, counted from 0; where there is none of that number, the skeleton is at rest. All their
+names are in the glTF's ``extras``. It has nodes, skins and samples at every frame; y is up, lengths are metres. Exit
+status 1 comes with a reason on standard error.
+
+It runs apart from motet because of ufbx: that is C code, which strangers' files may break, and version 0.0.5 gives its
+Python objects away without counting the reference, so that each has to be kept until the process ends.
+"""
+
+import base64
+import gc
+import json
+import os
+import sys
+from array import array
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, TypeVar
+
+import ufbx
+
+MEMORY, MEMORY_PER_BYTE = 2**28, 32
+"""Bytes of memory that a file may take: these, and so many for each of its own."""
+
+FREE_VALUES = 10**5
+"""Frames times nodes of a file of any size; one of more has four bytes for each, so that a small one stays cheap."""
+
+FPS, MAX_FPS = 30.0, 1000.0
+"""The frame rate of a file that says none, and the highest."""
+
+PARTS = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3"}
+"""What glTF and ufbx both call the parts of a node's transform, and glTF's types of them."""
+
+SAME = 1e-5
+"""A node that no curve moves gets samples where it is further than this from its rest."""
+
+Vector = Sequence[float]
+Matrix = Sequence[Vector]
+"""Four columns of three numbers: the axes and the origin of one space in another."""
+
+Thing = TypeVar("Thing")
+_KEPT: list[Any] = []
+
+
+def keep(thing: Thing) -> Thing:
+    """An object of ufbx, which must not be freed."""
+    _KEPT.append(thing)
+    return thing
+
+
+def each(things: Iterable[Thing]) -> list[Thing]:
+    """The objects of one of ufbx's lists."""
+    return [keep(thing) for thing in things]
+
+
+def product(a: Matrix, b: Matrix) -> Matrix:
+    """First ``b``, then ``a``."""
+    x, y, z, origin = a
+    axes = [[x[i] * u + y[i] * v + z[i] * w for i in range(3)] for u, v, w in b]
+    return [*axes[:3], [axes[3][i] + origin[i] for i in range(3)]]
+
+
+def inverse(matrix: Matrix) -> Matrix:
+    """What undoes it; ValueError for one that flattens."""
+    x, y, z, origin = matrix
+    rows = [_cross(y, z), _cross(z, x), _cross(x, y)]
+    volume = sum(a * b for a, b in zip(x, rows[0], strict=True))
+    if not volume:
+        raise ValueError("a bone hangs on one that is bound without volume")
+    axes = [[row[i] / volume for row in rows] for i in range(3)]
+    return product([*axes, [0.0, 0.0, 0.0]], [*ufbx.identity_matrix[:3], [-number for number in origin]])
+
+
+def _cross(a: Vector, b: Vector) -> Vector:
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+
+def matrix_of(transform: Any) -> Matrix:
+    """That of a translation, a rotation and a scale."""
+    x, y, z, w = transform.rotation
+    turn = (
+        (1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)),
+        (2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)),
+        (2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)),
+    )
+    return [
+        *([size * number for number in axis] for axis, size in zip(turn, transform.scale, strict=True)),
+        transform.translation,
+    ]
+
+
+class Scene:
+    """A file's nodes without the root, each after its parent, and which of them are joints.
+
+    at: indices in ``nodes`` by ufbx's numbers. bound: for bones of skins, where they are in the world when bound.
+    skins: the bones of each skin, then those that no skin uses, skeleton by skeleton. near: the bones and what they
+    hang on; all nodes where there is no bone.
+    """
+
+    def __init__(self, content: bytes) -> None:
+        self.size = len(content)
+        self.scene = ufbx.load_memory(
+            content,
+            file_format=ufbx.FileFormat.FBX,
+            ignore_geometry=True,
+            ignore_embedded=True,
+            target_axes=ufbx.axes_right_handed_y_up,
+            target_unit_meters=1.0,
+            space_conversion=ufbx.SpaceConversion.ADJUST_TRANSFORMS,
+            inherit_mode_handling=ufbx.InheritModeHandling.COMPENSATE,
+        )
+        keep(self.scene)
+        self.nodes = [node for node in each(self.scene.nodes) if not node.is_root]
+        self.at = {node.typed_id: i for i, node in enumerate(self.nodes)}
+        self.parents = [self.at.get(keep(node.parent).typed_id, -1) for node in self.nodes]
+        self.bound: dict[int, Any] = {}
+        self.skins = [self._skin(skin) for skin in each(self.scene.skin_deformers)]
+        self.skins += self._bare(set().union(*self.skins))
+        self.near = self._above(set().union(*self.skins)) or set(self.at.values())
+
+    def _skin(self, skin: Any) -> set[int]:
+        bones = set()
+        for cluster in each(skin.clusters):
+            node = keep(cluster.bone_node)
+            if node is not None and node.typed_id in self.at:
+                bones.add(self.at[node.typed_id])
+                self.bound.setdefault(self.at[node.typed_id], cluster.bind_to_world)
+        return bones
+
+    def _bare(self, skinned: set[int]) -> Iterator[set[int]]:
+        """The bones that no skin uses, together where they hang on the same one."""
+        tops: dict[int, int] = {}
+        groups: dict[int, set[int]] = {}
+        for i, node in enumerate(self.nodes):
+            if node.attrib_type == ufbx.ElementType.BONE:
+                tops[i] = tops.get(self.parents[i], i)
+                groups.setdefault(tops[i], set()).update({i} - skinned)
+        yield from filter(None, groups.values())
+
+    def _above(self, nodes: set[int]) -> set[int]:
+        found = set(nodes)
+        for i in reversed(range(len(self.parents))):
+            if i in found and self.parents[i] >= 0:
+                found.add(self.parents[i])
+        return found
+
+    def rest(self) -> list[Matrix]:
+        """How each node rests in its parent: bones of skins as they are bound."""
+        world: list[Matrix] = []
+        rest = []
+        for i, node in enumerate(self.nodes):
+            above = world[self.parents[i]] if self.parents[i] >= 0 else ufbx.identity_matrix
+            rest.append(product(inverse(above), self.bound[i]) if i in self.bound else tuple(node.node_to_parent))
+            world.append(product(above, rest[i]))
+        return rest
+
+
+@dataclass(frozen=True)
+class Take:
+    """An animation, its curves, and the nodes that they move."""
+
+    stack: Any
+    curves: list[Any]
+    moved: set[int]
+
+
+def takes(scene: Scene) -> list[Take]:
+    """The takes that move a bone or what one hangs on; in a file without bones any node."""
+    found = (_take(scene, stack) for stack in each(scene.scene.anim_stacks))
+    return [take for take in found if take.moved & scene.near]
+
+
+def _take(scene: Scene, stack: Any) -> Take:
+    curves, moved = [], set()
+    for animated in (found for layer in each(stack.layers) for found in layer.anim_props):
+        node = keep(animated.element)
+        if isinstance(node, ufbx.Node) and node.typed_id in scene.at and animated.prop_name.startswith("Lcl "):
+            moved.add(scene.at[node.typed_id])
+            curves += [curve for curve in keep(keep(animated.anim_value).curves) if curve is not None]
+    return Take(stack, curves, moved)
+
+
+def frame_times(scene: Scene, take: Take) -> list[float]:
+    """When a take's frames are, in seconds; ValueError for more of them than a file of its size may have."""
+    begin, end = span(take)
+    fps = frame_rate(scene, take)
+    if not (end - begin) * fps * len(scene.near) < FREE_VALUES + scene.size / 4:
+        raise ValueError(f"{end - begin:g} s at {fps:g} fps are too many frames")
+    return [begin + i / fps for i in range(round((end - begin) * fps) + 1)]
+
+
+def span(take: Take) -> tuple[float, float]:
+    """When a take has keys, within the time that the file gives it if that has any length."""
+    first = min((curve.min_time for curve in take.curves), default=0.0)
+    last = max((curve.max_time for curve in take.curves), default=0.0)
+    begin, end = max(first, take.stack.time_begin), min(last, take.stack.time_end)
+    return (begin, end) if begin < end else (first, max(first, last))
+
+
+def frame_rate(scene: Scene, take: Take) -> float:
+    """The file's, or that of the take's keys where they are denser."""
+    said = scene.scene.settings.frames_per_second
+    keys = max((curve.keyframes for curve in take.curves), key=len, default=())
+    times = [key.time for key in keys]
+    steps = sorted(later - time for time, later in pairwise(times))
+    step = steps[len(steps) // 2] if len(steps) > 1 else 0.0
+    keyed = 1 / step if step * MAX_FPS >= 1 else 0.0
+    fps = keyed if keyed > 1.01 * said else said
+    return fps if 0 < fps <= MAX_FPS else FPS
+
+
+def as_gltf(scene: Scene, take: Take | None) -> dict[str, Any]:
+    """The skeleton, and a take of it, as a glTF document that holds its buffer."""
+    rest = scene.rest()
+    nodes: list[dict[str, Any]] = [{"name": node.name} for node in scene.nodes]
+    for i, node in enumerate(scene.nodes):
+        parts = {name: getattr(node.local_transform, name) for name in PARTS}
+        nodes[i] |= {"matrix": _columns(rest[i])} if i in scene.bound else parts
+    for i, parent in enumerate(scene.parents):
+        if parent >= 0:
+            nodes[parent].setdefault("children", []).append(i)
+    document: dict[str, Any] = {"asset": {"version": "2.0"}, "nodes": nodes}
+    if any(scene.skins):
+        document["skins"] = [{"joints": sorted(bones)} for bones in scene.skins if bones]
+    return document if take is None else document | _animation(scene, take, rest)
+
+
+def _columns(matrix: Matrix) -> list[float]:
+    return [number for column, last in zip(matrix, (0, 0, 0, 1), strict=True) for number in (*column, last)]
+
+
+def _animation(scene: Scene, take: Take, rest: list[Matrix]) -> dict[str, Any]:
+    times = frame_times(scene, take)
+    values = array("f", [time - times[0] for time in times])
+    accessors = [{"bufferView": 0, "componentType": 5126, "count": len(times), "type": "SCALAR"}]
+    channels: list[dict[str, Any]] = []
+    for node in sorted(scene.near):
+        poses = [ufbx.evaluate_transform(take.stack.anim, scene.nodes[node], time) for time in times]
+        if node not in take.moved and not any(_differ(matrix_of(pose), rest[node]) for pose in poses):
+            continue
+        for name, kind in PARTS.items():
+            channels.append({"sampler": len(channels), "target": {"node": node, "path": name}})
+            accessors.append({**accessors[0], "byteOffset": 4 * len(values), "type": kind})
+            values.extend(number for pose in poses for number in getattr(pose, name))
+    if sys.byteorder == "big":
+        values.byteswap()
+    data = base64.b64encode(values.tobytes()).decode()
+    samplers = [{"input": 0, "output": i} for i in range(1, len(accessors))]
+    return {
+        "animations": [{"name": take.stack.name, "channels": channels, "samplers": samplers}],
+        "accessors": accessors,
+        "bufferViews": [{"buffer": 0, "byteLength": 4 * len(values)}],
+        "buffers": [{"byteLength": 4 * len(values), "uri": f"data:application/octet-stream;base64,{data}"}],
+    }
+
+
+def _differ(a: Matrix, b: Matrix) -> bool:
+    pairs = ((x, y) for left, right in zip(a, b, strict=True) for x, y in zip(left, right, strict=True))
+    return any(abs(x - y) > SAME * max(1.0, abs(y)) for x, y in pairs)
+
+
+def limit_memory(size: int) -> None:
+    """Let this process use no more memory than a file of this size needs, where the system can."""
+    with suppress(ImportError, ValueError, OSError):
+        import resource
+
+        most = MEMORY + MEMORY_PER_BYTE * size
+        resource.setrlimit(resource.RLIMIT_AS, (most, resource.getrlimit(resource.RLIMIT_AS)[1]))
+
+
+def main(number: int) -> dict[str, Any]:
+    """The glTF document of the file on standard input."""
+    content = sys.stdin.buffer.read()
+    limit_memory(len(content))
+    scene = Scene(content)
+    found = takes(scene)
+    document = as_gltf(scene, found[number] if 0 <= number < len(found) else None)
+    return document | {"extras": {"takes": [take.stack.name for take in found]}}
+
+
+if __name__ == "__main__":
+    gc.disable()  # it would count what ufbx did not
+    status = 0
+    try:
+        sys.stdout.write(json.dumps(main(int(sys.argv[1])), allow_nan=False))
+    except Exception as error:  # whatever ufbx raises on a broken file
+        sys.stderr.write(str(error) or type(error).__name__)
+        status = 1
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(status)
