@@ -10,6 +10,7 @@ from importlib.metadata import version
 from motet import motion
 from motet.bundle.bundle import Bundle, list_bundles
 from motet.bundle.session import SessionOptions
+from motet.checked import Checked, check
 from motet.errors import (
     BundleError,
     ControlError,
@@ -51,6 +52,7 @@ __version__ = version("motet")
 __all__ = [
     "Bundle",
     "BundleError",
+    "Checked",
     "CodesModel",
     "ControlError",
     "ControlModel",
@@ -88,6 +90,7 @@ __all__ = [
     "TextWarning",
     "Understood",
     "UnitError",
+    "check",
     "clips",
     "from_humanoid",
     "list_bundles",

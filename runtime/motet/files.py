@@ -2,7 +2,7 @@
 
 import shutil
 import uuid
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
@@ -22,6 +22,12 @@ def place_of(file: File) -> Path:
         return Path(file)
     name = getattr(file, "name", None)
     return Path(name) if isinstance(name, str) else Path("<file object>")
+
+
+def files_in(folder: Path, extensions: Collection[str]) -> list[Path]:
+    """The files of some types in a folder and all below it, sorted, but for hidden ones."""
+    found = (path for path in folder.rglob("*") if path.suffix.lower() in extensions and path.name[0] != ".")
+    return sorted(path for path in found if path.is_file())
 
 
 def check_place(path: str | Path) -> Path:

@@ -23,6 +23,7 @@ COMMANDS = {
     "live": ("motet.cli.live:live", "", "Steer figures live: in a page, by a server, onto an avatar."),
     "search": ("motet.cli.search:search", "", "Find motions in a folder by a sentence or a motion."),
     "embed": ("motet.cli.embed:embed", "", "Write context vectors of motions or sentences."),
+    "check": ("motet.cli.check:check", "", "Say what motion files hold and how they are understood."),
     "convert": ("motet.cli.convert:convert", "", "Convert motion files to other formats, rates, units."),
     "view": ("motet.cli.convert:view", "", "Write a web page that plays a motion."),
     "bundle": ("motet.cli.bundle:bundle", "", "List, inspect, verify and pack models (bundles)."),

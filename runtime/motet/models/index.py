@@ -9,7 +9,7 @@ import io
 import json
 import logging
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ import numpy as np
 
 from motet.bundle.graph import Floats
 from motet.errors import FormatError, MotetError, MotionError, OutputError, UnitError
-from motet.files import write_whole
+from motet.files import files_in, write_whole
 from motet.formats import MOCAP, clips, read_motion
 from motet.formats.clips import MARK
 from motet.formats.npy import array
@@ -181,7 +181,9 @@ def _renewed(
     """The index of a folder as it is now, with what is known already of files that did not change."""
     known = {} if before is None else _by_file(before)
     usable = known if before is not None and before.unit == unit else {}
-    paths = sorted(_motion_files(folder))
+    if not folder.is_dir():
+        raise FormatError(folder, "it is neither a folder of motion files nor the index of one")
+    paths = files_in(folder, MOCAP)
     if not paths:
         raise FormatError(folder, f"no motion files ({' '.join(MOCAP)}) are in it")
     members, vectors = [], []
@@ -206,14 +208,6 @@ def _by_file(index: Index) -> dict[tuple[str, int, int], list[tuple[Member, Floa
         file = member.path, member.size, member.changed
         found.setdefault(file, []).append((member, index.vectors[start:stop]))
     return found
-
-
-def _motion_files(folder: Path) -> Iterator[Path]:
-    if not folder.is_dir():
-        raise FormatError(folder, "it is neither a folder of motion files nor the index of one")
-    for path in folder.rglob("*"):
-        if path.suffix.lower() in MOCAP and not path.name.startswith(".") and path.is_file():
-            yield path
 
 
 def _embedded_clips(

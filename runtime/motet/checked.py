@@ -1,0 +1,129 @@
+"""What a motion file holds and how it is understood: what to look at first of a file that nobody knows."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from motet.errors import MotionError
+from motet.files import place_of
+from motet.formats import READABLE, clips, read_motion
+from motet.formats.clips import Clip, chosen, split_clip
+from motet.motion.fitting import sole_points
+from motet.motion.heading import heading
+from motet.motion.humanoid import HUMANOID, ground_under, leg_length
+from motet.motion.kinematics import global_transforms, positions
+from motet.motion.mmm_figure import is_mmm, with_figure
+from motet.motion.motion import Motion
+from motet.motion.retarget import SURE, Humanoid, to_humanoid
+
+STAYS = 0.3
+"""Metres over which hips move where a figure stays in place."""
+
+LEVEL = 0.5
+"""Sine of the angle from the vertical from which on the way that hips face is a way over the ground."""
+
+
+@dataclass(frozen=True)
+class Checked:
+    """One clip of a motion file, or all of a file without clips.
+
+    file: its path. clip: its name, None in a file without clips. clips: the names of all clips of the file.
+    frames, fps: how many, and how many a second. joints: of the skeleton, 0 where there is none.
+    refused: why it is not taken for a human's motion; what follows is then None or empty. None where it is one.
+    convention: of the joints' names, or "by the tree". confidence: from 0 to 1, that every joint is what it is taken
+        for.
+    unit: metres of one unit of the file's lengths. height: metres of the figure, standing straight. None, both, where
+        nothing tells the unit; other lengths are then those of an adult.
+    facing: degrees by which the figure faces to the left of +z in the first frame; None where it faces up or down.
+    ground: metres over y = 0 of the ground that the soles stand on. lowest: the same of the lowest point of the body in
+        all frames.
+    travel: metres between the ends of the ground that the hips pass over.
+    notes: sentences about what was assumed.
+    bones: bone of the humanoid -> the names of the joints that it was taken from.
+    """
+
+    file: str
+    clip: str | None
+    clips: tuple[str, ...]
+    frames: int
+    fps: float
+    joints: int
+    refused: str | None
+    convention: str | None = None
+    confidence: float | None = None
+    unit: float | None = None
+    height: float | None = None
+    facing: float | None = None
+    ground: float | None = None
+    lowest: float | None = None
+    travel: float | None = None
+    notes: tuple[str, ...] = ()
+    bones: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+    @property
+    def seconds(self) -> float:
+        """Frames over frames a second."""
+        return self.frames / self.fps
+
+    @property
+    def sure(self) -> bool:
+        """Whether it is a human's motion beyond doubt."""
+        return self.confidence is not None and self.confidence >= SURE
+
+    @property
+    def in_place(self) -> bool:
+        """Whether the figure hardly leaves its place."""
+        return self.travel is not None and self.travel < STAYS
+
+    def to_json(self) -> dict[str, Any]:
+        """All fields, and :attr:`seconds`, :attr:`sure` and :attr:`in_place`."""
+        return {**asdict(self), "seconds": self.seconds, "sure": self.sure, "in_place": self.in_place}
+
+
+def check(file: str | Path, *, clip: Clip = None, **options: Any) -> Checked:
+    """Look at a motion file, or at one clip of it: "file.glb#Walk", or ``clip``, by default the first.
+
+    options: as :func:`motet.read` takes them. FormatError for what cannot be read; what is read, and is no human's
+    motion, has the reason in :attr:`Checked.refused`.
+    """
+    motion = read_motion(file, clip=clip, **options)
+    place, named = split_clip(file, READABLE)
+    names = clips(place_of(place), format=options.get("format"))
+    taken = names[chosen(place_of(place), names, (named if clip is None else clip) or 1)] if names else None
+    joints = 0 if motion.skeleton is None else len(motion.skeleton.joints)
+    about = (str(place_of(place)), taken, names, len(motion), motion.fps, joints)
+    try:
+        found = to_humanoid(motion)
+    except MotionError as error:
+        return Checked(*about, refused=str(error))
+    said = found.convention, found.confidence, found.unit, found.height
+    return Checked(
+        *about, None, *said, _facing(found.motion), *_heights(motion, found), _travel(found), found.notes, found.joints
+    )
+
+
+def _facing(motion: Motion) -> float | None:
+    """Degrees to the left of +z that the hips face in the first frame of a motion of the humanoid."""
+    forward = global_transforms(motion[:1])[0][0, 0, :, 2]
+    level = float(np.hypot(forward[0], forward[2]))
+    return float(np.degrees(heading(motion[:1])[0])) if level > LEVEL else None
+
+
+def _heights(motion: Motion, found: Humanoid) -> tuple[float, float]:
+    """The ground under the soles and the lowest point of soles and joints, in metres over the file's y = 0."""
+    fitted, turn = found.figure.fitted, found.figure.turn
+    rotations = global_transforms(found.motion)[0]
+    places = positions(with_figure(motion) if is_mmm(motion) else motion) @ turn.T
+    soles = sole_points(fitted, {bone: rotations[:, HUMANOID.index(bone)] for bone in fitted.heights}, places)
+    lowest = min(float(places[..., 1].min()), float(soles[..., 1].min()))
+    metres = (found.leg or leg_length()) / fitted.leg
+    return ground_under(soles) * metres, lowest * metres
+
+
+def _travel(found: Humanoid) -> float:
+    """Metres between the ends of the ground that the hips pass over."""
+    way = np.ptp(positions(found.motion)[:, 0], axis=0)
+    return float(np.hypot(way[0], way[2])) * (found.leg or leg_length()) / leg_length()
