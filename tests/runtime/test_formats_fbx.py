@@ -128,6 +128,20 @@ def test_a_skin_rests_as_it_is_bound() -> None:
     check(motion, places(ARM, take, take.times)[:, 1:] / 100, [bone.name for bone in ARM[1:]])
 
 
+def test_the_rest_pose_can_be_that_of_another_file(tmp_path: Path) -> None:
+    pytest.importorskip("ufbx")
+    straight = [replace(bone, turn=(0.0, 0.0, 0.0), pre=(0.0, 0.0, 0.0)) for bone in ARM]
+    (tmp_path / "rest.fbx").write_bytes(binary_fbx(document(straight, [], settings(Y_UP))))
+    take = swing()
+    (tmp_path / "a.fbx").write_bytes(binary_fbx(document(ARM, [take], settings(Y_UP))))
+    motion = motet.read(tmp_path / "a.fbx", rest=tmp_path / "rest.fbx")
+    assert motion.skeleton is not None
+    offsets = {bone.name: np.array(bone.place) / 100 for bone in ARM}
+    for joint in motion.skeleton.joints[1:]:
+        np.testing.assert_allclose(joint.offset, offsets[joint.name], atol=1e-6)
+    check(motion, places(ARM, take, take.times)[:, 1:] / 100, [bone.name for bone in ARM[1:]])
+
+
 def test_of_two_skeletons_the_one_that_moves_is_taken(caplog: pytest.LogCaptureFixture) -> None:
     still = [replace(bone, name=f"still_{bone.name}", parent=bone.parent and bone.parent + 10) for bone in ARM[1:]]
     bones = [*ARM, *(replace(bone, parent=-1 if bone.parent <= 0 else bone.parent - 4) for bone in still)]

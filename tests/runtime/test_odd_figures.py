@@ -1,18 +1,21 @@
 """Files that are not as they should be, as other makers write them: each fault is put into a good figure."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
-from test_retarget import angles_between, dancing, skeleton_file
+from gltf_files import read_document, write_clips, write_document
+from test_retarget import SKELETONS, angles_between, dancing, skeleton_file
 
-from motet.errors import MotionError
+from motet.errors import FormatError, MotionError
+from motet.formats import read_motion
 from motet.formats.writable import with_names
 from motet.motion.humanoid import HUMANOID
 from motet.motion.kinematics import global_transforms, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.products import product
-from motet.motion.retarget import from_humanoid, to_humanoid
+from motet.motion.retarget import SURE, from_humanoid, to_humanoid
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Joint, Skeleton
 from motet.motion.world_rotations import motion_of
@@ -217,3 +220,54 @@ def test_a_pelvis_that_is_turned_below_its_joint_is_turned_as_the_legs_lie() -> 
     assert np.degrees(np.arccos(np.clip(np.sum(left * expected, axis=-1), -1, 1))).max() < 0.01
     others = tuple(name for name in HUMANOID.names if "Arm" not in name and "Leg" not in name)
     assert apart(found.motion, dance, others) < 1e-3
+
+
+def resting_in_its_start(path: Path) -> Path:
+    """The file with each node at rest as the first key of its track has it."""
+    document, binary = read_document(path)
+    animation = document["animations"][0]
+    for channel in animation["channels"]:
+        accessor = document["accessors"][animation["samplers"][channel["sampler"]]["output"]]
+        start = document["bufferViews"][accessor["bufferView"]].get("byteOffset", 0)
+        first = np.frombuffer(binary, "<f4", int(accessor["type"][-1]), start)
+        document["nodes"][channel["target"]["node"]][channel["target"]["path"]] = first.tolist()
+    del document["buffers"]
+    return write_document(path.with_name("start.glb"), document, binary)
+
+
+def test_a_rest_pose_out_of_a_motion_is_said_and_taken_from_another_file(tmp_path: Path) -> None:
+    dance = dancing(40)
+    motion = from_humanoid(dance, skeleton_file("mixamo")).with_unit(0.01).scaled(1.0)
+    stands = write_clips(tmp_path / "stands.glb", [("Dance", motion)])
+    lies = resting_in_its_start(write_clips(tmp_path / "a.glb", [("Dance", motion)], skin=False))
+    guessed = to_humanoid(read_motion(lies))
+    assert "the rest pose is out of a motion" in guessed.notes[0]
+    assert guessed.confidence < SURE
+    given = to_humanoid(read_motion(lies, rest=stands))
+    assert (given.confidence, given.notes) == (1.0, ())
+    assert apart(given.motion, dance) < 0.01
+    np.testing.assert_allclose(
+        global_transforms(given.motion)[1], global_transforms(to_humanoid(motion).motion)[1], atol=1e-4
+    )
+
+
+def test_the_first_frame_of_a_clip_can_be_the_rest_pose(tmp_path: Path) -> None:
+    motion = from_humanoid(dancing(40), skeleton_file("mixamo")).with_unit(0.01).scaled(1.0)
+    stance = skeleton_file("mixamo").with_unit(0.01).scaled(1.0)
+    lies = resting_in_its_start(write_clips(tmp_path / "a.glb", [("Dance", motion)], skin=False))
+    poses = write_clips(tmp_path / "poses.glb", [("Dance", motion), ("T-Pose", stance)])
+    given = to_humanoid(read_motion(lies, rest=f"{poses}#T-Pose"))
+    assert apart(given.motion, to_humanoid(motion).motion) < 0.01
+
+
+def test_a_rest_pose_is_taken_from_a_file_of_these_joints_alone(tmp_path: Path) -> None:
+    motion = from_humanoid(dancing(5), skeleton_file("mixamo")).with_unit(0.01).scaled(1.0)
+    path = write_clips(tmp_path / "a.glb", [("Dance", motion)])
+    with pytest.raises(FormatError, match="no joint of this figure's names"):
+        read_motion(path, rest=write_clips(tmp_path / "b.glb", [("Dance", nameless(motion))]))
+    with pytest.raises(FormatError, match="a rest pose is taken from one of"):
+        read_motion(path, rest=SKELETONS / "mixamo.bvh")
+    with pytest.raises(FormatError, match="no such file"):
+        read_motion(path, rest=tmp_path / "none.glb")
+    with pytest.raises(FormatError, match="'rest' is an option of"):
+        read_motion(SKELETONS / "mixamo.bvh", rest=path)

@@ -126,11 +126,24 @@ def read_options(command: Callable[..., None]) -> Callable[..., None]:
     @click.option(
         "--partial", is_flag=True, help=f"Take the complete frames of truncated files ({_takers('partial')})."
     )
+    @click.option(
+        "--rest",
+        type=Path,
+        metavar="FILE",
+        help=f"File that rests in a T-pose, of the same joints ({_takers('rest')}).",
+    )
     @functools.wraps(command)
     def with_read(
-        unit_in: str | None, fps_in: float | None, asf: Path | None, partial: bool, clip: str | None, **options: Any
+        unit_in: str | None,
+        fps_in: float | None,
+        asf: Path | None,
+        partial: bool,
+        clip: str | None,
+        rest: Path | None,
+        **options: Any,
     ) -> None:
-        command(read=Read({"unit": unit_in, "fps": fps_in, "asf": asf, "partial": partial}, clip), **options)
+        given = {"unit": unit_in, "fps": fps_in, "asf": asf, "partial": partial, "rest": rest}
+        command(read=Read(given, clip), **options)
 
     return with_read
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -82,11 +83,11 @@ FORMATS = (
     Format(".npz", "motet's own; AMASS", _NPZ, "npz", "npz", mocap=True),
     Format(".csv", "table", "values, units and frame rate, no skeleton", "csv", "csv"),
     Format(".xml", "MMM of KIT", "angles and root; the skeleton is not in the file", "mmm"),
-    Format(".glb", "glTF 2.0", _GLB, "gltf", "glb", options=("clip",), mocap=True, loose=True),
-    Format(".gltf", "glTF 2.0, as text", _CHARACTER, "gltf", options=("clip",), loose=True),
-    Format(".vrm", "VRM avatar", _CHARACTER, "gltf", options=("clip",), loose=True),
-    Format(".vrma", "VRM Animation", _VRMA, "gltf", "vrma", options=("clip",), mocap=True, loose=True),
-    Format(".fbx", "FBX", _FBX, "fbx", options=("clip",), mocap=True, loose=True),
+    Format(".glb", "glTF 2.0", _GLB, "gltf", "glb", options=("clip", "rest"), mocap=True, loose=True),
+    Format(".gltf", "glTF 2.0, as text", _CHARACTER, "gltf", options=("clip", "rest"), loose=True),
+    Format(".vrm", "VRM avatar", _CHARACTER, "gltf", options=("clip", "rest"), loose=True),
+    Format(".vrma", "VRM Animation", _VRMA, "gltf", "vrma", options=("clip", "rest"), mocap=True, loose=True),
+    Format(".fbx", "FBX", _FBX, "fbx", options=("clip", "rest"), mocap=True, loose=True),
     Format(".html", "web page", "a page with a player: orbit, play, scrub, no network", writer="html"),
     Format(".gif", "picture", _GIF, writer="gif", needs="PIL"),
 )
@@ -115,7 +116,7 @@ HUMAN_HEIGHT = (0.5, 3.0)
 """Metres from the sole to the top of the skull, or from hand to hand, that a figure of a human's size has."""
 
 
-def read_motion(
+def read_motion(  # noqa: PLR0913  options, each of which has a default
     file: File,
     *,
     fps: float | None = None,
@@ -123,6 +124,7 @@ def read_motion(
     unit: str | float | None = None,
     partial: bool = False,
     clip: Clip = None,
+    rest: File | None = None,
     format: str | None = None,
 ) -> Motion:
     """Read a motion file, or a file object of bytes; "file.glb#Walk" is the clip Walk of file.glb.
@@ -134,17 +136,17 @@ def read_motion(
     partial: take the complete frames of a truncated AMC or BVH file, which is refused otherwise.
     clip: which motion of a file that holds several: a name as :func:`clips` has them, or a number from 1; by default
         the first, with a word in the log where there are others.
+    rest: a glTF file of the same joints that rests in a T-pose, for glTF and FBX files that rest in their first frame;
+        as "file.glb#TPose" the first frame of that clip. Of FBX an FBX file, too.
     format: the extension, such as "bvh", where it is not the path's; a file object needs it.
     FormatError for an unknown extension, a missing file, one that is not a motion, and an option that the format does
     not take or the file contradicts.
     """
     file, named = split_clip(file, READABLE)
     kind, path = _format(file, format, READABLE, "read"), place_of(file)
-    given = {"fps": fps, "asf": asf, "partial": partial or None, "clip": named if clip is None else clip}
-    options = {name: value for name, value in given.items() if value is not None}
-    for name in options.keys() - set(kind.options):
-        takers = " ".join(known.extension for known in FORMATS if name in known.options)
-        raise FormatError(path, f"{name!r} is an option of {takers} files only")
+    clip = named if clip is None else clip
+    given = {"fps": fps, "asf": asf, "partial": partial or None, "clip": clip, "rest": rest}
+    options = _taken(path, kind, given)
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # what gets infinite is refused by Motion
             motion = kind.read()(file, **options)
@@ -154,6 +156,15 @@ def read_motion(
         raise
     except MotionError as error:
         raise FormatError(path, str(error)) from error
+
+
+def _taken(path: Path, kind: Format, given: Mapping[str, Any]) -> dict[str, Any]:
+    """The options that are given, all of which a format must take."""
+    options = {name: value for name, value in given.items() if value is not None}
+    for name in options.keys() - set(kind.options):
+        takers = " ".join(known.extension for known in FORMATS if name in known.options)
+        raise FormatError(path, f"{name!r} is an option of {takers} files only")
+    return options
 
 
 def clips(file: File, *, format: str | None = None) -> tuple[str, ...]:

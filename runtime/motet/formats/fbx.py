@@ -28,11 +28,12 @@ SECONDS = 600
 """How long one may take."""
 
 
-def read(file: File, clip: Clip = None) -> Motion:
+def read(file: File, clip: Clip = None, rest: File | None = None) -> Motion:
     """Read a take, the first that moves a bone by default, or the rest pose as one frame where there is none.
 
     Lengths are metres. Channels: three angles in "deg" for each joint, the translation of the root and of joints that
     move in "length". FormatError names what the file lacks, and the extra where ufbx is not installed.
+    rest: as of :func:`motet.formats.gltf.read`, or an FBX file, whose own rest pose it then is.
     """
     path, content = place_of(file), read_bytes(file, MAX_BYTES)
     found = _gltf(path, content, 0 if clip is None else None)
@@ -41,7 +42,9 @@ def read(file: File, clip: Clip = None) -> Motion:
         found = _gltf(path, content, chosen(path, names, clip))
     elif names:
         chosen(path, names, None)  # which says that there are others
-    return gltf.read(found)
+    if rest is not None and place_of(rest).suffix.lower() == ".fbx":
+        rest = _gltf(place_of(rest), read_bytes(rest, MAX_BYTES), None)
+    return gltf.read(found, rest=rest)
 
 
 def clips(file: File) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 Scales of nodes count in lengths, and so does what nodes above the skeleton do.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,26 +13,32 @@ import numpy as np
 
 from motet.errors import FormatError, MotionError
 from motet.files import File, place_of
-from motet.formats.clips import Clip, chosen, clip_names
+from motet.formats.clips import Clip, chosen, clip_names, split_clip
 from motet.formats.gltf_data import Gltf, parse
 from motet.formats.gltf_figures import Figure, above, figure_of, figures, likeliest
 from motet.formats.gltf_tracks import FPS, Tracks, moved, tracks
 from motet.formats.lines import Names
-from motet.formats.nodes import Poses, motion_of_nodes
+from motet.formats.nodes import Poses, motion_of_nodes, rested
 from motet.motion.humanoid import BONES
 from motet.motion.motion import Motion
 from motet.motion.products import product, rotated
-from motet.motion.rotations import frames_last, quat_to_rotmat
+from motet.motion.rotations import Array, frames_last, quat_to_rotmat
+
+EXTENSIONS = (".glb", ".gltf", ".vrm", ".vrma")
+"""What these files are called."""
 
 
-def read(file: File, clip: Clip = None) -> Motion:
+def read(file: File, clip: Clip = None, rest: File | None = None) -> Motion:
     """Read a clip, the first by default, or the rest pose as one frame where there is none; lengths are metres.
+
+    rest: a file of the same joints that rests in a T-pose, or "file#clip", whose first frame is one: that is the rest
+        pose then, where the nodes of an animation without a character rest in its first frame.
 
     Bones of a VRM humanoid get VRM's names, other joints keep theirs. Channels: three angles in "deg" for each joint,
     the translation of the root and of joints that move in "length". FormatError names what the file lacks.
     """
     with broken(place_of(file)):
-        return _read(_parsed(file), clip)
+        return _read(_parsed(file), clip, {} if rest is None else _stance(rest))
 
 
 def clips(file: File) -> tuple[str, ...]:
@@ -73,15 +79,47 @@ def _parsed(file: File) -> _Scene:
     return _Scene(gltf, found, moving, clip_names(str(animation.get("name", "")) for animation in moving))
 
 
-def _read(scene: _Scene, clip: Clip) -> Motion:
+@dataclass(frozen=True)
+class _Take:
+    """A figure at rest, in one frame, and in the frames of an animation."""
+
+    figure: Figure
+    rest: Poses
+    poses: Poses
+    fps: float
+
+
+def _read(scene: _Scene, clip: Clip, turns: Mapping[str, Array]) -> Motion:
+    """turns: rotations (3, 3) in the world that joints are taken to rest in."""
+    named = scene.names or clip is not None
+    take = _take(scene, chosen(scene.gltf.path, scene.names, clip) if named else None)
+    names, parents = take.figure.names, take.figure.parents
+    if turns and not turns.keys() & set(names):
+        raise FormatError(scene.gltf.path, "the file of the rest pose has no joint of this figure's names")
+    rest = rested(take.rest, names, parents, turns)
+    return motion_of_nodes(
+        scene.gltf.path, _named(scene.gltf, take.figure), parents, rest, take.poses, take.fps, metres=1.0
+    )
+
+
+def _stance(file: File) -> dict[str, Array]:
+    """How a file's joints are turned (3, 3) in the world, by name: at rest, or where a clip is named in its start."""
+    file, clip = split_clip(file, EXTENSIONS)
+    if isinstance(file, str | Path) and Path(file).suffix.lower() not in EXTENSIONS:
+        raise FormatError(place_of(file), f"a rest pose is taken from one of {' '.join(EXTENSIONS)}")
+    with broken(place_of(file)):
+        scene = _parsed(file)
+        take = _take(scene, None if clip is None else chosen(scene.gltf.path, scene.names, clip))
+        return dict(zip(take.figure.names, (take.rest if clip is None else take.poses).turns[0], strict=True))
+
+
+def _take(scene: _Scene, index: int | None) -> _Take:
     gltf = scene.gltf
-    index = chosen(gltf.path, scene.names, clip) if scene.names or clip is not None else None
     animation = {} if index is None else scene.animations[index]
     figure = figure_of(gltf, likeliest(gltf, scene.figures, moved(animation)))
     values, fps = ({}, FPS) if index is None else tracks(gltf, animation, scene.names[index], above(gltf, figure.nodes))
     rest, poses = _world(gltf, {}, 1), _world(gltf, values, len(next(iter(values.values()), np.zeros(1))))
-    rest, poses = rest.of(figure.nodes), poses.of(figure.nodes)
-    return motion_of_nodes(gltf.path, _named(gltf, figure), figure.parents, rest, poses, fps, metres=1.0)
+    return _Take(figure, rest.of(figure.nodes), poses.of(figure.nodes), fps)
 
 
 def _named(gltf: Gltf, joints: Figure) -> list[str]:

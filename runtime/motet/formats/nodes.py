@@ -4,7 +4,7 @@ A motion's skeleton rests in the pose that the file's nodes rest in, with all ro
 pose, whatever the nodes' own axes.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -46,6 +46,21 @@ def motion_of_nodes(
     skeleton = skeleton_of_nodes(path, names, parents, offsets, metres)
     turned = product(poses.turns, inverse(rest.turns[0]))
     return motion_of(skeleton, turned, _moved(skeleton, turned, poses.places), fps)
+
+
+def rested(rest: Poses, names: Sequence[str], parents: Sequence[int], turns: Mapping[str, Array]) -> Poses:
+    """A rest pose with each bone turned as another figure's of its joints' names: rotations (3, 3) in the world.
+
+    Bones keep their lengths, and joints that the other lacks their turn against the joint that they hang on.
+    """
+    turned, places = rest.turns.copy(), rest.places.copy()
+    for i, (name, parent) in enumerate(zip(names, parents, strict=True)):
+        if parent >= 0:
+            back = turned[0, parent] @ rest.turns[0, parent].T
+            turned[0, i] = back @ rest.turns[0, i]
+            places[0, i] = places[0, parent] + back @ (rest.places[0, i] - rest.places[0, parent])
+        turned[0, i] = turns.get(name, turned[0, i])
+    return Poses(turned, places)
 
 
 def skeleton_of_nodes(

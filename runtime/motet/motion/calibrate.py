@@ -43,13 +43,17 @@ SMALL = 0.05
 
 @dataclass(frozen=True)
 class _Frames:
-    """Rotations (T, J, 3, 3) and positions (T, J, 3) of joints, which are bones, and what is found: A (J, 3, 3)."""
+    """Rotations (T, J, 3, 3) and positions (T, J, 3) of joints, which are bones, and what is found: A (J, 3, 3).
+
+    along_axes: whether the joints' axes are along bones and hinges.
+    """
 
     rotations: Array
     positions: Array
     joint_map: JointMap
     aims: Aims
     aligned: Array
+    along_axes: bool
 
     def turns(self, joint: int) -> Array:
         """Rotations (T, 3, 3) of the humanoid's bone for a joint whose A is found."""
@@ -62,7 +66,8 @@ class _Frames:
     def settle(self, joint: int, turns: Array) -> None:
         """A of a joint from estimates (T, 3, 3) of its bone's rotation: what the convention says, or near the axes."""
         known = self.joint_map.axes.get(joint)
-        self.aligned[joint] = _known(known) if known else _near_axes(_mean(self.rotations[:, joint], turns))
+        mean = _mean(self.rotations[:, joint], turns)
+        self.aligned[joint] = _known(known) if known else _near_axes(mean) if self.along_axes else mean
 
     def settle_limb(self, bone: str, along: Array, turns: Array) -> None:
         """The same for a bone of a limb, which then also points where it really does, along (T, 3)."""
@@ -91,9 +96,15 @@ def axes_agree(rotations: Array, positions: Array, joint_map: JointMap, aims: Ai
     )
 
 
-def alignments_of_frames(rotations: Array, positions: Array, joint_map: JointMap, aims: Aims) -> Array:
-    """A (J, 3, 3) for all joints that are bones, from rotations (T, J, 3, 3) and positions (T, J, 3) of frames."""
-    frames = _Frames(rotations, positions, joint_map, aims, np.tile(np.eye(3), (rotations.shape[1], 1, 1)))
+def alignments_of_frames(
+    rotations: Array, positions: Array, joint_map: JointMap, aims: Aims, along_axes: bool = True
+) -> Array:
+    """A (J, 3, 3) for all joints that are bones, from rotations (T, J, 3, 3) and positions (T, J, 3) of frames.
+
+    along_axes: whether joints have axes along bones and hinges, as in files that rest with all bones in one line.
+    """
+    still = np.tile(np.eye(3), (rotations.shape[1], 1, 1))
+    frames = _Frames(rotations, positions, joint_map, aims, still, along_axes)
     _trunk(frames)
     for side in LEFT_RIGHT:
         _leg(frames, side)

@@ -18,6 +18,7 @@ from motet.motion.rest_pose import (
     body_frame,
     direction,
     humanoid_direction,
+    moves,
     to_left,
     unit,
 )
@@ -29,6 +30,11 @@ ALONG = 0.96
 
 TWISTED = 30.0
 """Degrees from which on the hips' joint does not tell how the pelvis is turned: the joints of the legs do."""
+
+OUT_OF_A_MOTION = (
+    "the rest pose is out of a motion: how the joints stand was guessed from the frames, to 10 or 20 degrees; "
+    "give a file of this figure that rests in a T-pose (rest=, --rest)"
+)
 
 
 @dataclass(frozen=True)
@@ -84,7 +90,8 @@ def _fit(skeleton: Skeleton, joint_map: JointMap, rotations: Array, places: Arra
     leg = leg_of(skeleton, joint_map, aims, places[0] if len(places) else skeleton.rest_positions)
     still = np.tile(np.eye(3), (len(skeleton.joints), 1, 1))
     body = body_frame(skeleton.rest_positions, joint_map, aims)
-    if body is not None:
+    moving = len(places) > 1 and moves(skeleton.rest_positions, joint_map, aims)
+    if body is not None and not moving:
         aligned = alignments_of_pose(skeleton, (still, skeleton.rest_positions), body, joint_map, aims)
         heights = _heights(skeleton, joint_map, leg, skeleton.rest_positions @ body[:, 1])
         return Fitted(joint_map, aims, aligned, leg, heights, body[:, 1], True, 1.0, ())
@@ -102,10 +109,12 @@ def _fit(skeleton: Skeleton, joint_map: JointMap, rotations: Array, places: Arra
         left = unit(to_left(places, joint_map, "UpperLeg"))
         check_stance(places, joint_map)
         check_frames(places, joint_map, aims, dict.fromkeys(LEFT_RIGHT, left))
-    aligned = alignments_of_frames(rotations, places, joint_map, aims)
+    aligned = alignments_of_frames(rotations, places, joint_map, aims, along_axes=known or not moving)
     hips, carrier = joint_map.joints["hips"], joint_map.carrier(skeleton)
     aligned[carrier] = rotations[0, carrier].T @ rotations[0, hips] @ aligned[hips]
     heights = _heights(skeleton, joint_map, leg, None)
+    if moving and not known:
+        return Fitted(joint_map, aims, aligned, leg, heights, None, True, 0.7, (OUT_OF_A_MOTION,))
     how = "known by the convention" if known else "found from the frames"
     note = f"the rest pose is not a standing body: how the joints stand was {how}"
     return Fitted(joint_map, aims, aligned, leg, heights, None, True, 0.95 if known else 0.85, (note,))

@@ -18,6 +18,12 @@ from motet.motion.skeleton import Skeleton
 
 LIMBS = tuple(tuple(sided(side, part) for part in limb) for side in LEFT_RIGHT for limb in (LEG, ARM[1:]))
 
+ALIKE = np.cos(np.radians(6))
+"""Limbs of left and right whose directions mirror each other's by less than this cosine do not rest."""
+
+ALONG_AXES = np.cos(np.radians(18))
+"""Bones that point along axes by more than this cosine are in one line because nobody has posed them."""
+
 Aims = Mapping[str, tuple[int, ...]]
 """For a bone of a limb the joints whose mean place it points to."""
 
@@ -131,6 +137,19 @@ def body_frame(rest: Array, joint_map: JointMap, aims: Aims, exact: bool = False
     arms = [float((body.T @ to_left(rest, joint_map, part))[0]) for part in ("UpperArm", "LowerArm")]
     stands = all(leg[1] < -0.75 for leg in legs) and float(trunk_up(rest, joint_map) @ body[:, 1]) > 0.85
     return body if stands and all(foot[2] > 0.2 for foot in feet) and min(arms) > 0 else None
+
+
+def moves(rest: Array, joint_map: JointMap, aims: Aims) -> bool:
+    """Whether a rest pose (J, 3) is one out of a motion: limbs of left and right differ, and are not along axes."""
+    body = frame(to_left(rest, joint_map, "UpperLeg"), trunk_up(rest, joint_map))
+    bones = [(bone, sided("right", bone.removeprefix("left"))) for limb in LIMBS[:2] for bone in limb[:2] if aims[bone]]
+    left, right = (
+        np.array([unit(direction(rest, joint_map.joints[pair[side]], aims[pair[side]])) for pair in bones])
+        for side in (0, 1)
+    )
+    alike = np.sum((left @ body) * (right @ body) * [-1.0, 1.0, 1.0], axis=-1)
+    along = np.abs([left, right]).max(axis=-1)
+    return bool(alike.min() < ALIKE and along.min() < ALONG_AXES)
 
 
 def _leg_bones() -> list[str]:
