@@ -196,6 +196,13 @@ def test_a_process_that_breaks_down_is_a_broken_file(
         load(b"")
 
 
+def test_without_an_interpreter_it_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fbx, "find_spec", lambda name: True)
+    monkeypatch.setattr(fbx.sys, "executable", "/no/python")
+    with pytest.raises(FormatError, match="no process to read it can be started: No such file"):
+        motet.read(io.BytesIO(b""), format="fbx")
+
+
 def test_broken_files_are_refused() -> None:
     whole = binary_fbx(document(ARM, [swing()], settings(Y_UP)))
     long = Curves("Walk", [0.0, 1e7], {(1, "R"): np.eye(3)[:2]})

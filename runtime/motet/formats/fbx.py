@@ -77,6 +77,8 @@ def _run(path: Path, content: bytes, number: str) -> bytes:
         done = subprocess.run(command, input=content, capture_output=True, timeout=SECONDS, check=False)
     except subprocess.TimeoutExpired as error:
         raise FormatError(path, f"it takes more than {SECONDS} s to read") from error
+    except OSError as error:
+        raise FormatError(path, f"no process to read it can be started: {error.strerror}") from error
     if done.returncode:
         reason = done.stderr.decode(errors="replace")[:200] if done.returncode == 1 else "ufbx breaks down on it"
         raise FormatError(path, f"broken FBX file: {reason}")
