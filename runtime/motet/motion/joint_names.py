@@ -156,11 +156,12 @@ def _match(convention: Convention, skeleton: Skeleton) -> Match:
         if bone not in CHAINS and (found := [name for name in known if name in names])
     }
     chains = {
-        chain: tuple(sorted(names.index(name) for name in convention.names[chain] if name in names)) for chain in CHAINS
+        chain: tuple(sorted(names.index(name) for name in convention.names.get(chain, ()) if name in names))
+        for chain in CHAINS
     }
     known = {name for bone in convention.names.values() for name in bone} | convention.aside
     absent = [bone for bone in convention.names if bone not in joints and not chains.get(bone)]
-    absent += [name for chain in CHAINS for name in convention.names[chain] if name not in names]
+    absent += [name for chain in CHAINS for name in convention.names.get(chain, ()) if name not in names]
     axes = {i: convention.axes[name] for i, name in enumerate(names) if name in convention.axes}
     count = sum(name in known for name in names)
     return Match(convention.title, joints, chains, count, len(absent), convention.rest, axes)
