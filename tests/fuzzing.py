@@ -148,6 +148,7 @@ def _work(pipe: Connection, steps: Steps, limit: int) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (limit << 20, limit << 20))
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
     warnings.simplefilter("ignore")
+    pipe.send(None)
     while True:
         pipe.send(tried(steps, pipe.recv()))
 
@@ -165,6 +166,7 @@ class Worker:
         self._process = context.Process(target=_work, args=(other, self._steps, self._limit), daemon=True)
         self._process.start()
         other.close()
+        self._pipe.recv()  # it is there, however busy the machine
 
     def run(self, path: Path) -> Found:
         """What becomes of a file; "DIED" or "HANGS" where the worker did not live to say so."""
@@ -221,7 +223,7 @@ def fuzz(given: argparse.Namespace, mutate: Callable[[Generator], Mutant], steps
     """Try mutants and say what came of them; the exit code, which is 1 where one failed."""
     outcomes: Counter[str] = Counter()
     failures, slowest, largest, started = 0, 0.0, 0.0, time.perf_counter()
-    worker = Worker(steps, address_space=4096, patience=15 * given.seconds)
+    worker = Worker(steps, address_space=4096, patience=100 * given.seconds)
     with tempfile.TemporaryDirectory() as folder:
         for number in range(given.first, given.first + given.count):
             how, files = mutate(np.random.default_rng([given.seed, number]))
