@@ -34,7 +34,7 @@ Steps = Callable[[Path], Iterator[Callable[[], object]]]
 
 NASTY: list[Any] = [
     None, True, False, 0, 1, -1, 2, 255, 1 << 31, 1 << 63, 10**30, 0.5, -0.5, 1e9, 1e30, 1e308, 1e-320, "", "x", "0",
-    "batch", "../x", "\x00", "x" * 5000, [], {}, [None], [[]], {"x": 1}, [1e9] * 3, ["batch", 1], [0] * 1000,
+    "batch", "../x", "\x00", "\ud800", "x" * 5000, [], {}, [None], [[]], {"x": 1}, [1e9] * 3, ["batch", 1], [0] * 1000,
 ]  # fmt: skip
 """What stands in the place of a value. 10**400 and NaN are in tests/runtime/test_bundle.py."""
 
@@ -128,9 +128,9 @@ def tried(steps: Steps, path: Path) -> Found:
         try:
             step()
         except MotetError as error:
-            outcome, detail = (type(error).__name__, str(error)) if outcome == "runs" else (outcome, detail)
+            outcome, detail = (type(error).__name__, ascii(str(error))) if outcome == "runs" else (outcome, detail)
         except BaseException:
-            outcome, detail = "FOREIGN", traceback.format_exc()
+            outcome, detail = "FOREIGN", ascii(traceback.format_exc()).replace("\\n", "\n")
         slowest = max(slowest, time.process_time() - started)
         if outcome == "FOREIGN":
             break

@@ -75,6 +75,8 @@ BAD_NPZ = {
     "a shape of 10^14 rows": savez(**WHOLE).replace(
         b"'shape': (2, 1), }" + b" " * 13, b"'shape': (200000000000000, 1), }"
     ),
+    "no character": savez(**{**WHOLE, "channels": np.array([0x200061], np.uint32).view("U1")}),
+    "half a character": savez(**{**WHOLE, "channels": np.array([0xD800], np.uint32).view("U1")}),
     "a flat list": savez(**{**WHOLE, "values": np.zeros(2)}),
 }
 

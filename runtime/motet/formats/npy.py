@@ -29,4 +29,11 @@ def array(archive: zipfile.ZipFile, name: str, kinds: str) -> NDArray[Any]:
     size = len(content) - stream.tell()
     if dtype.kind not in kinds or math.prod(shape) * dtype.itemsize != size:
         raise ValueError(f"array {name!r} of {dtype} {shape} does not fit {size} bytes, or is of the wrong type")
+    if dtype.kind == "U" and not _is_text(np.frombuffer(content, f"{dtype.byteorder}u4", offset=stream.tell())):
+        raise ValueError(f"array {name!r} holds numbers that are no characters")
     return np.frombuffer(content, dtype, offset=stream.tell()).reshape(shape, order="F" if by_columns else "C")
+
+
+def _is_text(points: NDArray[np.uint32]) -> bool:
+    """Whether all are code points of Unicode: numpy makes strings of others, which nothing can print."""
+    return bool(((points < 0xD800) | ((points > 0xDFFF) & (points <= 0x10FFFF))).all())
