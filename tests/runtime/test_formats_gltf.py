@@ -265,6 +265,14 @@ def test_a_file_of_many_alike_nodes_is_read_in_time_that_grows_with_it(tmp_path:
     motion = gltf.read(tmp_path / "deep.gltf")
     assert motion.skeleton is not None
     assert motion.skeleton.names[-1] == "x_2000"
+    long = document | {"nodes": [{"children": [i + 1]} for i in range(4_000)] + [{}]}
+    for skins, said in (
+        ([{"joints": [0, 4_000]}], "its skeleton has 4001 joints"),
+        ([{}] * 1_001, "it has 1001 skins"),
+    ):
+        (tmp_path / "long.gltf").write_text(json.dumps(long | {"skins": skins}))
+        with pytest.raises(FormatError, match=said):
+            gltf.read(tmp_path / "long.gltf")
     nodes *= 20
     (tmp_path / "deep.gltf").write_text(json.dumps(document))
     with pytest.raises(FormatError, match="it has 40000 nodes"):

@@ -10,6 +10,7 @@ from motet.cli.notes import noted
 from motet.cli.options import session_options
 from motet.cli.reading import Read, naming, out_option, read_options
 from motet.cli.writing import Output, size, write_options
+from motet.formats import names_motion
 from motet.formats.html import write as write_html
 from motet.models.controllable import Controllable
 from motet.models.load import load_as
@@ -64,7 +65,7 @@ def control(
     model = load_as(Controllable, bundle, session)
     captions = model.captions(script)
     with naming(start), noted():
-        first = read(Path(start)) if start and Path(start).suffix else start
+        first = read(Path(start)) if start and (Path(start).suffix or names_motion(start)) else start
         motion = model.run(script, first, **{name: value for name, value in settings.items() if value is not None})
     motion = output.shaped(motion)
     if out.suffix.lower() == ".html":

@@ -117,8 +117,11 @@ def _take(scene: _Scene, index: int | None) -> _Take:
     gltf = scene.gltf
     animation = {} if index is None else scene.animations[index]
     figure = figure_of(gltf, likeliest(gltf, scene.figures, moved(animation)))
-    values, fps = ({}, FPS) if index is None else tracks(gltf, animation, scene.names[index], above(gltf, figure.nodes))
-    rest, poses = _world(gltf, {}, 1), _world(gltf, values, len(next(iter(values.values()), np.zeros(1))))
+    near = above(gltf, figure.nodes)
+    values, fps = ({}, FPS) if index is None else tracks(gltf, animation, scene.names[index], near)
+    rest = poses = _world(gltf, near, {}, 1)
+    if values:
+        poses = _world(gltf, near, values, len(next(iter(values.values()))))
     return _Take(figure, rest.of(figure.nodes), poses.of(figure.nodes), fps)
 
 
@@ -129,12 +132,12 @@ def _named(gltf: Gltf, joints: Figure) -> list[str]:
     return [bones.get(node) or given.unique(name) for node, name in zip(joints.nodes, joints.names, strict=True)]
 
 
-def _world(gltf: Gltf, values: Tracks, count: int) -> Poses:
-    """All nodes in the world in ``count`` frames, with tracks in place of the rest."""
+def _world(gltf: Gltf, near: set[int], values: Tracks, count: int) -> Poses:
+    """Nodes and all above them in the world in ``count`` frames, with tracks in place of the rest; others are 0."""
     nodes = len(gltf.objects("nodes"))
     linear, turns = frames_last((count, nodes, 3, 3)), frames_last((count, nodes, 3, 3))
     places = frames_last((count, nodes, 3))
-    for node in gltf.order:
+    for node in (node for node in gltf.order if node in near):
         rest = dict(zip(("translation", "rotation", "scale"), gltf.local(node), strict=True))
         move, quat, scale = (values.get((node, name), rest[name]) for name in ("translation", "rotation", "scale"))
         turn = quat_to_rotmat(quat / np.linalg.norm(quat, axis=-1, keepdims=True))

@@ -15,8 +15,11 @@ from motet.motion.skeleton import END_SUFFIX
 
 log = logging.getLogger(__name__)
 
-MAX_SKINS = 1000
+MAX_SKINS = 500
 """Skins of a file; a figure has one for each of its meshes."""
+
+MAX_JOINTS = 3000
+"""Joints of a figure; one with a face of many bones has a thousand."""
 
 THINGS = ("mesh", "camera")
 """What makes a node something else than a bone, unless it is animated; an extension, such as a light, does so, too."""
@@ -60,7 +63,9 @@ def figure_of(gltf: Gltf, joints: set[int]) -> Figure:
     """The joints and what lies between them, with the ends that hang on them."""
     inside = set(gltf.branch(joints))
     ends = {node for node in gltf.order if gltf.parents[node] in inside and _is_end(gltf, node)}
-    kept = tuple(node for node in gltf.order if node in inside | ends)
+    kept = tuple(node for node in gltf.order if node in inside or node in ends)
+    if len(kept) > MAX_JOINTS:
+        raise FormatError(gltf.path, f"its skeleton has {len(kept)} joints: expected at most {MAX_JOINTS}")
     at, given = {node: i for i, node in enumerate(kept)}, Names()
     names = tuple(given.unique(gltf.name(node)) for node in kept)
     return Figure(kept, tuple(at.get(gltf.parents[node], -1) for node in kept), names)
@@ -93,7 +98,8 @@ def _animated(gltf: Gltf, moved: set[int]) -> list[set[int]]:
     bones = {node for node in moved if not _is_thing(gltf, node, ("camera",))}
     hanging: set[int] = set()
     for node in gltf.order:
-        if gltf.parents[node] in bones | hanging and (node in bones or not _is_thing(gltf, node, THINGS)):
+        held = gltf.parents[node] in bones or gltf.parents[node] in hanging
+        if held and (node in bones or not _is_thing(gltf, node, THINGS)):
             hanging.add(node)
     parts = [part for part in _by_tree(gltf, bones | hanging) if part & bones & hanging]
     if not parts:

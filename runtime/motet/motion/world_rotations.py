@@ -31,14 +31,15 @@ def motion_of(skeleton: Skeleton, turned: Array, moved: dict[int, Array], fps: f
     frames: all in "deg" and "length", with angles that do not leap."""
     kept = [i for i, j in enumerate(skeleton.joints) if skeleton.children[i] or not j.name.endswith(END_SUFFIX)]
     angles = np.degrees(eulers_of(local_of(skeleton, turned)[:, kept], [skeleton.joints[i] for i in kept]))
+    columns = dict(zip(kept, np.moveaxis(angles, 1, 0), strict=True))
     names: list[str] = []
     values: list[Array] = []
     for i, joint in enumerate(skeleton.joints):
         if i in moved:
             names += [f"{joint.name}.t{axis}" for axis in AXES]
             values.append(moved[i])
-        if i in kept:
+        if i in columns:
             names += [f"{joint.name}.r{axis}" for axis in AXES]
-            values.append(angles[:, kept.index(i)])
+            values.append(columns[i])
     units = tuple("deg" if name[-2] == "r" else "length" for name in names)
     return Motion(np.concatenate(values, axis=1), tuple(names), units, fps, skeleton)
