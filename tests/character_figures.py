@@ -1,9 +1,10 @@
 """How motions stand on characters: ``python tests/character_figures.py MOTION... -- CHARACTER.glb...``.
 
 Each motion is written by --like and by --onto, and played by the names of the character's nodes with kinematics that
-are not motet's. Printed for each: the lowest corner of the character's mesh over all frames and in the median frame, in
-centimetres for a figure with the legs of the humanoid, how far the trunk and the limbs are off those of the
-humanoid, in degrees, and how much longer the path is than the humanoid's, in percent, legs made alike.
+are not motet's. Printed for each: the lowest corner of the character's mesh (its lowest joint where it has none) over
+all frames and in the median frame, in centimetres for a figure with the legs of the humanoid; how far the trunk is off
+the humanoid's, in the median frame and at most, and the limbs at most, in degrees; and how much longer the path is than
+the humanoid's, in percent, legs made alike.
 """
 
 import sys
@@ -60,13 +61,14 @@ def measured(file: Path, played: Played, motion: motet.Motion) -> str:
     if trunk(still)[0, 2, 2] < 0:  # the character faces the other way at rest
         figure, still = ({bone: each * [-1, 1, -1] for bone, each in places.items()} for places in (figure, still))
     scale = sum(np.linalg.norm(figure[a][0] - figure[b][0]) for a, b in BONES[:2]) / leg_length()
-    lowest = np.min([played.skin(node)[..., 1].min(axis=1) for node in played.skinned()], axis=0) / scale
+    points = [played.skin(node) for node in played.skinned()] or [played.places(*names.values())]
+    lowest = np.min([each[..., 1].min(axis=1) for each in points], axis=0) / scale
     up = trunk(figure) @ trunk(still)[0, 1]  # where the rest's up points; the line of the trunk may lean at rest
-    tilt = angles(up, trunk(human)[..., 1]).max()
+    tilt = angles(up, trunk(human)[..., 1])
     limb = max(angles(figure[b] - figure[a], human[b] - human[a]).max() for a, b in BONES)
     path = 100 * (way(figure) / scale / max(way(human), 1e-9) - 1)
     ground = f"lowest {100 * lowest.min():6.1f}, median {100 * np.median(lowest):5.1f} cm"
-    return f"{ground}  trunk {tilt:4.1f} limbs {limb:4.1f} deg  path {path:5.2f} %"
+    return f"{ground}  trunk {np.median(tilt):4.1f}, {tilt.max():4.1f} limbs {limb:4.1f} deg  path {path:5.2f} %"
 
 
 def main(arguments: list[str]) -> None:

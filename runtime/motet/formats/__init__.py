@@ -74,6 +74,7 @@ _GIF = "a picture that moves; needs Pillow: `pip install 'motet[plot]'`"
 _NPZ = "everything, to the last bit; of AMASS the body's joints"
 _GLB = "a skeleton and its animations, each a clip; written with a body, for viewers and engines"
 _CHARACTER = "a skeleton and its animations, each a clip, or the pose that it rests in"
+_AVATAR = f"{_CHARACTER}; written by `--onto`, the avatar itself ([humanoid.md](humanoid.md#characters))"
 _FBX = "a skeleton and its takes, each a clip; needs ufbx: `pip install 'motet[fbx]'`"
 _VRMA = "the humanoid: a motion of another human figure is brought to it ([humanoid.md](humanoid.md))"
 
@@ -85,7 +86,7 @@ FORMATS = (
     Format(".xml", "MMM of KIT", "angles and root; the skeleton is not in the file", "mmm"),
     Format(".glb", "glTF 2.0", _GLB, "gltf", "glb", options=("clip", "rest"), mocap=True, loose=True),
     Format(".gltf", "glTF 2.0, as text", _CHARACTER, "gltf", options=("clip", "rest"), loose=True),
-    Format(".vrm", "VRM avatar", _CHARACTER, "gltf", options=("clip", "rest"), loose=True),
+    Format(".vrm", "VRM avatar", _AVATAR, "gltf", options=("clip", "rest"), loose=True),
     Format(".vrma", "VRM Animation", _VRMA, "gltf", "vrma", options=("clip", "rest"), mocap=True, loose=True),
     Format(".fbx", "FBX", _FBX, "fbx", options=("clip", "rest"), mocap=True, loose=True),
     Format(".html", "web page", "a page with a player: orbit, play, scrub, no network", writer="html"),
