@@ -185,12 +185,19 @@ def test_a_frame_time_is_a_whole_rate_as_far_as_it_tells(read, time, fps):
     assert read(PLAIN.replace("0.033333", time)).fps == pytest.approx(fps, rel=1e-12)
 
 
-@pytest.mark.parametrize("declared", [1, 5])
-def test_another_number_of_frames_than_declared(read, declared):
-    text = PLAIN.replace("Frames: 2", f"Frames: {declared}")
-    with pytest.raises(FormatError, match=f"declares {declared} frames but holds 2"):
+def test_fewer_frames_than_declared(read):
+    text = PLAIN.replace("Frames: 2", "Frames: 5")
+    with pytest.raises(FormatError, match="declares 5 frames but holds 2"):
         read(text)
     assert len(read(text, partial=True)) == 2
+
+
+def test_more_frames_than_declared_are_taken_and_said(read, caplog):
+    motion = read(PLAIN.replace("Frames: 2", "Frames: 1"))
+    np.testing.assert_array_equal(motion.values, read(PLAIN).values)
+    assert [record.message.partition(": ")[2] for record in caplog.records] == [
+        "it declares 1 frames and holds 2: took them all"
+    ]
 
 
 @pytest.mark.parametrize(

@@ -90,6 +90,24 @@ def test_npz_refuses_what_is_no_motion(tmp_path, name):
     assert error.value.path == path
 
 
+@pytest.mark.parametrize(
+    ("arrays", "said"),
+    [
+        (
+            ("posed_joints", "local_rot_mats", "root_positions"),
+            "Kimodo's npz, which has no skeleton: convert it to BVH",
+        ),
+        (("fps", "joint_pos", "body_pos_w", "body_quat_w"), "a robot's motion"),
+        (("fps", "root_pos", "root_rot", "dof_pos"), "angles of a robot's motors"),
+    ],
+)
+def test_npz_of_other_programs_is_called_what_it_is(tmp_path, arrays, said):
+    path = tmp_path / "b.npz"
+    path.write_bytes(savez(**{name: np.zeros((3, 3)) for name in arrays}))
+    with pytest.raises(FormatError, match=said):
+        npz.read(path)
+
+
 def test_an_array_that_would_not_fit_into_memory_is_not_unpacked(tmp_path):
     path = tmp_path / "b.npz"
     path.write_bytes(with_size(savez(**WHOLE), 2**29 + 1))

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from gltf_files import read_document, write_clips, write_document
-from test_retarget import SKELETONS, angles_between, dancing, skeleton_file
+from test_retarget import SKELETONS, angles_between, dancing, limbless, skeleton_file
 
 from motet.errors import FormatError, MotionError
 from motet.formats import read_motion
@@ -271,3 +271,34 @@ def test_a_rest_pose_is_taken_from_a_file_of_these_joints_alone(tmp_path: Path) 
         read_motion(path, rest=tmp_path / "none.glb")
     with pytest.raises(FormatError, match="'rest' is an option of"):
         read_motion(SKELETONS / "mixamo.bvh", rest=path)
+
+
+@pytest.mark.parametrize("spare", [("ribs", "tip"), ("leftEye", "Thumb1")])
+def test_a_known_rest_pose_is_not_forced_on_other_figures_of_the_same_names(spare: tuple[str, str]) -> None:
+    """The humanoid, which rests in a straight T-pose, by names of CMU's figure of 43 joints: with joints that it lacks,
+    and with none."""
+    names = {"hips": "hip", "spine": "abdomen", "chest": spare[0], "upperChest": "chest"}
+    parts = {"UpperLeg": "Thigh", "LowerLeg": "Shin", "Foot": "Foot", "Toes": spare[1], "Shoulder": "Collar"}
+    parts |= {"UpperArm": "Shldr", "LowerArm": "ForeArm", "Hand": "Hand"}
+    names |= {f"{side}{old}": f"{side[0]}{new}" for side in ("left", "right") for old, new in parts.items()}
+    dance = dancing(9)
+    found = to_humanoid(with_names(dance, [names.get(name, name) for name in HUMANOID.names]))
+    assert found.convention == "CMU in BVH, 43 joints (Poser, DAZ)"
+    assert apart(found.motion, dance, ("spine", "hest", "neck", "Toes", "_end")) < 1e-3
+    assert not any("made up for" in note for note in found.notes)
+
+
+def test_a_foot_in_line_with_the_shin_has_no_direction() -> None:
+    """As in the first example files of Biovision: the tip of the ankle lies straight below."""
+    like = limbless(skeleton_file("mixamo"), "mixamorig:LeftToeBase", "mixamorig:RightToeBase")
+    skeleton = skeleton_of(like)
+    feet = [f"mixamorig:{side}Foot" for side in ("Left", "Right")]
+    tips = [Joint(f"{foot}_end", skeleton.index(foot), (0.0, -8.0, 0.0)) for foot in feet]
+    motion = replace(like, skeleton=Skeleton((*skeleton.joints, *tips)))
+    found = to_humanoid(motion)
+    assert found.confidence > 0.9
+    assert found.figure.fitted.at_rest
+    turned = global_transforms(found.motion)[0]
+    for side in ("left", "right"):
+        foot, shin = (turned[:, HUMANOID.index(f"{side}{part}")] for part in ("Foot", "LowerLeg"))
+        np.testing.assert_allclose(foot, shin, atol=1e-9)

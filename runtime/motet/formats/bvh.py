@@ -45,8 +45,8 @@ def read(file: File, partial: bool = False) -> Motion:
 
     A frame time is read as a whole number of frames per second if that is the only one which its digits allow:
     0.0083333 is 120 fps, and 0.03, which may stand for 29 to 40, is 33.33.
-    partial: take the complete frames of a file that is truncated or declares another number, which is refused
-        otherwise.
+    partial: take the complete frames of a file that is truncated or holds fewer than it declares, which is refused
+        otherwise. Of one that holds more all are taken, with a warning in the log.
     FormatError names file and line.
     """
     path, lines = place_of(file), read_text(file).split("\n")
@@ -57,11 +57,13 @@ def read(file: File, partial: bool = False) -> Motion:
         raise FormatError(path, f"the file declares {declared} frames and has no channels", start)
     kept = _without_broken_end(lines, start, len(channels)) if partial else lines
     values = _values(path, kept, start, len(channels)) if channels else np.zeros((declared, 0))
-    if len(values) != declared and not partial:
+    if len(values) < declared and not partial:
         reason = f"the file declares {declared} frames but holds {len(values)}: correct the line 'Frames:'"
         raise FormatError(path, f"{reason}, or read it with partial=True (--partial)", start)
-    if len(values) != declared:
+    if len(values) < declared:
         log.info("%s: took %d frames of the %d that it declares", path, len(values), declared)
+    elif len(values) > declared:
+        log.warning("%s: it declares %d frames and holds %d: took them all", path, declared, len(values))
     units = tuple("deg" if name[-2] == "r" else "length" for name in channels)
     return Motion(values, tuple(channels), units, fps, Skeleton(tuple(_joint(path, node) for node in nodes)))
 

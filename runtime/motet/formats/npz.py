@@ -7,6 +7,7 @@ text of the JSON object of :meth:`motet.motion.skeleton.Skeleton.to_json`, empty
 import io
 import json
 import zipfile
+from pathlib import Path
 
 import numpy as np
 
@@ -17,6 +18,14 @@ from motet.formats.lines import frame_rate, read_bytes
 from motet.formats.npy import MAX_BYTES, array
 from motet.motion.motion import Motion
 from motet.motion.skeleton import Skeleton
+
+OTHERS = {
+    "posed_joints": "Kimodo's npz, which has no skeleton: convert it to BVH with its own kimodo_convert",
+    "body_pos_w": "a robot's motion as controllers are trained on, and no human's",
+    "dof_pos": "angles of a robot's motors, and no human's",
+    "joint_pos": "angles of a robot's motors, and no human's",
+}
+"""An array -> what a file that has it is."""
 
 KINDS = {"values": "fiu", "channels": "U", "units": "U", "fps": "fiu", "skeleton": "U"}
 """Array -> the kinds of dtype that it may have."""
@@ -29,6 +38,7 @@ def read(file: File) -> Motion:
         return amass.parse(path, content)
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            _refuse_others(path, {name.removesuffix(".npy") for name in archive.namelist()})
             values, channels, units, fps, skeleton = (array(archive, name, kinds) for name, kinds in KINDS.items())
         names, kinds, text = map(str, channels.tolist()), map(str, units.tolist()), str(skeleton)
         bones = Skeleton.from_json(json.loads(text)) if text else None
@@ -38,6 +48,13 @@ def read(file: File) -> Motion:
     # a damaged archive makes zipfile, its unpackers, numpy and json raise errors of a dozen types
     except Exception as error:
         raise FormatError(path, f"not a motion that motet wrote as .npz: {str(error)[:200]}") from error
+
+
+def _refuse_others(path: Path, arrays: set[str]) -> None:
+    """Say what a file is whose arrays are those of another program, not what motet's own files have."""
+    for name, kind in OTHERS.items():
+        if name in arrays and not arrays >= KINDS.keys():
+            raise FormatError(path, f"this is {kind}; expected a motion of motet or of AMASS")
 
 
 def write(file: File, motion: Motion) -> None:

@@ -28,8 +28,13 @@ from motet.motion.skeleton import Skeleton
 ALONG = 0.96
 """Cosine above which a bone counts as standing as in a T-pose."""
 
+SAME = np.cos(np.radians(4))
+"""Cosine above which a bone points where a convention says."""
+
 TWISTED = 30.0
 """Degrees from which on the hips' joint does not tell how the pelvis is turned: the joints of the legs do."""
+
+KNOWN_REST = "the convention's rest pose, which is no straight T-pose, was made up for"
 
 OUT_OF_A_MOTION = (
     "the rest pose is out of a motion: how the joints stand was guessed from the frames, to 10 or 20 degrees; "
@@ -92,9 +97,14 @@ def _fit(skeleton: Skeleton, joint_map: JointMap, rotations: Array, places: Arra
     body = body_frame(skeleton.rest_positions, joint_map, aims)
     moving = len(places) > 1 and moves(skeleton.rest_positions, joint_map, aims)
     if body is not None and not moving:
+        if joint_map.rest is not None and not _rests_as_known(skeleton.rest_positions, body, joint_map, aims):
+            joint_map = replace(joint_map, rest=None)
         aligned = alignments_of_pose(skeleton, (still, skeleton.rest_positions), body, joint_map, aims)
         heights = _heights(skeleton, joint_map, leg, skeleton.rest_positions @ body[:, 1])
-        return Fitted(joint_map, aims, aligned, leg, heights, body[:, 1], True, 1.0, ())
+        notes = (
+            () if joint_map.rest is None else ("the rest pose is one that the convention knows, which was made up for",)
+        )
+        return Fitted(joint_map, aims, aligned, leg, heights, body[:, 1], True, 1.0, notes)
     known = bool(len(places)) and axes_agree(rotations, places, joint_map, aims)
     joint_map = joint_map if known else replace(joint_map, axes={})
     first = body_frame(places[0], joint_map, aims, exact=True) if len(places) and not known else None
@@ -118,6 +128,14 @@ def _fit(skeleton: Skeleton, joint_map: JointMap, rotations: Array, places: Arra
     how = "known by the convention" if known else "found from the frames"
     note = f"the rest pose is not a standing body: how the joints stand was {how}"
     return Fitted(joint_map, aims, aligned, leg, heights, None, True, 0.95 if known else 0.85, (note,))
+
+
+def _rests_as_known(rest: Array, body: Array, joint_map: JointMap, aims: Aims) -> bool:
+    """Whether bones point in the rest pose (J, 3) where the convention says, within some degrees."""
+    return all(
+        float(unit(direction(rest, joint_map.joints[bone], aims[bone])) @ body @ unit(np.array(points))) > SAME
+        for bone, points in joint_map.points.items()
+    )
 
 
 def _is_t_pose(pose: Array, body: Array, joint_map: JointMap, aims: Aims) -> bool:

@@ -40,6 +40,7 @@ class JointMap:
     confidence: from 0 to 1, how sure it is that each joint is what it is taken for.
     rest: where the convention is known to rest in a pose of its own: bone -> the rotation vector in degrees by which
         the humanoid's bone is turned in that pose; a bone that is not named is not turned.
+    points: bone -> where it points in that pose (3), left, up and forward: a skeleton that rests otherwise is another.
     axes: where the convention is known to rest in no body's pose: joint -> its axes that point to the humanoid's left,
         up and forward in a T-pose, such as "-z x -y".
     """
@@ -50,6 +51,7 @@ class JointMap:
     convention: str
     confidence: float
     rest: Mapping[str, Triple] | None = None
+    points: Mapping[str, Triple] = field(default_factory=dict)
     axes: Mapping[int, str] = field(default_factory=dict)
 
     def carrier(self, skeleton: Skeleton) -> int:

@@ -4,7 +4,8 @@ A table is a JSON object: "title"; "sides", pairs of what stands for left and ri
 have, with ``{s}`` in the place of the side (of "spine" and "neck" all that are there count, upwards, of others the
 first); "aside", other joints that files of this convention have and that tell it from its neighbours; "prefixes",
 regular expressions of what can stand before every name; "rest", for files that are known to rest in a T-pose of their
-own, what that pose is on the humanoid: bone -> rotation vector in degrees, of the left side; "axes", for files that
+own, what that pose is on the humanoid: bone -> rotation vector in degrees, of the left side, and "points", where bones
+point there, by which such a file is known among others of these names; "axes", for files that
 rest in no body's pose: name -> the joint's axes that point left, up and forward in a T-pose. Upper and lower case and
 separators do not count.
 """
@@ -20,7 +21,7 @@ from typing import Any
 from motet.errors import MotionError
 from motet.motion.humanoid import LEFT_RIGHT, sided
 from motet.motion.joint_map import JointMap, Triple, check_map, missing_bones, missing_reason, one_sided
-from motet.motion.skeleton import Skeleton
+from motet.motion.skeleton import END_SUFFIX, Skeleton
 
 
 class HalfKnownError(MotionError):
@@ -40,6 +41,7 @@ class Convention:
     aside: frozenset[str]
     prefixes: tuple[str, ...]
     rest: dict[str, Triple] | None
+    points: dict[str, Triple]
     axes: dict[str, str]
 
 
@@ -56,6 +58,7 @@ class Match:
     known: int
     absent: int
     rest: dict[str, Triple] | None
+    points: dict[str, Triple]
     axes: dict[int, str]
 
     def fit(self) -> tuple[int, int]:
@@ -90,19 +93,18 @@ def _convention(content: dict[str, Any], sides: Sequence[str]) -> Convention:
     aside = {plain(name.replace("{s}", word)) for name in content.get("aside", []) for word in sides}
     axes = {plain(name): known for name, known in content.get("axes", {}).items()}
     prefixes = tuple(content.get("prefixes", ()))
-    return Convention(content["title"], names, frozenset(aside), prefixes, _rest(content.get("rest")), axes)
+    rest = _of_both_sides(content["rest"], (1, -1, -1)) if "rest" in content else None
+    points = _of_both_sides(content.get("points", {}), (-1, 1, 1))
+    return Convention(content["title"], names, frozenset(aside), prefixes, rest, points, axes)
 
 
-def _rest(turns: dict[str, list[float]] | None) -> dict[str, Triple] | None:
-    """The turns of both sides: those of the right mirror those of the left."""
-    if turns is None:
-        return None
-    rest: dict[str, Triple] = {}
-    for bone, (x, y, z) in turns.items():
-        rest |= (
-            {bone: (x, y, z)} if bone in TRUNK else {sided("left", bone): (x, y, z), sided("right", bone): (x, -y, -z)}
-        )
-    return rest
+def _of_both_sides(of_left: dict[str, list[float]], signs: tuple[int, int, int]) -> dict[str, Triple]:
+    """Vectors of bones of both sides: those of the right are those of the left with signs, which mirror them."""
+    found: dict[str, Triple] = {}
+    for bone, (x, y, z) in of_left.items():
+        right = (signs[0] * x, signs[1] * y, signs[2] * z)
+        found |= {bone: (x, y, z)} if bone in TRUNK else {sided("left", bone): (x, y, z), sided("right", bone): right}
+    return found
 
 
 def plain(name: str) -> str:
@@ -139,7 +141,14 @@ def map_by_names(skeleton: Skeleton) -> JointMap | None:
         return None
     confidence = round(1.0 - 0.3 * best.absent / (best.absent + best.known), 2)
     found = JointMap(
-        best.joints, best.chains["spine"], best.chains["neck"], best.title, confidence, best.rest, best.axes
+        best.joints,
+        best.chains["spine"],
+        best.chains["neck"],
+        best.title,
+        confidence,
+        best.rest,
+        best.points,
+        best.axes,
     )
     try:
         return check_map(skeleton, found)
@@ -164,7 +173,9 @@ def _match(convention: Convention, skeleton: Skeleton) -> Match:
     absent += [name for chain in CHAINS for name in convention.names.get(chain, ()) if name not in names]
     axes = {i: convention.axes[name] for i, name in enumerate(names) if name in convention.axes}
     count = sum(name in known for name in names)
-    return Match(convention.title, joints, chains, count, len(absent), convention.rest, axes)
+    # other makers' figures of these names have joints besides, or rest in another pose
+    rest = convention.rest if count >= sum(not name.endswith(END_SUFFIX) for name in skeleton.names) else None
+    return Match(convention.title, joints, chains, count, len(absent), rest, convention.points, axes)
 
 
 def _refuse_two_hips(skeleton: Skeleton, names: list[str], hips: tuple[str, ...]) -> None:

@@ -18,6 +18,9 @@ from motet.motion.skeleton import Skeleton
 
 LIMBS = tuple(tuple(sided(side, part) for part in limb) for side in LEFT_RIGHT for limb in (LEG, ARM[1:]))
 
+IN_LINE = np.cos(np.radians(15))
+"""A foot that goes on from the shin within this cosine has no direction of its own."""
+
 ALIKE = np.cos(np.radians(6))
 """Limbs of left and right whose directions mirror each other's by less than this cosine do not rest."""
 
@@ -56,13 +59,22 @@ def humanoid_direction(bone: str) -> Array:
 
 
 def aims_of(skeleton: Skeleton, joint_map: JointMap) -> Aims:
-    """What each bone of a limb points to: the limb's next bone, or the joints after it but the thumb; none if none."""
+    """What each bone of a limb points to: the limb's next bone, or the joints after it but the thumb; none if none.
+
+    A foot without toes whose tip lies in line with the shin, as in old files, is no more than the shin's end.
+    """
     aims = {}
     for limb in LIMBS:
         for bone, after in zip(limb, (*limb[1:], ""), strict=True):
             if bone in joint_map.joints:
                 joint = joint_map.joints[bone]
                 aims[bone] = (joint_map.joints[after],) if after in joint_map.joints else _ends(skeleton, joint)
+    for foot, toes, shin in (
+        (sided(side, "Foot"), sided(side, "Toes"), sided(side, "LowerLeg")) for side in LEFT_RIGHT
+    ):
+        if aims.get(foot) and toes not in joint_map.joints:
+            ends = [unit(direction(skeleton.rest_positions, joint_map.joints[i], aims[i])) for i in (shin, foot)]
+            aims[foot] = () if ends[0] @ ends[1] > IN_LINE else aims[foot]
     return aims
 
 
