@@ -28,11 +28,13 @@ def blocks(text: str, language: str) -> list[str]:
 
 @pytest.fixture
 def clone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A working directory with the folders of the repository, and one for what is written."""
+    """A working directory with the folders of the repository, a character of the reader's, and a folder to write to."""
     for place in ROOT.iterdir():
         if place.is_dir() and place.name != "out" and not place.name.startswith("."):
             (tmp_path / place.name).symlink_to(place)
     (tmp_path / "out").mkdir()
+    character = read_motion(ROOT / "tests/runtime/skeletons/mixamo.bvh", unit="cm")
+    write_motion(tmp_path / "character.glb", character)  # with a simple body for a mesh
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -111,7 +113,7 @@ def test_commands_exist_with_their_options(page: str) -> None:
 
 
 def test_the_readmes_commands_run_in_their_order(clone: Path) -> None:
-    """What one command reads an earlier one has written, but for KIT's recordings, which are not in the repository."""
+    """What one command reads an earlier one has written, but for a character and for KIT's recordings."""
     lines = list(commands(PAGES["README.md"].read_text()))
     runnable = [line for line in lines if "kit" not in line]
     assert len(runnable) == len(lines) - 2
