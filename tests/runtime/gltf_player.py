@@ -28,6 +28,25 @@ def matrix(move: Array, quat: Array, scale: Array) -> Array:
     return found
 
 
+def between(keys: Array, values: Array, sampler: dict[str, Any], times: Array) -> Array:
+    """Values (T, K) of a sampler at some times: of rotations the shortest way on the sphere."""
+    after = np.clip(np.searchsorted(keys, times, "right"), 1, max(len(keys) - 1, 1))
+    one, other = values[after - 1], values[np.minimum(after, len(keys) - 1)]
+    span = keys[np.minimum(after, len(keys) - 1)] - keys[after - 1]
+    part = np.clip((times - keys[after - 1]) / np.where(span > 0, span, 1), 0, 1)[:, None]
+    if sampler.get("interpolation") == "STEP":
+        return np.where(part < 1, one, other)
+    cosine = np.sum(one * other, axis=1, keepdims=True)
+    angle = np.arccos(np.clip(np.abs(cosine), 0, 1))
+    if values.shape[1] < 4 or not (angle > 1e-6).any():
+        straight: Array = one + part * (other - one)
+        return straight
+    sine = np.where(angle > 1e-6, np.sin(angle), 1)
+    weights = [np.where(angle > 1e-6, np.sin(share * angle) / sine, share) for share in (1 - part, part)]
+    round_: Array = weights[0] * one + weights[1] * np.where(cosine < 0, -other, other)
+    return round_
+
+
 @dataclass
 class Played:
     """A GLB file; what moves its nodes is at their rest, until :meth:`play` says otherwise."""
@@ -74,6 +93,19 @@ class Played:
             target = channel["target"]
             keys = self.array(animation["samplers"][channel["sampler"]]["output"])
             found[self.names[target["node"]], target["path"]] = keys
+        return found
+
+    def sampled(self, number: int, fps: float, frames: int) -> dict[tuple[str, str], Array]:
+        """The tracks of an animation, linear or in steps, at a frame rate from its first key on."""
+        animation = self.document["animations"][number]
+        keys = {i: self.array(sampler["input"])[:, 0] for i, sampler in enumerate(animation["samplers"])}
+        moved = [channel for channel in animation["channels"] if channel["target"]["path"] != "weights"]
+        times = min(keys[channel["sampler"]][0] for channel in moved) + np.arange(frames) / fps
+        found = {}
+        for channel in moved:
+            sampler, target = animation["samplers"][channel["sampler"]], channel["target"]
+            values = between(keys[channel["sampler"]], self.array(sampler["output"]), sampler, times)
+            found[self.names[target["node"]], target["path"]] = values
         return found
 
     def play(self, clip: dict[tuple[str, str], Array]) -> Self:
