@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any, overload
 
 import numpy as np
@@ -259,8 +260,6 @@ class PredictSession:
         self.model = model
         self._kept = math.ceil((model.seed_frames + 1) * start.fps / model.fps) + 1
         self._motion = start[-self._kept :]
-        self._measured: Figure | None = None
-        self._known = False
 
     def push(self, frames: ArrayLike) -> None:
         """The next frame (D,), or several (T, D); MotionError where they do not fit, and then nothing has changed."""
@@ -275,6 +274,8 @@ class PredictSession:
 
     def predict(self, frames: int | None = None) -> Motion:
         """As :meth:`PredictModel.predict`, after all that was pushed so far."""
-        if not self._known:
-            self._measured, self._known = self.model.contract.measured(self._motion), True
         return self.model.following(self._motion, frames, self._measured)
+
+    @cached_property
+    def _measured(self) -> Figure | None:
+        return self.model.contract.measured(self._motion)
