@@ -1,6 +1,7 @@
 """``motet check``: what is found of files whose figure, place and way are known, and how a folder is told."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from gltf_files import write_clips
 import motet
 from motet import checked
 from motet.checked import Checked
+from motet.errors import MotionError
 from motet.motion import HUMANOID, Motion
 
 FRAMES, FPS = 40, 30.0
@@ -68,7 +70,8 @@ def test_clips_and_what_is_no_human(tmp_path: Path) -> None:
     motet.write(tmp_path / "b.npz", walker())
     refused = motet.check(tmp_path / "b.npz")
     assert (refused.frames, refused.joints, refused.sure) == (40, 14, False)
-    assert "no human's" in str(refused.refused)
+    with pytest.raises(MotionError, match=re.escape(str(refused.refused))):
+        motet.to_humanoid(walker())
     assert refused.convention is refused.height is refused.travel is None
 
 
