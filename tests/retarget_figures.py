@@ -22,10 +22,12 @@ from motet.formats import read_motion
 from motet.models.describe import DescribeModel
 from motet.models.language import MAX_SECONDS
 from motet.motion.humanoid import BONES, HUMANOID
-from motet.motion.kinematics import global_transforms
+from motet.motion.kinematics import global_transforms, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.retarget import from_humanoid, to_humanoid
 from motet.motion.rigs import MIXAMO
+from motet.motion.skeleton import Skeleton
+from motet.motion.world_rotations import motion_of
 
 ARCHIVES = ("cmu-asfamc.zip", "cmu-asfamc-more.zip", "cmu-bvh.zip", "cmu-bvh-more.zip", "accad-bvh.zip")
 
@@ -45,6 +47,7 @@ STOCKY = replace(
 )
 """A figure of Mixamo's names with short legs and a long trunk."""
 
+TRUNK = ("hips", "spine", "chest", "upperChest", "neck", "head")
 LIMBS = tuple(bone for bone in BONES if bone.endswith(("UpperLeg", "LowerLeg", "Foot", "UpperArm", "LowerArm")))
 
 
@@ -116,6 +119,32 @@ def _print_actions(folder: Path) -> None:
     print("\n".join(different))
 
 
+def in_its_start(motion: Motion) -> Motion:
+    """The motion on a skeleton that rests in its first frame."""
+    skeleton, (turned, places) = skeleton_of(motion), global_transforms(motion)
+    offsets = [places[0, i] - (places[0, j.parent] if j.parent >= 0 else 0.0) for i, j in enumerate(skeleton.joints)]
+    joints = [replace(j, offset=tuple(o), axis=(0.0, 0.0, 0.0)) for j, o in zip(skeleton.joints, offsets, strict=True)]
+    rested = Skeleton(tuple(joints), skeleton.metres_per_unit)
+    return motion_of(rested, turned @ np.swapaxes(turned[0], -1, -2), {0: places[:, 0]}, motion.fps)
+
+
+def _print_rests(figures: Path) -> None:
+    """How far off the humanoid is where clips of several characters rest in their first frame, by bones and twists."""
+    apart = []
+    for path in (figures / f"{name}.glb" for name in ("Michelle", "Soldier", "Xbot", "many-clips")):
+        for motion in (read_motion(path, clip=clip) for clip in motet.clips(path)):
+            if len(motion) > 4:
+                known, guessed = (global_transforms(to_humanoid(m).motion)[0] for m in (motion, in_its_start(motion)))
+                cosines = (np.trace(np.swapaxes(known, -1, -2) @ guessed, axis1=-2, axis2=-1) - 1) / 2
+                degrees = np.degrees(np.arccos(np.clip(cosines, -1, 1)))
+                bones = [[HUMANOID.index(bone) for bone in of] for of in (TRUNK, LIMBS)]
+                apart.append([degrees[:, of].mean() for of in bones])
+    (trunk, limbs), worst = np.mean(apart, axis=0), np.max(apart)
+    print(
+        f"{len(apart)} clips resting in their start: trunks {trunk:.0f} degrees off, limbs {limbs:.0f}, worst {worst:.0f}"
+    )
+
+
 def _print_times(motion: Motion) -> None:
     """Milliseconds of one core for ten seconds of a motion of CMU's, there and on."""
     for fps in (30, 120):
@@ -163,6 +192,8 @@ def main(data: Path) -> None:
             print(f"{name}  {len(amc):5d}  {apart:6.2f}  {mean:6.2f}  {worst} {limbs[worst]:.2f}")
         _print_descriptions(folder)
         _print_actions(folder)
+        if (data / "figures").is_dir():
+            _print_rests(data / "figures")
         _print_times(next(amc for _, _, amc, _ in both_forms(folder)))
 
 
