@@ -245,7 +245,7 @@ def test_a_model_of_a_relative_path_pickles_to_another_folder(
 
 
 def test_bombs_are_refused_at_once(folder: Path, tmp_path: Path) -> None:
-    started = time.perf_counter()
+    started = time.process_time()
     zeros = tmp_path / "zeros.zip"
     with zipfile.ZipFile(zeros, "w", zipfile.ZIP_DEFLATED) as archive, archive.open("manifest.json", "w") as member:
         for _ in range(30):
@@ -254,7 +254,7 @@ def test_bombs_are_refused_at_once(folder: Path, tmp_path: Path) -> None:
     with zipfile.ZipFile(many, "w") as archive:
         for number in range(3_000):
             archive.writestr(f"{number}", b"")
-    written = time.perf_counter() - started
+    written = time.process_time() - started
     for path, reason in ((zeros, "unpacks to more than 100 times"), (many, "too many files")):
         with pytest.raises(BundleError, match=reason):
             load(path)
@@ -262,7 +262,7 @@ def test_bombs_are_refused_at_once(folder: Path, tmp_path: Path) -> None:
         (folder / f"{number}").touch()
     with pytest.raises(BundleError, match="it holds 74 files; a bundle has at most 64"):
         load(folder)
-    assert time.perf_counter() - started - written < 0.5
+    assert time.process_time() - started - written < 0.5
 
 
 def test_a_member_longer_than_declared_is_not_read_to_its_end(folder: Path) -> None:

@@ -251,7 +251,7 @@ def test_partial_does_not_excuse_a_broken_frame_before_the_last(read):
 
 
 def test_many_joints_of_one_name_and_long_chains(read, tmp_path):
-    started, node = time.monotonic(), "JOINT a\n{\nOFFSET 0 1 0\nCHANNELS 0\n"
+    started, node = time.process_time(), "JOINT a\n{\nOFFSET 0 1 0\nCHANNELS 0\n"
     wide = read("HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 0\n" + (node + "}\n") * 5000 + END)
     assert wide.skeleton.names[:3] == ("a", "a_2", "a_3")
     joints = [Joint("a", -1, (0, 0, 0)), *(Joint(f"a{i}", i, (0, 1, 0)) for i in range(2000))]
@@ -259,7 +259,7 @@ def test_many_joints_of_one_name_and_long_chains(read, tmp_path):
     write_motion(tmp_path / "chain.bvh", chain)
     assert (tmp_path / "chain.bvh").stat().st_size < 2_000_000
     assert same_positions(chain, read_motion(tmp_path / "chain.bvh"), chain.skeleton.names) < 1e-9
-    assert time.monotonic() - started < 10
+    assert time.process_time() - started < 10
 
 
 def same_positions(one, other, names=None):

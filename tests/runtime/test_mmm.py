@@ -85,7 +85,7 @@ def test_what_is_no_motion_is_refused_with_its_place(tmp_path: Path, text: str, 
 
 
 def test_an_attribute_of_20_megabytes_takes_no_time(tmp_path: Path) -> None:
-    started = time.monotonic()
+    started = time.process_time()
     motion = read_motion(write(tmp_path, xml(frame(0), frame(0.01), name="n" * 20_000_000)))
     assert len(motion) == 2
-    assert time.monotonic() - started < 10
+    assert time.process_time() - started < 10

@@ -67,10 +67,10 @@ def test_a_segment_shorter_than_half_a_frame_is_empty_and_such_a_script_is_refus
     "script", ["walk " + "9" * 300_000 + "x", "walk" + "-" * 300_000, "walk 0.01s," * 30_000 + "x"]
 )
 def test_long_scripts_are_read_in_no_time_and_refused_in_few_words(script: str) -> None:
-    started = time.monotonic()
+    started = time.process_time()
     with pytest.raises(ScriptError) as caught:
         parse_script(script, LABELS)
-    assert time.monotonic() - started < 2
+    assert time.process_time() - started < 2
     assert len(str(caught.value)) < 1000
 
 
