@@ -141,7 +141,7 @@ def _print_rests(figures: Path) -> None:
                 apart.append([degrees[:, of].mean() for of in bones])
     (trunk, limbs), worst = np.mean(apart, axis=0), np.max(apart)
     print(
-        f"{len(apart)} clips resting in their start: trunks {trunk:.0f} degrees off, limbs {limbs:.0f}, worst {worst:.0f}"
+        f"{len(apart)} that rest in their start: trunks {trunk:.0f} degrees off, limbs {limbs:.0f}; worst {worst:.0f}"
     )
 
 
