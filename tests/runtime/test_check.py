@@ -130,7 +130,7 @@ def test_a_single_motion_is_told_whole(folder: Path, tmp_path: Path) -> None:
         ["clip", "Go, 2 of 2"],
         ["figure", "Unity Humanoid, VRM, confidence 1.00"],
         ["size", "1.70 m tall; lengths are in metres"],
-        ["facing", "30° left in the first frame (+z is ahead)"],
+        ["facing", "30° left in the first frame; ahead is +z"],
         ["ground", "soles stand at 0.20 m; lowest point 0.20 m"],
         ["travel", "5.00 m"],
         ["length", "40 frames at 30 fps, 1.33 s"],

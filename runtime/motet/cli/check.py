@@ -189,7 +189,7 @@ def _understood(found: Checked) -> Iterator[str]:
     unsure = "" if found.sure else ": look at it, or give a map (motet convert --map)"
     yield from _entry("figure", f"{found.convention}, confidence {found.confidence:.2f}{unsure}")
     yield from _entry("size", "not known" if found.height is None else f"{found.height:.2f} m tall{_unit(found)}")
-    yield from _entry("facing", f"{_facing(found)} in the first frame (+z is ahead)")
+    yield from _entry("facing", f"{_facing(found)} in the first frame; ahead is +z")
     yield from _entry("ground", f"soles stand at {_metres(found.ground)} m; lowest point {_metres(found.lowest)} m")
     yield from _entry("travel", "in place" if found.in_place else f"{_metres(found.travel)} m")
 
