@@ -26,7 +26,7 @@ from fuzzing import Files, Generator, Mutant, altered, damaged, fuzz, options
 from vrm_avatar import avatar
 
 import motet
-from motet.formats import READABLE, clips, write_motion
+from motet.formats import CLIPPED, READABLE, clips, write_motion
 from motet.formats.glb import container
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
@@ -227,7 +227,7 @@ def steps(path: Path) -> Iterator[Callable[[], object]]:
             yield partial(write_motion, io.BytesIO(), motion[:100], format=kind)
         yield partial(write_motion, path.with_name("out.amc"), motion[:100])
     yield partial(write_motion, io.BytesIO(), other(), format="bvh", like=path)
-    if path.suffix in (".glb", ".vrm"):
+    if path.suffix in CLIPPED:
         yield partial(write_motion, io.BytesIO(), other(), format="glb", like=path)
         yield partial(write_motion, io.BytesIO(), other(), format="glb", onto=path)
 

@@ -124,17 +124,22 @@ def tried(steps: Steps, path: Path) -> Found:
     Path("/proc/self/clear_refs").write_text("5")  # the peak begins anew
     before, slowest, outcome, detail = _megabytes("VmRSS"), 0.0, "runs", ""
     for step in steps(path):
-        started = time.process_time()
+        started = _seconds()
         try:
             step()
         except MotetError as error:
             outcome, detail = (type(error).__name__, ascii(str(error))) if outcome == "runs" else (outcome, detail)
         except BaseException:
             outcome, detail = "FOREIGN", ascii(traceback.format_exc()).replace("\\n", "\n")
-        slowest = max(slowest, time.process_time() - started)
+        slowest = max(slowest, _seconds() - started)
         if outcome == "FOREIGN":
             break
     return Found(outcome, slowest, _megabytes("VmHWM") - before, detail)
+
+
+def _seconds() -> float:
+    """Processor time of this process and of those that it has waited for."""
+    return sum(os.times()[:4])
 
 
 def _megabytes(kind: str) -> float:
