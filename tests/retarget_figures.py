@@ -140,9 +140,7 @@ def _print_rests(figures: Path) -> None:
                 bones = [[HUMANOID.index(bone) for bone in of] for of in (TRUNK, LIMBS)]
                 apart.append([degrees[:, of].mean() for of in bones])
     (trunk, limbs), worst = np.mean(apart, axis=0), np.max(apart)
-    print(
-        f"{len(apart)} that rest in their start: trunks {trunk:.0f} degrees off, limbs {limbs:.0f}; worst {worst:.0f}"
-    )
+    print(f"{len(apart)} clips from their start: trunks {trunk:.0f} degrees off, limbs {limbs:.0f}; worst {worst:.0f}")
 
 
 def _print_times(motion: Motion) -> None:
