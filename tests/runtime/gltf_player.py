@@ -151,6 +151,7 @@ class Played:
         corners = []
         for primitive in self.document["meshes"][own["mesh"]]["primitives"]:
             given = {name: self.array(index) for name, index in primitive["attributes"].items() if name != "TANGENT"}
+            given["WEIGHTS_0"] /= given["WEIGHTS_0"].sum(axis=1, keepdims=True)  # as engines do
             points = np.concatenate([given["POSITION"], np.ones((len(given["POSITION"]), 1))], axis=1)
             corner = np.zeros((len(moves), len(points), 3))
             for joint, weight in zip(given["JOINTS_0"].astype(int).T, given["WEIGHTS_0"].T, strict=True):

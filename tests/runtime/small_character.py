@@ -30,7 +30,7 @@ def local(node: Node) -> Array:
     return matrix(*(np.array([rest[path]], float) for path in ("translation", "rotation", "scale")))[0]
 
 
-def joints(above: Array, size: float, backwards: bool) -> tuple[list[Node], Array]:
+def joints(above: Array, size: float, backwards: bool, matrices: bool) -> tuple[list[Node], Array]:
     """A node for each joint, with a rest rotation of its own, and their matrices (J, 4, 4) in the world."""
     random = np.random.default_rng(3)
     turn = np.diag([-1.0, 1, -1]) if backwards else np.eye(3)
@@ -39,7 +39,8 @@ def joints(above: Array, size: float, backwards: bool) -> tuple[list[Node], Arra
     nodes = []
     for i, joint in enumerate(MIXAMO.joints):
         own = np.linalg.inv(worlds[joint.parent] if i else above) @ worlds[i]
-        nodes.append({"name": joint.name, "translation": own[:3, 3].tolist(), "rotation": quaternion(own[:3, :3])})
+        parts = {"translation": own[:3, 3].tolist(), "rotation": quaternion(own[:3, :3])}
+        nodes.append({"name": joint.name} | ({"matrix": own.T.reshape(-1).tolist()} if matrices else parts))
     return nodes, worlds
 
 
@@ -72,11 +73,20 @@ def soles(size: float, backwards: bool) -> tuple[Array, Array]:
 
 
 def character(
-    path: Path, above: Sequence[Node] = (), size: float = 1.0, *, backwards: bool = False, meshed: bool = True
+    path: Path,
+    above: Sequence[Node] = (),
+    size: float = 1.0,
+    *,
+    backwards: bool = False,
+    meshed: bool = True,
+    matrices: bool = False,
 ) -> Path:
-    """Write a GLB: ``above`` are the nodes that its hips hang below, from the top."""
+    """Write a GLB: ``above`` are the nodes that its hips hang below, from the top.
+
+    backwards: it faces -z at rest; meshed: it has a mesh; matrices: its joints rest by matrices.
+    """
     base = np.linalg.multi_dot([np.eye(4), np.eye(4), *map(local, above)])
-    bones, worlds = joints(base, size, backwards)
+    bones, worlds = joints(base, size, backwards, matrices)
     start = len(above)
     nodes = [{"name": f"above{i}", "children": [i + 1], **node} for i, node in enumerate(above)] + bones
     for i, joint in enumerate(MIXAMO.joints[1:], start=1):
@@ -87,7 +97,7 @@ def character(
     arrays = (
         (corners.astype("<f4"), "VEC3", 5126),
         (np.stack([owners, 0 * owners, 0 * owners, 0 * owners], 1).astype("u1"), "VEC4", 5121),
-        (np.tile([255, 0, 0, 0], (len(owners), 1)).astype("u1"), "VEC4", 5121),
+        (np.tile([200, 0, 0, 0], (len(owners), 1)).astype("u1"), "VEC4", 5121),
         (bind.reshape(-1, 16).astype("<f4"), "MAT4", 5126),
         (np.array([0.0, 1.0], "<f4"), "SCALAR", 5126),
         (np.array([[0.0, 0, 0], [0, size, 0]], "<f4"), "VEC3", 5126),

@@ -1,15 +1,17 @@
 """Clips for a character's own nodes, and characters with clips in them, played by kinematics that are not motet's."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from gltf_player import Array, Played
 from small_character import QUARTER, TEXTURE, Node, character, packed
-from test_retarget import dancing
+from test_retarget import SKELETONS, dancing
 
 import motet
 from motet.errors import FormatError, MotionError
+from motet.formats.character import Character
 from motet.motion.humanoid import HUMANOID, LEFT_RIGHT
 from motet.motion.rigs import MIXAMO
 
@@ -83,8 +85,27 @@ def test_the_character_itself_has_the_clip(tmp_path: Path, above: list[Node]) ->
     motet.write(tmp_path / "out.glb", motion, onto=avatar)
     out = Played(tmp_path / "out.glb")
     check(out.play(out.clip()), motion)
-    for animation in out.document["animations"]:  # a node with a matrix cannot be animated
-        assert not any("matrix" in out.document["nodes"][c["target"]["node"]] for c in animation["channels"])
+
+
+def test_nodes_that_are_animated_have_no_matrices(tmp_path: Path) -> None:
+    avatar, motion = character(tmp_path / "avatar.glb", [SCALE | TURN], matrices=True), walk()
+    motet.write(tmp_path / "out.glb", motion, onto=avatar)
+    out = Played(tmp_path / "out.glb")
+    moved = {channel["target"]["node"] for channel in out.document["animations"][0]["channels"]}
+    assert not any("matrix" in out.document["nodes"][node] for node in moved)
+    assert any("matrix" in node for node in Played(avatar).document["nodes"])
+    check(out.play(out.clip()), motion)
+
+
+@pytest.mark.parametrize(("above", "left"), [(0.04, 0.0), (-0.04, 0.0), (0.4, 0.4)])
+def test_a_motion_that_floats_a_little_is_laid_on_the_ground(tmp_path: Path, above: float, left: float) -> None:
+    avatar, motion = character(tmp_path / "avatar.glb"), walk()
+    values = np.array(motion.values)
+    values[:, motion.channels.index("hips.ty")] += above
+    motet.write(tmp_path / "out.glb", replace(motion, values=values), onto=avatar)
+    out = Played(tmp_path / "out.glb")
+    lowest = out.play(out.clip()).skin(len(out.names) - 1)[..., 1].min(axis=1)
+    assert np.percentile(lowest, 5) == pytest.approx(left, abs=1e-3)
 
 
 @pytest.mark.parametrize("size", [0.18, 1.3, 38.0])
@@ -124,6 +145,7 @@ def test_all_else_in_the_file_stays(tmp_path: Path) -> None:
     assert named == ["a person walks", "stays", "日本/語", "old"]
     assert after.binary.startswith(before.binary[: before.document["buffers"][0]["byteLength"]])
     assert TEXTURE in after.binary
+    assert all(view["byteOffset"] % 4 == 0 for view in after.document["bufferViews"])
     changed = {"animations", "accessors", "bufferViews", "buffers"}
     for key in before.document.keys() - changed:
         assert after.document[key] == before.document[key], key
@@ -152,6 +174,7 @@ def test_a_motion_of_the_characters_own_goes_back_onto_it(tmp_path: Path) -> Non
 
 def test_what_is_no_character_is_refused(tmp_path: Path) -> None:
     avatar, motion, out = character(tmp_path / "avatar.glb"), walk(), tmp_path / "out.glb"
+    bvh = SKELETONS / "mixamo.bvh"
     document = Played(avatar).document
     (tmp_path / "apart.glb").write_bytes(packed(document | {"images": [{"uri": "skin.png"}]}, Played(avatar).binary))
     flat = [dict(node) for node in document["nodes"]]
@@ -160,7 +183,8 @@ def test_what_is_no_character_is_refused(tmp_path: Path) -> None:
     for onto, place, error, said in (
         (tmp_path / "apart.glb", out, FormatError, "apart.glb: parts of this character are other files"),
         (tmp_path / "flat.glb", out, FormatError, "flat.glb: .*scale 0"),
-        (Path(__file__).parent / "skeletons" / "mixamo.bvh", out, MotionError, "no mesh"),
+        (bvh, out, FormatError, "cannot write onto files of type '.bvh'; expected one of .glb .vrm"),
+        (Character(motet.read(bvh)), out, MotionError, "no mesh"),
         (avatar, tmp_path / "out.vrm", FormatError, "avatar.glb: it is no VRM avatar"),
         (avatar, tmp_path / "out.bvh", FormatError, "cannot write files of type '.bvh'; expected one of .glb .vrm"),
         (tmp_path / "none.glb", out, FormatError, "none.glb: no such file"),

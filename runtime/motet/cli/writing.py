@@ -86,10 +86,10 @@ def write_options(command: Callable[..., None]) -> Callable[..., None]:
     def with_output(like: Path | None, onto: Path | None, fps: float | None, in_place: bool, **options: Any) -> None:
         if like and onto:
             raise click.UsageError("--like writes motions alone, --onto the character with them: give one of the two")
+        if onto and onto.suffix.lower() not in ONTO:
+            raise click.UsageError(f"--onto takes a character with its mesh ({' '.join(ONTO)}), which {onto} is not")
         given = onto or like
         character = None if given is None else read_character(given)
-        if onto and character and character.nodes is None:
-            raise click.UsageError(f"--onto takes a character with its mesh ({' '.join(ONTO)}), which {onto} is not")
         command(output=Output(character, fps, in_place, onto), **options)
 
     return with_output

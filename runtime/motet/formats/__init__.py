@@ -194,7 +194,8 @@ def read_character(file: File) -> Character:
     reader = _format(file, None, READABLE, "read").reader
     if reader not in CHARACTERS:
         return Character(read_motion(file))
-    found: Character = import_module(f"motet.formats.{CHARACTERS[reader]}").read_character(file)
+    with np.errstate(over="ignore", invalid="ignore"):  # what gets infinite is refused by Skeleton
+        found: Character = import_module(f"motet.formats.{CHARACTERS[reader]}").read_character(file)
     return found
 
 
@@ -240,6 +241,8 @@ def write_on(file: File, motion: Motion, character: Character | None, *, format:
 def write_onto(file: File, motions: Mapping[str, Motion], onto: File | Character, *, format: str | None = None) -> None:
     """Write a character with motions by their names, as :func:`write_motion` does."""
     check_writable(file, format, ONTO)
+    if not isinstance(onto, Character):
+        _format(onto, None, ONTO, "write onto")
     character = onto if isinstance(onto, Character) else read_character(onto)
     write_all_on(file, {name: put_onto(motion, character) for name, motion in motions.items()}, character)
 

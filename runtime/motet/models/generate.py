@@ -76,9 +76,10 @@ class Generated:
         plant: bool = True,
         *,
         like: File | Character | Motion | Skeleton | None = None,
+        onto: File | Character | None = None,
     ) -> None:
-        """Write :meth:`playable` as :func:`motet.write` does, perhaps put onto a character."""
-        write_motion(path, self.playable(fps, plant), like=like)
+        """Write :meth:`playable` as :func:`motet.write` does, perhaps put onto a character, or into its file."""
+        write_motion(path, self.playable(fps, plant), like=like, onto=onto)
 
     def __repr__(self) -> str:
         seconds = len(self.frames) / self.contract.fps
