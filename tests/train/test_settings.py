@@ -184,7 +184,7 @@ def test_these_resume_from_the_command_line_too(
         steps = iter([None] * 3)
         patched.setattr("motet_train.progress.Shown.step", lambda *_: next(steps, KeyboardInterrupt) and stop())
         stopped = motet(*command, tmp_path / "parts")
-    assert (stopped.exit_code, "--resume continues" in stopped.output) == (1, True)
+    assert (stopped.exit_code, "--resume continues" in stopped.output) == (130, True)
     assert "it exists" in motet(*command, tmp_path / "parts").output
     resumed = motet(*command, tmp_path / "parts", "--resume")
     assert resumed.exit_code == 0, resumed.output
