@@ -102,7 +102,7 @@ def test_a_stopped_run_says_how_it_goes_on(store: Path, tmp_path: Path, monkeypa
     out = tmp_path / "run"
     stop_at(monkeypatch, epoch=2)
     result = motet("train", "describe", "--data", store, "--out", out)
-    assert result.exit_code == 1
+    assert result.exit_code == 130
     assert "the same command with --resume continues" in result.output
     assert {path.name for path in out.iterdir()} == {CHECKPOINT, LOG, SETTINGS, "run.json", "weights.pt"}
     assert Run.load(out).manifest["verb"] == "describe"
@@ -112,7 +112,7 @@ def test_nothing_is_left_of_a_run_without_an_epoch(
     store: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stop_at(monkeypatch, epoch=1)
-    assert motet("train", "generate", "--data", store, "--out", tmp_path / "run").exit_code == 1
+    assert motet("train", "generate", "--data", store, "--out", tmp_path / "run").exit_code == 130
     assert list(tmp_path.iterdir()) == []
 
 
