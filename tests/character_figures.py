@@ -18,8 +18,8 @@ from gltf_player import Array, Played
 
 import motet
 from motet.formats import read_character
-from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, leg_length, sided
-from motet.motion.retarget import map_of, on_humanoid
+from motet.motion.humanoid.bones import HUMANOID, LEFT_RIGHT, leg_length, sided
+from motet.motion.humanoid.retarget import map_of, on_humanoid
 
 BONES = [
     (sided(side, a), sided(side, b))

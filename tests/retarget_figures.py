@@ -21,11 +21,11 @@ from motet.errors import MotetError
 from motet.formats import read_motion
 from motet.models.describe import DescribeModel
 from motet.models.language import MAX_SECONDS
-from motet.motion.humanoid import BONES, HUMANOID
+from motet.motion.humanoid.bones import BONES, HUMANOID
+from motet.motion.humanoid.retarget import from_humanoid, to_humanoid
+from motet.motion.humanoid.rigs import MIXAMO
 from motet.motion.kinematics import global_transforms, skeleton_of
 from motet.motion.motion import Motion
-from motet.motion.retarget import from_humanoid, to_humanoid
-from motet.motion.rigs import MIXAMO
 from motet.motion.skeleton import Skeleton
 from motet.motion.world_rotations import motion_of
 

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.formats.glb import FLOAT, INDICES, UINT16, UINT32, VERTICES, Buffer, container
-from motet.motion.humanoid import PARENTS
-from motet.motion.rest_pose import swing
+from motet.motion.humanoid.bones import PARENTS
+from motet.motion.humanoid.rest_pose import swing
 from motet.motion.rotations import rotmat_to_quat
 
 Array = NDArray[np.float64]

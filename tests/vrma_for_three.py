@@ -5,9 +5,9 @@ import sys
 from pathlib import Path
 
 from motet.formats import read_motion, vrma
-from motet.motion.humanoid import HUMANOID
+from motet.motion.humanoid.bones import HUMANOID
+from motet.motion.humanoid.retarget import to_humanoid
 from motet.motion.kinematics import positions
-from motet.motion.retarget import to_humanoid
 
 
 def main(folder: Path, source: Path) -> None:

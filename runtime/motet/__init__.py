@@ -32,20 +32,20 @@ from motet.live.page import live_page, write_live_page
 from motet.models.codes import CodesModel, Passage, Story
 from motet.models.control import ControlModel, ControlSession, Snapshot
 from motet.models.describe import DescribeModel, Description, Part
+from motet.models.familiarity import Understood
 from motet.models.fill import FillModel
 from motet.models.generate import Generated, GenerateModel
 from motet.models.index import Hit, Index
-from motet.models.known import Understood
 from motet.models.load import load, load_as
 from motet.models.mixture import MixtureModel
 from motet.models.predict import PredictModel, PredictSession
 from motet.models.search import SearchModel
 from motet.models.steer import SteerModel
 from motet.models.steer_session import SteerSession, SteerSnapshot
-from motet.motion.joint_map import read_map
+from motet.motion.humanoid.joint_map import read_map
+from motet.motion.humanoid.retarget import Humanoid, from_humanoid, to_humanoid
 from motet.motion.motion import Motion
 from motet.motion.pose import Pose
-from motet.motion.retarget import Humanoid, from_humanoid, to_humanoid
 
 __version__ = version("motet")
 

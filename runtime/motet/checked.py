@@ -11,13 +11,13 @@ from motet.errors import MotionError
 from motet.files import place_of
 from motet.formats import READABLE, clips, read_motion
 from motet.formats.clips import Clip, chosen, split_clip
-from motet.motion.fitting import sole_points
 from motet.motion.heading import heading
-from motet.motion.humanoid import HUMANOID, ground_under, leg_length
+from motet.motion.humanoid.bones import HUMANOID, ground_under, leg_length
+from motet.motion.humanoid.fitting import sole_points
+from motet.motion.humanoid.mmm_figure import is_mmm, with_figure
+from motet.motion.humanoid.retarget import SURE, Humanoid, to_humanoid
 from motet.motion.kinematics import global_transforms, positions
-from motet.motion.mmm_figure import is_mmm, with_figure
 from motet.motion.motion import Motion
-from motet.motion.retarget import SURE, Humanoid, to_humanoid
 
 STAYS = 0.3
 """Metres over which hips move where a figure stays in place."""

@@ -14,7 +14,7 @@ from motet.bundle.bundle import Bundle
 from motet.models.codes import CodesModel
 from motet.models.text import RULES, SPECIALS
 from motet.models.verify import verify
-from motet.motion.humanoid import HUMANOID
+from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.kinematics import positions
 from motet.motion.skeleton import END_SUFFIX
 from motet.representation.contract import MotionContract

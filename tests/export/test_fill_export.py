@@ -11,7 +11,7 @@ from motet.bundle.bundle import Bundle
 from motet.models.fill import FillModel
 from motet.models.load import load
 from motet.models.verify import verify
-from motet.motion.humanoid import BONES, HUMANOID
+from motet.motion.humanoid.bones import BONES, HUMANOID
 from motet.representation.contract import MotionContract
 from motet.representation.placed import CHANNELS
 from motet.representation.root_sixd import KINDS, ROOT_SIXD, ROOT_SIXD_UNITS

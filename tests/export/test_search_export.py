@@ -12,7 +12,7 @@ from motet.models.load import load
 from motet.models.search import SearchModel
 from motet.models.text import RULES, SPECIALS
 from motet.models.verify import verify
-from motet.motion.humanoid import HUMANOID
+from motet.motion.humanoid.bones import HUMANOID
 from motet.representation.contract import MotionContract
 from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS
 from motet_export.bundles import export_run, parity_of

@@ -4,7 +4,7 @@ import numpy as np
 from fake_models import FakeGraph, manifest, spec
 
 from motet.models.fill import FillModel
-from motet.motion.humanoid import BONES, HUMANOID
+from motet.motion.humanoid.bones import BONES, HUMANOID
 from motet.motion.motion import Motion
 from motet.representation.contract import MotionContract
 from motet.representation.placed import CHANNELS

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from gltf_player import Array, matrix
 
-from motet.motion.humanoid import REST
-from motet.motion.rigs import MIXAMO
+from motet.motion.humanoid.bones import REST
+from motet.motion.humanoid.rigs import MIXAMO
 
 QUARTER = 0.5**0.5
 

@@ -11,12 +11,12 @@ import pytest
 from command_line import run
 
 import motet
-from motet.decode.onward import Pace
+from motet.decode.continue_codes import Pace
 from motet.errors import DecodingError, MotionError
-from motet.models.beyond import AROUND, QUICKER, at_rate, joined, levelled, paced
 from motet.models.codes import CodesModel
+from motet.models.continuation import AROUND, QUICKER, at_rate, joined, levelled, paced
 from motet.models.predict import SURE, PredictModel
-from motet.motion.humanoid import HUMANOID
+from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
 from motet.representation.contract import MotionContract

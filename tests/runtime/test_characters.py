@@ -13,7 +13,7 @@ from motet.errors import FormatError, MotionError
 from motet.formats import read_character
 from motet.formats.character import Character
 from motet.motion import HUMANOID, MIXAMO, positions
-from motet.motion.humanoid import BONES
+from motet.motion.humanoid.bones import BONES
 
 
 def test_a_motion_is_written_onto_a_character_given_in_any_way(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ import pytest
 from test_retarget import angles_between, dancing
 
 from motet.motion import HUMANOID, Joint, Motion, Skeleton, from_humanoid, local_rotations, positions
-from motet.motion.humanoid import LEFT_RIGHT
+from motet.motion.humanoid.bones import LEFT_RIGHT
 from motet.motion.rotations import Array, rotvec_to_rotmat
 from motet.motion.world_rotations import motion_of
 

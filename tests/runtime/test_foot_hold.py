@@ -6,8 +6,8 @@ import pytest
 from motet.errors import MotionError
 from motet.formats import read_motion
 from motet.motion import HUMANOID, global_transforms, hold_feet, positions, to_humanoid
-from motet.motion.foot_hold import BENT, FARTHEST
-from motet.motion.humanoid import LEFT_RIGHT, ground_under, sole_points
+from motet.motion.feet.hold import BENT, FARTHEST
+from motet.motion.humanoid.bones import LEFT_RIGHT, ground_under, sole_points
 from motet.motion.motion import Motion
 from motet.motion.rotations import euler_to_rotmat
 from motet.motion.skeleton import Joint, Skeleton

@@ -7,9 +7,9 @@ import pytest
 
 from motet.errors import FormatError
 from motet.formats import amass, read_motion
-from motet.motion.humanoid import HUMANOID
+from motet.motion.humanoid.bones import HUMANOID
+from motet.motion.humanoid.retarget import to_humanoid
 from motet.motion.kinematics import positions
-from motet.motion.retarget import to_humanoid
 from motet.motion.rotations import Array
 
 STANDING = np.array([np.pi / 2, 0.0, 0.0])

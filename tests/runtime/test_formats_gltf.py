@@ -10,11 +10,11 @@ import pytest
 
 from motet.errors import FormatError, MotionError
 from motet.formats import glb, gltf, gltf_data, read_character, read_motion, vrma
-from motet.motion.humanoid import BONES, HUMANOID, REST, ground_under, sole_points
+from motet.motion.humanoid.bones import BONES, HUMANOID, REST, ground_under, sole_points
+from motet.motion.humanoid.retarget import from_humanoid, grounded, to_humanoid
+from motet.motion.humanoid.rigs import MIXAMO
 from motet.motion.kinematics import global_transforms, local_rotations, positions, skeleton_of
 from motet.motion.motion import Motion
-from motet.motion.retarget import from_humanoid, grounded, to_humanoid
-from motet.motion.rigs import MIXAMO
 from motet.motion.rotations import Array, quat_to_rotmat, rotmat_to_quat, rotmat_to_rotvec
 
 SKELETONS = Path(__file__).parent / "skeletons"

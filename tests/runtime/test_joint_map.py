@@ -7,11 +7,11 @@ import pytest
 from motet.errors import FormatError
 from motet.formats import read_motion
 from motet.formats.writable import with_names
-from motet.motion.joint_map import read_map
-from motet.motion.joint_names import conventions, map_by_names
+from motet.motion.humanoid.joint_map import read_map
+from motet.motion.humanoid.joint_names import conventions, map_by_names
+from motet.motion.humanoid.retarget import to_humanoid
 from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
-from motet.motion.retarget import to_humanoid
 
 SKELETONS = Path(__file__).parent / "skeletons"
 DOCS = Path(__file__).parents[2] / "docs" / "formats.md"

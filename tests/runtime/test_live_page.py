@@ -16,7 +16,7 @@ from motet.draw.page import source
 from motet.errors import BundleError, ControlError, OutputError
 from motet.live.page import body_data, net_data
 from motet.models.steer import SteerModel
-from motet.motion.humanoid import HUMANOID
+from motet.motion.humanoid.bones import HUMANOID
 
 NODE = shutil.which("node")
 PLAN = [("walk", 1.3, 0, 0), ("walk", 1.2, 80, 80), ("run", 3, 80, 80), ("run", 1.5, -120, -60), ("walk", 0, 0, -70)]

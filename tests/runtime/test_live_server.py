@@ -15,7 +15,7 @@ import pytest
 
 from motet.errors import OutputError
 from motet.models.steer import SteerModel
-from motet.motion.humanoid import BONES, HUMANOID
+from motet.motion.humanoid.bones import BONES, HUMANOID
 from motet.motion.pose import Pose
 
 pytest.importorskip("websockets", reason="the extra live is not installed")

@@ -6,7 +6,7 @@ import pytest
 
 from motet.errors import OutputError, ScriptError
 from motet.models.steer import SteerModel
-from motet.motion.humanoid import BONES, HUMANOID
+from motet.motion.humanoid.bones import BONES, HUMANOID
 from motet.motion.pose import Pose
 from motet.motion.rotations import quat_to_rotmat
 

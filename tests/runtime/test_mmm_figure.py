@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from motet.formats import read_motion
-from motet.motion.humanoid import HUMANOID, sole_points
+from motet.motion.humanoid.bones import HUMANOID, sole_points
+from motet.motion.humanoid.mmm_figure import SKELETON, is_mmm, with_figure
+from motet.motion.humanoid.retarget import to_humanoid
 from motet.motion.kinematics import global_transforms, positions
-from motet.motion.mmm_figure import SKELETON, is_mmm, with_figure
 from motet.motion.motion import Motion
-from motet.motion.retarget import to_humanoid
 
 ROOT = ("root.tx", "root.ty", "root.tz", "root.rx", "root.ry", "root.rz")
 

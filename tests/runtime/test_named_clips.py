@@ -11,7 +11,7 @@ from gltf_files import node_places, read_document, write_clips, write_document
 import motet
 from motet.errors import FormatError
 from motet.formats.clips import clip_names
-from motet.motion.humanoid import BONES, HUMANOID
+from motet.motion.humanoid.bones import BONES, HUMANOID
 from motet.motion.kinematics import skeleton_of
 from motet.motion.motion import Motion
 

@@ -11,11 +11,11 @@ from test_retarget import SKELETONS, angles_between, dancing, limbless, skeleton
 from motet.errors import FormatError, MotionError
 from motet.formats import read_motion
 from motet.formats.writable import with_names
-from motet.motion.humanoid import HUMANOID
+from motet.motion.humanoid.bones import HUMANOID
+from motet.motion.humanoid.retarget import SURE, from_humanoid, to_humanoid
 from motet.motion.kinematics import global_transforms, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.products import product
-from motet.motion.retarget import SURE, from_humanoid, to_humanoid
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Joint, Skeleton
 from motet.motion.world_rotations import motion_of

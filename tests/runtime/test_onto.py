@@ -12,8 +12,8 @@ from test_retarget import SKELETONS, dancing
 import motet
 from motet.errors import FormatError, MotionError
 from motet.formats.character import Character
-from motet.motion.humanoid import HUMANOID, LEFT_RIGHT
-from motet.motion.rigs import MIXAMO
+from motet.motion.humanoid.bones import HUMANOID, LEFT_RIGHT
+from motet.motion.humanoid.rigs import MIXAMO
 
 SCALE: Node = {"scale": [0.01] * 3}
 TURN: Node = {"rotation": [QUARTER, 0, 0, QUARTER]}
@@ -35,9 +35,9 @@ LIMBS = [("UpLeg", "Leg"), ("Leg", "Foot"), ("Arm", "ForeArm"), ("ForeArm", "Han
 def walk() -> motet.Motion:
     """The humanoid on its feet while all its joints move, with its soles on the ground."""
     motion = dancing()
-    soles = motet.motion.humanoid.sole_points(*motet.motion.global_transforms(motion))
+    soles = motet.motion.humanoid.bones.sole_points(*motet.motion.global_transforms(motion))
     values = np.array(motion.values)
-    values[:, motion.channels.index("hips.ty")] -= motet.motion.humanoid.ground_under(soles)
+    values[:, motion.channels.index("hips.ty")] -= motet.motion.humanoid.bones.ground_under(soles)
     return motet.Motion(values, motion.channels, motion.units, motion.fps, HUMANOID)
 
 

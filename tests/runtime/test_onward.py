@@ -8,8 +8,7 @@ import pytest
 from fake_codes import ACTIONS, END, MOVES, memory_graph, numbers_of, remembered, source
 
 from motet.decode.codes import Drawing
-from motet.decode.memory import Memory
-from motet.decode.onward import (
+from motet.decode.continue_codes import (
     ALIKE,
     FADING,
     GOING,
@@ -25,9 +24,10 @@ from motet.decode.onward import (
     onward,
     paces_off,
 )
-from motet.decode.onward import (
+from motet.decode.continue_codes import (
     numbers_of as asked_numbers,
 )
+from motet.decode.memory import Memory
 
 MOTIONS = remembered()
 DRAWING = Drawing(temperature=1.0, first=1.0, top_p=1.0, guidance=1.0, memory=0.5)

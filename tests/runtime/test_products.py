@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from motet.motion.humanoid.rest_pose import swing
 from motet.motion.products import inverse, product, rotated
-from motet.motion.rest_pose import swing
 from motet.motion.rotations import frames_last, rotvec_to_rotmat
 
 RNG = np.random.default_rng(3)

@@ -7,11 +7,11 @@ import pytest
 from motet.errors import MotionError
 from motet.formats import read_motion, write_motion
 from motet.formats.writable import with_names
-from motet.motion.humanoid import BONES, HUMANOID, REST, sole_points
-from motet.motion.joint_tree import map_by_tree
+from motet.motion.humanoid.bones import BONES, HUMANOID, REST, sole_points
+from motet.motion.humanoid.joint_tree import map_by_tree
+from motet.motion.humanoid.retarget import Humanoid, from_humanoid, to_humanoid
 from motet.motion.kinematics import global_transforms, skeleton_of
 from motet.motion.motion import Motion
-from motet.motion.retarget import Humanoid, from_humanoid, to_humanoid
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Joint, Skeleton
 from motet.motion.world_rotations import motion_of

@@ -6,10 +6,10 @@ import pytest
 
 from motet.errors import MotionError
 from motet.formats import clips, read_motion
-from motet.motion.humanoid import HUMANOID
-from motet.motion.joint_names import map_by_names
+from motet.motion.humanoid.bones import HUMANOID
+from motet.motion.humanoid.joint_names import map_by_names
+from motet.motion.humanoid.retarget import to_humanoid
 from motet.motion.kinematics import global_transforms
-from motet.motion.retarget import to_humanoid
 
 sys.path.append(str(Path(__file__).parents[1]))
 from retarget_figures import agreement, unpacked

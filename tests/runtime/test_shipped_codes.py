@@ -9,7 +9,7 @@ from command_line import run
 
 import motet
 from motet.decode.codes import WINDOW, Drawing, Writer, drawn_steps
-from motet.decode.unrolled import Unrolled
+from motet.decode.streaming_decoder import Unrolled
 from motet.errors import DecodingError, MotionError, TextError, TextWarning
 from motet.models.codes import CodesModel
 from motet.motion.kinematics import positions

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from motet import ControlError, ControlWarning, SteerModel, load
-from motet.motion.humanoid import HUMANOID
+from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.kinematics import positions
 from motet.motion.pose import Pose
 

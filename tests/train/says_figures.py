@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from motet.motion.humanoid import HUMANOID, REST
-from motet_train.evaluate.says.track import RATE
+from motet.motion.humanoid.bones import HUMANOID, REST
+from motet_train.evaluate.text_adherence.track import RATE
 
 INDEX = HUMANOID.index
 HIPS = 0.98

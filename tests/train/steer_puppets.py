@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from motet.motion.humanoid import BONES
+from motet.motion.humanoid.bones import BONES
 from motet.motion.pose import Pose
 
 FPS = 30.0

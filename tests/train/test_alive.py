@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from motet.motion.humanoid import HUMANOID
+from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.motion import Motion
-from motet_train.evaluate.predict.alive import (
+from motet_train.evaluate.predict.liveliness import (
     ALONE,
     BEYOND,
     RECORDED,

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from motet.formats import read_motion
+from motet.motion.feet.root_path import smoothed
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
-from motet.motion.root_path import smoothed
 from motet_train.data.clips import CMU_CLIPS, CMU_FOLDER
 from motet_train.evaluate.control.feet import CALM, LOW, SHORTEST, acceleration, leap, slide, speed, stances
 

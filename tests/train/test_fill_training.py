@@ -17,7 +17,7 @@ from motet.bundle.manifest import Manifest
 from motet.cli import main
 from motet.models.fill import FillModel
 from motet.models.load import build
-from motet.motion.humanoid import BONES, HUMANOID
+from motet.motion.humanoid.bones import BONES, HUMANOID
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
 from motet.representation.placed import CHANNELS, bridge, mirror, placed, placed_by_way, pose_of, unplaced

@@ -10,7 +10,7 @@ import torch
 from motet import to_humanoid
 from motet.decode.matching import ASKED, mirrored_features
 from motet.formats import read_motion
-from motet.motion.humanoid import BONES, HUMANOID
+from motet.motion.humanoid.bones import BONES, HUMANOID
 from motet.motion.kinematics import positions
 from motet.motion.mirror import mirror
 from motet.motion.motion import Motion

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from motet.errors import FormatError
 from motet.formats import read_motion
-from motet.motion.humanoid import HUMANOID
+from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.mirror import mirror
 from motet.motion.motion import Motion

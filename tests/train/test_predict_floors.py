@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from test_predict_data import write_files
 
 from motet.formats import read_motion
-from motet.motion.humanoid import HUMANOID
+from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.kinematics import chained, local_rotations, local_translations, positions
 from motet_train.data.clips import CMU_FOLDER
 from motet_train.data.errors import DataError

@@ -21,7 +21,7 @@ from motet_train.evaluate.predict.curves import FEW, MEAN, complete, curves
 from motet_train.evaluate.predict.floors import ZERO
 from motet_train.evaluate.predict.published_h36m import CONV
 from motet_train.manifest import About
-from motet_train.models.predict.doubt import LEAST, SIGNS, Doubt, Signs
+from motet_train.models.predict.error_head import LEAST, SIGNS, Doubt, Signs
 from motet_train.models.predict.predictor import Predictor, PredictorConfig
 from motet_train.recipes.predict import DEFAULT, train_predict
 from motet_train.recipes.recipe import Job

@@ -14,7 +14,7 @@ from motet_train.models.predict import lstm_3lr, lstm_ae, rrnn
 from motet_train.models.predict.lstm_3lr import EncoderRecurrentDecoder
 from motet_train.models.predict.lstm_ae import LSTMAE
 from motet_train.models.predict.noise import noise_at
-from motet_train.models.predict.reused import Reused, one_gradient
+from motet_train.models.predict.reused_activations import Reused, one_gradient
 from motet_train.models.predict.rrnn import RRNN
 from motet_train.models.predict.stepwise import System, free_run
 

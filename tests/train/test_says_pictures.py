@@ -4,14 +4,14 @@ from pathlib import Path
 
 import motet
 from motet.models.codes import CodesModel
+from motet.motion.humanoid.retarget import on_humanoid
 from motet.motion.motion import Motion
-from motet.motion.retarget import on_humanoid
 from motet_train.data.clips import CMU_FOLDER
 from motet_train.evaluate.figures import save
-from motet_train.evaluate.says.outside import OUTSIDE, said_to_be_outside
-from motet_train.evaluate.says.pictures import EVERY, says_drawings
-from motet_train.evaluate.says.prompts import prompts
-from motet_train.evaluate.says.track import track_of
+from motet_train.evaluate.text_adherence.outside import OUTSIDE, said_to_be_outside
+from motet_train.evaluate.text_adherence.pictures import EVERY, says_drawings
+from motet_train.evaluate.text_adherence.prompts import prompts
+from motet_train.evaluate.text_adherence.track import track_of
 
 
 class Walks:

@@ -9,13 +9,13 @@ import pytest
 from says_figures import HIPS, leaping, led, shifted, standing, stepping, times, tipped, walking, whole_tipped
 
 from motet.formats import read_motion
-from motet.motion.humanoid import HUMANOID
+from motet.motion.humanoid.bones import HUMANOID
+from motet.motion.humanoid.retarget import to_humanoid
 from motet.motion.mirror import mirror
-from motet.motion.retarget import to_humanoid
 from motet_train.data.errors import DataError
-from motet_train.evaluate.says.prompts import actions, prompts
-from motet_train.evaluate.says.rules import RULES, holds
-from motet_train.evaluate.says.track import RATE, Track, calm, longest, spells, swings, track_of
+from motet_train.evaluate.text_adherence.prompts import actions, prompts
+from motet_train.evaluate.text_adherence.rules import RULES, holds
+from motet_train.evaluate.text_adherence.track import RATE, Track, calm, longest, spells, swings, track_of
 
 WAVE = np.sin(2 * np.pi * times(2.0))
 
@@ -278,7 +278,7 @@ def test_the_table_of_prompts() -> None:
 
 
 def test_the_table_of_trials_has_each_trial_once() -> None:
-    folder = Path(__file__).parents[2] / "train/motet_train/evaluate/says/trials.tsv"
+    folder = Path(__file__).parents[2] / "train/motet_train/evaluate/text_adherence/trials.tsv"
     names = [name for line in folder.read_text().splitlines()[1:] for name in line.split("\t")[1].split()]
     assert len(names) == len(set(names)) == len(actions())
     assert actions()["16_01"] == "jump"

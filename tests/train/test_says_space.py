@@ -12,11 +12,11 @@ import motet
 from motet.errors import MotionError
 from motet.formats import read_motion
 from motet.motion.motion import Motion
-from motet_train.evaluate.says import table
-from motet_train.evaluate.says.prompts import prompts
-from motet_train.evaluate.says.space import CHOICES, embedded, frechet, r_precision, rivals, space_report
-from motet_train.evaluate.says.table import says_table
-from motet_train.evaluate.says.trials import Trial
+from motet_train.evaluate.text_adherence import table
+from motet_train.evaluate.text_adherence.prompts import prompts
+from motet_train.evaluate.text_adherence.space import CHOICES, embedded, frechet, r_precision, rivals, space_report
+from motet_train.evaluate.text_adherence.table import says_table
+from motet_train.evaluate.text_adherence.trials import Trial
 
 Array = NDArray[np.float64]
 STAND, LIE = gliding(), gliding(tip=90)

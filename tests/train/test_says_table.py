@@ -11,19 +11,19 @@ from says_figures import HIPS, led, shifted, standing, stepping, times, walking
 
 from motet.cli import main
 from motet.errors import TextError
-from motet.motion.humanoid import HUMANOID
+from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.motion import Motion
 from motet.representation.root_block import to_root_block
 from motet_train.cli.evaluate_says import trained_on
 from motet_train.data.errors import DataError
 from motet_train.data.store import Entry, Store
-from motet_train.evaluate.says import table
-from motet_train.evaluate.says.lookup import LookUp
-from motet_train.evaluate.says.measures import depth, distance, jerk, poses, slide, spread
-from motet_train.evaluate.says.prompts import Prompt, prompts
-from motet_train.evaluate.says.table import says_table, says_text
-from motet_train.evaluate.says.track import RATE, Track
-from motet_train.evaluate.says.trials import Trial, of_store, read_trials
+from motet_train.evaluate.text_adherence import table
+from motet_train.evaluate.text_adherence.lookup import LookUp
+from motet_train.evaluate.text_adherence.measures import depth, distance, jerk, poses, slide, spread
+from motet_train.evaluate.text_adherence.prompts import Prompt, prompts
+from motet_train.evaluate.text_adherence.table import says_table, says_text
+from motet_train.evaluate.text_adherence.track import RATE, Track
+from motet_train.evaluate.text_adherence.trials import Trial, of_store, read_trials
 
 CMU = Path(__file__).parents[2] / "train/motet_train/data/cmu"
 STILL, LYING, LEFT, ZOMBIE = (

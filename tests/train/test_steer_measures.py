@@ -10,7 +10,7 @@ from steer_puppets import FPS, Puppets, resting, turned
 
 from motet import to_humanoid
 from motet.formats import read_motion
-from motet.motion.humanoid import BONES, HUMANOID
+from motet.motion.humanoid.bones import BONES, HUMANOID
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
 from motet.motion.pose import Pose

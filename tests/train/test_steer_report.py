@@ -18,7 +18,7 @@ from motet.cli import main
 from motet.formats import read_motion
 from motet.models.load import build
 from motet.models.steer import SteerModel
-from motet.motion.humanoid import HUMANOID, sole_points
+from motet.motion.humanoid.bones import HUMANOID, sole_points
 from motet.motion.kinematics import global_transforms
 from motet.representation import named
 from motet_train.data import clips

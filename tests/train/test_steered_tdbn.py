@@ -15,7 +15,7 @@ from motet.cli import main
 from motet.formats import read_motion
 from motet.models.control import ControlModel
 from motet.models.load import build
-from motet.motion.humanoid import HUMANOID
+from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.kinematics import positions
 from motet.representation import named
 from motet.representation.root_block import way

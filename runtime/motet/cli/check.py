@@ -19,9 +19,9 @@ from motet.errors import FormatError, MotetError
 from motet.files import files_in
 from motet.formats import CLIPPED, MOCAP, READS, html
 from motet.formats.clips import MARK
-from motet.motion.figure_checks import UNITS
+from motet.motion.humanoid.figure_checks import UNITS
+from motet.motion.humanoid.retarget import to_humanoid
 from motet.motion.motion import Motion
-from motet.motion.retarget import to_humanoid
 
 HEAD = ("figure", "sure", "tall m", "seconds", "fps", "facing", "ground m", "travel m", "notes")
 COLUMNS = "{:<26}{:>6}{:>8}{:>9}{:>7}{:>11}{:>10}{:>10}{:>7}"

@@ -10,14 +10,14 @@ import click
 from motet.cli.reading import Read, Source, Tries, places, read_options
 from motet.cli.writing import Output, size, write_options
 from motet.formats import READS, WRITES, write_motion
-from motet.motion.foot_hold import hold_feet as feet_held
-from motet.motion.joint_map import read_map
+from motet.motion.feet.hold import hold_feet as feet_held
+from motet.motion.feet.root_path import lay_root_path
+from motet.motion.humanoid.joint_map import read_map
+from motet.motion.humanoid.retarget import to_humanoid
 from motet.motion.kinematics import skeleton_of
 from motet.motion.looping import looped
 from motet.motion.mirror import mirror as mirrored
 from motet.motion.motion import Motion
-from motet.motion.retarget import to_humanoid
-from motet.motion.root_path import lay_root_path
 from motet.motion.units import METRES
 
 log = logging.getLogger(__name__)

@@ -22,8 +22,8 @@ from motet.errors import FormatError, MotionError, OutputError
 from motet.files import File, check_place, place_of
 from motet.formats.character import Character, put_onto
 from motet.formats.clips import Clip, split_clip
+from motet.motion.humanoid.rigs import rig
 from motet.motion.motion import Motion
-from motet.motion.rigs import rig
 from motet.motion.skeleton import Skeleton
 from motet.motion.units import metres
 
@@ -186,8 +186,8 @@ def names_motion(text: str) -> bool:
 def read_character(file: File) -> Character:
     """Read a skeleton to put motions onto: of glTF, VRM and FBX as their nodes have it, of others that of the motion.
 
-    The name of a rig out of :data:`motet.motion.rigs.RIGS`, such as "mixamo", gives that rig where there is no such
-    file. FormatError as :func:`read_motion`.
+    The name of a rig of :data:`motet.motion.humanoid.rigs.RIGS`, such as "mixamo", gives that rig where there is no
+    such file. FormatError as :func:`read_motion`.
     """
     if isinstance(file, str | Path) and not Path(file).suffix and not Path(file).exists():
         return _character(_rig(Path(file)))

@@ -53,7 +53,7 @@ def clips(file: File) -> tuple[str, ...]:
 
 
 def read_character(file: File) -> Character:
-    """Read a character's skeleton for :func:`motet.motion.retarget.from_humanoid`; FormatError as :func:`read`."""
+    """Read a character's skeleton to put motions onto; FormatError as :func:`read`."""
     return gltf_character.read_character(_gltf(place_of(file), read_bytes(file, MAX_BYTES), None))
 
 

@@ -19,7 +19,7 @@ from motet.formats.gltf_figures import Figure, above, figure_of, figures, likeli
 from motet.formats.gltf_tracks import FPS, Tracks, moved, tracks
 from motet.formats.lines import Names
 from motet.formats.nodes import Poses, motion_of_nodes, rested
-from motet.motion.humanoid import BONES
+from motet.motion.humanoid.bones import BONES
 from motet.motion.motion import Motion
 from motet.motion.products import product, rotated
 from motet.motion.rotations import Array, frames_last, quat_to_rotmat

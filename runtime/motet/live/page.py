@@ -1,7 +1,7 @@
 """Write a steered figure as one HTML page that runs it: no network, no other file, any browser.
 
 The page is ``page.html`` with ``loop.js``, which does in JavaScript what :mod:`motet.decode.matching` and
-:mod:`motet.decode.foot_lock` do, and with the numbers of the bundle: its table with codes as 16-bit floats and features
+:mod:`motet.motion.feet.lock` do, and with the numbers of the bundle: its table with codes as 16-bit floats and features
 as int8, gzipped; the linear map from codes to poses, which its graph "pose" gives; and the constants of both modules.
 """
 
@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.decode import foot_lock
 from motet.decode.matching import AHEAD, BEFORE, BEHIND, EVERY, HASTE, LAG, LASTING, STANDS
 from motet.draw.body import Body
 from motet.draw.page import bone_data, filled, source
@@ -21,7 +20,8 @@ from motet.files import File, place_of, write_whole
 from motet.models import steer_session
 from motet.models.steer import SteerModel
 from motet.motion import two_bone
-from motet.motion.humanoid import BONES, HUMANOID
+from motet.motion.feet import lock as foot_lock
+from motet.motion.humanoid.bones import BONES, HUMANOID
 
 FINE = 16
 """Steps of a feature in 8 bits: features are multiples of 1 / FINE."""

@@ -13,15 +13,15 @@ from motet.bundle.fields import Fields
 from motet.bundle.graph import Floats, Graph
 from motet.bundle.manifest import Manifest
 from motet.decode.codes import Drawing, Source, Writer, draw_codes, drawn_actions, drawn_steps
-from motet.decode.ground import nearest_moves
 from motet.decode.memory import Memory
 from motet.decode.noise import Noise
+from motet.decode.planar import nearest_moves
 from motet.decode.rollout import Ids
 from motet.decode.sample import Sample
-from motet.decode.unrolled import Sight, Unrolled
+from motet.decode.streaming_decoder import Sight, Unrolled
 from motet.errors import DecodingError, MotionError, TextError, TextWarning
+from motet.models.familiarity import Known, Understood
 from motet.models.generate import Generated, GenerateModel
-from motet.models.known import Known, Understood
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.representation.root_block import way

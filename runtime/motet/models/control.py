@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
-from motet.decode.ahead import Ahead, begun, ticked
+from motet.decode.lookahead import Ahead, begun, ticked
 from motet.decode.noise import RowNoise, RowsOfNoise
 from motet.decode.session import tick
 from motet.errors import BundleError, ControlError, DecodingError, MotionError
@@ -81,8 +81,8 @@ class ControlModel(Controllable):
         temperature: of the sigmoid, the bundle's by default; lower is more deterministic.
         iterations: Gibbs iterations for each frame, by default as many as the bundle's; more than 1 only in models
             with free hidden units.
-        smooth: show frames that do not tremble more than recorded ones (:mod:`motet.decode.ahead`); else those of the
-            net as they are. What the net does is the same.
+        smooth: show frames that do not tremble more than recorded ones (:mod:`motet.decode.lookahead`); else those
+            of the net as they are. What the net does is the same.
         Raises ControlError for values out of range, MotionError for a motion that does not fit.
         """
         if not 1 <= characters <= MAX_CHARACTERS:

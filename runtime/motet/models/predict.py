@@ -15,12 +15,12 @@ from motet.bundle.signature import bind
 from motet.decode.rollout import two_rows
 from motet.errors import BundleError, DecodingError, MotionError
 from motet.models.base import BundleModel
-from motet.models.beyond import carried_on, futures, together
+from motet.models.continuation import carried_on, futures, together
 from motet.models.generate import GenerateModel
 from motet.models.progress import Progress, silent
 from motet.models.seeds import seeds_of
+from motet.motion.humanoid.retarget import Figure
 from motet.motion.motion import Motion
-from motet.motion.retarget import Figure
 from motet.motion.rotations import Array
 
 MAX_FRAMES, MAX_GOLDEN = 100_000, 1000

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from motet.bundle.graph import Floats
-from motet.decode.foot_lock import FootLock
 from motet.decode.matching import Playing, Rows, tick
 from motet.errors import ControlError, ControlWarning
 from motet.models.steer_script import Order, parse_orders
+from motet.motion.feet.lock import FootLock
 from motet.motion.motion import Motion
 from motet.motion.pose import Pose
 from motet.motion.quaternions import wrapped

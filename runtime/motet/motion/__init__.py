@@ -1,18 +1,18 @@
 """Geometry: motions, skeletons, rotations, and what is done to them without a model."""
 
-from motet.motion.feet import feet_of, ground_of, has_feet
-from motet.motion.foot_hold import hold_feet
+from motet.motion.feet.hold import hold_feet
+from motet.motion.feet.root_path import lay_root_path
+from motet.motion.feet.standing import feet_of, ground_of, has_feet
 from motet.motion.heading import heading, without_heading
-from motet.motion.humanoid import HUMANOID
-from motet.motion.joint_map import JointMap, read_map
+from motet.motion.humanoid.bones import HUMANOID
+from motet.motion.humanoid.joint_map import JointMap, read_map
+from motet.motion.humanoid.retarget import Humanoid, from_humanoid, to_humanoid
+from motet.motion.humanoid.rigs import MIXAMO, rig
 from motet.motion.kinematics import global_transforms, local_rotations, local_translations, positions
 from motet.motion.looping import looped
 from motet.motion.mirror import lateral_axis, mirror
 from motet.motion.motion import UNITS, Motion
-from motet.motion.retarget import Humanoid, from_humanoid, to_humanoid
-from motet.motion.rigs import MIXAMO, rig
 from motet.motion.root_motion import in_place
-from motet.motion.root_path import lay_root_path
 from motet.motion.sides import partners_of, sides_of
 from motet.motion.skeleton import Joint, Skeleton
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from motet.motion.humanoid.retarget import from_humanoid, on_humanoid
 from motet.motion.kinematics import (
     AXES,
     continued,
@@ -16,7 +17,6 @@ from motet.motion.kinematics import (
 )
 from motet.motion.motion import Motion
 from motet.motion.products import inverse, product, rotated
-from motet.motion.retarget import from_humanoid, on_humanoid
 from motet.motion.rotations import Array, axis_to_rotmat
 
 log = logging.getLogger(__name__)

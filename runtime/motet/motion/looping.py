@@ -11,11 +11,11 @@ from dataclasses import replace
 import numpy as np
 
 from motet.errors import MotionError
+from motet.motion.humanoid.spread import twist
 from motet.motion.kinematics import AXES, global_transforms, local_rotations, local_translations, posed, skeleton_of
 from motet.motion.motion import TURN, Motion
 from motet.motion.products import inverse, product, rotated
 from motet.motion.rotations import Array, rotmat_to_rotvec, rotvec_to_rotmat
-from motet.motion.spread import twist
 
 SHORTEST = 0.7
 """Seconds that a loop takes at least: a stride of a run."""

@@ -3,14 +3,14 @@
 import numpy as np
 
 from motet.errors import MotionError
-from motet.motion.fitting import fit
-from motet.motion.joint_map import JointMap
+from motet.motion.humanoid.fitting import fit
+from motet.motion.humanoid.joint_map import JointMap
+from motet.motion.humanoid.retarget import map_of
+from motet.motion.humanoid.upright import upright
 from motet.motion.kinematics import AXES, global_transforms, local_translations, posed, skeleton_of, with_channels
 from motet.motion.motion import Motion
 from motet.motion.products import inverse, rotated
-from motet.motion.retarget import map_of
 from motet.motion.rotations import Array
-from motet.motion.upright import upright
 
 Y = np.array([0.0, 1.0, 0.0])
 

@@ -6,11 +6,11 @@ They do not say where a figure goes: its path is laid by what its feet do, and w
 import numpy as np
 
 from motet.errors import MotionError
-from motet.motion.feet import has_feet
-from motet.motion.foot_hold import hold_feet
+from motet.motion.feet.hold import hold_feet
+from motet.motion.feet.root_path import GENERATED, lay_root_path
+from motet.motion.feet.standing import has_feet
 from motet.motion.mirror import mirror
 from motet.motion.motion import Motion
-from motet.motion.root_path import GENERATED, lay_root_path
 from motet.representation.base import FrameMirror, in_units
 
 

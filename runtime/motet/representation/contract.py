@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from motet.errors import MotionError
+from motet.motion.humanoid.retarget import Figure, logged, to_humanoid
 from motet.motion.motion import Motion
-from motet.motion.retarget import Figure, logged, to_humanoid
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
 from motet.representation import named
 from motet.representation.base import FrameMirror, phases
 from motet.representation.figure import in_joints_of
-from motet.representation.foreign import brought, foreign, in_known_unit
+from motet.representation.retargeting import brought, foreign, in_known_unit
 
 LIMIT = 50.0
 """Standard deviations: z is clipped to this, in the nets' graphs too. Of 256 of CMU's trials one frame in a thousand

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from motet.errors import MotionError
-from motet.motion.feet import feet_of, ground_of, has_feet
+from motet.motion.feet.root_path import led_along, velocity_by_feet
+from motet.motion.feet.standing import feet_of, ground_of, has_feet
 from motet.motion.heading import heading
 from motet.motion.kinematics import (
     AXES,
@@ -24,7 +25,6 @@ from motet.motion.kinematics import (
     with_channels,
 )
 from motet.motion.motion import Motion
-from motet.motion.root_path import led_along, velocity_by_feet
 from motet.motion.rotations import Array, euler_to_rotmat, rotmats_to_euler
 
 ROOT_BLOCK = ("root.forward", "root.left", "root.turn", "root.height", "root.pitch", "root.roll")

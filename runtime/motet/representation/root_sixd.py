@@ -13,8 +13,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.motion.foot_hold import hold_feet
-from motet.motion.humanoid import HUMANOID
+from motet.motion.feet.hold import hold_feet
+from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.kinematics import AXES, continued, local_rotations, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.products import product
@@ -52,7 +52,7 @@ class RootSixd:
         return features if like is None else features.select(like.channels, like.units)
 
     def planted(self, features: Motion) -> Motion:
-        """The features with feet that stay where they stand (:func:`motet.motion.foot_hold.hold_feet`)."""
+        """The features with feet that stay where they stand (:func:`motet.motion.feet.hold.hold_feet`)."""
         if features.skeleton != HUMANOID or len(features) < 2:
             return features
         return self.features(hold_feet(self.motion(features)), features)

@@ -36,9 +36,9 @@ from motet_train.evaluate.control.experiments import GOALS, control_report, stud
 from motet_train.evaluate.fill.report import fill_text
 from motet_train.evaluate.language.report import GOALS as LANGUAGE_GOALS
 from motet_train.evaluate.language.search import GOALS as SEARCH_GOALS
-from motet_train.evaluate.says.table import says_text
 from motet_train.evaluate.steer.report import steer_text
 from motet_train.evaluate.tables import Report, json_ready, report_table
+from motet_train.evaluate.text_adherence.table import says_text
 from motet_train.recipes.recipe import SETTINGS
 from motet_train.runs import MANIFEST, Run
 from motet_train.settings import read_settings
@@ -130,7 +130,7 @@ def _says(
         raise click.UsageError(f"--says asks generate models; {', '.join(others)} is none")
     if plots is not None:
         from motet_train.evaluate.figures import save
-        from motet_train.evaluate.says.pictures import says_drawings
+        from motet_train.evaluate.text_adherence.pictures import says_drawings
 
         for name, model in found.items():
             save(says_drawings(Best(model)), plots if len(found) == 1 else plots / Path(name).name)

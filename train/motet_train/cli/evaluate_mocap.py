@@ -9,7 +9,7 @@ from motet.models.load import load_as
 from motet.motion.kinematics import skeleton_of
 from motet.motion.motion import Motion
 from motet_train.data.store import Store
-from motet_train.evaluate.predict import alive, calibration, mocap
+from motet_train.evaluate.predict import calibration, liveliness, mocap
 from motet_train.evaluate.predict.calibration import Calibration
 from motet_train.evaluate.predict.costs import cost_table, harness_table
 from motet_train.evaluate.predict.floors import FLOORS
@@ -53,13 +53,13 @@ def mocap_reports(models: Models, data: Path, plots: Path | None) -> tuple[Ready
     gone = _alive(drawn(models, groups), motions)
     for name, reports in gone.items():
         figures[name]["alive"] = {kind: json_ready(report) for kind, report in reports.items()}
-    return figures, "\n\n".join(part for part in (*tables, alive.alive_table(gone)) if part)
+    return figures, "\n\n".join(part for part in (*tables, liveliness.alive_table(gone)) if part)
 
 
-def _alive(models: Models, motions: Mapping[str, Motion]) -> dict[str, alive.Figures]:
+def _alive(models: Models, motions: Mapping[str, Motion]) -> dict[str, liveliness.Figures]:
     """What the models predict for half a minute."""
     writer = load_as(CodesModel, "generate")
-    return {name: alive.measured(model, writer, motions) for name, model in models.items()}
+    return {name: liveliness.measured(model, writer, motions) for name, model in models.items()}
 
 
 def _calibrations(models: Models, found: Measured, parts: Mapping[str, Part]) -> dict[str, Calibration]:

@@ -12,11 +12,11 @@ from motet.models.generate import GenerateModel
 from motet.models.search import SearchModel
 from motet.motion.motion import Motion
 from motet_train.data.errors import DataError
-from motet_train.evaluate.says.outside import OUTSIDE, said_to_be_outside
-from motet_train.evaluate.says.prompts import prompts
-from motet_train.evaluate.says.table import says_table
-from motet_train.evaluate.says.trials import Trial, read_trials
 from motet_train.evaluate.tables import Report
+from motet_train.evaluate.text_adherence.outside import OUTSIDE, said_to_be_outside
+from motet_train.evaluate.text_adherence.prompts import prompts
+from motet_train.evaluate.text_adherence.table import says_table
+from motet_train.evaluate.text_adherence.trials import Trial, read_trials
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from motet.motion.feet.root_path import HEIGHT
 from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
-from motet.motion.root_path import HEIGHT
 from motet.motion.rotations import Array
 
 LEAP, EDGE = 10.0, 0.5

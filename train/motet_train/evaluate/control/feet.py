@@ -12,10 +12,10 @@ Letters in shapes: T frames, K points, J joints. Lengths are metres, y is up.
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.motion.feet import ground_of
+from motet.motion.feet.root_path import smoothed
+from motet.motion.feet.standing import ground_of
 from motet.motion.kinematics import local_rotations
 from motet.motion.motion import Motion
-from motet.motion.root_path import smoothed
 from motet.motion.rotations import Array
 
 LOW = 0.03

@@ -7,10 +7,10 @@ alone: their path is laid, too, and their feet are left as they then are.
 import numpy as np
 
 from motet.errors import MotionError
+from motet.motion.feet.root_path import lay_root_path
+from motet.motion.humanoid.retarget import map_of
 from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
-from motet.motion.retarget import map_of
-from motet.motion.root_path import lay_root_path
 from motet_train.evaluate.control.feet import acceleration, leap, slide, speed
 from motet_train.evaluate.control.gaits import Figures
 from motet_train.evaluate.control.study import ControlStudy

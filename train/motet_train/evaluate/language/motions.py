@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from motet.motion.feet import feet_of, ground_of
+from motet.motion.feet.standing import feet_of, ground_of
 from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array

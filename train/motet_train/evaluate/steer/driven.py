@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from motet.bundle.graph import Floats
-from motet.decode.foot_lock import FootLock
 from motet.models.control import ControlModel
-from motet.motion.humanoid import sole_points
+from motet.motion.feet.lock import FootLock
+from motet.motion.humanoid.bones import sole_points
 from motet.motion.pose import Pose
 from motet.motion.quaternions import wrapped
 from motet.motion.rotations import Array, quat_to_rotmat, rotmat_to_quat

@@ -6,7 +6,7 @@ lost: the next one is chosen from where the moves so far have really led (error 
 
 import numpy as np
 
-from motet.decode.ground import REACH, seen_from
+from motet.decode.planar import REACH, seen_from
 from motet.motion.rotations import Array
 
 

@@ -14,7 +14,7 @@ from torch import Tensor, nn
 
 from motet_train.models.language.gru import recur
 from motet_train.models.predict.noise import noise_at, noisy
-from motet_train.models.predict.reused import Reused, one_gradient
+from motet_train.models.predict.reused_activations import Reused, one_gradient
 from motet_train.models.predict.stepwise import State, System, squared_error
 
 

@@ -20,7 +20,7 @@ from torch.nn.functional import gelu
 from motet.bundle.graph import GraphSpec, TensorSpec
 from motet_train.models.net import Net, Part, tuples
 from motet_train.models.normalised import normalised
-from motet_train.models.predict.doubt import Doubt, Signs
+from motet_train.models.predict.error_head import Doubt, Signs
 
 GAIN = 3.0
 """Differences of normalised frames are multiplied by it, so that they vary about as much as poses do."""
@@ -33,7 +33,7 @@ class PredictorConfig:
     channels: C. kept: the channels that vary, the root's first. held: how many of these are seen, relative to the last
     frame, but not predicted. mirrored, signs: channel c of a mirrored frame is channel ``mirrored[c]`` times
     ``signs[c]``; empty where left and right are not known. doubts: whether it knows its errors
-    (:class:`motet_train.models.predict.doubt.Doubt`).
+    (:class:`motet_train.models.predict.error_head.Doubt`).
     """
 
     channels: int
@@ -181,7 +181,7 @@ class Predictor(Net):
         return found
 
     def judged_by(self, frames: Tensor) -> Tensor:
-        """Frames (B, L, C) to the signs (B, N, S) of :class:`motet_train.models.predict.doubt.Signs`."""
+        """Frames (B, L, C) to the signs (B, N, S) of :class:`motet_train.models.predict.error_head.Signs`."""
         moved = self.kept[self.config.held :]
         one, other = self._both(frames)
         one, other = ((found - frames[:, -1:])[..., moved] / self.scale[self.config.held :] for found in (one, other))

@@ -13,7 +13,7 @@ import torch
 from torch import Tensor, nn
 
 from motet_train.models.language.gru import recur
-from motet_train.models.predict.reused import Reused, one_gradient
+from motet_train.models.predict.reused_activations import Reused, one_gradient
 from motet_train.models.predict.stepwise import State, System
 
 

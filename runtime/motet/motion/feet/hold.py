@@ -1,0 +1,199 @@
+"""Holding feet: what stands on the ground stays where it stands, whatever the root does meanwhile.
+
+A foot stands where heel, ball or tip of the toes is low and slow. How much each of them does, between 0 and 1, says
+whose movement over the ground is taken out of the foot: that of the heel after it has landed, that of all three while
+the sole is flat, that of the ball and the toes as the foot rolls off. What has been taken out adds up to a shift of the
+foot; over a stance its median is 0, so the foot stands where it stood on average. Before and after, the shift comes
+and goes smoothly. Hip, knee and ankle follow by :mod:`motet.motion.two_bone`.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motet.errors import MotionError
+from motet.motion.feet.root_path import GENERATED, TREMBLE, smoothed
+from motet.motion.humanoid.bones import GROUND, HUMANOID, LEFT_RIGHT, ground_under, leg_length, sided
+from motet.motion.humanoid.fitting import Fitted, fit, sole_points
+from motet.motion.humanoid.retarget import map_of
+from motet.motion.humanoid.upright import upright
+from motet.motion.kinematics import AXES, euler_of, global_transforms, skeleton_of, with_channels
+from motet.motion.motion import TURN, Motion
+from motet.motion.products import inverse, product
+from motet.motion.rotations import Array
+from motet.motion.skeleton import Skeleton
+from motet.motion.two_bone import Leg
+
+LOW = (0.02, 0.05)  # m above the ground: a point of the sole touches it surely, and not at all
+SLOW = (0.3, 0.9)  # m/s over the ground: it stands surely, and not at all
+SLIDING = (0.7, 3.0)  # m/s: the same for feet that tremble and slide
+LIFTED = 0.1  # s: a foot that does not touch the ground for less goes on standing where it stands
+BLEND = 0.2  # s: in which a shift comes and goes, most of it in half of that
+FARTHEST = 0.15  # m: a foot is shifted by less; what slides farther than twice that in a stance does slide
+SOFT = 0.05  # s: before and after a foot is in the ground it is being lifted out of it
+
+BENT = ("UpperLeg", "LowerLeg", "Foot")
+
+Flags = NDArray[np.bool_]
+
+
+def hold_feet(motion: Motion, trembling: bool = False) -> Motion:
+    """The motion of any human figure with feet that stay where they stand and are never deeper than the ground, by
+    turning hips, knees and ankles; the root and all other joints are as they were, and the feet keep their directions
+    in the world.
+
+    The ground is level, and where :func:`motet.motion.to_humanoid` lays it: the soles are deeper in 5 % of the frames.
+    A foot is shifted by FARTHEST at most, and a leg that is nearly straight is hardly drawn longer: what is left slides
+    on. Lengths are those of the figure at the humanoid's size.
+
+    trembling: whether the feet tremble and slide as those of a model that gives joint angles alone: where they stand is
+        then seen over longer, and what slides faster stands, too.
+    MotionError, with the reason, for a figure that is no human's, or one that does not stand along y.
+    """
+    if len(motion) < 2:
+        return motion
+    skeleton, joint_map = skeleton_of(motion), map_of(motion)
+    rotations, places = global_transforms(motion)
+    fitted = fit(skeleton, joint_map, rotations, places)
+    if not np.array_equal(upright(fitted, places).turn, np.eye(3)):
+        raise MotionError("this figure does not stand along y: turn it upright by to_humanoid")
+    soles = _soles(skeleton, fitted, rotations, places)
+    places = places * (leg_length() / fitted.leg)
+    turned = np.array(rotations)
+    for side, points in zip(LEFT_RIGHT, np.split(soles, 2, axis=1), strict=True):
+        joints = [joint_map.joints[sided(side, part)] for part in BENT]
+        bend = product(rotations[:, joints[1]], fitted.aligned[joints[1]])[..., 0]
+        hip, knee, ankle = (places[:, joint] for joint in joints)
+        leg = Leg(hip, knee, ankle, bend)
+        for joint, turn in zip(
+            joints, (*leg.turns(_target(leg, points, motion.fps, trembling)), np.eye(3)), strict=True
+        ):
+            hanging = list(skeleton.subtree(skeleton.names[joint]))
+            turned[:, hanging] = product(turn[..., None, :, :], rotations[:, hanging])
+    return _with_joints(motion, [joint_map.joints[sided(side, part)] for side in LEFT_RIGHT for part in BENT], turned)
+
+
+def _soles(skeleton: Skeleton, fitted: Fitted, rotations: Array, places: Array) -> Array:
+    """Points (T, P, 3) of both soles, first the left one, above a ground at 0, at the humanoid's size."""
+    joints = fitted.joint_map.joints
+    bones = {bone: product(rotations[:, joints[bone]], fitted.aligned[joints[bone]]) for bone in fitted.heights}
+    soles = sole_points(fitted, bones, places) * (leg_length() / fitted.leg)
+    # how thick the soles of another figure are is not known: each of their points is on the ground where it is lowest
+    own = np.percentile(soles[..., 1], GROUND, axis=0)
+    soles[..., 1] -= ground_under(soles) if skeleton == HUMANOID else own
+    return soles
+
+
+def _target(leg: Leg, points: Array, fps: float, trembling: bool) -> Array:
+    """Where the ankle comes to (T, 3), from points (T, K, 3) of the sole above a ground at 0."""
+    over_ground = _held(points, fps, trembling)
+    target = leg.eased(leg.ankle + np.insert(over_ground, 1, 0.0, axis=1))
+    lowest = points[..., 1].min(axis=1) + target[:, 1] - leg.ankle[:, 1]
+    target[:, 1] += np.minimum(_lift(-lowest, fps), FARTHEST)
+    return target
+
+
+def _held(points: Array, fps: float, trembling: bool) -> Array:
+    """The shift (T, 2) over the ground."""
+    steps = np.diff(points[..., [0, 2]], axis=0)
+    touch = touching(points, fps, trembling)
+    weights = touch / np.maximum(touch.sum(axis=1, keepdims=True), 1e-9)
+    undone = -(touch.max(axis=1) * (weights[..., None] * steps).sum(axis=1).T).T
+    times, values = [], []
+    for start, stop in _stances(touch.max(axis=1) > 0, fps):
+        path = np.concatenate([np.zeros((1, 2)), np.cumsum(undone[start:stop], axis=0)])
+        path -= np.median(path, axis=0)
+        times.append(np.arange(start, stop + 1))
+        values.append(path)
+    shift = _between(times, values, len(points), BLEND * fps)
+    # toes that tremble are not followed
+    return _bounded(smoothed(shift[:, None], TREMBLE, fps)[:, 0])
+
+
+def touching(points: Array, fps: float, trembling: bool = False) -> Array:
+    """How much points (T, K, 3) touch a ground at 0 and stand from each frame to the next, (T - 1, K) from 0 to 1."""
+    calm = smoothed(points, GENERATED if trembling else TREMBLE, fps)
+    speed = np.linalg.norm(np.diff(calm[..., [0, 2]], axis=0), axis=-1) * fps
+    height = (points[1:, :, 1] + points[:-1, :, 1]) / 2
+    return _fading(height, *LOW) * _fading(speed, *(SLIDING if trembling else SLOW))
+
+
+def _fading(values: Array, full: float, none: float) -> Array:
+    return 1 - _eased(np.clip((values - full) / (none - full), 0, 1))
+
+
+def _eased(part: Array) -> Array:
+    eased: Array = part**3 * (10 - 15 * part + 6 * part**2)
+    return eased
+
+
+def _stances(standing: Flags, fps: float) -> list[tuple[int, int]]:
+    """First and last frame of each stance, from whether the foot stands from each frame to the next (T - 1,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], standing, [False]]).astype(int))).reshape(-1, 2)
+    found: list[tuple[int, int]] = []
+    for start, stop in edges.tolist():
+        goes_on = bool(found) and start - found[-1][1] < LIFTED * fps
+        found.append((found.pop()[0] if goes_on else start, stop))
+    return found
+
+
+def _between(times: list[NDArray[np.intp]], values: list[Array], frames: int, blend: float) -> Array:
+    """Values (frames, 2) that are known at ``times``, go to 0 and come back in ``blend`` frames, smoothly."""
+    zero = np.zeros((1, 2))
+    keys, known = [np.array([-2 * blend])], [zero]
+    for time, value in zip(times, values, strict=True):
+        last = keys[-1][-1]
+        if time[0] - last > 2 * blend:
+            keys.append(np.array([last + blend, time[0] - blend]))
+            known += [zero, zero]
+        keys.append(time.astype(np.float64))
+        known.append(value)
+    keys.append(keys[-1][-1:] + blend)
+    known.append(zero)
+    at, of = np.concatenate(keys), np.concatenate(known)
+    frame = np.arange(frames)
+    after = np.clip(np.searchsorted(at, frame, side="right"), 1, len(at) - 1)
+    part = _eased(np.clip((frame - at[after - 1]) / (at[after] - at[after - 1]), 0, 1))[:, None]
+    found: Array = of[after - 1] + part * (of[after] - of[after - 1])
+    return found
+
+
+def _lift(depth: Array, fps: float) -> Array:
+    """Heights (T,), without kinks, by which what is ``depth`` (T,) under the ground comes out of it."""
+    reach = max(1, round(SOFT * fps))
+    deepest = np.max(windows(np.maximum(depth, 0), reach), axis=1)
+    # a mean over the window in which each is the deepest is as high as the one in the middle
+    bell = np.hanning(2 * reach + 3)[1:-1]
+    found: Array = windows(deepest, reach) @ (bell / bell.sum())
+    return found
+
+
+def windows(values: Array, reach: int) -> Array:
+    """Values (T,) with ``reach`` before and as many after each, (T, 2 reach + 1); those at the ends go on."""
+    return np.lib.stride_tricks.sliding_window_view(np.pad(values, reach, mode="edge"), 2 * reach + 1)
+
+
+def _bounded(shift: Array) -> Array:
+    """Shifts (T, N) no longer than FARTHEST; short ones are as they are within a few per cent."""
+    length = np.linalg.norm(shift, axis=-1, keepdims=True) / FARTHEST
+    bounded: Array = shift / (1 + length**4) ** 0.25
+    return bounded
+
+
+def _with_joints(motion: Motion, joints: Sequence[int], turned: Array) -> Motion:
+    """The motion with the angles of some joints from the joints' rotations in the world (T, J, 3, 3).
+
+    The humanoid's get three. Those of another figure keep to the angles that they have, as knees that have one.
+    """
+    skeleton = skeleton_of(motion)
+    for index in joints:
+        joint, had = skeleton.joints[index], dict(zip(motion.channels, motion.units, strict=True))
+        names = tuple(f"{joint.name}.r{axis}" for axis in AXES)
+        own = [] if skeleton == HUMANOID else [i for i, name in enumerate(names) if name in had]
+        kept = own or [0, 1, 2]
+        units = tuple(had.get(names[i], "deg") for i in kept)
+        angles = euler_of(product(inverse(turned[:, joint.parent]), turned[:, index]), joint)[:, kept]
+        values = angles * np.array([TURN[unit] for unit in units]) / (2 * np.pi)
+        motion = with_channels(motion, tuple(names[i] for i in kept), values, units)
+    return motion

@@ -1,0 +1,119 @@
+"""A foot lock for live figures: what stands stays where it stands, without looking ahead.
+
+While a foot stands, what its lowest point moves over the ground is taken out of the foot, tick by tick; when it leaves,
+what has been taken out fades. Hip, knee and ankle follow (:mod:`motet.motion.two_bone`). The offline twin, which knows
+how long a foot is going to stand, is :mod:`motet.motion.feet.hold`.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from motet.bundle.graph import Floats
+from motet.motion.humanoid.bones import BONES, HUMANOID, LEFT_RIGHT, SOLE, sided
+from motet.motion.pose import Pose
+from motet.motion.quaternions import conjugate, quat_product, quat_rotated
+from motet.motion.rotations import rotmat_to_quat
+from motet.motion.springs import damped, damping_of
+from motet.motion.two_bone import Leg
+
+FADE = 0.06
+"""Seconds: the half-life in which a released foot comes back to where it is played."""
+
+FARTHEST = 0.2
+"""Metres: what has to be shifted farther slides."""
+
+SWINGS = 1.0
+"""m/s: what moves faster does not stand yet, whatever the recording says that a figure has just jumped to."""
+
+CHAIN = ("UpperLeg", "LowerLeg", "Foot", "Toes")
+COLUMNS = np.array([[BONES.index(sided(side, part)) for part in CHAIN] for side in LEFT_RIGHT])
+"""Bones (2, 4) of both legs among the humanoid's."""
+
+OFFSETS = np.array([[HUMANOID.offsets[HUMANOID.index(sided(side, part))] for part in CHAIN] for side in LEFT_RIGHT])
+"""Where they begin in their parents' frames (2, 4, 3), the hips' for the first."""
+
+POINTS = np.array([place for places in SOLE.values() for place in places], dtype=np.float32)
+CARRIERS = [CHAIN.index(part) for part, places in SOLE.items() for _ in places]
+"""Points (3, 3) of a sole, and which joint of CHAIN carries each."""
+
+
+@dataclass(eq=False)
+class FootLock:
+    """The lock of B characters. dt: seconds of a tick.
+
+    shift, drift: (B, 2, 2) by how much each foot is moved along x and z, and how fast that changes. soles: (B, 2, 3, 3)
+    where the points of the soles were, None before the first tick.
+    """
+
+    characters: int
+    dt: float
+    shift: Floats | None = None
+    drift: Floats | None = None
+    soles: Floats | None = None
+
+    def copy(self) -> "FootLock":
+        """One that goes on by itself."""
+        return replace(self)  # its arrays are replaced, never written into
+
+    def held(self, pose: Pose) -> Pose:
+        """The next pose with feet that stay where they stand, and not under the ground; a tick after the last."""
+        hips, turned, places = _legs(pose)
+        soles = places[:, :, CARRIERS] + quat_rotated(turned[:, :, CARRIERS], POINTS)
+        shift = self._shift(soles, pose.contacts)
+        lift = np.maximum(-soles[..., 1].min(axis=2), 0)
+        if not shift.any() and not lift.any():
+            return pose
+        target = places[:, :, 2] + np.stack([shift[..., 0], lift, shift[..., 1]], axis=-1)
+        return replace(pose, rotations=_reached(pose.rotations, hips, turned, places, target))
+
+    def _shift(self, soles: Floats, contacts: Floats) -> Floats:
+        """By how much each foot is moved now (B, 2, 2), from the points of the soles (B, 2, 3, 3)."""
+        if self.soles is None or self.shift is None or self.drift is None:
+            self.shift = self.drift = np.zeros((*soles.shape[:2], 2), dtype=np.float32)
+            self.soles = soles
+        lowest = soles[..., 1].argmin(axis=2)[..., None, None]
+        moved = np.take_along_axis(soles - self.soles, lowest, axis=2)[:, :, 0, ::2]
+        faded, slower = damped(self.shift, self.drift, damping_of(FADE), self.dt)
+        held = self.shift - moved
+        stands = contacts[..., None] > 0.5
+        stands &= np.linalg.norm(held, axis=-1, keepdims=True) < FARTHEST
+        stands &= np.linalg.norm(moved, axis=-1, keepdims=True) < SWINGS * self.dt
+        self.drift = np.where(stands, np.float32(0), slower).astype(np.float32)
+        self.shift = np.where(stands, held, faded).astype(np.float32)
+        self.soles = soles
+        return self.shift
+
+
+def _legs(pose: Pose) -> tuple[Floats, Floats, Floats]:
+    """World rotations of the hips (B, 4), and rotations (B, 2, 4, 4) and places (B, 2, 4, 3) of the legs' joints."""
+    hips = quat_product(pose.heading, pose.rotations[:, 0])
+    place = pose.place[:, None]
+    place[..., 1] = pose.height[:, None]
+    local, above = pose.rotations[:, COLUMNS], hips[:, None]
+    turned, places = np.empty_like(local), np.empty((*local.shape[:3], 3), dtype=np.float32)
+    for joint, offset in enumerate(np.swapaxes(OFFSETS, 0, 1).astype(np.float32)):
+        place = place + quat_rotated(above, offset)
+        above = quat_product(above, local[:, :, joint])
+        turned[:, :, joint], places[:, :, joint] = above, place
+    return hips, turned, places
+
+
+def _reached(rotations: Floats, hips: Floats, turned: Floats, places: Floats, target: Floats) -> Floats:
+    """Rotations (B, J, 4) with ankles at targets (B, 2, 3), from those of :func:`_legs`."""
+    hip, knee, ankle, goal = (
+        p.reshape(-1, 3).astype(np.float64) for p in (*np.moveaxis(places[:, :, :3], 2, 0), target)
+    )
+    thigh, shin, foot = (turned[:, :, joint] for joint in range(3))
+    hinge = quat_rotated(shin, np.array([1, 0, 0], dtype=np.float32)).reshape(-1, 3).astype(np.float64)
+    leg = Leg(hip, knee, ankle, hinge)
+    turns = leg.turns(leg.eased(goal))
+    new_thigh, new_shin = (
+        quat_product(rotmat_to_quat(turn).astype(np.float32).reshape(-1, 2, 4), before)
+        for turn, before in zip(turns, (thigh, shin), strict=True)
+    )
+    found = rotations.copy()
+    found[:, COLUMNS[:, 0]] = quat_product(conjugate(hips)[:, None], new_thigh)
+    found[:, COLUMNS[:, 1]] = quat_product(conjugate(new_thigh), new_shin)
+    found[:, COLUMNS[:, 2]] = quat_product(conjugate(new_shin), foot)
+    return found

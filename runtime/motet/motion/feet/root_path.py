@@ -1,0 +1,140 @@
+"""Where a figure goes: a root translation from joint angles alone, found by what the feet do on the ground.
+
+A foot that carries weight stays where it is, so the root moves against it. Which foot that is has to be found at the
+same time as the velocity. Every point of the feet votes for a velocity, and a vote counts the more, the nearer its
+point is to the ground and the better it agrees with the others around it in time: robust regression by iteratively
+reweighted least squares (Beaton and Tukey 1974). Votes that are too slow count less, as the joints of a foot that
+rolls from heel to toe do move forward. Between steps of a run nothing agrees, and the velocity of the last and the
+next step carries through.
+
+The ground pushes but does not pull: where the root falls faster than gravity while the lowest point of the feet is
+held at the ground, the figure has jumped. It then flies along a parabola until its feet reach the ground again.
+
+On level ground with feet that do not slide this is within a few per cent of the true path: in 42 of CMU's trials that
+had no part in the choice of the constants below, the end is off by 5 % of the path on average in walking (at most 8)
+and by 6 % in running (at most 15, in a leap), nearly always too near. Stairs, sitting, lying and walking on hands are
+beyond it.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from motet.errors import MotionError
+from motet.motion.feet.standing import feet_of
+from motet.motion.kinematics import positions, skeleton_of, with_channels
+from motet.motion.motion import Motion
+from motet.motion.rotations import Array
+
+GRAVITY = 9.81  # m/s^2
+HEIGHT = 1.7  # m: taken for a figure whose skeleton does not know its unit of length
+REACH = 0.03  # m: how high a point of a foot can be and still well be on the ground
+SLIP = 0.2  # m/s: how far a vote may be off if it is slower than the rest
+FASTER = 3.0  # times as much for one that is faster
+TREMBLE = 0.015  # s: what is shorter is no movement but noise
+GENERATED = 0.06  # s: the same for motions that a model generated, whose feet tremble more
+CARRY = 0.05  # s: over which votes are brought together
+TAKE_OFF = 0.05  # s: over which the velocity upwards is measured
+ROUNDS = 10
+
+
+def lay_root_path(
+    motion: Motion,
+    feet: tuple[Sequence[str], Sequence[str]] | None = None,
+    tremble: float = TREMBLE,
+    keep_height: bool = False,
+) -> Motion:
+    """The motion with root channels tx, ty, tz in "length" units, found from the feet's contact with the ground.
+
+    The path begins at x = z = 0; y is such that the lowest joint of the feet touches the ground, y = 0, within
+    millimetres, but in flight. A translation that the motion has already is replaced.
+    feet: the names of the joints of each foot, toes included; if not given, the lowest joints that are paired left
+        and right. MotionError for a motion without skeleton or one without such joints.
+    tremble: seconds over which the feet are smoothed; recorded motions need little, generated ones GENERATED, and 0
+        smooths nothing.
+    keep_height: leave y as it is, as of a motion in place whose height is right.
+    """
+    if not 0 <= tremble < np.inf:
+        raise MotionError(f"feet are smoothed over 0 or more seconds, not {tremble}")
+    skeleton = skeleton_of(motion)
+    joints = feet_of(skeleton) if feet is None else [skeleton.index(name) for name in (*feet[0], *feet[1])]
+    metres = skeleton.metres_per_unit or HEIGHT / skeleton.height
+    places = positions(motion)
+    points = (places[:, joints] - places[:, :1]) * metres
+    height = _height(points[..., 1], motion.fps)
+    plane = smoothed(points[..., [0, 2]], tremble, motion.fps)
+    velocity = (
+        velocity_by_feet(plane, points[..., 1] + height[:, None], motion.fps) if len(motion) > 1 else np.zeros((0, 2))
+    )
+    return led_along(motion, velocity, places[:, 0, 1] * metres if keep_height else height, metres)
+
+
+def led_along(motion: Motion, velocity: Array, height: Array, metres: float) -> Motion:
+    """The motion with its root led by velocities (T - 1, 2) in m/s, from x = z = 0, at heights (T,) in m."""
+    path = np.zeros((len(motion), 3))
+    path[1:, [0, 2]] = np.cumsum(velocity, axis=0) / motion.fps
+    path[:, 1] = height
+    names = tuple(f"{skeleton_of(motion).names[0]}.{kind}" for kind in ("tx", "ty", "tz"))
+    return with_channels(motion, names, path / metres, ("length",) * 3)
+
+
+def _height(points: Array, fps: float) -> Array:
+    """Heights (T,) of the root above the ground from those of the feet's points (T, K) above the root, in metres."""
+    standing = -points.min(axis=1)
+    # what jumps up forward in time falls down backward: only what both agree on is flight
+    flight = np.minimum(_with_flight(standing, fps), _with_flight(standing[::-1], fps)[::-1])
+    return smoothed(flight[:, None, None], TREMBLE, fps)[:, 0, 0]
+
+
+def _with_flight(standing: Array, fps: float) -> Array:
+    heights, speed, span = standing.tolist(), 0.0, max(1, round(TAKE_OFF * fps))
+    for t in range(1, len(heights)):
+        falling = heights[t - 1] + speed / fps - 0.5 * GRAVITY / fps**2
+        if falling > heights[t]:
+            heights[t] = falling
+            speed -= GRAVITY / fps
+        else:
+            start = max(0, t - span)
+            speed = (heights[t] - heights[start]) * fps / (t - start)
+    return np.array(heights)
+
+
+def velocity_by_feet(
+    points: Array, above: Array, fps: float, guess: Array | float = 0.0, trust: float = 1e-12
+) -> Array:
+    """Velocity (T - 1, 2) in m/s of the root, from points of the feet (T, K, 2) and their heights (T, K).
+
+    guess: (T - 1, 2) in m/s, a vote of weight ``trust`` that always counts.
+    """
+    between = (above[1:] + above[:-1]) / 2
+    near = np.exp(-0.5 * (between / REACH) ** 2)
+    votes = -np.diff(points, axis=0) * fps
+    velocity = _agreed(votes, near, fps, guess, trust)
+    for _ in range(ROUNDS):
+        off = votes - velocity[:, None]
+        faster = (off * velocity[:, None]).sum(axis=-1) > 0
+        slip = np.where(faster, FASTER * SLIP, SLIP)
+        velocity = _agreed(votes, near / (1 + (off**2).sum(axis=-1) / slip**2) ** 2, fps, guess, trust)
+    return velocity
+
+
+def smoothed(points: Array, tremble: float, fps: float) -> Array:
+    """Points (T, ..., ...) through a Gaussian window in time, continued at both ends as they come in."""
+    reach = round(3 * tremble * fps)
+    if len(points) < 2 or not reach:
+        return points
+    window = np.exp(-0.5 * (np.arange(-reach, reach + 1) / (tremble * fps)) ** 2)
+    padded = np.pad(points, ((reach, reach), (0, 0), (0, 0)), mode="reflect", reflect_type="odd")
+    calm: Array = sum(weight * padded[i : i + len(points)] for i, weight in enumerate(window / window.sum()))
+    return calm
+
+
+def _agreed(votes: Array, weights: Array, fps: float, guess: Array | float, trust: float) -> Array:
+    """The mean (T, 2) of votes (T, K, 2) by their weights (T, K) and by how near they are in time, and of the guess."""
+    reach = round(1.0 * fps)
+    nearness = np.exp(-np.abs(np.arange(-reach, reach + 1)) / (CARRY * fps))
+    columns = [weights.sum(axis=1), *np.moveaxis((weights[..., None] * votes).sum(axis=1), 1, 0)]
+    total, x, z = (np.convolve(column, nearness)[reach : reach + len(votes)] for column in columns)
+    # without any vote within a second: the guess
+    mean: Array = (np.stack([x, z], axis=1) + trust * guess) / (total + trust)[:, None]
+    return mean

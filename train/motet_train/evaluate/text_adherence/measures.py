@@ -1,0 +1,64 @@
+"""How good the motions of a prompt are, whatever they show: sliding feet, jerk, sinking in, variety, duration."""
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+
+from motet.motion.feet.standing import feet_of, ground_of
+from motet.motion.humanoid.bones import HUMANOID, LEFT_RIGHT, sided
+from motet.motion.rotations import Array
+from motet_train.evaluate.text_adherence.track import RATE, Track
+
+FEET = feet_of(HUMANOID)
+
+LOW = 0.04
+"""Metres above the ground: the ball of a foot that is no higher, 2 cm above where it is in standing, is on it."""
+
+POSES = 32
+"""Poses, evenly spaced in time, by which two motions of any length are compared."""
+
+BALLS = [HUMANOID.index(sided(side, "Toes")) for side in LEFT_RIGHT]
+"""The joints in the balls of the feet, which stay in place from the heel's landing to the toes' leaving."""
+
+
+def slide(track: Track) -> float:
+    """How fast feet on the ground slide, m/s: the mean speed over the ground of the balls of the feet from one frame to
+    the next, in both of which they are low (LOW). NaN where none ever is."""
+    balls = track.points[:, BALLS]
+    low = balls[..., 1] <= ground_of(track.points[:, FEET, 1]) + LOW
+    speed = np.linalg.norm(np.diff(balls[..., [0, 2]], axis=0), axis=-1) * RATE
+    standing = low[1:] & low[:-1]
+    return float(speed[standing].mean()) if standing.any() else np.nan
+
+
+def jerk(track: Track) -> float:
+    """The mean length of the third difference of joint positions, m/s^3; NaN for less than four frames."""
+    third = np.diff(track.points, n=3, axis=0) * RATE**3
+    return float(np.linalg.norm(third, axis=-1).mean()) if len(third) else np.nan
+
+
+def depth(track: Track) -> float:
+    """How deep the lowest joint is under y = 0, metres: the mean over all frames, 0 where it is above."""
+    return float(np.maximum(-track.points[..., 1].min(axis=1), 0).mean())
+
+
+def distance(one: Array, other: Array) -> float:
+    """The mean distance of joints, metres, between the :func:`poses` of two motions."""
+    return float(np.linalg.norm(one - other, axis=-1).mean())
+
+
+def poses(track: Track) -> Array:
+    """Poses (POSES, J, 3), evenly spaced in time: what is in front, to the left and how high, each seen from the hips,
+    so that neither the place nor the heading nor how long it takes makes a difference."""
+    frames = np.round(np.linspace(0, len(track) - 1, POSES)).astype(int)
+    part = Track(track.points[frames])
+    part.__dict__["ground"] = track.ground
+    return np.stack([part.body(name) for name in HUMANOID.names], axis=1)
+
+
+def spread(tracks: Sequence[Track]) -> float:
+    """The mean :func:`distance` between two of several motions; NaN for less than two."""
+    seen = [poses(track) for track in tracks]
+    pairs = [distance(one, other) for one, other in combinations(seen, 2)]
+    return float(np.mean(pairs)) if pairs else np.nan

@@ -1,0 +1,58 @@
+"""Recorded trials: what the rules are checked on, and what a look-up plays."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from motet.errors import MotionError
+from motet.motion.motion import Motion
+from motet.representation import named
+from motet_train.data.corpus import read_corpus
+from motet_train.data.errors import DataError
+from motet_train.data.records import Record
+from motet_train.data.store import INDEX, Store
+from motet_train.evaluate.text_adherence.prompts import actions
+from motet_train.evaluate.text_adherence.track import Track, track_of
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A motion of any human figure, its name, and what was said about it."""
+
+    name: str
+    sentences: tuple[str, ...]
+    motion: Motion
+
+    @property
+    def action(self) -> str | None:
+        """What it shows, None for a trial that the table of trials does not have."""
+        return actions().get(self.name)
+
+    @cached_property
+    def track(self) -> Track:
+        """The track of its motion; DataError for a motion that is none of a human figure."""
+        try:
+            return track_of(self.motion)
+        except MotionError as error:
+            raise DataError(f"{self.name} cannot be judged: {error}") from error
+
+
+def read_trials(path: Path, unit: str | float | None = None) -> Iterator[Trial]:
+    """The trials in a store, or in a folder or zip of motion files with a table of sentences; DataError where it is
+    neither. What cannot be read or has no sentence is left out.
+
+    unit: the length unit of files that do not state theirs, as in :func:`motet.read`.
+    """
+    if (path / INDEX).is_file():
+        yield from of_store(Store.open(path))
+    else:
+        records = (item for item in read_corpus(path, unit=unit) if isinstance(item, Record))
+        yield from (Trial(record.name, record.sentences, record.motion) for record in records)
+
+
+def of_store(store: Store) -> Iterator[Trial]:
+    """The records of a store as trials, at its frame rate, the figure moving over the ground as its root block says."""
+    representation = named(store.representation)
+    for index, record in enumerate(store.records):
+        yield Trial(record.name, record.sentences, representation.motion(store.motion(index)))
