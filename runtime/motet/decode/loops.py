@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from motet.decode import beam, between, codes, consensus, free_run, matching, mixture, nearest, session
+from motet.decode import beam, codes, consensus, free_run, in_betweening, matching, mixture, nearest, session
 from motet.decode.loop import Loop
 from motet.errors import BundleError
 
@@ -15,7 +15,7 @@ LOOPS: Mapping[str, Loop] = {
     "session": session.LOOP,
     "matching": matching.LOOP,
     "nearest": nearest.LOOP,
-    "between": between.LOOP,
+    "between": in_betweening.LOOP,
 }
 
 
