@@ -34,6 +34,7 @@ ONE_WAY = {
     "motet_train.models": ("motet_train.recipes", "motet_train.evaluate", "motet_train.cli"),
     "motet_train.evaluate": ("motet_train.recipes", "motet_train.cli"),
     "motet_train.recipes": ("motet_train.cli",),
+    "motet_train.papers": ("motet_train.cli",),
 }
 """Package -> what its modules do not import when they are imported."""
 

@@ -10,8 +10,8 @@ from predict_manifest import predict_manifest
 from motet.models.load import load
 from motet.models.predict import PredictModel
 from motet_export.bundles import export_run
-from motet_train.models.predict.stepwise import Stepwise
-from motet_train.models.predict.systems import stepwise
+from motet_train.papers.li2018.stepwise import Stepwise
+from motet_train.papers.li2018.systems import stepwise
 from motet_train.runs import Run
 
 pytestmark = pytest.mark.slow  # torch's exporter

@@ -8,8 +8,8 @@ import torch
 from motet.bundle.graph import OnnxGraph
 from motet.decode.free_run import free_run
 from motet_export.exporter import export_graph
-from motet_train.models.predict.srnn import EDGES, NODES, SRNN, Config
-from motet_train.models.predict.stepwise import Stepwise
+from motet_train.papers.li2018.srnn import EDGES, NODES, SRNN, Config
+from motet_train.papers.li2018.stepwise import Stepwise
 from motet_train.torch_graph import TorchGraph
 
 pytestmark = pytest.mark.slow  # torch's exporter

@@ -11,11 +11,11 @@ from motet.bundle.graph import OnnxGraph
 from motet.decode.free_run import free_run
 from motet_export.exporter import export_graph
 from motet_export.parity import check_carried, check_one_step
-from motet_train.models.predict import lstm_3lr, lstm_ae, rrnn
-from motet_train.models.predict.lstm_3lr import EncoderRecurrentDecoder
-from motet_train.models.predict.lstm_ae import LSTMAE
-from motet_train.models.predict.rrnn import RRNN
-from motet_train.models.predict.stepwise import Stepwise, System
+from motet_train.papers.li2018 import lstm_3lr, lstm_ae, rrnn
+from motet_train.papers.li2018.lstm_3lr import EncoderRecurrentDecoder
+from motet_train.papers.li2018.lstm_ae import LSTMAE
+from motet_train.papers.li2018.rrnn import RRNN
+from motet_train.papers.li2018.stepwise import Stepwise, System
 from motet_train.torch_graph import TorchGraph
 
 pytestmark = pytest.mark.slow  # torch's exporter

@@ -12,13 +12,13 @@ from control_runs import control_run
 from motet.bundle.manifest import Manifest
 from motet.models.control import ControlModel
 from motet_export.bundles import export_run
-from motet_train.data.clips import read_clips
-from motet_train.evaluate.control.experiments import experiments, study_of
-from motet_train.evaluate.control.gaits import limit_cycle, switch
-from motet_train.models.control.angle_crbm import AngleCRBM, AngleCRBMConfig, from_config
-from motet_train.models.control.contrastive import DivergedError, Learning
-from motet_train.models.control.crbm import CRBM
 from motet_train.models.net import tuples
+from motet_train.papers.tdbn.angle_crbm import AngleCRBM, AngleCRBMConfig, from_config
+from motet_train.papers.tdbn.clips import read_clips
+from motet_train.papers.tdbn.contrastive import DivergedError, Learning
+from motet_train.papers.tdbn.crbm import CRBM
+from motet_train.papers.tdbn.experiments.gaits import limit_cycle, switch
+from motet_train.papers.tdbn.experiments.report import experiments, study_of
 from motet_train.runs import Run
 
 SHORT = replace(AngleCRBMConfig(), iterations=3, crbm=Learning(3, 3e-2, temperature=(1.0, 1.0)))

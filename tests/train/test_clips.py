@@ -7,11 +7,12 @@ from control_runs import control_run
 
 from motet.errors import FormatError
 from motet.formats import read_motion, write_motion
-from motet_train.data.body import body_parts
-from motet_train.data.clips import CMU_FOLDER, read_clips
+from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.errors import DataError
-from motet_train.models.control.contrastive import Learning
-from motet_train.models.control.tdbn import TDBNConfig
+from motet_train.papers.tdbn.body import body_parts
+from motet_train.papers.tdbn.clips import read_clips
+from motet_train.papers.tdbn.contrastive import Learning
+from motet_train.papers.tdbn.tdbn import TDBNConfig
 
 
 def test_the_default_clips_are_the_thesis_trials() -> None:

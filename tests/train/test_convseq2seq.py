@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from motet_train.data.errors import DataError
 from motet_train.descent import Training
-from motet_train.models.predict.convseq2seq import SLOPE, Config, Convolution, ConvSeq2Seq, Discriminator
-from motet_train.models.predict.stepwise import Stepwise, free_run
-from motet_train.recipes.systems import Adversary
+from motet_train.papers.li2018.convseq2seq import SLOPE, Config, Convolution, ConvSeq2Seq, Discriminator
+from motet_train.papers.li2018.recipe import Adversary
+from motet_train.papers.li2018.stepwise import Stepwise, free_run
 
 Array = NDArray[Any]
 SMALL = Config(45, filters=(3, 4, 5), units=8)

@@ -13,7 +13,7 @@ from motet.formats.glb import container
 from motet.formats.gltf_data import parse
 from motet.formats.mmm import read
 from motet_train.data.archive import Archive
-from motet_train.data.clips import CMU_FOLDER
+from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.corpus import read_corpus, recordings
 from motet_train.data.errors import DataError
 from motet_train.data.records import Record, Skipped

@@ -19,15 +19,16 @@ from motet.models.control import ControlModel
 from motet.models.load import load
 from motet.representation.contract import MotionContract
 from motet_train.cli.evaluate import _clips
-from motet_train.data.clips import CMU_FOLDER, Clips, read_clips
+from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.errors import DataError
-from motet_train.evaluate.control.experiments import GOALS, by_label, control_report, study_of
-from motet_train.evaluate.control.gaits import gait_transitions, limit_cycle
-from motet_train.evaluate.control.plots import drawings
-from motet_train.evaluate.control.study import ControlStudy
 from motet_train.evaluate.figures import save
 from motet_train.evaluate.tables import reached
-from motet_train.models.control.tdbn import TDBNConfig
+from motet_train.papers.tdbn.clips import Clips, read_clips
+from motet_train.papers.tdbn.experiments.gaits import gait_transitions, limit_cycle
+from motet_train.papers.tdbn.experiments.plots import drawings
+from motet_train.papers.tdbn.experiments.report import GOALS, by_label, control_report, study_of
+from motet_train.papers.tdbn.experiments.study import ControlStudy
+from motet_train.papers.tdbn.tdbn import TDBNConfig
 
 
 @pytest.fixture(scope="module")

@@ -9,8 +9,8 @@ from motet.formats import read_motion
 from motet.motion.feet.root_path import smoothed
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
-from motet_train.data.clips import CMU_CLIPS, CMU_FOLDER
-from motet_train.evaluate.control.feet import CALM, LOW, SHORTEST, acceleration, leap, slide, speed, stances
+from motet_train.data.cmu_trials import CMU_CLIPS, CMU_FOLDER
+from motet_train.evaluate.feet import CALM, LOW, SHORTEST, acceleration, leap, slide, speed, stances
 
 Array = np.ndarray
 FPS = 40.0

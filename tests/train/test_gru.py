@@ -8,8 +8,8 @@ from torch import Tensor
 
 from motet_train.models.language.dropout import WordEmbedding, mask
 from motet_train.models.language.gru import GRU
-from motet_train.models.language.layer_norm_gru import LayerNormGRU
 from motet_train.models.language.sequence import Decoder, Encoder
+from motet_train.papers.plappert2017.layer_norm_gru import LayerNormGRU
 
 Array = NDArray[np.float64]
 LAYERS = pytest.mark.parametrize("layer", [GRU, LayerNormGRU])

@@ -9,7 +9,6 @@ import torch
 from torch import Tensor
 
 from motet_train.data.batch import Batch
-from motet_train.models.language.language_to_motion import LanguageToMotion, LanguageToMotionConfig
 from motet_train.models.language.motion_to_language import (
     EOS,
     PAD,
@@ -18,6 +17,7 @@ from motet_train.models.language.motion_to_language import (
     MotionToLanguage,
     MotionToLanguageConfig,
 )
+from motet_train.papers.plappert2017.language_to_motion import LanguageToMotion, LanguageToMotionConfig
 from motet_train.runs import MODELS
 
 D, V = 3, 11

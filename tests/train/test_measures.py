@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from motet_train.data.body import body_parts
-from motet_train.data.clips import read_clips
-from motet_train.data.period import is_periodic, period
-from motet_train.evaluate.control.measures import ARRIVED, Reference, arrival, upsample
+from motet_train.papers.tdbn.body import body_parts
+from motet_train.papers.tdbn.clips import read_clips
+from motet_train.papers.tdbn.experiments.measures import ARRIVED, Reference, arrival, upsample
+from motet_train.papers.tdbn.period import is_periodic, period
 
 
 def wave(frames: int, cycle: float, phase: float = 0.0) -> np.ndarray:

@@ -16,11 +16,11 @@ from motet.motion.mirror import mirror
 from motet.motion.motion import Motion
 from motet.representation import named
 from motet.representation.contract import MotionContract
-from motet_train.data import clips as clips_module
 from motet_train.data.locomotion import Gait, Recording, read_gaits
 from motet_train.data.matching_rows import MatchingRows, mirrored_poses, rows_of, scaling
 from motet_train.models.codes.sixd_places import tree_of
 from motet_train.models.control.matching import Matching, MatchingConfig, from_config
+from motet_train.papers.tdbn import clips as clips_module
 from motet_train.recipes.matching_table import take
 
 CLIPS = Path(clips_module.__file__).parent / "cmu"

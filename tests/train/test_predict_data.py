@@ -18,16 +18,25 @@ from motet.motion.rotations import continuous_rotvec, rotmat_to_euler, rotmat_to
 from motet.motion.skeleton import END_SUFFIX
 from motet.representation import named
 from motet.representation.contract import MotionContract
-from motet_train.data.clips import CMU_FOLDER
+from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.errors import DataError
-from motet_train.data.expmap_files import CMU_LAYOUT, H36M_LAYOUT, Scaling, is_expmap, parse, read_expmap, scaling_of
 from motet_train.data.predict_data import Material, expmap_material, store_material
 from motet_train.data.preparation import FULL, VECTORS, Preparation
 from motet_train.data.records import Record
 from motet_train.data.split import split
 from motet_train.data.store import Store, prepare
 from motet_train.data.windows import Windows
-from motet_train.evaluate.predict.protocol import (
+from motet_train.models.predict.places import VectorPlaces
+from motet_train.papers.li2018.expmap_files import (
+    CMU_LAYOUT,
+    H36M_LAYOUT,
+    Scaling,
+    is_expmap,
+    parse,
+    read_expmap,
+    scaling_of,
+)
+from motet_train.papers.li2018.protocol import (
     REPORTED,
     errors,
     euler_frames,
@@ -40,7 +49,6 @@ from motet_train.evaluate.predict.protocol import (
     windows,
     zero_velocity,
 )
-from motet_train.models.predict.places import VectorPlaces
 
 
 def write_files(folder: Path, frames: int = 200, actions: tuple[str, ...] = ("walking", "running")) -> Path:

@@ -11,17 +11,18 @@ from test_predict_data import write_files
 from motet.formats import read_motion
 from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.kinematics import chained, local_rotations, local_translations, positions
-from motet_train.data.clips import CMU_FOLDER
+from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.errors import DataError
-from motet_train.data.expmap_files import ExpmapCorpus, read_expmap, scaling_of
 from motet_train.data.preparation import VECTORS
 from motet_train.data.records import Record
 from motet_train.data.store import prepare
-from motet_train.evaluate.predict import mocap_floors, text_floors
+from motet_train.evaluate.predict import mocap_floors
 from motet_train.evaluate.predict.floors import CONSTANT, DAMPED, FLOORS, JOINTS, ZERO, best, gone_on, key, reach
 from motet_train.evaluate.predict.mocap_floors import Windows, apart, chosen, floors, places
-from motet_train.evaluate.predict.protocol import OUTPUT_FRAMES, zero_velocity
-from motet_train.evaluate.predict.text_floors import velocity
+from motet_train.papers.li2018 import text_floors
+from motet_train.papers.li2018.expmap_files import ExpmapCorpus, read_expmap, scaling_of
+from motet_train.papers.li2018.protocol import OUTPUT_FRAMES, zero_velocity
+from motet_train.papers.li2018.text_floors import velocity
 
 
 def test_the_last_step_is_gone_as_often_as_its_decay_says() -> None:

@@ -14,15 +14,15 @@ from motet.bundle.manifest import Manifest
 from motet.cli import main
 from motet.formats import read_motion, write_motion
 from motet.models.predict import PredictModel
-from motet_train.data.clips import CMU_FOLDER
-from motet_train.data.expmap_files import CMU_ACTIONS, read_expmap
+from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.predict_data import expmap_material
-from motet_train.evaluate.predict.curves import FEW, MEAN, complete, curves
 from motet_train.evaluate.predict.floors import ZERO
-from motet_train.evaluate.predict.published_h36m import CONV
 from motet_train.manifest import About
 from motet_train.models.predict.error_head import LEAST, SIGNS, Doubt, Signs
 from motet_train.models.predict.predictor import Predictor, PredictorConfig
+from motet_train.papers.li2018.curves import FEW, MEAN, complete, curves
+from motet_train.papers.li2018.expmap_files import CMU_ACTIONS, read_expmap
+from motet_train.papers.li2018.published_h36m import CONV
 from motet_train.recipes.predict import DEFAULT, train_predict
 from motet_train.recipes.recipe import Job
 from motet_train.runs import Run

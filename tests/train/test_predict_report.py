@@ -20,22 +20,22 @@ from motet.motion.heading import heading
 from motet.motion.kinematics import local_rotations, positions
 from motet.motion.rotations import axis_to_rotmat, rotmat_to_rotvec, rotvec_to_rotmat
 from motet_train.cli.evaluate_predict import predict_reports
-from motet_train.data.clips import CMU_FOLDER
-from motet_train.data.expmap_files import CMU_LAYOUT, H36M_LAYOUT, ExpmapCorpus, Layout, parse, read_expmap
+from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.predict_data import expmap_material
-from motet_train.evaluate.predict import published
-from motet_train.evaluate.predict.ablations import ablated, ablation_table
 from motet_train.evaluate.predict.costs import cost_table, harness_table
-from motet_train.evaluate.predict.curves import COUNTS, MANY, MEAN, Curves, spreads_of
 from motet_train.evaluate.predict.floors import CONSTANT, DAMPED, ZERO
 from motet_train.evaluate.predict.plots import _looks
-from motet_train.evaluate.predict.protocol import windows
-from motet_train.evaluate.predict.protocol_table import protocol_table
-from motet_train.evaluate.predict.published_h36m import CONV, ERD, RRNN
 from motet_train.evaluate.predict.seed_groups import SeedGroup, mean, pooled, seed_groups, spread
-from motet_train.evaluate.predict.strips import EVERY, GIVEN, places, strips
-from motet_train.models.predict.convseq2seq import Config
-from motet_train.models.predict.systems import stepwise
+from motet_train.papers.li2018 import published
+from motet_train.papers.li2018.ablations import ablated, ablation_table
+from motet_train.papers.li2018.convseq2seq import Config
+from motet_train.papers.li2018.curves import COUNTS, MANY, MEAN, Curves, spreads_of
+from motet_train.papers.li2018.expmap_files import CMU_LAYOUT, H36M_LAYOUT, ExpmapCorpus, Layout, parse, read_expmap
+from motet_train.papers.li2018.protocol import windows
+from motet_train.papers.li2018.protocol_table import protocol_table
+from motet_train.papers.li2018.published_h36m import CONV, ERD, RRNN
+from motet_train.papers.li2018.strips import EVERY, GIVEN, places, strips
+from motet_train.papers.li2018.systems import stepwise
 from motet_train.runs import Run
 
 FIVE = ("basketball", "jumping", "running", "soccer", "walking")

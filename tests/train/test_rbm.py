@@ -5,8 +5,8 @@ import math
 import numpy as np
 import torch
 
-from motet_train.models.control.contrastive import Ascent, Epoch, Learning, balanced, schedule
-from motet_train.models.control.rbm import RBM, RBMLayer, block_mask, reconstruct
+from motet_train.papers.tdbn.contrastive import Ascent, Epoch, Learning, balanced, schedule
+from motet_train.papers.tdbn.rbm import RBM, RBMLayer, block_mask, reconstruct
 
 
 def small_rbm() -> RBM:

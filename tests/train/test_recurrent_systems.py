@@ -10,13 +10,13 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from motet_train.models.predict import lstm_3lr, lstm_ae, rrnn
-from motet_train.models.predict.lstm_3lr import EncoderRecurrentDecoder
-from motet_train.models.predict.lstm_ae import LSTMAE
-from motet_train.models.predict.noise import noise_at
-from motet_train.models.predict.reused_activations import Reused, one_gradient
-from motet_train.models.predict.rrnn import RRNN
-from motet_train.models.predict.stepwise import System, free_run
+from motet_train.papers.li2018 import lstm_3lr, lstm_ae, rrnn
+from motet_train.papers.li2018.lstm_3lr import EncoderRecurrentDecoder
+from motet_train.papers.li2018.lstm_ae import LSTMAE
+from motet_train.papers.li2018.noise import noise_at
+from motet_train.papers.li2018.reused_activations import Reused, one_gradient
+from motet_train.papers.li2018.rrnn import RRNN
+from motet_train.papers.li2018.stepwise import System, free_run
 
 Array = NDArray[np.float64]
 D, SEED = 5, 6

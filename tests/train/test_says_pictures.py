@@ -6,7 +6,7 @@ import motet
 from motet.models.codes import CodesModel
 from motet.motion.humanoid.retarget import on_humanoid
 from motet.motion.motion import Motion
-from motet_train.data.clips import CMU_FOLDER
+from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.evaluate.figures import save
 from motet_train.evaluate.text_adherence.outside import OUTSIDE, said_to_be_outside
 from motet_train.evaluate.text_adherence.pictures import EVERY, says_drawings

@@ -14,10 +14,10 @@ from test_predict_data import write_files
 
 from motet.cli import main
 from motet.formats import read_motion, write_motion
-from motet_train.data.clips import CMU_FOLDER
+from motet_train.data.cmu_trials import CMU_FOLDER
+from motet_train.papers.li2018.recipe import RECIPES as SYSTEMS
+from motet_train.papers.tdbn.recipe import RECIPES as CONTROL
 from motet_train.recipes import codec, codes, describe, predict
-from motet_train.recipes.control import RECIPES as CONTROL
-from motet_train.recipes.systems import RECIPES as SYSTEMS
 from motet_train.runs import Run
 from motet_train.settings import SettingsError, changed, read_settings, to_toml
 
@@ -176,7 +176,7 @@ def test_a_bad_file_is_refused_and_nothing_written(
 def test_these_resume_from_the_command_line_too(
     model: str, data: dict[str, tuple[object, ...]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("motet_train.divergence.EVERY", 2)
+    monkeypatch.setattr("motet_train.papers.tdbn.divergence.EVERY", 2)
     (tmp_path / "small.toml").write_text(SMALL[model])
     command = ("train", model, *data[model], "--config", tmp_path / "small.toml", "--out")
     assert motet(*command, tmp_path / "whole").exit_code == 0

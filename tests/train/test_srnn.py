@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from motet_train.data.errors import DataError
-from motet_train.data.expmap_files import CMU_LAYOUT, H36M_LAYOUT
-from motet_train.models.predict.noise import noise_at, noisy
-from motet_train.models.predict.srnn import SRNN, Config, parts_of
+from motet_train.papers.li2018.expmap_files import CMU_LAYOUT, H36M_LAYOUT
+from motet_train.papers.li2018.noise import noise_at, noisy
+from motet_train.papers.li2018.srnn import SRNN, Config, parts_of
 from motet_train.precision import has_bfloat16
 
 Array = NDArray[np.float64]

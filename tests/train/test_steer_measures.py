@@ -15,13 +15,13 @@ from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
 from motet.motion.pose import Pose
 from motet.representation import named
-from motet_train.data import clips
 from motet_train.data.locomotion import Recording
 from motet_train.data.matching_rows import rows_of
 from motet_train.evaluate.steer.following import PACES, aside_errors, speed_errors, turn_errors
 from motet_train.evaluate.steer.standing import standing, stretches
 from motet_train.evaluate.steer.track import Track, tracks_of
 from motet_train.evaluate.steer.wandering import Limits, Watch, broken, frozen, leaps, turns, wandering, watched
+from motet_train.papers.tdbn import clips
 
 
 def puppets(**how: Any) -> Any:

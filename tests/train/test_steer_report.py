@@ -21,7 +21,6 @@ from motet.models.steer import SteerModel
 from motet.motion.humanoid.bones import HUMANOID, sole_points
 from motet.motion.kinematics import global_transforms
 from motet.representation import named
-from motet_train.data import clips
 from motet_train.data.errors import DataError
 from motet_train.data.locomotion import Gait, recordings
 from motet_train.data.records import Record
@@ -30,6 +29,7 @@ from motet_train.eager import eager_model
 from motet_train.evaluate.steer import following, standing
 from motet_train.evaluate.steer.report import Recorded, seldom, steer_report, steer_text
 from motet_train.evaluate.tables import report_table
+from motet_train.papers.tdbn import clips
 from motet_train.runs import Run
 
 GAITS = tuple(Gait(name, (name,), ("*",)) for name in ("walk", "run"))

@@ -21,19 +21,19 @@ from motet.representation import named
 from motet.representation.root_block import way
 from motet.representation.root_sixd import ROOT_SIXD
 from motet_train.cli.evaluate_steer import as_steered
-from motet_train.data import clips
-from motet_train.data.body import TRUNK, body_parts
-from motet_train.data.courses import LABELS, MOST, controls_of, course
 from motet_train.data.errors import DataError
 from motet_train.data.locomotion import Gait, recordings
 from motet_train.data.records import Record
 from motet_train.data.store import Store, prepare
 from motet_train.evaluate.steer import following, standing
-from motet_train.evaluate.steer.driven import Driven, DrivenSession, moved
 from motet_train.evaluate.steer.report import Recorded, steer_report
 from motet_train.manifest import About
+from motet_train.papers.tdbn import clips
+from motet_train.papers.tdbn.body import TRUNK, body_parts
+from motet_train.papers.tdbn.courses import LABELS, MOST, controls_of, course
+from motet_train.papers.tdbn.driven import Driven, DrivenSession, moved
+from motet_train.papers.tdbn.steered import RECIPES, mirrored_too, train_steered
 from motet_train.recipes.recipe import Job
-from motet_train.recipes.steered import RECIPES, mirrored_too, train_steered
 from motet_train.runs import Run
 
 GAITS = tuple(Gait(name, (name,), ("*",)) for name in ("walk", "run"))
@@ -59,7 +59,7 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
 @pytest.fixture(scope="module", autouse=True)
 def two_gaits() -> Any:
     with pytest.MonkeyPatch.context() as patch:
-        for place in ("motet_train.recipes.steered", "motet_train.evaluate.steer.report"):
+        for place in ("motet_train.papers.tdbn.steered", "motet_train.evaluate.steer.report"):
             patch.setattr(f"{place}.read_gaits", lambda: GAITS)
         yield
 

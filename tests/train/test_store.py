@@ -19,7 +19,7 @@ from motet.motion.kinematics import euler_of, local_rotations, positions, with_c
 from motet.motion.motion import Motion
 from motet.representation.contract import FLOORS
 from motet.representation.root_block import ROOT_BLOCK, from_root_block
-from motet_train.data.clips import CMU_FOLDER
+from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.corpus import read_corpus
 from motet_train.data.errors import DataError
 from motet_train.data.preparation import ANGLES, FULL, SIXD, VECTORS, Preparation, preparation

@@ -4,8 +4,8 @@ import numpy as np
 import torch
 
 from motet_train.data.batch import Batch
-from motet_train.models.language.language_to_motion import LanguageToMotion, LanguageToMotionConfig
 from motet_train.models.language.summary import LARGEST, SummaryHead, summary
+from motet_train.papers.plappert2017.language_to_motion import LanguageToMotion, LanguageToMotionConfig
 
 SMALL = LanguageToMotionConfig(channels=3, words=9, encoder_units=(4,), decoder_units=(5,), embedding=4, components=2)
 

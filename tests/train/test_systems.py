@@ -12,12 +12,12 @@ from click.testing import CliRunner, Result
 from test_predict_data import write_files
 
 from motet.cli import main
-from motet_train.data.expmap_files import read_expmap
 from motet_train.data.predict_data import expmap_material, validation_files
-from motet_train.models.predict.convseq2seq import Config
-from motet_train.models.predict.systems import SYSTEMS
+from motet_train.papers.li2018.convseq2seq import Config
+from motet_train.papers.li2018.expmap_files import read_expmap
+from motet_train.papers.li2018.recipe import RECIPES, sized, validation_error
+from motet_train.papers.li2018.systems import SYSTEMS
 from motet_train.recipes.recipe import Recipe
-from motet_train.recipes.systems import RECIPES, sized, validation_error
 from motet_train.runs import Run
 from motet_train.trainer import CHECKPOINT
 

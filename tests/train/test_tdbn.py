@@ -8,11 +8,11 @@ from control_runs import control_run
 
 from motet.bundle.manifest import Manifest
 from motet.models.control import ControlModel
-from motet_train.data.body import body_parts
-from motet_train.data.clips import read_clips
-from motet_train.models.control.contrastive import Learning
-from motet_train.models.control.tdbn import TDBN, TDBNConfig, from_config
 from motet_train.models.net import tuples
+from motet_train.papers.tdbn.body import body_parts
+from motet_train.papers.tdbn.clips import read_clips
+from motet_train.papers.tdbn.contrastive import Learning
+from motet_train.papers.tdbn.tdbn import TDBN, TDBNConfig, from_config
 from motet_train.runs import Run, RunError
 
 SHORT = replace(TDBNConfig(), restarts=1, tries=1, rbm=Learning(epochs=2), crbm=Learning(epochs=2))

@@ -16,11 +16,14 @@ from motet.bundle.graph import Graph, GraphSpec
 from motet.errors import MotetError
 from motet.files import write_whole
 from motet_train.models.codes import actions, codec, motion_codes
-from motet_train.models.control import angle_crbm, matching, tdbn
+from motet_train.models.control import matching
 from motet_train.models.fill import filler
-from motet_train.models.language import joint_embedding, language_to_motion, motion_to_language
+from motet_train.models.language import joint_embedding, motion_to_language
 from motet_train.models.net import Net
-from motet_train.models.predict import predictor, systems
+from motet_train.models.predict import predictor
+from motet_train.papers.li2018 import systems
+from motet_train.papers.plappert2017 import language_to_motion
+from motet_train.papers.tdbn import angle_crbm, tdbn
 from motet_train.torch_graph import TorchGraph
 
 MANIFEST, WEIGHTS = "run.json", "weights.pt"

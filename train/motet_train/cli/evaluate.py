@@ -29,16 +29,16 @@ from motet_train.cli.evaluate_says import Best, says_reports
 from motet_train.cli.evaluate_steer import as_steered, steer_reports
 from motet_train.cli.prepared import store_beside
 from motet_train.cli.train_options import unit_in
-from motet_train.data.clips import Clips, read_clips
 from motet_train.data.errors import DataError
 from motet_train.data.store import INDEX
-from motet_train.evaluate.control.experiments import GOALS, control_report, study_of
 from motet_train.evaluate.fill.report import fill_text
 from motet_train.evaluate.language.report import GOALS as LANGUAGE_GOALS
 from motet_train.evaluate.language.search import GOALS as SEARCH_GOALS
 from motet_train.evaluate.steer.report import steer_text
 from motet_train.evaluate.tables import Report, json_ready, report_table
 from motet_train.evaluate.text_adherence.table import says_text
+from motet_train.papers.tdbn.clips import Clips, read_clips
+from motet_train.papers.tdbn.experiments.report import GOALS, control_report, study_of
 from motet_train.recipes.recipe import SETTINGS
 from motet_train.runs import MANIFEST, Run
 from motet_train.settings import read_settings
@@ -192,8 +192,8 @@ def _control(
         with tqdm(desc=name, unit=" experiments", disable=None, leave=False) as bar:
             reports[name] = control_report(study, lambda key, bar=bar: bar.update())  # type: ignore[misc]
         if plots is not None:
-            from motet_train.evaluate.control.plots import drawings
             from motet_train.evaluate.figures import save
+            from motet_train.papers.tdbn.experiments.plots import drawings
 
             save(drawings(study), plots if len(models) == 1 else plots / Path(name).name)
     return reports

@@ -71,7 +71,7 @@ def _report(name: str, models: Models, corpora: Mapping[str, SplitStore], bar: "
 
 def _draw(name: str, model: DescribeModel | GenerateModel, corpus: SplitStore, folder: Path) -> None:
     from motet_train.evaluate.figures import save
-    from motet_train.evaluate.language.pictures import describe_drawings, generate_drawings
+    from motet_train.papers.plappert2017.figures import describe_drawings, generate_drawings
 
     run = Path(name) if (Path(name) / LOG).is_file() else None
     if isinstance(model, DescribeModel):

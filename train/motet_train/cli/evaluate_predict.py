@@ -9,13 +9,13 @@ from tqdm import tqdm
 from motet.formats import read_motion
 from motet.motion.kinematics import skeleton_of
 from motet_train.cli.evaluate_mocap import mocap_reports
-from motet_train.data.clips import CMU_FOLDER
-from motet_train.data.expmap_files import CMU_LAYOUT, ExpmapCorpus, is_expmap, read_expmap
+from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.predict_data import STRIDE
-from motet_train.evaluate.predict import curves, strips
-from motet_train.evaluate.predict.results import Models, Ready, Results, results_json, results_of, results_text
 from motet_train.evaluate.predict.seed_groups import drawn
-from motet_train.evaluate.predict.text_floors import TEXT_FLOORS
+from motet_train.papers.li2018 import curves, strips
+from motet_train.papers.li2018.expmap_files import CMU_LAYOUT, ExpmapCorpus, is_expmap, read_expmap
+from motet_train.papers.li2018.results import Models, Ready, Results, results_json, results_of, results_text
+from motet_train.papers.li2018.text_floors import TEXT_FLOORS
 
 DRAWN = ("running", "jumping")
 """Actions of the text files of which stick figures are drawn (Li et al. 2018, figure 5)."""

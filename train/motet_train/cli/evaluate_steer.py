@@ -11,9 +11,9 @@ from motet.models.control import ControlModel
 from motet.models.load import Model
 from motet.models.steer import SteerModel
 from motet_train.data.store import Store
-from motet_train.evaluate.steer.driven import Driven
 from motet_train.evaluate.steer.report import Recorded, steer_report
 from motet_train.evaluate.tables import Report
+from motet_train.papers.tdbn.driven import Driven
 
 
 def as_steered(model: Model) -> SteerModel | None:

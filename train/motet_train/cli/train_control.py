@@ -6,8 +6,8 @@ from pathlib import Path
 import click
 
 from motet_train.cli.train_options import train_command, unit_in
-from motet_train.data.clips import read_clips
-from motet_train.recipes.control import BASELINES, RECIPES, train_control
+from motet_train.papers.tdbn.clips import read_clips
+from motet_train.papers.tdbn.recipe import BASELINES, RECIPES, train_control
 from motet_train.recipes.recipe import Job
 from motet_train.runs import Run
 

@@ -8,9 +8,9 @@ import click
 from motet_train.cli.prepare import CORPUS
 from motet_train.cli.prepared import prepared
 from motet_train.cli.train_options import train_command
-from motet_train.models.language.language_to_motion import LOSSES
+from motet_train.papers.plappert2017 import recipe as generating
+from motet_train.papers.plappert2017.language_to_motion import LOSSES
 from motet_train.recipes import describe as describing
-from motet_train.recipes import generate as generating
 from motet_train.recipes import search as searching
 from motet_train.recipes.language import train_language
 from motet_train.recipes.recipe import Job

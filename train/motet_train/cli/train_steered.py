@@ -6,8 +6,8 @@ from typing import Any
 from motet_train.cli.prepared import prepared
 from motet_train.cli.train_language import DATA
 from motet_train.cli.train_options import train_command
+from motet_train.papers.tdbn.steered import RECIPES, train_steered
 from motet_train.recipes.recipe import Job
-from motet_train.recipes.steered import RECIPES, train_steered
 from motet_train.runs import Run
 
 

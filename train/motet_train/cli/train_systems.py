@@ -9,10 +9,10 @@ import click
 from motet_train.cli.train_options import train_command
 from motet_train.cli.train_predict import AUGMENTATION, read_expmap_files
 from motet_train.data.predict_data import expmap_material, validation_files
-from motet_train.evaluate.predict.protocol import WINDOW
-from motet_train.models.predict.systems import TITLES
+from motet_train.papers.li2018.protocol import WINDOW
+from motet_train.papers.li2018.recipe import RECIPES, train_system
+from motet_train.papers.li2018.systems import TITLES
 from motet_train.recipes.recipe import Job
-from motet_train.recipes.systems import RECIPES, train_system
 from motet_train.runs import Run
 
 OPTIONS = (

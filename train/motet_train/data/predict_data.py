@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from motet.errors import MotionError
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
-from motet_train.data.clips import CMU_LICENCE
+from motet_train.data.cmu_trials import CMU_LICENCE
 from motet_train.data.errors import DataError
-from motet_train.data.expmap_files import ROOT, ExpmapCorpus, Layout, scaling_of
 from motet_train.data.preparation import VECTORS
 from motet_train.data.split import split
 from motet_train.data.store import Store
+from motet_train.papers.li2018.expmap_files import ROOT, ExpmapCorpus, Layout, scaling_of
 
 STRIDE = 2
 """Of the protocol: every second frame of a text file."""

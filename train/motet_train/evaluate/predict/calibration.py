@@ -16,7 +16,7 @@ from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet_train.evaluate.predict.error_rows import ErrorRows
 from motet_train.evaluate.predict.mocap import PLACE, Measured
-from motet_train.evaluate.predict.protocol import REPORTED
+from motet_train.papers.li2018.protocol import REPORTED
 
 QUARTERS = ("least expected", "second", "third", "most expected")
 """Of the windows, by what is expected at a frame."""

@@ -5,8 +5,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from motet.motion.rotations import Array
-from motet_train.evaluate.predict.protocol import REPORTED
 from motet_train.evaluate.tables import aligned
+from motet_train.papers.li2018.protocol import REPORTED
 
 ROOM = 6
 """Of a spread in brackets, with a space before it."""

@@ -6,7 +6,7 @@ walks. The whole recording is given. What follows is measured over SPANS of seco
 
 speed: the root's mean speed over the ground, relative to that of the given motion's last GIVEN seconds.
 energy: the mean speed of all joints as seen from the root, relative to the same.
-slide: how far the balls of the feet slide in a stance (:mod:`motet_train.evaluate.control.feet`), centimetres.
+slide: how far the balls of the feet slide in a stance (:mod:`motet_train.evaluate.feet`), centimetres.
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,7 +25,7 @@ from motet.motion.humanoid.retarget import on_humanoid
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
-from motet_train.evaluate.control.feet import slide, stances
+from motet_train.evaluate.feet import slide, stances
 from motet_train.evaluate.tables import Report, aligned
 from motet_train.evaluate.text_adherence.measures import BALLS
 

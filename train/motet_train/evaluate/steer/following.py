@@ -17,9 +17,9 @@ from motet.models.steer_session import SteerSession
 from motet.motion.pose import Pose
 from motet.motion.quaternions import wrapped
 from motet.motion.rotations import Array
-from motet_train.evaluate.control.measures import arrival
 from motet_train.evaluate.steer.standing import standing
 from motet_train.evaluate.steer.track import Track
+from motet_train.papers.tdbn.experiments.measures import arrival
 
 PHASES, APART = 8, 4
 """Times of a change, and ticks between them."""

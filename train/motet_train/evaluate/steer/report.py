@@ -87,7 +87,7 @@ def steer_report(
 ) -> Report:
     """The figures of a model, of recordings and of the rival; ``told`` is told what is measured next.
 
-    model: or a net that stands for one (:class:`motet_train.evaluate.steer.driven.Driven`), which has no rival.
+    model: or a net that stands for one (:class:`motet_train.papers.tdbn.driven.Driven`), which has no rival.
     DataError for a model without a walk and a run.
     """
     if missing := [gait for gait in SPEEDS if gait not in model.gaits]:

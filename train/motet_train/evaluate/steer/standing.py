@@ -1,6 +1,6 @@
 """How well a gait stands and how calmly it moves, steered and recorded.
 
-By the measures of :mod:`motet_train.evaluate.control.feet`: the slide in a stance, in centimetres, of the joints in the
+By the measures of :mod:`motet_train.evaluate.feet`: the slide in a stance, in centimetres, of the joints in the
 balls of the feet and of the points of the soles (heel, ball, tip); the speed of the balls while they stand; and the
 acceleration of all joints.
 """
@@ -12,7 +12,7 @@ import numpy as np
 
 from motet.models.steer import SteerModel
 from motet.motion.rotations import Array
-from motet_train.evaluate.control.feet import acceleration, slide, speed, stances
+from motet_train.evaluate.feet import acceleration, slide, speed, stances
 from motet_train.evaluate.steer.track import BALLS, Track
 
 SPEEDS = {"walk": 1.4, "run": 3.0}

@@ -1,0 +1,176 @@
+"""The convolutional sequence-to-sequence predictor of Li et al. 2018, and the discriminator it is trained against.
+
+Letters in shapes: B rows, T frames, D channels, C frames of the short-term encoder's window, U units.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import torch
+from torch import Tensor, nn
+from torch.nn.functional import leaky_relu, pad
+
+from motet_train.data.errors import DataError
+from motet_train.papers.li2018.stepwise import State, System, free_run, squared_error
+
+SLOPE = 0.2
+"""Of the leaky rectifiers."""
+
+Padding = Literal["valid", "same"]
+Loss = Literal["square", "distance"]
+
+
+@dataclass(frozen=True)
+class Config:
+    """Sizes of the net; the defaults are the paper's for CMU, and the switches those of its ablations.
+
+    window: C of the short-term encoder, eq. 2. kernel: frames x channels. padding: none ("valid", CMU) or as much as
+    keeps the borders ("same", Human3.6M); a window of 5 frames and other kernels need it. long_term: which encoder
+    sees the whole seed: the convolutional one, an LSTM, or none. dropout: of convolutions' outputs, in their order;
+    decoder_dropout: of the decoder's hidden units. own: the share of predicted frames in what training feeds back, eta
+    in eq. 10. loss: of predicted frames: the mean of the squared distances, eq. 7, or of the distances, which is what
+    is measured in the end and gives early frames, whose errors are small, more weight.
+    """
+
+    dimensions: int
+    seed_frames: int = 50
+    window: int = 20
+    kernel: tuple[int, int] = (2, 7)
+    padding: Padding = "valid"
+    long_term: Literal["convolutional", "recurrent", "none"] = "convolutional"
+    filters: tuple[int, ...] = (64, 128, 128)
+    units: int = 512
+    dropout: tuple[float, ...] = (0.0, 0.0, 0.5)
+    decoder_dropout: float = 0.5
+    own: float = 1.0
+    loss: Loss = "square"
+
+
+class Convolution(nn.Module):
+    """A convolution of stride 2 over frames and channels, without bias, and a leaky rectifier (section 3.1)."""
+
+    def __init__(self, inputs: int, outputs: int, kernel: tuple[int, int], padding: Padding) -> None:
+        super().__init__()
+        self.weight = nn.Parameter(torch.empty(outputs, inputs, *kernel))
+        nn.init.xavier_uniform_(self.weight)
+        self.kernel, self.padding = kernel, padding
+
+    def size(self, frames: int, channels: int) -> tuple[int, int]:
+        """The size of what comes out for an image of frames x channels."""
+        pairs = zip((frames, channels), self.kernel, strict=True)
+        if self.padding == "same":
+            return -(-frames // 2), -(-channels // 2)
+        height, width = ((n - k) // 2 + 1 for n, k in pairs)
+        return height, width
+
+    def forward(self, x: Tensor) -> Tensor:
+        """(B, inputs, T, D) to (B, outputs, T', D')."""
+        if self.padding == "same":
+            x = pad(x, [*self._border(x.shape[3], 1), *self._border(x.shape[2], 0)])
+        return leaky_relu(nn.functional.conv2d(x, self.weight, stride=2), SLOPE)
+
+    def _border(self, length: int, axis: int) -> tuple[int, int]:
+        """What to add before and after, so that ceil(length / 2) places come out; the odd one goes after."""
+        total = max(0, 2 * (-(-length // 2) - 1) + self.kernel[axis] - length)
+        return total // 2, total - total // 2
+
+
+class EncodingModule(nn.Module):
+    """Three convolutions and a fully connected layer: frames (B, T, D) to (B, U) (section 3.1, the CEM).
+
+    DataError for fewer frames or channels than the convolutions need.
+    """
+
+    def __init__(self, frames: int, config: Config, filters: tuple[int, ...]) -> None:
+        super().__init__()
+        size, inputs, layers = (frames, config.dimensions), 1, []
+        for outputs, rate in zip(filters, config.dropout, strict=True):
+            layer = Convolution(inputs, outputs, config.kernel, config.padding)
+            size, inputs = layer.size(*size), outputs
+            layers += [layer, nn.Dropout(rate)]
+        if min(size) < 1:
+            image = f"{frames} frames of {config.dimensions} channels"
+            raise DataError(f"{image} are too few for these convolutions without padding: use padding 'same'")
+        self.layers = nn.Sequential(*layers, nn.Flatten())
+        self.linear = nn.Linear(inputs * size[0] * size[1], config.units)
+
+    def forward(self, frames: Tensor) -> Tensor:
+        """Frames (B, T, D) to (B, U)."""
+        image = frames[:, None].contiguous(memory_format=torch.channels_last)  # a fifth faster on a CPU
+        return leaky_relu(self.linear(self.layers(image)), SLOPE)
+
+
+class RecurrentEncoder(nn.Module):
+    """What the paper compares the long-term encoder with: the last output of an LSTM."""
+
+    def __init__(self, config: Config) -> None:
+        super().__init__()
+        self.lstm = nn.LSTM(config.dimensions, config.units, batch_first=True)
+
+    def forward(self, frames: Tensor) -> Tensor:
+        """Frames (B, T, D) to (B, U)."""
+        out: Tensor = self.lstm(frames)[0][:, -1]
+        return out
+
+
+class ConvSeq2Seq(System):
+    """Long-term encoder of the seed, short-term encoder of a sliding window, decoder of both, residual (eqs 1-6)."""
+
+    def __init__(self, config: Config) -> None:
+        super().__init__()
+        self.config = config
+        self.carried = {"window": (config.window, config.dimensions)}
+        self.long_term = _long_term(config)
+        self.constant = {} if self.long_term is None else {"long_term": (config.units,)}
+        self.short_term = EncodingModule(config.window, config, config.filters)
+        hidden = nn.Linear(config.units * (1 + len(self.constant)), config.units)
+        outward = nn.Linear(config.units, config.dimensions)
+        self.decoder = nn.Sequential(hidden, nn.LeakyReLU(SLOPE), nn.Dropout(config.decoder_dropout), outward)
+
+    def begin(self, seed: Tensor) -> State:
+        """The last C frames, and what the long-term encoder makes of all frames but the last."""
+        state = {"window": seed[:, -self.config.window :]}
+        return state if self.long_term is None else {**state, "long_term": self.long_term(seed[:, :-1])}
+
+    def predict(self, state: State) -> tuple[Tensor, State]:
+        """Eq. 6: the last frame plus what the decoder says; nothing else changes."""
+        both = [state[name] for name in self.constant] + [self.short_term(state["window"])]
+        return state["window"][:, -1] + self.decoder(torch.cat(both, dim=1)), {}
+
+    def push(self, state: State, frame: Tensor) -> State:
+        """The window, one frame further (eq. 5)."""
+        return {"window": torch.cat([state["window"][:, 1:], frame[:, None]], dim=1)}
+
+    def imagine(self, windows: Tensor, seed_frames: int) -> Tensor:
+        """As everywhere, but that a share of what is fed back may be true frames (eq. 10)."""
+        seed, truth = windows[:, :seed_frames], windows[:, seed_frames:]
+        return free_run(self, seed, truth.shape[1], truth if self.config.own < 1 else None, self.config.own)
+
+    def error(self, predicted: Tensor, truth: Tensor) -> Tensor:
+        """Eq. 7, per channel; or the mean distance of frames, over the root of the number of channels."""
+        if self.config.loss == "square":
+            return squared_error(predicted, truth)
+        mean: Tensor = torch.linalg.vector_norm(predicted - truth, dim=-1).mean() / math.sqrt(truth.shape[-1])
+        return mean
+
+
+def _long_term(config: Config) -> nn.Module | None:
+    if config.long_term == "recurrent":
+        return RecurrentEncoder(config)
+    return EncodingModule(config.seed_frames - 1, config, config.filters) if config.long_term != "none" else None
+
+
+class Discriminator(nn.Module):
+    """Tells true windows from those that end as predicted (eq. 8); of use in training only."""
+
+    def __init__(self, config: Config, frames: int) -> None:
+        super().__init__()
+        self.encode = EncodingModule(frames, config, tuple(2 * n for n in config.filters))
+        half = config.units // 2
+        self.judge = nn.Sequential(nn.Linear(config.units, half), nn.LeakyReLU(SLOPE), nn.Linear(half, 1))
+
+    def forward(self, windows: Tensor) -> Tensor:
+        """Windows (B, T, D) to log odds (B,) that they are true."""
+        odds: Tensor = self.judge(self.encode(windows))[:, 0]
+        return odds

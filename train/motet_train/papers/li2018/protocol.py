@@ -1,0 +1,124 @@
+"""The protocol by which motion prediction has been measured since Martinez et al. 2017.
+
+50 frames in, 25 out, of every second frame of a file. Letters in shapes: W windows, N output frames, T frames, C
+columns of a file.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motet.motion.rotations import Array, rotvec_to_rotmat
+from motet_train.data.errors import DataError
+from motet_train.data.predict_data import STRIDE
+from motet_train.papers.li2018.expmap_files import CONSTANT, ROOT, Scaling
+
+SEED, SEED_FRAMES, OUTPUT_FRAMES = 1234567890, 50, 25
+WINDOW = SEED_FRAMES + OUTPUT_FRAMES
+
+REPORTED = (1, 3, 7, 9, 13, 24)
+"""Output frames, from 0."""
+
+LABELS = (80, 160, 320, 400, 560, 1000)
+"""The milliseconds customary in tables; files of 120 Hz have others, see :func:`true_times`."""
+
+Continuation = Callable[[Array], Array]
+"""Seed frames (W, 50, C) in a file's own columns to predicted ones (W, 25, C)."""
+
+
+def true_times(fps: float) -> tuple[float, ...]:
+    """The milliseconds after the last seed frame at which the reported frames lie, for files of ``fps``."""
+    return tuple((frame + 1) * STRIDE / fps * 1000 for frame in REPORTED)
+
+
+def rotmat_to_protocol_euler(matrix: Array) -> Array:
+    """Matrices (..., 3, 3) to the protocol's Euler angles (..., 3): Slabaugh's formula on the transposed matrix.
+
+    They are the angles of order "xyz" of :func:`motet.motion.rotations.rotmat_to_euler` with the sign changed. At
+    gimbal lock, where the last one is 0 and the first should be what the matrix says, it is 0 or pi as in the papers'
+    code.
+    """
+    sin = np.clip(matrix[..., 0, 2], -1.0, 1.0)
+    locked = np.abs(sin) >= 1.0
+    cos = np.where(locked, 1.0, np.sqrt(1.0 - sin**2))
+    first = np.arctan2(matrix[..., 1, 2] / cos, matrix[..., 2, 2] / cos)
+    last = np.arctan2(matrix[..., 0, 1] / cos, matrix[..., 0, 0] / cos)
+    first = np.where(locked, np.arctan2(matrix[..., 0, 1], matrix[..., 0, 2]), first)
+    return np.stack([first, -np.arcsin(sin), np.where(locked, 0.0, last)], axis=-1)
+
+
+def euler_frames(frames: Array) -> Array:
+    """Frames (..., C) of exponential maps to frames (..., C) of Euler angles; the root's six columns become 0."""
+    vectors = frames[..., 3:].reshape(*frames.shape[:-1], -1, 3)
+    angles = rotmat_to_protocol_euler(rotvec_to_rotmat(vectors)).reshape(*frames.shape[:-1], -1)
+    result = np.zeros(frames.shape)
+    result[..., ROOT:] = angles[..., ROOT - 3 :]
+    return result
+
+
+def window_starts(length: int, count: int = 8) -> NDArray[np.int64]:
+    """Starts (W,) of the test windows in a motion of ``length`` sub-sampled frames, from the protocol's generator."""
+    if length <= WINDOW:
+        raise DataError(f"a test motion of {length} frames is too short: windows need more than {WINDOW}")
+    generator = np.random.RandomState(SEED)
+    return np.array([generator.randint(0, length - WINDOW) for _ in range(count)], dtype=np.int64)
+
+
+def windows(motion: Array, count: int = 8) -> Array:
+    """The test windows (W, 75, C) of a motion (T, C) at its file's frame rate."""
+    frames = motion[::STRIDE]
+    return np.stack([frames[start : start + WINDOW] for start in window_starts(len(frames), count)])
+
+
+def window_errors(predicted: Array, truth: Array) -> Array:
+    """Euler error (W, 25) of predicted frames (W, 25, C) against whole windows (W, 75, C)."""
+    return euler_errors(predicted, euler_frames(truth))
+
+
+def euler_errors(predicted: Array, angles: Array) -> Array:
+    """As :func:`window_errors`, against windows (W, 75, C) whose frames are Euler angles, :func:`euler_frames`."""
+    counted = angles.std(axis=1, keepdims=True) > CONSTANT
+    difference = np.where(counted, euler_frames(predicted) - angles[:, SEED_FRAMES:], 0.0)
+    error: Array = np.linalg.norm(difference, axis=-1)
+    return error
+
+
+def rotation_errors(predicted: Array, truth: Array) -> Array:
+    """Degrees (W, 25) between predicted rotations and true ones: the mean over the joints that move in a window.
+
+    Not of the protocol: Euler errors leap where a joint passes gimbal lock, these do not. Arguments as in
+    :func:`window_errors`.
+    """
+    vectors, said = (frames[..., ROOT:].reshape(*frames.shape[:-1], -1, 3) for frames in (truth, predicted))
+    moving = (vectors.std(axis=1, keepdims=True) > CONSTANT).any(axis=-1)
+    apart = rotvec_to_rotmat(said) - rotvec_to_rotmat(vectors[:, SEED_FRAMES:])
+    half_sin = np.linalg.norm(apart, axis=(-2, -1)) / np.sqrt(8)
+    angles = 2 * np.degrees(np.arcsin(np.minimum(half_sin, 1.0)))
+    error: Array = (angles * moving).sum(axis=-1) / np.maximum(moving.sum(axis=-1), 1)
+    return error
+
+
+Predictions = Mapping[str, tuple[Array, Array]]
+"""Action -> predicted frames (W, 25, C) and whole true windows (W, 75, C), of all its motions."""
+
+
+def predictions(
+    system: Continuation, test: Mapping[str, Sequence[Array]], scaling: Scaling, count: int = 8
+) -> Predictions:
+    """What is predicted of ``count`` windows of each motion (T, C) of each action."""
+    found = {}
+    for action, motions in test.items():
+        truth = scaling.with_constants(np.concatenate([windows(motion, count) for motion in motions]))
+        found[action] = system(truth[:, :SEED_FRAMES]), truth
+    return found
+
+
+def errors(found: Predictions, measure: Callable[[Array, Array], Array] = window_errors) -> dict[str, Array]:
+    """Error (25,) of each action: mean over windows."""
+    return {action: measure(predicted, truth).mean(axis=0) for action, (predicted, truth) in found.items()}
+
+
+def zero_velocity(seed: Array) -> Array:
+    """The last seed frame, held (W, 25, C): the floor that papers have."""
+    return np.repeat(seed[:, -1:], OUTPUT_FRAMES, axis=1)

@@ -1,0 +1,63 @@
+"""Poses of CMU's text files as places of joints, and what models predict of a test window (Li et al. 2018, figure 5).
+
+The 38 exponential maps of a line are those of the joints of an ASF skeleton, depth first, its left leg first, tips of
+bones among them: the order of :attr:`motet.motion.skeleton.Skeleton.joints`. Vectors of joints are rows there and are
+turned by the matrix from the right, so a rotation here is the transposed one. (The .amc of a test file, 35_01 of
+walking/walking_1.txt, gives the same rotations.) Who moved is not in a file; bones are those of the skeleton given.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from motet.errors import MotionError
+from motet.models.predict import PredictModel
+from motet.motion.rotations import Array, axis_to_rotmat, rotvec_to_rotmat
+from motet.motion.skeleton import Skeleton
+from motet_train.papers.li2018.curves import predictor
+from motet_train.papers.li2018.expmap_files import ExpmapCorpus
+from motet_train.papers.li2018.protocol import OUTPUT_FRAMES, SEED_FRAMES, windows
+
+EVERY, GIVEN = 2, 4
+"""Frames from one stick figure to the next, and stick figures of seed frames."""
+
+
+def places(frames: Array, skeleton: Skeleton) -> Array:
+    """Places (..., J, 3) of joints of frames (..., 3 + 3 J), in the skeleton's unit.
+
+    The root is at the origin, leans as it does and faces along z. MotionError for a skeleton of another number of
+    joints.
+    """
+    count = len(skeleton.joints)
+    if frames.shape[-1] != 3 + 3 * count:
+        raise MotionError(f"frames of {frames.shape[-1]} columns do not fit a skeleton of {count} joints")
+    vectors = frames[..., 3:].reshape(*frames.shape[:-1], count, 3)
+    turns = np.swapaxes(rotvec_to_rotmat(vectors), -1, -2)
+    turns[..., 0, :, :] = _facing(turns[..., 0, :, :])
+    points = np.zeros(vectors.shape)
+    for i, joint in enumerate(skeleton.joints[1:], start=1):
+        parent = turns[..., joint.parent, :, :]
+        points[..., i, :] = points[..., joint.parent, :] + parent @ np.array(joint.offset)
+        turns[..., i, :, :] = parent @ turns[..., i, :, :]
+    return points
+
+
+def _facing(turns: Array) -> Array:
+    """Rotations (..., 3, 3) turned about y so that their forward axis has no part along x."""
+    result: Array = axis_to_rotmat("y", -np.arctan2(turns[..., 0, 2], turns[..., 2, 2])) @ turns
+    return result
+
+
+def strips(
+    models: Mapping[str, PredictModel], corpus: ExpmapCorpus, action: str, skeleton: Skeleton
+) -> dict[str, Array]:
+    """The first test window of an action: the truth, and each prediction; places (K, J, 3) of every second frame.
+
+    The first :data:`GIVEN` poses are seed frames. The root's rotation is drawn as predicted, though not measured.
+    """
+    window = windows(next(iter(corpus.test[action].values())), 1)
+    seed = window[:, :SEED_FRAMES]
+    found = {"truth": window}
+    found |= {name: np.concatenate([seed, predictor(name, m, corpus)(seed)], axis=1) for name, m in models.items()}
+    shown = slice(SEED_FRAMES - GIVEN * EVERY, SEED_FRAMES + OUTPUT_FRAMES, EVERY)
+    return {name: places(frames[0, shown], skeleton) for name, frames in found.items()}

@@ -1,0 +1,1 @@
+"""The thesis: a temporal deep belief net of RBM and CRBM for live control; its page is docs/control.md."""

@@ -1,0 +1,100 @@
+"""The thesis' family as a figure that travels: its channels say where the root goes, its control values where to."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from motet.motion.motion import Motion
+from motet.motion.rotations import Array
+from motet.representation.contract import MotionContract, living
+from motet.representation.root_sixd import ROOT_SIXD
+from motet_train.data.errors import DataError
+from motet_train.data.locomotion import Recording, read_gaits, recordings
+from motet_train.data.store import Store
+from motet_train.papers.tdbn.angle_crbm import AngleCRBMConfig
+from motet_train.papers.tdbn.contrastive import Learning
+from motet_train.papers.tdbn.courses import LABELS, controls_of, course
+from motet_train.papers.tdbn.divergence import DivergenceLearner
+from motet_train.papers.tdbn.recipe import defaults_of, stages_of, untrained
+from motet_train.papers.tdbn.tdbn import TDBNConfig
+from motet_train.recipes.recipe import Job, Recipe
+from motet_train.runs import Run
+
+GAITS = ("walk", "run")
+
+TDBN = TDBNConfig(
+    hidden_per_part=60,
+    control_units=8,
+    past_noise=0.1,
+    own=12,
+    restarts=1,
+    tries=1,
+    rbm=Learning(40, rate=1e-2, final_rate=0.03, batch=50, temperature=(1.0, 0.38)),
+    crbm=Learning(60, rate=1e-2, final_rate=0.05, batch=50, temperature=(0.38, 0.38)),
+)
+
+CRBM = AngleCRBMConfig(
+    taps=6,
+    control_units=4,
+    free_units=200,
+    past_noise=0.3,
+    past_rate=2e-3,
+    iterations=10,
+    crbm=Learning(120, rate=1e-2, final_rate=0.03, batch=50, decay=2e-5, temperature=(1.0, 1.0)),
+)
+
+RECIPES = {
+    "default": Recipe("control", "tdbn", "session", TDBN),
+    "recorded-past": Recipe("control", "tdbn", "session", replace(TDBN, own=0, past_noise=0.3)),
+    "crbm": Recipe("control", "angle-crbm", "session", CRBM),
+}
+"""The deep net; the same as the thesis has it, whose past is always the recorded one; and Taylor's, without the RBM."""
+
+
+def train_steered(store: Store, job: Job, data: str = "") -> Run:
+    """Train on the recordings of a store in ``root_sixd`` that show :data:`GAITS`, and on their mirror images.
+
+    DataError where a gait has none, or where the store is in another representation.
+    """
+    if store.representation != "root_sixd":
+        raise DataError(f"steering is trained on root_sixd (motet prepare --for codes), not {store.representation}")
+    found = recordings(store, tuple(gait for gait in read_gaits() if gait.name in GAITS))
+    contract, motions = mirrored_too(store, found)
+    frames, controls = _rows([motion.values for motion in motions]), _rows([controls_of(course(m)) for m in motions])
+    assert contract.skeleton is not None
+    config = replace(job.recipe.config, fps=store.fps)
+    net = untrained(config, contract.skeleton, contract.channels, len(LABELS)).to(job.device)
+    net.measure_by(contract.mean, contract.std * config.sigma)
+    generator = torch.Generator(job.device).manual_seed(job.about.seed)
+    given, told = ([rows.to(job.device) for rows in part] for part in (frames, controls))
+    stages, others = stages_of(net, [given], [told], [1.0], generator)
+    learner = DivergenceLearner(net, stages, generator, None, others)
+    start = _stillest(found, net.taps).round(6).tolist()
+    control = {"labels": LABELS, "starts": dict.fromkeys(LABELS, start)}
+    about = {"data": {"name": data, "recordings": len(found), "frames": sum(map(len, frames))}}
+    return job.run(
+        net, learner, job.manifest(contract, net.to_config(), defaults_of(net), None, about, control=control)
+    )
+
+
+def mirrored_too(store: Store, found: Sequence[Recording]) -> tuple[MotionContract, list[Motion]]:
+    """The recordings and their mirror images, and the contract with the mean and deviation of all of them."""
+    motions = [one.features for one in found]
+    plain = np.zeros(len(store.channels))
+    contract = MotionContract("root_sixd", store.channels, store.units, store.fps, plain, plain + 1, store.skeleton)
+    motions += [replace(motion, values=contract.mirror(motion.values)) for motion in motions]
+    every = np.concatenate([motion.values for motion in motions])
+    return replace(contract, mean=every.mean(axis=0), std=living(every.std(axis=0), store.units)), motions
+
+
+def _stillest(found: Sequence[Recording], taps: int) -> Array:
+    """The frames (K, D) at the start of the recording in which the root moves least there."""
+    starts = [one.features.values[:taps] for one in found if len(one.features) >= taps]
+    return min(starts, key=lambda frames: float(np.abs(frames[:, : len(ROOT_SIXD) - 1]).sum()))
+
+
+def _rows(values: Sequence[Array]) -> list[Tensor]:
+    return [torch.tensor(rows, dtype=torch.float32) for rows in values]
