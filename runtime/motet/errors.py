@@ -57,11 +57,15 @@ class TextWarning(UserWarning):
     """A sentence has words that the model does not know; UNK takes their place."""
 
 
-class DecodingError(MotetError, ValueError):
+class SettingError(MotetError, ValueError):
+    """A setting that is out of range or of another type."""
+
+
+class DecodingError(SettingError):
     """A setting of decoding that is out of range: beams, hypotheses, candidates, temperature, seed, length."""
 
 
-class ControlError(MotetError, ValueError):
+class ControlError(SettingError):
     """A control value, label or number of characters that the model cannot take."""
 
 

@@ -115,10 +115,10 @@ def test_another_frame_rate_and_length_unit_go_on_alike(walk: Motion) -> None:
 
 def test_what_cannot_be_gone_on_with_is_refused(walk: Motion) -> None:
     for samples in (0, 101):
-        with pytest.raises(DecodingError, match=f"1 to 100 samples can be drawn, not {samples}"):
+        with pytest.raises(DecodingError, match=f"samples must be a whole number from 1 to 100, not {samples}"):
             predictor().futures(walk, beyond=writer(), samples=samples)
     for frames in (0, 100_001):
-        with pytest.raises(DecodingError, match=f"1 to 100000 frames can be predicted, not {frames}"):
+        with pytest.raises(DecodingError, match=f"frames must be a whole number from 1 to 100000, not {frames}"):
             predictor().futures(walk, beyond=writer(), frames=frames)
     with pytest.raises(DecodingError, match="1 to 100000 frames"):
         predictor().predict(walk, beyond=writer(), frames=100_001)

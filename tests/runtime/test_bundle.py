@@ -15,7 +15,7 @@ from click.testing import CliRunner
 from motet.bundle.bundle import FORMAT, Bundle, list_bundles, write_bundle, zip_bytes
 from motet.bundle.session import SessionOptions
 from motet.cli import main
-from motet.errors import BundleError, OutputError
+from motet.errors import BundleError, OutputError, SettingError
 from motet.models.load import VERBS, kind_of, load
 from motet.models.verify import verify
 
@@ -56,7 +56,14 @@ def test_folder_and_zip_run_alike_and_pack_to_the_same_bytes(folder: Path, tmp_p
     assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes() == SHIPPED.read_bytes()
 
 
+def test_a_bundle_says_what_it_is() -> None:
+    path = str(list_bundles()["cmu-control"])
+    assert repr(Bundle.open("cmu-control")) == f"Bundle('cmu-control', 'control' by 'session', {path!r})"
+
+
 def test_an_unknown_name_lists_the_known() -> None:
+    with pytest.raises(BundleError, match=r"unknown bundle '3'.*expected one of cmu-control"):
+        load(3)  # type: ignore[call-overload]
     with pytest.raises(BundleError, match=r"unknown bundle 'nothing'.*expected one of cmu-control"):
         load("nothing")
 
@@ -343,13 +350,19 @@ def test_long_figures_are_shown_as_json_alone(folder: Path) -> None:
 
 @pytest.mark.parametrize("threads", [0, -1, 257, 10_000, True, 1.5])
 def test_threads_are_bounded(threads: Any) -> None:
-    with pytest.raises(BundleError, match="threads must be a number between 1 and 256"):
+    with pytest.raises(SettingError, match="threads must be a whole number from 1 to 256"):
         SessionOptions(threads=threads)
 
 
+def test_threads_may_be_numpys() -> None:
+    assert load("cmu-control", SessionOptions(threads=np.int64(2))).providers == ("CPUExecutionProvider",)  # type: ignore[arg-type]
+
+
 def test_a_provider_that_is_not_here_is_refused_and_what_is_active_is_said() -> None:
-    with pytest.raises(BundleError, match=r"no provider 'NoExecutionProvider' here; it has .*CPUExecutionProvider"):
+    with pytest.raises(SettingError, match=r"no provider 'NoExecutionProvider' here; it has .*CPUExecutionProvider"):
         SessionOptions(providers=("NoExecutionProvider",))
-    with pytest.raises(BundleError, match="options for each provider or for none"):
+    with pytest.raises(SettingError, match="options for each provider or for none"):
         SessionOptions(provider_options=({}, {}))
+    with pytest.raises(SettingError, match=r"a tuple of names, such as \('CPUExecutionProvider',\)"):
+        SessionOptions(providers="CPUExecutionProvider")  # type: ignore[arg-type]
     assert load("cmu-control", SessionOptions(threads=2)).providers == ("CPUExecutionProvider",)

@@ -163,8 +163,10 @@ def test_a_model_from_a_bundle_pickles(model: ControlModel) -> None:
 @pytest.mark.parametrize(
     ("options", "reason"),
     [
-        ({"characters": 0}, "1 to 100000 characters, not 0"),
-        ({"characters": 10**12}, "1 to 100000 characters"),
+        ({"characters": 0}, "characters must be a whole number from 1 to 100000, not 0"),
+        ({"characters": 10**12}, "from 1 to 100000"),
+        ({"characters": 2.5}, "not 2.5"),
+        ({"start": 3}, "cannot start from 3"),
         ({"characters": 2, "seed": [1]}, "one for each of 2"),
         ({"seed": 1.5}, "not 1.5"),
         ({"seed": -1}, "seed of 0 or more"),

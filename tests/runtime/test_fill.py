@@ -99,6 +99,8 @@ def test_several_gaps_are_as_one_after_the_other(model: FillModel, walk: Motion)
         ([(1.0, 1.0)], "is empty: it has to start before it stops"),
         ([(2.0, 1.0)], "is empty: it has to start before it stops"),
         ([(float("nan"), 1.0)], "is empty"),
+        ([1.0, 1.5], r"a gap is two numbers in seconds, such as \(1.0, 2.0\), not 1.0"),
+        ([(1.0, "end")], r"a gap is two numbers in seconds, .*, not \(1.0, 'end'\)"),
         ([(1.0, 1.001)], "has no frame at 30 fps: make it longer"),
         ([(0.0, 1.0)], "at the very start of the motion of 3 s: there is nothing before it"),
         ([(2.0, 3.0)], r"at the very end of the motion of 3 s: there is nothing after it.*motet predict"),

@@ -193,8 +193,12 @@ def test_what_does_not_fit_is_refused() -> None:
         model.predict(whole.select(whole.channels[3:]))
     with pytest.raises(MotionError, match=r"metres_per_unit"):
         model.predict(replace(whole, skeleton=walker(metres_per_unit=None, scale=0.3).skeleton))
-    with pytest.raises(DecodingError, match="not 0"):
-        model.predict(whole, frames=0)
+    for frames in (0, 2.5, True, "two"):
+        with pytest.raises(DecodingError, match=f"frames must be a whole number from 1 to 100000, not {frames!r}"):
+            model.predict(whole, frames=frames)  # type: ignore[call-overload]
+    for frame in ("x", [None] * 9, np.zeros(4)):
+        with pytest.raises(MotionError, match="9"):
+            model.stream(whole).push(frame)
     with pytest.raises(MotionError, match="finite"):
         model.next_frames(np.full((1, model.seed_frames, len(model.contract.channels)), np.nan))
     with pytest.raises(MotionError, match="do not fit"):
@@ -228,6 +232,7 @@ def test_what_knows_its_errors_tells_them_in_centimetres() -> None:
     expected = 100 * np.abs(motion.values[-1, 0]) * np.arange(1, HORIZON + 1)
     np.testing.assert_allclose(sure.expected_errors(motion), expected, rtol=1e-6)
     np.testing.assert_array_equal(sure.expected_errors([motion[:-1], motion])[1], sure.expected_errors(motion))
+    assert sure.expected_errors([]).shape == (0, HORIZON)
     wrong = spec({"frames": "batch L C"}, {"error": "batch N"}, {**sizes, "N": HORIZON + 1})
     with pytest.raises(BundleError, match="4 errors of a horizon of 3"):
         PredictModel(model.manifest, {**model.graphs, "error": FakeGraph(wrong, lambda frames: (frames,))})

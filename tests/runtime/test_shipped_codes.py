@@ -110,8 +110,10 @@ def test_it_says_what_it_does_not_know(model: CodesModel) -> None:
     found = model.understood(strange)
     assert not found.confident
     assert len(found.nearest) == 3
-    with pytest.warns(TextWarning, match="outside of what the model knows"):
-        model.generate(strange, seconds=1)
+    for call in (model.generate, model.story):
+        with pytest.warns(TextWarning, match="outside of what the model knows") as caught:
+            call([strange], seconds=1)
+        assert {warning.filename for warning in caught} == {__file__}
     with pytest.raises(TextError, match="nearest: '"):
         model.generate(strange, seconds=1, strict=True)
     with pytest.raises(TextError, match="nearest: '"):

@@ -166,8 +166,9 @@ def test_it_goes_on_from_a_motion(model: SteerModel) -> None:
 
 def test_a_speed_that_a_gait_does_not_have(model: SteerModel) -> None:
     session = model.start()
-    with pytest.warns(ControlWarning, match="20 m/s is out of what 'walk' can do"):
+    with pytest.warns(ControlWarning, match="20 m/s is out of what 'walk' can do") as caught:
         session.control(speed=20)
+    assert [warning.filename for warning in caught] == [__file__]
     session.control(speed=21)  # said once
     poses = [session.tick() for _ in range(60)]
     assert np.hypot(*(poses[-1].ground - poses[-31].ground)[0, :2]) < 2.5
@@ -182,6 +183,7 @@ def test_a_speed_that_a_gait_does_not_have(model: SteerModel) -> None:
         ({"direction": np.inf}, "direction must be of finite numbers"),
         ({"speed": [1, 2, 3]}, "one for each of 2 characters"),
         ({"gait": "swim"}, "unknown gait 'swim'; expected one of walk, run"),
+        ({"gait": 3}, "unknown gait 3; expected one of walk, run"),
         ({"gait": ["walk"]}, "1 gaits do not fit 2 characters"),
         ({"velocity": (1, 2, 3)}, "a velocity needs x and z"),
         ({"velocity": (1, 2), "speed": 1}, "give it or them"),
@@ -200,9 +202,12 @@ def test_what_is_told_is_refused_and_changes_nothing(
 
 
 def test_sessions_and_poses_that_make_no_sense(model: SteerModel) -> None:
-    for count in (0, 1_000_000):
-        with pytest.raises(ControlError, match="1 to 100000 characters"):
-            model.start(characters=count)
+    for count in (0, 1_000_000, 2.5, "two"):
+        with pytest.raises(ControlError, match="characters must be a whole number from 1 to 100000"):
+            model.start(characters=count)  # type: ignore[arg-type]
+    for start in (3, object()):
+        with pytest.raises(ControlError, match="unknown gait"):
+            model.start(start)  # type: ignore[arg-type]
     session = model.start(characters=2)
     pose = session.tick()
     with pytest.raises(ControlError, match="does not fit 2 characters"):

@@ -54,6 +54,9 @@ class Bundle:
         except BundleError as error:
             raise error if str(path) in str(error) else BundleError(f"{path} is not a bundle: {error}") from error
 
+    def __repr__(self) -> str:
+        return f"Bundle({self.name!r}, {self.manifest.verb!r} by {self.manifest.loop!r}, {str(self.path)!r})"
+
     @property
     def name(self) -> str:
         """The bundle's own name."""
@@ -117,7 +120,7 @@ def find_bundle(name_or_path: str | Path) -> Path:
         if path.is_dir() or path.is_file():
             return path
         fault = "neither a folder nor a file" if path.exists() else "no such path"
-    except (OSError, ValueError) as error:
+    except (OSError, TypeError, ValueError) as error:
         fault = str(error)
     raise BundleError(f"unknown bundle {str(name_or_path)!r}: {fault}; expected one of {', '.join(known)}")
 

@@ -6,7 +6,8 @@ from typing import Any
 
 import onnxruntime
 
-from motet.errors import BundleError
+from motet.arguments import checked_int
+from motet.errors import SettingError
 
 MAX_THREADS = 256
 
@@ -22,7 +23,7 @@ class SessionOptions:
     providers: execution providers of ONNX Runtime, the preferred first. ONNX Runtime gives the CPU what the others
         cannot run, all of it where one does not start: a model's ``providers`` are those that are really active.
     provider_options: options of each provider, in the same order; none by default.
-    BundleError for a number of threads out of range, and for a provider that this build of ONNX Runtime does not have.
+    SettingError for a number of threads out of range, and for a provider that this build of ONNX Runtime does not have.
     """
 
     threads: int = 1
@@ -30,19 +31,20 @@ class SessionOptions:
     provider_options: tuple[Options, ...] = ()
 
     def __post_init__(self) -> None:
-        if isinstance(self.threads, bool) or not isinstance(self.threads, int) or not 1 <= self.threads <= MAX_THREADS:
-            raise BundleError(f"threads must be a number between 1 and {MAX_THREADS}, not {self.threads!r}")
+        checked_int("threads", self.threads, 1, MAX_THREADS)
+        if isinstance(self.providers, str):
+            raise SettingError(f"providers must be a tuple of names, such as ({self.providers!r},)")
         available = onnxruntime.get_available_providers()
         for provider in self.providers:
             if provider not in available:
-                raise BundleError(f"ONNX Runtime has no provider {provider!r} here; it has {', '.join(available)}")
+                raise SettingError(f"ONNX Runtime has no provider {provider!r} here; it has {', '.join(available)}")
         if not self.providers or len(self.provider_options) not in {0, len(self.providers)}:
-            raise BundleError("give at least one provider, and options for each provider or for none")
+            raise SettingError("give at least one provider, and options for each provider or for none")
 
     def session(self, model: bytes) -> Any:
         """A session of ONNX Runtime for a model in memory; raises what ONNX Runtime raises."""
         options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = self.threads
+        options.intra_op_num_threads = int(self.threads)
         options.inter_op_num_threads = 1
         options.enable_cpu_mem_arena = False  # memory goes back after a large batch, at the same speed
         options.log_severity_level = 4

@@ -1,7 +1,6 @@
 """Motion as words: motions written code by code, as long as they take or as is asked, continued, told as a story."""
 
 import math
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -9,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from motet.arguments import warn
 from motet.bundle.fields import Fields
 from motet.bundle.graph import Floats, Graph
 from motet.bundle.manifest import Manifest
@@ -110,7 +110,7 @@ class CodesModel(GenerateModel):
         said = f"{sentence!r} is outside of what the model knows (confidence {found.confidence:.2f}); nearest: {near}"
         if strict:
             raise TextError(said)
-        warnings.warn(said, TextWarning, stacklevel=3)
+        warn(said, TextWarning)
 
     def decode(self, contexts: Floats, noise: Sequence[Noise], settings: Mapping[str, Any]) -> list[list[Sample]]:
         """See :meth:`GenerateModel.decode`."""

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from motet.arguments import checked_int
 from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
 from motet.decode.lookahead import Ahead, begun, ticked
@@ -85,8 +86,7 @@ class ControlModel(Controllable):
             of the net as they are. What the net does is the same.
         Raises ControlError for values out of range, MotionError for a motion that does not fit.
         """
-        if not 1 <= characters <= MAX_CHARACTERS:
-            raise ControlError(f"a session has 1 to {MAX_CHARACTERS} characters, not {characters}")
+        characters = checked_int("characters", characters, 1, MAX_CHARACTERS, ControlError)
         seeds = seeds_of(seed, characters, ControlError)
         if isinstance(start, Motion):
             first, label = self._frames_of(start), None

@@ -36,7 +36,10 @@ def spans_of(motion: Motion, gaps: Sequence[Gap], longest: float) -> list[Span]:
 
 
 def _check(motion: Motion, gap: Gap, longest: float) -> None:
-    start, stop = gap
+    try:
+        start, stop = map(float, gap)
+    except (TypeError, ValueError) as error:
+        raise MotionError(f"a gap is two numbers in seconds, such as (1.0, 2.0), not {gap!r}") from error
     text, whole = f"the gap {_text(start, stop)} s", f"the motion of {motion.duration:g} s"
     if not (np.isfinite([start, stop]).all() and start < stop):
         raise MotionError(f"{text} is empty: it has to start before it stops")

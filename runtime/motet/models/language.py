@@ -1,7 +1,6 @@
 """What describe and generate share: the vocabulary, limits on inputs, and batches of sequences."""
 
 import math
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
@@ -9,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from motet.arguments import warn
 from motet.bundle.graph import Floats, Graph
 from motet.bundle.manifest import Manifest
 from motet.decode.rollout import two_rows
@@ -49,7 +49,7 @@ class LanguageModel(BundleModel):
         """
         ids, unknown = self.vocabulary.encode(sentence)
         if unknown:
-            warnings.warn(f"the model does not know {', '.join(unknown)} (in {sentence!r})", TextWarning, stacklevel=3)
+            warn(f"the model does not know {', '.join(unknown)} (in {sentence!r})", TextWarning)
         return ids
 
     def frames(self, motion: Motion) -> Array:

@@ -9,6 +9,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
+from motet.arguments import checked_int
 from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
 from motet.bundle.signature import bind
@@ -164,8 +165,7 @@ class PredictModel(BundleModel):
         on average. Sample i is what seed + i gives alone. append, channels and errors: as :meth:`predict`; progress:
         called with the number of samples done and of all. DecodingError for other than 1 to MAX_SAMPLES samples.
         """
-        if not 1 <= samples <= MAX_SAMPLES:
-            raise DecodingError(f"1 to {MAX_SAMPLES} samples can be drawn, not {samples}")
+        samples = checked_int("samples", samples, 1, MAX_SAMPLES, DecodingError)
         count, seeds = checked(self.horizon if frames is None else frames), seeds_of(seed, samples, DecodingError)
         whole = motion if motion.fps == self.fps else motion.continuous().resample(self.fps, to_end=True)
         found = futures(beyond, whole, count, seeds, progress)
@@ -220,7 +220,8 @@ class PredictModel(BundleModel):
             raise DecodingError(f"{self!r} does not know its errors: it has no graph for them")
         given = [motions] if isinstance(motions, Motion) else list(motions)
         seeds = np.zeros((len(given), self.seed_frames, len(self.contract.channels)), dtype=np.float32)
-        seeds[:] = [self._seed(motion)[2] for motion in given]
+        for row, motion in zip(seeds, given, strict=True):
+            row[:] = self._seed(motion)[2]
         rows = two_rows(np.arange(len(given)))
         found = 100 * self.graphs["error"]({"frames": seeds[rows]})["error"][: len(given)]
         return found[0] if isinstance(motions, Motion) else found
@@ -245,9 +246,7 @@ class PredictModel(BundleModel):
 
 def checked(frames: int) -> int:
     """The number of frames to predict; DecodingError where it is out of range."""
-    if not 1 <= frames <= MAX_FRAMES:
-        raise DecodingError(f"1 to {MAX_FRAMES} frames can be predicted, not {frames}")
-    return frames
+    return checked_int("frames", frames, 1, MAX_FRAMES, DecodingError)
 
 
 class PredictSession:
@@ -263,7 +262,10 @@ class PredictSession:
 
     def push(self, frames: ArrayLike) -> None:
         """The next frame (D,), or several (T, D); MotionError where they do not fit, and then nothing has changed."""
-        new = np.atleast_2d(np.asarray(frames, dtype=np.float64))
+        try:
+            new = np.atleast_2d(np.asarray(frames, dtype=np.float64))
+        except (TypeError, ValueError) as error:
+            raise MotionError(f"a frame needs {len(self._motion.channels)} numbers, not {frames!r}") from error
         if new.ndim != 2 or new.shape[1] != len(self._motion.channels):
             raise MotionError(f"a frame of shape {np.shape(frames)} does not fit {len(self._motion.channels)} channels")
         values = np.concatenate([self._motion.values, new])[-self._kept :]

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from motet.arguments import checked_int
 from motet.bundle.fields import Fields
 from motet.bundle.graph import Arrays, Graph
 from motet.bundle.manifest import Manifest
@@ -99,9 +100,8 @@ class SteerModel(Controllable):
             have, which is brought into its range otherwise.
         ControlError for values out of range, MotionError for a motion that does not fit.
         """
-        if not 1 <= characters <= MAX_CHARACTERS:
-            raise ControlError(f"a session has 1 to {MAX_CHARACTERS} characters, not {characters}")
-        gait = start if isinstance(start, str) else self.gaits[0]
+        characters = checked_int("characters", characters, 1, MAX_CHARACTERS, ControlError)
+        gait = self.gaits[0] if start is None or isinstance(start, Motion) else start
         playing = self._standing(characters, self.gait(gait))
         session = SteerSession(self, playing, gait, hold_feet, strict)
         if isinstance(start, Motion):

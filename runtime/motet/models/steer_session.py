@@ -1,13 +1,13 @@
 """A session of figures that are steered: told where to go, they give a pose a tick."""
 
-import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from motet.arguments import warn
 from motet.bundle.graph import Floats
 from motet.decode.matching import Playing, Rows, tick
 from motet.errors import ControlError, ControlWarning
@@ -140,7 +140,7 @@ class SteerSession:
         return np.array(np.broadcast_to(found, (self.characters, columns)))
 
     def _gaits(self, names: str | Sequence[str]) -> Rows:
-        each = [names] * self.characters if isinstance(names, str) else list(names)
+        each = list(names) if isinstance(names, Iterable) and not isinstance(names, str) else [names] * self.characters
         if len(each) != self.characters:
             raise ControlError(f"{len(each)} gaits do not fit {self.characters} characters")
         return np.array([self.model.gait(name) for name in each])
@@ -165,7 +165,7 @@ class SteerSession:
                 raise ControlError(said)
             if name not in self._said:
                 self._said.add(name)
-                warnings.warn(said, ControlWarning, stacklevel=3)
+                warn(said, ControlWarning)
         return inside
 
     def tick(self) -> Pose:
