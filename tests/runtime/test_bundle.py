@@ -1,10 +1,12 @@
 import json
 import os
 import pickle
+import shutil
 import time
 import zipfile
 from collections.abc import Callable
 from contextlib import suppress
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
 
@@ -236,8 +238,25 @@ def test_a_folder_that_cannot_be_listed_is_refused(folder: Path, monkeypatch: py
 def test_a_path_loads_where_the_default_bundles_were_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("motet.bundle.bundle.DEFAULT_BUNDLES", tmp_path / "gone")
     assert load(SHIPPED).manifest.name == "cmu-control"
-    with pytest.raises(BundleError, match="unknown bundle 'cmu-control'"):
-        load("cmu-control")
+    with pytest.raises(BundleError, match="unknown bundle 'describe'"):
+        load("describe")
+
+
+def test_packages_bring_bundles_by_an_entry_point(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    package = tmp_path / "more_motions"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    shutil.copy(SHIPPED, package / "bends.zip")
+    shutil.copy(SHIPPED, package / "describe.zip")
+    monkeypatch.syspath_prepend(tmp_path)
+    points = (EntryPoint("more", "more_motions", "motet.bundles"),)
+    monkeypatch.setattr("motet.bundle.bundle.entry_points", lambda group: points if group == "motet.bundles" else ())
+    assert load("bends").manifest.name == "cmu-control"
+    assert load("describe").manifest.name == "describe"  # motet's own come first
+    assert list(list_bundles()) == sorted([*VERBS, "bends"])
+    monkeypatch.setattr("motet.bundle.bundle.entry_points", lambda group: ())
+    with pytest.raises(BundleError, match=r"expected one of control, describe.*the package motet-papers has more"):
+        load("bends")
 
 
 def test_a_model_of_a_relative_path_pickles_to_another_folder(

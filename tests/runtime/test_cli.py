@@ -211,7 +211,7 @@ def test_a_command_without_its_extra_says_how_to_get_it(tmp_path: Path) -> None:
         "u.find_spec = lambda name, *rest: None if name == 'torch' else find(name, *rest)\n"
     )
     code = "from motet.cli import main; main()"
-    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])}
     done = subprocess.run(
         [sys.executable, "-c", code, "train"], capture_output=True, text=True, env=environment, check=False
     )

@@ -10,8 +10,11 @@ import io
 import json
 import os
 import zipfile
+from collections import ChainMap
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from importlib import resources
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +26,9 @@ from motet.errors import BundleError
 from motet.files import new_folder, write_whole
 
 DEFAULT_BUNDLES = Path(__file__).parents[1] / "bundles"
+PLUGINS = "motet.bundles"
+"""Entry points whose values are packages with more bundles in them, as zips."""
+
 MAX_MANIFEST = 4 << 20
 """Bytes; as JSON objects in memory they can be twenty times as many."""
 
@@ -111,9 +117,10 @@ class Bundle:
 
 
 def find_bundle(name_or_path: str | Path) -> Path:
-    """Path of a default bundle's name or of an existing folder or zip; BundleError lists the known names."""
-    known, name = list_bundles(), str(name_or_path)
-    if name in known:
+    """Path of an installed bundle's name or of an existing folder or zip; BundleError lists the known names."""
+    name = str(name_or_path)
+    known = _zips(DEFAULT_BUNDLES)
+    if name in known or name in (known := list_bundles()):
         return known[name]
     try:
         path = Path(os.path.abspath(name_or_path))  # noqa: PTH100 - resolve() follows links, and raises where they loop
@@ -122,12 +129,18 @@ def find_bundle(name_or_path: str | Path) -> Path:
         fault = "neither a folder nor a file" if path.exists() else "no such path"
     except (OSError, TypeError, ValueError) as error:
         fault = str(error)
-    raise BundleError(f"unknown bundle {str(name_or_path)!r}: {fault}; expected one of {', '.join(known)}")
+    more = "" if entry_points(group=PLUGINS) else "; the package motet-papers has more"
+    raise BundleError(f"unknown bundle {name!r}: {fault}; expected one of {', '.join(known)}{more}")
 
 
 def list_bundles() -> dict[str, Path]:
-    """The bundles that come with motet, by name."""
-    return {path.stem: path for path in sorted(DEFAULT_BUNDLES.glob("*.zip"))}
+    """The installed bundles by name: motet's own, and those of packages with an entry point ``motet.bundles``."""
+    plugins = [_zips(Path(str(resources.files(point.value)))) for point in entry_points(group=PLUGINS)]
+    return dict(sorted(ChainMap(_zips(DEFAULT_BUNDLES), *plugins).items()))
+
+
+def _zips(folder: Path) -> dict[str, Path]:
+    return {path.stem: path for path in sorted(folder.glob("*.zip"))}
 
 
 def entry(data: bytes) -> FileEntry:

@@ -28,20 +28,28 @@ def bundle() -> None:
 @bundle.command("list")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def list_(as_json: bool) -> None:
-    """List the bundles that ship with motet."""
+    """List the installed bundles: motet's own, and those of other packages."""
     rows = [_row(Bundle.open(path)) for path in list_bundles().values()]
     if as_json:
         click.echo(json.dumps(rows))
         return
     for row in rows:
-        click.echo(f"{row['name']:<16} {row['verb']:<10} {row['size'] / 1e6:6.2f} MB  {row['licence'] or NOT_STATED}")
+        size, licence = row["size"] / 1e6, row["licence"] or NOT_STATED
+        click.echo(f"{row['name']:<16} {row['version']:<6} {row['verb']:<10} {size:6.2f} MB  {licence}")
 
 
 def _row(bundle: Bundle) -> dict[str, Any]:
     manifest = bundle.manifest
     size = sum(entry.size for entry in manifest.files.values())
     licence = manifest.licence.get("weights")
-    return {"name": bundle.name, "verb": manifest.verb, "model": manifest.model, "size": size, "licence": licence}
+    return {
+        "name": bundle.name,
+        "version": manifest.version,
+        "verb": manifest.verb,
+        "model": manifest.model,
+        "size": size,
+        "licence": licence,
+    }
 
 
 @bundle.command()
