@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from motet.formats import read_motion
-from motet.motion.feet.root_path import smoothed
+from motet.motion.feet.contacts import smoothed
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
 from motet_train.data.cmu_trials import CMU_CLIPS, CMU_FOLDER

@@ -7,6 +7,7 @@ as int8, gzipped; the linear map from codes to poses, which its graph "pose" giv
 
 import gzip
 from base64 import b64encode
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -150,9 +151,7 @@ def _lock() -> dict[str, Any]:
     joints = [[HUMANOID.index(BONES[bone]) for bone in leg] for leg in bones]
     legs = zip(joints, bones, strict=True)
     return {
-        "fade": foot_lock.FADE,
-        "farthest": foot_lock.FARTHEST,
-        "swings": foot_lock.SWINGS,
+        **asdict(foot_lock.LockSettings()),
         "soles": [[part, point] for part, point in points],
         "legs": [{"joints": joints, "bones": bones} for joints, bones in legs],
     }

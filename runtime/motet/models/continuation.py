@@ -13,8 +13,8 @@ from motet.errors import DecodingError, MotionError
 from motet.models.codes import CodesModel
 from motet.models.generate import SETTLED, GenerateModel
 from motet.models.progress import Progress, silent
+from motet.motion.feet.contacts import GROUND_PERCENT, feet_of, ground_of
 from motet.motion.feet.hold import hold_feet, windows
-from motet.motion.feet.standing import LOW, feet_of, ground_of
 from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.humanoid.retarget import Figure
 from motet.motion.kinematics import positions
@@ -122,7 +122,7 @@ def levelled(contract: MotionContract, frames: Array, given: int) -> Array:
     """
     soles = positions(contract.motion(frames, plant=False))[:, feet_of(HUMANOID), 1].min(axis=1)
     reach = round(AROUND * contract.fps)
-    grounds = np.percentile(windows(soles, reach), LOW, axis=1)
+    grounds = np.percentile(windows(soles, reach), GROUND_PERCENT, axis=1)
     off = np.clip(grounds - ground_of(soles[:given, None]), -OFF, OFF)
     bell = np.hanning(2 * reach + 3)[1:-1]
     # at the seam there is no leap to another floor

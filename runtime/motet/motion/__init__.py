@@ -1,8 +1,8 @@
 """Geometry: motions, skeletons, rotations, and what is done to them without a model."""
 
+from motet.motion.feet.contacts import feet_of, ground_of, has_feet
 from motet.motion.feet.hold import hold_feet
 from motet.motion.feet.root_path import lay_root_path
-from motet.motion.feet.standing import feet_of, ground_of, has_feet
 from motet.motion.heading import heading, without_heading
 from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.humanoid.joint_map import JointMap, read_map

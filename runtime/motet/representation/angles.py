@@ -6,9 +6,9 @@ They do not say where a figure goes: its path is laid by what its feet do, and w
 import numpy as np
 
 from motet.errors import MotionError
+from motet.motion.feet.contacts import has_feet
 from motet.motion.feet.hold import hold_feet
-from motet.motion.feet.root_path import GENERATED, lay_root_path
-from motet.motion.feet.standing import has_feet
+from motet.motion.feet.root_path import lay_root_path
 from motet.motion.mirror import mirror
 from motet.motion.motion import Motion
 from motet.representation.base import FrameMirror, in_units
@@ -32,7 +32,7 @@ class Angles:
         """With the root's translation, found from the feet's contact with the ground; a human's feet stay there."""
         if features.skeleton is None or not has_feet(features.skeleton):
             return features
-        laid = lay_root_path(features, tremble=GENERATED)
+        laid = lay_root_path(features, tremble=0.06)
         try:
             return hold_feet(laid, trembling=True)
         except MotionError:  # not a human: what its legs are is not known

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from motet.errors import MotionError
+from motet.motion.feet.contacts import feet_of, ground_of, has_feet
 from motet.motion.feet.root_path import led_along, velocity_by_feet
-from motet.motion.feet.standing import feet_of, ground_of, has_feet
 from motet.motion.heading import heading
 from motet.motion.kinematics import (
     AXES,

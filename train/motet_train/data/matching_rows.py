@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.decode.matching import AHEAD, haste, mirrored_features
-from motet.motion.feet.hold import touching
+from motet.motion.feet.contacts import contacts_of
 from motet.motion.humanoid.bones import BONES, HUMANOID, LEFT_RIGHT, ground_under, sided, sole_points
 from motet.motion.kinematics import global_transforms
 from motet.motion.motion import Motion
@@ -82,7 +82,7 @@ def _rows(features: Motion) -> tuple[Array, Array, Array, Array, Array]:
     way = poses_of(block, features.fps)  # x, z, facing
     soles = sole_points(turned, places)
     soles[..., 1] -= ground_under(soles)
-    touch = touching(soles, features.fps).reshape(-1, 2, 3).max(axis=2)
+    touch = contacts_of(soles, features.fps).reshape(-1, 2, 3).max(axis=2)
     contacts = np.concatenate([touch[:1], touch])
     speed = _mean(np.hypot(block[:, 0], block[:, 1]), round(STEADY * features.fps))
     local = joint_rotations(features)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from motet.motion.feet.root_path import HEIGHT
+from motet.motion.feet.root_path import ADULT_HEIGHT
 from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
@@ -23,7 +23,7 @@ def trim(motion: Motion) -> Motion:
     pose, standing about around karate, jumps and songs, and dancers who hold their last pose for up to eleven seconds.
     """
     skeleton = skeleton_of(motion)
-    places = positions(motion) * (skeleton.metres_per_unit or HEIGHT / skeleton.height)
+    places = positions(motion) * (skeleton.metres_per_unit or ADULT_HEIGHT / skeleton.height)
     start, stop = _between_leaps(_speed(places, 1, motion.fps).mean(axis=1), round(EDGE * motion.fps))
     width, keep = max(1, round(WINDOW * motion.fps)), round(KEEP * motion.fps)
     moving = start + np.flatnonzero(_speed(places[start:stop], width, motion.fps).max(axis=1) > STILL)

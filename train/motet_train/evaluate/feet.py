@@ -12,8 +12,8 @@ Letters in shapes: T frames, K points, J joints. Lengths are metres, y is up.
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.motion.feet.root_path import smoothed
-from motet.motion.feet.standing import ground_of
+from motet.motion.feet.contacts import ContactSettings, ground_of, smoothed
+from motet.motion.feet.contacts import standing as feet_standing
 from motet.motion.kinematics import local_rotations
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
@@ -21,16 +21,17 @@ from motet.motion.rotations import Array
 LOW = 0.03
 CALM = 0.05
 SHORTEST = 0.1
+STANDS = ContactSettings(heights=(LOW, LOW), speeds=(0.0, 0.0), calm=CALM)
+"""The speed is that along the root's way, less half of the root's."""
 
 
 def standing(points: Array, root: Array, fps: float) -> NDArray[np.bool_]:
     """In which frames points (T, K, 3) stand, (T, K), beside the root's positions (T, 3)."""
-    calm, way = smoothed(points, CALM, fps), np.gradient(smoothed(root[:, None], CALM, fps)[:, 0], axis=0)
+    calm, way = smoothed(points, STANDS.calm, fps), np.gradient(smoothed(root[:, None], STANDS.calm, fps)[:, 0], axis=0)
     ground = np.array([ground_of(calm[:, [k], 1]) for k in range(points.shape[1])])
     ahead = np.gradient(calm, axis=0) - way[:, None] / 2
     forward = (ahead[..., [0, 2]] * way[:, None, [0, 2]]).sum(axis=-1)
-    found: NDArray[np.bool_] = (calm[..., 1] <= ground + LOW) & (forward <= 0)
-    return found
+    return feet_standing(calm[..., 1] - ground, forward, STANDS)
 
 
 def stances(points: Array, root: Array, fps: float) -> list[Array]:

@@ -1,1 +1,1 @@
-"""Feet: which stand, where they are held and locked, and the path that they lay for the root."""
+"""Feet: which stand (`contacts`), where they are held or locked, and the path that they lay for the root."""

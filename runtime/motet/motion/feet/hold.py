@@ -8,12 +8,13 @@ and goes smoothly. Hip, knee and ankle follow by :mod:`motet.motion.two_bone`.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motet.errors import MotionError
-from motet.motion.feet.root_path import GENERATED, TREMBLE, smoothed
+from motet.motion.feet.contacts import SOLES, ContactSettings, contacts_of, rise, smoothed
 from motet.motion.humanoid.bones import GROUND, HUMANOID, LEFT_RIGHT, ground_under, leg_length, sided
 from motet.motion.humanoid.fitting import Fitted, fit, sole_points
 from motet.motion.humanoid.retarget import map_of
@@ -25,17 +26,30 @@ from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
 from motet.motion.two_bone import Leg
 
-LOW = (0.02, 0.05)  # m above the ground: a point of the sole touches it surely, and not at all
-SLOW = (0.3, 0.9)  # m/s over the ground: it stands surely, and not at all
-SLIDING = (0.7, 3.0)  # m/s: the same for feet that tremble and slide
-LIFTED = 0.1  # s: a foot that does not touch the ground for less goes on standing where it stands
-BLEND = 0.2  # s: in which a shift comes and goes, most of it in half of that
-FARTHEST = 0.15  # m: a foot is shifted by less; what slides farther than twice that in a stance does slide
-SOFT = 0.05  # s: before and after a foot is in the ground it is being lifted out of it
+
+@dataclass(frozen=True)
+class HoldSettings:
+    """Seconds, metres and metres a second.
+
+    contact: when a point of the sole stands. lifted: a foot that does not touch the ground for less stays where it
+    stands. blend: in which a shift comes and goes, most of it in half of that. farthest: a foot is shifted by less;
+    what slides farther than twice that in a stance does slide. soft: before and after a foot is in the ground it is
+    being lifted out of it. tremble: what is shorter is no movement, and toes do not follow it.
+    """
+
+    contact: ContactSettings = SOLES
+    lifted: float = 0.1
+    blend: float = 0.2
+    farthest: float = 0.15
+    soft: float = 0.05
+    tremble: float = 0.015
+
+
+RECORDED = HoldSettings()
+TREMBLING = HoldSettings(contact=ContactSettings(speeds=(0.7, 3.0), calm=0.06))
+"""For feet that tremble and slide: where they stand is seen over longer, and what slides faster stands, too."""
 
 BENT = ("UpperLeg", "LowerLeg", "Foot")
-
-Flags = NDArray[np.bool_]
 
 
 def hold_feet(motion: Motion, trembling: bool = False) -> Motion:
@@ -44,11 +58,10 @@ def hold_feet(motion: Motion, trembling: bool = False) -> Motion:
     in the world.
 
     The ground is level, and where :func:`motet.motion.to_humanoid` lays it: the soles are deeper in 5 % of the frames.
-    A foot is shifted by FARTHEST at most, and a leg that is nearly straight is hardly drawn longer: what is left slides
+    A foot is shifted by 15 cm at most, and a leg that is nearly straight is hardly drawn longer: what is left slides
     on. Lengths are those of the figure at the humanoid's size.
 
-    trembling: whether the feet tremble and slide as those of a model that gives joint angles alone: where they stand is
-        then seen over longer, and what slides faster stands, too.
+    trembling: whether the feet tremble and slide like those of a model that gives joint angles alone.
     MotionError, with the reason, for a figure that is no human's, or one that does not stand along y.
     """
     if len(motion) < 2:
@@ -58,7 +71,7 @@ def hold_feet(motion: Motion, trembling: bool = False) -> Motion:
     fitted = fit(skeleton, joint_map, rotations, places)
     if not np.array_equal(upright(fitted, places).turn, np.eye(3)):
         raise MotionError("this figure does not stand along y: turn it upright by to_humanoid")
-    soles = _soles(skeleton, fitted, rotations, places)
+    soles, settings = _soles(skeleton, fitted, rotations, places), TREMBLING if trembling else RECORDED
     places = places * (leg_length() / fitted.leg)
     turned = np.array(rotations)
     for side, points in zip(LEFT_RIGHT, np.split(soles, 2, axis=1), strict=True):
@@ -66,9 +79,8 @@ def hold_feet(motion: Motion, trembling: bool = False) -> Motion:
         bend = product(rotations[:, joints[1]], fitted.aligned[joints[1]])[..., 0]
         hip, knee, ankle = (places[:, joint] for joint in joints)
         leg = Leg(hip, knee, ankle, bend)
-        for joint, turn in zip(
-            joints, (*leg.turns(_target(leg, points, motion.fps, trembling)), np.eye(3)), strict=True
-        ):
+        turns = leg.turns(_target(leg, points, motion.fps, settings))
+        for joint, turn in zip(joints, (*turns, np.eye(3)), strict=True):
             hanging = list(skeleton.subtree(skeleton.names[joint]))
             turned[:, hanging] = product(turn[..., None, :, :], rotations[:, hanging])
     return _with_joints(motion, [joint_map.joints[sided(side, part)] for side in LEFT_RIGHT for part in BENT], turned)
@@ -85,55 +97,40 @@ def _soles(skeleton: Skeleton, fitted: Fitted, rotations: Array, places: Array) 
     return soles
 
 
-def _target(leg: Leg, points: Array, fps: float, trembling: bool) -> Array:
+def _target(leg: Leg, points: Array, fps: float, settings: HoldSettings) -> Array:
     """Where the ankle comes to (T, 3), from points (T, K, 3) of the sole above a ground at 0."""
-    over_ground = _held(points, fps, trembling)
+    over_ground = _held(points, fps, settings)
     target = leg.eased(leg.ankle + np.insert(over_ground, 1, 0.0, axis=1))
     lowest = points[..., 1].min(axis=1) + target[:, 1] - leg.ankle[:, 1]
-    target[:, 1] += np.minimum(_lift(-lowest, fps), FARTHEST)
+    target[:, 1] += np.minimum(_lift(-lowest, settings.soft * fps), settings.farthest)
     return target
 
 
-def _held(points: Array, fps: float, trembling: bool) -> Array:
+def _held(points: Array, fps: float, settings: HoldSettings) -> Array:
     """The shift (T, 2) over the ground."""
     steps = np.diff(points[..., [0, 2]], axis=0)
-    touch = touching(points, fps, trembling)
+    touch = contacts_of(points, fps, settings.contact)
     weights = touch / np.maximum(touch.sum(axis=1, keepdims=True), 1e-9)
     undone = -(touch.max(axis=1) * (weights[..., None] * steps).sum(axis=1).T).T
     times, values = [], []
-    for start, stop in _stances(touch.max(axis=1) > 0, fps):
+    for start, stop in _stances(touch.max(axis=1) > 0, settings.lifted * fps):
         path = np.concatenate([np.zeros((1, 2)), np.cumsum(undone[start:stop], axis=0)])
         path -= np.median(path, axis=0)
         times.append(np.arange(start, stop + 1))
         values.append(path)
-    shift = _between(times, values, len(points), BLEND * fps)
-    # toes that tremble are not followed
-    return _bounded(smoothed(shift[:, None], TREMBLE, fps)[:, 0])
+    shift = _between(times, values, len(points), settings.blend * fps)
+    return _bounded(smoothed(shift[:, None], settings.tremble, fps)[:, 0], settings.farthest)
 
 
-def touching(points: Array, fps: float, trembling: bool = False) -> Array:
-    """How much points (T, K, 3) touch a ground at 0 and stand from each frame to the next, (T - 1, K) from 0 to 1."""
-    calm = smoothed(points, GENERATED if trembling else TREMBLE, fps)
-    speed = np.linalg.norm(np.diff(calm[..., [0, 2]], axis=0), axis=-1) * fps
-    height = (points[1:, :, 1] + points[:-1, :, 1]) / 2
-    return _fading(height, *LOW) * _fading(speed, *(SLIDING if trembling else SLOW))
+def _stances(standing: NDArray[np.bool_], lifted: float) -> list[tuple[int, int]]:
+    """First and last frame of each stance, from whether the foot stands from each frame to the next (T - 1,).
 
-
-def _fading(values: Array, full: float, none: float) -> Array:
-    return 1 - _eased(np.clip((values - full) / (none - full), 0, 1))
-
-
-def _eased(part: Array) -> Array:
-    eased: Array = part**3 * (10 - 15 * part + 6 * part**2)
-    return eased
-
-
-def _stances(standing: Flags, fps: float) -> list[tuple[int, int]]:
-    """First and last frame of each stance, from whether the foot stands from each frame to the next (T - 1,)."""
+    lifted: frames; stances with fewer between them are one.
+    """
     edges = np.flatnonzero(np.diff(np.concatenate([[False], standing, [False]]).astype(int))).reshape(-1, 2)
     found: list[tuple[int, int]] = []
     for start, stop in edges.tolist():
-        goes_on = bool(found) and start - found[-1][1] < LIFTED * fps
+        goes_on = bool(found) and start - found[-1][1] < lifted
         found.append((found.pop()[0] if goes_on else start, stop))
     return found
 
@@ -154,14 +151,15 @@ def _between(times: list[NDArray[np.intp]], values: list[Array], frames: int, bl
     at, of = np.concatenate(keys), np.concatenate(known)
     frame = np.arange(frames)
     after = np.clip(np.searchsorted(at, frame, side="right"), 1, len(at) - 1)
-    part = _eased(np.clip((frame - at[after - 1]) / (at[after] - at[after - 1]), 0, 1))[:, None]
+    part = rise((frame - at[after - 1]) / (at[after] - at[after - 1]), 0, 1)[:, None]
     found: Array = of[after - 1] + part * (of[after] - of[after - 1])
     return found
 
 
-def _lift(depth: Array, fps: float) -> Array:
-    """Heights (T,), without kinks, by which what is ``depth`` (T,) under the ground comes out of it."""
-    reach = max(1, round(SOFT * fps))
+def _lift(depth: Array, soft: float) -> Array:
+    """Heights (T,), without kinks, by which what is ``depth`` (T,) under the ground comes out of it in ``soft``
+    frames."""
+    reach = max(1, round(soft))
     deepest = np.max(windows(np.maximum(depth, 0), reach), axis=1)
     # a mean over the window in which each is the deepest is as high as the one in the middle
     bell = np.hanning(2 * reach + 3)[1:-1]
@@ -174,9 +172,9 @@ def windows(values: Array, reach: int) -> Array:
     return np.lib.stride_tricks.sliding_window_view(np.pad(values, reach, mode="edge"), 2 * reach + 1)
 
 
-def _bounded(shift: Array) -> Array:
-    """Shifts (T, N) no longer than FARTHEST; short ones are as they are within a few per cent."""
-    length = np.linalg.norm(shift, axis=-1, keepdims=True) / FARTHEST
+def _bounded(shift: Array, farthest: float) -> Array:
+    """Shifts (T, N) no longer than ``farthest``; short ones are as they are within a few per cent."""
+    length = np.linalg.norm(shift, axis=-1, keepdims=True) / farthest
     bounded: Array = shift / (1 + length**4) ** 0.25
     return bounded
 

@@ -1,5 +1,7 @@
 """A foot lock for live figures: what stands stays where it stands, without looking ahead.
 
+What stands is in the table that is played, by :func:`motet.motion.feet.contacts.contacts_of` of the recordings.
+
 While a foot stands, what its lowest point moves over the ground is taken out of the foot, tick by tick; when it leaves,
 what has been taken out fades. Hip, knee and ankle follow (:mod:`motet.motion.two_bone`). The offline twin, which knows
 how long a foot is going to stand, is :mod:`motet.motion.feet.hold`.
@@ -16,14 +18,17 @@ from motet.motion.rotations import rotmat_to_quat
 from motet.motion.springs import damped, damping_of
 from motet.motion.two_bone import Leg
 
-FADE = 0.06
-"""Seconds: the half-life in which a released foot comes back to where it is played."""
 
-FARTHEST = 0.2
-"""Metres: what has to be shifted farther slides."""
+@dataclass(frozen=True)
+class LockSettings:
+    """fade: seconds, the half-life in which a released foot comes back to where it is played. farthest: metres, the
+    largest correction; beyond it the foot is released. swings: m/s; above this speed a foot is swinging, even if the
+    clip that was just jumped to marks a contact."""
 
-SWINGS = 1.0
-"""m/s: what moves faster does not stand yet, whatever the recording says that a figure has just jumped to."""
+    fade: float = 0.06
+    farthest: float = 0.2
+    swings: float = 1.0
+
 
 CHAIN = ("UpperLeg", "LowerLeg", "Foot", "Toes")
 COLUMNS = np.array([[BONES.index(sided(side, part)) for part in CHAIN] for side in LEFT_RIGHT])
@@ -50,6 +55,7 @@ class FootLock:
     shift: Floats | None = None
     drift: Floats | None = None
     soles: Floats | None = None
+    settings: LockSettings = LockSettings()
 
     def copy(self) -> "FootLock":
         """One that goes on by itself."""
@@ -73,11 +79,11 @@ class FootLock:
             self.soles = soles
         lowest = soles[..., 1].argmin(axis=2)[..., None, None]
         moved = np.take_along_axis(soles - self.soles, lowest, axis=2)[:, :, 0, ::2]
-        faded, slower = damped(self.shift, self.drift, damping_of(FADE), self.dt)
+        faded, slower = damped(self.shift, self.drift, damping_of(self.settings.fade), self.dt)
         held = self.shift - moved
         stands = contacts[..., None] > 0.5
-        stands &= np.linalg.norm(held, axis=-1, keepdims=True) < FARTHEST
-        stands &= np.linalg.norm(moved, axis=-1, keepdims=True) < SWINGS * self.dt
+        stands &= np.linalg.norm(held, axis=-1, keepdims=True) < self.settings.farthest
+        stands &= np.linalg.norm(moved, axis=-1, keepdims=True) < self.settings.swings * self.dt
         self.drift = np.where(stands, np.float32(0), slower).astype(np.float32)
         self.shift = np.where(stands, held, faded).astype(np.float32)
         self.soles = soles

@@ -11,7 +11,7 @@ The ground pushes but does not pull: where the root falls faster than gravity wh
 held at the ground, the figure has jumped. It then flies along a parabola until its feet reach the ground again.
 
 On level ground with feet that do not slide this is within a few per cent of the true path: in 42 of CMU's trials that
-had no part in the choice of the constants below, the end is off by 5 % of the path on average in walking (at most 8)
+had no part in the choice of the constants, the end is off by 5 % of the path on average in walking (at most 8)
 and by 6 % in running (at most 15, in a leap), nearly always too near. Stairs, sitting, lying and walking on hands are
 beyond it.
 """
@@ -21,21 +21,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from motet.errors import MotionError
-from motet.motion.feet.standing import feet_of
+from motet.motion.feet.contacts import ContactSettings, contacts, feet_of, smoothed
 from motet.motion.kinematics import positions, skeleton_of, with_channels
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 
 GRAVITY = 9.81  # m/s^2
-HEIGHT = 1.7  # m: taken for a figure whose skeleton does not know its unit of length
-REACH = 0.03  # m: how high a point of a foot can be and still well be on the ground
-SLIP = 0.2  # m/s: how far a vote may be off if it is slower than the rest
-FASTER = 3.0  # times as much for one that is faster
+ADULT_HEIGHT = 1.7  # m: taken for a figure whose skeleton does not know its unit of length
+NEAR = ContactSettings(heights=(0.0, 0.07))  # a vote counts the less, the higher its point is
 TREMBLE = 0.015  # s: what is shorter is no movement but noise
-GENERATED = 0.06  # s: the same for motions that a model generated, whose feet tremble more
-CARRY = 0.05  # s: over which votes are brought together
-TAKE_OFF = 0.05  # s: over which the velocity upwards is measured
-ROUNDS = 10
 
 
 def lay_root_path(
@@ -50,7 +44,7 @@ def lay_root_path(
     millimetres, but in flight. A translation that the motion has already is replaced.
     feet: the names of the joints of each foot, toes included; if not given, the lowest joints that are paired left
         and right. MotionError for a motion without skeleton or one without such joints.
-    tremble: seconds over which the feet are smoothed; recorded motions need little, generated ones GENERATED, and 0
+    tremble: seconds over which the feet are smoothed; recorded motions need little, generated ones 0.06 s, and 0
         smooths nothing.
     keep_height: leave y as it is, as of a motion in place whose height is right.
     """
@@ -58,7 +52,7 @@ def lay_root_path(
         raise MotionError(f"feet are smoothed over 0 or more seconds, not {tremble}")
     skeleton = skeleton_of(motion)
     joints = feet_of(skeleton) if feet is None else [skeleton.index(name) for name in (*feet[0], *feet[1])]
-    metres = skeleton.metres_per_unit or HEIGHT / skeleton.height
+    metres = skeleton.metres_per_unit or ADULT_HEIGHT / skeleton.height
     places = positions(motion)
     points = (places[:, joints] - places[:, :1]) * metres
     height = _height(points[..., 1], motion.fps)
@@ -87,7 +81,8 @@ def _height(points: Array, fps: float) -> Array:
 
 
 def _with_flight(standing: Array, fps: float) -> Array:
-    heights, speed, span = standing.tolist(), 0.0, max(1, round(TAKE_OFF * fps))
+    # the velocity upwards is measured over .05 s
+    heights, speed, span = standing.tolist(), 0.0, max(1, round(0.05 * fps))
     for t in range(1, len(heights)):
         falling = heights[t - 1] + speed / fps - 0.5 * GRAVITY / fps**2
         if falling > heights[t]:
@@ -107,32 +102,22 @@ def velocity_by_feet(
     guess: (T - 1, 2) in m/s, a vote of weight ``trust`` that always counts.
     """
     between = (above[1:] + above[:-1]) / 2
-    near = np.exp(-0.5 * (between / REACH) ** 2)
+    near = contacts(between, None, NEAR)
+    slip = 0.2  # m/s: how far off a slower vote may be; a faster one three times as far
     votes = -np.diff(points, axis=0) * fps
     velocity = _agreed(votes, near, fps, guess, trust)
-    for _ in range(ROUNDS):
+    for _ in range(10):
         off = votes - velocity[:, None]
         faster = (off * velocity[:, None]).sum(axis=-1) > 0
-        slip = np.where(faster, FASTER * SLIP, SLIP)
-        velocity = _agreed(votes, near / (1 + (off**2).sum(axis=-1) / slip**2) ** 2, fps, guess, trust)
+        allowed = np.where(faster, 3 * slip, slip)
+        velocity = _agreed(votes, near / (1 + (off**2).sum(axis=-1) / allowed**2) ** 2, fps, guess, trust)
     return velocity
-
-
-def smoothed(points: Array, tremble: float, fps: float) -> Array:
-    """Points (T, ..., ...) through a Gaussian window in time, continued at both ends as they come in."""
-    reach = round(3 * tremble * fps)
-    if len(points) < 2 or not reach:
-        return points
-    window = np.exp(-0.5 * (np.arange(-reach, reach + 1) / (tremble * fps)) ** 2)
-    padded = np.pad(points, ((reach, reach), (0, 0), (0, 0)), mode="reflect", reflect_type="odd")
-    calm: Array = sum(weight * padded[i : i + len(points)] for i, weight in enumerate(window / window.sum()))
-    return calm
 
 
 def _agreed(votes: Array, weights: Array, fps: float, guess: Array | float, trust: float) -> Array:
     """The mean (T, 2) of votes (T, K, 2) by their weights (T, K) and by how near they are in time, and of the guess."""
     reach = round(1.0 * fps)
-    nearness = np.exp(-np.abs(np.arange(-reach, reach + 1)) / (CARRY * fps))
+    nearness = np.exp(-np.abs(np.arange(-reach, reach + 1)) / (0.05 * fps))  # votes are brought together over .05 s
     columns = [weights.sum(axis=1), *np.moveaxis((weights[..., None] * votes).sum(axis=1), 1, 0)]
     total, x, z = (np.convolve(column, nearness)[reach : reach + len(votes)] for column in columns)
     # without any vote within a second: the guess

@@ -9,6 +9,7 @@ import torch
 from numpy.typing import NDArray
 
 from motet.models.fill import FillModel
+from motet.motion.feet.contacts import ContactSettings, ground_speeds, standing
 from motet.motion.humanoid.bones import HUMANOID, LEFT_RIGHT, sided
 from motet.motion.rotations import Array
 from motet.representation.placed import PLACE, bridge, placed_by_way, straight
@@ -23,8 +24,8 @@ SECONDS = (0.5, 1.0, 2.0)
 
 FEET = [HUMANOID.index(sided(side, part)) for side in LEFT_RIGHT for part in ("Foot", "Toes")]
 
-STANDING, LOW = 0.2, 0.15
-"""Metres a second and metres: a joint of the feet that was slower and lower stands."""
+STANDS = ContactSettings(heights=(0.15, 0.15), speeds=(0.2, 0.2))
+"""Joints of feet: the ankle of a foot that stands is 8 cm above the ground."""
 
 GOING = 0.5
 """Metres a second that the hips go over the ground, from one end of a gap to the other, of a figure on its way."""
@@ -99,8 +100,8 @@ def _standing(past: Array, after: Array, count: int) -> Array:
 def _figures(joints: SixdPlaces, systems: Mapping[str, Fill], windows: list[Window], fps: float) -> dict[str, float]:
     true = _places(joints, windows, [one.truth for one in windows])
     feet = true[:, :, FEET]
-    slow = np.linalg.norm(np.diff(feet, axis=1), axis=-1) * fps < STANDING
-    stands = slow & (feet[:, 1:, :, 1] < LOW)
+    speeds = np.linalg.norm(np.diff(feet, axis=1), axis=-1) * fps
+    stands = standing(feet[:, 1:, :, 1], speeds, STANDS)
     ways = np.array([np.linalg.norm((one.after[0] - one.past[-1])[[0, 2]]) for one in windows])
     going = ways * fps / (len(windows[0].truth) + 1) > GOING
     found: dict[str, float] = {
@@ -135,8 +136,8 @@ def _places(joints: SixdPlaces, windows: list[Window], filled: list[Array]) -> A
 
 def _slide(places: Array, stands: NDArray[np.bool_], fps: float) -> float:
     """Centimetres a second over the ground of feet while those recorded stand."""
-    over = np.linalg.norm(np.diff(places[:, :, FEET], axis=1)[..., [0, 2]], axis=-1)
-    return 100 * fps * float(over[stands].mean()) if stands.any() else float("nan")
+    over = ground_speeds(places[:, :, FEET], fps)
+    return 100 * float(over[stands].mean()) if stands.any() else float("nan")
 
 
 def _jerk(places: Array) -> float:

@@ -4,15 +4,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from motet.motion.feet.standing import feet_of, ground_of
+from motet.motion.feet.contacts import ContactSettings, feet_of, ground_of, ground_speeds, standing
 from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
 from motet.representation.root_block import ROOT_BLOCK, from_root_block
 
-LOW = 0.05
-"""m: a joint of a foot no higher than this above the ground is on it."""
+STANDS = ContactSettings(heights=(0.05, 0.05))
+"""Joints of feet, by their heights alone."""
 
 QUIET = 5
 """Per cent of the training motions whose last second has less energy than what counts as frozen."""
@@ -70,14 +70,14 @@ def speed(motion: Motion) -> float:
 def skate(motion: Motion) -> float:
     """How fast feet on the ground slide, m/s: the mean over all steps from one frame to the next.
 
-    A joint of a foot counts that is on the ground (LOW) before and after the step; of several the slowest does,
+    A joint of a foot counts that stands before and after the step; of several the slowest does,
     since the others roll. NaN where none ever is.
     """
     skeleton = skeleton_of(motion)
     feet = positions(from_root_block(motion))[:, feet_of(skeleton)] * skeleton.unit_factor(1.0)
-    low = feet[..., 1] <= ground_of(feet[..., 1]) + LOW
-    slides = np.linalg.norm(np.diff(feet[..., [0, 2]], axis=0), axis=-1) * motion.fps
+    low = standing(feet[..., 1] - ground_of(feet[..., 1]), None, STANDS)
+    slides = ground_speeds(feet, motion.fps)
     slides[~(low[1:] & low[:-1])] = np.inf
     slowest = slides.min(axis=1)
-    standing = np.isfinite(slowest)
-    return float(slowest[standing].mean()) if standing.any() else np.nan
+    stands = np.isfinite(slowest)
+    return float(slowest[stands].mean()) if stands.any() else np.nan

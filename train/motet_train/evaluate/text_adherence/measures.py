@@ -5,15 +5,15 @@ from itertools import combinations
 
 import numpy as np
 
-from motet.motion.feet.standing import feet_of, ground_of
+from motet.motion.feet.contacts import ContactSettings, feet_of, ground_of, ground_speeds, standing
 from motet.motion.humanoid.bones import HUMANOID, LEFT_RIGHT, sided
 from motet.motion.rotations import Array
 from motet_train.evaluate.text_adherence.track import RATE, Track
 
 FEET = feet_of(HUMANOID)
 
-LOW = 0.04
-"""Metres above the ground: the ball of a foot that is no higher, 2 cm above where it is in standing, is on it."""
+STANDS = ContactSettings(heights=(0.04, 0.04))
+"""The ball of a foot that is no higher than 2 cm above where it is in standing is on the ground."""
 
 POSES = 32
 """Poses, evenly spaced in time, by which two motions of any length are compared."""
@@ -24,12 +24,11 @@ BALLS = [HUMANOID.index(sided(side, "Toes")) for side in LEFT_RIGHT]
 
 def slide(track: Track) -> float:
     """How fast feet on the ground slide, m/s: the mean speed over the ground of the balls of the feet from one frame to
-    the next, in both of which they are low (LOW). NaN where none ever is."""
+    the next, in both of which they stand. NaN where none ever does."""
     balls = track.points[:, BALLS]
-    low = balls[..., 1] <= ground_of(track.points[:, FEET, 1]) + LOW
-    speed = np.linalg.norm(np.diff(balls[..., [0, 2]], axis=0), axis=-1) * RATE
-    standing = low[1:] & low[:-1]
-    return float(speed[standing].mean()) if standing.any() else np.nan
+    low = standing(balls[..., 1] - ground_of(track.points[:, FEET, 1]), None, STANDS)
+    stands = low[1:] & low[:-1]
+    return float(ground_speeds(balls, RATE)[stands].mean()) if stands.any() else np.nan
 
 
 def jerk(track: Track) -> float:

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from motet.bundle.graph import Floats
 from motet.models.control import ControlModel
+from motet.motion.feet.contacts import ContactSettings, standing
 from motet.motion.feet.lock import FootLock
 from motet.motion.humanoid.bones import sole_points
 from motet.motion.pose import Pose
@@ -24,8 +25,8 @@ from motet_train.papers.tdbn.courses import LABELS, controls_of
 HASTE = 3.0
 """1/s: how fast a figure is told to turn, for each radian that its facing is off."""
 
-LOW = 0.03
-"""Metres: a foot stands, for the foot lock, whose lowest point is no higher; the net says nothing of contacts."""
+STANDS = ContactSettings(heights=(0.03, 0.03))
+"""A foot stands, for the foot lock, by the height of its lowest point: the net says nothing of contacts."""
 
 SPEEDS = {"walk": (0.3, 1.8), "run": (1.8, 4.0)}
 """m/s. The net has no gaits: it walks or runs as the speed asks."""
@@ -114,5 +115,4 @@ def _contacts(pose: Pose) -> Floats:
     """Which feet (B, 2) stand, by how high their soles are."""
     turned, places = (part.astype(np.float64) for part in pose.global_transforms())
     heights = sole_points(quat_to_rotmat(turned), places)[..., 1].reshape(len(pose), 2, 3).min(axis=2)
-    found: Floats = (heights <= LOW).astype(np.float32)
-    return found
+    return standing(heights, None, STANDS).astype(np.float32)
