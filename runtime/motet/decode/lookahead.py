@@ -46,7 +46,7 @@ class Ahead(NamedTuple):
     histories: tuple[Floats, ...]
     control: Floats
     shown: Floats
-    fade: Fade | None = None
+    fade: Fade
 
 
 def begun(run: Run, history: Floats, past: Floats, control: Floats, fps: float) -> Ahead:
@@ -55,12 +55,13 @@ def begun(run: Run, history: Floats, past: Floats, control: Floats, fps: float) 
     reach = reach_of(fps)
     before = past[np.maximum(np.arange(-reach - 1, 0), -len(past))]
     frames, histories = _run_on(run, before, (history,), reach)
-    return Ahead(frames, histories, control, _mean(frames, fps))
+    shown = _mean(frames, fps)
+    return Ahead(frames, histories, control, shown, Fade(np.zeros_like(shown), np.zeros_like(shown)))
 
 
 def ticked(now: Ahead, run: Run, control: Floats, fps: float, most: Floats) -> Ahead:
     """One tick later; ``run`` counts from the tick that is now. A channel changes by no more than ``most`` (D)."""
-    reach, fade = reach_of(fps), None if now.fade is None else _faded(now.fade, 1 / fps)
+    reach, fade = reach_of(fps), _faded(now.fade, 1 / fps)
     if control is now.control or np.array_equal(control, now.control):
         frames, histories = _run_on(run, now.frames[1:], now.histories, 1)
     else:
@@ -68,19 +69,21 @@ def ticked(now: Ahead, run: Run, control: Floats, fps: float, most: Floats) -> A
         # what is farthest ahead was not run before: it is taken to differ as what is before it does
         apart = now.frames[reach + 1 :] - frames[reach:-1]
         offset = _mean(np.concatenate([np.zeros_like(apart), apart, apart[-1:]]), fps)
-        fade = Fade(offset, np.zeros_like(offset)) if fade is None else Fade(fade.offset + offset, fade.speed)
+        fade = Fade(fade.offset + offset, fade.speed)
     return _held_back(now.shown, Ahead(frames, histories[1:], control, _mean(frames, fps), fade), most)
 
 
 def _held_back(before: Floats, after: Ahead, most: Floats) -> Ahead:
-    """What is shown (B, D) after a frame: with what fades, and no faster than ``most`` (D); what is too fast fades."""
-    wanted = after.shown if after.fade is None else after.shown + after.fade.offset
+    """What is shown (B, D) after a frame: with what fades, and no faster than ``most`` (D); what is too fast fades.
+
+    Each character by itself: it moves as it would alone, to the bit.
+    """
+    wanted = after.shown + after.fade.offset
     step = wanted - before
-    if (np.abs(step) <= most).all():
-        return after._replace(shown=wanted)
-    shown = before + np.clip(step, -most, most)
-    offset = shown - after.shown
-    return after._replace(shown=shown, fade=Fade(offset, after.fade.speed if after.fade else np.zeros_like(offset)))
+    fast = (np.abs(step) > most).any(axis=1, keepdims=True)
+    shown = np.where(fast, before + np.clip(step, -most, most), wanted)
+    offset = np.where(fast, shown - after.shown, after.fade.offset)
+    return after._replace(shown=shown, fade=Fade(offset, after.fade.speed))
 
 
 def reach_of(fps: float) -> int:
@@ -113,7 +116,8 @@ def _window(fps: float) -> Floats:
     return weights
 
 
-def _faded(fade: Fade, seconds: float) -> Fade | None:
-    """A critically damped spring at rest at 0, so many seconds later (exact)."""
-    after = Fade(*damped(fade.offset, fade.speed, FADING, seconds))
-    return after if np.abs(after.offset).max() > FADED or np.abs(after.speed).max() > FADED else None
+def _faded(fade: Fade, seconds: float) -> Fade:
+    """A critically damped spring at rest at 0, so many seconds later (exact), for each character that is not there."""
+    offset, speed = damped(fade.offset, fade.speed, FADING, seconds)
+    moving = (np.maximum(np.abs(offset), np.abs(speed)) > FADED).any(axis=1, keepdims=True)
+    return Fade(np.where(moving, offset, 0), np.where(moving, speed, 0))
