@@ -7,13 +7,15 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from motet.bundle.arrays import array_bytes
 from motet.bundle.bundle import Bundle, write_bundle
-from motet.bundle.graph import Graph, OnnxGraph
+from motet.bundle.graph import OnnxGraph
 from motet.bundle.manifest import Manifest
 from motet.bundle.session import SessionOptions
 from motet.files import check_place
+from motet.models.load import Model, build, kind_of
 from motet_export.decoded import whole_runs
-from motet_export.examples import examples
+from motet_export.examples import Examples, examples
 from motet_export.exporter import ExportError, export_graph
 from motet_export.golden import FILE, golden_vectors
 from motet_export.half import HALF, halved, round_weights
@@ -36,7 +38,8 @@ def export_run(run: Run, out: str | Path, int8: bool = False, half: bool = False
         raise ExportError("weights are kept in 8 bits or in 16: export with --int8 or with --half")
     if half:
         round_weights(run.model)
-    manifest, modules, torch = Manifest.from_json(run.manifest), run.graphs(), run.torch_graphs()
+    modules, torch = run.graphs(), build(Manifest.from_json(run.manifest), run.torch_graphs(), run.tables())
+    manifest = torch.manifest
     label = {"motet": version("motet"), "bundle": manifest.name, "model": manifest.model}
     files = {}
     for role, (module, spec) in modules.items():
@@ -44,17 +47,15 @@ def export_run(run: Run, out: str | Path, int8: bool = False, half: bool = False
         graph = export_graph(module, spec, {**label, "role": role})
         files[f"{role}.onnx"] = halved(graph) if half else graph
     log.info("comparing it with torch")
-    onnx = _sessions(files, torch)
-    report = parity(manifest, onnx, torch)
+    onnx = _served(torch, files)
+    report = parity(onnx, torch)
     if half:
         report["weights"] = HALF
     if int8:
         files, exact = {name: quantised(data) for name, data in files.items()}, onnx
-        onnx = _sessions(files, torch)
-        report["int8"] = difference(manifest, onnx, exact)
-    files[FILE], golden = golden_vectors(manifest, onnx, examples(manifest, torch))
-    graphs = {role: {"file": f"{role}.onnx", **spec.to_json()} for role, (_, spec) in modules.items()}
-    write_bundle(out, {**run.manifest, "graphs": graphs, "golden": golden, "parity": report}, files)
+        onnx = _served(torch, files)
+        report["int8"] = difference(onnx, exact)
+    _write(out, onnx, files, {**run.manifest, "parity": report}, examples(manifest, torch.graphs))
     return report
 
 
@@ -65,20 +66,34 @@ def halve_bundle(bundle: Bundle, out: str | Path) -> dict[str, Any]:
     parity report says what the rounding makes of the runs, under "half".
     """
     check_place(out)
-    manifest = bundle.manifest
-    exact: dict[str, Graph] = {role: bundle.graph(role, SessionOptions()) for role in manifest.graphs}
-    files = {f"{role}.onnx": halved(bundle.read(entry.file), rounded=True) for role, entry in manifest.graphs.items()}
-    onnx = _sessions(files, exact)
-    changes = difference(manifest, onnx, exact)
-    files[FILE], golden = golden_vectors(manifest, onnx, examples(manifest, exact))
-    graphs = {role: {"file": f"{role}.onnx", **graph.spec.to_json()} for role, graph in exact.items()}
-    report = {**manifest.parity, "weights": HALF, "half": changes}
-    write_bundle(out, {**manifest.source, "graphs": graphs, "golden": golden, "parity": report}, files)
+    exact = kind_of(bundle.manifest).load(bundle)
+    files = {f"{role}.onnx": halved(bundle.read(g.file), rounded=True) for role, g in bundle.manifest.graphs.items()}
+    onnx = _served(exact, files)
+    changes = difference(onnx, exact)
+    report = {**bundle.manifest.parity, "weights": HALF, "half": changes}
+    _write(out, onnx, files, {**bundle.manifest.source, "parity": report}, examples(bundle.manifest, exact.graphs))
     return changes
 
 
-def _sessions(files: Mapping[str, bytes], torch: Mapping[str, Graph]) -> dict[str, Graph]:
-    return {role: OnnxGraph(files[f"{role}.onnx"], graph.spec) for role, graph in torch.items()}
+def _served(model: Model, files: Mapping[str, bytes]) -> Model:
+    """The model with its graphs run by ONNX Runtime."""
+    graphs = {role: OnnxGraph(files[f"{role}.onnx"], graph.spec) for role, graph in model.graphs.items()}
+    return build(model.manifest, graphs, model.tables)
+
+
+def _write(
+    out: str | Path, model: Model, graphs: Mapping[str, bytes], about: Mapping[str, Any], draws: Mapping[str, Examples]
+) -> None:
+    """Write the bundle of a model, with golden vectors and plain arrays."""
+    vectors, golden = golden_vectors(model, draws)
+    specs = {role: {"file": f"{role}.onnx", **graph.spec.to_json()} for role, graph in model.graphs.items()}
+    tables = {
+        name: {"file": f"{name}.npy", "dtype": array.dtype.name, "shape": array.shape}
+        for name, array in model.tables.items()
+    }
+    arrays = {f"{name}.npy": array_bytes(array) for name, array in model.tables.items()}
+    manifest = {**about, "graphs": specs, "tables": tables, "golden": golden}
+    write_bundle(out, manifest, {**graphs, **arrays, FILE: vectors})
 
 
 def parity_of(run: Run, bundle: Bundle, options: SessionOptions | None = None) -> dict[str, Any]:
@@ -90,20 +105,21 @@ def parity_of(run: Run, bundle: Bundle, options: SessionOptions | None = None) -
         raise ExportError(f"bundle {bundle.path} has 8-bit weights, which torch cannot check; export without --int8")
     if bundle.manifest.parity.get("weights") == HALF:
         round_weights(run.model)
-    onnx = {role: bundle.graph(role, options or SessionOptions()) for role in run.graphs()}
-    return parity(bundle.manifest, onnx, run.torch_graphs())
+    model = kind_of(bundle.manifest).load(bundle, options)
+    return parity(model, build(bundle.manifest, run.torch_graphs(), run.tables()))
 
 
-def parity(manifest: Manifest, onnx: Mapping[str, Graph], torch: Mapping[str, Graph]) -> dict[str, Any]:
+def parity(onnx: Model, torch: Model) -> dict[str, Any]:
     """Climb the parity ladder; the report that goes into the manifest. ExportError at the first rung that fails."""
-    draws = examples(manifest, torch)
+    draws = examples(onnx.manifest, torch.graphs)
     report: dict[str, Any] = {
-        f"{role}.one_step": check_one_step(role, onnx[role], graph, draws[role]) for role, graph in torch.items()
+        f"{role}.one_step": check_one_step(role, onnx.graphs[role], graph, draws[role])
+        for role, graph in torch.graphs.items()
     }
-    horizon = manifest.defaults["horizon"] if manifest.verb == "predict" else None
-    if "step" in torch:
-        report["step.carried"] = check_carried(onnx["step"], torch["step"], draws["step"], horizon)
-    report["runs"] = check_runs(whole_runs(manifest, onnx, torch))
+    horizon = int(onnx.defaults["horizon"]) if onnx.VERB == "predict" else None
+    if "step" in torch.graphs:
+        report["step.carried"] = check_carried(onnx.graphs["step"], torch.graphs["step"], draws["step"], horizon)
+    report["runs"] = check_runs(whole_runs(onnx, torch))
     report["versions"] = {name: version(name) for name in ("torch", "onnx", "onnxruntime")}
     report["machine"] = f"{platform.system()} {platform.machine()}"
     return report

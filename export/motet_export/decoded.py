@@ -8,15 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.bundle.graph import Graph
-from motet.bundle.manifest import Manifest
 from motet.errors import TextWarning
 from motet.models.control import ControlModel
 from motet.models.describe import DescribeModel
 from motet.models.fill import FillModel
 from motet.models.generate import GenerateModel
 from motet.models.language import LanguageModel
-from motet.models.load import build
+from motet.models.load import Model
 from motet.models.predict import PredictModel
 from motet.models.search import SearchModel
 from motet.models.steer import SteerModel
@@ -32,16 +30,11 @@ Runs = dict[str, Callable[[], tuple[Decoded, Decoded]]]
 Named = dict[str, Callable[[Any], Decoded]]
 """By name of a run: what a model decodes."""
 
-Graphs = Mapping[str, Graph]
 
-
-def whole_runs(manifest: Manifest, onnx: Graphs, torch: Graphs) -> Runs:
-    """The runs by which a bundle of the manifest's verb is judged, each by its name."""
-    models = [build(manifest, graphs) for graphs in (onnx, torch)]
-    return {
-        name: partial(_pair, models, run)
-        for name, run in _RUNS.get(manifest.loop, _RUNS[manifest.verb])(models[0]).items()
-    }
+def whole_runs(onnx: Model, torch: Model) -> Runs:
+    """The runs by which a model is judged, each by its name."""
+    runs = _RUNS.get(onnx.manifest.loop, _RUNS[onnx.VERB])(onnx)
+    return {name: partial(_pair, (onnx, torch), run) for name, run in runs.items()}
 
 
 def _control(_: ControlModel) -> Named:

@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 
 from motet.bundle.golden import TOLERANCE, vectors
-from motet.bundle.graph import Arrays, Graph
-from motet.bundle.manifest import Manifest
+from motet.bundle.graph import Arrays
 from motet.decode.ancestral import noise_of
 from motet.decode.noise import Recording
 from motet.models.control import ControlModel
@@ -15,7 +14,7 @@ from motet.models.describe import DescribeModel
 from motet.models.fill import FillModel
 from motet.models.generate import GenerateModel
 from motet.models.language import LanguageModel
-from motet.models.load import build
+from motet.models.load import Model
 from motet.models.predict import PredictModel
 from motet.models.search import SearchModel
 from motet.models.steer import SteerModel
@@ -31,13 +30,11 @@ Run = tuple[Arrays, dict[str, Any]]
 """The inputs of a whole run, and its settings."""
 
 
-def golden_vectors(
-    manifest: Manifest, graphs: Mapping[str, Graph], draws: Mapping[str, Examples]
-) -> tuple[bytes, dict[str, Any]]:
+def golden_vectors(model: Model, draws: Mapping[str, Examples]) -> tuple[bytes, dict[str, Any]]:
     """The file of golden vectors, and what the manifest says of it."""
-    rng, model = np.random.default_rng(5), build(manifest, graphs)
-    feeds = {role: draws[role](rng, ROWS) for role in graphs}
-    given, settings = _RUNS.get(manifest.loop, _RUNS[manifest.verb])(model, rng)
+    rng = np.random.default_rng(5)
+    feeds = {role: draws[role](rng, ROWS) for role in model.graphs}
+    given, settings = _RUNS.get(model.manifest.loop, _RUNS[model.VERB])(model, rng)
     entry = {"file": FILE, "tolerance": TOLERANCE, "run": settings}
     return vectors(model, feeds, given, settings), entry
 

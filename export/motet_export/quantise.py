@@ -1,11 +1,9 @@
 """8-bit weights: a bundle of a quarter of the size, and what that changes in complete runs."""
 
-from collections.abc import Mapping
-
 import numpy as np
 
-from motet.bundle.graph import Floats, Graph
-from motet.bundle.manifest import Manifest
+from motet.bundle.graph import Floats
+from motet.models.load import Model
 from motet_export.decoded import whole_runs
 from motet_export.weights import Small, stored
 
@@ -19,7 +17,7 @@ def quantised(model: bytes) -> bytes:
     return stored(model, _rows, weights="int8")
 
 
-def difference(manifest: Manifest, int8: Mapping[str, Graph], exact: Mapping[str, Graph]) -> dict[str, float]:
+def difference(int8: Model, exact: Model) -> dict[str, float]:
     """What int8 changes in the runs of the parity ladder, for the manifest.
 
     "<run>.equal": share of the decoded sentences that are the same. "<run>.score": mean |difference| of the
@@ -27,7 +25,7 @@ def difference(manifest: Manifest, int8: Mapping[str, Graph], exact: Mapping[str
     their mean |difference|.
     """
     report: dict[str, float] = {}
-    for name, run in whole_runs(manifest, int8, exact).items():
+    for name, run in whole_runs(int8, exact).items():
         found, expected = run()
         if "words" in found and found["words"].shape == expected["words"].shape:
             report[f"{name}.equal"] = float((found["words"] == expected["words"]).all(axis=1).mean())

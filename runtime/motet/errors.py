@@ -58,7 +58,7 @@ class TextWarning(UserWarning):
 
 
 class SettingError(MotetError, ValueError):
-    """A setting that is out of range or of another type."""
+    """A setting that is unknown, out of range or of another type."""
 
 
 class DecodingError(SettingError):

@@ -199,7 +199,7 @@ def test_the_model_holds_no_state(model: DescribeModel) -> None:
         ({"defaults": {"beams": 5}}, "manifest, defaults.max_words: is missing"),
         (
             {"defaults": {"beams": 5, "max_words": "x"}},
-            "defaults.max_words: max_words must be between 1 and 1000, not x",
+            "defaults.max_words must be between 1 and 1000, not x",
         ),
         ({"defaults": {"beams": 2.5, "max_words": 5}}, "beams must be a whole number, not 2.5"),
         ({"loop": "mixture"}, "manifest, loop: 'mixture' does not describe; expected one of beam, consensus"),

@@ -103,7 +103,7 @@ def header(shape: str, dtype: str = "<f4") -> bytes:
     ],
 )
 def test_what_is_not_an_array_is_refused(content: bytes) -> None:
-    with pytest.raises(BundleError, match=r"'x.npy', which is not a plain array"):
+    with pytest.raises(BundleError, match=r"golden vectors, x.npy' is not a plain array"):
         read(archive_bytes({"x.npy": content}))
 
 

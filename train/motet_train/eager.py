@@ -10,4 +10,5 @@ from motet_train.runs import MODELS, Run
 def eager_model(manifest: Manifest, threads: int) -> Model:
     """A bundle's model with the same sizes in torch, its weights untrained: speed does not depend on them."""
     torch.set_num_threads(threads)
-    return build(manifest, Run(manifest.source, MODELS[manifest.model](manifest.config)).torch_graphs())
+    run = Run(manifest.source, MODELS[manifest.model](manifest.config))
+    return build(manifest, run.torch_graphs(), run.tables())

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import torch
+from numpy.typing import NDArray
 from torch import nn
 
 from motet.bundle.graph import Graph, GraphSpec
@@ -59,6 +60,10 @@ class Run:
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """For each role the module to export and the contract that its forward keeps."""
         return self.model.graphs()
+
+    def tables(self) -> dict[str, NDArray[Any]]:
+        """The plain arrays of the bundle, by name."""
+        return self.model.tables()
 
     def torch_graphs(self) -> dict[str, Graph]:
         """The graphs, run by torch."""

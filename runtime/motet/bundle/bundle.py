@@ -18,6 +18,10 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from motet.bundle.arrays import array_of
 from motet.bundle.graph import OnnxGraph
 from motet.bundle.manifest import FORMAT, MANIFEST, FileEntry, Manifest
 from motet.bundle.members import Archive, Folder, Members
@@ -86,6 +90,17 @@ class Bundle:
             if found is None:
                 raise BundleError("there is none")
             return OnnxGraph(self.read(found.file), found.spec, options)
+
+    def table(self, name: str) -> NDArray[Any]:
+        """A table's array, read-only; BundleError where it is not as declared, or holds a number that is not finite."""
+        found = self.manifest.tables[name]
+        with self.named(f", table {name}"):
+            array = array_of(self.read(found.file), found.file, [found.dtype])
+            if array.shape != found.shape:
+                raise BundleError(f"it has the shape {list(array.shape)}, declared {list(found.shape)}")
+            if array.dtype.kind == "f" and not np.isfinite(array).all():
+                raise BundleError("it holds numbers that are not finite")
+            return array
 
     def check_files(self) -> list[str]:
         """Read every file that the manifest lists; returns their names. BundleError at the first fault."""

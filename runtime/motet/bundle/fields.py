@@ -1,7 +1,6 @@
 """JSON read with types: every refusal is a BundleError with the path of the key, such as ``motion.mean``."""
 
 import json
-import math
 import reprlib
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.errors import BundleError
+from motet.settings import is_number
 
 LARGEST = 1e9
 """Of any number: what is larger is an error, and would overflow in float32 soon."""
@@ -110,6 +110,11 @@ class Fields:
                 raise self.fault(f"numbers between {low:g} and {LARGEST:g}", item, key)
         return np.array(found, dtype=np.float64)
 
+    def wholes(self, key: str, low: int, high: int) -> tuple[int, ...]:
+        """A list of whole numbers between two others."""
+        found = Fields({str(n): item for n, item in enumerate(self.items(key))}, self.at(key))
+        return tuple(found.whole(n, low, high) for n in found.data)
+
     def table(self, key: str, columns: int) -> NDArray[np.float64]:
         """A list of lists of ``columns`` numbers as (rows, columns) float64."""
         rows = Fields({str(n): row for n, row in enumerate(self.items(key))}, self.at(key))
@@ -131,10 +136,3 @@ class Fields:
     def list_of_fields(self, key: str) -> "list[Fields]":
         """A list of objects."""
         return [Fields(item, self.at(f"{key}[{n}]")) for n, item in enumerate(self.items(key))]
-
-
-def is_number(value: object) -> bool:
-    """Whether a value is a finite number, and not true or false."""
-    return (isinstance(value, int) and not isinstance(value, bool)) or (
-        isinstance(value, float) and math.isfinite(value)
-    )

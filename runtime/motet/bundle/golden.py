@@ -4,16 +4,14 @@ They are arrays in an .npz: ``ROLE.in.NAME`` and ``ROLE.out.NAME`` of one call o
 ``run.out.NAME`` of the run, whose settings are in the manifest. docs/bundle.md says what the run of each verb is.
 """
 
-import io
 import math
-import struct
-import tokenize
 from collections.abc import Mapping
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from motet.bundle.arrays import array_bytes, array_of
 from motet.bundle.bundle import archive_bytes
 from motet.bundle.graph import Arrays, Graph
 from motet.bundle.manifest import Golden
@@ -26,18 +24,7 @@ TOLERANCE = 1e-3
 MAX_GOLDEN = 16 << 20
 """Bytes of all arrays together."""
 
-DTYPES = ("<f4", "<f8", "<i8")
-
-_NOT_AN_ARRAY = (
-    ValueError,
-    SyntaxError,
-    TypeError,
-    EOFError,
-    struct.error,
-    tokenize.TokenError,
-    RecursionError,
-    MemoryError,
-)
+DTYPES = ("float32", "float64", "int64")
 
 
 class Replayable(Protocol):
@@ -57,7 +44,7 @@ def vectors(model: Replayable, feeds: Mapping[str, Arrays], given: Arrays, setti
         arrays.update({f"{role}.out.{name}": value for name, value in model.graphs[role](inputs).items()})
     arrays.update({f"run.in.{name}": value for name, value in given.items()})
     arrays.update({f"run.out.{name}": value for name, value in model.replay(given, settings).items()})
-    return archive_bytes({f"{name}.npy": _bytes(value) for name, value in arrays.items()})
+    return archive_bytes({f"{name}.npy": array_bytes(value) for name, value in arrays.items()})
 
 
 def replay(model: Replayable, data: bytes, golden: Golden) -> dict[str, float]:
@@ -107,27 +94,8 @@ def read(data: bytes) -> dict[str, NDArray[Any]]:
         left -= len(content)
         if left < 0:
             raise BundleError(f"the golden vectors are larger than {MAX_GOLDEN} bytes")
-        found[member.removesuffix(".npy")] = _array(member, content)
+        found[member.removesuffix(".npy")] = array_of(content, f"golden vectors, {member}", DTYPES)
     return found
-
-
-def _array(member: str, content: bytes) -> NDArray[Any]:
-    file = io.BytesIO(content)
-    try:
-        version = np.lib.format.read_magic(file)
-        shape, fortran, dtype = np.lib.format.read_array_header_1_0(file)
-        rest = content[file.tell() :]
-        if version != (1, 0) or fortran or dtype.str not in DTYPES or math.prod(shape) * dtype.itemsize != len(rest):
-            raise ValueError("expected float32, float64 or int64 in C order, and nothing after it")
-        return np.frombuffer(rest, dtype).reshape(shape)
-    except _NOT_AN_ARRAY as error:
-        raise BundleError(f"the golden vectors hold {member!r}, which is not a plain array: {error}") from error
-
-
-def _bytes(array: NDArray[Any]) -> bytes:
-    buffer = io.BytesIO()
-    np.lib.format.write_array(buffer, np.ascontiguousarray(array), (1, 0), allow_pickle=False)
-    return buffer.getvalue()
 
 
 def _part(arrays: Arrays, prefix: str) -> dict[str, NDArray[Any]]:

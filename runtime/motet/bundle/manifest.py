@@ -21,6 +21,9 @@ FORMAT = 2
 
 MANIFEST = "manifest.json"
 
+TABLE_DTYPES = ("float16", "float32", "int8", "uint8", "int16", "uint16", "int32", "int64")
+"""Of the numbers of a table."""
+
 MAX_CHANNELS, FASTEST = 10_000, 1000.0
 """Channels of a model, and its frames per second."""
 
@@ -39,6 +42,15 @@ class GraphEntry:
 
     file: str
     spec: GraphSpec
+
+
+@dataclass(frozen=True)
+class TableEntry:
+    """A plain array: the .npy file that it is in, its dtype and its shape."""
+
+    file: str
+    dtype: str
+    shape: tuple[int, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,8 +74,9 @@ class Golden:
 class Manifest:
     """All that is known about a model.
 
-    A training run has no graphs, files and golden vectors. text, vocabulary and control are those of the verbs that
-    need them. ``source`` is the JSON object that the rest was read from.
+    A training run has no graphs, tables, files and golden vectors. text, vocabulary and control are those of the verbs
+    that need them. settings: of each feature the values that are not its code's. ``source`` is the JSON object that the
+    rest was read from.
     """
 
     name: str
@@ -73,6 +86,7 @@ class Manifest:
     version: str
     motion: MotionContract
     defaults: Mapping[str, Any]
+    settings: Mapping[str, Mapping[str, Any]]
     text: Mapping[str, Any] | None
     vocabulary: tuple[str, ...]
     control: Control | None
@@ -82,6 +96,7 @@ class Manifest:
     quality: Mapping[str, Any]
     parity: Mapping[str, Any]
     graphs: Mapping[str, GraphEntry]
+    tables: Mapping[str, TableEntry]
     files: Mapping[str, FileEntry]
     golden: Golden | None
     source: Mapping[str, Any]
@@ -99,6 +114,7 @@ class Manifest:
             version=top.text("version") if "version" in top else "",
             motion=motion,
             defaults=top.fields("defaults").data,
+            settings={name: entry.data for name, entry in top.entries("settings")} if "settings" in top else {},
             text=top.mapping("text") if "text" in top else None,
             vocabulary=top.texts("vocabulary") if "vocabulary" in top else (),
             control=_control(top.fields("control"), len(motion.channels)) if "control" in top else None,
@@ -108,6 +124,7 @@ class Manifest:
             quality=top.mapping("quality"),
             parity=top.mapping("parity"),
             graphs={role: _graph(entry) for role, entry in top.entries("graphs")} if "graphs" in top else {},
+            tables={name: _table(entry) for name, entry in top.entries("tables")} if "tables" in top else {},
             files={name: _file(name, entry) for name, entry in top.entries("files")} if "files" in top else {},
             golden=_golden(top.fields("golden")) if "golden" in top else None,
             source=top.data,
@@ -129,6 +146,7 @@ class Manifest:
             raise BundleError("manifest: it needs graphs and golden vectors")
         named = {
             **{f"graphs.{role}.file": g.file for role, g in found.graphs.items()},
+            **{f"tables.{name}.file": t.file for name, t in found.tables.items()},
             "golden.file": found.golden.file,
         }
         for key, file in named.items():
@@ -182,6 +200,10 @@ def _control(data: Fields, channels: int) -> Control:
 
 def _graph(data: Fields) -> GraphEntry:
     return GraphEntry(data.text("file"), GraphSpec.read(data))
+
+
+def _table(data: Fields) -> TableEntry:
+    return TableEntry(data.text("file"), data.one_of("dtype", TABLE_DTYPES), data.wholes("shape", 1, MAX_SIZE))
 
 
 def _file(name: str, data: Fields) -> FileEntry:

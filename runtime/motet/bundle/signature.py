@@ -27,7 +27,7 @@ def bind(
     for wanted, find in ((inputs, spec.input), (outputs, spec.output)):
         for name, shape in wanted.items():
             try:
-                _bind(find(name), shape, sizes)
+                bind_tensor(find(name), shape.lstrip("*"), "int64" if shape.startswith("*") else "float32", sizes)
             except BundleError as error:
                 raise BundleError(f"manifest, graphs.{role}: {error}") from error
     for tensor in spec.inputs:
@@ -38,8 +38,9 @@ def bind(
         spec.start_shape(tensor.name)
 
 
-def _bind(tensor: TensorSpec, shape: str, sizes: Sizes) -> None:
-    dtype, axes = ("int64" if shape.startswith("*") else "float32"), shape.lstrip("*").split()
+def bind_tensor(tensor: TensorSpec, shape: str, dtype: str, sizes: Sizes) -> None:
+    """Check one tensor, whose shape is put as :func:`bind` has it; BundleError says what is expected."""
+    axes = shape.split()
     expected = tuple(sizes.get(axis, axis) if axis.isupper() else axis for axis in axes)
     fits = tensor.dtype == dtype and len(tensor.shape) == len(axes)
     for axis, size in zip(axes, tensor.shape, strict=False):

@@ -1,16 +1,23 @@
 """Beam search over words. Section 4.2.3 of Plappert et al. 2017."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from motet.bundle.graph import Arrays, Floats, Graph
-from motet.decode.loop import Loop, Setting
+from motet.decode.loop import Loop
 from motet.decode.rollout import Ids, Scores, advance, two_rows, zero_state
+from motet.settings import Range, Settings
 
-WORDS = Setting(1, 1000, whole=True)
-"""How many words a sentence has at most."""
+
+@dataclass(frozen=True)
+class BeamSettings(Settings):
+    """max_words: how many words a sentence has at most. beams: hypotheses that are kept, and given."""
+
+    max_words: Annotated[int, Range(1, 1000)]
+    beams: Annotated[int, Range(1, 100)] = 5
 
 
 class Limits(NamedTuple):
@@ -102,6 +109,4 @@ def _hypotheses(ids: Ids, scores: Scores, end: int) -> list[Hypothesis]:
 INPUTS, OUTPUTS = {"word": "*batch", "context": "batch C"}, {"log_probabilities": "batch V"}
 """Of the step of every loop over words."""
 
-LOOP = Loop(
-    "describe", beam_search, INPUTS, OUTPUTS, {"beams": Setting(1, 100, whole=True), "max_words": WORDS}, batch=128
-)
+LOOP = Loop("describe", beam_search, INPUTS, OUTPUTS, BeamSettings, batch=128)

@@ -7,16 +7,17 @@ an action is followed can be raised by classifier-free guidance (Ho and Salimans
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motet.bundle.graph import Floats, Graph
-from motet.decode.loop import Loop, Setting
+from motet.decode.loop import Loop
 from motet.decode.memory import PAST, Memory
 from motet.decode.noise import Noise
 from motet.decode.rollout import Ids, Scores, advance, zero_state
+from motet.settings import Range, Settings
 
 WINDOW = 64
 """Steps that a writer looks back at most, those of the windows that writers are trained on: a stream may last for ever.
@@ -226,20 +227,26 @@ def drawn_steps(writer: Writer, action: int, longest: int, exactly: bool = False
         yield codes[0]
 
 
+@dataclass(frozen=True)
+class CodesSettings(Settings):
+    """hypotheses: motions that are given. The others are those of :class:`Drawing`; certainty: of the action; seconds:
+    0 lets the model end a motion, after max_seconds at most."""
+
+    hypotheses: Annotated[int, Range(1, 100)] = 1
+    temperature: Annotated[float, Range(0.01, 100)] = 1.0
+    first_temperature: Annotated[float, Range(0.01, 100)] = 1.0
+    top_p: Annotated[float, Range(0.01, 1)] = 1.0
+    guidance: Annotated[float, Range(0, 10)] = 1.0
+    memory: Annotated[float, Range(0, 1)] = 0.0
+    certainty: Annotated[float, Range(0.01, 100)] = 1.0
+    seconds: Annotated[float, Range(0, 600, "s")] = 0.0
+    max_seconds: Annotated[float, Range(0, 600, "s")] = 30.0
+
+
 LOOP = Loop(
     "generate",
     draw_codes,
     {"codes": "*batch P", "action": "*batch", "age": "*batch"},
     {"known": "batch H", "numbers": "batch L"},
-    {
-        "hypotheses": Setting(1, 100, whole=True, default=1),
-        "temperature": Setting(0.01, 100, default=1.0),
-        "first_temperature": Setting(0.01, 100, default=1.0),
-        "top_p": Setting(0.01, 1, default=1.0),
-        "guidance": Setting(0, 10, default=1.0),
-        "memory": Setting(0, 1, default=0),
-        "certainty": Setting(0.01, 100, default=1.0),
-        "seconds": Setting(0, 600, default=0),
-        "max_seconds": Setting(0, 600, default=30),
-    },
+    CodesSettings,
 )

@@ -5,14 +5,17 @@ From many draws, as Eikema and Aziz (2020) do: "Is MAP decoding all you need?"
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from motet.bundle.graph import Floats, Graph
 from motet.decode.ancestral import Drawn, draw_sequences
-from motet.decode.beam import INPUTS, OUTPUTS, WORDS, Hypothesis, Limits
-from motet.decode.loop import Loop, Setting
+from motet.decode.beam import INPUTS, OUTPUTS, BeamSettings, Hypothesis, Limits
+from motet.decode.loop import Loop
 from motet.decode.rollout import Ids, Scores
+from motet.settings import Range
 
 ORDERS = (1, 2)
 """Words, and pairs of words that follow each other."""
@@ -74,16 +77,12 @@ def _marks(sequences: Sequence[tuple[int, ...]], order: int) -> Scores:
     return marks
 
 
-LOOP = Loop(
-    "describe",
-    consensus,
-    INPUTS,
-    OUTPUTS,
-    {
-        "max_words": WORDS,
-        "beams": Setting(1, 100, whole=True, default=5),
-        "draws": Setting(1, 1000, whole=True, default=100),
-        "temperature": Setting(0.01, 100, default=1.0),
-    },
-    batch=16,
-)
+@dataclass(frozen=True)
+class ConsensusSettings(BeamSettings):
+    """beams: sentences that are given. draws: sentences that are drawn."""
+
+    draws: Annotated[int, Range(1, 1000)] = 100
+    temperature: Annotated[float, Range(0.01, 100)] = 1.0
+
+
+LOOP = Loop("describe", consensus, INPUTS, OUTPUTS, ConsensusSettings, batch=16)

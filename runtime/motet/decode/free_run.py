@@ -1,12 +1,21 @@
 """The loop of predictors: a step graph whose frames go on from seed frames."""
 
+from dataclasses import dataclass
+from typing import Annotated
+
 import numpy as np
 
 from motet.bundle.graph import Floats, Graph
-from motet.decode.loop import Loop, Setting
+from motet.decode.loop import Loop
 from motet.decode.rollout import advance, zero_state
+from motet.settings import Range, Settings
 
-MAX_HORIZON = 10_000
+
+@dataclass(frozen=True)
+class FreeRunSettings(Settings):
+    """horizon: frames after which the encoder is asked again."""
+
+    horizon: Annotated[int, Range(1, 10_000)]
 
 
 def free_run(encoder: Graph, step: Graph, seed: Floats, count: int, horizon: int) -> Floats:
@@ -31,4 +40,4 @@ def free_run(encoder: Graph, step: Graph, seed: Floats, count: int, horizon: int
     return frames[:, given:]
 
 
-LOOP = Loop("predict", free_run, {}, {"frame": "batch D"}, {"horizon": Setting(1, MAX_HORIZON, whole=True)}, batch=4096)
+LOOP = Loop("predict", free_run, {}, {"frame": "batch D"}, FreeRunSettings, batch=4096)

@@ -1,10 +1,22 @@
 """The loop of models that fill gaps: one call of the graph gives all frames of a gap."""
 
-from motet.bundle.graph import Floats, Graph
-from motet.decode.loop import Loop, Setting
+from dataclasses import dataclass
+from typing import Annotated
 
-MOST = 1000
-"""Frames that settings may ask for."""
+from motet.bundle.graph import Floats, Graph
+from motet.decode.loop import Loop
+from motet.settings import Range, Settings
+
+Frames = Annotated[int, Range(1, 1000, "frames")]
+
+
+@dataclass(frozen=True)
+class BetweenSettings(Settings):
+    """context: the most frames that are seen before and after a gap; least: the fewest; longest: of the gap itself."""
+
+    context: Frames
+    least: Frames
+    longest: Frames
 
 
 def between(graph: Graph, past: Floats, plain: Floats, after: Floats) -> Floats:
@@ -14,15 +26,4 @@ def between(graph: Graph, past: Floats, plain: Floats, after: Floats) -> Floats:
     return filled
 
 
-LOOP = Loop(
-    "fill",
-    between,
-    {},
-    {},
-    {
-        "context": Setting(1, MOST, whole=True),
-        "least": Setting(1, MOST, whole=True),
-        "longest": Setting(1, MOST, whole=True),
-    },
-)
-"""context: the most frames that are seen before and after a gap; least: the fewest; longest: of the gap itself."""
+LOOP = Loop("fill", between, {}, {}, BetweenSettings)

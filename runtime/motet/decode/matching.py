@@ -262,5 +262,4 @@ LOOP = Loop(
     tick,
     {"recorded": "batch 2 W", "at": "batch 2", "control": "batch 3"},
     {"rotations": "batch J 4", "height": "batch 1", "contacts": "batch 2"},
-    {},
 )

@@ -1,16 +1,18 @@
 """Beam search over frames drawn from a mixture of Gaussians. Section 4.3.3 of Plappert et al. 2017."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motet.bundle.graph import Arrays, Floats, Graph
-from motet.decode.loop import Loop, Setting
+from motet.decode.loop import Loop
 from motet.decode.noise import Noise
 from motet.decode.rollout import Ids, Scores, advance, two_rows, zero_state
 from motet.decode.sample import Sample
+from motet.settings import Range, Settings
 
 SMALLEST = 2.0**-24
 """A probability of the flag below this counts as this, where a logarithm is taken."""
@@ -169,15 +171,20 @@ def log_density(frames: Floats, log_weights: Floats, means: Floats, stds: Floats
     return found
 
 
+@dataclass(frozen=True)
+class MixtureSettings(Settings):
+    """hypotheses: motions that are given. candidates: frames that are drawn for each."""
+
+    hypotheses: Annotated[int, Range(1, 100)]
+    candidates: Annotated[int, Range(1, 100)]
+    temperature: Annotated[float, Range(0.01, 100)]
+    max_seconds: Annotated[float, Range(0.01, 600, "s")]
+
+
 LOOP = Loop(
     "generate",
     mixture_search,
     {"frame": "batch F", "context": "batch C"},
     {"log_weights": "batch K", "means": "batch K D", "stds": "batch K D", "active": "batch"},
-    {
-        "hypotheses": Setting(1, 100, whole=True),
-        "candidates": Setting(1, 100, whole=True),
-        "temperature": Setting(0.01, 100),
-        "max_seconds": Setting(0.01, 600),
-    },
+    MixtureSettings,
 )

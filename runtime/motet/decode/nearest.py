@@ -1,13 +1,22 @@
 """The loop of models that search: which of many unit vectors are the nearest to some."""
 
+from dataclasses import dataclass
+from typing import Annotated
+
 import numpy as np
 from numpy.typing import NDArray
 
 from motet.bundle.graph import Floats
-from motet.decode.loop import Loop, Setting
+from motet.decode.loop import Loop
 from motet.decode.rollout import Ids
+from motet.settings import Range, Settings
 
-MAX_COUNT = 1000
+
+@dataclass(frozen=True)
+class NearestSettings(Settings):
+    """count: motions that are found."""
+
+    count: Annotated[int, Range(1, 1000)] = 5
 
 
 def nearest(scores: Floats, count: int) -> Ids:
@@ -16,4 +25,4 @@ def nearest(scores: Floats, count: int) -> Ids:
     return order
 
 
-LOOP = Loop("search", nearest, {}, {}, {"count": Setting(1, MAX_COUNT, whole=True, default=5)})
+LOOP = Loop("search", nearest, {}, {}, NearestSettings)

@@ -1,9 +1,20 @@
 """The loop of control: one frame a tick, from what the figure did and what it is told."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated
 
 from motet.bundle.graph import Arrays, Floats, Graph
-from motet.decode.loop import Loop, Setting
+from motet.decode.loop import Loop
+from motet.settings import Range, Settings
+
+
+@dataclass(frozen=True)
+class TickSettings(Settings):
+    """temperature: divides what goes into the sigmoids. iterations: Gibbs iterations of a tick."""
+
+    temperature: Annotated[float, Range(0.01, 100)]
+    iterations: Annotated[int, Range(1, 100)] = 1
 
 
 def tick(step: Graph, history: Floats, inputs: Callable[[], Arrays], iterations: int) -> tuple[Floats, Floats]:
@@ -30,5 +41,5 @@ LOOP = Loop(
         "temperature": "batch 1",
     },
     {"next_codes": "batch H", "frame": "batch D"},
-    {"temperature": Setting(0.01, 100), "iterations": Setting(1, 100, whole=True, default=1)},
+    TickSettings,
 )

@@ -2,17 +2,22 @@
 
 import logging
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Self, TypeVar, cast
+
+from numpy.typing import NDArray
 
 from motet.bundle.bundle import Bundle
-from motet.bundle.graph import Arrays, Graph
+from motet.bundle.graph import Arrays, Graph, TensorSpec
 from motet.bundle.manifest import Manifest
 from motet.bundle.session import SessionOptions
-from motet.bundle.signature import Sizes, bind
+from motet.bundle.signature import Sizes, bind, bind_tensor
 from motet.decode.loops import loop_of
 from motet.errors import BundleError
+from motet.settings import Settings
+
+S = TypeVar("S", bound=Settings)
 
 log = logging.getLogger(__name__)
 
@@ -21,16 +26,18 @@ class BundleModel(ABC):
     """A model that runs graphs; without state, so that requests and threads can share it.
 
     manifest: of a bundle of the model's verb, or of a training run.
-    graphs: by role.
-    BundleError where the graphs are not those of the verb, or do not fit the manifest.
+    graphs: by role. tables: plain arrays by name.
+    BundleError where graphs or tables are not those of the verb, or do not fit the manifest.
     """
 
     VERB: ClassVar[str]
     ROLES: ClassVar[tuple[str, ...]] = ("encoder", "step")
+    SETTINGS: ClassVar[tuple[type[Settings], ...]] = ()
+    """Of the features whose numbers a bundle may hold."""
 
     _source: tuple[Path, SessionOptions] | None = None
 
-    def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph]) -> None:
+    def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:
         if manifest.verb != self.VERB:
             raise BundleError(f"manifest, verb: {manifest.verb!r}, expected {self.VERB!r}")
         for role in self.ROLES:
@@ -38,14 +45,27 @@ class BundleModel(ABC):
                 raise BundleError(f"manifest, graphs: there is no graph for the role {role!r}")
         self.manifest = manifest
         self.contract = manifest.motion
-        self.graphs = graphs
+        self.graphs, self.tables = graphs, tables or {}
         self.loop = loop_of(manifest.loop, self.VERB)
         self.defaults = self.loop.defaults(manifest.defaults)
+        self._tuned = _read_settings(self.SETTINGS, manifest.settings)
         self.sizes: Sizes = {"D": len(self.contract.channels)}
 
     def bind(self, role: str, inputs: Mapping[str, str], outputs: Mapping[str, str]) -> None:
         """Check the graph of a role against :attr:`sizes`, and note the sizes it adds; BundleError as :func:`bind`."""
         bind(role, self.graphs[role].spec, inputs, outputs, self.sizes)
+
+    def settings(self, kind: type[S]) -> S:
+        """The settings of a feature, one of :attr:`SETTINGS`: the bundle's, and defaults for what it does not say."""
+        return cast(S, self._tuned[kind])
+
+    def table(self, name: str, shape: str, dtype: str) -> NDArray[Any]:
+        """The table of a name, its shape checked like :meth:`bind`; BundleError where it is missing, or another."""
+        if name not in self.tables:
+            raise BundleError(f"manifest, tables: there is no table {name!r}")
+        found = self.tables[name]
+        bind_tensor(TensorSpec(name, found.shape, str(found.dtype)), shape, dtype, self.sizes)
+        return found
 
     @classmethod
     def load(cls, bundle: Bundle, options: SessionOptions | None = None) -> Self:
@@ -53,7 +73,8 @@ class BundleModel(ABC):
         options = options or SessionOptions()
         graphs = {role: bundle.graph(role, options) for role in bundle.manifest.graphs}
         with bundle.named():
-            model = cls(bundle.manifest, graphs)
+            tables = {name: bundle.table(name) for name in bundle.manifest.tables}
+            model = cls(bundle.manifest, graphs, tables)
         model._source = (bundle.path, options)
         log.info("loaded %s for %s on %s", bundle.path, model.VERB, ", ".join(model.providers))
         return model
@@ -81,6 +102,15 @@ class BundleModel(ABC):
     @abstractmethod
     def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
         """The whole run of the golden vectors (docs/bundle.md): what follows from its inputs and settings."""
+
+
+def _read_settings(
+    kinds: Sequence[type[Settings]], given: Mapping[str, Mapping[str, Any]]
+) -> dict[type[Settings], Settings]:
+    known = {kind.FEATURE: kind for kind in kinds}
+    if unknown := sorted(given.keys() - known.keys()):
+        raise BundleError(f"manifest, settings.{unknown[0]}: is unknown; expected {', '.join(known) or 'none'}")
+    return {kind: kind.read(given.get(name, {}), f"settings.{name}") for name, kind in known.items()}
 
 
 def _reload(kind: type[BundleModel], path: Path, options: SessionOptions) -> BundleModel:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from motet.arguments import warn
 from motet.bundle.fields import Fields
-from motet.bundle.graph import Floats, Graph
+from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
 from motet.decode.codes import Drawing, Source, Writer, draw_codes, drawn_actions, drawn_steps
 from motet.decode.memory import Memory
@@ -66,8 +66,8 @@ class CodesModel(GenerateModel):
 
     ROLES = ("encoder", "part", "decoder", "tokens", "memory", "step")
 
-    def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph]) -> None:
-        super().__init__(manifest, graphs)
+    def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:
+        super().__init__(manifest, graphs, tables)
         codec = Fields(manifest.config, "config").fields("codec")
         self.moves, self.sizes["T"] = codec.whole("moves", 1, 1 << 15), codec.whole("hop", 1, 100)
         ahead = codec.items("ahead")

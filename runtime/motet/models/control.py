@@ -37,8 +37,8 @@ class ControlModel(Controllable):
         next history), and for models with free hidden units also codes -> step.
     """
 
-    def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph]) -> None:
-        super().__init__(manifest, graphs)
+    def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:
+        super().__init__(manifest, graphs, tables)
         if manifest.control is None:
             raise BundleError("manifest, control: is missing")
         self.encoder, self.stepper = graphs["encoder"], graphs["step"]

@@ -64,8 +64,8 @@ class DescribeModel(LanguageModel):
 
     VERB = "describe"
 
-    def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph]) -> None:
-        super().__init__(manifest, graphs)
+    def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:
+        super().__init__(manifest, graphs, tables)
         context = {"context": "batch C"}
         self.bind("encoder", {"frames": "batch time D", "lengths": "*batch"}, context)
         self.bind("step", self.loop.inputs, self.loop.outputs)

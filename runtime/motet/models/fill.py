@@ -50,8 +50,8 @@ class FillModel(BundleModel):
     VERB = "fill"
     ROLES = ("filler",)
 
-    def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph]) -> None:
-        super().__init__(manifest, graphs)
+    def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:
+        super().__init__(manifest, graphs, tables)
         if self.contract.skeleton != HUMANOID:
             raise BundleError("manifest, motion.skeleton: a model that fills gaps needs motet's humanoid")
         self.sizes["E"] = CHANNELS

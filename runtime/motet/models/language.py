@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.arguments import warn
-from motet.bundle.graph import Floats, Graph
+from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
 from motet.decode.rollout import two_rows
 from motet.errors import BundleError, MotionError, TextError, TextWarning
@@ -28,8 +28,8 @@ BATCH = 32
 class LanguageModel(BundleModel):
     """A model between motion and language: a motion contract, a vocabulary, graphs, and a decoding loop."""
 
-    def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph]) -> None:
-        super().__init__(manifest, graphs)
+    def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:
+        super().__init__(manifest, graphs, tables)
         if manifest.text is None:
             raise BundleError("manifest, text: is missing")
         try:

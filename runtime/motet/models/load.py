@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Literal, TypeVar, cast, overload
 
 from motet.bundle.bundle import Bundle
-from motet.bundle.graph import Graph
+from motet.bundle.graph import Arrays, Graph
 from motet.bundle.manifest import Manifest
 from motet.bundle.session import SessionOptions
 from motet.errors import BundleError
@@ -74,9 +74,9 @@ def load_as(kind: Callable[..., Kind], name_or_path: str | Path, options: Sessio
     return cast(Kind, model)
 
 
-def build(manifest: Manifest, graphs: Mapping[str, Graph]) -> Model:
+def build(manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> Model:
     """The model of a manifest's verb over graphs of any kind; BundleError where they do not fit."""
-    return kind_of(manifest)(manifest, graphs)
+    return kind_of(manifest)(manifest, graphs, tables)
 
 
 def kind_of(manifest: Manifest) -> type[Model]:

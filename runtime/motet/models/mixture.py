@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from motet.bundle.graph import Floats, Graph
+from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
 from motet.decode.noise import Noise
 from motet.decode.sample import Sample
@@ -20,8 +20,8 @@ class MixtureModel(GenerateModel):
     number of frames and their settings by name, and give samples for each row, best first.
     """
 
-    def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph]) -> None:
-        super().__init__(manifest, graphs)
+    def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:
+        super().__init__(manifest, graphs, tables)
         self.sizes["F"] = self.sizes["D"] + 1  # with the active flag
         context = {"context": "batch C"}
         self.bind("encoder", {"words": "*batch words", "lengths": "*batch"}, context)

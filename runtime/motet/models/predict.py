@@ -45,8 +45,8 @@ class PredictModel(BundleModel):
 
     VERB = "predict"
 
-    def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph]) -> None:
-        super().__init__(manifest, graphs)
+    def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:
+        super().__init__(manifest, graphs, tables)
         self.horizon = int(self.defaults["horizon"])
         encoder, step = graphs["encoder"].spec, graphs["step"].spec
         self.bind("encoder", {"frames": "batch L D"}, {})

@@ -22,8 +22,8 @@ class SearchModel(LanguageModel):
     VERB = "search"
     ROLES = ("motion", "text")
 
-    def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph]) -> None:
-        super().__init__(manifest, graphs)
+    def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:
+        super().__init__(manifest, graphs, tables)
         vector = {"vector": "batch E"}
         self.bind("motion", {"frames": "batch time D", "lengths": "*batch"}, vector)
         self.bind("text", {"words": "*batch words", "lengths": "*batch"}, vector)

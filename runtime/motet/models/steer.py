@@ -35,8 +35,8 @@ class SteerModel(Controllable):
 
     ROLES = ("encoder", "rows", "step")
 
-    def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph]) -> None:
-        super().__init__(manifest, graphs)
+    def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:
+        super().__init__(manifest, graphs, tables)
         config = Fields(manifest.config, "config")
         self.gaits = config.texts("gaits")
         speeds = config.table("speeds", 5)

@@ -118,7 +118,7 @@ def _own_store(runs: Iterable[str], data: Path | None) -> Path | None:
 
 
 def _model(run: Run) -> Model:
-    return build(Manifest.from_json(run.manifest), run.torch_graphs())
+    return build(Manifest.from_json(run.manifest), run.torch_graphs(), run.tables())
 
 
 def _says(

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import torch
+from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from motet.bundle.graph import GraphSpec
@@ -34,6 +35,10 @@ class Net(nn.Module, ABC):
     @abstractmethod
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """For each role the module to export and the contract that its forward keeps."""
+
+    def tables(self) -> dict[str, NDArray[Any]]:
+        """The plain arrays that a bundle holds beside the graphs, by name."""
+        return {}
 
 
 class Part(nn.Module):

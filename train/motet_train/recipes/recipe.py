@@ -8,6 +8,7 @@ from typing import Any
 
 from motet.files import write_whole
 from motet.representation.contract import MotionContract
+from motet.settings import Settings
 from motet_train import distributed
 from motet_train.descent import Training
 from motet_train.manifest import About, refuse_other, surroundings
@@ -37,7 +38,8 @@ class Recipe:
     """What is trained, and how.
 
     verb, model, loop: as in the manifest. config: the model's sizes, a dataclass, of which ``derived`` are found in the
-    data. training: None where the config says it. visits: how the data is visited, a dataclass. defaults: the verb's.
+    data. training: None where the config says it. visits: how the data is visited, a dataclass. defaults: of the loop.
+    settings: of the features whose numbers are not their code's.
     """
 
     verb: str
@@ -48,6 +50,7 @@ class Recipe:
     training: Training | None = None
     visits: Any = None
     defaults: Mapping[str, Any] = field(default_factory=dict)
+    settings: tuple[Settings, ...] = ()
 
     def sized(self, **found: Any) -> Any:
         """The config with what was found in the data."""
@@ -96,6 +99,7 @@ class Job:
             "motion": contract.to_json(),
             **more,
             "defaults": dict(defaults),
+            "settings": {settings.FEATURE: asdict(settings) for settings in recipe.settings},
             "config": dict(config),
             "licence": {"weights": about.licence, "data": about.data_licence or data_licence},
             "training": {"command": about.command, "seed": about.seed, **trained, **(training or {})},

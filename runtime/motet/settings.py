@@ -1,0 +1,87 @@
+"""Settings: numbers that were tuned or may be chosen, each with a range and a unit.
+
+Those of a feature are a frozen dataclass, with defaults beside the code that uses them::
+
+    @dataclass(frozen=True)
+    class FootLockSettings(Settings):
+        FEATURE: ClassVar = "foot_lock"
+        reach: Annotated[float, Range(0, 1, "m")] = 0.2
+
+A bundle holds values of its own under ``settings.foot_lock`` of its manifest.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import MISSING, dataclass, fields
+from typing import Annotated, Any, ClassVar, NamedTuple, Self, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from motet.errors import BundleError, SettingError
+
+
+class Range(NamedTuple):
+    """The lowest and the highest value of a setting, and its unit where it has one."""
+
+    low: float
+    high: float
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Base of every feature's settings, whose fields are ``Annotated[float or int, Range(...)]``.
+
+    SettingError where a value is out of range, or not whole where its type is int.
+    """
+
+    FEATURE: ClassVar[str] = ""
+    RANGES: ClassVar[Mapping[str, tuple[bool, Range]]] = {}
+    """Of each setting by name: whether it is a whole number, and its range."""
+
+    def __init_subclass__(cls) -> None:
+        hints = {
+            name: hint for name, hint in get_type_hints(cls, None, None, True).items() if get_origin(hint) is Annotated
+        }
+        cls.RANGES = {name: (get_args(hint)[0] is int, get_args(hint)[1]) for name, hint in hints.items()}
+
+    def __post_init__(self) -> None:
+        for name in self.RANGES:
+            object.__setattr__(self, name, self.check(name, getattr(self, name)))
+
+    @classmethod
+    def read(cls, given: Mapping[str, Any], path: str) -> Self:
+        """The settings of a manifest's object at ``path``, and defaults for those that it does not name.
+
+        BundleError with the key of one that is unknown, missing, or out of range.
+        """
+        for name in given:
+            if name not in cls.RANGES:
+                raise BundleError(f"manifest, {path}.{name}: is unknown; expected one of {', '.join(cls.RANGES)}")
+        for field in fields(cls):
+            if field.default is MISSING and field.name not in given:
+                raise BundleError(f"manifest, {path}.{field.name}: is missing")
+        try:
+            return cls(**given)
+        except SettingError as error:
+            raise BundleError(f"manifest, {path}.{error}") from error
+
+    @classmethod
+    def check(cls, name: str, value: Any) -> float:
+        """The value of a setting as int or float; SettingError where it is unknown or out of range."""
+        if name not in cls.RANGES:
+            raise SettingError(f"there is no setting {name!r}, only {', '.join(cls.RANGES)}")
+        whole, (low, high, unit) = cls.RANGES[name]
+        number = value.item() if isinstance(value, np.generic) else value
+        if not is_number(number) or not low <= number <= high:
+            raise SettingError(f"{name} must be between {low:g} and {f'{high:g} {unit}'.strip()}, not {value}")
+        if whole and number != int(number):
+            raise SettingError(f"{name} must be a whole number, not {value}")
+        return int(number) if whole else float(number)
+
+
+def is_number(value: object) -> bool:
+    """Whether a value is a finite number, and not true or false."""
+    return (isinstance(value, int) and not isinstance(value, bool)) or (
+        isinstance(value, float) and math.isfinite(value)
+    )
