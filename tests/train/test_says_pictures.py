@@ -8,9 +8,8 @@ from motet.motion.humanoid.retarget import on_humanoid
 from motet.motion.motion import Motion
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.evaluate.figures import save
-from motet_train.evaluate.text_adherence.outside import OUTSIDE, said_to_be_outside
-from motet_train.evaluate.text_adherence.pictures import EVERY, says_drawings
-from motet_train.evaluate.text_adherence.prompts import prompts
+from motet_train.evaluate.text_adherence.prompts import outside, prompts
+from motet_train.evaluate.text_adherence.table import said_to_be_outside, says_drawings
 from motet_train.evaluate.text_adherence.track import track_of
 
 
@@ -33,7 +32,7 @@ def test_prompts_are_drawn_that_are_done_and_those_passed_over_are_counted(tmp_p
     done = [prompt.text for prompt in prompts() if prompt.passes(track_of(walks.walk))]
     assert titles[0] == walks.asked[0] == "a person walks straight forward"
     assert set(titles) <= set(done)
-    eights = [prompts()[start : start + EVERY] for start in range(0, len(prompts()), EVERY)]
+    eights = [prompts()[start : start + 8] for start in range(0, len(prompts()), 8)]
     assert titles == [
         next(p.text for p in part if p.text in done) for part in eights if set(done) & {p.text for p in part}
     ]
@@ -47,6 +46,6 @@ def test_prompts_are_drawn_that_are_done_and_those_passed_over_are_counted(tmp_p
 def test_what_no_recording_shows_is_said_to_be_outside() -> None:
     model = motet.load("generate")
     assert isinstance(model, CodesModel)
-    assert said_to_be_outside(model, OUTSIDE) >= 0.9
+    assert said_to_be_outside(model, outside()) >= 0.9
     assert said_to_be_outside(model, ["a person walks forward", "a man is running", "someone kicks"]) == 0
     assert said_to_be_outside(model, ["xyzzy", ""]) == 1

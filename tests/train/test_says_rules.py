@@ -13,8 +13,7 @@ from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.humanoid.retarget import to_humanoid
 from motet.motion.mirror import mirror
 from motet_train.data.errors import DataError
-from motet_train.evaluate.text_adherence.prompts import actions, prompts
-from motet_train.evaluate.text_adherence.rules import RULES, holds
+from motet_train.evaluate.text_adherence.prompts import RULES, actions, holds, prompts
 from motet_train.evaluate.text_adherence.track import RATE, Track, calm, longest, spells, swings, track_of
 
 WAVE = np.sin(2 * np.pi * times(2.0))

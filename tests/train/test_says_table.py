@@ -18,12 +18,11 @@ from motet_train.cli.evaluate_says import trained_on
 from motet_train.data.errors import DataError
 from motet_train.data.store import Entry, Store
 from motet_train.evaluate.text_adherence import table
-from motet_train.evaluate.text_adherence.lookup import LookUp
 from motet_train.evaluate.text_adherence.measures import depth, distance, jerk, poses, slide, spread
 from motet_train.evaluate.text_adherence.prompts import Prompt, prompts
 from motet_train.evaluate.text_adherence.table import says_table, says_text
 from motet_train.evaluate.text_adherence.track import RATE, Track
-from motet_train.evaluate.text_adherence.trials import Trial, of_store, read_trials
+from motet_train.evaluate.text_adherence.trials import LookUp, Trial, of_store, read_trials
 
 CMU = Path(__file__).parents[2] / "train/motet_train/data/cmu"
 STILL, LYING, LEFT, ZOMBIE = (

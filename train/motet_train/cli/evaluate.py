@@ -25,7 +25,7 @@ from motet.models.steer import SteerModel
 from motet_train.cli.evaluate_fill import fill_figures
 from motet_train.cli.evaluate_language import by_subject, language_reports
 from motet_train.cli.evaluate_predict import predict_reports
-from motet_train.cli.evaluate_says import Best, says_reports
+from motet_train.cli.evaluate_says import says_reports
 from motet_train.cli.evaluate_steer import as_steered, steer_reports
 from motet_train.cli.prepared import store_beside
 from motet_train.cli.train_options import unit_in
@@ -36,7 +36,7 @@ from motet_train.evaluate.language.report import GOALS as LANGUAGE_GOALS
 from motet_train.evaluate.language.search import GOALS as SEARCH_GOALS
 from motet_train.evaluate.steer.report import steer_text
 from motet_train.evaluate.tables import Report, json_ready, report_table
-from motet_train.evaluate.text_adherence.table import says_text
+from motet_train.evaluate.text_adherence.table import Best, says_drawings, says_text
 from motet_train.papers.tdbn.clips import Clips, read_clips
 from motet_train.papers.tdbn.experiments.report import GOALS, control_report, study_of
 from motet_train.recipes.recipe import SETTINGS
@@ -130,7 +130,6 @@ def _says(
         raise click.UsageError(f"--says asks generate models; {', '.join(others)} is none")
     if plots is not None:
         from motet_train.evaluate.figures import save
-        from motet_train.evaluate.text_adherence.pictures import says_drawings
 
         for name, model in found.items():
             save(says_drawings(Best(model)), plots if len(found) == 1 else plots / Path(name).name)

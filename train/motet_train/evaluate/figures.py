@@ -1,4 +1,4 @@
-"""Figures: axes, stick figures, files. They are drawn without pyplot and need no display."""
+"""The one writer of pictures: axes, stick figures, strips, files. They are drawn without pyplot and need no display."""
 
 import io
 from collections.abc import Callable, Mapping, Sequence
@@ -10,8 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
+from motet.draw.body import COLOURS
+from motet.draw.figure import figure_of
 from motet.errors import OutputError
 from motet.files import write_whole
+from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
 
@@ -73,3 +76,22 @@ def stick_figures(axes: Axes, points: Array, bones: Bones, colours: Sequence[Any
     axes.autoscale_view()
     axes.set_aspect("equal")
     axes.axis("off")
+
+
+def strips(motions: Sequence[Motion], titles: Sequence[str], title: str, count: int = 9) -> Figure:
+    """Motions that can be played, each as a strip of ``count`` stick figures under its title.
+
+    They stand at even times from left to right, seen from a little in front of the side they first turn to.
+    """
+    picture, rows = panels(len(motions), 1, (9, 2.0 * len(motions)), title)
+    for axes, motion, text in zip(rows, motions, titles, strict=True):
+        figure = figure_of(motion)
+        view = figure.heading + np.radians(60)
+        points = figure.points[np.linspace(0, len(figure.points) - 1, count).round().astype(int)]
+        across = (points - points[:, :1])[..., [0, 2]] @ [np.sin(view), np.cos(view)]
+        colours = [np.array(COLOURS[bone.side]) / 255 for bone in figure.bones]
+        bones = [(bone.start, bone.end) for bone in figure.bones]
+        stick_figures(axes, np.stack([across, points[..., 1]], axis=-1), bones, [colours] * count, width=1.2)
+        axes.set(xlim=(-SPACING, SPACING * count), ylim=(-0.05, 1.25))
+        axes.set_title(text, fontsize=8, loc="left")
+    return picture

@@ -1,11 +1,14 @@
-"""Reports, groups of figures with stable keys, as JSON and as text; and tables in general."""
+"""The one writer of figures: reports, groups of figures with stable keys, as JSON and as text; tables of cells."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from tqdm import tqdm
 
 Report = dict[str, dict[str, float]]
+"""Group -> key -> figure. A measure is a function of a model and data that gives one, or gives it part by part."""
 
 Goals = Mapping[str, tuple[float | None, float | None]]
 """Name of a figure, "GROUP.KEY" -> (least, most) that is to be reached."""
@@ -13,12 +16,23 @@ Goals = Mapping[str, tuple[float | None, float | None]]
 GAP = "   "
 
 
-def json_ready(report: Report) -> dict[str, dict[str, float | None]]:
-    """The report with numbers that JSON lacks as null, rounded to six digits."""
-    return {
-        name: {key: float(f"{value:.6g}") if np.isfinite(value) else None for key, value in figures.items()}
-        for name, figures in report.items()
-    }
+def gathered(parts: Iterable[Report], name: str) -> Report:
+    """The parts of a report in one, with a bar while they are measured."""
+    report: Report = {}
+    for part in tqdm(parts, desc=name, unit=" parts", disable=None, leave=False):
+        report |= part
+    return report
+
+
+def json_ready(figures: Any) -> Any:
+    """Figures, nested in any way, rounded to six digits; null for numbers that JSON lacks."""
+    if isinstance(figures, Mapping):
+        return {key: json_ready(value) for key, value in figures.items()}
+    if isinstance(figures, list | tuple):
+        return [json_ready(value) for value in figures]
+    if isinstance(figures, float):
+        return float(f"{figures:.6g}") if np.isfinite(figures) else None
+    return figures
 
 
 def aligned(rows: Sequence[Sequence[str]], left: Sequence[int] = (0,)) -> str:
@@ -42,14 +56,18 @@ def report_table(reports: Mapping[str, Report], goals: Goals, beside: Mapping[st
 
     beside: further columns, which need not reach goals.
     """
-    others = beside or {}
-    rows = [["", *short_names(list(reports)), *others, ""]]
-    for group, key in _names(reports):
-        name, values = f"{group}.{key}", [report.get(group, {}).get(key) for report in reports.values()]
-        cells = [*values, *(report.get(group, {}).get(key) for report in others.values())]
-        shown = ["" if value is None else f"{value:.4g}" for value in cells]
-        rows.append([name, *shown, _goal(goals, name, [value for value in values if value is not None])])
-    return aligned(rows, left=(0, len(reports) + len(others) + 1))
+    columns = [*reports.values(), *(beside or {}).values()]
+    groups: dict[str, dict[str, None]] = {}
+    for report in reports.values():
+        for group, figures in report.items():
+            groups.setdefault(group, {}).update(dict.fromkeys(figures))
+    rows = [["", *short_names(list(reports)), *(beside or {}), ""]]
+    for group, key in ((group, key) for group, keys in groups.items() for key in keys):
+        values = [report.get(group, {}).get(key) for report in columns]
+        shown = ["" if value is None else f"{value:.4g}" for value in values]
+        own = [value for value in values[: len(reports)] if value is not None]
+        rows.append([f"{group}.{key}", *shown, _goal(goals, f"{group}.{key}", own)])
+    return aligned(rows, left=(0, len(columns) + 1))
 
 
 def short_names(names: Sequence[str]) -> list[str]:
@@ -64,15 +82,7 @@ def reached(goals: Goals, name: str, value: float) -> bool:
     return (least is None or value >= least) and (most is None or value <= most)
 
 
-def _names(reports: Mapping[str, Report]) -> Iterator[tuple[str, str]]:
-    groups: dict[str, dict[str, None]] = {}
-    for report in reports.values():
-        for group, figures in report.items():
-            groups.setdefault(group, {}).update(dict.fromkeys(figures))
-    return ((group, key) for group, keys in groups.items() for key in keys)
-
-
-def _goal(goals: Goals, name: str, values: list[float]) -> str:
+def _goal(goals: Goals, name: str, values: Sequence[float]) -> str:
     if name not in goals:
         return ""
     least, most = goals[name]

@@ -6,18 +6,18 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 from sklearn.feature_extraction.text import TfidfVectorizer
+from sklearn.metrics import pairwise_distances_argmin
 
 from motet.motion.motion import Motion
 from motet_train.evaluate.language.bleu import References, bleu
 from motet_train.evaluate.language.looks import Looks
 from motet_train.evaluate.language.split_store import SplitStore
-from motet_train.evaluate.nearest import nearest
 
 
 def nearest_motions(corpus: SplitStore, motions: Sequence[Motion]) -> list[int]:
     """For each motion the training record that looks most like it."""
     train, looks = corpus.described(corpus.parts.train), Looks(corpus)
-    found, _ = nearest(looks.features(motions), looks.features(corpus.motions(train)))
+    found = pairwise_distances_argmin(looks.features(motions), looks.features(corpus.motions(train)))
     return [train[i] for i in found]
 
 

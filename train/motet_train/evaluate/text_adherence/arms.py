@@ -5,135 +5,123 @@ side: "left", "right", or "both", and where it says so "either".
 
 import numpy as np
 
-from motet.motion.humanoid.bones import HUMANOID, LEFT_RIGHT, sided
+from motet.motion.humanoid.bones import HUMANOID, LEFT_RIGHT
 from motet.motion.rotations import Array
-from motet_train.evaluate.text_adherence.track import RATE, Flags, Track, calm, longest, spells, swings
+from motet_train.evaluate.text_adherence.track import RATE, Flags, Track, calm, longest, pair, spells, swings
 
-ARM = float(sum(np.linalg.norm(HUMANOID.offsets[HUMANOID.index(f"left{part}")]) for part in ("LowerArm", "Hand")))
-"""Length of the humanoid's arm from shoulder to wrist, metres."""
+HANDS = pair("Hand")
 
 
 def raises(track: Track, side: str, above: float, seconds: float = 0.3) -> bool:
     """A hand is so many metres above the head's joint, about the mouth, for a while; "both": at the same time."""
-    up = [track.height(sided(one, "Hand")) - track.height("head") >= above for one in LEFT_RIGHT]
+    up = [hand - track.height("head") >= above for hand in track.heights("Hand")]
     return longest(_hands(up, side)) >= seconds
 
 
 def waves(track: Track, count: int) -> bool:
     """A raised hand, above its elbow and about shoulder height, goes from side to side so many times, by 10 cm."""
-
-    def found(one: str) -> bool:
-        hand = track.body(sided(one, "Hand"))
-        high = hand[:, 1] > np.maximum(track.height(sided(one, "LowerArm")), track.height(sided(one, "UpperArm")) - 0.1)
-        return any(swings(hand[start:stop, 0], 0.1) >= count for start, stop in spells(high))
-
-    return any(map(found, LEFT_RIGHT))
+    parts = zip(track.bodies("Hand"), track.heights("LowerArm"), track.heights("UpperArm"), strict=True)
+    return any(
+        swings(hand[start:stop, 0], 0.1) >= count
+        for hand, elbow, shoulder in parts
+        for start, stop in spells(hand[:, 1] > np.maximum(elbow, shoulder - 0.1))
+    )
 
 
 def punches(track: Track, side: str, speed: float = 2.5, count: int = 1) -> bool:
     """A hand shoots forward or up from the chest at a speed, m/s, so many times; "both": each does. Asked for one side,
     it is half as fast again as the other hand."""
-    thrust = {one: _thrust(track, one) for one in LEFT_RIGHT}
+    thrust = dict(zip(LEFT_RIGHT, (_thrust(track, name) for name in HANDS), strict=True))
     if side in LEFT_RIGHT:
-        other = next(one for one in LEFT_RIGHT if one != side)
-        if thrust[side].max() < 1.5 * thrust[other].max():
+        own = thrust.pop(side)
+        (other,) = thrust.values()
+        if own.max() < 1.5 * other.max():
             return False
-    return all(len(spells(thrust[one] >= speed)) >= count for one in LEFT_RIGHT if side in (one, "both"))
+        thrust = {side: own}
+    return all(len(spells(one >= speed)) >= count for one in thrust.values())
 
 
 def reaches_down(track: Track, most: float, side: str = "either") -> bool:
     """A hand comes as near to the ground as so many metres, for a moment."""
-    low = [track.height(sided(one, "Hand")) <= most for one in LEFT_RIGHT]
-    return longest(_hands(low, side)) >= 0.1
+    return longest(_hands([hand <= most for hand in track.heights("Hand")], side)) >= 0.1
 
 
 def wipes(track: Track, count: int) -> bool:
     """A hand, in front and above the chest for a third of the time, goes up and down or sideways so many times, by 20
     cm."""
 
-    def found(one: str) -> bool:
-        hand = track.body(sided(one, "Hand"))
+    def found(hand: Array) -> bool:
         there = (hand[:, 1] > track.height("upperChest")) & (hand[:, 2] > 0.2)
         moves = max(sum(swings(hand[a:b, i], 0.2) for a, b in spells(there)) for i in (0, 1))
         return bool(there.mean() >= 0.3) and moves >= count
 
-    return any(map(found, LEFT_RIGHT))
+    return any(map(found, track.bodies("Hand")))
 
 
 def to_mouth(track: Track) -> bool:
     """One hand is at the mouth for half a second, the other one lower than the chest."""
-    near = [np.linalg.norm(track.joint(sided(one, "Hand")) - track.joint("head"), axis=1) < 0.42 for one in LEFT_RIGHT]
-    low = [track.height(sided(one, "Hand")) < track.height("chest") + 0.05 for one in LEFT_RIGHT]
+    near = [np.linalg.norm(track.joint(name) - track.joint("head"), axis=1) < 0.42 for name in HANDS]
+    low = [hand < track.height("chest") + 0.05 for hand in track.heights("Hand")]
     return max(longest(near[0] & low[1]), longest(near[1] & low[0])) >= 0.5
 
 
 def on_guard(track: Track, share: float = 0.5) -> bool:
     """Both hands are in front of the chest, between its height and the mouth, for a share of the time."""
-    up = [_in_front(track, one) for one in LEFT_RIGHT]
+    low, high = track.height("chest") - 0.1, track.height("head") + 0.05
+    up = [(hand[:, 1] > low) & (hand[:, 1] < high) & (hand[:, 2] > 0.1) for hand in track.bodies("Hand")]
     return bool((up[0] & up[1]).mean() >= share)
 
 
 def hands_together(track: Track, most: float, share: float = 0.5) -> bool:
     """The hands are no farther than so many metres apart for a share of the time."""
-    return bool((between_hands(track) <= most).mean() >= share)
+    return bool((_between_hands(track) <= most).mean() >= share)
 
 
 def arms_out(track: Track) -> bool:
     """The arms are spread, the hands 90 cm apart or more, for a while."""
-    return longest(between_hands(track) >= 0.9) >= 0.3
+    return longest(_between_hands(track) >= 0.9) >= 0.3
 
 
 def arms_ahead(track: Track) -> bool:
     """Both arms are stretched out to the front at about shoulder height for half of the time."""
-    out = []
-    for one in LEFT_RIGHT:
-        hand, shoulder = track.body(sided(one, "Hand")), track.body(sided(one, "UpperArm"))
-        out.append((hand[:, 2] - shoulder[:, 2] > 0.6 * ARM) & (np.abs(hand[:, 1] - shoulder[:, 1]) < 0.3))
+    arm = sum(np.linalg.norm(HUMANOID.offsets[HUMANOID.index(name)]) for name in ("leftLowerArm", "leftHand"))
+    away = [hand - shoulder for hand, shoulder in zip(track.bodies("Hand"), track.bodies("UpperArm"), strict=True)]
+    out = [(one[:, 2] > 0.6 * arm) & (np.abs(one[:, 1]) < 0.3) for one in away]
     return bool((out[0] & out[1]).mean() >= 0.5)
 
 
 def swings_arms(track: Track, count: int, metres: float = 0.2) -> bool:
     """Both hands, relative to the hips, go to and fro by so many metres so many times, or both from side to side."""
-    hands = [track.body(sided(one, "Hand")) for one in LEFT_RIGHT]
+    hands = track.bodies("Hand")
     return any(min(swings(hand[:, axis], metres) for hand in hands) >= count for axis in (0, 1, 2))
 
 
 def hands_still(track: Track, most: float) -> bool:
     """The hands move relative to the hips by no more than so many m/s, on the whole: they do not swing."""
-    return all(track.motion_of(sided(one, "Hand")).mean() <= most for one in LEFT_RIGHT)
+    return all(track.motion_of(name).mean() <= most for name in HANDS)
 
 
 def hands_move(track: Track, least: float, most: float = np.inf) -> bool:
     """The mean speed of the hands relative to the chest is from least to most, m/s."""
-    speeds = [track.motion_of(sided(one, "Hand"), "upperChest").mean() for one in LEFT_RIGHT]
-    return least <= float(np.mean(speeds)) <= most
+    return bool(least <= np.mean([track.motion_of(name, "upperChest").mean() for name in HANDS]) <= most)
 
 
 def hands_fast(track: Track, least: float) -> bool:
     """A hand reaches a speed relative to the chest, m/s."""
-    speeds = [track.motion_of(sided(one, "Hand"), "upperChest").max() for one in LEFT_RIGHT]
-    return bool(max(speeds) >= least)
+    return bool(max(track.motion_of(name, "upperChest").max() for name in HANDS) >= least)
 
 
-def between_hands(track: Track) -> Array:
+def _between_hands(track: Track) -> Array:
     """The distance (T,) between the wrists, metres."""
-    found: Array = np.linalg.norm(track.joint("leftHand") - track.joint("rightHand"), axis=1)
+    left, right = map(track.joint, HANDS)
+    found: Array = np.linalg.norm(left - right, axis=1)
     return found
 
 
-def _thrust(track: Track, side: str) -> Array:
+def _thrust(track: Track, hand: str) -> Array:
     """How fast (T,) a hand goes forward and up relative to the chest, m/s; 0 where it comes back."""
-    away = track.body(sided(side, "Hand")) - track.body("chest")
-    speed = np.diff(away, axis=0) * RATE
-    out = np.sqrt(np.maximum(speed[:, 2], 0) ** 2 + np.maximum(speed[:, 1], 0) ** 2)
-    return np.concatenate([[0.0], calm(out, 0.1)])
-
-
-def _in_front(track: Track, side: str) -> Flags:
-    hand = track.body(sided(side, "Hand"))
-    low, high = track.height("chest") - 0.1, track.height("head") + 0.05
-    found: Flags = (hand[:, 1] > low) & (hand[:, 1] < high) & (hand[:, 2] > 0.1)
-    return found
+    speed = np.maximum(np.diff(track.body(hand) - track.body("chest"), axis=0) * RATE, 0)
+    return np.concatenate([[0.0], calm(np.hypot(speed[:, 2], speed[:, 1]), 0.1)])
 
 
 def _hands(flags: list[Flags], side: str) -> Flags:

@@ -2,51 +2,38 @@
 
 import numpy as np
 
-from motet.motion.humanoid.bones import HUMANOID, REST
-from motet.motion.rotations import Array
-from motet_train.evaluate.text_adherence.track import CALM, RATE, Track, calm, swings
-
-STANDING = float(REST[HUMANOID.index("hips"), 1])
-"""Height of the hips in metres where the humanoid stands."""
+from motet_train.evaluate.text_adherence.track import RATE, Track, calm, swings
 
 WAYS = {"forward": (0, 1), "backward": (0, -1), "left": (1, 1), "right": (1, -1)}
 """Way -> the column of the velocity, and its sign."""
 
-MOMENT = 0.4
-"""Seconds: the first or the last moments."""
-
-STRIDE = 0.2
-"""Metres that one foot is moved past the other in a stride."""
-
-TYPICAL = 75
-"""Per cent: the velocity of which a quarter of the frames has more, so that standing at the ends does not matter."""
-
 
 def goes(track: Track, way: str, least: float, most: float = np.inf, metres: float = 0.0) -> bool:
-    """Goes one way at a typical velocity from least to most, m/s, and comes so many metres that way in all."""
+    """Goes one way at a typical velocity from least to most, m/s, and comes so many metres that way in all.
+
+    A quarter of the frames has more than the typical velocity, so that standing at the ends does not matter.
+    """
     column, sign = WAYS[way]
     there = sign * track.velocity[:, column]
-    return bool(least <= np.percentile(there, TYPICAL) <= most and there.sum() / RATE >= metres)
+    return bool(least <= np.percentile(there, 75) <= most and there.sum() / RATE >= metres)
 
 
 def sidesteps(track: Track, side: str, metres: float) -> bool:
     """Comes so many metres to one side of where it faces, and not as far forward or back."""
     column, sign = WAYS[side]
-    forward, sideways = track.velocity.sum(axis=0) / RATE
-    return bool(sign * (forward, sideways)[column] >= max(metres, abs(forward)))
+    gone = track.velocity.sum(axis=0) / RATE
+    return bool(sign * gone[column] >= max(metres, abs(gone[0])))
 
 
 def travels(track: Track, metres: float) -> bool:
     """Ends so many metres or more away from where it started."""
-    path = track.joint("hips")[:, [0, 2]]
-    return bool(np.linalg.norm(path[-1] - path[0]) >= metres)
+    return bool(np.linalg.norm(track.path[-1] - track.path[0]) >= metres)
 
 
 def wanders(track: Track) -> bool:
     """Goes two metres over the ground or more, and ends less than half of its way from where it started."""
-    path = track.joint("hips")[:, [0, 2]]
     way = float(track.pace.sum() / RATE)
-    return way >= 2.0 and bool(np.linalg.norm(path[-1] - path[0]) < way / 2)
+    return way >= 2.0 and bool(np.linalg.norm(track.path[-1] - track.path[0]) < way / 2)
 
 
 def turns(track: Track, least: float, most: float = np.inf) -> bool:
@@ -56,7 +43,7 @@ def turns(track: Track, least: float, most: float = np.inf) -> bool:
 
 def turned_about(track: Track, least: float, most: float = np.inf) -> bool:
     """Turns by least to most degrees, no matter to which side: between the two headings that are farthest apart."""
-    return bool(least <= np.ptp(calm(track.facing, CALM)) <= most)
+    return bool(least <= np.ptp(calm(track.facing, 0.3)) <= most)
 
 
 def straight(track: Track, most: float = 30.0) -> bool:
@@ -81,13 +68,13 @@ def reaches(track: Track, least: float = 0.0, most: float = np.inf) -> bool:
 
 def stays(track: Track, most: float) -> bool:
     """Is never farther than so many metres from where it was at first."""
-    path = track.joint("hips")[:, [0, 2]]
-    return bool(np.linalg.norm(path - path[0], axis=1).max() <= most)
+    return bool(np.linalg.norm(track.path - track.path[0], axis=1).max() <= most)
 
 
 def strides(track: Track, least: int = 2, most: float = np.inf) -> bool:
-    """One foot is moved past the other from least to most times."""
-    return least <= swings(ahead(track), STRIDE) <= most
+    """One foot is moved past the other, by 20 cm, from least to most times."""
+    left, right = track.bodies("Foot")
+    return least <= swings(left[:, 2] - right[:, 2], 0.2) <= most
 
 
 def bobs(track: Track, metres: float) -> bool:
@@ -109,10 +96,6 @@ def hips(track: Track, least: float = -np.inf, most: float = np.inf) -> bool:
     return bool(least <= low and high <= most)
 
 
-def ahead(track: Track) -> Array:
-    """How far (T,) the left foot is in front of the right one, metres."""
-    return track.body("leftFoot")[:, 2] - track.body("rightFoot")[:, 2]
-
-
 def _moment(track: Track) -> int:
-    return min(round(MOMENT * RATE), len(track))
+    """Frames of the first or the last 0.4 s."""
+    return min(round(0.4 * RATE), len(track))

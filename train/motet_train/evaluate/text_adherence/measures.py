@@ -1,24 +1,18 @@
 """How good the motions of a prompt are, whatever they show: sliding feet, jerk, sinking in, variety, duration."""
 
 from collections.abc import Sequence
-from itertools import combinations
 
 import numpy as np
 
 from motet.motion.feet.contacts import ContactSettings, feet_of, ground_of, ground_speeds, standing
-from motet.motion.humanoid.bones import HUMANOID, LEFT_RIGHT, sided
+from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.rotations import Array
-from motet_train.evaluate.text_adherence.track import RATE, Track
-
-FEET = feet_of(HUMANOID)
+from motet_train.evaluate.text_adherence.track import RATE, Track, pair
 
 STANDS = ContactSettings(heights=(0.04, 0.04))
 """The ball of a foot that is no higher than 2 cm above where it is in standing is on the ground."""
 
-POSES = 32
-"""Poses, evenly spaced in time, by which two motions of any length are compared."""
-
-BALLS = [HUMANOID.index(sided(side, "Toes")) for side in LEFT_RIGHT]
+BALLS = [HUMANOID.index(name) for name in pair("Toes")]
 """The joints in the balls of the feet, which stay in place from the heel's landing to the toes' leaving."""
 
 
@@ -26,7 +20,7 @@ def slide(track: Track) -> float:
     """How fast feet on the ground slide, m/s: the mean speed over the ground of the balls of the feet from one frame to
     the next, in both of which they stand. NaN where none ever does."""
     balls = track.points[:, BALLS]
-    low = standing(balls[..., 1] - ground_of(track.points[:, FEET, 1]), None, STANDS)
+    low = standing(balls[..., 1] - ground_of(track.points[:, feet_of(HUMANOID), 1]), None, STANDS)
     stands = low[1:] & low[:-1]
     return float(ground_speeds(balls, RATE)[stands].mean()) if stands.any() else np.nan
 
@@ -42,22 +36,21 @@ def depth(track: Track) -> float:
     return float(np.maximum(-track.points[..., 1].min(axis=1), 0).mean())
 
 
+def poses(track: Track, count: int = 32) -> Array:
+    """Poses (count, J, 3), evenly spaced in time: what is in front, to the left and how high, each seen from the hips,
+    so that neither the place nor the heading nor how long it takes makes a difference."""
+    frames = np.round(np.linspace(0, len(track) - 1, count)).astype(int)
+    part = track.on_ground(track.points[frames])
+    return np.stack([part.body(name) for name in HUMANOID.names], axis=1)
+
+
 def distance(one: Array, other: Array) -> float:
     """The mean distance of joints, metres, between the :func:`poses` of two motions."""
     return float(np.linalg.norm(one - other, axis=-1).mean())
 
 
-def poses(track: Track) -> Array:
-    """Poses (POSES, J, 3), evenly spaced in time: what is in front, to the left and how high, each seen from the hips,
-    so that neither the place nor the heading nor how long it takes makes a difference."""
-    frames = np.round(np.linspace(0, len(track) - 1, POSES)).astype(int)
-    part = Track(track.points[frames])
-    part.__dict__["ground"] = track.ground
-    return np.stack([part.body(name) for name in HUMANOID.names], axis=1)
-
-
 def spread(tracks: Sequence[Track]) -> float:
     """The mean :func:`distance` between two of several motions; NaN for less than two."""
     seen = [poses(track) for track in tracks]
-    pairs = [distance(one, other) for one, other in combinations(seen, 2)]
+    pairs = [distance(one, other) for i, one in enumerate(seen) for other in seen[:i]]
     return float(np.mean(pairs)) if pairs else np.nan

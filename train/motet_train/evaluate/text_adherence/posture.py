@@ -4,35 +4,31 @@ import numpy as np
 
 from motet.motion.humanoid.bones import LEFT_RIGHT, sided
 from motet.motion.rotations import Array
-from motet_train.evaluate.text_adherence.legs import knee
-from motet_train.evaluate.text_adherence.track import RATE, Flags, Track, calm, longest, spells, swings
+from motet_train.evaluate.text_adherence.track import RATE, Flags, Track, calm, longest, pair, spells, swings
 
 WHEN = {"any": (0.0, 1.0), "start": (0.0, 0.2), "end": (0.8, 1.0)}
 """When something is to be -> the part of the motion, shares of its time."""
-
-WHILE = 0.2
-"""Seconds that it is to be so."""
 
 
 def lies(track: Track, when: str) -> bool:
     """Head and hips are near the ground for a while."""
     part = track.part(*WHEN[when])
-    return longest((part.height("hips") < 0.42) & (part.height("head") < 0.55)) >= min(WHILE, part.seconds)
+    return _for_a_while(part, (part.height("hips") < 0.42) & (part.height("head") < 0.55))
 
 
 def crouches(track: Track, when: str = "any", hips: float = 0.65) -> bool:
     """The hips are lower than so many metres on bent knees for a while, the head over them."""
     part = track.part(*WHEN[when])
-    bent = np.minimum(knee(part, "left"), knee(part, "right")) < 110
+    knees = [part.angle(*(sided(side, joint) for joint in ("UpperLeg", "LowerLeg", "Foot"))) for side in LEFT_RIGHT]
     low = (part.height("hips") < hips) & (part.height("head") > part.height("hips") + 0.25)
-    return longest(low & bent) >= min(WHILE, part.seconds)
+    return _for_a_while(part, low & (np.minimum(*knees) < 110))
 
 
 def upright(track: Track, when: str = "any") -> bool:
     """Stands or goes upright for a while: the hips high, the head well above them."""
     part = track.part(*WHEN[when])
-    tall = (part.height("hips") > 0.8) & (part.height("head") > part.height("hips") + 0.4)
-    return longest(tall) >= min(WHILE, part.seconds)
+    hips = part.height("hips")
+    return _for_a_while(part, (hips > 0.8) & (part.height("head") > hips + 0.4))
 
 
 def prone(track: Track, share: float) -> bool:
@@ -49,18 +45,23 @@ def comes_up(track: Track, metres: float) -> bool:
 
 
 def sits(track: Track) -> bool:
-    """Sits on a seat for a second, at rest: the thighs about level, the hips behind a foot."""
-    return longest(seated(track) & (track.pace < 0.3)) >= 1.0
+    """Sits on a seat for a second, at rest: the thighs within 50 degrees of level, the hips behind a foot."""
+    there: Flags = (track.height("hips") > 0.45) & (track.pace < 0.3)
+    ahead = np.full(len(track), -np.inf)
+    for hip, knee, foot in zip(*(track.bodies(part) for part in ("UpperLeg", "LowerLeg", "Foot")), strict=True):
+        there &= np.abs(hip[:, 1] - knee[:, 1]) < np.sin(np.radians(50)) * 0.42
+        ahead = np.maximum(ahead, foot[:, 2] - hip[:, 2])
+    return longest(there & (ahead > 0.2)) >= 1.0
 
 
 def bends(track: Track, degrees: float, seconds: float) -> bool:
     """The trunk leans by so many degrees for so long."""
-    return longest(tilt(track) >= degrees) >= seconds
+    return longest(_tilt(track) >= degrees) >= seconds
 
 
 def bows(track: Track) -> bool:
     """Standing on straight legs, the trunk leans by 25 degrees or more, once, and comes up again."""
-    lean = calm(tilt(track), 0.2)
+    lean = calm(_tilt(track), 0.2)
     there = lean >= 25
     stands = bool(track.pace[there].max(initial=0.0) < 0.6) and track.height("hips")[there].min(initial=1.0) > 0.8
     return stands and len(spells(there)) == 1 and bool(max(lean[0], lean[-1]) < 12)
@@ -68,8 +69,8 @@ def bows(track: Track) -> bool:
 
 def upside_down(track: Track) -> bool:
     """The hips are above the head, and a foot above the hips."""
-    feet = np.maximum(track.height("leftFoot"), track.height("rightFoot"))
-    return longest((track.height("hips") > track.height("head")) & (feet > track.height("hips"))) > 0.05
+    hips = track.height("hips")
+    return longest((hips > track.height("head")) & (np.maximum(*track.heights("Foot")) > hips)) > 0.05
 
 
 def rolls(track: Track) -> bool:
@@ -93,13 +94,15 @@ def still(track: Track) -> bool:
 
 def sways(track: Track, count: int, metres: float = 0.1) -> bool:
     """The trunk goes from side to side above the feet so many times, by so many metres."""
-    feet = (track.body("leftFoot")[:, 0] + track.body("rightFoot")[:, 0]) / 2
+    feet = np.mean(track.bodies("Foot"), axis=0)[:, 0]
     return swings(calm(track.body("upperChest")[:, 0] - feet, 0.2), metres) >= count
 
 
 def twists(track: Track, count: int, degrees: float = 40.0) -> bool:
-    """The shoulders turn against the hips, to and fro by so many degrees, so many times."""
-    return swings(twist(track), degrees) >= count
+    """The shoulders turn against the hips about y, to and fro by so many degrees, so many times."""
+    across = [np.subtract(*map(track.joint, pair(part))) for part in ("UpperLeg", "UpperArm")]
+    hips, shoulders = (np.arctan2(-one[:, 2], one[:, 0]) for one in across)
+    return swings(np.degrees(np.unwrap(shoulders - hips)), degrees) >= count
 
 
 def climbs(track: Track, metres: float) -> bool:
@@ -109,7 +112,7 @@ def climbs(track: Track, metres: float) -> bool:
 
 def feet_stay(track: Track, most: float = 0.15) -> bool:
     """Each foot stays within so many metres of its typical place on the ground."""
-    feet = [track.joint(sided(side, "Foot"))[:, [0, 2]] for side in LEFT_RIGHT]
+    feet = [track.joint(name)[:, [0, 2]] for name in pair("Foot")]
     return all(np.percentile(np.linalg.norm(foot - np.median(foot, axis=0), axis=1), 95) <= most for foot in feet)
 
 
@@ -118,29 +121,13 @@ def lasts(track: Track, seconds: float) -> bool:
     return track.seconds >= seconds
 
 
-def tilt(track: Track) -> Array:
+def _for_a_while(part: Track, flags: Flags) -> bool:
+    """For 0.2 s, or as long as the part is."""
+    return longest(flags) >= min(0.2, part.seconds)
+
+
+def _tilt(track: Track) -> Array:
     """The angle (T,) between trunk and vertical, degrees."""
     trunk = track.joint("neck") - track.joint("hips")
     found: Array = np.degrees(np.arccos(np.clip(trunk[:, 1] / np.maximum(np.linalg.norm(trunk, axis=1), 1e-9), -1, 1)))
     return found
-
-
-def twist(track: Track) -> Array:
-    """The angle (T,) about y from hips to shoulders, degrees."""
-    angles = []
-    for part in ("UpperLeg", "UpperArm"):
-        across = track.joint(sided("left", part)) - track.joint(sided("right", part))
-        angles.append(np.arctan2(-across[:, 2], across[:, 0]))
-    found: Array = np.degrees(np.unwrap(angles[1] - angles[0]))
-    return found
-
-
-def seated(track: Track) -> Flags:
-    """Frames (T,) in which both thighs are within 50 degrees of level, the hips over a seat and behind a foot."""
-    flags: Flags = track.height("hips") > 0.45
-    ahead = np.full(len(track), -np.inf)
-    for side in LEFT_RIGHT:
-        hip, bent, foot = (track.body(sided(side, part)) for part in ("UpperLeg", "LowerLeg", "Foot"))
-        flags &= np.abs(hip[:, 1] - bent[:, 1]) < np.sin(np.radians(50)) * 0.42
-        ahead = np.maximum(ahead, foot[:, 2] - hip[:, 2])
-    return flags & (ahead > 0.2)

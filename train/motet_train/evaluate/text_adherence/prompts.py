@@ -1,22 +1,37 @@
-"""The table of prompts: what is asked, what counts as done, and which recorded trials show it."""
+"""The table of prompts: what is asked, the rules that count as done, and which recorded trials show it."""
 
+import inspect
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import cache
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
-from motet_train.evaluate.text_adherence.rules import Condition, holds
+from motet_train.evaluate.text_adherence import arms, going, legs, posture
 from motet_train.evaluate.text_adherence.track import Track
 
 HERE = Path(__file__).parent
-PROMPTS_FILE, TRIALS_FILE = HERE / "prompts.toml", HERE / "trials.tsv"
+
+RULES: Mapping[str, Callable[..., bool]] = MappingProxyType(
+    {
+        name: found
+        for module in (going, legs, arms, posture)
+        for name, found in inspect.getmembers(module, inspect.isfunction)
+        if found.__module__ == module.__name__ and not name.startswith("_")
+    }
+)
+"""Name -> rule: a track, and parameters by name, to whether it is so."""
+
+SHORTEST = 0.3
+"""Seconds: a motion that is shorter does nothing that a sentence could say."""
 
 
 @dataclass(frozen=True)
 class Prompt:
-    """One prompt. group: "locomotion" or "rest". rules: what must be so.
+    """One prompt. group: "locomotion" or "rest". rules: what must be so, the name of a rule, "is", and its parameters.
 
     shown: patterns of the actions whose trials show it. aside: of those that may show it, counted neither way.
     walk: whether it asks for a walk forward, of which sliding feet are measured.
@@ -24,10 +39,10 @@ class Prompt:
 
     text: str
     group: str
-    rules: tuple[Condition, ...]
-    shown: tuple[str, ...]
-    aside: tuple[str, ...]
-    walk: bool
+    rules: Sequence[Mapping[str, Any]]
+    shown: Sequence[str]
+    aside: Sequence[str]
+    walk: bool = False
 
     @property
     def turns(self) -> bool:
@@ -45,29 +60,35 @@ class Prompt:
         return None if _matches(action, self.aside) else False
 
 
+def holds(track: Track, rules: Sequence[Mapping[str, Any]]) -> bool:
+    """Whether all of some rules are so."""
+    given = ({key: value for key, value in rule.items() if key != "is"} for rule in rules)
+    found = (RULES[rule["is"]](track, **more) for rule, more in zip(rules, given, strict=True))
+    return track.seconds >= SHORTEST and all(found)
+
+
+@cache
+def _table() -> Mapping[str, Any]:
+    return tomllib.loads((HERE / "prompts.toml").read_text(encoding="utf-8"))
+
+
 @cache
 def prompts() -> tuple[Prompt, ...]:
     """All prompts, in the order of the file."""
-    rows = tomllib.loads(PROMPTS_FILE.read_text(encoding="utf-8"))["prompt"]
-    return tuple(
-        Prompt(
-            text=row["text"],
-            group=row["group"],
-            rules=tuple(row["rules"]),
-            shown=tuple(row["shown"]),
-            aside=tuple(row["aside"]),
-            walk=row.get("walk", False),
-        )
-        for row in rows
-    )
+    return tuple(Prompt(**row) for row in _table()["prompt"])
+
+
+def outside() -> tuple[str, ...]:
+    """Everyday sentences about what none of the recorded trials shows."""
+    return tuple(_table()["outside"])
 
 
 @cache
 def actions() -> Mapping[str, str]:
     """The name of each recorded trial -> its action."""
-    lines = TRIALS_FILE.read_text(encoding="utf-8").splitlines()[1:]
+    lines = (HERE / "trials.tsv").read_text(encoding="utf-8").splitlines()[1:]
     return {trial: action for action, trials in (line.split("\t") for line in lines) for trial in trials.split()}
 
 
-def _matches(action: str, patterns: tuple[str, ...]) -> bool:
+def _matches(action: str, patterns: Sequence[str]) -> bool:
     return any(fnmatchcase(action, pattern) for pattern in patterns)

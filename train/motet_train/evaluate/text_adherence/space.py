@@ -5,9 +5,9 @@ section 5), with the space of a model of :class:`SearchModel` in the place of th
 """
 
 from collections.abc import Mapping, Sequence
-from math import comb
 
 import numpy as np
+from scipy.stats import hypergeom
 
 from motet.bundle.graph import Floats
 from motet.models.index import direction
@@ -16,8 +16,7 @@ from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet_train.evaluate.language.split_store import unknown_words_allowed
 from motet_train.evaluate.tables import Report
-from motet_train.evaluate.text_adherence.prompts import Prompt, actions
-from motet_train.evaluate.text_adherence.rules import SHORTEST
+from motet_train.evaluate.text_adherence.prompts import SHORTEST, Prompt, actions
 from motet_train.evaluate.text_adherence.trials import Trial
 
 CHOICES = 32
@@ -46,7 +45,7 @@ def space_report(
     with unknown_words_allowed():
         texts = model.embed_text([prompt.text for prompt in asked])
     seen = embedded(model, [trial.motion for trial in trials])
-    shown = {prompt.text: [i for i, t in enumerate(trials) if t.action and prompt.shows(t.action)] for prompt in asked}
+    shown = {prompt.text: [i for i, trial in enumerate(trials) if trial.shows(prompt)] for prompt in asked}
     shown = {text: rows for text, rows in shown.items() if rows}
     real = {"_real": {text: seen[rows] for text, rows in shown.items()}} if shown else {}
     report = {f"r_precision{kind}": _precisions(found, asked, texts) for kind, found in (*made.items(), *real.items())}
@@ -89,15 +88,11 @@ def r_precision(own: Array, others: Array) -> dict[str, float]:
     rivals all are drawn; NaN with none. Motions without a vector (NaN) find nothing, nor do no motions.
     """
     count = others.shape[1]
-    drawn = min(CHOICES - 1, count)
-    if not drawn:
+    if not count:
         return {str(top): np.nan for top in TOPS}
-    nearer = [int(row) for row in (~(own[:, None] > others)).sum(axis=1)]
-
-    def share(b: int, top: int) -> float:
-        return sum(comb(b, i) * comb(count - b, drawn - i) for i in range(min(top, drawn + 1))) / comb(count, drawn)
-
-    return {str(top): sum(share(b, top) for b in nearer) / max(1, len(nearer)) for top in TOPS}
+    nearer = (~(own[:, None] > others)).sum(axis=1)
+    drawn = hypergeom(count, nearer, min(CHOICES - 1, count))
+    return {str(top): float(drawn.cdf(top - 1).mean()) if len(nearer) else 0.0 for top in TOPS}
 
 
 def frechet(one: Floats, other: Floats) -> float:

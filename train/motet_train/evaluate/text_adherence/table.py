@@ -1,25 +1,28 @@
 """Does what it says: every prompt asked with several seeds, beside recorded trials and the look-up."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from matplotlib.figure import Figure
+from tqdm import tqdm
 
 from motet.bundle.graph import Floats
 from motet.errors import TextError
+from motet.models.codes import CodesModel
+from motet.models.generate import GenerateModel
 from motet.models.search import SearchModel
 from motet.motion.motion import Motion
 from motet_train.data.errors import DataError
+from motet_train.evaluate.figures import Drawings, strips
 from motet_train.evaluate.language.split_store import unknown_words_allowed
 from motet_train.evaluate.tables import Goals, Report, aligned, report_table, short_names
-from motet_train.evaluate.text_adherence.lookup import LookUp
 from motet_train.evaluate.text_adherence.measures import depth, jerk, slide, spread
 from motet_train.evaluate.text_adherence.prompts import Prompt, prompts
 from motet_train.evaluate.text_adherence.space import embedded, space_report
 from motet_train.evaluate.text_adherence.track import Track, track_of
-from motet_train.evaluate.text_adherence.trials import Trial
-
-SEEDS = 10
+from motet_train.evaluate.text_adherence.trials import LookUp, Trial
 
 LEFT_90, RIGHT_90 = (f"a person walks forward and turns {side} 90 degrees" for side in ("left", "right"))
 
@@ -35,18 +38,23 @@ GOALS: Goals = {
 }
 """Figure -> (least, most) that the models that come with motet are to reach."""
 
-TAKES = 10
-"""Trials of one action that are compared with each other at most."""
-
-Told = Callable[[str], object]
-"""What is told each prompt before it is asked."""
-
 
 class Generator(Protocol):
     """Whatever makes motions of a human figure from a sentence and a seed; TextError for one that it cannot take."""
 
     def generate(self, text: str, seed: int) -> Motion:
         """The motion."""
+
+
+@dataclass(frozen=True)
+class Best:
+    """A model as users get it: the first of its motions, with its default settings."""
+
+    model: GenerateModel
+
+    def generate(self, text: str, seed: int) -> Motion:
+        """The motion at 30 frames a second, its feet planted."""
+        return self.model.generate(text, seed=seed)[0].motion
 
 
 Figures = dict[str, float]
@@ -56,8 +64,7 @@ def says_table(
     generator: Generator,
     trials: Sequence[Trial] = (),
     training: Iterable[str] | None = None,
-    seeds: int = SEEDS,
-    progress: Told = lambda text: None,
+    seeds: int = 10,
     search: SearchModel | None = None,
 ) -> Report:
     """The shares of motions that do what prompts say, by prompt and as means over groups of prompts, and how good the
@@ -68,27 +75,28 @@ def says_table(
         all). "known" is the mean over the prompts whose action a training trial shows.
     search: a model in whose space motions and prompts are compared (:func:`space_report`); without one they are not.
     """
-    lookup, names = _floor(trials, training)
-    floor: dict[str, tuple[Generator, int]] = {} if lookup is None else {"_lookup": (lookup, 1)}
-    sources = {"": (generator, seeds)} | floor
-    rows: dict[str, dict[str, Figures]] = {"": {}, "_lookup": {}, "_real": {}}
+    own = [trial for trial in trials if training is None or trial.name in set(training)]
+    if trials and not own:
+        raise DataError("none of the trials is one of the training motions to be looked up")
+    sources: dict[str, tuple[Generator, int]] = {"": (generator, seeds)}
+    sources |= {"_lookup": (LookUp(own), 1)} if own else {}
+    rows: dict[str, dict[str, Figures]] = {kind: {} for kind in (*sources, *(["_real"] if own else []))}
     others: Figures = {}
     seen: dict[str, dict[str, Floats]] = {kind: {} for kind in sources}
-    for prompt in prompts():
-        progress(prompt.text)
+    for prompt in tqdm(prompts(), unit=" prompts", disable=None, leave=False):
         for kind, (source, count) in sources.items():
             motions = asked(source, prompt, count)
             rows[kind][prompt.text] = figures(prompt, [track_of(motion) for motion in motions])
             if search is not None:
                 seen[kind][prompt.text] = embedded(search, motions)
-        if lookup is not None:
+        if own:
             rows["_real"][prompt.text] = real(prompt, trials)
-            others[prompt.text] = _share(prompt, [trial.track for trial in trials if _shows(prompt, trial) is False])
-    known = {prompt.text for prompt in prompts() if any(t.name in names and _shows(prompt, t) for t in trials)}
+            others[prompt.text] = _share(prompt, [trial.track for trial in trials if trial.shows(prompt) is False])
+    known = [prompt.text for prompt in prompts() if any(trial.shows(prompt) for trial in own)]
     report: Report = {}
     for kind, found in rows.items():
-        report |= _groups(kind, found, known) if found else {}
-    if others:
+        report |= _groups(kind, found, known)
+    if own:
         report["prompt_others"] = others
         report["quality"] |= _ratios(rows[""], rows["_real"])
     return report if search is None else report | space_report(search, prompts(), seen, trials)
@@ -117,24 +125,33 @@ def figures(prompt: Prompt, tracks: Sequence[Track]) -> Figures:
 
 
 def real(prompt: Prompt, trials: Sequence[Trial]) -> Figures:
-    """The same of the trials that show what is asked; the spread is that between takes of the same action."""
-    shown = [trial for trial in trials if _shows(prompt, trial)]
+    """The same of the trials that show what is asked; the spread is that between takes of the same action, of which ten
+    are compared at most."""
+    shown = [trial for trial in trials if trial.shows(prompt)]
     found = figures(prompt, [trial.track for trial in shown])
-    takes: dict[str | None, list[Track]] = {}
-    for trial in shown:
-        takes.setdefault(trial.action, []).append(trial.track)
-    return found | {
-        "share": found["share"] if shown else np.nan,
-        "spread": _mean([spread(tracks[:: -(-len(tracks) // TAKES)]) for tracks in takes.values()]),
-    }
+    actions = dict.fromkeys(trial.action for trial in shown)
+    takes = [[trial.track for trial in shown if trial.action == one] for one in actions]
+    apart = _mean([spread(tracks[:: -(-len(tracks) // 10)]) for tracks in takes])
+    return found | {"share": found["share"] if shown else np.nan, "spread": apart}
+
+
+def said_to_be_outside(model: CodesModel, sentences: Sequence[str]) -> float:
+    """The share of sentences that are refused, or said to be outside of what a model knows."""
+
+    def outside(sentence: str) -> bool:
+        try:
+            return not model.understood(sentence).confident
+        except TextError:
+            return True
+
+    with unknown_words_allowed():
+        return sum(map(outside, sentences)) / len(sentences)
 
 
 def says_text(reports: Mapping[str, Report]) -> str:
     """The shares of each prompt in per cent, of every generator and beside them those of the look-up, of real trials
     and of trials of other actions; then all other figures with the goals."""
-    columns = {
-        name: report["prompt"] for name, report in zip(short_names(list(reports)), reports.values(), strict=True)
-    }
+    columns = dict(zip(short_names(list(reports)), (report["prompt"] for report in reports.values()), strict=True))
     first = next(iter(reports.values()))
     columns |= {key: first[f"prompt_{key}"] for key in ("lookup", "real", "others") if f"prompt_{key}" in first}
     rows = [["%", *columns]]
@@ -148,27 +165,34 @@ def says_text(reports: Mapping[str, Report]) -> str:
     return f"{aligned(rows)}\n\n{report_table(rest, GOALS)}"
 
 
-def _floor(trials: Sequence[Trial], training: Iterable[str] | None) -> tuple[LookUp | None, set[str]]:
-    if not trials:
-        return None, set()
-    names = {trial.name for trial in trials} if training is None else set(training)
-    part = [trial for trial in trials if trial.name in names]
-    if not part:
-        raise DataError("none of the trials is one of the training motions to be looked up")
-    return LookUp(part), names
+def says_drawings(generator: Generator, every: int = 8) -> Drawings:
+    """Every eighth prompt with a motion of seed 0 that does what it says, else the next that is done before the eighth
+    after it; how many were passed over so is said above them."""
+
+    def draw() -> Figure:
+        shown, failed = dict[str, Motion](), 0
+        for start in range(0, len(prompts()), every):
+            for prompt in prompts()[start : start + every]:
+                motion = generator.generate(prompt.text, 0)
+                if prompt.passes(track_of(motion)):
+                    shown[prompt.text] = motion
+                    break
+                failed += 1
+        title = f"every eighth prompt; {failed} whose motions did not do what they say are passed over for the next"
+        return strips(list(shown.values()), list(shown), title)
+
+    return {"says": draw}
 
 
-def _groups(kind: str, found: Mapping[str, Figures], known: set[str]) -> Report:
+def _groups(kind: str, found: Mapping[str, Figures], known: list[str]) -> Report:
     """The means over groups of prompts, the figures of each, and the quality of all."""
     shares = {text: row["share"] for text, row in found.items()}
-    groups = {"all": list(prompts())}
-    for name in ("locomotion", "rest"):
-        groups[name] = [prompt for prompt in prompts() if prompt.group == name]
-    if known:
-        groups["known"] = [prompt for prompt in prompts() if prompt.text in known]
+    groups = {"all": [prompt.text for prompt in prompts()]}
+    groups |= {name: [p.text for p in prompts() if p.group == name] for name in ("locomotion", "rest")}
+    groups |= {"known": known} if known else {}
     keys = ("slide", "jerk", "depth", "spread", "seconds")
     return {
-        f"says{kind}": {name: _mean([shares[prompt.text] for prompt in group]) for name, group in groups.items()},
+        f"says{kind}": {name: _mean([shares[text] for text in texts]) for name, texts in groups.items()},
         f"quality{kind}": {key: _mean([row[key] for row in found.values()]) for key in keys},
         f"turn{kind}": {prompt.text: found[prompt.text]["turn"] for prompt in prompts() if prompt.turns},
         f"prompt{kind}": shares,
@@ -187,11 +211,6 @@ def _ratios(found: Mapping[str, Figures], recorded: Mapping[str, Figures]) -> Fi
 
 def _share(prompt: Prompt, tracks: Sequence[Track]) -> float:
     return _mean([float(prompt.passes(track)) for track in tracks])
-
-
-def _shows(prompt: Prompt, trial: Trial) -> bool | None:
-    """As :meth:`Prompt.shows`; None for a trial of which nothing is known."""
-    return None if trial.action is None else prompt.shows(trial.action)
 
 
 def _mean(values: Sequence[float]) -> float:

@@ -5,6 +5,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import find_objects, label, uniform_filter1d
 
 from motet.motion.humanoid.bones import HUMANOID, LEFT_RIGHT, sided
 from motet.motion.humanoid.retarget import on_humanoid
@@ -20,14 +21,11 @@ Flags = NDArray[np.bool_]
 RATE = 30.0
 """Frames per second at which rules look at a motion, whatever its own rate is."""
 
-GROUND = 5
-"""Per cent of the frames whose lowest joint is under what counts as the ground: one bad frame does not matter."""
 
-CALM = 0.3
-"""Seconds over which velocities are averaged: the sway within a step falls away."""
-
-ENDS = 0.3
-"""Seconds at the start and at the end over which the heading is averaged."""
+def pair(part: str) -> tuple[str, str]:
+    """The names of the left and the right joint of a part."""
+    left, right = (sided(side, part) for side in LEFT_RIGHT)
+    return left, right
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +50,11 @@ class Track:
     def part(self, start: float, stop: float) -> "Track":
         """The part between two times, each a share of the whole; one frame at least. The ground stays the same."""
         first = min(int(start * len(self)), len(self) - 1)
-        found = replace(self, points=self.points[first : max(first + 1, round(stop * len(self)))])
+        return self.on_ground(self.points[first : max(first + 1, round(stop * len(self)))])
+
+    def on_ground(self, points: Array) -> "Track":
+        """Some frames (T', J, 3) of the same track, above the same ground."""
+        found = replace(self, points=points)
         found.__dict__["ground"] = self.ground
         return found
 
@@ -63,45 +65,57 @@ class Track:
 
     @cached_property
     def ground(self) -> float:
-        """The height of the ground."""
-        return float(np.percentile(self.points[..., 1].min(axis=1), GROUND))
+        """The height under which the lowest joint is in one frame of twenty: single bad frames do not matter."""
+        return float(np.percentile(self.points[..., 1].min(axis=1), 5))
 
     def height(self, name: str) -> Array:
         """Height (T,) of a joint above the ground."""
         return self.joint(name)[:, 1] - self.ground
 
+    def heights(self, part: str) -> tuple[Array, Array]:
+        """Heights (T,) of the left and the right joint of a part above the ground."""
+        left, right = pair(part)
+        return self.height(left), self.height(right)
+
     @cached_property
     def soles(self) -> Array:
         """Height (T, 2) of the lowest joint of the left and of the right foot above the ground."""
-        parts = ("Foot", "Toes", "Toes_end")
-        found = [np.min([self.height(sided(side, part)) for part in parts], axis=0) for side in LEFT_RIGHT]
-        return np.stack(found, axis=1)
+        found: Array = np.min([self.heights(part) for part in ("Foot", "Toes", "Toes_end")], axis=0).T
+        return found
+
+    @cached_property
+    def path(self) -> Array:
+        """Where the hips are over the ground (T, 2)."""
+        return self.joint("hips")[:, [0, 2]]
 
     @cached_property
     def facing(self) -> Array:
         """The angle (T,) about y that hips and shoulders face, in degrees, unwrapped; 0 is along z, 90 along x."""
-        pairs = [(sided("left", part), sided("right", part)) for part in ("UpperLeg", "UpperArm")]
-        across = np.sum([_unit((self.joint(left) - self.joint(right))[:, [0, 2]]) for left, right in pairs], axis=0)
+        pairs = [[self.joint(name) for name in pair(part)] for part in ("UpperLeg", "UpperArm")]
+        across = np.sum([_unit((left - right)[:, [0, 2]]) for left, right in pairs], axis=0)
         found: Array = np.degrees(np.unwrap(np.arctan2(-across[:, 1], across[:, 0])))
         return found
 
     @property
     def turn(self) -> float:
-        """Degrees that the figure turns to the left from start to end, negative to the right, more than a whole turn
-        where it goes on."""
-        count = max(1, min(round(ENDS * RATE), len(self) // 2))
+        """Degrees that the figure turns to the left, negative to the right, from its first to its last 0.3 s; more than
+        a whole turn where it continues."""
+        count = max(1, min(round(0.3 * RATE), len(self) // 2))
         return float(self.facing[-count:].mean() - self.facing[:count].mean())
 
     @cached_property
     def velocity(self) -> Array:
-        """How the hips move over the ground (T, 2), m/s: forward and to the left of where the figure faces."""
-        steps = np.diff(self.joint("hips")[:, [0, 2]], axis=0) * RATE
-        east, north = calm(steps, CALM).T if len(steps) else np.zeros((2, 0))
-        angle = np.radians(self.facing[1:])
-        moved = np.stack(
-            [east * np.sin(angle) + north * np.cos(angle), east * np.cos(angle) - north * np.sin(angle)], axis=1
-        )
-        return np.concatenate([moved[:1], moved]) if len(moved) else np.zeros((1, 2))
+        """How the hips move over the ground (T, 2), m/s: forward and to the left of where the figure faces.
+
+        Means over 0.3 s, in which the sway within a step falls away.
+        """
+        steps = np.diff(self.path, axis=0) * RATE
+        if not len(steps):
+            return np.zeros((1, 2))
+        (east, north), angle = calm(steps, 0.3).T, np.radians(self.facing[1:])
+        sin, cos = np.sin(angle), np.cos(angle)
+        moved = np.stack([east * sin + north * cos, east * cos - north * sin], axis=1)
+        return np.concatenate([moved[:1], moved])
 
     @cached_property
     def pace(self) -> Array:
@@ -111,16 +125,18 @@ class Track:
 
     def body(self, name: str) -> Array:
         """A joint (T, 3) as the figure sees it: to its left and in front of its hips, and above the ground (y)."""
-        away = self.joint(name) - self.joint("hips")
-        angle = np.radians(self.facing)
-        left = away[:, 0] * np.cos(angle) - away[:, 2] * np.sin(angle)
-        front = away[:, 0] * np.sin(angle) + away[:, 2] * np.cos(angle)
+        (x, _, z), angle = (self.joint(name) - self.joint("hips")).T, np.radians(self.facing)
+        left, front = x * np.cos(angle) - z * np.sin(angle), x * np.sin(angle) + z * np.cos(angle)
         return np.stack([left, self.height(name), front], axis=1)
+
+    def bodies(self, part: str) -> tuple[Array, Array]:
+        """The left and the right joint of a part as :meth:`body` gives them."""
+        left, right = pair(part)
+        return self.body(left), self.body(right)
 
     def motion_of(self, name: str, beside: str = "hips") -> Array:
         """Speed (T,) of a joint relative to another one, m/s, over a tenth of a second."""
-        away = self.joint(name) - self.joint(beside)
-        steps = np.linalg.norm(np.diff(away, axis=0), axis=1) * RATE
+        steps = np.linalg.norm(np.diff(self.joint(name) - self.joint(beside), axis=0), axis=1) * RATE
         return np.concatenate([[0.0], calm(steps, 0.1)])
 
     def angle(self, above: str, joint: str, below: str) -> Array:
@@ -138,18 +154,15 @@ def track_of(motion: Motion) -> Track:
 
 def calm(values: Array, seconds: float) -> Array:
     """Values (T, ...) averaged over a window of so many seconds; at the ends over the part of it that there is."""
-    half = max(0, round(seconds * RATE) // 2)
-    total = np.concatenate([np.zeros_like(values[:1]), np.cumsum(values, axis=0)])
-    frames = np.arange(len(values))
-    start, stop = np.maximum(frames - half, 0), np.minimum(frames + half + 1, len(values))
-    found: Array = (total[stop] - total[start]) / (stop - start).reshape(-1, *[1] * (values.ndim - 1))
+    window = 2 * (round(seconds * RATE) // 2) + 1
+    total, frames = (uniform_filter1d(of, window, axis=0, mode="constant") for of in (values, np.ones_like(values)))
+    found: Array = total / frames
     return found
 
 
 def spells(flags: Flags) -> list[tuple[int, int]]:
     """The frames (start, stop) of each stretch over which flags (T,) are true."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
-    return [(int(start), int(stop)) for start, stop in edges.reshape(-1, 2)]
+    return [(part.start, part.stop) for (part,) in find_objects(label(flags)[0])]
 
 
 def longest(flags: Flags) -> float:

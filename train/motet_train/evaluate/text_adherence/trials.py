@@ -1,18 +1,19 @@
-"""Recorded trials: what the rules are checked on, and what a look-up plays."""
+"""Recorded trials: what the rules are checked on, and the look-up among them, the floor of every generator."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 from motet.errors import MotionError
+from motet.models.text import RULES
 from motet.motion.motion import Motion
 from motet.representation import named
 from motet_train.data.corpus import read_corpus
 from motet_train.data.errors import DataError
 from motet_train.data.records import Record
 from motet_train.data.store import INDEX, Store
-from motet_train.evaluate.text_adherence.prompts import actions
+from motet_train.evaluate.text_adherence.prompts import Prompt, actions
 from motet_train.evaluate.text_adherence.track import Track, track_of
 
 
@@ -28,6 +29,10 @@ class Trial:
     def action(self) -> str | None:
         """What it shows, None for a trial that the table of trials does not have."""
         return actions().get(self.name)
+
+    def shows(self, prompt: Prompt) -> bool | None:
+        """Whether it shows what a prompt asks; None where it may, and where nothing is known of it."""
+        return None if self.action is None else prompt.shows(self.action)
 
     @cached_property
     def track(self) -> Track:
@@ -56,3 +61,26 @@ def of_store(store: Store) -> Iterator[Trial]:
     representation = named(store.representation)
     for index, record in enumerate(store.records):
         yield Trial(record.name, record.sentences, representation.motion(store.motion(index)))
+
+
+class LookUp:
+    """Plays the trial whose sentences share most words with what is asked.
+
+    Trials without a sentence are never found; DataError if none has one.
+    """
+
+    def __init__(self, trials: Sequence[Trial]) -> None:
+        known = [(trial, frozenset(RULES.words(said))) for trial in trials for said in trial.sentences]
+        self._known = sorted(((trial, words) for trial, words in known if words), key=lambda pair: pair[0].name)
+        if not self._known:
+            raise DataError("no trial to look up has a sentence")
+
+    def generate(self, text: str, seed: int) -> Motion:
+        """The motion of :meth:`found`, the same for every seed."""
+        return self.found(text).motion
+
+    def found(self, text: str) -> Trial:
+        """The trial with the sentence that shares most different words with the text; of several such sentences the one
+        with the fewest different words, and where they are as many, of the first trial by name."""
+        asked = frozenset(RULES.words(text))
+        return max(self._known, key=lambda pair: (len(asked & pair[1]), -len(pair[1])))[0]

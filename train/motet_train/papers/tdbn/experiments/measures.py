@@ -10,10 +10,10 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from sklearn.metrics import pairwise_distances_argmin
 
 from motet.motion.resample import lines
 from motet.motion.rotations import Array
-from motet_train.evaluate.nearest import nearest
 from motet_train.papers.tdbn.clips import CONSTANT
 from motet_train.papers.tdbn.period import period
 
@@ -61,7 +61,8 @@ class Reference:
         flat = z.reshape(-1, z.shape[-1])
         finite = np.isfinite(flat).all(axis=1)
         distance = np.full(len(flat), np.inf)
-        distance[finite] = nearest(flat[finite], self.z(points))[1] / np.sqrt(flat.shape[1])
+        near = self.z(points)[pairwise_distances_argmin(flat[finite], self.z(points))] if finite.any() else flat[finite]
+        distance[finite] = np.linalg.norm(flat[finite] - near, axis=1) / np.sqrt(flat.shape[1])
         return distance.reshape(z.shape[:-1])
 
     def jumps(self, frames: Array) -> Array:
