@@ -10,7 +10,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.metrics import pairwise_distances_argmin
 
 from motet.motion.resample import lines
 from motet.motion.rotations import Array
@@ -57,6 +56,8 @@ class Reference:
 
     def distance(self, frames: Array, points: Array) -> Array:
         """RMS z (...) from frames (..., D) to the nearest of points (N, D); infinite for frames that are not finite."""
+        from sklearn.metrics import pairwise_distances_argmin  # for this alone, so that other trainings do not load it
+
         z = self.z(frames)
         flat = z.reshape(-1, z.shape[-1])
         finite = np.isfinite(flat).all(axis=1)
