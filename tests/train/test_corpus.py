@@ -2,6 +2,7 @@ import json
 import shutil
 import time
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +13,16 @@ from motet.formats import read_motion, write_motion
 from motet.formats.glb import container
 from motet.formats.gltf_data import parse
 from motet.formats.mmm import read
+from motet_train.data import locomotion
 from motet_train.data.archive import Archive
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.corpus import read_corpus, recordings
 from motet_train.data.errors import DataError
+from motet_train.data.gaits import read_gaits
+from motet_train.data.locomotion import gaits_of
+from motet_train.data.preparation import SIXD
 from motet_train.data.records import Record, Skipped
+from motet_train.data.store import prepare
 from motet_train.data.table import Person, person, read_people, read_table
 
 
@@ -152,6 +158,27 @@ def test_a_table_of_people_says_who_moves_by_patterns(tmp_path: Path) -> None:
     assert person(people[:1], "39_01") == Person("39_01", "39")
     with pytest.raises(DataError, match="needs the columns clip and subject"):
         read_people(table(tmp_path / "texts.tsv", "a\tb"))
+
+
+def test_a_column_or_a_table_of_patterns_says_which_gaits_are_shown(own: Path) -> None:
+    rows = ("02_06\tSomeone bends.\t\t", "09_07\tA person runs.\trun\trun, jog", "stroll\tA man walks.\t\twalk")
+    table(own / "texts.tsv", *rows, header="clip\tsentence\tdescription\tgait")
+    patterns = own / "gaits.toml"
+    patterns.write_text('[[gait]]\nname = "sprint"\nactions = ["r*"]\n\n[[gait]]\nname = "walk"\nactions = ["s*"]\n')
+    for gaits, expected in (
+        ((), [(), ("run", "jog"), ("walk",)]),
+        (read_gaits(patterns), [(), ("run", "jog", "sprint"), ("walk",)]),
+    ):
+        store = prepare(read_corpus(own, gaits=gaits), own.parent / f"store{len(gaits)}", SIXD)
+        assert [record.gaits for record in store.records] == expected
+        assert next(iter(gaits_of(store))).name == "walk"  # of the most frames: what a figure starts in
+    unsaid = replace(store, records=tuple(replace(record, gaits=()) for record in store.records))
+    assert gaits_of(unsaid) == read_gaits()
+    with pytest.raises(DataError, match="shows the gait 'walk': name gaits in a column gait"):
+        locomotion.recordings(unsaid, gaits_of(unsaid))
+    patterns.write_text('[[gait]]\nname = "sprint"\n')
+    with pytest.raises(DataError, match=r"gaits\.toml is not a table of gaits"):
+        read_gaits(patterns)
 
 
 def test_recordings_need_no_table(own: Path) -> None:

@@ -16,7 +16,8 @@ from motet.motion.mirror import mirror
 from motet.motion.motion import Motion
 from motet.representation import named
 from motet.representation.contract import MotionContract
-from motet_train.data.locomotion import Gait, Recording, read_gaits
+from motet_train.data.gaits import Gait, read_gaits
+from motet_train.data.locomotion import Recording
 from motet_train.data.matching_rows import MatchingRows, mirrored_poses, rows_of, scaling
 from motet_train.models.codes.sixd_places import tree_of
 from motet_train.models.control.matching import Matching, MatchingConfig, from_config

@@ -22,7 +22,7 @@ from motet.motion.humanoid.bones import HUMANOID, sole_points
 from motet.motion.kinematics import global_transforms
 from motet.representation import named
 from motet_train.data.errors import DataError
-from motet_train.data.locomotion import Gait, recordings
+from motet_train.data.locomotion import gaits_of, recordings
 from motet_train.data.records import Record
 from motet_train.data.store import Store, prepare
 from motet_train.eager import eager_model
@@ -31,8 +31,6 @@ from motet_train.evaluate.steer.report import Recorded, seldom, steer_report, st
 from motet_train.evaluate.tables import report_table
 from motet_train.papers.tdbn import clips
 from motet_train.runs import Run
-
-GAITS = tuple(Gait(name, (name,), ("*",)) for name in ("walk", "run"))
 
 SETTINGS = """
 [training]
@@ -50,16 +48,8 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
     """A walk, and a run: the same, twice as fast."""
     walk = read_motion(Path(clips.__file__).parent / "cmu" / "39_14.amc")
     motions = {"walk": walk, "run": replace(walk, fps=240.0)}
-    found = [Record(name, "16", to_humanoid(motion).motion, (), (), action=name) for name, motion in motions.items()]
+    found = [Record(name, "16", to_humanoid(motion).motion, (), (), gaits=(name,)) for name, motion in motions.items()]
     return prepare(iter(found), tmp_path_factory.mktemp("steer") / "store", PREPARATION)
-
-
-@pytest.fixture(scope="module", autouse=True)
-def two_gaits() -> Any:
-    with pytest.MonkeyPatch.context() as patch:
-        for place in ("motet_train.recipes.matching", "motet_train.evaluate.steer.report"):
-            patch.setattr(f"{place}.read_gaits", lambda: GAITS)
-        yield
 
 
 @pytest.fixture(scope="module")
@@ -136,7 +126,7 @@ def test_the_rival_searches_seldom(model: SteerModel) -> None:
 
 
 def test_recordings_come_with_their_feet_held_and_as_they_are(store: Store) -> None:
-    held, plain = (recordings(store, GAITS, held) for held in (True, False))
+    held, plain = (recordings(store, gaits_of(store), held) for held in (True, False))
     np.testing.assert_array_equal(plain[0].features.values, store.motion(0).values[1:-1])
     assert 0 < np.abs(held[0].features.values - plain[0].features.values).max() < 0.5
 

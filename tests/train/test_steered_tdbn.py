@@ -22,7 +22,7 @@ from motet.representation.root_block import way
 from motet.representation.root_sixd import ROOT_SIXD
 from motet_train.cli.evaluate_steer import as_steered
 from motet_train.data.errors import DataError
-from motet_train.data.locomotion import Gait, recordings
+from motet_train.data.locomotion import gaits_of, recordings
 from motet_train.data.records import Record
 from motet_train.data.store import Store, prepare
 from motet_train.evaluate.steer import following, standing
@@ -35,8 +35,6 @@ from motet_train.papers.tdbn.driven import Driven, DrivenSession, moved
 from motet_train.papers.tdbn.steered import RECIPES, mirrored_too, train_steered
 from motet_train.recipes.recipe import Job
 from motet_train.runs import Run
-
-GAITS = tuple(Gait(name, (name,), ("*",)) for name in ("walk", "run"))
 
 SETTINGS = """
 [model]
@@ -52,16 +50,8 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
     """Two seconds of a walk, and a run: the same, twice as fast."""
     walk = to_humanoid(read_motion(Path(clips.__file__).parent / "cmu" / "39_14.amc")[:480]).motion
     motions = {"walk": walk[:240], "run": replace(walk, fps=2 * walk.fps)}
-    found = [Record(name, "16", motion, (), (), action=name) for name, motion in motions.items()]
+    found = [Record(name, "16", motion, (), (), gaits=(name,)) for name, motion in motions.items()]
     return prepare(iter(found), tmp_path_factory.mktemp("steered") / "store", PREPARATION)
-
-
-@pytest.fixture(scope="module", autouse=True)
-def two_gaits() -> Any:
-    with pytest.MonkeyPatch.context() as patch:
-        for place in ("motet_train.papers.tdbn.steered", "motet_train.evaluate.steer.report"):
-            patch.setattr(f"{place}.read_gaits", lambda: GAITS)
-        yield
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +89,7 @@ def test_a_course_is_the_mean_of_what_comes(store: Store) -> None:
 
 
 def test_mirror_images_balance_left_and_right(store: Store) -> None:
-    found = recordings(store, GAITS)
+    found = recordings(store, gaits_of(store))
     contract, motions = mirrored_too(store, found)
     assert len(motions) == 2 * len(found)
     at = [contract.channels.index(name) for name in ("root.left", "root.turn")]

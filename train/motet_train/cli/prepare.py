@@ -10,6 +10,7 @@ from motet.representation import named
 from motet_train.cli.train_options import unit_in
 from motet_train.data.corpus import Corpus, read_corpus
 from motet_train.data.errors import DataError
+from motet_train.data.gaits import read_gaits
 from motet_train.data.preparation import FIGURES, Preparation, preparation
 from motet_train.data.records import Record, Skipped
 from motet_train.data.store import Item, Store
@@ -19,6 +20,7 @@ from motet_train.data.table import read_people
 CORPUS = (
     click.option("--sentences", type=Path, help="Table of sentences. [default: the only .tsv in or beside the data]"),
     click.option("--people", type=Path, help="Table of who moves in which clips. [default: by the clips' names]"),
+    click.option("--gaits", type=Path, help="Table of gaits (TOML), to steer by. [default: the column gait]"),
     click.option("--figure", type=click.Choice(FIGURES), help="Whose joints. [default: humanoid; of KIT's data, own]"),
     unit_in,
 )
@@ -51,6 +53,7 @@ def prepare(
     fps: float | None,
     sentences: Path | None,
     people: Path | None,
+    gaits: Path | None,
     figure: str | None,
     unit_in: str | None,
 ) -> None:
@@ -63,7 +66,8 @@ def prepare(
     its sentences.
     """
     who = () if people is None else read_people(people)
-    corpus = read_corpus(data, sentences, who, unit_in, described=verb != "predict")
+    shown = () if gaits is None else read_gaits(gaits)
+    corpus = read_corpus(data, sentences, who, unit_in, verb != "predict", shown)
     found = preparation(verb, corpus.kit, figure, fps)
     _check_unit(corpus, found)
     store = _prepared(corpus, found, out)

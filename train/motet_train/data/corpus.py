@@ -1,7 +1,7 @@
 """Corpora: motions with sentences, from the KIT Motion-Language data or from mocap files beside a table."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from motet.formats import CLIPPED, MOCAP, clips, read_motion
@@ -9,6 +9,7 @@ from motet.formats.clips import MARK
 from motet_train.data import kit
 from motet_train.data.archive import BROKEN, Archive
 from motet_train.data.errors import DataError
+from motet_train.data.gaits import Gait
 from motet_train.data.records import Record, Skipped
 from motet_train.data.table import Described, Person, person, read_table
 
@@ -20,7 +21,7 @@ class Corpus:
     paths: its folders and zips, of which the later takes the place of the earlier's files. names: the motion files.
     kit: whether it is KIT's. table: of sentences, None for motions alone. people: who moves in which clips. A motion
     that cannot be read, comes twice or is not in the table is given as Skipped, and so is a clip of the table without a
-    motion.
+    motion. gaits: which motions show them, beside those of which the table says so.
     """
 
     paths: tuple[Path, ...]
@@ -29,6 +30,7 @@ class Corpus:
     table: Path | None = None
     people: tuple[Person, ...] = ()
     unit: str | float | None = None
+    gaits: tuple[Gait, ...] = ()
 
     def __len__(self) -> int:
         """The number of motion files: each gives one Record or Skipped, or one for each of its clips."""
@@ -37,10 +39,16 @@ class Corpus:
     def __iter__(self) -> Iterator[Record | Skipped]:
         with Archive(*self.paths) as archive:
             if self.kit:
-                yield from kit.records(archive)
+                found = kit.records(archive)
             else:
                 said = None if self.table is None else read_table(self.table)
-                yield from recordings(archive, self.unit, said, self.people)
+                found = recordings(archive, self.unit, said, self.people)
+            yield from (self._moving(item) if isinstance(item, Record) else item for item in found)
+
+    def _moving(self, record: Record) -> Record:
+        action = record.action or record.take or record.name
+        shown = (gait.name for gait in self.gaits if gait.shown(action, record.subject))
+        return replace(record, gaits=tuple(dict.fromkeys((*record.gaits, *shown))))
 
 
 def read_corpus(
@@ -49,6 +57,7 @@ def read_corpus(
     people: tuple[Person, ...] = (),
     unit: str | float | None = None,
     described: bool = True,
+    gaits: tuple[Gait, ...] = (),
 ) -> Corpus:
     """The corpus at ``paths``, folders and zips; DataError where it is none.
 
@@ -56,19 +65,19 @@ def read_corpus(
     .glb .vrma and a table of sentences: ``table``, or the only .tsv in the first folder, or the only one beside
     it. Of two files of one name that of the later place counts. people: who moves in which clips.
     unit: the length unit of mocap files that do not state theirs, as in :func:`motet.read`. described: whether its
-    motions need sentences; else a table that is not named is not looked for.
+    motions need sentences; else a table that is not named is not looked for. gaits: see :class:`Corpus`.
     """
     places = (paths,) if isinstance(paths, Path) else tuple(paths)
     with Archive(*places) as archive:
         names, motions = archive.names, motion_files(archive)
     if any(name.endswith(kit.ANNOTATIONS) for name in names):
-        return Corpus(places, tuple(name for name in names if name.endswith(kit.MOTION)), kit=True)
+        return Corpus(places, tuple(name for name in names if name.endswith(kit.MOTION)), kit=True, gaits=gaits)
     if not motions:
         raise DataError(
             f"no motion files ({' '.join(MOCAP)}) in {', '.join(map(str, places))}, nor KIT's NNNNN{kit.ANNOTATIONS}"
         )
     table = table or (_only_table(places[0]) if described else None)
-    return Corpus(places, motions, False, table, people, unit)
+    return Corpus(places, motions, False, table, people, unit, gaits)
 
 
 def motion_files(archive: Archive) -> tuple[str, ...]:
@@ -128,7 +137,9 @@ def _record(
         with archive.opened(file) as place:
             motion = read_motion(place, unit=unit, clip=own)
         subject = said.subject or who.subject
-        return Record(clip, subject, motion, tuple(said.sentences), tuple(said.unseen), who.take, said.action)
+        return Record(
+            clip, subject, motion, tuple(said.sentences), tuple(said.unseen), who.take, said.action, said.gaits
+        )
     except BROKEN as error:
         return Skipped(clip, archive.reason(error))
 

@@ -1,10 +1,8 @@
 """Recordings that a figure is steered by: which of a store they are, by gait, their feet held to the ground."""
 
-import tomllib
+from collections import Counter
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 
@@ -13,10 +11,9 @@ from motet.motion.rotations import rotmat_to_rotvec
 from motet.representation import named
 from motet.representation.root_sixd import joint_rotations
 from motet_train.data.errors import DataError
+from motet_train.data.gaits import Gait, read_gaits
 from motet_train.data.sixd_windows import action_of
 from motet_train.data.store import Store
-
-GAITS_FILE = Path(__file__).with_name("gaits.toml")
 
 SHORTEST = 1.5
 """Seconds that a recording lasts at least."""
@@ -28,19 +25,6 @@ HEIGHT, AROUND = 0.06, 0.5
 """A jump is where the hips rise so many metres above where they mostly are; and so many seconds before and after."""
 
 
-@dataclass(frozen=True)
-class Gait:
-    """A way of moving. actions, people: patterns of what its recordings show, and of who does."""
-
-    name: str
-    actions: tuple[str, ...]
-    people: tuple[str, ...]
-
-    def shown(self, action: str, person: str) -> bool:
-        """Whether a recording of a person's action shows it."""
-        return _fits(action, self.actions) and _fits(person, self.people)
-
-
 @dataclass(frozen=True, eq=False)
 class Recording:
     """features: a motion in ``root_sixd``. gaits: names of those that it shows."""
@@ -49,20 +33,20 @@ class Recording:
     gaits: frozenset[str]
 
 
-def read_gaits(path: Path = GAITS_FILE) -> tuple[Gait, ...]:
-    """The table of gaits; DataError where it cannot be read."""
-    try:
-        rows = tomllib.loads(path.read_text(encoding="utf-8"))["gait"]
-        return tuple(Gait(row["name"], tuple(row["actions"]), tuple(row["people"])) for row in rows)
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise DataError(f"{path} is not a table of gaits: {error}") from error
+def gaits_of(store: Store) -> tuple[Gait, ...]:
+    """The gaits that a store's records name, that of the most frames first; CMU's and ACCAD's where none is named."""
+    frames = Counter[str]()
+    for record in store.records:
+        frames.update(dict.fromkeys(record.gaits, sum(stop - start for start, stop in record.spans)))
+    return tuple(Gait(name, (), ()) for name, _ in frames.most_common()) or read_gaits()
 
 
 def recordings(store: Store, gaits: tuple[Gait, ...], held: bool = True) -> list[Recording]:
     """The recordings of a store that show gaits; DataError where a gait has none. held: their feet are held."""
     representation, found = named(store.representation), list[Recording]()
     for index, record in enumerate(store.records):
-        shown = frozenset(g.name for g in gaits if g.shown(action_of(store, index), record.subject))
+        action = action_of(store, index)
+        shown = frozenset(g.name for g in gaits if g.name in record.gaits or g.shown(action, record.subject))
         if not shown:
             continue
         features = store.motion(index)
@@ -72,7 +56,8 @@ def recordings(store: Store, gaits: tuple[Gait, ...], held: bool = True) -> list
         found += [Recording(piece, shown) for piece in pieces if len(piece) >= SHORTEST * store.fps]
     missing = [gait.name for gait in gaits if not any(gait.name in one.gaits for one in found)]
     if missing:
-        raise DataError(f"no recording shows the gait {missing[0]!r}")
+        how = "name gaits in a column gait of the table of sentences, or give motet prepare a table of them, --gaits"
+        raise DataError(f"no recording of {SHORTEST:g} s shows the gait {missing[0]!r}: {how}")
     return found
 
 
@@ -94,7 +79,3 @@ def _jumps(features: Motion) -> list[Motion]:
     high = np.convolve(height > np.median(height) + HEIGHT, np.ones(2 * reach + 1), "same") > 0
     edges = np.flatnonzero(np.diff(np.concatenate([[False], high, [False]]).astype(int))).reshape(-1, 2)
     return [features[start:stop] for start, stop in edges.tolist()]
-
-
-def _fits(name: str, patterns: tuple[str, ...]) -> bool:
-    return any(fnmatchcase(name, pattern) for pattern in patterns)

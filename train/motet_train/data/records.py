@@ -11,7 +11,8 @@ class Record:
 
     subject: who moved, if the corpus tells. unseen: sentences whose wordings are for measuring, never for training.
     take: what it is a part of that must not be divided; "" where it is a take of its own. action: what it shows, named
-    alike for all motions that show it; "" where it is not said.
+    alike for all motions that show it; "" where it is not said. gaits: the ways of moving that it shows, where that
+    is said.
     """
 
     name: str
@@ -21,6 +22,7 @@ class Record:
     unseen: tuple[str, ...] = ()
     take: str = ""
     action: str = ""
+    gaits: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

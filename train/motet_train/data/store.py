@@ -34,7 +34,8 @@ class Entry:
 
     skeleton: the index of its figure among the store's. unseen: sentences for measuring. take: what must not be
     divided, which the pieces of a motion have in common. ends: whether the motion ends with it. starts: whether it
-    begins with it. action: what is shown, named alike in all records that show it; "" where it is not said.
+    begins with it. action: what is shown, named alike in all records that show it; "" where it is not said. gaits: the
+    ways of moving that are shown, where that is said.
     """
 
     name: str
@@ -47,6 +48,7 @@ class Entry:
     ends: bool = True
     starts: bool = True
     action: str = ""
+    gaits: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +116,7 @@ class Store:
 
 def _entry(data: dict[str, Any]) -> Entry:
     spans = tuple((int(start), int(stop)) for start, stop in data["spans"])
-    said = {key: tuple(data[key]) for key in ("sentences", "unseen")}
+    said = {key: tuple(data.get(key, ())) for key in ("sentences", "unseen", "gaits")}
     return Entry(**{**data, **said, "spans": spans})
 
 
@@ -180,7 +182,7 @@ class _Writer:
             spans.append((self.frames, self.frames + len(features)))
             self.frames += len(features)
         own = None if features.skeleton is None else self._number(features.skeleton)
-        said = record.sentences, tuple(spans), own, record.unseen, record.take, *place, record.action
+        said = record.sentences, tuple(spans), own, record.unseen, record.take, *place, record.action, record.gaits
         self.entries.append(Entry(record.name, record.subject, *said))
 
     def _number(self, skeleton: Skeleton) -> int:

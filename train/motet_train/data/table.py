@@ -15,13 +15,15 @@ class Described:
     """What a table says of a clip.
 
     sentences: to train on. unseen: those whose wordings no training sees. subject: who moved, "" where it is not said.
-    action: what the clip shows, in words that all clips which show it share; "" where it is not said.
+    action: what the clip shows, in words that all clips which show it share; "" where it is not said. gaits: which
+    ways of moving it shows, for a figure to be steered by.
     """
 
     sentences: list[str] = field(default_factory=list)
     unseen: list[str] = field(default_factory=list)
     subject: str = ""
     action: str = ""
+    gaits: tuple[str, ...] = ()
 
 
 def read_table(path: Path) -> dict[str, Described]:
@@ -29,8 +31,8 @@ def read_table(path: Path) -> dict[str, Described]:
 
     Several lines of a clip give several sentences, empty ones are left out, as are clips without any. A column ``pool``
     says which are to train on, "train" or empty, and which are kept for measuring, "test". A column ``subject`` says
-    who moved, once for each clip or always alike; a column ``description`` which action is shown. DataError names the
-    line that does not fit.
+    who moved, once for each clip or always alike; a column ``description`` which action is shown; a column ``gait``
+    which ways of moving are, such as "walk" or, of several, "walk, run". DataError names the line that does not fit.
     """
     found: dict[str, Described] = {}
     for number, row in _rows(path, "clip", "sentence"):
@@ -46,6 +48,7 @@ def read_table(path: Path) -> dict[str, Described]:
             )
         said.subject = subject or said.subject
         said.action = row.get("description", "") or said.action
+        said.gaits = tuple(filter(None, map(str.strip, row.get("gait", "").split(",")))) or said.gaits
     return {clip: said for clip, said in found.items() if clip and said.sentences}
 
 

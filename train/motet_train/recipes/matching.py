@@ -13,7 +13,7 @@ from motet.motion.humanoid.bones import LEFT_RIGHT, sided
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
 from motet_train.data.errors import DataError
-from motet_train.data.locomotion import read_gaits, recordings
+from motet_train.data.locomotion import gaits_of, recordings
 from motet_train.data.matching_rows import MatchingRows, rows_of, scaling
 from motet_train.data.store import Store
 from motet_train.descent import GradientLearner, Term, Terms, Training
@@ -66,7 +66,7 @@ def train_matching(store: Store, job: Job, data: str = "") -> Run:
     assert training is not None
     if store.representation != "root_sixd":
         raise DataError(f"steering is trained on root_sixd (motet prepare --for codes), not {store.representation}")
-    gaits = read_gaits()
+    gaits = gaits_of(store)
     names = tuple(gait.name for gait in gaits)
     found = recordings(store, gaits)
     contract = store.contract(tuple(range(len(store.records))))

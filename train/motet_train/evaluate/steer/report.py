@@ -8,7 +8,7 @@ from typing import Any
 from motet.errors import ControlWarning
 from motet.models.steer import SteerModel
 from motet_train.data.errors import DataError
-from motet_train.data.locomotion import Recording, read_gaits, recordings
+from motet_train.data.locomotion import Recording, gaits_of, recordings
 from motet_train.data.matching_rows import rows_of
 from motet_train.data.store import Store
 from motet_train.evaluate.steer.following import aside_errors, speed_errors, turn_errors
@@ -73,7 +73,7 @@ class Recorded:
 
 
 def _shown(store: Store, held: bool) -> list[tuple[Recording, Track]]:
-    gaits = read_gaits()
+    gaits = gaits_of(store)
     found = recordings(store, gaits, held)
     return list(zip(found, tracks_of(found, rows_of(found, tuple(gait.name for gait in gaits))), strict=True))
 

@@ -12,7 +12,8 @@ from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract, living
 from motet.representation.root_sixd import ROOT_SIXD
 from motet_train.data.errors import DataError
-from motet_train.data.locomotion import Recording, read_gaits, recordings
+from motet_train.data.gaits import Gait
+from motet_train.data.locomotion import Recording, gaits_of, recordings
 from motet_train.data.store import Store
 from motet_train.papers.tdbn.angle_crbm import AngleCRBMConfig
 from motet_train.papers.tdbn.contrastive import Learning
@@ -61,7 +62,8 @@ def train_steered(store: Store, job: Job, data: str = "") -> Run:
     """
     if store.representation != "root_sixd":
         raise DataError(f"steering is trained on root_sixd (motet prepare --for codes), not {store.representation}")
-    found = recordings(store, tuple(gait for gait in read_gaits() if gait.name in GAITS))
+    shown = {gait.name: gait for gait in gaits_of(store)}
+    found = recordings(store, tuple(shown.get(name, Gait(name, (), ())) for name in GAITS))
     contract, motions = mirrored_too(store, found)
     frames, controls = _rows([motion.values for motion in motions]), _rows([controls_of(course(m)) for m in motions])
     assert contract.skeleton is not None
