@@ -1,7 +1,6 @@
 """Training of a figure that is steered: rows of recordings, their mirror images, poses in few codes, the step."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,7 +23,7 @@ from motet_train.models.control.matching import Matching, MatchingConfig, from_c
 from motet_train.papers.tdbn import clips as clips_module
 from motet_train.recipes.matching_table import take
 
-CLIPS = Path(clips_module.__file__).parent / "cmu"
+CLIPS = clips_module.CMU_FOLDER
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,6 @@
 """Measures of figures that are steered, on figures that do what they are told in a known way."""
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -31,7 +30,7 @@ def puppets(**how: Any) -> Any:
 @pytest.fixture(scope="module")
 def walk() -> Motion:
     features = named("root_sixd").features(
-        to_humanoid(read_motion(Path(clips.__file__).parent / "cmu" / "39_14.amc")).motion.resample(FPS)
+        to_humanoid(read_motion(clips.CMU_FOLDER / "39_14.amc")).motion.resample(FPS)
     )
     return named("root_sixd").planted(features)
 

@@ -46,7 +46,7 @@ odd = 6
 @pytest.fixture(scope="module")
 def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
     """A walk, and a run: the same, twice as fast."""
-    walk = read_motion(Path(clips.__file__).parent / "cmu" / "39_14.amc")
+    walk = read_motion(clips.CMU_FOLDER / "39_14.amc")
     motions = {"walk": walk, "run": replace(walk, fps=240.0)}
     found = [Record(name, "16", to_humanoid(motion).motion, (), (), gaits=(name,)) for name, motion in motions.items()]
     return prepare(iter(found), tmp_path_factory.mktemp("steer") / "store", PREPARATION)

@@ -48,7 +48,7 @@ crbm = {epochs = 2, rate = 0.01}
 @pytest.fixture(scope="module")
 def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
     """Two seconds of a walk, and a run: the same, twice as fast."""
-    walk = to_humanoid(read_motion(Path(clips.__file__).parent / "cmu" / "39_14.amc")[:480]).motion
+    walk = to_humanoid(read_motion(clips.CMU_FOLDER / "39_14.amc")[:480]).motion
     motions = {"walk": walk[:240], "run": replace(walk, fps=2 * walk.fps)}
     found = [Record(name, "16", motion, (), (), gaits=(name,)) for name, motion in motions.items()]
     return prepare(iter(found), tmp_path_factory.mktemp("steered") / "store", PREPARATION)
