@@ -26,7 +26,7 @@ import motet
 from motet.bundle.bundle import Bundle, list_bundles
 from motet.bundle.protobuf import Value, fields
 from motet.bundle.session import SessionOptions
-from motet.models.codes import CodesModel
+from motet.models.generate_codes import CodesModel
 from motet.models.verify import verify
 from motet.motion.motion import Motion
 
@@ -204,7 +204,7 @@ def use(path: Path) -> None:
             session.tick()
         model.run(f"{model.gaits[0]} .3s", start=given)
         motet.write_live_page(io.BytesIO(), model)
-    elif isinstance(model, motet.ControlModel):
+    elif isinstance(model, motet.TdbnModel):
         model.start(variety=0.5).step()
         model.run(f"{model.labels[0]} .2s")
     elif isinstance(model, CodesModel):

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.errors import TextWarning
-from motet.models.control import ControlModel
 from motet.models.describe import DescribeModel
 from motet.models.fill import FillModel
 from motet.models.generate import GenerateModel
@@ -18,6 +17,7 @@ from motet.models.load import Model
 from motet.models.predict import PredictModel
 from motet.models.search import SearchModel
 from motet.models.steer import SteerModel
+from motet.models.tdbn_control import TdbnModel
 from motet.models.text import MAX_WORDS, SPECIALS
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
@@ -37,11 +37,11 @@ def whole_runs(onnx: Model, torch: Model) -> Runs:
     return {name: partial(_pair, (onnx, torch), run) for name, run in runs.items()}
 
 
-def _control(_: ControlModel) -> Named:
+def _control(_: TdbnModel) -> Named:
     return {"mean_field": partial(_controlled, 0.0), "sampled": partial(_controlled, 1.0)}
 
 
-def _controlled(variety: float, model: ControlModel) -> Decoded:
+def _controlled(variety: float, model: TdbnModel) -> Decoded:
     """Four characters go through all labels, one after the other, half a second of ramp between."""
     labels = len(model.labels)
     hold, ramp = round(2 * model.fps), round(model.fps / 2)

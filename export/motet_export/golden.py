@@ -9,7 +9,6 @@ from motet.bundle.golden import TOLERANCE, vectors
 from motet.bundle.graph import Arrays
 from motet.decode.ancestral import noise_of
 from motet.decode.noise import Recording
-from motet.models.control import ControlModel
 from motet.models.describe import DescribeModel
 from motet.models.fill import FillModel
 from motet.models.generate import GenerateModel
@@ -18,6 +17,7 @@ from motet.models.load import Model
 from motet.models.predict import PredictModel
 from motet.models.search import SearchModel
 from motet.models.steer import SteerModel
+from motet.models.tdbn_control import TdbnModel
 from motet.models.text import SPECIALS
 from motet_export.examples import Examples, sides, walks
 
@@ -39,7 +39,7 @@ def golden_vectors(model: Model, draws: Mapping[str, Examples]) -> tuple[bytes, 
     return vectors(model, feeds, given, settings), entry
 
 
-def _control(model: ControlModel, rng: np.random.Generator) -> Run:
+def _control(model: TdbnModel, rng: np.random.Generator) -> Run:
     """From the first label to each other one."""
     places = np.linspace(0, len(model.labels) - 1, TICKS)[:, None]
     track = np.maximum(0, 1 - np.abs(places - np.arange(len(model.labels)))).astype(np.float32)

@@ -30,19 +30,20 @@ from motet.formats import clips
 from motet.formats import read_motion as read
 from motet.formats import write_motion as write
 from motet.live.page import live_page, write_live_page
-from motet.models.codes import CodesModel, Passage, Story
-from motet.models.control import ControlModel, ControlSession, Snapshot
+from motet.models.control import ControlModel
 from motet.models.describe import DescribeModel, Description, Part
 from motet.models.familiarity import Understood
 from motet.models.fill import FillModel
 from motet.models.generate import Generated, GenerateModel
+from motet.models.generate_codes import CodesModel, Passage, Story
+from motet.models.generate_mixture import MixtureModel
 from motet.models.index import Hit, Index
 from motet.models.load import load, load_as
-from motet.models.mixture import MixtureModel
 from motet.models.predict import PredictModel, PredictSession
 from motet.models.search import SearchModel
 from motet.models.steer import SteerModel
 from motet.models.steer_session import SteerSession, SteerSnapshot
+from motet.models.tdbn_control import TdbnModel, TdbnSession, TdbnSnapshot
 from motet.motion.humanoid.joint_map import read_map
 from motet.motion.humanoid.retarget import Humanoid, from_humanoid, to_humanoid
 from motet.motion.motion import Motion
@@ -57,7 +58,6 @@ __all__ = [
     "CodesModel",
     "ControlError",
     "ControlModel",
-    "ControlSession",
     "ControlWarning",
     "DecodingError",
     "DescribeModel",
@@ -83,11 +83,13 @@ __all__ = [
     "SearchModel",
     "SessionOptions",
     "SettingError",
-    "Snapshot",
     "SteerModel",
     "SteerSession",
     "SteerSnapshot",
     "Story",
+    "TdbnModel",
+    "TdbnSession",
+    "TdbnSnapshot",
     "TextError",
     "TextWarning",
     "Understood",

@@ -15,15 +15,15 @@ from motet.bundle.graph import Arrays, Graph
 from motet.errors import TextWarning
 from motet.formats import read_motion, write_motion
 from motet.models.base import BundleModel
-from motet.models.codes import CodesModel
-from motet.models.control import ControlModel
 from motet.models.describe import DescribeModel
 from motet.models.fill import FillModel
 from motet.models.generate import GenerateModel
+from motet.models.generate_codes import CodesModel
 from motet.models.predict import PredictModel
 from motet.models.search import SearchModel
 from motet.models.steer import SteerModel
 from motet.models.steer_session import SteerSession
+from motet.models.tdbn_control import TdbnModel
 from motet.models.text import EOS, SPECIALS
 from motet.representation.placed import placed
 
@@ -102,7 +102,7 @@ def _made_file(model: DescribeModel, folder: Path) -> Path:
     return folder / "motion.amc"
 
 
-def control_figures(model: ControlModel | SteerModel, seconds: float) -> Figures:
+def control_figures(model: TdbnModel | SteerModel, seconds: float) -> Figures:
     """One character's tick (median and 99th percentile) and the frame rate at the best batch, plain and sampled.
 
     Of the net alone; and of a smooth session whose control stays, and of one whose control changes at every tick.
@@ -131,7 +131,7 @@ def control_figures(model: ControlModel | SteerModel, seconds: float) -> Figures
     return figures
 
 
-def _rate(model: ControlModel, batch: int, variety: float, seconds: float) -> float:
+def _rate(model: TdbnModel, batch: int, variety: float, seconds: float) -> float:
     session = model.start(characters=batch, variety=variety, smooth=False)
     return batch / float(np.median(durations(session.step, seconds)))
 

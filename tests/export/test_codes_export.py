@@ -11,7 +11,7 @@ from torch import nn
 
 import motet
 from motet.bundle.bundle import Bundle
-from motet.models.codes import CodesModel
+from motet.models.generate_codes import CodesModel
 from motet.models.text import RULES, SPECIALS
 from motet.models.verify import verify
 from motet.motion.humanoid.bones import HUMANOID

@@ -11,8 +11,8 @@ from torch import nn
 from motet.bundle.bundle import Bundle, list_bundles
 from motet.bundle.graph import GraphSpec, OnnxGraph, TensorSpec
 from motet.cli import main
-from motet.models.control import ControlModel
 from motet.models.load import load_as
+from motet.models.tdbn_control import TdbnModel
 from motet.models.verify import verify
 from motet_export.exporter import export_graph
 from motet_export.half import halved, round_weights
@@ -57,9 +57,9 @@ def test_a_bundle_is_written_anew_with_half_the_weights(tmp_path: Path) -> None:
     done = CliRunner().invoke(main, ["export", str(exact), "--half", "-o", str(tmp_path / "half.zip")])
     assert done.exit_code == 0, done.output
     assert (tmp_path / "half.zip").stat().st_size < 0.62 * exact.stat().st_size
-    small = load_as(ControlModel, tmp_path / "half.zip")
+    small = load_as(TdbnModel, tmp_path / "half.zip")
     assert small.manifest.parity["weights"] == "float16"
-    assert small.manifest.quality == load_as(ControlModel, exact).manifest.quality
-    frames = [model.run("walk 1s", smooth=False).values for model in (small, load_as(ControlModel, exact))]
+    assert small.manifest.quality == load_as(TdbnModel, exact).manifest.quality
+    frames = [model.run("walk 1s", smooth=False).values for model in (small, load_as(TdbnModel, exact))]
     assert 0 < np.abs(frames[0][:, 3:] - frames[1][:, 3:]).mean() < 0.5  # degrees
     assert max(verify(Bundle.open(tmp_path / "half.zip")).errors.values()) == 0

@@ -12,9 +12,9 @@ import pytest
 from motet.bundle.bundle import list_bundles
 from motet.errors import ControlError, MotionError
 from motet.formats import read_motion, write_motion
-from motet.models.control import ControlModel
 from motet.models.load import load
-from motet.models.script import control_track, parse_script
+from motet.models.tdbn_control import TdbnModel
+from motet.models.tdbn_script import control_track, parse_script
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
 
@@ -22,11 +22,11 @@ SCRIPT = "walk .5s, walk>run .5s, run .5s, bend .5s"
 
 
 @pytest.fixture(scope="module")
-def model() -> ControlModel:
+def model() -> TdbnModel:
     return load("cmu-control")
 
 
-def test_the_documented_loop_gives_the_same_frames(model: ControlModel) -> None:
+def test_the_documented_loop_gives_the_same_frames(model: TdbnModel) -> None:
     """docs/bundle.md in plain onnxruntime: no code of motet between the bundle and the frames."""
     with zipfile.ZipFile(list_bundles()["cmu-control"]) as archive:
         manifest = json.loads(archive.read("manifest.json"))
@@ -55,13 +55,13 @@ def test_the_documented_loop_gives_the_same_frames(model: ControlModel) -> None:
 
 
 @pytest.mark.parametrize("variety", [0.0, 0.5, 1.0])
-def test_a_character_moves_as_it_would_alone(model: ControlModel, variety: float) -> None:
+def test_a_character_moves_as_it_would_alone(model: TdbnModel, variety: float) -> None:
     together = model.start(characters=5, seed=3, variety=variety).frames(_track(model))
     alone = model.start(seed=5, variety=variety).frames(_track(model))
     np.testing.assert_allclose(together[2], alone[0], atol=1e-3)  # degrees; a matrix product rounds by batch size
 
 
-def test_each_character_has_its_own_control(model: ControlModel) -> None:
+def test_each_character_has_its_own_control(model: TdbnModel) -> None:
     session = model.start("walk", characters=3)
     session.control(walk=[1, 0, 0.5], run=[0, 1, 0.5])
     mixed = np.stack([session.step() for _ in range(60)], axis=1)
@@ -71,12 +71,12 @@ def test_each_character_has_its_own_control(model: ControlModel) -> None:
         np.testing.assert_allclose(mixed[row], np.concatenate([alone.step() for _ in range(60)]), atol=1e-3)
 
 
-def test_seeds_of_characters_can_be_an_array(model: ControlModel) -> None:
+def test_seeds_of_characters_can_be_an_array(model: TdbnModel) -> None:
     listed, array = (model.start(characters=3, seed=s, variety=1.0).step() for s in ([7, 1, 4], np.array([7, 1, 4])))
     np.testing.assert_array_equal(array, listed)
 
 
-def test_seeds_repeat_and_differ(model: ControlModel) -> None:
+def test_seeds_repeat_and_differ(model: TdbnModel) -> None:
     first, again, other = (model.start(seed=seed, variety=1.0).frames(_track(model)) for seed in (1, 1, 2))
     np.testing.assert_array_equal(first, again)
     assert np.abs(first - other).max() > 1
@@ -84,7 +84,7 @@ def test_seeds_repeat_and_differ(model: ControlModel) -> None:
     np.testing.assert_array_equal(*quiet)
 
 
-def test_a_snapshot_continues_with_the_same_frames(model: ControlModel) -> None:
+def test_a_snapshot_continues_with_the_same_frames(model: TdbnModel) -> None:
     session = model.start(characters=2, seed=4, variety=1.0)
     session.frames(_track(model)[:13])
     session.control(walk=0.3, run=[0.7, 0.2])
@@ -95,7 +95,7 @@ def test_a_snapshot_continues_with_the_same_frames(model: ControlModel) -> None:
     np.testing.assert_array_equal(after, [session.step() for _ in range(40)])
 
 
-def test_many_threads_share_a_model_bit_for_bit(model: ControlModel) -> None:
+def test_many_threads_share_a_model_bit_for_bit(model: TdbnModel) -> None:
     expected = model.start(characters=4, seed=1, variety=1.0).frames(_track(model))
     results: list[np.ndarray] = []
     threads = [
@@ -113,14 +113,14 @@ def test_many_threads_share_a_model_bit_for_bit(model: ControlModel) -> None:
         np.testing.assert_array_equal(result, expected)
 
 
-def test_walking_and_running_have_their_training_periods(model: ControlModel, clips: Path) -> None:
+def test_walking_and_running_have_their_training_periods(model: TdbnModel, clips: Path) -> None:
     for label, file in (("walk", "39_14.amc"), ("run", "09_07.amc")):
         knee = model.start(label).run(f"{label} 20s")[0].select(("rtibia.rx",)).values[400:, 0]
         data = read_motion(clips / file).select(("rtibia.rx",)).resample(model.fps).values[:, 0]
         assert _period(knee) == pytest.approx(_period(data), abs=1.0)
 
 
-def test_a_motion_is_carried_on(model: ControlModel, clips: Path) -> None:
+def test_a_motion_is_carried_on(model: TdbnModel, clips: Path) -> None:
     walk = read_motion(clips / "39_14.amc")
     session = model.start(walk)
     session.control(walk=1.0)
@@ -132,7 +132,7 @@ def test_a_motion_is_carried_on(model: ControlModel, clips: Path) -> None:
     assert np.sqrt(np.mean(difference[3:] ** 2)) < 0.6
 
 
-def test_a_late_turn_does_not_turn_the_start(model: ControlModel, clips: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_late_turn_does_not_turn_the_start(model: TdbnModel, clips: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Ten seconds straight on and a quarter turn in the last one: what is carried on faces where the last frames do."""
     walk = read_motion(clips / "39_14.amc")
     values = np.tile(walk.values, (4, 1))[:1320]
@@ -147,7 +147,7 @@ def test_a_late_turn_does_not_turn_the_start(model: ControlModel, clips: Path, m
     assert np.abs(turned).max() < 3 * 3.3  # three deviations of training
 
 
-def test_a_run_is_written_as_it_is(model: ControlModel, tmp_path: Path) -> None:
+def test_a_run_is_written_as_it_is(model: TdbnModel, tmp_path: Path) -> None:
     motion = model.start("walk").run("walk 2s")[0]
     write_motion(tmp_path / "x.bvh", motion)
     root = positions(read_motion(tmp_path / "x.bvh"))[:, 0]
@@ -155,7 +155,7 @@ def test_a_run_is_written_as_it_is(model: ControlModel, tmp_path: Path) -> None:
     np.testing.assert_allclose(root, positions(motion)[:, 0], atol=1e-6)
 
 
-def test_a_model_from_a_bundle_pickles(model: ControlModel) -> None:
+def test_a_model_from_a_bundle_pickles(model: TdbnModel) -> None:
     copy = pickle.loads(pickle.dumps(model))
     np.testing.assert_array_equal(copy.start().frames(_track(model)), model.start().frames(_track(model)))
 
@@ -178,12 +178,12 @@ def test_a_model_from_a_bundle_pickles(model: ControlModel) -> None:
         ({"start": "swim"}, "expected one of walk, run, bend"),
     ],
 )
-def test_a_start_out_of_range_is_refused(model: ControlModel, options: dict[str, object], reason: str) -> None:
+def test_a_start_out_of_range_is_refused(model: TdbnModel, options: dict[str, object], reason: str) -> None:
     with pytest.raises(ControlError, match=reason):
         model.start(**options)  # type: ignore[arg-type]
 
 
-def test_a_control_out_of_range_changes_nothing(model: ControlModel) -> None:
+def test_a_control_out_of_range_changes_nothing(model: TdbnModel) -> None:
     session = model.start(characters=2)
     session.control(run=0.5)
     before = session.snapshot().control
@@ -203,22 +203,22 @@ def test_a_control_out_of_range_changes_nothing(model: ControlModel) -> None:
         session.set_control([1.0])
 
 
-def test_a_control_is_copied(model: ControlModel) -> None:
+def test_a_control_is_copied(model: TdbnModel) -> None:
     session, control = model.start(), np.array([[1.0, 0.0, 0.0]], dtype=np.float32)
     session.set_control(control)
     control[:] = 5.0
     np.testing.assert_array_equal(session.snapshot().control, [[1, 0, 0]])
 
 
-def test_one_figure_runs_a_script_in_one_call(model: ControlModel) -> None:
+def test_one_figure_runs_a_script_in_one_call(model: TdbnModel) -> None:
     motion = model.run("run .2s, walk .1s", seed=np.int64(3), variety=0.5)
     session = model.start("run", seed=3, variety=0.5)
     np.testing.assert_array_equal(motion.values, session.run("run .2s, walk .1s")[0].values)
-    assert repr(session) == "ControlSession(1 characters, tick 12, ControlModel('cmu-control', 59 channels, 40 fps))"
-    assert repr(session.snapshot()) == "Snapshot(1 characters, tick 12)"
+    assert repr(session) == "TdbnSession(1 characters, tick 12, TdbnModel('cmu-control', 59 channels, 40 fps))"
+    assert repr(session.snapshot()) == "TdbnSnapshot(1 characters, tick 12)"
 
 
-def test_a_motion_that_does_not_fit_is_refused(model: ControlModel, clips: Path) -> None:
+def test_a_motion_that_does_not_fit_is_refused(model: TdbnModel, clips: Path) -> None:
     walk = read_motion(clips / "39_14.amc")
     with pytest.raises(MotionError, match="needs 3 frames at 40 fps, this motion has 1"):
         model.start(walk[:3])
@@ -226,7 +226,7 @@ def test_a_motion_that_does_not_fit_is_refused(model: ControlModel, clips: Path)
         model.start(walk.select(tuple(name for name in walk.channels if name != "rtoes.rx")))
 
 
-def test_frames_come_in_the_contract(model: ControlModel) -> None:
+def test_frames_come_in_the_contract(model: TdbnModel) -> None:
     session = model.start(characters=3)
     frame = session.step()
     assert frame.dtype == np.float32
@@ -239,7 +239,7 @@ def test_frames_come_in_the_contract(model: ControlModel) -> None:
 
 
 @pytest.mark.parametrize("variety", [0.0, 0.7])
-def test_the_net_runs_as_it_does_whatever_is_shown(model: ControlModel, variety: float) -> None:
+def test_the_net_runs_as_it_does_whatever_is_shown(model: TdbnModel, variety: float) -> None:
     smooth, plain = (model.start(characters=2, seed=1, variety=variety, smooth=s) for s in (True, False))
     changes = np.random.default_rng(0).uniform(size=(12, 2, 3))
     for control in changes.repeat([1, 1, 2, 3, 5, 1, 8, 2, 1, 1, 4, 9], axis=0):
@@ -249,7 +249,7 @@ def test_the_net_runs_as_it_does_whatever_is_shown(model: ControlModel, variety:
         np.testing.assert_allclose(smooth.snapshot().history, plain.snapshot().history, atol=1e-6)
 
 
-def test_a_smooth_frame_is_the_mean_of_those_around_it(model: ControlModel) -> None:
+def test_a_smooth_frame_is_the_mean_of_those_around_it(model: TdbnModel) -> None:
     """Under one control, against a loop over frames; before the first are those of the start."""
     plain = model.start(smooth=False).frames(np.eye(3)[[0] * 60])[0].astype(np.float64)
     shown = model.start().frames(np.eye(3)[[0] * 50])[0]
@@ -260,7 +260,7 @@ def test_a_smooth_frame_is_the_mean_of_those_around_it(model: ControlModel) -> N
         np.testing.assert_allclose(found, sum(w * f for w, f in around) / sum(weights), atol=1e-3)
 
 
-def test_no_joint_leaps_when_the_control_does(model: ControlModel) -> None:
+def test_no_joint_leaps_when_the_control_does(model: TdbnModel) -> None:
     track = np.random.default_rng(0).uniform(size=(60, 3)).repeat(10, axis=0)
     leaps = [np.abs(np.diff(model.start(smooth=s).frames(track)[0], axis=0)).max() for s in (True, False)]
     assert leaps[0] <= 1.8 * 360 / 40 + 1e-3
@@ -272,7 +272,7 @@ def test_no_joint_leaps_when_the_control_does(model: ControlModel) -> None:
     assert np.abs(last.max(axis=0) - plain.max(axis=0)).max() < 15
 
 
-def test_frames_that_were_given_can_be_changed(model: ControlModel) -> None:
+def test_frames_that_were_given_can_be_changed(model: TdbnModel) -> None:
     first, other = model.start(), model.start()
     for _ in range(5):
         frame = first.step()
@@ -280,14 +280,14 @@ def test_frames_that_were_given_can_be_changed(model: ControlModel) -> None:
         frame += 100
 
 
-def test_what_is_shown_is_not_late(model: ControlModel) -> None:
+def test_what_is_shown_is_not_late(model: TdbnModel) -> None:
     smooth, plain = (model.start("run", smooth=s).frames(np.eye(3)[[1] * 400])[0, 200:] for s in (True, False))
     moving = model.contract.std > 5
     apart = [np.square(smooth[10:-10] - np.roll(plain, lag, axis=0)[10:-10])[:, moving].mean() for lag in range(-3, 4)]
     assert int(np.argmin(apart)) - 3 == 0
 
 
-def test_a_snapshot_knows_what_has_been_run_ahead(model: ControlModel) -> None:
+def test_a_snapshot_knows_what_has_been_run_ahead(model: TdbnModel) -> None:
     session = model.start(characters=2, seed=4, variety=0.3)
     session.frames(_track(model)[:13])
     saved, after = session.snapshot(), []
@@ -303,7 +303,7 @@ def test_a_snapshot_knows_what_has_been_run_ahead(model: ControlModel) -> None:
         session.restore(plain.snapshot())
 
 
-def _track(model: ControlModel) -> np.ndarray:
+def _track(model: TdbnModel) -> np.ndarray:
     return control_track(parse_script(SCRIPT, model.labels), model.labels, model.fps)
 
 

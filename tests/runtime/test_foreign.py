@@ -15,9 +15,9 @@ from test_retarget import SKELETONS, angles_between
 import motet
 from motet.errors import MotionError
 from motet.formats.writable import with_names
-from motet.models.control import ControlModel
 from motet.models.describe import DescribeModel
 from motet.models.predict import PredictModel
+from motet.models.tdbn_control import TdbnModel
 from motet.motion import MIXAMO, Joint, Motion, Skeleton, global_transforms, positions
 from motet.motion.rotations import euler_to_rotmat, rotmats_to_euler
 
@@ -182,7 +182,7 @@ def turned(motion: Motion, turn: np.ndarray) -> Motion:
 
 
 def test_control_goes_on_from_another_figure(mixamo: Motion, walk: Motion) -> None:
-    model = motet.load_as(ControlModel, "cmu-control")
+    model = motet.load_as(TdbnModel, "cmu-control")
     found, expected = (model.run("walk 1s", motion) for motion in (mixamo, walk))
     knee = found.channels.index("ltibia.rx")
     assert np.abs(found.values[:, knee] - expected.values[:, knee]).mean() < 5

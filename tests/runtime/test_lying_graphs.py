@@ -12,7 +12,7 @@ from motet.bundle.bundle import Bundle
 from motet.bundle.graph import Arrays, Graph
 from motet.bundle.manifest import Manifest
 from motet.errors import BundleError
-from motet.models.codes import CodesModel
+from motet.models.generate_codes import CodesModel
 from motet.models.load import Model, build
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from motet.errors import ControlError, ScriptError
-from motet.models.script import Segment, control_track, parse_script, starts_of
+from motet.models.tdbn_script import Segment, control_track, parse_script, starts_of
 
 LABELS = ("walk", "run", "bend_over")
 

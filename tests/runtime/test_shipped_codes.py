@@ -11,7 +11,7 @@ import motet
 from motet.decode.codes import WINDOW, Drawing, Writer, drawn_steps
 from motet.decode.streaming_decoder import Unrolled
 from motet.errors import DecodingError, MotionError, TextError, TextWarning
-from motet.models.codes import CodesModel
+from motet.models.generate_codes import CodesModel
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
 

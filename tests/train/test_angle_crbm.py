@@ -10,7 +10,7 @@ import torch
 from control_runs import control_run
 
 from motet.bundle.manifest import Manifest
-from motet.models.control import ControlModel
+from motet.models.tdbn_control import TdbnModel
 from motet_export.bundles import export_run
 from motet_train.models.net import tuples
 from motet_train.papers.tdbn.angle_crbm import AngleCRBM, AngleCRBMConfig, from_config
@@ -40,7 +40,7 @@ def train(*labels: str, config: AngleCRBMConfig = SHORT) -> Run:
 @pytest.mark.slow
 def test_a_slow_rate_from_the_past_keeps_walking() -> None:
     run = train("walk", config=replace(AngleCRBMConfig(), iterations=10))
-    study = study_of(ControlModel(Manifest.from_json(run.manifest), run.torch_graphs()), read_clips())
+    study = study_of(TdbnModel(Manifest.from_json(run.manifest), run.torch_graphs()), read_clips())
     assert study.run is None
     assert set(experiments(study)) == {"cycle", "feet", "random", "sync"}
     figures = limit_cycle(study, seconds=30.0)
@@ -53,7 +53,7 @@ def test_a_slow_rate_from_the_past_keeps_walking() -> None:
 def test_with_one_control_unit_running_starts_and_never_ends() -> None:
     config = replace(AngleCRBMConfig(), iterations=10)
     run = train("walk", "run", config=replace(config, crbm=replace(config.crbm, epochs=150)))
-    study = study_of(ControlModel(Manifest.from_json(run.manifest), run.torch_graphs()), read_clips())
+    study = study_of(TdbnModel(Manifest.from_json(run.manifest), run.torch_graphs()), read_clips())
     assert np.isfinite(switch(study, "walk", "run", 4)[0]).all()
     assert not np.isfinite(switch(study, "run", "walk", 4)[0]).any()
 
@@ -96,7 +96,7 @@ def test_a_run_reads_back_exports_and_iterates_as_its_manifest_says(tmp_path: Pa
     again = Run.load(tmp_path)
     assert from_config(again.manifest["config"]).to_config() == tuples(run.manifest["config"])
     export_run(again, tmp_path / "bundle.zip")
-    model = ControlModel(Manifest.from_json(run.manifest), run.torch_graphs())
+    model = TdbnModel(Manifest.from_json(run.manifest), run.torch_graphs())
     found, three, one = (model.start(iterations=n).frames(np.eye(2)) for n in (None, 3, 1))
     np.testing.assert_array_equal(found, three)
     assert not np.array_equal(found, one)

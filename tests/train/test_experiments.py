@@ -15,8 +15,8 @@ from motet.bundle.graph import Arrays, GraphSpec, TensorSpec
 from motet.bundle.manifest import Manifest
 from motet.errors import OutputError
 from motet.formats import read_motion, write_motion
-from motet.models.control import ControlModel
 from motet.models.load import load
+from motet.models.tdbn_control import TdbnModel
 from motet.representation.contract import MotionContract
 from motet_train.cli.evaluate import _clips
 from motet_train.data.cmu_trials import CMU_FOLDER
@@ -60,7 +60,7 @@ def test_unclamped_control_units_make_the_state_leap(clips: Clips, clamped: bool
     config = TDBNConfig().unclamped()
     config = replace(config, clamped=clamped, rbm=replace(config.rbm, epochs=300))
     run = control_run(clips, config)
-    study = study_of(ControlModel(Manifest.from_json(run.manifest), run.torch_graphs()), clips)
+    study = study_of(TdbnModel(Manifest.from_json(run.manifest), run.torch_graphs()), clips)
     assert least < gait_transitions(study, count=8)["jump_ratio"] < most
 
 
@@ -148,7 +148,7 @@ def autoregression(study: ControlStudy) -> ControlStudy:
     outputs = (replace(codes, name="next_codes"), frame, replace(history, name="next_history"))
     step = FunctionGraph(linear.step, GraphSpec(inputs, outputs, {"history": "next_history"}))
     encoder = FunctionGraph(linear.encode, GraphSpec((replace(frame, name="frames"),), (codes,)))
-    model = ControlModel(study.model.manifest, {"encoder": encoder, "step": step})
+    model = TdbnModel(study.model.manifest, {"encoder": encoder, "step": step})
     return ControlStudy(model, study.reference, study.walk, study.run, study.bend, None)
 
 

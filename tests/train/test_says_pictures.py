@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import motet
-from motet.models.codes import CodesModel
+from motet.models.generate_codes import CodesModel
 from motet.motion.humanoid.retarget import on_humanoid
 from motet.motion.motion import Motion
 from motet_train.data.cmu_trials import CMU_FOLDER

@@ -13,8 +13,8 @@ from motet import to_humanoid
 from motet.bundle.manifest import Manifest
 from motet.cli import main
 from motet.formats import read_motion
-from motet.models.control import ControlModel
 from motet.models.load import build
+from motet.models.tdbn_control import TdbnModel
 from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.kinematics import positions
 from motet.representation import named
@@ -63,10 +63,10 @@ def folder(store: Store, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def model(folder: Path) -> ControlModel:
+def model(folder: Path) -> TdbnModel:
     run = Run.load(folder / "run")
     found = build(Manifest.from_json(run.manifest), run.torch_graphs())
-    assert isinstance(found, ControlModel)
+    assert isinstance(found, TdbnModel)
     return found
 
 
@@ -118,7 +118,7 @@ def test_steps_lead_where_the_representation_says() -> None:
     np.testing.assert_allclose(places, np.stack([x, z, facing], axis=1), atol=1e-12)
 
 
-def test_frames_become_the_poses_of_their_motion(model: ControlModel, store: Store) -> None:
+def test_frames_become_the_poses_of_their_motion(model: TdbnModel, store: Store) -> None:
     values = np.array(store.motion(0).values)
     values[0, :3] = 0  # a motion begins at the origin
     features = replace(store.motion(0), values=values)
@@ -133,7 +133,7 @@ def test_frames_become_the_poses_of_their_motion(model: ControlModel, store: Sto
     assert set(soles.sum(axis=1)) >= {1, 2}
 
 
-def test_a_figure_is_told_what_turns_it_to_where_it_shall_face(model: ControlModel) -> None:
+def test_a_figure_is_told_what_turns_it_to_where_it_shall_face(model: TdbnModel) -> None:
     session = Driven(model).start(characters=3, hold_feet=False)
     session.control(speed=1.8, direction=[0, 90, 180], facing=[0, 90, 0])
     told: list[Any] = []
@@ -145,7 +145,7 @@ def test_a_figure_is_told_what_turns_it_to_where_it_shall_face(model: ControlMod
     assert back == pytest.approx({**dict.fromkeys(LABELS, 0.0), "backward": 0.4}, abs=1e-9)
 
 
-def test_it_is_measured_as_a_steered_figure_without_a_rival(model: ControlModel, store: Store) -> None:
+def test_it_is_measured_as_a_steered_figure_without_a_rival(model: TdbnModel, store: Store) -> None:
     steered = as_steered(model)
     assert steered is not None
     with pytest.MonkeyPatch.context() as patch:
@@ -159,7 +159,7 @@ def test_it_is_measured_as_a_steered_figure_without_a_rival(model: ControlModel,
     assert list(report) == [*groups, *beside, "random_held"]
 
 
-def test_the_contract_makes_its_frames_travel(model: ControlModel) -> None:
+def test_the_contract_makes_its_frames_travel(model: TdbnModel) -> None:
     motion = model.run("forward 1s", in_place=True)
     assert motion.skeleton == HUMANOID
     assert len(motion) == 30

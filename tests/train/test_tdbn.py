@@ -7,7 +7,7 @@ import torch
 from control_runs import control_run
 
 from motet.bundle.manifest import Manifest
-from motet.models.control import ControlModel
+from motet.models.tdbn_control import TdbnModel
 from motet_train.models.net import tuples
 from motet_train.papers.tdbn.body import body_parts
 from motet_train.papers.tdbn.clips import read_clips
@@ -49,7 +49,7 @@ def test_a_run_reads_back_as_it_was(config: TDBNConfig, tmp_path: Path) -> None:
     assert other.manifest == run.manifest
     assert tuples(from_config(other.manifest["config"]).to_config()) == tuples(run.manifest["config"])
     frames = [
-        ControlModel(Manifest.from_json(r.manifest), r.torch_graphs()).start(seed=1, variety=0.5).frames(np.eye(3))
+        TdbnModel(Manifest.from_json(r.manifest), r.torch_graphs()).start(seed=1, variety=0.5).frames(np.eye(3))
         for r in (run, other)
     ]
     np.testing.assert_array_equal(*frames)
@@ -57,7 +57,7 @@ def test_a_run_reads_back_as_it_was(config: TDBNConfig, tmp_path: Path) -> None:
 
 def test_gibbs_iterations_run_where_there_are_free_units() -> None:
     run = train(replace(SHORT, free_units=8))
-    model = ControlModel(Manifest.from_json(run.manifest), run.torch_graphs())
+    model = TdbnModel(Manifest.from_json(run.manifest), run.torch_graphs())
     once, twice = (model.start(variety=1.0, iterations=n).frames(np.eye(3)) for n in (1, 2))
     assert once.shape == twice.shape == (1, 3, 59)
     assert not np.array_equal(once, twice)

@@ -12,7 +12,7 @@ from motet.cli.reading import Read, naming, out_option, read_options
 from motet.cli.writing import Output, size, write_options
 from motet.formats import names_motion
 from motet.formats.html import write as write_html
-from motet.models.controllable import Controllable
+from motet.models.control import ControlModel
 from motet.models.load import load_as
 
 
@@ -62,7 +62,7 @@ def control(
     With --bundle cmu-control: a label and seconds; a ramp "walk>run 5s"; a mix "walk*.3+run*.7 2s".
     """
     output.check(out)
-    model = load_as(Controllable, bundle, session)
+    model = load_as(ControlModel, bundle, session)
     captions = model.captions(script)
     with naming(start), noted():
         first = read(Path(start)) if start and (Path(start).suffix or names_motion(start)) else start

@@ -15,8 +15,8 @@ from motet.cli.options import session_options
 from motet.cli.reading import Tries, bar, naming, out_option, places
 from motet.cli.writing import Output, size, write_options
 from motet.formats import read_motion
-from motet.models.codes import CodesModel, Story
 from motet.models.generate import PLAYED, Generated, GenerateModel
+from motet.models.generate_codes import CodesModel, Story
 from motet.models.load import load_as
 from motet.motion.looping import looped
 

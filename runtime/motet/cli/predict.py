@@ -13,7 +13,7 @@ from motet.cli.options import session_options
 from motet.cli.reading import Read, Tries, bar, out_option, places, read_options, say_resampled
 from motet.cli.writing import Output, size, write_options
 from motet.errors import MotionError
-from motet.models.codes import CodesModel
+from motet.models.generate_codes import CodesModel
 from motet.models.load import load_as
 from motet.models.predict import MAX_SAMPLES, PredictModel
 from motet.motion.motion import Motion

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 from motet.decode.codes import Drawing
 from motet.decode.continue_codes import Ground, Pace, Shown, onward
 from motet.errors import DecodingError, MotionError
-from motet.models.codes import CodesModel
 from motet.models.generate import SETTLED, GenerateModel
+from motet.models.generate_codes import CodesModel
 from motet.models.progress import Progress, silent
 from motet.motion.feet.contacts import GROUND_PERCENT, feet_of, ground_of
 from motet.motion.feet.hold import hold_feet, windows

@@ -88,8 +88,8 @@ class Generated:
 
 
 class GenerateModel(LanguageModel):
-    """A model that puts words into motion: :class:`motet.models.mixture.MixtureModel` or
-    :class:`motet.models.codes.CodesModel`, as the bundle's loop says."""
+    """A model that puts words into motion: :class:`motet.models.generate_mixture.MixtureModel` or
+    :class:`motet.models.generate_codes.CodesModel`, as the bundle's loop says."""
 
     VERB = "generate"
 

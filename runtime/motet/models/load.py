@@ -10,20 +10,20 @@ from motet.bundle.manifest import Manifest
 from motet.bundle.session import SessionOptions
 from motet.errors import BundleError
 from motet.models.base import BundleModel
-from motet.models.codes import CodesModel
-from motet.models.control import ControlModel
 from motet.models.describe import DescribeModel
 from motet.models.fill import FillModel
 from motet.models.generate import GenerateModel
-from motet.models.mixture import MixtureModel
+from motet.models.generate_codes import CodesModel
+from motet.models.generate_mixture import MixtureModel
 from motet.models.predict import PredictModel
 from motet.models.search import SearchModel
 from motet.models.steer import SteerModel
+from motet.models.tdbn_control import TdbnModel
 
-Model = ControlModel | DescribeModel | FillModel | GenerateModel | PredictModel | SearchModel | SteerModel
+Model = TdbnModel | DescribeModel | FillModel | GenerateModel | PredictModel | SearchModel | SteerModel
 Kind = TypeVar("Kind", bound=BundleModel)
 
-_KINDS: tuple[type[Model], ...] = (ControlModel, DescribeModel, FillModel, MixtureModel, PredictModel, SearchModel)
+_KINDS: tuple[type[Model], ...] = (TdbnModel, DescribeModel, FillModel, MixtureModel, PredictModel, SearchModel)
 VERBS: dict[str, type[Model]] = {kind.VERB: kind for kind in _KINDS}
 """Verb of a bundle -> the class of its model, where the loop does not say another."""
 
@@ -34,7 +34,7 @@ BY_LOOP: dict[str, type[Model]] = {"codes": CodesModel, "matching": SteerModel}
 @overload
 def load(name_or_path: Literal["control"], options: SessionOptions | None = None) -> SteerModel: ...
 @overload
-def load(name_or_path: Literal["cmu-control"], options: SessionOptions | None = None) -> ControlModel: ...
+def load(name_or_path: Literal["cmu-control"], options: SessionOptions | None = None) -> TdbnModel: ...
 @overload
 def load(name_or_path: Literal["describe"], options: SessionOptions | None = None) -> DescribeModel: ...
 @overload

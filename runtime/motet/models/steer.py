@@ -12,10 +12,10 @@ from motet.bundle.graph import Arrays, Graph
 from motet.bundle.manifest import Manifest
 from motet.decode.matching import FEATURES, Matcher, Playing, Table
 from motet.errors import BundleError, ControlError
-from motet.models.control import MAX_CHARACTERS
-from motet.models.controllable import Controllable
+from motet.models.control import ControlModel
 from motet.models.steer_script import captions, parse_orders
 from motet.models.steer_session import SteerSession
+from motet.models.tdbn_control import MAX_CHARACTERS
 from motet.motion.humanoid.bones import BONES
 from motet.motion.motion import Motion
 from motet.motion.pose import Pose
@@ -26,7 +26,7 @@ CHANNELS = (*ROOT_SIXD, *(f"{bone}.{kind}" for bone in BONES for kind in KINDS))
 """In the order of a pose's numbers."""
 
 
-class SteerModel(Controllable):
+class SteerModel(ControlModel):
     """A figure to be steered; any number of sessions and threads share it.
 
     graphs: "encoder" (rotations, height -> codes), "rows" (row -> frames, features, gaits, left), and "step", see
@@ -150,7 +150,7 @@ class SteerModel(Controllable):
         return self.start(orders[0].gait if start is None else start, hold_feet=hold_feet).run(script)[0]
 
     def captions(self, script: str) -> list[tuple[float, str]]:
-        """See :meth:`Controllable.captions`."""
+        """See :meth:`ControlModel.captions`."""
         return captions(parse_orders(script, self.gaits))
 
     def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:

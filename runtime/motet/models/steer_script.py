@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from motet.errors import ScriptError
-from motet.models.script import MAX_SECONDS
+from motet.models.tdbn_script import MAX_SECONDS
 
 SECONDS = {"turn": 1.5, "stop": 1.5}
 """How long an order takes that does not say it; a gait takes 2."""

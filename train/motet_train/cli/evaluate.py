@@ -14,7 +14,6 @@ from tqdm import tqdm
 from motet.bundle.manifest import Manifest
 from motet.bundle.session import SessionOptions
 from motet.cli.options import session_options
-from motet.models.control import ControlModel
 from motet.models.describe import DescribeModel
 from motet.models.fill import FillModel
 from motet.models.generate import GenerateModel
@@ -22,6 +21,7 @@ from motet.models.load import Model, build, load, load_as
 from motet.models.predict import PredictModel
 from motet.models.search import SearchModel
 from motet.models.steer import SteerModel
+from motet.models.tdbn_control import TdbnModel
 from motet_train.cli.evaluate_fill import fill_figures
 from motet_train.cli.evaluate_language import by_subject, language_reports
 from motet_train.cli.evaluate_predict import predict_reports
@@ -142,7 +142,7 @@ def _measured(
 ) -> tuple[dict[str, Any], str]:
     """The figures of each model, ready for JSON, and all of them as text."""
     steered = {name: one for name, model in models.items() if (one := as_steered(model)) is not None}
-    controls = {name: m for name, m in models.items() if isinstance(m, ControlModel) and name not in steered}
+    controls = {name: m for name, m in models.items() if isinstance(m, TdbnModel) and name not in steered}
     others = {
         name: model for name, model in models.items() if isinstance(model, DescribeModel | GenerateModel | SearchModel)
     }
@@ -183,7 +183,7 @@ def _filled(models: Mapping[str, FillModel], data: Path | None, plots: Path | No
 
 
 def _control(
-    models: Mapping[str, ControlModel], data: Path | None, plots: Path | None, unit: str | None
+    models: Mapping[str, TdbnModel], data: Path | None, plots: Path | None, unit: str | None
 ) -> dict[str, Report]:
     reports: dict[str, Report] = {}
     for name, model in models.items():
@@ -198,7 +198,7 @@ def _control(
     return reports
 
 
-def _clips(name: str, model: ControlModel, data: Path | None, unit: str | None = None) -> Clips:
+def _clips(name: str, model: TdbnModel, data: Path | None, unit: str | None = None) -> Clips:
     """The clips in ``data``, else those that training was given, else CMU's; DataError where they are gone."""
     if data is None:
         data = _given(Path(name), str(model.manifest.training.get("command", "")))

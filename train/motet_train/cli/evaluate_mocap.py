@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 
-from motet.models.codes import CodesModel
+from motet.models.generate_codes import CodesModel
 from motet.models.load import load_as
 from motet.motion.kinematics import skeleton_of
 from motet.motion.motion import Motion

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from motet.bundle.manifest import Manifest
-from motet.models.codes import CodesModel
 from motet.models.generate import GenerateModel
+from motet.models.generate_codes import CodesModel
 from motet.models.search import SearchModel
 from motet_train.data.errors import DataError
 from motet_train.evaluate.tables import Report

@@ -7,9 +7,9 @@ from typing import cast
 import click
 from tqdm import tqdm
 
-from motet.models.control import ControlModel
 from motet.models.load import Model
 from motet.models.steer import SteerModel
+from motet.models.tdbn_control import TdbnModel
 from motet_train.data.store import Store
 from motet_train.evaluate.steer.report import Recorded, steer_report
 from motet_train.evaluate.tables import Report
@@ -18,7 +18,7 @@ from motet_train.papers.tdbn.driven import Driven
 
 def as_steered(model: Model) -> SteerModel | None:
     """What is measured as a figure that is steered: a model of them, or what stands for it; None for all others."""
-    if isinstance(model, ControlModel) and Driven.fits(model):
+    if isinstance(model, TdbnModel) and Driven.fits(model):
         return cast(SteerModel, Driven(model))
     return model if isinstance(model, SteerModel) else None
 

@@ -18,7 +18,7 @@ import numpy as np
 from tqdm import tqdm
 
 from motet.errors import MotionError
-from motet.models.codes import CodesModel
+from motet.models.generate_codes import CodesModel
 from motet.models.predict import PredictModel
 from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.humanoid.retarget import on_humanoid

@@ -10,8 +10,8 @@ from tqdm import tqdm
 
 from motet.bundle.graph import Floats
 from motet.errors import TextError
-from motet.models.codes import CodesModel
 from motet.models.generate import GenerateModel
+from motet.models.generate_codes import CodesModel
 from motet.models.search import SearchModel
 from motet.motion.motion import Motion
 from motet_train.data.errors import DataError

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from motet.bundle.graph import Floats
-from motet.models.control import ControlModel
+from motet.models.tdbn_control import TdbnModel
 from motet.motion.feet.contacts import ContactSettings, standing
 from motet.motion.feet.lock import FootLock
 from motet.motion.humanoid.bones import sole_points
@@ -37,11 +37,11 @@ class Driven:
     """A control model with the labels of :mod:`motet_train.papers.tdbn.courses`, to be measured in place of
     :class:`motet.models.steer.SteerModel`: the part of it that measures use."""
 
-    model: ControlModel
+    model: TdbnModel
     gaits: tuple[str, ...] = tuple(SPEEDS)
 
     @staticmethod
-    def fits(model: ControlModel) -> bool:
+    def fits(model: TdbnModel) -> bool:
         """Whether a model is such a net."""
         return model.labels == LABELS and model.contract.representation == "root_sixd"
 
@@ -63,7 +63,7 @@ class Driven:
 class DrivenSession:
     """Figures that are told what :class:`motet.models.steer_session.SteerSession` is told."""
 
-    def __init__(self, model: ControlModel, characters: int, hold_feet: bool) -> None:
+    def __init__(self, model: TdbnModel, characters: int, hold_feet: bool) -> None:
         self.session, self.fps = model.start(characters=characters), model.fps
         self.ground = np.zeros((characters, 3))
         self.told = np.zeros((3, characters))

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from motet.bundle.manifest import Manifest
-from motet.models.control import ControlModel
+from motet.models.tdbn_control import TdbnModel
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
 from motet.representation.contract import MotionContract, living
@@ -91,7 +91,7 @@ def _missed(
 
     def missed(enough: int) -> list[str]:
         run = Run(manifest, deepcopy(net).cpu())
-        model = ControlModel(Manifest.from_json(run.manifest), run.torch_graphs())
+        model = TdbnModel(Manifest.from_json(run.manifest), run.torch_graphs())
         return missed_goals(study_of(model, clips), enough)
 
     return missed

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from motet.models.control import ControlModel
+from motet.models.tdbn_control import TdbnModel
 from motet_train.data.errors import DataError
 from motet_train.evaluate.tables import Goals, Report, reached
 from motet_train.papers.tdbn.body import BodyParts, body_parts
@@ -59,7 +59,7 @@ GOALS: Goals = {
 ROLES = re.compile(r"(?<![a-z])(?:walk|run|bend)(?![a-z])")
 
 
-def study_of(model: ControlModel, clips: Clips) -> ControlStudy:
+def study_of(model: TdbnModel, clips: Clips) -> ControlStudy:
     """A model beside the clips it was trained on; DataError where clips and model do not go together.
 
     The first two periodic labels are taken for walk and run (those of these names first), the first other for bend.
@@ -133,7 +133,7 @@ def by_label(study: ControlStudy, name: str) -> str:
     return ROLES.sub(lambda role: getattr(study, role[0]) or role[0], name)
 
 
-def _legs(model: ControlModel, parts: BodyParts) -> tuple[Leg, Leg] | None:
+def _legs(model: TdbnModel, parts: BodyParts) -> tuple[Leg, Leg] | None:
     if not parts.legs:
         return None
     # codes are the channels themselves, or as many of each part

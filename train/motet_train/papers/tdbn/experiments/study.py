@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from motet.models.control import ControlModel, ControlSession
+from motet.models.tdbn_control import TdbnModel, TdbnSession
 from motet.motion.rotations import Array
 from motet_train.papers.tdbn.experiments.measures import ARRIVED, Reference, arrival, upsample
 from motet_train.papers.tdbn.period import period
@@ -50,7 +50,7 @@ class ControlStudy:
     legs: the left and the right one, where the skeleton has legs.
     """
 
-    model: ControlModel
+    model: TdbnModel
     reference: Reference
     walk: str
     run: str | None
@@ -74,15 +74,13 @@ class ControlStudy:
             track[..., self.model.labels.index(getattr(self, role))] = value
         return track
 
-    def start(self, history: Codes, **options: Any) -> ControlSession:
+    def start(self, history: Codes, **options: Any) -> TdbnSession:
         """A session whose characters have the given histories (B, K, H)."""
         session = self.model.start(characters=len(history), smooth=False, **options)
         session.restore(replace(session.snapshot(), history=history.astype(np.float32)))
         return session
 
-    def play(
-        self, session: ControlSession, track: Array, force: Callable[[int, Codes], None] | None = None
-    ) -> Recording:
+    def play(self, session: TdbnSession, track: Array, force: Callable[[int, Codes], None] | None = None) -> Recording:
         """Run a control track (T, L) or (T, B, L); ``force(t, codes)`` may overwrite a tick's codes (B, H) in place."""
         frames, codes = [], []
         for time, control in enumerate(track):
@@ -100,7 +98,7 @@ class ControlStudy:
         track = np.repeat(self.control(**{role: 1.0})[None], self.frames(seconds), axis=0)
         return self.play(self.start(history, **options), track)
 
-    def settle(self, session: ControlSession, control: Array, seconds: float) -> None:
+    def settle(self, session: TdbnSession, control: Array, seconds: float) -> None:
         """Run under constant control values (B, L), of which nothing is recorded."""
         session.set_control(control)
         for _ in range(self.frames(seconds)):

@@ -27,7 +27,7 @@ SHOWN = 200
 """Characters of a long script that an error shows around the place."""
 
 MAX_SECONDS = 3600.0
-"""A script is laid out in memory before it runs; longer ones are for a loop over ``ControlSession.step``."""
+"""A script is laid out in memory before it runs; longer ones are for a loop over ``TdbnSession.step``."""
 
 
 @dataclass(frozen=True)
