@@ -24,10 +24,9 @@ from motet.models.language import MAX_SECONDS
 from motet.motion.humanoid.bones import BONES, HUMANOID
 from motet.motion.humanoid.retarget import from_humanoid, to_humanoid
 from motet.motion.humanoid.rigs import MIXAMO
-from motet.motion.kinematics import global_transforms, skeleton_of
+from motet.motion.kinematics import global_transforms, motion_of, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.skeleton import Skeleton
-from motet.motion.world_rotations import motion_of
 
 ARCHIVES = ("cmu-asfamc.zip", "cmu-asfamc-more.zip", "cmu-bvh.zip", "cmu-bvh-more.zip", "accad-bvh.zip")
 

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from motet.formats.glb import FLOAT, INDICES, UINT16, UINT32, VERTICES, Buffer, container
 from motet.motion.humanoid.bones import PARENTS
-from motet.motion.humanoid.rest_pose import swing
-from motet.motion.rotations import rotmat_to_quat
+from motet.motion.rotations import rotmat_to_quat, swing
 
 Array = NDArray[np.float64]
 

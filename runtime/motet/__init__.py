@@ -44,8 +44,7 @@ from motet.models.search import SearchModel
 from motet.models.steer import SteerModel
 from motet.models.steer_session import SteerSession, SteerSnapshot
 from motet.models.tdbn_control import TdbnModel, TdbnSession, TdbnSnapshot
-from motet.motion.humanoid.joint_map import read_map
-from motet.motion.humanoid.retarget import Humanoid, from_humanoid, to_humanoid
+from motet.motion.humanoid import Humanoid, from_humanoid, read_map, to_humanoid
 from motet.motion.motion import Motion
 from motet.motion.pose import Pose
 

@@ -12,10 +12,16 @@ from motet.files import place_of
 from motet.formats import READABLE, clips, read_motion
 from motet.formats.clips import Clip, chosen, split_clip
 from motet.motion.heading import heading
-from motet.motion.humanoid.bones import HUMANOID, ground_under, leg_length
-from motet.motion.humanoid.fitting import sole_points
-from motet.motion.humanoid.mmm_figure import is_mmm, with_figure
-from motet.motion.humanoid.retarget import SURE, Humanoid, to_humanoid
+from motet.motion.humanoid import (
+    HUMANOID,
+    SURE,
+    Humanoid,
+    ground_under,
+    is_mmm,
+    leg_length,
+    to_humanoid,
+    with_figure,
+)
 from motet.motion.kinematics import global_transforms, positions
 from motet.motion.motion import Motion
 
@@ -117,7 +123,7 @@ def _heights(motion: Motion, found: Humanoid) -> tuple[float, float]:
     fitted, turn = found.figure.fitted, found.figure.turn
     rotations = global_transforms(found.motion)[0]
     places = positions(with_figure(motion) if is_mmm(motion) else motion) @ turn.T
-    soles = sole_points(fitted, {bone: rotations[:, HUMANOID.index(bone)] for bone in fitted.heights}, places)
+    soles = fitted.soles({bone: rotations[:, HUMANOID.index(bone)] for bone in fitted.heights}, places)
     lowest = min(float(places[..., 1].min()), float(soles[..., 1].min()))
     metres = (found.leg or leg_length()) / fitted.leg
     return ground_under(soles) * metres, lowest * metres

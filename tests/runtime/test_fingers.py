@@ -6,8 +6,8 @@ from test_retarget import angles_between, dancing
 
 from motet.motion import HUMANOID, Joint, Motion, Skeleton, from_humanoid, local_rotations, positions
 from motet.motion.humanoid.bones import LEFT_RIGHT
+from motet.motion.kinematics import motion_of
 from motet.motion.rotations import Array, rotvec_to_rotmat
-from motet.motion.world_rotations import motion_of
 
 FINGERS = {"Thumb": 0.05, "Index": 0.03, "Middle": 0.01, "Ring": -0.01, "Little": -0.03}
 """Finger -> how far before the middle of the hand it begins, in metres."""

@@ -2,10 +2,12 @@ import numpy as np
 import pytest
 from figures import walker
 
+import motet
 from motet.errors import MotionError
 from motet.formats import read_motion, write_motion
+from motet.motion import mirroring
 from motet.motion.kinematics import positions, with_channels
-from motet.motion.mirror import lateral_axis, mirror
+from motet.motion.mirroring import lateral_axis, mirror
 from motet.motion.motion import Motion
 from motet.motion.sides import partners_of
 from motet.motion.skeleton import Joint, Skeleton
@@ -109,3 +111,8 @@ def test_what_cannot_be_mirrored_is_refused():
         mirror(Motion(np.zeros((1, 1)), ("root.rx",), ("deg",), 30, line_of("root", "spine")))
     with pytest.raises(MotionError, match="not mirror images"):
         mirror(Motion(np.zeros((1, 1)), ("root.rx",), ("deg",), 30, line_of("root", "lleg", "rleg")))
+
+
+def test_the_function_does_not_hide_a_module():
+    assert motet.motion.mirror is mirroring.mirror
+    assert not callable(motet.motion.mirroring)

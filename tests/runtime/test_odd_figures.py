@@ -13,12 +13,10 @@ from motet.formats import read_motion
 from motet.formats.writable import with_names
 from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.humanoid.retarget import SURE, from_humanoid, to_humanoid
-from motet.motion.kinematics import global_transforms, skeleton_of
+from motet.motion.kinematics import global_transforms, motion_of, skeleton_of
 from motet.motion.motion import Motion
-from motet.motion.products import product
-from motet.motion.rotations import Array
+from motet.motion.rotations import Array, product
 from motet.motion.skeleton import Joint, Skeleton
-from motet.motion.world_rotations import motion_of
 
 
 def apart(one: Motion, other: Motion, but: tuple[str, ...] = ("!",)) -> float:

@@ -6,7 +6,7 @@ from fake_fill import CONTRACT, glider
 
 from motet.motion.humanoid.bones import BONES, HUMANOID
 from motet.motion.kinematics import positions
-from motet.motion.mirror import mirror as mirrored
+from motet.motion.mirroring import mirror as mirrored
 from motet.motion.motion import Motion
 from motet.motion.rotations import axis_to_rotmat, rotvec_to_rotmat
 from motet.representation.placed import (

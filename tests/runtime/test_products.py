@@ -1,9 +1,7 @@
 import numpy as np
 import pytest
 
-from motet.motion.humanoid.rest_pose import swing
-from motet.motion.products import inverse, product, rotated
-from motet.motion.rotations import frames_last, rotvec_to_rotmat
+from motet.motion.rotations import frames_last, inverse, product, rotated, rotvec_to_rotmat, swing
 
 RNG = np.random.default_rng(3)
 TURNS = rotvec_to_rotmat(RNG.normal(size=(7, 5, 3)))

@@ -10,11 +10,10 @@ from motet.formats.writable import with_names
 from motet.motion.humanoid.bones import BONES, HUMANOID, REST, sole_points
 from motet.motion.humanoid.joint_tree import map_by_tree
 from motet.motion.humanoid.retarget import Humanoid, from_humanoid, to_humanoid
-from motet.motion.kinematics import global_transforms, skeleton_of
+from motet.motion.kinematics import global_transforms, motion_of, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Joint, Skeleton
-from motet.motion.world_rotations import motion_of
 
 SKELETONS = Path(__file__).parent / "skeletons"
 

@@ -11,7 +11,7 @@ from test_retarget import SKELETONS, dancing, skeleton_file
 import motet
 from motet.errors import MotionError
 from motet.motion import HUMANOID, Motion, Skeleton, from_humanoid, global_transforms, in_place, positions
-from motet.motion.world_rotations import motion_of
+from motet.motion.kinematics import motion_of
 
 
 def test_the_way_over_the_ground_goes_and_all_else_stays() -> None:

@@ -6,7 +6,7 @@ import torch
 from language_data import small_store, walker
 
 from motet.models.text import RULES
-from motet.motion.mirror import mirror
+from motet.motion.mirroring import mirror
 from motet.representation.root_block import to_root_block
 from motet_train.data.batch import Batch
 from motet_train.data.batches import Examples, examples, frame_mirror

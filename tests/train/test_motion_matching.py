@@ -11,7 +11,7 @@ from motet.decode.matching import ASKED, mirrored_features
 from motet.formats import read_motion
 from motet.motion.humanoid.bones import BONES, HUMANOID
 from motet.motion.kinematics import positions
-from motet.motion.mirror import mirror
+from motet.motion.mirroring import mirror
 from motet.motion.motion import Motion
 from motet.representation import named
 from motet.representation.contract import MotionContract

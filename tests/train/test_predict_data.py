@@ -12,7 +12,7 @@ from motet.errors import FormatError
 from motet.formats import read_motion
 from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.kinematics import positions, skeleton_of
-from motet.motion.mirror import mirror
+from motet.motion.mirroring import mirror
 from motet.motion.motion import Motion
 from motet.motion.rotations import continuous_rotvec, rotmat_to_euler, rotmat_to_rotvec, rotvec_to_rotmat
 from motet.motion.skeleton import END_SUFFIX

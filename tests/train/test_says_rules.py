@@ -11,7 +11,7 @@ from says_figures import HIPS, leaping, led, shifted, standing, stepping, times,
 from motet.formats import read_motion
 from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.humanoid.retarget import to_humanoid
-from motet.motion.mirror import mirror
+from motet.motion.mirroring import mirror
 from motet_train.data.errors import DataError
 from motet_train.evaluate.text_adherence.prompts import RULES, actions, holds, prompts
 from motet_train.evaluate.text_adherence.track import RATE, Track, calm, longest, spells, swings, track_of

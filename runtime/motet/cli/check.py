@@ -19,8 +19,7 @@ from motet.errors import FormatError, MotetError
 from motet.files import files_in
 from motet.formats import CLIPPED, MOCAP, READS, html
 from motet.formats.clips import MARK
-from motet.motion.humanoid.figure_checks import UNITS
-from motet.motion.humanoid.retarget import to_humanoid
+from motet.motion.humanoid import UNITS, to_humanoid
 from motet.motion.motion import Motion
 
 HEAD = ("figure", "sure", "tall m", "seconds", "fps", "facing", "ground m", "travel m", "notes")

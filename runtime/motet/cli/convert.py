@@ -12,11 +12,10 @@ from motet.cli.writing import Output, size, write_options
 from motet.formats import READS, WRITES, write_motion
 from motet.motion.feet.hold import hold_feet as feet_held
 from motet.motion.feet.root_path import lay_root_path
-from motet.motion.humanoid.joint_map import read_map
-from motet.motion.humanoid.retarget import to_humanoid
+from motet.motion.humanoid import read_map, to_humanoid
 from motet.motion.kinematics import skeleton_of
 from motet.motion.looping import looped
-from motet.motion.mirror import mirror as mirrored
+from motet.motion.mirroring import mirror as mirrored
 from motet.motion.motion import Motion
 from motet.motion.units import METRES
 

@@ -11,7 +11,7 @@ import click
 from motet.formats import ONTO, WRITABLE, check_writable, read_character, write_all_on, write_on
 from motet.formats.character import Character, put_onto
 from motet.formats.lines import Names
-from motet.motion.humanoid.rigs import RIGS
+from motet.motion.humanoid import RIGS
 from motet.motion.motion import Motion
 from motet.motion.root_motion import in_place
 

@@ -22,7 +22,7 @@ from motet.errors import FormatError, MotionError, OutputError
 from motet.files import File, check_place, place_of
 from motet.formats.character import Character, put_onto
 from motet.formats.clips import Clip, split_clip
-from motet.motion.humanoid.rigs import rig
+from motet.motion.humanoid import rig
 from motet.motion.motion import Motion
 from motet.motion.skeleton import Skeleton
 from motet.motion.units import metres

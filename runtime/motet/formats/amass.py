@@ -15,11 +15,10 @@ from motet.errors import FormatError
 from motet.files import File, place_of
 from motet.formats.lines import frame_rate, read_bytes
 from motet.formats.npy import array
+from motet.motion.kinematics import motion_of
 from motet.motion.motion import Motion
-from motet.motion.products import product
-from motet.motion.rotations import Array, rotvec_to_rotmat
+from motet.motion.rotations import Array, product, rotvec_to_rotmat
 from motet.motion.skeleton import Joint, Skeleton
-from motet.motion.world_rotations import motion_of
 
 JOINTS = (
     ("pelvis", -1, (0.0, 0.0, 0.0)),

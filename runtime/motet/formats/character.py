@@ -5,8 +5,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from motet.errors import MotionError
-from motet.motion.humanoid.joint_map import JointMap
-from motet.motion.humanoid.retarget import from_humanoid, grounded, on_humanoid
+from motet.motion.humanoid import JointMap, from_humanoid, grounded, on_humanoid
 from motet.motion.motion import Motion
 from motet.motion.root_motion import travel_on_root
 from motet.motion.rotations import Array

@@ -19,10 +19,9 @@ from motet.formats.gltf_figures import Figure, above, figure_of, figures, likeli
 from motet.formats.gltf_tracks import FPS, Tracks, moved, tracks
 from motet.formats.lines import Names
 from motet.formats.nodes import Poses, motion_of_nodes, rested
-from motet.motion.humanoid.bones import BONES
+from motet.motion.humanoid import BONES
 from motet.motion.motion import Motion
-from motet.motion.products import product, rotated
-from motet.motion.rotations import Array, frames_last, quat_to_rotmat
+from motet.motion.rotations import Array, frames_last, product, quat_to_rotmat, rotated
 
 EXTENSIONS = (".glb", ".gltf", ".vrm", ".vrma")
 """What these files are called."""

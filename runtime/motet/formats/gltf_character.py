@@ -19,12 +19,10 @@ from motet.formats.gltf_data import Gltf, parse
 from motet.formats.gltf_rest import Rest, at_rest
 from motet.formats.gltf_skin import skin_of
 from motet.formats.gltf_tracks import FPS
-from motet.motion.humanoid.bones import BONES, REQUIRED
-from motet.motion.humanoid.joint_map import JointMap, check_map
+from motet.motion.humanoid import BONES, REQUIRED, JointMap, check_map
 from motet.motion.kinematics import local_rotations, local_translations
 from motet.motion.motion import Motion
-from motet.motion.products import product
-from motet.motion.rotations import Array, quat_to_rotmat, rotmat_to_quat
+from motet.motion.rotations import Array, product, quat_to_rotmat, rotmat_to_quat
 from motet.motion.skeleton import Skeleton
 
 STILL = 1e-6

@@ -11,11 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from motet.errors import FormatError, MotionError
+from motet.motion.kinematics import motion_of
 from motet.motion.motion import Motion
-from motet.motion.products import inverse, product, rotated
-from motet.motion.rotations import Array
+from motet.motion.rotations import Array, inverse, product, rotated
 from motet.motion.skeleton import Joint, Skeleton
-from motet.motion.world_rotations import motion_of
 
 STILL = 1e-4
 """A joint stays at its offset where it is nowhere further from it than this part of the figure's height."""

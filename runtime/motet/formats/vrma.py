@@ -12,9 +12,7 @@ import numpy as np
 from motet.errors import MotionError
 from motet.files import File, write_whole
 from motet.formats.glb import Buffer, Track, animation, container, joint_nodes, joint_tracks
-from motet.motion.humanoid.bones import BONES, HUMANOID, LEFT_RIGHT, sided
-from motet.motion.humanoid.fingers import relaxed
-from motet.motion.humanoid.retarget import grounded, on_humanoid
+from motet.motion.humanoid import BONES, HUMANOID, LEFT_RIGHT, grounded, on_humanoid, relaxed, sided
 from motet.motion.motion import Motion
 from motet.motion.rotations import rotmat_to_quat
 from motet.motion.skeleton import Joint, Skeleton

@@ -22,7 +22,7 @@ from motet.models import steer_session
 from motet.models.steer import SteerModel
 from motet.motion import two_bone
 from motet.motion.feet import lock as foot_lock
-from motet.motion.humanoid.bones import BONES, HUMANOID
+from motet.motion.humanoid import BONES, HUMANOID
 
 FINE = 16
 """Steps of a feature in 8 bits: features are multiples of 1 / FINE."""

@@ -14,7 +14,7 @@ import numpy as np
 from motet.errors import ControlError, ControlWarning, MotetError, quoted
 from motet.models.steer import SteerModel
 from motet.models.steer_session import LARGEST
-from motet.motion.humanoid.bones import BONES, HUMANOID
+from motet.motion.humanoid import BONES, HUMANOID
 from motet.motion.pose import Pose
 
 MOST = 16

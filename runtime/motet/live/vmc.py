@@ -15,7 +15,7 @@ from motet.bundle.graph import Floats
 from motet.errors import OutputError
 from motet.models.steer import SteerModel
 from motet.models.steer_script import parse_orders
-from motet.motion.humanoid.bones import BONES, HUMANOID
+from motet.motion.humanoid import BONES, HUMANOID
 from motet.motion.pose import Pose
 
 try:

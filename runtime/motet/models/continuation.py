@@ -15,8 +15,7 @@ from motet.models.generate_codes import CodesModel
 from motet.models.progress import Progress, silent
 from motet.motion.feet.contacts import GROUND_PERCENT, feet_of, ground_of
 from motet.motion.feet.hold import hold_feet, windows
-from motet.motion.humanoid.bones import HUMANOID
-from motet.motion.humanoid.retarget import Figure
+from motet.motion.humanoid import HUMANOID, Figure
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array

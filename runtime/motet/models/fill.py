@@ -13,8 +13,7 @@ from motet.errors import BundleError, MotionError
 from motet.models.base import BundleModel
 from motet.models.gaps import Gap, at_own_rate, log_elsewhere, spans_of
 from motet.motion.follow import alike, following
-from motet.motion.humanoid.bones import HUMANOID
-from motet.motion.humanoid.retarget import on_humanoid
+from motet.motion.humanoid import HUMANOID, on_humanoid
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.representation.placed import CHANNELS, bridge, placed, pose_of, put_at, seen_from, unplaced

@@ -20,7 +20,7 @@ from motet.models.continuation import carried_on, futures, together
 from motet.models.generate import GenerateModel
 from motet.models.progress import Progress, silent
 from motet.models.seeds import seeds_of
-from motet.motion.humanoid.retarget import Figure
+from motet.motion.humanoid import Figure
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 

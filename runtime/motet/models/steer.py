@@ -16,7 +16,7 @@ from motet.models.control import ControlModel
 from motet.models.steer_script import captions, parse_orders
 from motet.models.steer_session import SteerSession
 from motet.models.tdbn_control import MAX_CHARACTERS
-from motet.motion.humanoid.bones import BONES
+from motet.motion.humanoid import BONES
 from motet.motion.motion import Motion
 from motet.motion.pose import Pose
 from motet.motion.rotations import rotmat_to_quat

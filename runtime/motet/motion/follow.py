@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from motet.motion.humanoid.retarget import from_humanoid, on_humanoid
+from motet.motion.humanoid import from_humanoid, on_humanoid
 from motet.motion.kinematics import (
     AXES,
     continued,
@@ -16,8 +16,7 @@ from motet.motion.kinematics import (
     skeleton_of,
 )
 from motet.motion.motion import Motion
-from motet.motion.products import inverse, product, rotated
-from motet.motion.rotations import Array, axis_to_rotmat
+from motet.motion.rotations import Array, axis_to_rotmat, inverse, product, rotated
 
 log = logging.getLogger(__name__)
 

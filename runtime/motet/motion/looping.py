@@ -11,11 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from motet.errors import MotionError
-from motet.motion.humanoid.spread import twist
 from motet.motion.kinematics import AXES, global_transforms, local_rotations, local_translations, posed, skeleton_of
 from motet.motion.motion import TURN, Motion
-from motet.motion.products import inverse, product, rotated
-from motet.motion.rotations import Array, rotmat_to_rotvec, rotvec_to_rotmat
+from motet.motion.rotations import UP, Array, inverse, product, rotated, rotmat_to_rotvec, rotvec_to_rotmat, twist
 
 SHORTEST = 0.7
 """Seconds that a loop takes at least: a stride of a run."""
@@ -34,8 +32,6 @@ which is no more than strides of a steady walk differ by."""
 
 MOST = 1500
 """Frames that are compared, each with each: of longer motions every second or third, and then those in between."""
-
-UP = np.array([0.0, 1.0, 0.0])
 
 
 def looped(motion: Motion, shortest: float = SHORTEST) -> Motion:

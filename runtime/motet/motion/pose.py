@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.motion.humanoid.bones import BONES, HUMANOID
+from motet.motion.humanoid import BONES, HUMANOID
 from motet.motion.quaternions import quat_product, quat_rotated, wrapped
 
 Floats = NDArray[np.float32]

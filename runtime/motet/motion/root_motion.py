@@ -3,16 +3,12 @@
 import numpy as np
 
 from motet.errors import MotionError
+from motet.motion.humanoid import JointMap, map_of
 from motet.motion.humanoid.fitting import fit
-from motet.motion.humanoid.joint_map import JointMap
-from motet.motion.humanoid.retarget import map_of
 from motet.motion.humanoid.upright import upright
 from motet.motion.kinematics import AXES, global_transforms, local_translations, posed, skeleton_of, with_channels
 from motet.motion.motion import Motion
-from motet.motion.products import inverse, rotated
-from motet.motion.rotations import Array
-
-Y = np.array([0.0, 1.0, 0.0])
+from motet.motion.rotations import UP, Array, inverse, rotated
 
 AT_FLOOR = 0.3
 """Of the figure's height: a root this far below what carries legs and back rests at the floor."""
@@ -48,7 +44,7 @@ def travel_on_root(motion: Motion, joint_map: JointMap | None = None) -> Motion:
         return motion
     moves = local_translations(motion)[:, [0, joint]]
     rotations, places = global_transforms(motion)
-    way = (places[:, joint] - places[:, 0]) * (1 - Y)
+    way = (places[:, joint] - places[:, 0]) * (1 - UP)
     moves[:, 0] += way
     moves[:, 1] -= rotated(inverse(rotations[:, skeleton.joints[joint].parent]), way)
     names = tuple(f"{skeleton.names[i]}.t{axis}" for i in (0, joint) for axis in AXES)
@@ -73,5 +69,5 @@ def _carrier(motion: Motion) -> tuple[int, Array]:
         joint_map, transforms = map_of(motion), global_transforms(motion)
         turn = upright(fit(skeleton, joint_map, *transforms), transforms[1]).turn
     except MotionError:
-        return 0, Y
-    return joint_map.carrier(skeleton), turn.T @ Y
+        return 0, UP
+    return joint_map.carrier(skeleton), turn.T @ UP

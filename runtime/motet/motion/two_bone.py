@@ -5,8 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from motet.motion.products import product, rotated
-from motet.motion.rotations import Array, rotvec_to_rotmat
+from motet.motion.rotations import Array, product, rotated, rotvec_to_rotmat, swing, unit
 
 SHORTEST = -0.95
 """The cosine of the angle by which a knee bends at most, 162 degrees: what would bend it more is not reached."""
@@ -59,8 +58,8 @@ class Leg:
         after = np.arccos(np.clip(cosine, SHORTEST, 1.0))
         bend = rotvec_to_rotmat(self._axis * (after - bent))
         ankle = self.knee - self.hip + rotated(bend, self.ankle - self.knee)
-        swing = _shortest_turn(ankle, target - self.hip)
-        return swing, product(swing, bend)
+        turn = swing(ankle, target - self.hip)
+        return turn, product(turn, bend)
 
     @cached_property
     def _upper(self) -> Array:
@@ -73,7 +72,7 @@ class Leg:
     @cached_property
     def _axis(self) -> Array:
         along = self.knee - self.hip
-        return _unit(self.hinge - _dot(self.hinge, along) / _dot(along, along) * along)
+        return unit(self.hinge - _dot(self.hinge, along) / _dot(along, along) * along)
 
     @cached_property
     def _bent(self) -> Array:
@@ -85,22 +84,13 @@ class Leg:
     @cached_property
     def _in_plane(self) -> Array:
         """The part of the shin that is in the plane of the bend."""
-        out = _dot(_unit(self.ankle - self.knee), self._axis)
+        out = _dot(unit(self.ankle - self.knee), self._axis)
         return np.sqrt(np.maximum(1 - out**2, 1e-12))
 
     @cached_property
     def _longest(self) -> Array:
         upper, lower = self._upper, self._lower
         return np.sqrt(upper**2 + lower**2 + 2 * upper * lower * self._in_plane)
-
-
-def _shortest_turn(start: Array, end: Array) -> Array:
-    """Rotations (T, 3, 3) from the direction of one vector (T, 3) to that of another, which is not its opposite."""
-    start, end = _unit(start), _unit(end)
-    axis = np.cross(start, end)
-    sine = _length(axis)
-    angle = np.arctan2(sine, _dot(start, end))
-    return rotvec_to_rotmat(axis * angle / np.maximum(sine, 1e-12))
 
 
 def _dot(one: Array, other: Array) -> Array:
@@ -111,7 +101,3 @@ def _dot(one: Array, other: Array) -> Array:
 def _length(vectors: Array) -> Array:
     found: Array = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return found
-
-
-def _unit(vectors: Array) -> Array:
-    return vectors / np.maximum(_length(vectors), 1e-12)

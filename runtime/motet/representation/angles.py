@@ -9,7 +9,7 @@ from motet.errors import MotionError
 from motet.motion.feet.contacts import has_feet
 from motet.motion.feet.hold import hold_feet
 from motet.motion.feet.root_path import lay_root_path
-from motet.motion.mirror import mirror
+from motet.motion.mirroring import mirror
 from motet.motion.motion import Motion
 from motet.representation.base import FrameMirror, in_units
 
@@ -43,7 +43,7 @@ class Angles:
         return features
 
     def mirror(self, features: Motion) -> FrameMirror:
-        """By :mod:`motet.motion.mirror`."""
+        """By :mod:`motet.motion.mirroring`."""
         # each column of a probe frame holds its own number: where mirroring puts it, and with which sign, can be read
         count = len(features.channels)
         probe = Motion(np.arange(1.0, count + 1)[None], features.channels, features.units, 1.0, features.skeleton)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from motet.errors import MotionError
 from motet.motion.kinematics import AXES, skeleton_of
-from motet.motion.mirror import lateral_axis
+from motet.motion.mirroring import lateral_axis
 from motet.motion.motion import Motion
 from motet.motion.skeleton import Skeleton
 

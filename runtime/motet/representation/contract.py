@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from motet.errors import MotionError
-from motet.motion.humanoid.retarget import Figure, logged, to_humanoid
+from motet.motion.humanoid import Figure, to_humanoid
+from motet.motion.humanoid.retarget import logged
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton

@@ -9,11 +9,10 @@ x and its y axis point in its parent's frame (:mod:`motet.representation.root_si
 
 import numpy as np
 
-from motet.motion.humanoid.bones import BONES
+from motet.motion.humanoid import BONES
 from motet.motion.kinematics import AXES, continued, local_rotations, skeleton_of
 from motet.motion.motion import Motion
-from motet.motion.products import inverse, product
-from motet.motion.rotations import Array, rotmat_to_rotvec, rotvec_to_rotmat
+from motet.motion.rotations import Array, inverse, product, rotmat_to_rotvec, rotvec_to_rotmat
 from motet.motion.sides import partners_of
 from motet.representation.base import FrameMirror
 from motet.representation.root_sixd import KINDS, ROOT_SIXD, SIGNS, rotmat_to_sixd, sixd_to_rotmat

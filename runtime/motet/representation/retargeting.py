@@ -7,25 +7,23 @@ from dataclasses import replace
 import numpy as np
 
 from motet.errors import MotionError, listed
-from motet.motion.humanoid.bones import HUMANOID
+from motet.motion.humanoid import HUMANOID, Figure, from_humanoid, is_mmm, map_of, on_humanoid
 from motet.motion.humanoid.figure_checks import leg_of, unit_of
-from motet.motion.humanoid.mmm_figure import is_mmm
 from motet.motion.humanoid.rest_pose import aims_of
-from motet.motion.humanoid.retarget import Figure, figure_like, from_humanoid, map_of, on_humanoid, poses_on
+from motet.motion.humanoid.retarget import figure_like, poses_on
 from motet.motion.kinematics import (
     AXES,
     continued,
     euler_of,
+    local_of,
     local_rotations,
     local_translations,
     skeleton_of,
     with_channels,
 )
 from motet.motion.motion import Motion
-from motet.motion.products import inverse, product
-from motet.motion.rotations import Array, rotmat_to_rotvec, rotvec_to_rotmat
+from motet.motion.rotations import Array, inverse, product, rotmat_to_rotvec, rotvec_to_rotmat
 from motet.motion.skeleton import Skeleton
-from motet.motion.world_rotations import local_of
 from motet.representation.figure import other_bones
 
 log = logging.getLogger(__name__)

@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.motion.feet.hold import hold_feet
-from motet.motion.humanoid.bones import HUMANOID
+from motet.motion.humanoid import HUMANOID
 from motet.motion.kinematics import AXES, continued, local_rotations, skeleton_of
 from motet.motion.motion import Motion
-from motet.motion.products import product
-from motet.motion.rotations import Array, axis_to_rotmat, rotmat_to_quat
+from motet.motion.rotations import Array, axis_to_rotmat, product, rotmat_to_quat
 from motet.motion.sides import partners_of
 from motet.motion.skeleton import END_SUFFIX
 from motet.representation.base import FrameMirror, at_rest, lateral_x

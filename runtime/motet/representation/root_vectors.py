@@ -55,7 +55,7 @@ class RootVectors:
         return carry_on(after, features)
 
     def mirror(self, features: Motion) -> FrameMirror:
-        """As :func:`motet.motion.mirror.mirror` does it, for exponential maps in the parent joint's axes."""
+        """As :func:`motet.motion.mirroring.mirror` does it, for exponential maps in the parent joint's axes."""
         lateral_x(features)
         joints = joints_of(features.channels)
         places = {name: column for column, name in enumerate(features.channels)}

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from motet.decode.matching import AHEAD, haste, mirrored_features
 from motet.motion.feet.contacts import contacts_of
-from motet.motion.humanoid.bones import BONES, HUMANOID, LEFT_RIGHT, ground_under, sided, sole_points
+from motet.motion.humanoid import BONES, HUMANOID, LEFT_RIGHT, ground_under, sided, sole_points
 from motet.motion.kinematics import global_transforms
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, rotmat_to_quat

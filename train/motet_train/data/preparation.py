@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from motet.errors import MotionError
-from motet.motion.humanoid.retarget import on_humanoid
+from motet.motion.humanoid import on_humanoid
 from motet.motion.motion import Motion
 from motet.representation.contract import sequences
 from motet_train.data.trim import trim

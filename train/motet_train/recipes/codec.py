@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from motet.motion.humanoid.bones import LEFT_RIGHT, sided
+from motet.motion.humanoid import LEFT_RIGHT, sided
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
 from motet_train.data.batches import frame_mirror

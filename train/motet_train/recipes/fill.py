@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from motet.motion.humanoid.bones import HUMANOID, LEFT_RIGHT, sided
+from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, sided
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
 from motet.representation.placed import CHANNELS

@@ -9,7 +9,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from motet.motion.humanoid.bones import LEFT_RIGHT, sided
+from motet.motion.humanoid import LEFT_RIGHT, sided
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
 from motet_train.data.errors import DataError

@@ -15,15 +15,13 @@ from numpy.typing import NDArray
 
 from motet.errors import MotionError
 from motet.motion.feet.contacts import SOLES, ContactSettings, contacts_of, rise, smoothed
-from motet.motion.humanoid.bones import GROUND, HUMANOID, LEFT_RIGHT, ground_under, leg_length, sided
-from motet.motion.humanoid.fitting import Fitted, fit, sole_points
-from motet.motion.humanoid.retarget import map_of
+from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, ground_under, leg_length, map_of, sided, sole_points
+from motet.motion.humanoid.bones import GROUND
+from motet.motion.humanoid.fitting import fit
 from motet.motion.humanoid.upright import upright
 from motet.motion.kinematics import AXES, euler_of, global_transforms, skeleton_of, with_channels
 from motet.motion.motion import TURN, Motion
-from motet.motion.products import inverse, product
-from motet.motion.rotations import Array
-from motet.motion.skeleton import Skeleton
+from motet.motion.rotations import Array, inverse, product, rotated
 from motet.motion.two_bone import Leg
 
 
@@ -66,35 +64,46 @@ def hold_feet(motion: Motion, trembling: bool = False) -> Motion:
     """
     if len(motion) < 2:
         return motion
-    skeleton, joint_map = skeleton_of(motion), map_of(motion)
-    rotations, places = global_transforms(motion)
-    fitted = fit(skeleton, joint_map, rotations, places)
-    if not np.array_equal(upright(fitted, places).turn, np.eye(3)):
-        raise MotionError("this figure does not stand along y: turn it upright by to_humanoid")
-    soles, settings = _soles(skeleton, fitted, rotations, places), TREMBLING if trembling else RECORDED
-    places = places * (leg_length() / fitted.leg)
+    skeleton, (rotations, places) = skeleton_of(motion), global_transforms(motion)
+    known = _of_humanoid(rotations, places) if skeleton == HUMANOID else None
+    legs, scale, soles = known or _measured(motion, rotations, places)
+    settings, places = TREMBLING if trembling else RECORDED, places * scale
     turned = np.array(rotations)
-    for side, points in zip(LEFT_RIGHT, np.split(soles, 2, axis=1), strict=True):
-        joints = [joint_map.joints[sided(side, part)] for part in BENT]
-        bend = product(rotations[:, joints[1]], fitted.aligned[joints[1]])[..., 0]
+    for (joints, hinge), points in zip(legs, np.split(soles, 2, axis=1), strict=True):
         hip, knee, ankle = (places[:, joint] for joint in joints)
-        leg = Leg(hip, knee, ankle, bend)
+        leg = Leg(hip, knee, ankle, rotated(rotations[:, joints[1]], hinge))
         turns = leg.turns(_target(leg, points, motion.fps, settings))
         for joint, turn in zip(joints, (*turns, np.eye(3)), strict=True):
             hanging = list(skeleton.subtree(skeleton.names[joint]))
             turned[:, hanging] = product(turn[..., None, :, :], rotations[:, hanging])
-    return _with_joints(motion, [joint_map.joints[sided(side, part)] for side in LEFT_RIGHT for part in BENT], turned)
+    return _with_joints(motion, [joint for joints, _ in legs for joint in joints], turned)
 
 
-def _soles(skeleton: Skeleton, fitted: Fitted, rotations: Array, places: Array) -> Array:
-    """Points (T, P, 3) of both soles, first the left one, above a ground at 0, at the humanoid's size."""
-    joints = fitted.joint_map.joints
-    bones = {bone: product(rotations[:, joints[bone]], fitted.aligned[joints[bone]]) for bone in fitted.heights}
-    soles = sole_points(fitted, bones, places) * (leg_length() / fitted.leg)
+Legs = list[tuple[list[int], Array]]
+"""Of each side the joints of hip, knee and ankle, and the knee's axis (3,), to the left, in its joint's frame."""
+
+
+def _of_humanoid(rotations: Array, places: Array) -> tuple[Legs, float, Array]:
+    """As :func:`_measured`, of the humanoid itself."""
+    soles = sole_points(rotations, places)
+    soles[..., 1] -= ground_under(soles)
+    legs = [([HUMANOID.index(sided(side, part)) for part in BENT], np.array([1.0, 0.0, 0.0])) for side in LEFT_RIGHT]
+    return legs, 1.0, soles
+
+
+def _measured(motion: Motion, rotations: Array, places: Array) -> tuple[Legs, float, Array]:
+    """The legs, what makes lengths those of the humanoid's size, and points (T, P, 3) of both soles, first the left
+    one, above a ground at 0, at that size."""
+    joint_map = map_of(motion)
+    fitted = fit(skeleton_of(motion), joint_map, rotations, places)
+    if not np.array_equal(upright(fitted, places).turn, np.eye(3)):
+        raise MotionError("this figure does not stand along y: turn it upright by to_humanoid")
+    scale = leg_length() / fitted.leg
+    soles = fitted.soles(fitted.bones(rotations), places) * scale
     # how thick the soles of another figure are is not known: each of their points is on the ground where it is lowest
-    own = np.percentile(soles[..., 1], GROUND, axis=0)
-    soles[..., 1] -= ground_under(soles) if skeleton == HUMANOID else own
-    return soles
+    soles[..., 1] -= np.percentile(soles[..., 1], GROUND, axis=0)
+    sides = [[joint_map.joints[sided(side, part)] for part in BENT] for side in LEFT_RIGHT]
+    return [(joints, fitted.aligned[joints[1]][:, 0]) for joints in sides], scale, soles
 
 
 def _target(leg: Leg, points: Array, fps: float, settings: HoldSettings) -> Array:

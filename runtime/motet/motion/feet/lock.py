@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from motet.motion.humanoid.bones import BONES, HUMANOID, LEFT_RIGHT, SOLE, sided
+from motet.motion.humanoid import BONES, HUMANOID, LEFT_RIGHT, SOLE, sided
 from motet.motion.pose import Floats, Pose
 from motet.motion.quaternions import conjugate, quat_product, quat_rotated
 from motet.motion.rotations import rotmat_to_quat

@@ -1,1 +1,69 @@
-"""Any human figure to the humanoid and back: which joint is which bone, how it stands at rest, and its rotations."""
+"""Any human figure to the humanoid and back: which joint is which bone, how a figure stands, retargeting.
+
+Two doors: :func:`to_humanoid` and :func:`from_humanoid`, with a :class:`Figure` measured once for more than one motion.
+"""
+
+from motet.motion.humanoid.bones import (
+    ARM,
+    BONES,
+    HUMANOID,
+    LEFT_RIGHT,
+    LEG,
+    PARENTS,
+    REQUIRED,
+    REST,
+    SOLE,
+    ground_under,
+    leg_length,
+    sided,
+    sole_points,
+)
+from motet.motion.humanoid.figure_checks import UNITS
+from motet.motion.humanoid.fingers import relaxed
+from motet.motion.humanoid.joint_map import JointMap, check_map, read_map
+from motet.motion.humanoid.mmm_figure import is_mmm, with_figure
+from motet.motion.humanoid.retarget import (
+    SURE,
+    Figure,
+    Humanoid,
+    from_humanoid,
+    grounded,
+    map_of,
+    on_humanoid,
+    to_humanoid,
+)
+from motet.motion.humanoid.rigs import MIXAMO, RIGS, rig
+
+__all__ = [
+    "ARM",
+    "BONES",
+    "HUMANOID",
+    "LEFT_RIGHT",
+    "LEG",
+    "MIXAMO",
+    "PARENTS",
+    "REQUIRED",
+    "REST",
+    "RIGS",
+    "SOLE",
+    "SURE",
+    "UNITS",
+    "Figure",
+    "Humanoid",
+    "JointMap",
+    "check_map",
+    "from_humanoid",
+    "ground_under",
+    "grounded",
+    "is_mmm",
+    "leg_length",
+    "map_of",
+    "on_humanoid",
+    "read_map",
+    "relaxed",
+    "rig",
+    "sided",
+    "sole_points",
+    "to_humanoid",
+    "with_figure",
+]

@@ -11,8 +11,7 @@ the joint of the upper arm lies inside the shoulder's width, the ankle at the he
 
 import numpy as np
 
-from motet.motion.products import rotated
-from motet.motion.rotations import Array
+from motet.motion.rotations import Array, rotated
 from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
 
 LEFT_RIGHT = ("left", "right")

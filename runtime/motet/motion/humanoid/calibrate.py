@@ -14,19 +14,15 @@ from motet.motion.humanoid.bones import ARM, LEFT_RIGHT, LEG, sided
 from motet.motion.humanoid.joint_map import JointMap
 from motet.motion.humanoid.rest_pose import (
     Aims,
-    angle_between,
     direction,
     frame,
     humanoid_direction,
     middle,
     nearest_axes,
-    swing,
     to_left,
-    unit,
     with_columns,
 )
-from motet.motion.products import product
-from motet.motion.rotations import Array
+from motet.motion.rotations import Array, angle_between, product, swing, unit
 
 NEAR_AXES = 30.0
 """Degrees within which a joint's alignment is taken to be along its axes."""

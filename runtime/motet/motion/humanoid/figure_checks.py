@@ -7,8 +7,8 @@ import numpy as np
 from motet.errors import MotionError, listed
 from motet.motion.humanoid.bones import HUMANOID, LEFT_RIGHT, LEG, REST, SPINE, leg_length, sided
 from motet.motion.humanoid.joint_map import BY_THE_TREE, NEEDED, JointMap
-from motet.motion.humanoid.rest_pose import Aims, direction, legs_up, to_left, trunk_up, unit
-from motet.motion.rotations import Array
+from motet.motion.humanoid.rest_pose import Aims, direction, legs_up, to_left, trunk_up
+from motet.motion.rotations import Array, unit
 from motet.motion.skeleton import Skeleton
 
 UNITS = {

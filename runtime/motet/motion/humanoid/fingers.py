@@ -12,9 +12,8 @@ from itertools import pairwise
 import numpy as np
 
 from motet.motion.humanoid.bones import LEFT_RIGHT, sided
-from motet.motion.humanoid.rest_pose import unit
 from motet.motion.kinematics import chained
-from motet.motion.rotations import Array, rotvec_to_rotmat
+from motet.motion.rotations import Array, rotvec_to_rotmat, unit
 from motet.motion.skeleton import Skeleton
 
 BEND = (15.0, 25.0, 15.0)

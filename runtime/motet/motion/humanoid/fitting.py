@@ -19,10 +19,8 @@ from motet.motion.humanoid.rest_pose import (
     humanoid_direction,
     moves,
     to_left,
-    unit,
 )
-from motet.motion.products import rotated
-from motet.motion.rotations import Array
+from motet.motion.rotations import Array, product, rotated, unit
 from motet.motion.skeleton import Skeleton
 
 ALONG = 0.96
@@ -67,6 +65,20 @@ class Fitted:
     def at_rest(self) -> bool:
         """Whether A comes from the rest pose, every angle 0."""
         return self.up is not None
+
+    def bones(self, rotations: Array) -> dict[str, Array]:
+        """Rotations (T, 3, 3) of the humanoid's feet and toes, from those of the joints in the world (T, J, 3, 3)."""
+        joints = self.joint_map.joints
+        return {bone: product(rotations[:, joints[bone]], self.aligned[joints[bone]]) for bone in self.heights}
+
+    def soles(self, bones: dict[str, Array], places: Array) -> Array:
+        """Points (T, P, 3) of the soles, from the rotations of :meth:`bones` and positions (T, J, 3) of joints."""
+        scale, points = self.leg / leg_length(), []
+        for bone, height in self.heights.items():
+            for x, _, z in SOLE[bone.removeprefix("left").removeprefix("right")]:
+                point = np.array([x * scale, -height, z * scale])
+                points.append(places[:, self.joint_map.joints[bone]] + rotated(bones[bone], point))
+        return np.stack(points, axis=1)
 
 
 def fit(skeleton: Skeleton, joint_map: JointMap, rotations: Array, places: Array) -> Fitted:
@@ -158,16 +170,3 @@ def _heights(skeleton: Skeleton, joint_map: JointMap, leg: float, rise: Array | 
         below = 0.0 if rise is None else float(rise[joint] - rise[list(skeleton.subtree(skeleton.names[joint]))].min())
         heights[bone] = below if below > 0.3 * usual or bone.endswith("Toes") else usual
     return heights
-
-
-def sole_points(fitted: Fitted, turned: dict[str, Array], places: Array) -> Array:
-    """Points (T, P, 3) of a figure's soles, from its bones' rotations as the humanoid's and positions (T, J, 3)."""
-    scale = fitted.leg / leg_length()
-    points = []
-    for bone, height in fitted.heights.items():
-        for x, _, z in SOLE[bone.removeprefix("left").removeprefix("right")]:
-            points.append(
-                places[:, fitted.joint_map.joints[bone]]
-                + rotated(turned[bone], np.array([x * scale, -height, z * scale]))
-            )
-    return np.stack(points, axis=1)

@@ -13,10 +13,9 @@ import numpy as np
 from motet.errors import MotionError
 from motet.motion.humanoid.bones import ARM, LEFT_RIGHT, LEG, sided
 from motet.motion.humanoid.joint_map import BY_THE_TREE, JointMap, check_map
-from motet.motion.humanoid.rest_pose import unit
 from motet.motion.kinematics import local_translations, positions, skeleton_of
 from motet.motion.motion import Motion
-from motet.motion.rotations import Array
+from motet.motion.rotations import Array, unit
 from motet.motion.sides import LEFT, RIGHT, partners_of, sides_of
 from motet.motion.skeleton import END_SUFFIX, Skeleton
 

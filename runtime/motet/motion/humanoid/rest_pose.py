@@ -13,7 +13,7 @@ import numpy as np
 
 from motet.motion.humanoid.bones import ARM, HUMANOID, LEFT_RIGHT, LEG, sided
 from motet.motion.humanoid.joint_map import JointMap
-from motet.motion.rotations import Array, frames_last, rodrigues, rotvec_to_rotmat
+from motet.motion.rotations import Array, angle_between, frames_last, rotvec_to_rotmat, swing, unit
 from motet.motion.skeleton import Skeleton
 
 LIMBS = tuple(tuple(sided(side, part) for part in limb) for side in LEFT_RIGHT for limb in (LEG, ARM[1:]))
@@ -29,27 +29,6 @@ ALONG_AXES = np.cos(np.radians(18))
 
 Aims = Mapping[str, tuple[int, ...]]
 """For a bone of a limb the joints whose mean place it points to."""
-
-
-def unit(vectors: Array) -> Array:
-    """Vectors (..., 3) of length 1; zero vectors stay."""
-    lengths = np.sqrt(np.einsum("...i,...i->...", vectors, vectors))[..., None]
-    scaled: Array = vectors / np.where(lengths > 1e-12, lengths, 1.0)
-    return scaled
-
-
-def swing(start: Array, end: Array) -> Array:
-    """The shortest rotations (..., 3, 3) that turn directions (..., 3) into others; half a turn is about any axis."""
-    start, end = unit(start), unit(end)
-    axis, cosine = np.cross(start, end), np.sum(start * end, axis=-1)
-    versed = axis / np.maximum(1 + cosine, 1e-9)[..., None]
-    # 1 - (1 - cosine) and not the cosine itself: where a direction is 0, nothing is turned
-    turn = rodrigues(1 - np.sum(versed * axis, axis=-1), axis, versed, axis)
-    half = cosine < -1 + 1e-6
-    if half.any():
-        side = unit(np.cross(start, np.eye(3)[np.argmin(np.abs(start), axis=-1)]))
-        turn = np.where(half[..., None, None], 2 * side[..., :, None] * side[..., None, :] - np.eye(3), turn)
-    return turn
 
 
 def humanoid_direction(bone: str) -> Array:
@@ -181,11 +160,6 @@ def nearest_axes(rotation: Array) -> Array:
     """The rotation (3, 3) nearest to one given among the 24 that turn coordinate axes into coordinate axes."""
     nearest: Array = AXES_ROTATIONS[int(np.argmax(np.sum(AXES_ROTATIONS * rotation, axis=(1, 2))))]
     return nearest
-
-
-def angle_between(one: Array, other: Array) -> float:
-    """Angle in degrees between two rotations (3, 3)."""
-    return float(np.degrees(np.arccos(np.clip((np.sum(one * other) - 1) / 2, -1, 1))))
 
 
 def _axes_rotations() -> Array:

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from motet.errors import MotionError
-from motet.motion.humanoid import bones, fitting
+from motet.motion.humanoid import bones
 from motet.motion.humanoid.bones import HUMANOID, LEFT_RIGHT, NECK, PARENTS, SPINE, leg_length, sided
 from motet.motion.humanoid.figure_checks import check_frames, height_of, unit_of
 from motet.motion.humanoid.fingers import relaxed
@@ -22,15 +22,32 @@ from motet.motion.humanoid.joint_map import BY_THE_TREE, JointMap
 from motet.motion.humanoid.joint_names import HalfKnownError, map_by_names
 from motet.motion.humanoid.joint_tree import map_by_tree
 from motet.motion.humanoid.mmm_figure import is_mmm, with_figure
-from motet.motion.humanoid.rest_pose import middle, swing, to_left
-from motet.motion.humanoid.spread import spread, twist
+from motet.motion.humanoid.rest_pose import middle, to_left
 from motet.motion.humanoid.upright import upright
-from motet.motion.kinematics import global_transforms, local_rotations, local_translations, side_by_side, skeleton_of
+from motet.motion.kinematics import (
+    global_transforms,
+    local_rotations,
+    local_translations,
+    motion_of,
+    places_of,
+    side_by_side,
+    skeleton_of,
+)
 from motet.motion.motion import Motion
-from motet.motion.products import inverse, product, rotated
-from motet.motion.rotations import Array, angle_of, axis_to_rotmat, frames_last
+from motet.motion.rotations import (
+    Array,
+    angle_of,
+    axis_to_rotmat,
+    frames_last,
+    inverse,
+    product,
+    rotated,
+    rotmat_to_rotvec,
+    rotvec_to_rotmat,
+    swing,
+    twist,
+)
 from motet.motion.skeleton import END_SUFFIX, Skeleton
-from motet.motion.world_rotations import motion_of, places_of
 
 log = logging.getLogger(__name__)
 
@@ -300,7 +317,7 @@ def _soles(
             [places[:, joint, None] + rotated(turned[:, joint, None], skin[joint]) for joint in own], 1
         )
     bones = {bone: source[:, HUMANOID.index(bone)] for bone in fitted.heights}
-    return fitting.sole_points(fitted, bones, places)
+    return fitted.soles(bones, places)
 
 
 def _still(example: Motion, fitted: Fitted) -> tuple[Skeleton, Array]:
@@ -343,3 +360,22 @@ def _figure_rotations(source: Array, fitted: Fitted, skeleton: Skeleton, still: 
 
 def _chain(chain: list[Array], count: int) -> list[Array]:
     return list(np.moveaxis(spread(side_by_side(chain, len(chain[0])), count), 1, 0)) if count else []
+
+
+def spread(chain: Array, count: int) -> Array:
+    """World rotations (T, count, 3, 3) of another chain with the same ends, from those of a chain (T, N + 1, 3, 3).
+
+    The first rotation is that of the joint that carries the chain and is not among the result; the last of both
+    chains is the same. Between joints rotations go the shortest way, by how far up the chain they are.
+    """
+    last = chain.shape[1] - 1
+    places = np.arange(1, count + 1) * last / count
+    below = np.ceil(places).astype(int) - 1
+    part = places - below
+    shared: Array = chain[:, below + 1]
+    inner = np.flatnonzero(part < 1)
+    if len(inner):
+        lower = chain[:, below[inner]]
+        turn = rotmat_to_rotvec(product(inverse(lower), shared[:, inner]))
+        shared[:, inner] = product(lower, rotvec_to_rotmat(turn * part[inner, None]))
+    return shared

@@ -5,13 +5,11 @@ from typing import NamedTuple
 import numpy as np
 
 from motet.motion.humanoid.fitting import Fitted
-from motet.motion.humanoid.rest_pose import legs_up, middle, swing, trunk_up
-from motet.motion.rotations import Array
+from motet.motion.humanoid.rest_pose import legs_up, middle, trunk_up
+from motet.motion.rotations import UP, Array, swing
 
 ALONG = 0.82
 """Cosine from which on a body counts as standing along an axis."""
-
-Y = np.array([0.0, 1.0, 0.0])
 
 
 class Up(NamedTuple):
@@ -36,7 +34,7 @@ def upright(fitted: Fitted, places: Array) -> Up:
     if fitted.up is None or fitted.up[1] > 0.5:
         return _turned_frames(fitted, places)
     stands = float(np.median(trunk_up(places, fitted.joint_map) @ fitted.up)) > 0.7
-    return Up(swing(fitted.up, Y), "turned upright: the figure does not stand along y") if stands else STANDS
+    return Up(swing(fitted.up, UP), "turned upright: the figure does not stand along y") if stands else STANDS
 
 
 def _turned_frames(fitted: Fitted, places: Array) -> Up:
@@ -53,7 +51,7 @@ def _turned_frames(fitted: Fitted, places: Array) -> Up:
         return Up(
             np.eye(3), f"the body lies along {name} in most frames: if it stands there, export the file with y up"
         )
-    return Up(swing(up, Y), f"turned upright: the frames stand along {name}, the rest pose along y")
+    return Up(swing(up, UP), f"turned upright: the frames stand along {name}, the rest pose along y")
 
 
 def _walks(fitted: Fitted, places: Array, up: Array) -> bool:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from motet.models.fill import FillModel
 from motet.motion.feet.contacts import ContactSettings, ground_speeds, standing
-from motet.motion.humanoid.bones import HUMANOID, LEFT_RIGHT, sided
+from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, sided
 from motet.motion.rotations import Array
 from motet.representation.placed import PLACE, bridge, placed_by_way, straight
 from motet_train.data.errors import DataError

@@ -9,8 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from motet.motion.products import inverse, product
-from motet.motion.rotations import Array, rotmat_to_rotvec, rotvec_to_rotmat
+from motet.motion.rotations import Array, inverse, product, rotmat_to_rotvec, rotvec_to_rotmat
 
 ZERO, CONSTANT, DAMPED = "zero velocity", "constant velocity", "damped velocity"
 JOINTS = " of joints"

@@ -20,8 +20,7 @@ from tqdm import tqdm
 from motet.errors import MotionError
 from motet.models.generate_codes import CodesModel
 from motet.models.predict import PredictModel
-from motet.motion.humanoid.bones import HUMANOID
-from motet.motion.humanoid.retarget import on_humanoid
+from motet.motion.humanoid import HUMANOID, on_humanoid
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array

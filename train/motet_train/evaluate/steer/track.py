@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from motet.bundle.graph import Floats
-from motet.motion.humanoid.bones import HUMANOID, LEFT_RIGHT, sided, sole_points
+from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, sided, sole_points
 from motet.motion.pose import Pose
 from motet.motion.rotations import quat_to_rotmat
 from motet.representation.root_sixd import ROOT_SIXD

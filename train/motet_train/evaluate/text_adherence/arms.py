@@ -5,7 +5,7 @@ side: "left", "right", or "both", and where it says so "either".
 
 import numpy as np
 
-from motet.motion.humanoid.bones import HUMANOID, LEFT_RIGHT
+from motet.motion.humanoid import HUMANOID, LEFT_RIGHT
 from motet.motion.rotations import Array
 from motet_train.evaluate.text_adherence.track import RATE, Flags, Track, calm, longest, pair, spells, swings
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from motet.motion.humanoid.bones import HUMANOID, LEFT_RIGHT, REST, sided
+from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, REST, sided
 from motet_train.evaluate.text_adherence.track import RATE, Track, longest, spells, swings
 
 CLEAR = 0.1

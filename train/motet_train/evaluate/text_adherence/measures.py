@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from motet.motion.feet.contacts import ContactSettings, feet_of, ground_of, ground_speeds, standing
-from motet.motion.humanoid.bones import HUMANOID
+from motet.motion.humanoid import HUMANOID
 from motet.motion.rotations import Array
 from motet_train.evaluate.text_adherence.track import RATE, Track, pair
 

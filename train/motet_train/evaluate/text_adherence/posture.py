@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from motet.motion.humanoid.bones import LEFT_RIGHT, sided
+from motet.motion.humanoid import LEFT_RIGHT, sided
 from motet.motion.rotations import Array
 from motet_train.evaluate.text_adherence.track import RATE, Flags, Track, calm, longest, pair, spells, swings
 

@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import find_objects, label, uniform_filter1d
 
-from motet.motion.humanoid.bones import HUMANOID, LEFT_RIGHT, sided
-from motet.motion.humanoid.retarget import on_humanoid
+from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, on_humanoid, sided
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
 from motet.motion.resample import resampled

@@ -15,7 +15,7 @@ from motet.bundle.graph import Floats
 from motet.models.tdbn_control import TdbnModel
 from motet.motion.feet.contacts import ContactSettings, standing
 from motet.motion.feet.lock import FootLock
-from motet.motion.humanoid.bones import sole_points
+from motet.motion.humanoid import sole_points
 from motet.motion.pose import Pose
 from motet.motion.quaternions import wrapped
 from motet.motion.rotations import Array, quat_to_rotmat, rotmat_to_quat

@@ -8,7 +8,7 @@ import numpy as np
 
 from motet.errors import MotionError
 from motet.motion.feet.root_path import lay_root_path
-from motet.motion.humanoid.retarget import map_of
+from motet.motion.humanoid import map_of
 from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
 from motet_train.evaluate.feet import acceleration, leap, slide, speed
