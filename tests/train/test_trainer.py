@@ -310,8 +310,10 @@ def test_learning_rates() -> None:
     decaying = Training(steps=100, learning_rate=1.0, decay=(0.95, 10))
     np.testing.assert_allclose([rate(decaying, step) for step in (9, 10, 35)], [1, 0.95, 0.95**3])
     wave = Training(steps=100, learning_rate=1.0, warm_up=4, cosine=True)
-    expected = [0, 0.5 * (0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * 0.02))), 0.505, 0.01]
+    expected = [0.25, 0.75 * (0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * 0.02))), 0.505, 0.01]
     np.testing.assert_allclose([rate(wave, step) for step in (0, 2, 50, 100)], expected)
+    warm = Training(epochs=9, learning_rate=2.0, warm_up=4)  # the first epoch learns, too
+    assert [rate(warm, done) for done in range(6)] == [0.5, 1.0, 1.5, 2.0, 2.0, 2.0]
 
 
 def test_l2_is_a_term_of_the_loss_and_leaves_biases_alone() -> None:

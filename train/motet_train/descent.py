@@ -32,8 +32,9 @@ class Training:
     """How a net is trained.
 
     epochs or steps: how long; one of the two. every: of these from one line of the log, validation and checkpoint to
-    the next. warm_up: over so many the learning rate rises from zero; falling: the share, at the end, over which it
-    falls linearly to zero; cosine: it falls to a hundredth along half a cosine; decay: a factor for every so many.
+    the next. warm_up: over this many the learning rate rises, by equal steps, to the whole; falling: the share, at the
+    end, over which it falls linearly to zero; cosine: it falls to a hundredth along half a cosine; decay: a factor for
+    every so many.
     l2: the weight of the squared weights, not biases, in the loss. weight_decay: of "adamw" and "muon", apart from
     the loss. clip: the greatest norm of the gradient. adversary: the weight of a discriminator's opinion in the loss.
     average: of the running mean of weights, which is then what is kept. keep: the weights of the "best" validation or
@@ -72,8 +73,8 @@ class Training:
 
 
 def rate(training: Training, done: int) -> float:
-    """The learning rate after so many epochs or steps."""
-    factor = min(1.0, done / training.warm_up) if training.warm_up else 1.0
+    """The learning rate of the epoch or step that begins after ``done`` of them."""
+    factor = min(1.0, (done + 1) / training.warm_up) if training.warm_up else 1.0
     if training.falling:
         factor *= min(1.0, (training.length - done) / (training.falling * training.length))
     if training.cosine:
