@@ -7,6 +7,7 @@ from control_runs import control_run
 
 from motet.errors import FormatError
 from motet.formats import read_motion, write_motion
+from motet_train.data import cmu_trials
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.errors import DataError
 from motet_train.papers.tdbn.body import body_parts
@@ -65,6 +66,12 @@ def test_a_length_unit_is_for_clips_that_do_not_state_theirs(tmp_path: Path) -> 
     assert read_clips(own_clips(tmp_path)).skeleton.metres_per_unit is None
     assert read_clips(tmp_path, unit="cm").skeleton.metres_per_unit == 1.0
     assert read_clips(unit="cm").skeleton == read_clips().skeleton  # AMC files state theirs, which stays
+
+
+def test_without_a_checkout_the_default_clips_are_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cmu_trials, "CMU_FOLDER", tmp_path)
+    with pytest.raises(DataError, match=r"39_14 is not installed: run this in a checkout .* or give --data"):
+        read_clips()
 
 
 def test_clips_that_do_not_go_together_are_named(tmp_path: Path) -> None:

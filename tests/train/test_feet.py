@@ -9,7 +9,7 @@ from motet.formats import read_motion
 from motet.motion.feet.contacts import smoothed
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
-from motet_train.data.cmu_trials import CMU_CLIPS, CMU_FOLDER
+from motet_train.data.cmu_trials import CMU_CLIPS, cmu_trial
 from motet_train.evaluate.feet import CALM, LOW, SHORTEST, acceleration, leap, slide, speed, stances
 
 Array = np.ndarray
@@ -85,7 +85,7 @@ def test_acceleration_of_a_fall_beside_the_root() -> None:
 
 @pytest.mark.parametrize(("label", "most"), [("walk", 0.035), ("run", 0.04)])
 def test_recorded_feet_stand_and_feet_that_are_made_to_slide_do_not(label: str, most: float) -> None:
-    motion = read_motion(CMU_FOLDER / CMU_CLIPS[label]).resample(FPS)
+    motion = read_motion(cmu_trial(CMU_CLIPS[label])).resample(FPS)
     places = positions(motion) * motion.skeleton.metres_per_unit
     points, root = places[:, [motion.skeleton.index(name) for name in ("ltoes", "rtoes")]], places[:, 0]
     assert 0.02 < slide(points, root, FPS) < most
@@ -97,7 +97,7 @@ def test_recorded_feet_stand_and_feet_that_are_made_to_slide_do_not(label: str, 
 
 
 def test_a_leap_is_the_angle_that_a_joint_turns_by() -> None:
-    motion = read_motion(CMU_FOLDER / CMU_CLIPS["bend"]).resample(FPS)
+    motion = read_motion(cmu_trial(CMU_CLIPS["bend"])).resample(FPS)
     still = replace(motion, values=np.repeat(motion.values[:1], 5, axis=0))
     values = np.array(still.values)
     values[3:, motion.channels.index("ltibia.rx")] += 71

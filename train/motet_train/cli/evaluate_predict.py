@@ -9,18 +9,18 @@ from tqdm import tqdm
 from motet.formats import read_motion
 from motet.motion.kinematics import skeleton_of
 from motet_train.cli.evaluate_mocap import mocap_reports
-from motet_train.data.cmu_trials import CMU_FOLDER
-from motet_train.data.predict_data import STRIDE
-from motet_train.evaluate.predict.seed_groups import drawn
+from motet_train.data.cmu_trials import cmu_trial
+from motet_train.evaluate.predict.seed_groups import Models, Ready, drawn
 from motet_train.papers.li2018 import curves, strips
 from motet_train.papers.li2018.expmap_files import CMU_LAYOUT, ExpmapCorpus, is_expmap, read_expmap
-from motet_train.papers.li2018.results import Models, Ready, Results, results_json, results_of, results_text
+from motet_train.papers.li2018.material import STRIDE
+from motet_train.papers.li2018.results import Results, results_json, results_of, results_text
 from motet_train.papers.li2018.text_floors import TEXT_FLOORS
 
 DRAWN = ("running", "jumping")
 """Actions of the text files of which stick figures are drawn (Li et al. 2018, figure 5)."""
 
-BONES = "39_14.amc"
+BONES = "39_14"
 """The trial whose skeleton they have: the text files do not hold one."""
 
 ERRORS = "predict-error"
@@ -62,7 +62,7 @@ def _draw(results: Results, plots: Path) -> None:
     errors = {action: {name: many[name][action] for name in many} for action in next(iter(many.values()))}
     drawings = {ERRORS: partial(error_over_time, errors, corpus.layout.fps / STRIDE, "Euler error")}
     if corpus.layout is CMU_LAYOUT:  # of Human3.6M's figure there are no bones
-        skeleton = skeleton_of(read_motion(CMU_FOLDER / BONES))
+        skeleton = skeleton_of(read_motion(cmu_trial(BONES)))
         for action in (action for action in DRAWN if action in corpus.test):
             poses = strips.strips(drawn(results.models, results.groups), corpus, action, skeleton)
             drawings[f"predict-{action}"] = partial(strips_drawing, poses, skeleton, strips.GIVEN)

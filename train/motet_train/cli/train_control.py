@@ -14,7 +14,7 @@ from motet_train.runs import Run
 DATA = click.option(
     "--data",
     type=Path,
-    help="Folder of clips LABEL.bvh and LABEL/*.bvh (or .amc .npz .csv). [default: three CMU trials]",
+    help="Folder of clips LABEL.bvh and LABEL/*.bvh (or .amc .npz .csv). [default: three CMU trials, in a checkout]",
 )
 
 # seed 6 is that of the bundle cmu-control

@@ -14,7 +14,7 @@ from motet.motion.skeleton import Skeleton
 from motet.representation.base import phases
 from motet.representation.contract import FLOORS
 from motet.representation.figure import in_joints_of
-from motet_train.data.cmu_trials import CMU_CLIPS, CMU_FOLDER, CMU_LICENCE
+from motet_train.data.cmu_trials import CMU_CLIPS, CMU_LICENCE, cmu_trial
 from motet_train.data.errors import DataError
 
 CONSTANT = FLOORS["deg"]
@@ -58,13 +58,13 @@ class Clips:
 
 
 def read_clips(folder: Path | None = None, root_rotation: bool = True, unit: str | float | None = None) -> Clips:
-    """Read labelled clips: from ``folder``, or the three CMU trials that come with motet.
+    """Read labelled clips: from ``folder``, or the three CMU trials of the repository.
 
     ``folder`` holds motion files, LABEL.bvh, and folders of them, LABEL/anything.bvh. Only joint angles are kept, in
     degrees, and with ``root_rotation`` the root's rotation with its heading taken out. unit: the length unit of
     files that do not state theirs, as in :func:`motet.read`. DataError or MotionError name the file that does not fit.
     """
-    paths = {label: [CMU_FOLDER / name] for label, name in CMU_CLIPS.items()} if folder is None else _find(folder)
+    paths = {label: [cmu_trial(name)] for label, name in CMU_CLIPS.items()} if folder is None else _find(folder)
     read = {
         label: [(path, _angles(read_motion(path, unit=unit), root_rotation)) for path in found]
         for label, found in paths.items()
