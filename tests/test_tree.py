@@ -19,6 +19,9 @@ TREES = {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in PAT
 FUNCTIONS = ast.FunctionDef | ast.AsyncFunctionDef
 
 HEAVY = ("torch", "onnx", "onnxscript", "scipy", "sklearn", "matplotlib", "sacrebleu", "tensorboard")
+PRODUCT = ("motet_train.data", "motet_train.models", "motet_train.evaluate", "motet_train.recipes")
+"""The rooms of training from the ground up; :mod:`motet_train.runs` names the nets of papers for all."""
+
 ONE_WAY = {
     "motet": ("motet_train", "motet_export", *HEAVY),
     "motet.motion": ("motet.representation", "motet.bundle", "motet.decode", "motet.models", "motet.formats"),
@@ -30,10 +33,10 @@ ONE_WAY = {
     "motet.models": ("motet.live", "motet.cli"),
     "motet.live": ("motet.cli",),
     "motet_train": ("motet_export",),
-    "motet_train.data": ("motet_train.models", "motet_train.recipes", "motet_train.evaluate", "motet_train.cli"),
-    "motet_train.models": ("motet_train.recipes", "motet_train.evaluate", "motet_train.cli"),
-    "motet_train.evaluate": ("motet_train.recipes", "motet_train.cli"),
-    "motet_train.recipes": ("motet_train.cli",),
+    "motet_train.data": (*PRODUCT[1:], "motet_train.papers", "motet_train.cli"),
+    "motet_train.models": (*PRODUCT[2:], "motet_train.papers", "motet_train.cli"),
+    "motet_train.evaluate": (*PRODUCT[3:], "motet_train.papers", "motet_train.cli"),
+    "motet_train.recipes": ("motet_train.papers", "motet_train.cli"),
     "motet_train.papers": ("motet_train.cli",),
 }
 """Package -> what its modules do not import when they are imported."""

@@ -20,7 +20,7 @@ from motet.representation import named
 from motet.representation.contract import MotionContract
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.errors import DataError
-from motet_train.data.predict_data import Material, expmap_material, store_material
+from motet_train.data.predict_data import Material, store_material
 from motet_train.data.preparation import FULL, VECTORS, Preparation
 from motet_train.data.records import Record
 from motet_train.data.split import split
@@ -36,6 +36,7 @@ from motet_train.papers.li2018.expmap_files import (
     read_expmap,
     scaling_of,
 )
+from motet_train.papers.li2018.material import expmap_material
 from motet_train.papers.li2018.protocol import (
     REPORTED,
     errors,

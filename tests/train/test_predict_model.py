@@ -15,13 +15,13 @@ from motet.cli import main
 from motet.formats import read_motion, write_motion
 from motet.models.predict import PredictModel
 from motet_train.data.cmu_trials import CMU_FOLDER
-from motet_train.data.predict_data import expmap_material
 from motet_train.evaluate.predict.floors import ZERO
 from motet_train.manifest import About
-from motet_train.models.predict.error_head import LEAST, SIGNS, Doubt, Signs
+from motet_train.models.predict.error_head import LEAST, SIGNS, ErrorHead, Signs
 from motet_train.models.predict.predictor import Predictor, PredictorConfig
 from motet_train.papers.li2018.curves import FEW, MEAN, complete, curves
 from motet_train.papers.li2018.expmap_files import CMU_ACTIONS, read_expmap
+from motet_train.papers.li2018.material import expmap_material
 from motet_train.papers.li2018.published_h36m import CONV
 from motet_train.recipes.predict import DEFAULT, train_predict
 from motet_train.recipes.recipe import Job
@@ -196,7 +196,7 @@ def test_doubt_finds_the_law_that_errors_follow() -> None:
     logarithms = torch.randn(4000, 3, SIGNS) * torch.tensor([1.0, 0.5, 2.0, 1.0, 0.1, 1.0]) - 2
     weight, bias = torch.tensor([0.5, 0, -0.2, 0.3, 0, 0.1]), torch.tensor([-3.0, -2.5, -2.0])
     mean = torch.exp((logarithms * weight).sum(-1) + bias)
-    doubt = Doubt(3)
+    doubt = ErrorHead(3)
     doubt.fit(logarithms, mean * torch.empty(4000, 3).exponential_())
     found = doubt(logarithms)
     assert float((found / mean).log().abs().mean()) < 0.08

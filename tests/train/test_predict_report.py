@@ -21,7 +21,6 @@ from motet.motion.kinematics import local_rotations, positions
 from motet.motion.rotations import axis_to_rotmat, rotmat_to_rotvec, rotvec_to_rotmat
 from motet_train.cli.evaluate_predict import predict_reports
 from motet_train.data.cmu_trials import CMU_FOLDER
-from motet_train.data.predict_data import expmap_material
 from motet_train.evaluate.predict.costs import cost_table, harness_table
 from motet_train.evaluate.predict.floors import CONSTANT, DAMPED, ZERO
 from motet_train.evaluate.predict.plots import _looks
@@ -31,6 +30,7 @@ from motet_train.papers.li2018.ablations import ablated, ablation_table
 from motet_train.papers.li2018.convseq2seq import Config
 from motet_train.papers.li2018.curves import COUNTS, MANY, MEAN, Curves, spreads_of
 from motet_train.papers.li2018.expmap_files import CMU_LAYOUT, H36M_LAYOUT, ExpmapCorpus, Layout, parse, read_expmap
+from motet_train.papers.li2018.material import expmap_material
 from motet_train.papers.li2018.protocol import windows
 from motet_train.papers.li2018.protocol_table import protocol_table
 from motet_train.papers.li2018.published_h36m import CONV, ERD, RRNN

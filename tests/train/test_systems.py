@@ -12,9 +12,9 @@ from click.testing import CliRunner, Result
 from test_predict_data import write_files
 
 from motet.cli import main
-from motet_train.data.predict_data import expmap_material, validation_files
 from motet_train.papers.li2018.convseq2seq import Config
 from motet_train.papers.li2018.expmap_files import read_expmap
+from motet_train.papers.li2018.material import expmap_material, validation_files
 from motet_train.papers.li2018.recipe import RECIPES, sized, validation_error
 from motet_train.papers.li2018.systems import SYSTEMS
 from motet_train.recipes.recipe import Recipe

@@ -23,9 +23,8 @@ from motet_train.evaluate.predict.mocap_table import (
     part_of,
     parts_of,
 )
-from motet_train.evaluate.predict.seed_groups import drawn, seed_groups
+from motet_train.evaluate.predict.seed_groups import Models, Ready, drawn, ready, seed_groups
 from motet_train.evaluate.tables import json_ready
-from motet_train.papers.li2018.results import Models, Ready, ready
 
 STRIPS = 3
 """Trials of motion files, about, of which stick figures are drawn."""

@@ -10,8 +10,9 @@ from motet_train.cli.prepare import CORPUS
 from motet_train.cli.prepared import prepared
 from motet_train.cli.train_options import train_command
 from motet_train.data.errors import DataError
-from motet_train.data.predict_data import Material, expmap_material, store_material
+from motet_train.data.predict_data import Material, store_material
 from motet_train.papers.li2018.expmap_files import ExpmapCorpus, is_expmap, read_expmap
+from motet_train.papers.li2018.material import expmap_material
 from motet_train.recipes.predict import RECIPES, train_predict
 from motet_train.recipes.recipe import Job
 from motet_train.runs import Run

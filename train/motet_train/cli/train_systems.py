@@ -8,7 +8,7 @@ import click
 
 from motet_train.cli.train_options import train_command
 from motet_train.cli.train_predict import AUGMENTATION, read_expmap_files
-from motet_train.data.predict_data import expmap_material, validation_files
+from motet_train.papers.li2018.material import expmap_material, validation_files
 from motet_train.papers.li2018.protocol import WINDOW
 from motet_train.papers.li2018.recipe import RECIPES, train_system
 from motet_train.papers.li2018.systems import TITLES

@@ -69,10 +69,11 @@ def train_predict(material: Material, job: Job) -> Run:
     net = _untrained(material, job.recipe)
     defaults = {"horizon": net.config.frames}
     manifest = job.manifest(material.contract, asdict(net.config), defaults, material.licence, {"data": material.about})
-    seed = net.config.seed_frames if material.layout is None else None  # text files are taken as they are
+    bones = material.contract.skeleton is not None
+    seed = net.config.seed_frames if bones else None  # text files are taken as they are
     windows = Windows(material, net.config.seed_frames + net.config.frames, **asdict(visits), seed=seed)
     times = _importance(net.config.frames).to(job.device)
-    places = VectorPlaces(material.contract).to(job.device) if material.layout is None else None
+    places = VectorPlaces(material.contract).to(job.device) if bones else None
 
     def batches(rng: np.random.Generator) -> Iterator[Tensor]:
         yield windows.draw(training.batch, rng)
@@ -80,7 +81,7 @@ def train_predict(material: Material, job: Job) -> Run:
     def validated() -> dict[str, float]:
         kept = learner.kept
         assert isinstance(kept, Predictor)
-        return {} if places is None or held is None else _doubting(kept, places, held)
+        return {} if places is None or held is None else _error_head_fitted(kept, places, held)
 
     held = windows.along(material.validation, APART).to(job.device) if net.config.doubts else None
     learner = GradientLearner(
@@ -100,7 +101,7 @@ def possible(visits: Visits, material: Material) -> Visits:
 def _untrained(material: Material, recipe: Recipe) -> Predictor:
     held, kept = material.held, list(material.kept)
     sides = {"mirrored": material.mirrored, "signs": material.signs}
-    doubts = material.layout is None and bool(material.mirrored) and len(material.validation) > 0
+    doubts = material.contract.skeleton is not None and bool(material.mirrored) and len(material.validation) > 0
     sizes = {"channels": len(material.contract.channels), "kept": material.kept, "held": held, "doubts": doubts}
     net = Predictor(recipe.sized(**sizes, **sides))
     if held not in (0, len(HELD_SCALES)):
@@ -128,7 +129,7 @@ def _length(vectors: Tensor) -> Tensor:
 
 
 @torch.no_grad()
-def _doubting(net: Predictor, places: VectorPlaces, held: Tensor) -> dict[str, float]:
+def _error_head_fitted(net: Predictor, places: VectorPlaces, held: Tensor) -> dict[str, float]:
     """Teach a net how far off it is where it was not trained; the mean distance of joints there, in centimetres."""
     net.eval()
     held = torch.cat([held, net.mirror(held)])

@@ -14,9 +14,8 @@ from scipy.stats import spearmanr
 
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
-from motet_train.evaluate.predict.error_rows import ErrorRows
+from motet_train.evaluate.predict.error_rows import REPORTED, ErrorRows
 from motet_train.evaluate.predict.mocap import PLACE, Measured
-from motet_train.papers.li2018.protocol import REPORTED
 
 QUARTERS = ("least expected", "second", "third", "most expected")
 """Of the windows, by what is expected at a frame."""

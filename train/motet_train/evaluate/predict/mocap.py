@@ -13,9 +13,9 @@ from motet.representation import named
 from motet_train.data.errors import DataError
 from motet_train.data.store import Entry, Store
 from motet_train.evaluate.predict import mocap_floors
+from motet_train.evaluate.predict.error_rows import REPORTED
 from motet_train.evaluate.predict.mocap_floors import Decays, Windows, apart, places
 from motet_train.evaluate.tables import Report
-from motet_train.papers.li2018.protocol import REPORTED
 
 Distances = dict[str, dict[str, Array]]
 """System -> measure -> mean distance (N,) in centimetres at each predicted frame."""

@@ -5,12 +5,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from motet_train.data.store import Entry
-from motet_train.evaluate.predict.error_rows import BRACKETS, ErrorRows
+from motet_train.evaluate.predict.error_rows import BRACKETS, REPORTED, ErrorRows
 from motet_train.evaluate.predict.floors import CONSTANT, DAMPED, FLOORS, ZERO, key
 from motet_train.evaluate.predict.kinds import by_kind
 from motet_train.evaluate.predict.mocap import PLACE, POSE, Distances, Measured, to_json
 from motet_train.evaluate.predict.seed_groups import SeedGroup, pooled, spread
-from motet_train.papers.li2018.protocol import REPORTED
 
 TITLES = {PLACE: "joints in the world, cm", POSE: "joints relative to the root, cm"}
 

@@ -12,10 +12,16 @@ import numpy as np
 from motet.bundle.manifest import Manifest
 from motet.models.predict import PredictModel
 from motet.motion.rotations import Array
+from motet_train.evaluate.predict.floors import key
 from motet_train.evaluate.tables import short_names
 
 SEED = re.compile(r"[-_. ]?(seed)?\d+$")
 """The end of a run's name that gives its seed."""
+
+Models = Mapping[str, PredictModel]
+Ready = dict[str, dict[str, Any]]
+Figures = Callable[[str], dict[str, Any]]
+"""The figures of a system or group, ready for JSON."""
 
 Errors = Mapping[str, Mapping[str, Array]]
 """Run or group, or the baseline -> action or measure -> error at each predicted frame (N,)."""
@@ -34,7 +40,7 @@ class SeedGroup:
         return _count(self.runs)
 
 
-def seed_groups(models: Mapping[str, PredictModel]) -> list[SeedGroup]:
+def seed_groups(models: Models) -> list[SeedGroup]:
     """The groups of some models by name, in their order.
 
     Runs of equal model, config, recipe and data are one group; another one with the same seed is a group of its own.
@@ -103,6 +109,25 @@ def pooled(
     return found
 
 
-def drawn(models: Mapping[str, PredictModel], groups: Sequence[SeedGroup]) -> dict[str, PredictModel]:
+def drawn(models: Models, groups: Sequence[SeedGroup]) -> dict[str, PredictModel]:
     """The first run of each group: a mean of poses is none."""
     return {group.runs[0]: models[group.runs[0]] for group in groups}
+
+
+def ready(
+    models: Models, groups: Sequence[SeedGroup], floors: Sequence[str], runs: Figures, means: Figures, spreads: Figures
+) -> Ready:
+    """The figures of each run and, under "zero_velocity", "constant_velocity" and so on, of the floors.
+
+    Of several models also "grouped": title of each group of several runs -> their names as "runs", the figures of their
+    mean, and as "spread" the largest minus the smallest.
+    """
+    beside = {key(floor): runs(floor) for floor in floors}
+    found: Ready = {name: {**runs(name), **beside} for name in models}
+    if len(models) > 1:
+        found["grouped"] = {
+            group.title: {"runs": list(group.runs), **means(group.title), "spread": spreads(group.title)}
+            for group in groups
+            if len(group.runs) > 1
+        }
+    return found

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from motet.models.steer import SteerModel
 from motet.models.steer_session import SteerSession
@@ -19,7 +19,6 @@ from motet.motion.quaternions import wrapped
 from motet.motion.rotations import Array
 from motet_train.evaluate.steer.standing import standing
 from motet_train.evaluate.steer.track import Track
-from motet_train.papers.tdbn.experiments.measures import arrival
 
 PHASES, APART = 8, 4
 """Times of a change, and ticks between them."""
@@ -180,3 +179,9 @@ def aside_errors(model: SteerModel) -> dict[str, float]:
         found |= {f"{name}_direction": way[own].mean(), f"{name}_facing": facing[own].mean()}
         found[f"{name}_speed"] = np.abs(pace[own] / SLOWLY - 1).mean()
     return {name: float(value) for name, value in found.items()}
+
+
+def arrival(inside: NDArray[np.bool_], fps: float) -> Array:
+    """Seconds (B,) until ``inside`` (T, B) holds until the end; infinite where it does not."""
+    frames = len(inside) - np.cumprod(inside[::-1], axis=0).sum(axis=0)
+    return np.where(frames < len(inside), (frames + 1) / fps, np.inf)

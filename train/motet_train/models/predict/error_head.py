@@ -47,7 +47,7 @@ def _size(values: Tensor) -> Tensor:
     return (values.square().mean(-1) + 1e-12).sqrt()
 
 
-class Doubt(nn.Module):
+class ErrorHead(nn.Module):
     """Signs to the expected error in metres, the mean over the joints: for each predicted frame a law of its own."""
 
     weight: Tensor

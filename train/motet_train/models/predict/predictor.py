@@ -20,7 +20,7 @@ from torch.nn.functional import gelu
 from motet.bundle.graph import GraphSpec, TensorSpec
 from motet_train.models.net import Net, Part, tuples
 from motet_train.models.normalised import normalised
-from motet_train.models.predict.error_head import Doubt, Signs
+from motet_train.models.predict.error_head import ErrorHead, Signs
 
 GAIN = 3.0
 """Differences of normalised frames are multiplied by it, so that they vary about as much as poses do."""
@@ -33,7 +33,7 @@ class PredictorConfig:
     channels: C. kept: the channels that vary, the root's first. held: how many of these are seen, relative to the last
     frame, but not predicted. mirrored, signs: channel c of a mirrored frame is channel ``mirrored[c]`` times
     ``signs[c]``; empty where left and right are not known. doubts: whether it knows its errors
-    (:class:`motet_train.models.predict.error_head.Doubt`).
+    (:class:`motet_train.models.predict.error_head.ErrorHead`).
     """
 
     channels: int
@@ -131,13 +131,14 @@ class Predictor(Net):
     placing: Tensor
     mirrored: Tensor
     signs: Tensor
-    doubt: Doubt | None
+    doubt: ErrorHead | None
+    """The error head, by the name that it has in the weights of runs."""
 
     def __init__(self, config: PredictorConfig) -> None:
         super().__init__(len(config.kept))
         self.config = config
         self.trajectory = Trajectory(config)
-        self.doubt = Doubt(config.frames) if config.doubts else None
+        self.doubt = ErrorHead(config.frames) if config.doubts else None
         kept, channels = list(config.kept), config.channels
         self.register_buffer("kept", torch.tensor(kept), persistent=False)
         self.register_buffer("relative", (torch.arange(len(kept)) < config.held).float(), persistent=False)

@@ -7,11 +7,11 @@ import numpy as np
 from motet.models.predict import PredictModel
 from motet.motion.rotations import Array
 from motet_train.data.errors import DataError
+from motet_train.evaluate.predict.error_rows import REPORTED
 from motet_train.evaluate.predict.seed_groups import SeedGroup, mean, pooled, spread
 from motet_train.papers.li2018.expmap_files import ExpmapCorpus, scaling_of
 from motet_train.papers.li2018.protocol import (
     OUTPUT_FRAMES,
-    REPORTED,
     Continuation,
     errors,
     predictions,

@@ -11,14 +11,12 @@ from numpy.typing import NDArray
 
 from motet.motion.rotations import Array, rotvec_to_rotmat
 from motet_train.data.errors import DataError
-from motet_train.data.predict_data import STRIDE
+from motet_train.evaluate.predict.error_rows import REPORTED
 from motet_train.papers.li2018.expmap_files import CONSTANT, ROOT, Scaling
+from motet_train.papers.li2018.material import STRIDE
 
 SEED, SEED_FRAMES, OUTPUT_FRAMES = 1234567890, 50, 25
 WINDOW = SEED_FRAMES + OUTPUT_FRAMES
-
-REPORTED = (1, 3, 7, 9, 13, 24)
-"""Output frames, from 0."""
 
 LABELS = (80, 160, 320, 400, 560, 1000)
 """The milliseconds customary in tables; files of 120 Hz have others, see :func:`true_times`."""

@@ -15,6 +15,7 @@ from motet_train.data.predict_data import Material
 from motet_train.data.windows import Windows
 from motet_train.descent import Descent, GradientLearner, Term, Terms, Training
 from motet_train.papers.li2018 import convseq2seq, lstm_3lr, lstm_ae, rrnn, srnn
+from motet_train.papers.li2018.material import ExpmapMaterial
 from motet_train.papers.li2018.protocol import OUTPUT_FRAMES, SEED_FRAMES, WINDOW
 from motet_train.papers.li2018.stepwise import Stepwise
 from motet_train.papers.li2018.systems import stepwise
@@ -65,17 +66,15 @@ RECIPES: Mapping[str, Mapping[str, Recipe]] = {
 """Model -> name of a preset -> recipe."""
 
 
-def sized(recipe: Recipe, material: Material) -> Any:
-    """The system's configuration for the material; DataError where it needs columns that are not known."""
+def sized(recipe: Recipe, material: ExpmapMaterial) -> Any:
+    """The system's configuration for the material."""
     dimensions = len(material.kept)
     if recipe.model != "srnn":
         return recipe.sized(dimensions=dimensions)
-    if material.layout is None:
-        raise DataError("a structural net needs text files whose columns are known")
     return recipe.sized(dimensions=dimensions, parts=srnn.parts_of(material.layout, material.kept))
 
 
-def train_system(material: Material, job: Job) -> Run:
+def train_system(material: ExpmapMaterial, job: Job) -> Run:
     """Train a system, see :meth:`motet_train.recipes.recipe.Job.run`; DataError where the data cannot be trained on.
 
     The weights kept are those with the smallest :func:`validation_error`.
@@ -133,7 +132,7 @@ class Adversary:
 
     def __init__(self, net: Stepwise, judge: nn.Module, training: Training) -> None:
         self.net, self.judge, self.weight = net, judge, training.adversary
-        self.descent = Descent(judge, self._doubt, training)
+        self.descent = Descent(judge, self._judging, training)
         self.parts: dict[str, Part] = {"judge": judge, "judging": self.descent.optimiser}
 
     def loss(self, windows: Tensor) -> Terms:
@@ -147,7 +146,7 @@ class Adversary:
         self.judge.requires_grad_(True)
         return (Term(self.net.system.error(predicted, normal[:, given:]) + self.weight * opinion, len(windows)),)
 
-    def _doubt(self, windows: Tensor) -> Terms:
+    def _judging(self, windows: Tensor) -> Terms:
         """Of false windows and as many true ones (2 B, L + N, D)."""
         false, true = windows.chunk(2)
         return (Term(softplus(self.judge(false).float()) + softplus(-self.judge(true).float()), len(true)),)

@@ -1,23 +1,16 @@
 """What was measured by the protocol: the figures of runs and of groups of seeds, as text and as JSON."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
-from motet.models.predict import PredictModel
 from motet_train.evaluate.predict.costs import cost_table, harness_table
-from motet_train.evaluate.predict.floors import FLOORS, key
-from motet_train.evaluate.predict.seed_groups import SeedGroup, seed_groups
+from motet_train.evaluate.predict.floors import FLOORS
+from motet_train.evaluate.predict.seed_groups import Models, Ready, SeedGroup, ready, seed_groups
 from motet_train.papers.li2018.ablations import ablated, ablation_table
 from motet_train.papers.li2018.curves import FEW, Curves, by_group, curves, spreads_of, to_json
 from motet_train.papers.li2018.expmap_files import ExpmapCorpus
 from motet_train.papers.li2018.protocol_table import protocol_table
-
-Models = Mapping[str, PredictModel]
-Ready = dict[str, dict[str, Any]]
-Figures = Callable[[str], dict[str, Any]]
-"""The figures of a system or group, ready for JSON."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,22 +50,3 @@ def results_json(results: Results) -> Ready:
     """See :func:`ready`."""
     figures = (partial(to_json, found) for found in (results.runs, results.means, results.spreads))
     return ready(results.models, results.groups, [name for name in results.means[FEW] if name in FLOORS], *figures)
-
-
-def ready(
-    models: Models, groups: Sequence[SeedGroup], floors: Sequence[str], runs: Figures, means: Figures, spreads: Figures
-) -> Ready:
-    """The figures of each run and, under "zero_velocity", "constant_velocity" and so on, of the floors.
-
-    Of several models also "grouped": title of each group of several runs -> their names as "runs", the figures of their
-    mean, and as "spread" the largest minus the smallest.
-    """
-    beside = {key(floor): runs(floor) for floor in floors}
-    found: Ready = {name: {**runs(name), **beside} for name in models}
-    if len(models) > 1:
-        found["grouped"] = {
-            group.title: {"runs": list(group.runs), **means(group.title), "spread": spreads(group.title)}
-            for group in groups
-            if len(group.runs) > 1
-        }
-    return found

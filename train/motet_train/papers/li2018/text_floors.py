@@ -6,9 +6,9 @@ import numpy as np
 
 from motet.motion.rotations import Array, rotmat_to_rotvec, rotvec_to_rotmat
 from motet_train.data.errors import DataError
-from motet_train.data.predict_data import STRIDE
 from motet_train.evaluate.predict.floors import CONSTANT, DAMPED, DECAYS, ZERO, best, gone_on, reach, turned_on
 from motet_train.papers.li2018.expmap_files import ExpmapCorpus, Files, Scaling, scaling_of
+from motet_train.papers.li2018.material import STRIDE
 from motet_train.papers.li2018.protocol import (
     OUTPUT_FRAMES,
     SEED_FRAMES,

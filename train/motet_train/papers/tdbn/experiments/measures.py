@@ -93,9 +93,3 @@ def _energy(angles: Array) -> float:
 def upsample(frames: Array, factor: int = UPSAMPLE) -> Array:
     """Frames (T, D) with factor - 1 linear ones between each two."""
     return lines(frames, np.arange((len(frames) - 1) * factor + 1) / factor)
-
-
-def arrival(inside: NDArray[np.bool_], fps: float) -> Array:
-    """Seconds (B,) until ``inside`` (T, B) holds until the end; infinite where it does not."""
-    frames = len(inside) - np.cumprod(inside[::-1], axis=0).sum(axis=0)
-    return np.where(frames < len(inside), (frames + 1) / fps, np.inf)
