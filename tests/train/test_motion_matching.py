@@ -15,15 +15,15 @@ from motet.motion.mirroring import mirror
 from motet.motion.motion import Motion
 from motet.representation import named
 from motet.representation.contract import MotionContract
+from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.gaits import Gait, read_gaits
 from motet_train.data.locomotion import Recording
 from motet_train.data.matching_rows import MatchingRows, mirrored_poses, rows_of, scaling
 from motet_train.models.codes.sixd_places import tree_of
 from motet_train.models.control.matching import Matching, MatchingConfig, from_config
-from motet_train.papers.tdbn import clips as clips_module
 from motet_train.recipes.matching_table import take
 
-CLIPS = clips_module.CMU_FOLDER
+CLIPS = CMU_FOLDER
 
 
 @pytest.fixture(scope="module")

@@ -14,13 +14,13 @@ from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
 from motet.motion.pose import Pose
 from motet.representation import named
+from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.locomotion import Recording
 from motet_train.data.matching_rows import rows_of
 from motet_train.evaluate.steer.following import PACES, aside_errors, speed_errors, turn_errors
 from motet_train.evaluate.steer.standing import standing, stretches
 from motet_train.evaluate.steer.track import Track, tracks_of
 from motet_train.evaluate.steer.wandering import Limits, Watch, broken, frozen, leaps, turns, wandering, watched
-from motet_train.papers.tdbn import clips
 
 
 def puppets(**how: Any) -> Any:
@@ -29,9 +29,7 @@ def puppets(**how: Any) -> Any:
 
 @pytest.fixture(scope="module")
 def walk() -> Motion:
-    features = named("root_sixd").features(
-        to_humanoid(read_motion(clips.CMU_FOLDER / "39_14.amc")).motion.resample(FPS)
-    )
+    features = named("root_sixd").features(to_humanoid(read_motion(CMU_FOLDER / "39_14.amc")).motion.resample(FPS))
     return named("root_sixd").planted(features)
 
 

@@ -21,6 +21,7 @@ from motet.models.steer import SteerModel
 from motet.motion.humanoid.bones import HUMANOID, sole_points
 from motet.motion.kinematics import global_transforms
 from motet.representation import named
+from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.errors import DataError
 from motet_train.data.locomotion import gaits_of, recordings
 from motet_train.data.records import Record
@@ -29,7 +30,6 @@ from motet_train.eager import eager_model
 from motet_train.evaluate.steer import following, standing
 from motet_train.evaluate.steer.report import Recorded, seldom, steer_report, steer_text
 from motet_train.evaluate.tables import report_table
-from motet_train.papers.tdbn import clips
 from motet_train.runs import Run
 
 SETTINGS = """
@@ -46,7 +46,7 @@ odd = 6
 @pytest.fixture(scope="module")
 def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
     """A walk, and a run: the same, twice as fast."""
-    walk = read_motion(clips.CMU_FOLDER / "39_14.amc")
+    walk = read_motion(CMU_FOLDER / "39_14.amc")
     motions = {"walk": walk, "run": replace(walk, fps=240.0)}
     found = [Record(name, "16", to_humanoid(motion).motion, (), (), gaits=(name,)) for name, motion in motions.items()]
     return prepare(iter(found), tmp_path_factory.mktemp("steer") / "store", PREPARATION)

@@ -21,6 +21,7 @@ from motet.representation import named
 from motet.representation.root_block import way
 from motet.representation.root_sixd import ROOT_SIXD
 from motet_train.cli.evaluate_steer import as_steered
+from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.errors import DataError
 from motet_train.data.locomotion import gaits_of, recordings
 from motet_train.data.records import Record
@@ -28,7 +29,6 @@ from motet_train.data.store import Store, prepare
 from motet_train.evaluate.steer import following, standing
 from motet_train.evaluate.steer.report import Recorded, steer_report
 from motet_train.manifest import About
-from motet_train.papers.tdbn import clips
 from motet_train.papers.tdbn.body import TRUNK, body_parts
 from motet_train.papers.tdbn.courses import LABELS, MOST, controls_of, course
 from motet_train.papers.tdbn.driven import Driven, DrivenSession, moved
@@ -48,7 +48,7 @@ crbm = {epochs = 2, rate = 0.01}
 @pytest.fixture(scope="module")
 def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
     """Two seconds of a walk, and a run: the same, twice as fast."""
-    walk = to_humanoid(read_motion(clips.CMU_FOLDER / "39_14.amc")[:480]).motion
+    walk = to_humanoid(read_motion(CMU_FOLDER / "39_14.amc")[:480]).motion
     motions = {"walk": walk[:240], "run": replace(walk, fps=2 * walk.fps)}
     found = [Record(name, "16", motion, (), (), gaits=(name,)) for name, motion in motions.items()]
     return prepare(iter(found), tmp_path_factory.mktemp("steered") / "store", PREPARATION)
