@@ -66,10 +66,10 @@ def _steered(model: SteerModel) -> Decoded:
     return {"frames": session.frames_of(poses)}
 
 
-def _describe(model: DescribeModel) -> Named:
+def _describe(_: DescribeModel) -> Named:
     searches = {"greedy": (1, 0), "beam": (5, 0), "consensus": (5, 50)}
     runs: Named = {name: partial(_described, *settings) for name, settings in searches.items()}
-    return {**runs, "scores": _sentence_scores} if "score" in model.graphs else runs
+    return {**runs, "scores": _sentence_scores}
 
 
 def _described(beams: int, draws: int, model: DescribeModel) -> Decoded:
@@ -90,10 +90,9 @@ def _sentence_scores(model: DescribeModel) -> Decoded:
 
 
 def _generate(model: GenerateModel) -> Named:
-    runs: Named = {"samples": partial(_generated, 1), "beam": partial(_generated, 4)}
     if "candidates" not in model.defaults:
-        runs = {"decoded": partial(_generated, None)}
-    return {**runs, "scores": _motion_scores} if "score" in model.graphs else runs
+        return {"decoded": partial(_generated, None)}
+    return {"samples": partial(_generated, 1), "beam": partial(_generated, 4), "scores": _motion_scores}
 
 
 def _generated(candidates: int | None, model: GenerateModel) -> Decoded:

@@ -106,6 +106,9 @@ class Transformer(nn.Module):
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         return {"encoder": (self.encoder, ENCODER), "step": (self.layer, STEP)}
 
+    def tables(self) -> dict[str, np.ndarray]:
+        return {}
+
 
 @pytest.fixture(scope="module")
 def net() -> Transformer:
@@ -136,7 +139,7 @@ def test_a_step_that_grows_is_that_of_torch(net: Transformer, step: bytes) -> No
             assert score == pytest.approx(wanted[ids], abs=1e-4)
 
 
-def test_the_bundle_needs_no_score_and_is_described_alone_as_in_a_batch(
+def test_a_bundle_of_it_works_and_is_described_alone_as_in_a_batch(
     net: Transformer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     named = {"name": "small", "verb": "describe", "model": "transformer", "loop": "beam", "motion": MOTION}

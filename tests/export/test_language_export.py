@@ -83,10 +83,10 @@ def bundles(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 def test_a_bundle_keeps_its_contracts_and_carries_its_parity(bundles: dict[str, Path], verb: str) -> None:
     bundle = Bundle.open(bundles[verb])
     found = verify(bundle)
-    assert found.files == ("encoder.onnx", "golden.npz", "score.onnx", "step.onnx")
+    assert found.files == ("encoder.onnx", "golden.npz", "step.onnx")
     assert max(found.errors.values()) < 1e-5
     report = bundle.manifest.parity
-    rungs = {"encoder.one_step", "step.one_step", "score.one_step", "step.carried", "runs"}
+    rungs = {"encoder.one_step", "step.one_step", "step.carried", "runs"}
     assert rungs <= report.keys()
     assert all(report[rung]["error"] < report[rung]["bound"] / 2 for rung in rungs)
     names = {"describe": {"greedy", "beam", "scores"}, "generate": {"samples", "beam", "scores"}}[verb]
@@ -95,21 +95,19 @@ def test_a_bundle_keeps_its_contracts_and_carries_its_parity(bundles: dict[str, 
     assert {rung: again[rung] for rung in rungs} == {rung: report[rung] for rung in rungs}
 
 
-@pytest.mark.parametrize(("verb", "role"), [("describe", "encoder"), ("generate", "encoder"), ("describe", "score")])
-def test_a_row_of_a_padded_batch_gets_what_it_gets_alone(bundles: dict[str, Path], verb: str, role: str) -> None:
-    graph = Bundle.open(bundles[verb]).graph(role)
+@pytest.mark.parametrize("verb", ["describe", "generate"])
+def test_a_row_of_a_padded_batch_gets_what_it_gets_alone(bundles: dict[str, Path], verb: str) -> None:
+    graph = Bundle.open(bundles[verb]).graph("encoder")
     rng = np.random.default_rng(0)
     feeds = example(graph.spec, rng, batch=6, below={"words": len(WORDS), "word": len(WORDS)})
-    padded, output = graph.spec.inputs[-1 if role == "score" else 0].name, graph.spec.outputs[0].name
-    lengths = feeds.get("lengths", np.full(6, feeds[padded].shape[1]))
+    padded, output = graph.spec.inputs[0].name, graph.spec.outputs[0].name
     together = graph(feeds)[output]
-    for row, length in enumerate(lengths):
+    for row, length in enumerate(feeds["lengths"]):
         single = {name: array[row : row + 1] for name, array in feeds.items()}
         single[padded] = single[padded][:, :length]
         np.testing.assert_allclose(graph(single)[output], together[row : row + 1], atol=1e-6)
     longer = {**feeds, padded: np.concatenate([feeds[padded], np.zeros_like(feeds[padded])], axis=1)}
-    expected = together if role == "encoder" else np.concatenate([together, 0 * together], axis=1)
-    np.testing.assert_allclose(graph(longer)[output], expected, atol=1e-6)
+    np.testing.assert_allclose(graph(longer)[output], together, atol=1e-6)
 
 
 def test_normalisation_is_inside_the_encoder_of_motions(bundles: dict[str, Path]) -> None:
@@ -147,7 +145,7 @@ def test_a_generated_motion_scores_what_its_beam_says(bundles: dict[str, Path]) 
 def test_graphs_are_plain_and_hold_no_dropout(bundles: dict[str, Path]) -> None:
     for verb, place in bundles.items():
         bundle = Bundle.open(place)
-        for role in ("encoder", "step", "score"):
+        for role in ("encoder", "step"):
             data = bundle.read(f"{role}.onnx")
             assert b"Dropout" not in data, (verb, role)
             assert (b"Scan" in data) == (role != "step"), (verb, role)

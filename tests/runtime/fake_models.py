@@ -124,23 +124,12 @@ def describe_model() -> DescribeModel:
     def encode(frames: Array, lengths: Array) -> tuple[Array]:
         return (_means((frames - CONTRACT.mean) / [0.5, 10, 1], lengths),)
 
-    def score(context: Array, words: Array) -> tuple[Array]:
-        state, found = np.zeros((len(words), STATE), np.float32), np.zeros(words.shape)
-        for t in range(1, words.shape[1]):
-            out = step({"word": words[:, t - 1], "context": context, "state": state})
-            state = out["next_state"]
-            found[:, t] = out["log_probabilities"][np.arange(len(words)), words[:, t]] * (words[:, t] != 0)
-        return (found,)
-
     sizes = {"C": size, "D": size}
     graphs = {
         "encoder": FakeGraph(
             spec({"frames": "batch time D", "lengths": "*batch"}, {"context": "batch C"}, sizes), encode
         ),
         "step": step,
-        "score": FakeGraph(
-            spec({"context": "batch C", "words": "*batch words"}, {"log_probabilities": "batch words"}, sizes), score
-        ),
     }
     return DescribeModel(_manifest("describe", {"beams": 5, "max_words": 6}), graphs)
 
@@ -154,24 +143,12 @@ def generate_model() -> MixtureModel:
     def encode(words: Array, lengths: Array) -> tuple[Array]:
         return (_means(table[words], lengths),)
 
-    def score(context: Array, frames: Array) -> tuple[Array]:
-        state, frame = np.zeros((len(frames), STATE), np.float32), np.ones((len(frames), size + 1), np.float32)
-        found = np.zeros(frames.shape[:2])
-        for t in range(frames.shape[1]):
-            out = step({"frame": frame, "context": context, "state": state})
-            state, frame = out["next_state"], frames[:, t]
-            found[:, t] = [log_likelihood(row, out, i) for i, row in enumerate(frame)]
-        return (found,)
-
     sizes = {"C": context, "D1": size + 1}
     graphs = {
         "encoder": FakeGraph(
             spec({"words": "*batch words", "lengths": "*batch"}, {"context": "batch C"}, sizes), encode
         ),
         "step": step,
-        "score": FakeGraph(
-            spec({"context": "batch C", "frames": "batch time D1"}, {"log_likelihood": "batch time"}, sizes), score
-        ),
     }
     defaults = {"hypotheses": 3, "candidates": 4, "temperature": 1.0, "max_seconds": 3}
     return MixtureModel(_manifest("generate", defaults), graphs)

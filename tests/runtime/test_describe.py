@@ -211,14 +211,6 @@ def test_a_manifest_that_does_not_fit(model: DescribeModel, change: dict[str, An
         DescribeModel(replace(model.manifest, **change), model.graphs)
 
 
-def test_without_a_score_graph_only_scoring_is_refused(model: DescribeModel) -> None:
-    graphs = {role: graph for role, graph in model.graphs.items() if role != "score"}
-    other = DescribeModel(model.manifest, graphs)
-    assert other.describe(moving(20)) == model.describe(moving(20))
-    with pytest.raises(BundleError, match="no graph 'score'"):
-        other.score(moving(20), "walks")
-
-
 def test_one_step_call_serves_the_batch(model: DescribeModel) -> None:
     step = model.graphs["step"]
     assert isinstance(step, FakeGraph)

@@ -71,7 +71,7 @@ def test_what_does_not_fit_a_model_is_refused() -> None:
     ):
         with pytest.raises(BundleError, match=reason):
             replay(model, packed({**arrays, **change}), golden)
-    for prefix in ("step.in.", "score.out.", "run.in."):
+    for prefix in ("step.in.", "encoder.out.", "run.in."):
         fewer = {key: value for key, value in arrays.items() if not key.startswith(prefix)}
         with pytest.raises(BundleError, match=r"have no|golden run cannot be replayed"):
             replay(model, packed(fewer), golden)

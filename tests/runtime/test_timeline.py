@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from fake_models import CHANNELS, CONTRACT, FPS, SKELETON, VOCABULARY, describe_model, moving
 
-from motet.errors import BundleError, MotionError
+from motet.errors import MotionError
 from motet.formats import read_motion
 from motet.models.describe import CONFIDENT, DescribeModel, Description
 from motet.models.load import load_as
@@ -61,7 +61,7 @@ def test_sentences_are_scored_for_windows_near_theirs(rows: int, monkeypatch: py
     said = [(start, *VOCABULARY.encode(text)[0].tolist(), end) for text in texts]
     told: list[tuple[int, int]] = []
     found = near_scores(
-        model.graphs["score"], model.embed(motions), said, 1, lambda done, total: told.append((done, total))
+        model.graphs["step"], model.embed(motions), said, 1, lambda done, total: told.append((done, total))
     )
     assert told[-1] == (5, 5)
     by_ids = dict(zip(said, texts, strict=True))
@@ -123,9 +123,6 @@ def test_what_has_no_timeline() -> None:
     model = describe_model()
     with pytest.raises(MotionError, match="needs two frames at 10 fps, and the motion has 1"):
         model.timeline(constant(1, *ONE))
-    silent = DescribeModel(model.manifest, {role: model.graphs[role] for role in ("encoder", "step")})
-    with pytest.raises(BundleError, match="no graph 'score'"):
-        silent.timeline(constant(30, *ONE))
 
 
 def test_a_description_is_believed_from_a_log_probability_on() -> None:

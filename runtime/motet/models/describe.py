@@ -12,6 +12,7 @@ from motet.bundle.manifest import Manifest
 from motet.decode.beam import Hypothesis, Limits
 from motet.decode.loop import Loop
 from motet.decode.loops import LOOPS
+from motet.decode.score import score_words
 from motet.models.language import MAX_SECONDS, LanguageModel
 from motet.models.progress import Progress, silent
 from motet.models.text import EOS, PAD, SOS, UNK
@@ -56,8 +57,7 @@ class Part(Description):
 class DescribeModel(LanguageModel):
     """A model that puts motions into words.
 
-    graphs: "encoder" (frames, lengths -> context), "step" (word, context, states -> log_probabilities, next states) and
-        perhaps "score" (context, words -> log_probabilities).
+    graphs: "encoder" (frames, lengths -> context) and "step" (word, context, states -> log_probabilities, next states).
     Its loops (:mod:`motet.decode.loops`) take the step, contexts (B, C), limits and their settings by name, and give up
     to ``beams`` hypotheses for each row, best first.
     """
@@ -66,11 +66,8 @@ class DescribeModel(LanguageModel):
 
     def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:
         super().__init__(manifest, graphs, tables)
-        context = {"context": "batch C"}
-        self.bind("encoder", {"frames": "batch time D", "lengths": "*batch"}, context)
+        self.bind("encoder", {"frames": "batch time D", "lengths": "*batch"}, {"context": "batch C"})
         self.bind("step", self.loop.inputs, self.loop.outputs)
-        if "score" in graphs:
-            self.bind("score", {**context, "words": "*batch words"}, {"log_probabilities": "batch words"})
 
     @overload
     def describe(
@@ -114,12 +111,12 @@ class DescribeModel(LanguageModel):
         :meth:`describe` does it, one of more than 30 s by its middle; neighbours of which the same is said are one.
 
         progress: called with the number of windows done and of all.
-        MotionError as :meth:`frames`, but for long motions; BundleError where the model has no graph "score".
+        MotionError as :meth:`frames`, but for long motions.
         """
         motion = self.contract.on_figure(motion).resample(self.fps)
         spans = windows(len(motion), motion.fps)
         contexts = self.embed([motion[start:stop] for start, stop in spans])
-        scores = near_scores(self.score_graph(), contexts, self._likeliest(contexts), round(NEAR / HOP), progress)
+        scores = near_scores(self.graphs["step"], contexts, self._likeliest(contexts), round(NEAR / HOP), progress)
         return self._parts(motion, edges(spans, best_path(scores, CHANGE)))
 
     def _likeliest(self, contexts: Floats) -> list[tuple[int, ...]]:
@@ -164,8 +161,7 @@ class DescribeModel(LanguageModel):
         """Log-probability of a sentence given a motion; unknown words count as UNK, and a TextWarning names them."""
         ids = self.vocabulary.ids
         words = np.concatenate([[ids[SOS]], self.ids(sentence), [ids[EOS]]])[None]
-        feeds = {"context": self.embed([motion]), "words": words}
-        return float(self.score_graph()(feeds)["log_probabilities"].sum(dtype=np.float64))
+        return float(score_words(self.graphs["step"], self.embed([motion]), np.zeros(1, np.int64), words)[0])
 
     def limits(self, settings: Mapping[str, Any]) -> Limits:
         """What bounds a sentence in ids of the vocabulary, with "max_words" of the settings."""

@@ -182,13 +182,9 @@ class GenerateModel(LanguageModel):
     def score(self, sentence: str, motion: Motion) -> float:
         """Log-likelihood of a motion, and of its end, given a sentence; a TextWarning names words that count as UNK.
 
-        BundleError for a model without a graph "score".
+        DecodingError for a model whose loop knows no likelihoods.
         """
-        normal = self.contract.normalised(self.frames(motion))
-        frames = np.zeros((1, len(normal) + 1, normal.shape[1] + 1), dtype=np.float32)
-        frames[0, :-1, :-1], frames[0, :-1, -1] = normal, 1
-        feeds = {"context": self.embed([sentence]), "frames": frames}
-        return float(self.score_graph()(feeds)["log_likelihood"].sum(dtype=np.float64))
+        raise DecodingError(f"models of the loop {self.manifest.loop!r} cannot score motions")
 
     def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
         """A sentence ("text" of the settings) and its noise to ids (words,) int64 and the frames of the best motion.

@@ -92,12 +92,6 @@ class LanguageModel(BundleModel):
             found[rows] = encoder({given.name: values, "lengths": lengths})[context.name]
         return found
 
-    def score_graph(self) -> Graph:
-        """The graph that scores known pairs; BundleError where the model has none, as one without likelihoods."""
-        if "score" not in self.graphs:
-            raise BundleError("this model has no graph 'score': it cannot score a pair")
-        return self.graphs["score"]
-
 
 def batches(lengths: Sequence[int], size: int) -> Iterator[list[int]]:
     """Indices in batches of at most ``size``, sequences of like length together."""

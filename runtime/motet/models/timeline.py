@@ -7,10 +7,11 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motet.bundle.graph import Arrays, Floats, Graph
-from motet.decode.rollout import Ids, Scores, two_rows
+from motet.bundle.graph import Floats, Graph
+from motet.decode.rollout import Ids, Scores
+from motet.decode.score import score_words
+from motet.models.language import padded
 from motet.models.progress import Progress, silent
 
 WINDOW, HOP = 1.5, 0.5
@@ -40,7 +41,7 @@ def windows(frames: int, fps: float) -> list[Span]:
 
 
 def near_scores(
-    score: Graph, contexts: Floats, said: Sequence[tuple[int, ...]], near: int, progress: Progress = silent
+    step: Graph, contexts: Floats, said: Sequence[tuple[int, ...]], near: int, progress: Progress = silent
 ) -> Scores:
     """Log-probabilities (W, S) of the sentences of W windows, sorted by their ids, given each window.
 
@@ -48,26 +49,17 @@ def near_scores(
     window are asked about its sentence; minus infinity stands for what is not asked. progress: counts windows.
     """
     sentences = sorted(set(said))
-    words = _padded(sentences)
+    words = padded([np.array(ids) for ids in sentences], "int64")[0]
     places = {ids: place for place, ids in enumerate(sentences)}
     own = np.array([places[ids] for ids in said])
     found = np.full((len(said), len(sentences)), -np.inf)
     for rows, columns in _chunks(own, near):
-        chosen = two_rows(np.arange(len(rows)))
-        feeds: Arrays = {"context": contexts[rows[chosen]], "words": words[columns[chosen]]}
-        found[rows, columns] = score(feeds)["log_probabilities"].sum(axis=1, dtype=np.float64)[: len(rows)]
+        found[rows, columns] = score_words(step, contexts, rows, words[columns])
         progress(int(rows[-1]) + 1, len(said))
     return found
 
 
-def _padded(sentences: Sequence[tuple[int, ...]]) -> Ids:
-    words = np.zeros((len(sentences), max(map(len, sentences))), dtype=np.int64)
-    for row, ids in zip(words, sentences, strict=True):
-        row[: len(ids)] = ids
-    return words
-
-
-def _chunks(own: NDArray[np.intp], near: int) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+def _chunks(own: Ids, near: int) -> Iterator[tuple[Ids, Ids]]:
     """Windows and sentences to be paired, both (N,), of as many windows at a time as give some :data:`ROWS` pairs."""
     rows: list[int] = []
     columns: list[int] = []

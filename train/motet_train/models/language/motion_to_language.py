@@ -98,31 +98,16 @@ class MotionToLanguage(LanguageNet):
         following = self.decoder.step(self.embedding(word[:, None])[:, 0], context, state)
         return self.log_probabilities(following), following
 
-    def score(self, context: Tensor, words: Tensor) -> Tensor:
-        """Context (B, C), words (B, W) = SOS w1.. EOS PAD.. to log p of each given those before (B, W).
-
-        0 for the first word, which is given, and for PAD.
-        """
-        log_probabilities = self.log_probabilities(self.outputs(words, context))[:, :-1]
-        found = log_probabilities.gather(2, words[:, 1:, None])[..., 0]
-        return functional.pad(torch.where(words[:, 1:] == PAD, 0.0, found), (1, 0))
-
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
-        """The encoder, the step and the score, each with its contract."""
+        """The encoder and the step, each with its contract."""
         context = TensorSpec("context", ("batch", 2 * self.config.encoder_units[-1]))
         frames = TensorSpec("frames", ("batch", "time", self.config.channels))
         lengths, word = TensorSpec("lengths", ("batch",), "int64"), TensorSpec("word", ("batch",), "int64")
         state, following = (TensorSpec(n, ("batch", sum(self.config.decoder_units))) for n in ("state", "next_state"))
         scores = TensorSpec("log_probabilities", ("batch", self.config.words))
         step = GraphSpec((word, context, state), (scores, following), {"state": "next_state"})
-        words = TensorSpec("words", ("batch", "words"), "int64")
-        score = GraphSpec((context, words), (TensorSpec("log_probabilities", ("batch", "words")),))
         encoder = GraphSpec((frames, lengths), (context,))
-        return {
-            "encoder": (Part(self, self.encode), encoder),
-            "step": (Part(self, self.step), step),
-            "score": (Part(self, self.score), score),
-        }
+        return {"encoder": (Part(self, self.encode), encoder), "step": (Part(self, self.step), step)}
 
 
 def from_config(config: Mapping[str, Any]) -> MotionToLanguage:

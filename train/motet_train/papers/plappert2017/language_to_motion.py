@@ -121,12 +121,8 @@ class LanguageToMotion(LanguageNet):
         stds = mixture.variances.sqrt()
         return mixture.log_weights, mixture.means, stds, mixture.active.sigmoid(), following
 
-    def score(self, context: Tensor, frames: Tensor) -> Tensor:
-        """Context (B, C), frames (B, T, D + 1) to log-likelihoods given all frames before (B, T)."""
-        return self.mixture(self.outputs(frames, context)).log_likelihood(frames[..., :-1], frames[..., -1])
-
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
-        """The encoder, the step and the score, each with its contract."""
+        """The encoder and the step, each with its contract."""
         channels, components = self.config.channels, self.config.components
         context = TensorSpec("context", ("batch", 2 * self.config.encoder_units[-1]))
         words, lengths = TensorSpec("words", ("batch", "words"), "int64"), TensorSpec("lengths", ("batch",), "int64")
@@ -138,14 +134,8 @@ class LanguageToMotion(LanguageNet):
         )
         frame = TensorSpec("frame", ("batch", channels + 1))
         step = GraphSpec((frame, context, state), (*mixture, following), {"state": "next_state"})
-        frames = TensorSpec("frames", ("batch", "time", channels + 1))
-        score = GraphSpec((context, frames), (TensorSpec("log_likelihood", ("batch", "time")),))
         encoder = GraphSpec((words, lengths), (context,))
-        return {
-            "encoder": (Part(self, self.encode), encoder),
-            "step": (Part(self, self.step), step),
-            "score": (Part(self, self.score), score),
-        }
+        return {"encoder": (Part(self, self.encode), encoder), "step": (Part(self, self.step), step)}
 
 
 def from_config(config: Mapping[str, Any]) -> LanguageToMotion:
