@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import cast
 
 import click
-from tqdm import tqdm
 
 from motet.models.load import Model
 from motet.models.steer import SteerModel
@@ -28,13 +27,4 @@ def steer_reports(models: Mapping[str, SteerModel], data: Path | None) -> dict[s
     if data is None:
         raise click.UsageError("figures that are steered need --data: the store that they were trained on")
     recorded = Recorded.of(Store.open(data))
-    reports = {}
-    with tqdm(unit=" parts", disable=None, leave=False) as bar:
-        for name, model in models.items():
-
-            def told(part: str, name: str = name) -> None:
-                bar.set_description(f"{name}: {part}")
-                bar.update()
-
-            reports[name] = steer_report(model, recorded, told)
-    return reports
+    return {name: steer_report(model, recorded) for name, model in models.items()}

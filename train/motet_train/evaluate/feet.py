@@ -1,13 +1,15 @@
 """How well feet stand and how calmly joints move, measured from positions alone: of any figure, by any model.
 
 A point of the sole **stands** in a frame where it is near the ground and nearer to staying than to going along: it is
-no higher than LOW above its own ground, the height under which it is in a tenth of all frames (a recorded figure's
+no higher than 3 cm above its own ground, the height under which it is in a tenth of all frames (a recorded figure's
 soles are not equally thick), and it goes forward, the way that the root goes, less than half as fast as the root. Both
-are seen from points smoothed over CALM seconds, so that trembling does not break a stance; what is then measured is not
-smoothed. A **stance** is a run of at least SHORTEST seconds of such frames.
+are seen from points smoothed over .05 s, so that trembling does not break a stance; what is then measured is not
+smoothed. A **stance** is a run of at least .1 s of such frames.
 
 Letters in shapes: T frames, K points, J joints. Lengths are metres, y is up.
 """
+
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +20,7 @@ from motet.motion.kinematics import local_rotations
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 
-LOW = 0.03
-CALM = 0.05
-SHORTEST = 0.1
-STANDS = ContactSettings(heights=(LOW, LOW), speeds=(0.0, 0.0), calm=CALM)
+STANDS = ContactSettings(heights=(0.03, 0.03), speeds=(0.0, 0.0), calm=0.05)
 """The speed is that along the root's way, less half of the root's."""
 
 
@@ -40,14 +39,14 @@ def stances(points: Array, root: Array, fps: float) -> list[Array]:
     found = []
     for point, up in zip(np.moveaxis(points, 1, 0), ~stands.T, strict=True):
         edges = np.flatnonzero(np.concatenate([[True], up, [True]]))
-        found += [point[a:b] for a, b in zip(edges[:-1], edges[1:] - 1, strict=True) if b - a >= SHORTEST * fps]
+        found += [point[a:b] for a, b in zip(edges[:-1], edges[1:] - 1, strict=True) if b - a >= 0.1 * fps]
     return found
 
 
-def slide(points: Array, root: Array, fps: float) -> float:
-    """How far points (T, K, 3) slide in a stance, metres: the mean over stances of the largest distance over the ground
+def slide(stances: Iterable[Array]) -> float:
+    """How far points slide in a stance, metres: the mean over stances (N, 3) of the largest distance over the ground
     between two of a point's places. NaN without a stance."""
-    across = [place[:, None, [0, 2]] - place[:, [0, 2]] for place in stances(points, root, fps)]
+    across = [place[:, None, [0, 2]] - place[:, [0, 2]] for place in stances]
     return float(np.mean([np.linalg.norm(apart, axis=-1).max() for apart in across])) if across else np.nan
 
 

@@ -92,10 +92,9 @@ class Seen:
         return float(np.linalg.norm(moved, axis=-1).mean() * self.fps)
 
     @property
-    def slide(self) -> tuple[float, int]:
-        """Centimetres that the balls of the feet slide in a stance, and the number of stances."""
-        given = (self.points[:, BALLS], self.points[:, 0], self.fps)
-        return 100 * slide(*given), len(stances(*given))
+    def stances(self) -> list[Array]:
+        """Where the balls of the feet are in each of their stances."""
+        return stances(self.points[:, BALLS], self.points[:, 0], self.fps)
 
     def last(self, seconds: float) -> "Seen":
         """The last seconds."""
@@ -172,10 +171,8 @@ def figures(pairs: Sequence[tuple[Seen, Seen]]) -> dict[str, float]:
 
 
 def _slide(parts: Sequence[Seen]) -> float:
-    """The mean over all stances; NaN without any."""
-    slides = [part.slide for part in parts]
-    known = [(value, count) for value, count in slides if count]
-    return float(np.average([v for v, _ in known], weights=[n for _, n in known])) if known else np.nan
+    """The mean over all stances, centimetres; NaN without any."""
+    return 100 * slide(stance for part in parts for stance in part.stances)
 
 
 def _apart(model: PredictModel, writer: CodesModel, motion: Motion) -> Report:

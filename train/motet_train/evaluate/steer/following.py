@@ -5,7 +5,6 @@ All changes are measured from several phases of the stride: each figure goes on 
 place over the ground and its facing.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -14,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from motet.models.steer import SteerModel
 from motet.models.steer_session import SteerSession
-from motet.motion.pose import Pose
 from motet.motion.quaternions import wrapped
 from motet.motion.rotations import Array
+from motet_train.evaluate.arrival import arrival
 from motet_train.evaluate.steer.standing import standing
 from motet_train.evaluate.steer.track import Track
 
@@ -27,24 +26,7 @@ SETTLE = 3.0
 """Seconds before a change."""
 
 PACES = (0.0, 0.6, 1.0, 1.4, 1.8, 2.0, 2.5, 3.0, 3.5, 4.0)
-"""Speeds in m/s between which is changed; up to :data:`WALK` it is a walk, above a run."""
-
-WALK = 1.8
-
-TURNS = (45, 90, 135, 180)
-"""Degrees, to the left and to the right."""
-
-TURNED = 10.0
-"""Degrees: a figure goes where it is told when its direction is no farther off, and stays so."""
-
-CALM = 0.5
-"""Seconds, about a step, over which the direction of travel is a mean."""
-
-ASIDE = {"left": 90.0, "right": -90.0, "back": 180.0}
-"""Degrees from the facing to where a figure goes that does not go where it faces, ..."""
-
-SLOWLY = 0.8
-"""... in m/s."""
+"""Speeds in m/s between which is changed."""
 
 
 @dataclass(frozen=True)
@@ -67,121 +49,118 @@ def responses(model: SteerModel, before: Asked, after: Asked, seconds: float, ho
     for phase in range(PHASES):
         session = model.start(characters=len(before.gait), hold_feet=hold_feet)
         before.tell(session)
-        poses = _ticks(session, round(SETTLE * model.fps) + APART * phase)[-1:]
+        poses = [session.tick() for _ in range(round(SETTLE * model.fps) + APART * phase)][-1:]
         after.tell(session)
-        poses += _ticks(session, round(seconds * model.fps))
+        poses += [session.tick() for _ in range(round(seconds * model.fps))]
         tracks.append(Track.of(poses, model.fps))
     return tracks
 
 
-def _ticks(session: SteerSession, count: int) -> list[Pose]:
-    return [session.tick() for _ in range(count)]
-
-
-def _ground(tracks: Sequence[Track]) -> Array:
+@dataclass(frozen=True)
+class Ground:
     """Places over the ground (T, B, 3), x, z and facing, of N figures of each phase."""
-    return np.concatenate([track.ground for track in tracks], axis=1).astype(np.float64)
+
+    places: Array
+    fps: float
+
+    @staticmethod
+    def of(tracks: list[Track]) -> "Ground":
+        """Those of :func:`responses`."""
+        return Ground(np.concatenate([track.ground for track in tracks], axis=1).astype(np.float64), tracks[0].fps)
+
+    def gone(self, start: float, stop: float) -> Array:
+        """The mean velocity (B, 2) over the ground between two times."""
+        first, last = round(start * self.fps), round(stop * self.fps)
+        found: Array = (self.places[last, :, :2] - self.places[first, :, :2]) * self.fps / (last - first)
+        return found
+
+    def pace(self, start: float, stop: float) -> Array:
+        """The mean speed (B,) between two times."""
+        found: Array = np.linalg.norm(self.gone(start, stop), axis=1)
+        return found
+
+    def way_off(self, asked: Array, start: float, stop: float) -> Array:
+        """By how many degrees (B,) figures go elsewhere than asked (B,), between two times; 180 for none that goes."""
+        return np.where(self.pace(start, stop) > 0.05, np.abs(_off(self.gone(start, stop), asked)), 180.0)
+
+    def facing_off(self, asked: Array, start: float, stop: float) -> Array:
+        """By how many degrees (B,) figures face elsewhere than is asked (B,), in the mean between two times."""
+        facing = self.places[round(start * self.fps) : round(stop * self.fps), :, 2]
+        found: Array = np.abs(np.degrees(wrapped(facing - np.radians(asked))).mean(axis=0))
+        return found
+
+    def seconds(self, asked: Array, calm: float) -> Array:
+        """Seconds (B,) until the direction of travel, a mean over ``calm`` seconds, is within 10 degrees of what is
+        asked (B,), in degrees, and stays so to the end; infinite where it does not."""
+        half = round(calm * self.fps / 2)
+        steps = self.places[2 * half :, :, :2] - self.places[: -2 * half, :, :2]  # around ticks half, half + 1, ...
+        there = np.abs(_off(steps, asked)) <= 10
+        return arrival(there, self.fps) + half / self.fps
 
 
-def gone(ground: Array, fps: float, start: float, stop: float) -> Array:
-    """The mean velocity (B, 2) over the ground between two times, from places (T, B, 3)."""
-    first, last = round(start * fps), round(stop * fps)
-    found: Array = (ground[last, :, :2] - ground[first, :, :2]) * fps / (last - first)
+def _off(velocity: Array, asked: Array) -> Array:
+    """Degrees (..., B) from the directions asked (B,) to those of velocities (..., B, 2)."""
+    found: Array = np.degrees(wrapped(np.arctan2(velocity[..., 0], velocity[..., 1]) - np.radians(asked)))
     return found
 
 
 def speed_errors(model: SteerModel) -> dict[str, float]:
     """How far the speed is off, as a share of what was asked: the mean velocity from 1 to 2 s after a change between
-    all pairs of :data:`PACES`, straight on. Mean, worst, the mean for each new speed; rest: m/s where 0 was asked.
+    all pairs of :data:`PACES`, straight on; up to 1.8 m/s it is a walk, above a run. Mean, worst, the mean for each new
+    speed; rest: m/s where 0 was asked.
     """
     pairs = [(a, b) for a, b in product(PACES, PACES) if a != b]
     old, new = np.array(pairs).T
-    before = tuple(_gait(max(a, 0.1)) if a else _gait(b) for a, b in pairs)
-    after = tuple(_gait(b) if b else _gait(a) for a, b in pairs)
-    ground = _ground(responses(model, Asked(before, old), Asked(after, new), 2.0))
-    pace = np.linalg.norm(gone(ground, model.fps, 1.0, 2.0), axis=1).reshape(PHASES, -1)
-    off = np.abs(pace - new) / np.where(new > 0, new, 1)
-    moving = off[:, new > 0]
-    found = {"mean": moving.mean(), "worst": moving.max(), "rest": off[:, new == 0].mean()}
-    found["rest_worst"] = off[:, new == 0].max()
-    found |= {f"to_{value:g}": off[:, new == value].mean() for value in PACES[1:]}
-    return {name: float(value) for name, value in found.items()}
-
-
-def _gait(pace: float) -> str:
-    return "walk" if pace <= WALK else "run"
+    # who stands, stands in the gait that comes, and stops in the gait that was
+    gaits = (np.where(own > 0, own, other) for own, other in ((old, new), (new, old)))
+    before, after = (tuple("walk" if pace <= 1.8 else "run" for pace in paces) for paces in gaits)
+    ground = Ground.of(responses(model, Asked(before, old), Asked(after, new), 2.0))
+    off = np.abs(ground.pace(1.0, 2.0).reshape(PHASES, -1) - new) / np.where(new > 0, new, 1)
+    moving, rest = off[:, new > 0], off[:, new == 0]
+    found = {"mean": moving.mean(), "worst": moving.max(), "rest": rest.mean(), "rest_worst": rest.max()}
+    return _floats(found | {f"to_{value:g}": off[:, new == value].mean() for value in PACES[1:]})
 
 
 def turn_errors(model: SteerModel, gait: str, pace: float) -> dict[str, float]:
-    """Turns by :data:`TURNS` to both sides at a speed, and the facing with it.
+    """Turns by 45 to 180 degrees to both sides at a speed, and the facing with it.
 
-    s: mean seconds until the direction of travel is within :data:`TURNED` degrees and stays so for the rest of 4 s
-    (infinite where one does not); worst_s. direction, facing: mean degrees off, from 2 to 3 s after the change.
-    slide_cm: as :func:`standing` has it, in all turns and the seconds after them.
+    s: mean seconds until the direction of travel is there (:meth:`Ground.seconds`) in 4 s; worst_s. direction, facing:
+    mean degrees off, from 2 to 3 s after the change. slide_cm: as :func:`standing` has it, in all turns and the seconds
+    after them.
     """
-    angles = np.array([side * turn for turn in TURNS for side in (1, -1)], dtype=np.float64)
+    turns, calm = (45, 90, 135, 180), 0.5
+    angles = np.array([side * turn for turn in turns for side in (1, -1)], dtype=np.float64)
     before = Asked((gait,) * len(angles), pace)
-    tracks = responses(model, before, replace(before, direction=angles, facing=angles), 4.0 + CALM, hold_feet=True)
-    ground = _ground(tracks)
-    asked = np.tile(angles, PHASES)
-    seconds = _seconds(ground, asked, model.fps)
-    way, facing = off_way(ground, asked, model.fps, 2.0, 3.0), off_facing(ground, asked, model.fps, 2.0, 3.0)
+    tracks = responses(model, before, replace(before, direction=angles, facing=angles), 4.0 + calm, hold_feet=True)
+    ground, asked = Ground.of(tracks), np.tile(angles, PHASES)
+    seconds = ground.seconds(asked, calm)
+    way, facing = ground.way_off(asked, 2.0, 3.0), ground.facing_off(asked, 2.0, 3.0)
     found = {"slide_cm": standing(tracks)["slide_cm"]}
-    for turn in TURNS:
-        own = np.abs(asked) == turn
+    for turn in turns:
+        own: NDArray[np.bool_] = np.abs(asked) == turn
         found |= {f"s_{turn}": seconds[own].mean(), f"worst_s_{turn}": seconds[own].max()}
         found |= {f"direction_{turn}": way[own].mean(), f"facing_{turn}": facing[own].mean()}
-    return {name: float(value) for name, value in found.items()}
-
-
-def _seconds(ground: Array, asked: Array, fps: float) -> Array:
-    """Seconds (B,) until the direction of travel is what is asked (B,), in degrees."""
-    half = round(CALM * fps / 2)
-    steps = ground[2 * half :, :, :2] - ground[: -2 * half, :, :2]  # around ticks half, half + 1, ...
-    off = np.abs(_degrees_off(np.arctan2(steps[..., 0], steps[..., 1]), asked))
-    return arrival(off <= TURNED, fps) + half / fps
-
-
-def off_way(ground: Array, asked: Array, fps: float, start: float, stop: float) -> Array:
-    """By how many degrees (B,) figures go elsewhere than is asked (B,), between two times; 180 for none that goes."""
-    velocity = gone(ground, fps, start, stop)
-    off = np.abs(_degrees_off(np.arctan2(velocity[:, 0], velocity[:, 1]), asked))
-    found: Array = np.where(np.linalg.norm(velocity, axis=1) > 0.05, off, 180.0)
-    return found
-
-
-def off_facing(ground: Array, asked: Array, fps: float, start: float, stop: float) -> Array:
-    """By how many degrees (B,) figures face elsewhere than is asked (B,), in the mean between two times."""
-    off = _degrees_off(ground[round(start * fps) : round(stop * fps), :, 2], asked)
-    found: Array = np.abs(off.mean(axis=0))
-    return found
-
-
-def _degrees_off(angles: Array, asked: Array) -> Array:
-    found: Array = np.degrees(wrapped(angles - np.radians(asked)))
-    return found
+    return _floats(found)
 
 
 def aside_errors(model: SteerModel) -> dict[str, float]:
-    """Side steps and walking backwards at :data:`SLOWLY`, from standing and from walking: degrees that direction and
-    facing are off, and the error of the speed as a share, from 2 to 4 s after the change."""
-    names = tuple(ASIDE)
-    ways = np.repeat([ASIDE[name] for name in names], 2)
-    before = Asked(("walk",) * len(ways), np.tile([0.0, 1.4], len(names)))
-    ground = _ground(responses(model, before, replace(before, speed=SLOWLY, direction=ways), 4.0))
-    asked = np.tile(ways, PHASES)
-    way = off_way(ground, asked, model.fps, 2.0, 4.0)
-    facing = off_facing(ground, np.zeros_like(asked), model.fps, 2.0, 4.0)
-    pace = np.linalg.norm(gone(ground, model.fps, 2.0, 4.0), axis=1)
-    found = dict[str, float]()
-    for name in names:
-        own = asked == ASIDE[name]
-        found |= {f"{name}_direction": way[own].mean(), f"{name}_facing": facing[own].mean()}
-        found[f"{name}_speed"] = np.abs(pace[own] / SLOWLY - 1).mean()
+    """Side steps and walking backwards at 0.8 m/s, from standing and from walking: degrees that direction and facing
+    are off, and the error of the speed as a share, from 2 to 4 s after the change."""
+    ways, slowly = {"left": 90.0, "right": -90.0, "back": 180.0}, 0.8
+    asked = np.repeat(list(ways.values()), 2)
+    before = Asked(("walk",) * len(asked), np.tile([0.0, 1.4], len(ways)))
+    ground = Ground.of(responses(model, before, replace(before, speed=slowly, direction=asked), 4.0))
+    asked = np.tile(asked, PHASES)
+    way, facing = ground.way_off(asked, 2.0, 4.0), ground.facing_off(np.zeros_like(asked), 2.0, 4.0)
+    speed = np.abs(ground.pace(2.0, 4.0) / slowly - 1)
+    return _floats(
+        {
+            f"{name}_{key}": values[asked == angle].mean()
+            for name, angle in ways.items()
+            for key, values in (("direction", way), ("facing", facing), ("speed", speed))
+        }
+    )
+
+
+def _floats(found: dict[str, float]) -> dict[str, float]:
     return {name: float(value) for name, value in found.items()}
-
-
-def arrival(inside: NDArray[np.bool_], fps: float) -> Array:
-    """Seconds (B,) until ``inside`` (T, B) holds until the end; infinite where it does not."""
-    frames = len(inside) - np.cumprod(inside[::-1], axis=0).sum(axis=0)
-    return np.where(frames < len(inside), (frames + 1) / fps, np.inf)

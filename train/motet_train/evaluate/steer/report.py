@@ -1,9 +1,9 @@
 """All figures of a model that is steered, beside recordings and beside the same model that seldom searches."""
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import partial
 
 from motet.errors import ControlWarning
 from motet.models.steer import SteerModel
@@ -15,7 +15,7 @@ from motet_train.evaluate.steer.following import aside_errors, speed_errors, tur
 from motet_train.evaluate.steer.standing import SPEEDS, held_on, standing, stretches
 from motet_train.evaluate.steer.track import Track, tracks_of
 from motet_train.evaluate.steer.wandering import Limits, wandering
-from motet_train.evaluate.tables import Goals, Report, report_table
+from motet_train.evaluate.tables import Goals, Report, gathered, report_table
 
 GOALS: Goals = {
     "walk.slide_cm": (None, 2.5),
@@ -33,18 +33,9 @@ GOALS: Goals = {
 }
 """Figure -> (least, most) that the model that comes with motet is to reach."""
 
-SELDOM = 30
-"""Ticks between two searches of the simple rival: the recording that fits best is played for a second, or until
-something else is told. (Two seconds make it weaker: few recorded runs go on for so long.)"""
-
-MINUTES, CHARACTERS = 10.0, 100
-"""How long how many figures are told anything at random."""
-
 BESIDE = {"recorded": "as recorded", "held": "feet held", "seldom": "seldom searched"}
 """What stands beside a model's figures, GROUP_NAME in a report, and the heads of their columns: recordings as they are
 and with their feet held, as they are played; and the rival."""
-
-Told = Callable[[str], object]
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,57 +69,41 @@ def _shown(store: Store, held: bool) -> list[tuple[Recording, Track]]:
     return list(zip(found, tracks_of(found, rows_of(found, tuple(gait.name for gait in gaits))), strict=True))
 
 
-def steer_report(
-    model: SteerModel,
-    recorded: Recorded,
-    told: Told = lambda part: None,
-    minutes: float = MINUTES,
-    characters: int = CHARACTERS,
-) -> Report:
-    """The figures of a model, of recordings and of the rival; ``told`` is told what is measured next.
+def steer_report(model: SteerModel, recorded: Recorded, minutes: float = 10.0, characters: int = 100) -> Report:
+    """The figures of a model, of recordings and of the rival.
 
     model: or a net that stands for one (:class:`motet_train.papers.tdbn.driven.Driven`), which has no rival.
+    minutes, characters: how long how many figures are told anything at random.
     DataError for a model without a walk and a run.
     """
     if missing := [gait for gait in SPEEDS if gait not in model.gaits]:
         raise DataError(f"a model that is steered is measured at a walk and a run; this one has no {missing[0]!r}")
-    limits = recorded.limits()
-    report: Report = {}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ControlWarning)  # speeds that a gait does not have show in the figures
-        rivals = {"_seldom": seldom(model)} if isinstance(model, SteerModel) else {}  # a net does not search
-        for name, one in {"": model, **rivals}.items():
-            own = _figures(one, limits, lambda part, name=name: told(part + name), minutes, characters)  # type: ignore[misc]
-            report |= {f"{group}{name}": figures for group, figures in own.items()}
-    for gait in SPEEDS:
-        told(f"{gait}_recorded")
-        report |= {f"{gait}_recorded": recorded.standing(gait, False), f"{gait}_held": recorded.standing(gait, True)}
-    report["random_held"] = {"largest_turn": float(limits.turn.max()), "largest_leap": 1.0}
-    return report
+        return gathered(_parts(model, recorded, minutes, characters), "steered figures")
 
 
-def seldom(model: SteerModel) -> SteerModel:
-    """The same model, which searches only every :data:`SELDOM` ticks, and when something else is told."""
-    config = {**model.manifest.config, "every": SELDOM}
-    return SteerModel(replace(model.manifest, config=config), model.graphs)
-
-
-def _figures(model: SteerModel, limits: Limits, told: Told, minutes: float, characters: int) -> Report:
-    parts: dict[str, Callable[[], dict[str, float]]] = {
-        **{gait: lambda gait=gait: _standing(model, gait) for gait in SPEEDS},  # type: ignore[misc]
-        "speed": lambda: speed_errors(model),
-        **{
-            f"turn_{gait}": lambda gait=gait, pace=pace: turn_errors(model, gait, pace)  # type: ignore[misc]
-            for gait, pace in SPEEDS.items()
-        },
-        "aside": lambda: aside_errors(model),
-        "random": lambda: wandering(model, limits, 60 * minutes, characters),
+def _parts(model: SteerModel, recorded: Recorded, minutes: float, characters: int) -> Iterator[Report]:
+    limits = recorded.limits()
+    measures: dict[str, Callable[[SteerModel], dict[str, float]]] = {
+        **{gait: partial(_standing, gait=gait) for gait in SPEEDS},
+        "speed": speed_errors,
+        **{f"turn_{gait}": partial(turn_errors, gait=gait, pace=pace) for gait, pace in SPEEDS.items()},
+        "aside": aside_errors,
+        "random": partial(wandering, limits=limits, seconds=60 * minutes, characters=characters),
     }
-    report: Report = {}
-    for name, part in parts.items():
-        told(name)
-        report[name] = part()
-    return report
+    rivals = {"_seldom": seldom(model)} if isinstance(model, SteerModel) else {}  # a net does not search
+    for ending, one in {"": model, **rivals}.items():
+        yield from ({f"{name}{ending}": measure(one)} for name, measure in measures.items())
+    for gait in SPEEDS:
+        yield {f"{gait}_recorded": recorded.standing(gait, False), f"{gait}_held": recorded.standing(gait, True)}
+    yield {"random_held": {"largest_turn": float(limits.turn.max()), "largest_leap": 1.0}}
+
+
+def seldom(model: SteerModel, every: int = 30) -> SteerModel:
+    """The simplest rival: the same model, which searches only every so many ticks, a second, and when something else is
+    told; until then, or until its end, the recording that fits best is played."""
+    return SteerModel(replace(model.manifest, config={**model.manifest.config, "every": every}), model.graphs)
 
 
 def _standing(model: SteerModel, gait: str) -> dict[str, float]:
@@ -147,9 +122,8 @@ def steer_text(reports: Mapping[str, Report]) -> str:
 def _of(report: Report, ending: str) -> Report:
     """The groups of a kind, without the ending that says which."""
     endings = tuple(f"_{kind}" for kind in BESIDE)
-    groups: dict[str, Any] = {
+    return {
         group.removesuffix(ending): found
         for group, found in report.items()
         if (group.endswith(ending) if ending else not group.endswith(endings))
     }
-    return groups

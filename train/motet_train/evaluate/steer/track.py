@@ -1,22 +1,19 @@
 """What figures did, steered or recorded, as all measures see it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from motet.bundle.graph import Floats
-from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, sided, sole_points
+from motet.motion.humanoid import sole_points
 from motet.motion.pose import Pose
 from motet.motion.rotations import quat_to_rotmat
 from motet.representation.root_sixd import ROOT_SIXD
 from motet_train.data.locomotion import Recording
 from motet_train.data.matching_rows import MatchingRows
 from motet_train.data.sixd_windows import poses_of
-
-BALLS = [HUMANOID.index(sided(side, "Toes")) for side in LEFT_RIGHT]
-"""The joints in the balls of both feet."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +30,7 @@ class Track:
     def of(poses: Sequence[Pose], fps: float) -> "Track":
         """What poses that follow each other show."""
         columns = ([getattr(pose, name) for pose in poses] for name in ("ground", "rotations", "height"))
-        ground, rotations, height = (np.stack(column) for column in columns)
+        ground, rotations, height = map(np.stack, columns)
         return Track(ground, rotations, height, fps)
 
     def __len__(self) -> int:
@@ -46,7 +43,7 @@ class Track:
 
     def seen(self) -> "Track":
         """The same as the figures themselves see it: all at the origin, and facing z."""
-        return Track(np.zeros_like(self.ground), self.rotations, self.height, self.fps)
+        return replace(self, ground=np.zeros_like(self.ground))
 
     @cached_property
     def transforms(self) -> tuple[Floats, Floats]:

@@ -1,7 +1,6 @@
 """Figures that are told anything at random, for minutes: whether their poses stay whole, and whether they go.
 
-Every .2 to 3 s a figure is told another gait, speed, direction and facing. What its joints do from tick to tick is
-held against what they do in the recordings that it plays (:class:`Limits`).
+What its joints do from tick to tick is held against what they do in the recordings that it plays (:class:`Limits`).
 """
 
 from dataclasses import dataclass, fields
@@ -15,27 +14,6 @@ from motet.motion.humanoid import BONES, HUMANOID
 from motet.motion.rotations import Array
 from motet.motion.sides import partners_of
 from motet_train.evaluate.steer.track import Track
-
-EACH = (0.2, 3.0)
-"""Seconds from one change to the next."""
-
-STILL, ALONG = 0.15, 0.5
-"""The share of changes that ask to stand, and of those that ask to face where it goes."""
-
-LEAP = 1.1
-"""Times as far as in any recording: a joint that is moved farther in a tick, seen from the figure itself, leaps."""
-
-BESIDE = 0.05
-"""Metres: hips that are so much lower or higher than in any recording are broken."""
-
-UNDER = 0.03
-"""Metres: soles that are deeper are under the ground."""
-
-ASKED, WITHIN, SHARE = 0.4, 2.0, 1 / 3
-"""A figure freezes that was asked to go at more m/s for seconds, and went less than this share of it."""
-
-STIFF, STIFF_FOR = 0.01, 0.5
-"""Degrees a tick by which no joint turns, for seconds: such a figure freezes, too."""
 
 CHUNK = 30
 """Ticks whose joints are looked at together."""
@@ -88,27 +66,24 @@ def leaps(track: Track) -> Array:
 class Watch:
     """What T ticks of B figures were: each array is (T, B) but ``ground`` (T, B, 3).
 
-    asked: m/s. since: ticks since the last change, 0 at the tick that follows it. gait: its number. finite: whether
-    all is. turn, bone: degrees that the bone turned which turned most, and which. leap, joint: how far the joint
-    moved that went the farthest beside its limit, as a share of that, and which. height: of the hips. lowest: of the
-    soles. All of turn and leap is 0 in the first tick.
+    asked: m/s. since: ticks since the last change, 0 at the tick that follows it. finite: whether all is. turn: degrees
+    that the bone turned which turned most. leap: how far the joint moved that went the farthest beside its limit, as a
+    share of that. height: of the hips. lowest: of the soles.
     """
 
     ground: Numbers
     asked: Numbers
     since: Numbers
-    gait: Numbers
     finite: Flags
     turn: Numbers
-    bone: Numbers
     leap: Numbers
-    joint: Numbers
     height: Numbers
     lowest: Numbers
 
 
 class _Teller:
-    """Tells B figures something else at random times."""
+    """Tells B figures something else after 0.2 to 3 s each: to stand in 15 of 100 changes, and to face where they go in
+    half of them."""
 
     def __init__(self, model: SteerModel, characters: int, seed: int) -> None:
         self.rng, self.fps, self.names = np.random.default_rng(seed), model.fps, np.array(model.gaits)
@@ -125,13 +100,13 @@ class _Teller:
         if not len(who):
             return
         rng, count = self.rng, len(who)
-        self.left[who], self.since[who] = np.round(rng.uniform(*EACH, count) * self.fps) - 1, 0
+        self.left[who], self.since[who] = np.round(rng.uniform(0.2, 3.0, count) * self.fps) - 1, 0
         self.gait[who] = rng.integers(len(self.names), size=count)
         low, high = self.ranges[self.gait[who]].T
-        self.speed[who] = np.where(rng.random(count) < STILL, 0.0, rng.uniform(low, high))
+        self.speed[who] = np.where(rng.random(count) < 0.15, 0.0, rng.uniform(low, high))
         self.direction[who] = rng.uniform(-180, 180, count)
         facing = rng.uniform(-180, 180, count)
-        self.facing[who] = np.where(rng.random(count) < ALONG, self.direction[who], facing)
+        self.facing[who] = np.where(rng.random(count) < 0.5, self.direction[who], facing)
         gaits = self.names[self.gait].tolist()
         self.session.control(gait=gaits, speed=self.speed, direction=self.direction, facing=self.facing)
         self.speed = np.hypot(*self.session.told[:, :2].T)  # within what gaits can do that way
@@ -146,13 +121,13 @@ def watched(model: SteerModel, limits: Limits, seconds: float, characters: int, 
         for _ in range(min(CHUNK, round(seconds * fps) - start)):
             teller.tell()
             poses.append(teller.session.tick())
-            asked.append((teller.speed.copy(), teller.since.copy(), teller.gait.copy()))
+            asked.append((teller.speed.copy(), teller.since.copy()))
         parts.append(_seen(Track.of([*last, *poses], fps), limits, *map(np.stack, zip(*asked, strict=True))))
         last = poses[-1:]
     return Watch(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Watch)))
 
 
-def _seen(track: Track, limits: Limits, asked: Array, since: Array, gait: Array) -> Watch:
+def _seen(track: Track, limits: Limits, asked: Array, since: Array) -> Watch:
     """The watch of all frames of a track but the first."""
     turned, moved, now = turns(track), leaps(track) / np.maximum(limits.leap, 1e-3), track[1:]
     finite = np.isfinite(now.places).all(axis=(2, 3)) & np.isfinite(now.ground).all(axis=2)
@@ -160,12 +135,9 @@ def _seen(track: Track, limits: Limits, asked: Array, since: Array, gait: Array)
         ground=now.ground,
         asked=asked.astype(np.float32),
         since=since.astype(np.int32),
-        gait=gait.astype(np.uint8),
         finite=np.asarray(finite),
         turn=turned.max(axis=2).astype(np.float32),
-        bone=turned.argmax(axis=2).astype(np.uint8),
         leap=moved.max(axis=2).astype(np.float32),
-        joint=moved.argmax(axis=2).astype(np.uint8),
         height=now.height,
         lowest=now.soles[..., 1].min(axis=2),
     )
@@ -173,38 +145,38 @@ def _seen(track: Track, limits: Limits, asked: Array, since: Array, gait: Array)
 
 def broken(watch: Watch, limits: Limits) -> Flags:
     """Poses (T, B) that are not finite, or where a bone turned more in a tick than any does in a recording, or whose
-    hips are lower or higher than in any."""
-    inside = (watch.height >= limits.low - BESIDE) & (watch.height <= limits.high + BESIDE)
+    hips are lower or higher than in any by 5 cm."""
+    inside = (watch.height >= limits.low - 0.05) & (watch.height <= limits.high + 0.05)
     found: Flags = ~(watch.finite & (watch.turn <= limits.turn.max()) & inside)
     return found
 
 
 def frozen(watch: Watch, fps: float) -> Flags:
-    """Ticks (T, B) at which a figure turns out to be frozen: it was told the same for :data:`WITHIN` seconds until
-    then, to go, and went too slowly along its path; or none of its joints has turned for :data:`STIFF_FOR`, for the
-    first time."""
-    ticks, stiff_for = round(WITHIN * fps), round(STIFF_FOR * fps)
+    """Ticks (T, B) at which a figure turns out to be frozen.
+
+    It was told the same for 2 s until then, to go at more than 0.4 m/s, and went less than a third as far along its
+    path; or for the first time none of its joints has turned by 0.01 degrees a tick for half a second.
+    """
+    ticks, stiff_for = round(2.0 * fps), round(0.5 * fps)
     steps = np.linalg.norm(np.diff(watch.ground[..., :2], axis=0, prepend=watch.ground[:1, :, :2]), axis=2)
-    path = np.cumsum(steps, axis=0, dtype=np.float64)
-    went = np.zeros_like(path)
+    path, stiff = np.cumsum(steps, axis=0, dtype=np.float64), np.cumsum(watch.turn < 0.01, axis=0)
+    went, still = np.zeros_like(path), np.zeros(path.shape, dtype=bool)
     went[ticks:] = path[ticks:] - path[:-ticks]
-    slow = (watch.since == ticks) & (watch.asked > ASKED) & (went / WITHIN < SHARE * watch.asked)
-    stiff = np.cumsum(watch.turn < STIFF, axis=0)
-    still = np.zeros_like(slow)
     still[stiff_for:] = stiff[stiff_for:] - stiff[:-stiff_for] == stiff_for
     still[1:] &= ~still[:-1]
-    found: Flags = slow | still
+    found: Flags = still | ((watch.since == ticks) & (watch.asked > 0.4) & (went / 2.0 < watch.asked / 3))
     return found
 
 
 def wandering(model: SteerModel, limits: Limits, seconds: float, characters: int) -> dict[str, float]:
-    """Counts, all ticks of all figures: broken poses, freezes, leaps, soles under the ground; and the most of each."""
+    """Counts, all ticks of all figures: broken poses, freezes, leaps (a joint goes a tenth farther in a tick, seen from
+    the figure, than in any recording), soles 3 cm or more under the ground; and the most of each."""
     watch = watched(model, limits, seconds, characters)
     return {
         "broken": float(broken(watch, limits).sum()),
         "frozen": float(frozen(watch, model.fps).sum()),
-        "leaps": float((watch.leap > LEAP).sum()),
-        "under_ground": float((watch.lowest < -UNDER).sum()),
+        "leaps": float((watch.leap > 1.1).sum()),
+        "under_ground": float((watch.lowest < -0.03).sum()),
         "largest_turn": float(watch.turn.max()),
         "largest_leap": float(watch.leap.max()),
         "deepest_cm": 100 * float(max(0.0, -watch.lowest.min())),

@@ -11,7 +11,7 @@ from motet.motion.feet.root_path import lay_root_path
 from motet.motion.humanoid import map_of
 from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
-from motet_train.evaluate.feet import acceleration, leap, slide, speed
+from motet_train.evaluate.feet import acceleration, leap, slide, speed, stances
 from motet_train.papers.tdbn.experiments.gaits import Figures
 from motet_train.papers.tdbn.experiments.study import ControlStudy
 
@@ -71,7 +71,7 @@ def _measured(motion: Motion, balls: list[int]) -> Figures:
     places = positions(motion) * (skeleton_of(motion).metres_per_unit or 1.0)
     points, root = places[:, balls], places[:, 0]
     return {
-        "slide": slide(points, root, motion.fps),
+        "slide": slide(stances(points, root, motion.fps)),
         "speed": speed(points, root, motion.fps),
         "acceleration": acceleration(places, root, motion.fps),
         "pace": float(np.linalg.norm((root[-1] - root[0])[[0, 2]])) / motion.duration,
