@@ -9,6 +9,7 @@ import pytest
 from fake_models import FakeGraph, manifest, spec
 from figures import walker
 
+import motet
 from motet.decode.free_run import free_run
 from motet.errors import BundleError, DecodingError, MotionError
 from motet.formats import read_motion, write_motion
@@ -236,3 +237,10 @@ def test_what_knows_its_errors_tells_them_in_centimetres() -> None:
     wrong = spec({"frames": "batch L C"}, {"error": "batch N"}, {**sizes, "N": HORIZON + 1})
     with pytest.raises(BundleError, match="4 errors of a horizon of 3"):
         PredictModel(model.manifest, {**model.graphs, "error": FakeGraph(wrong, lambda frames: (frames,))})
+
+
+def test_a_stream_of_another_figure_gives_what_the_whole_motion_gives(clips) -> None:
+    """The figure and its ground are those of the motion that the session starts with, not of the frames it keeps."""
+    model, walk = motet.load("predict"), read_motion(clips / "39_14.amc")
+    whole = model.predict(walk, frames=5)
+    np.testing.assert_allclose(model.stream(walk).predict(5).values, whole.values, atol=1e-4)

@@ -21,7 +21,7 @@ from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.motion.springs import damped, damping_of
 from motet.representation.contract import MotionContract
-from motet.representation.retargeting import carried_back
+from motet.representation.retargeting import from_model_figure
 from motet.representation.root_block import last_place
 from motet.representation.root_sixd import facing, in_world
 
@@ -216,9 +216,11 @@ def brought_back(
 ) -> tuple[Motion, Motion]:
     """What follows on the contract's figure, and the motion before it: both the motion's own, or where that is not
     possible on that figure. Arguments as :func:`carried_on`."""
-    if not _same_joints(own, figure) and (back := carried_back(following, figure, own, measured)) is not None:
-        return back, own
-    return following, figure
+    if _same_joints(own, figure):
+        return following, figure
+    shown = together(figure[-1:], following.select(figure.channels, figure.units))
+    back = from_model_figure(shown, own, own[-1:], measured)
+    return (following, figure) if back is None else (back, own)
 
 
 def _same_joints(own: Motion, figure: Motion) -> bool:

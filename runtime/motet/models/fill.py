@@ -17,7 +17,7 @@ from motet.motion.humanoid import HUMANOID, on_humanoid
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.representation.placed import CHANNELS, bridge, placed, pose_of, put_at, seen_from, unplaced
-from motet.representation.retargeting import carried_between
+from motet.representation.retargeting import from_model_figure
 from motet.representation.root_sixd import facing
 
 SEEN = 5.0
@@ -159,7 +159,7 @@ class FillModel(BundleModel):
         """Whether a motion's figure stands in its own world as in the model's, and can be set down there."""
         part = motion[-round(SEEN * motion.fps) :].continuous().resample(self.fps, to_end=True)
         ends = replace(part, values=part.values[[0, -1]] if len(part) else part.values)
-        return carried_between(on_humanoid(part), part, ends) is not None
+        return from_model_figure(on_humanoid(part), part, ends) is not None
 
     def _elsewhere(self, first: Motion, second: Motion, seconds: float) -> tuple[Motion, Motion, Motion]:
         """As :meth:`_joined`, on the humanoid."""
@@ -176,7 +176,7 @@ class FillModel(BundleModel):
         frames = at_own_rate(known.past, new, known.after, count)
         ends = replace(before, values=np.concatenate([before.values[-1:], after.values[:1]]))
         like = replace(known.figure[:1], fps=before.fps)
-        return carried_between(unplaced(frames, like), known.own, ends)
+        return from_model_figure(unplaced(frames, like), known.own, ends)
 
     def _sides(self, before: Motion, after: Motion) -> Sides:
         """What is known about a gap; MotionError where it is too little."""

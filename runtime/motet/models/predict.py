@@ -103,9 +103,9 @@ class PredictModel(BundleModel):
 
         A mocap motion is continued in its own channels, units and skeleton, from where its root is; features, in the
         channels of :attr:`contract`, as features. One of another human figure is brought onto the model's, and what
-        follows back, or given on the model's figure where that is not possible (docs/humanoid.md). Only the last
-        :attr:`seed_frames` at the model's frame rate are looked at; one at another rate is resampled, so that its last
-        frame is kept.
+        follows back, or given on the model's figure where that is not possible (docs/humanoid.md). The model
+        sees the last :attr:`seed_frames` at its frame rate; of another figure, all frames tell how its joints stand and
+        where its ground is. A motion at another rate is resampled, so that its last frame is kept.
         append: give the motion, resampled, and what follows it.
         progress: called with the number of motions done and of all.
         beyond: a model that writes codes, as ``motet.load("generate")``, which goes on where more frames than
@@ -167,18 +167,25 @@ class PredictModel(BundleModel):
         """
         samples = checked_int("samples", samples, 1, MAX_SAMPLES, DecodingError)
         count, seeds = checked(self.horizon if frames is None else frames), seeds_of(seed, samples, DecodingError)
-        whole = motion if motion.fps == self.fps else motion.continuous().resample(self.fps, to_end=True)
+        whole = self._at_rate(motion)
         found = futures(beyond, whole, count, seeds, progress)
         return [together(before, following) if append else following for following, before in found]
 
+    def measured(self, motion: Motion) -> Figure | None:
+        """The figure of a motion, measured for all predictions of it; None where it is the model's."""
+        return self.contract.measured(self._at_rate(motion))
+
     def following(self, motion: Motion, frames: int | None, measured: Figure | None) -> Motion:
-        """As :meth:`predict`, of a figure that the contract has measured already."""
+        """As :meth:`predict`, of a figure that is measured already."""
         whole, figure, last = self._seed(motion, measured)
         return carried_on(self.contract, self.next_frames([last], frames)[0], whole, figure, measured)[0]
 
+    def _at_rate(self, motion: Motion) -> Motion:
+        return motion if motion.fps == self.fps else motion.continuous().resample(self.fps, to_end=True)
+
     def _seed(self, motion: Motion, measured: Figure | None = None) -> tuple[Motion, Motion, Array]:
         """The motion at the model's frame rate, the same on the model's figure, and its last frames (L, C)."""
-        whole = motion if motion.fps == self.fps else motion.continuous().resample(self.fps, to_end=True)
+        whole = self._at_rate(motion)
         figure = self.contract.on_figure(whole, measured)
         frames = self.contract.frames(figure[max(0, len(whole) - self.seed_frames - 1) :])
         if len(frames) < self.seed_frames:
@@ -252,13 +259,14 @@ def checked(frames: int) -> int:
 class PredictSession:
     """A growing motion: push new frames, predict the next. Keeps only the frames that the model uses.
 
-    Another figure than the model's is measured once, at the first prediction, by the frames so far.
+    Another figure than the model's is measured once, at the first prediction: by the motion that the session starts
+    with or, where that is too short, by the frames that are kept. So is where its ground is.
     """
 
     def __init__(self, model: PredictModel, start: Motion) -> None:
         self.model = model
         self._kept = math.ceil((model.seed_frames + 1) * start.fps / model.fps) + 1
-        self._motion = start[-self._kept :]
+        self._start, self._motion = start, start[-self._kept :]
 
     def push(self, frames: ArrayLike) -> None:
         """The next frame (D,), or several (T, D); MotionError where they do not fit, and then nothing has changed."""
@@ -276,8 +284,10 @@ class PredictSession:
 
     def predict(self, frames: int | None = None) -> Motion:
         """As :meth:`PredictModel.predict`, after all that was pushed so far."""
-        return self.model.following(self._motion, frames, self._measured)
+        return self.model.following(self._motion, frames, self._figure)
 
     @cached_property
-    def _measured(self) -> Figure | None:
-        return self.model.contract.measured(self._motion)
+    def _figure(self) -> Figure | None:
+        known = self._start if len(self._start) >= len(self._motion) else self._motion
+        self._start = known[:0]  # not needed any more
+        return self.model.measured(known)

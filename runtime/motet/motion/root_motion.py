@@ -3,9 +3,7 @@
 import numpy as np
 
 from motet.errors import MotionError
-from motet.motion.humanoid import JointMap, map_of
-from motet.motion.humanoid.fitting import fit
-from motet.motion.humanoid.upright import upright
+from motet.motion.humanoid import Figure, JointMap, map_of
 from motet.motion.kinematics import AXES, global_transforms, local_translations, posed, skeleton_of, with_channels
 from motet.motion.motion import Motion
 from motet.motion.rotations import UP, Array, inverse, rotated
@@ -66,8 +64,7 @@ def _carrier(motion: Motion) -> tuple[int, Array]:
     """The joint that carries legs and back and where up is (3,); of what is no human figure the root, and y."""
     skeleton = skeleton_of(motion)
     try:
-        joint_map, transforms = map_of(motion), global_transforms(motion)
-        turn = upright(fit(skeleton, joint_map, *transforms), transforms[1]).turn
+        figure = Figure.of(motion)
     except MotionError:
         return 0, UP
-    return joint_map.carrier(skeleton), turn.T @ UP
+    return figure.fitted.joint_map.carrier(skeleton), figure.turn.T @ UP

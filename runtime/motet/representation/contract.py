@@ -10,14 +10,12 @@ from numpy.typing import ArrayLike
 
 from motet.errors import MotionError
 from motet.motion.humanoid import Figure, to_humanoid
-from motet.motion.humanoid.retarget import logged
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
 from motet.representation import named
 from motet.representation.base import FrameMirror, phases
-from motet.representation.figure import in_joints_of
-from motet.representation.retargeting import brought, foreign, in_known_unit
+from motet.representation.retargeting import foreign, in_joints_of, in_known_unit, to_model_figure
 
 LIMIT = 50.0
 """Standard deviations: z is clipped to this, in the nets' graphs too. Of 256 of CMU's trials one frame in a thousand
@@ -81,16 +79,16 @@ class MotionContract:
         """
         return next(sequences(self.representation, self.on_figure(motion), self.fps, self._like)).values
 
-    def on_figure(self, motion: Motion, measured: Figure | None = None) -> Motion:
+    def on_figure(self, motion: Motion, figure: Figure | None = None) -> Motion:
         """A motion of any human figure on the contract's skeleton; as it is where it has the joints or channels, with
         the length unit that its skeleton tells where the file does not.
 
         One that is brought there comes at the contract's frame rate where its own is higher, beginning with its first
         frame; joints of which the humanoid says nothing, such as thumbs, stand as they do on average. MotionError, with
         the reason, where that cannot be done.
-        measured: its figure as :meth:`measured` finds it, where more than one motion of it is brought.
+        figure: its figure as :meth:`measured` finds it, where more than one motion of it is brought.
         """
-        if self.skeleton is None or self._is_features(motion):
+        if self._is_own(motion) or self.skeleton is None:
             return motion
         reason = foreign(motion, self.skeleton, self._joints)
         if reason is None:
@@ -98,17 +96,19 @@ class MotionContract:
         if named(self.representation).required and not any(channel.endswith(".tx") for channel in motion.channels):
             raise MotionError("this motion lacks the root's tx, ty and tz: it does not say where the figure goes")
         slower = motion.continuous().resample(self.fps) if motion.fps > self.fps else motion
-        return brought(slower, self._average, reason, measured)
+        return to_model_figure(slower, self._average, reason, figure)
 
     def measured(self, motion: Motion) -> Figure | None:
         """The figure of a motion that :meth:`on_figure` brings to the humanoid, measured for more of it; None of one
         that is taken as it is. MotionError as there."""
-        if self.skeleton is None or self._is_features(motion) or not foreign(motion, self.skeleton, self._joints):
+        if self._is_own(motion) or self.skeleton is None or not foreign(motion, self.skeleton, self._joints):
             return None
-        return logged(to_humanoid(motion)).figure
+        return to_humanoid(motion).logged().figure
 
-    def _is_features(self, motion: Motion) -> bool:
-        return set(self.channels) <= set(motion.channels)
+    def _is_own(self, motion: Motion) -> bool:
+        """Whether a motion is of the contract's own figure, in a known unit, or features."""
+        known = self.skeleton is not None and self.skeleton.metres_per_unit is not None
+        return (known and motion.skeleton == self.skeleton) or set(self.channels) <= set(motion.channels)
 
     @cached_property
     def _average(self) -> Motion:

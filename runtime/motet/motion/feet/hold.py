@@ -15,10 +15,7 @@ from numpy.typing import NDArray
 
 from motet.errors import MotionError
 from motet.motion.feet.contacts import SOLES, ContactSettings, contacts_of, rise, smoothed
-from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, ground_under, leg_length, map_of, sided, sole_points
-from motet.motion.humanoid.bones import GROUND
-from motet.motion.humanoid.fitting import fit
-from motet.motion.humanoid.upright import upright
+from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, Figure, ground_under, leg_length, sided, sole_points
 from motet.motion.kinematics import AXES, euler_of, global_transforms, skeleton_of, with_channels
 from motet.motion.motion import TURN, Motion
 from motet.motion.rotations import Array, inverse, product, rotated
@@ -94,15 +91,15 @@ def _of_humanoid(rotations: Array, places: Array) -> tuple[Legs, float, Array]:
 def _measured(motion: Motion, rotations: Array, places: Array) -> tuple[Legs, float, Array]:
     """The legs, what makes lengths those of the humanoid's size, and points (T, P, 3) of both soles, first the left
     one, above a ground at 0, at that size."""
-    joint_map = map_of(motion)
-    fitted = fit(skeleton_of(motion), joint_map, rotations, places)
-    if not np.array_equal(upright(fitted, places).turn, np.eye(3)):
+    figure = Figure.of(motion)
+    fitted, joints_of = figure.fitted, figure.fitted.joint_map.joints
+    if not np.array_equal(figure.turn, np.eye(3)):
         raise MotionError("this figure does not stand along y: turn it upright by to_humanoid")
     scale = leg_length() / fitted.leg
     soles = fitted.soles(fitted.bones(rotations), places) * scale
     # how thick the soles of another figure are is not known: each of their points is on the ground where it is lowest
-    soles[..., 1] -= np.percentile(soles[..., 1], GROUND, axis=0)
-    sides = [[joint_map.joints[sided(side, part)] for part in BENT] for side in LEFT_RIGHT]
+    soles[..., 1] -= np.percentile(soles[..., 1], 5, axis=0)
+    sides = [[joints_of[sided(side, part)] for part in BENT] for side in LEFT_RIGHT]
     return [(joints, fitted.aligned[joints[1]][:, 0]) for joints in sides], scale, soles
 
 

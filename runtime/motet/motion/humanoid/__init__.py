@@ -18,9 +18,10 @@ from motet.motion.humanoid.bones import (
     sided,
     sole_points,
 )
-from motet.motion.humanoid.figure_checks import UNITS
 from motet.motion.humanoid.fingers import relaxed
 from motet.motion.humanoid.joint_map import JointMap, check_map, read_map
+from motet.motion.humanoid.joint_tree import map_of
+from motet.motion.humanoid.measure import UNITS, unit_by_legs
 from motet.motion.humanoid.mmm_figure import is_mmm, with_figure
 from motet.motion.humanoid.retarget import (
     SURE,
@@ -28,7 +29,6 @@ from motet.motion.humanoid.retarget import (
     Humanoid,
     from_humanoid,
     grounded,
-    map_of,
     on_humanoid,
     to_humanoid,
 )
@@ -65,5 +65,6 @@ __all__ = [
     "sided",
     "sole_points",
     "to_humanoid",
+    "unit_by_legs",
     "with_figure",
 ]

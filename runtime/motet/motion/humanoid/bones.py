@@ -88,9 +88,6 @@ REST = HUMANOID.rest_positions + HUMANOID.offsets[0]
 SOLE = {"Foot": ((0.0, -0.08, -0.05), (0.0, -0.08, 0.13)), "Toes": ((0.0, -0.02, 0.07),)}
 """Points of the sole in the frames of the foot (heel, ball) and of the toes (tip)."""
 
-GROUND = 5.0
-"""The percentile of the lowest points of the soles that stands on the ground."""
-
 
 def leg_length() -> float:
     """Length of the humanoid's thigh and shin together, in metres: the measure by which figures are scaled."""
@@ -108,5 +105,6 @@ def sole_points(rotations: Array, positions: Array) -> Array:
 
 
 def ground_under(soles: Array) -> float:
-    """The height of the ground under points (T, P, 3) of the soles; 0 for no frames."""
-    return float(np.percentile(soles[..., 1].min(axis=1), GROUND)) if len(soles) else 0.0
+    """The height of the ground under points (T, P, 3) of the soles: the lowest is deeper in 5 % of the frames; 0 for
+    no frames."""
+    return float(np.percentile(soles[..., 1].min(axis=1), 5)) if len(soles) else 0.0

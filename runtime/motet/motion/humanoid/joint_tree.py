@@ -13,6 +13,7 @@ import numpy as np
 from motet.errors import MotionError
 from motet.motion.humanoid.bones import ARM, LEFT_RIGHT, LEG, sided
 from motet.motion.humanoid.joint_map import BY_THE_TREE, JointMap, check_map
+from motet.motion.humanoid.joint_names import HalfKnownError, map_by_names
 from motet.motion.kinematics import local_translations, positions, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, unit
@@ -75,6 +76,21 @@ class _Fork:
     joint: int
     limbs: tuple[int, int]
     length: float
+
+
+def map_of(motion: Motion) -> JointMap:
+    """Which joint of the motion's skeleton is which bone: by names, else by the tree; MotionError if it is no human.
+
+    Where names fit in part, and the tree does not tell either, the error says which bones the names lack.
+    """
+    skeleton = skeleton_of(motion)
+    try:
+        return map_by_names(skeleton) or map_by_tree(motion)
+    except HalfKnownError as half:
+        try:
+            return map_by_tree(motion)
+        except MotionError:
+            raise half from None
 
 
 def map_by_tree(motion: Motion) -> JointMap:

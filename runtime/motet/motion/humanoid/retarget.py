@@ -1,7 +1,7 @@
 """Motions of any human figure onto the humanoid, and the humanoid's onto any figure.
 
 A bone of the humanoid has the rotation of its joint in the world, times a constant that makes up for the rest pose
-(:mod:`motet.motion.humanoid.fitting`). Back and neck share their turns out among their joints; what a figure lacks
+(:mod:`motet.motion.humanoid.measure`). Back and neck share their turns out among their joints; what a figure lacks
 stays at rest. Paths are scaled by the lengths of the legs and laid so that the feet are on the ground.
 """
 
@@ -15,15 +15,12 @@ import numpy as np
 from motet.errors import MotionError
 from motet.motion.humanoid import bones
 from motet.motion.humanoid.bones import HUMANOID, LEFT_RIGHT, NECK, PARENTS, SPINE, leg_length, sided
-from motet.motion.humanoid.figure_checks import check_frames, height_of, unit_of
 from motet.motion.humanoid.fingers import relaxed
-from motet.motion.humanoid.fitting import Fitted, fit
 from motet.motion.humanoid.joint_map import BY_THE_TREE, JointMap
-from motet.motion.humanoid.joint_names import HalfKnownError, map_by_names
-from motet.motion.humanoid.joint_tree import map_by_tree
+from motet.motion.humanoid.joint_tree import map_of
+from motet.motion.humanoid.measure import Fitted, check_frames, fit, height_of, unit_of, upright
 from motet.motion.humanoid.mmm_figure import is_mmm, with_figure
 from motet.motion.humanoid.rest_pose import middle, to_left
-from motet.motion.humanoid.upright import upright
 from motet.motion.kinematics import (
     global_transforms,
     local_rotations,
@@ -54,32 +51,48 @@ log = logging.getLogger(__name__)
 SURE = 0.75
 """Confidence from which on what was found needs no warning: less has a skeleton whose names do not even tell sides."""
 
-NEAR = 0.1
-"""Metres that a motion of the humanoid may float or sink by mistake."""
-
 HIPS = [HUMANOID.index(sided(side, "UpperLeg")) for side in LEFT_RIGHT]
 
 
 @dataclass(frozen=True, eq=False)
 class Figure:
-    """A skeleton measured against the humanoid once, by :func:`to_humanoid`, for any number of its motions.
+    """A skeleton measured against the humanoid once, for any number of its motions.
 
-    first: one frame of it. turn: (3, 3) stands the world of its files upright.
+    first: one frame of it. turn: (3, 3) stands the world of its files upright. ground: how high the ground of its files
+    is in the humanoid's world, in metres; None where each motion's feet tell.
     """
 
     fitted: Fitted
     first: Motion
     turn: Array
+    ground: float | None = None
 
-    def brought(self, motion: Motion) -> Motion:
+    @staticmethod
+    def of(like: Motion | Skeleton, joint_map: JointMap | None = None) -> "Figure":
+        """The figure of a skeleton, or of a motion where the rest pose is not a standing body, whose frames then tell
+        how its joints stand; MotionError, with the reason, where it is no human's."""
+        example = like if isinstance(like, Motion) else Motion(np.zeros((1, 0)), (), (), 1.0, like)
+        transforms = global_transforms(example)
+        fitted = fit(skeleton_of(example), joint_map or map_of(example), *transforms)
+        return Figure(fitted, example[:1], upright(fitted, transforms[1]).turn)
+
+    def to_humanoid(self, motion: Motion) -> Motion:
         """Another motion of the skeleton on the humanoid."""
-        return self.stood(*global_transforms(motion), motion.fps)
+        motion = with_figure(motion) if is_mmm(motion) else motion
+        return self._grounded(*self._on_humanoid(*global_transforms(motion)), motion.fps)[0]
 
-    def stood(self, rotations: Array, places: Array, fps: float) -> Motion:
-        """The humanoid's motion, from rotations (T, J, 3, 3) and positions (T, J, 3) of the skeleton's joints."""
+    def _on_humanoid(self, rotations: Array, places: Array) -> tuple[Array, Array]:
+        """Rotations (T, J, 3, 3) in the world and positions (T, J, 3) of the humanoid, over no ground yet."""
         turned = product(self.turn, _humanoid_rotations(rotations, places, self.fitted))
         legs = middle(places, self.fitted.joint_map, "UpperLeg") @ self.turn.T * (leg_length() / self.fitted.leg)
-        return _on_humanoid(turned, legs, fps)
+        found = places_of(HUMANOID, turned)
+        return turned, found + (legs - found[:, HIPS].mean(axis=1))[:, None]
+
+    def _grounded(self, turned: Array, places: Array, fps: float) -> tuple[Motion, "Figure"]:
+        """The motion of rotations and positions of the humanoid laid on the ground, and the figure that knows it."""
+        ground = bones.ground_under(bones.sole_points(turned, places)) if self.ground is None else self.ground
+        root = places[:, 0] - (0.0, ground, 0.0)
+        return motion_of(HUMANOID, turned, {0: root}, fps), replace(self, ground=ground)
 
     @cached_property
     def posture(self) -> tuple[Skeleton, Array]:
@@ -122,20 +135,11 @@ class Humanoid:
         found = "found by the tree" if self.convention == BY_THE_TREE else f"of {self.convention}"
         return "; ".join((f"joints {found}, confidence {self.confidence:.2f}", *self.notes))
 
-
-def map_of(motion: Motion) -> JointMap:
-    """Which joint of the motion's skeleton is which bone: by names, else by the tree; MotionError if it is no human.
-
-    Where names fit in part, and the tree does not tell either, the error says which bones the names lack.
-    """
-    skeleton = skeleton_of(motion)
-    try:
-        return map_by_names(skeleton) or map_by_tree(motion)
-    except HalfKnownError as half:
-        try:
-            return map_by_tree(motion)
-        except MotionError:
-            raise half from None
+    def logged(self) -> "Humanoid":
+        """The same, which is logged."""
+        level = logging.INFO if self.confidence >= SURE else logging.WARNING
+        log.log(level, "brought to the humanoid: %s", self.summary)
+        return self
 
 
 def to_humanoid(motion: Motion, joint_map: JointMap | None = None) -> Humanoid:
@@ -156,11 +160,12 @@ def to_humanoid(motion: Motion, joint_map: JointMap | None = None) -> Humanoid:
     check_frames(places, joint_map, fitted.aims, _hinges(rotations, fitted))
     unit, up = unit_of(skeleton, fitted.leg), upright(fitted, places)
     figure = Figure(fitted, motion[:1], up.turn)
+    found, figure = figure._grounded(*figure._on_humanoid(rotations, places), motion.fps)
     notes = [note for note in (*fitted.notes, unit.note, up.note) if note]
     if joint_map.joints["hips"]:
         notes.append(f"the joint {skeleton.names[0]!r} above the hips is folded in")
     return Humanoid(
-        figure.stood(rotations, places, motion.fps),
+        found,
         joint_map.names(skeleton),
         joint_map.convention,
         round(joint_map.confidence * fitted.confidence, 2),
@@ -174,24 +179,17 @@ def to_humanoid(motion: Motion, joint_map: JointMap | None = None) -> Humanoid:
 
 def on_humanoid(motion: Motion) -> Motion:
     """The motion of :func:`to_humanoid`, or the motion itself if it is the humanoid's; what is found is logged."""
-    return motion if motion.skeleton == HUMANOID else logged(to_humanoid(motion)).motion
-
-
-def logged(found: Humanoid) -> Humanoid:
-    """What was found, which is logged."""
-    level = logging.INFO if found.confidence >= SURE else logging.WARNING
-    log.log(level, "brought to the humanoid: %s", found.summary)
-    return found
+    return motion if motion.skeleton == HUMANOID else to_humanoid(motion).logged().motion
 
 
 def grounded(motion: Motion) -> Motion:
     """A motion of the humanoid laid on the ground, as :func:`to_humanoid` lays others, where it floats or sinks a
-    little, as motions of models may; one that is further than :data:`NEAR` from the ground stays as it is."""
+    little, as motions of models may; one that is further than 0.1 m from the ground stays as it is."""
     if "hips.ty" not in motion.channels:
         return motion
     ground = bones.ground_under(bones.sole_points(*global_transforms(motion)))
     values = np.array(motion.values)
-    values[:, motion.channels.index("hips.ty")] -= ground if abs(ground) < NEAR else 0.0
+    values[:, motion.channels.index("hips.ty")] -= ground if abs(ground) < 0.1 else 0.0
     return replace(motion, values=values)
 
 
@@ -223,14 +221,6 @@ def _shared_out(chain: list[Array], names: tuple[str, ...]) -> dict[str, Array]:
     return {name: shared[:, i] for i, name in enumerate(names)}
 
 
-def _on_humanoid(turned: Array, legs: Array, fps: float) -> Motion:
-    """The motion of rotations in the world (T, J, 3, 3), the middle of the legs' joints at ``legs`` (T, 3)."""
-    places = places_of(HUMANOID, turned)
-    root = legs - places[:, HIPS].mean(axis=1)
-    root[:, 1] -= bones.ground_under(bones.sole_points(turned, places + root[:, None]))
-    return motion_of(HUMANOID, turned, {0: root}, fps)
-
-
 def from_humanoid(
     motion: Motion,
     like: Motion | Skeleton | Figure,
@@ -251,33 +241,17 @@ def from_humanoid(
         soles that stand on the ground. ahead: the motion's z becomes the way that the figure faces at rest.
     MotionError for a motion that is not the humanoid's, or a skeleton that is no human's.
     """
-    figure = like if isinstance(like, Figure) else figure_like(like, joint_map)
-    turned, moved = poses_on(figure, motion, skin, ahead)
-    return motion_of(figure.posture[0], turned, moved, motion.fps)
-
-
-def poses_on(
-    figure: Figure, motion: Motion, skin: Mapping[int, Array] | None = None, ahead: bool = False
-) -> tuple[Array, dict[int, Array]]:
-    """What :func:`from_humanoid` makes a motion of: rotations (T, J, 3, 3) of a figure's joints in the world, and
-    translations (T, 3) in its parent's frame of the one that carries it."""
     if motion.skeleton != HUMANOID:
         raise MotionError("this motion is not on the humanoid: bring it there by to_humanoid first")
+    figure = like if isinstance(like, Figure) else Figure.of(like, joint_map)
     fitted, (skeleton, still) = figure.fitted, figure.posture
     source, places = global_transforms(motion)
     if ahead:
         front = _front(fitted)
         source, places = product(front, source), rotated(front, places)
     turned = _figure_rotations(source, fitted, skeleton, still)
-    carrier = fitted.joint_map.carrier(skeleton)
-    return turned, {carrier: _moved(fitted, skeleton, (source, places), turned, skin or {})}
-
-
-def figure_like(like: Motion | Skeleton, joint_map: JointMap | None = None) -> Figure:
-    """A figure to put motions onto, as :func:`from_humanoid` takes it, measured for several of them."""
-    example = like if isinstance(like, Motion) else Motion(np.zeros((1, 0)), (), (), 1.0, like)
-    fitted = fit(skeleton_of(example), joint_map or map_of(example), *global_transforms(example))
-    return Figure(fitted, example[:1], np.eye(3))
+    moved = _moved(fitted, skeleton, (source, places), turned, skin or {})
+    return motion_of(skeleton, turned, {fitted.joint_map.carrier(skeleton): moved}, motion.fps)
 
 
 def _moved(

@@ -13,7 +13,7 @@ from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
 from motet.representation.base import phases
 from motet.representation.contract import FLOORS
-from motet.representation.figure import in_joints_of
+from motet.representation.retargeting import in_joints_of
 from motet_train.data.cmu_trials import CMU_CLIPS, CMU_LICENCE, cmu_trial
 from motet_train.data.errors import DataError
 
