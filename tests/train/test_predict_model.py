@@ -19,10 +19,10 @@ from motet_train.evaluate.predict.floors import ZERO
 from motet_train.manifest import About
 from motet_train.models.predict.error_head import LEAST, SIGNS, ErrorHead, Signs
 from motet_train.models.predict.predictor import Predictor, PredictorConfig
-from motet_train.papers.li2018.curves import FEW, MEAN, complete, curves
 from motet_train.papers.li2018.expmap_files import CMU_ACTIONS, read_expmap
 from motet_train.papers.li2018.material import expmap_material
-from motet_train.papers.li2018.published_h36m import CONV
+from motet_train.papers.li2018.published import CONV
+from motet_train.papers.li2018.report import FEW, MEAN, complete, protocol_results
 from motet_train.recipes.predict import DEFAULT, train_predict
 from motet_train.recipes.recipe import Job
 from motet_train.runs import Run
@@ -85,10 +85,10 @@ def test_training_learns_and_repeats_itself(tmp_path: Path) -> None:
     loaded = Run.load(tmp_path / "a")
     models = {"a": PredictModel(Manifest.from_json(loaded.manifest), loaded.torch_graphs())}
     corpus = read_expmap(tmp_path / "data")
-    errors = curves(models, corpus)[FEW]
+    errors = protocol_results(models, corpus).errors
     assert complete(corpus) == ["running", "walking"]  # none is, so all count
     for action in ("walking", "running"):
-        assert errors["a"][action].mean() < 0.9 * errors[ZERO][action].mean()
+        assert errors["a"][FEW, action].mean() < 0.9 * errors[ZERO][FEW, action].mean()
     lines = [json.loads(line) for line in (tmp_path / "a" / "log.jsonl").read_text().splitlines()]
     assert [line["step"] for line in lines] == [60]
 
@@ -166,8 +166,8 @@ def test_the_mean_is_that_of_complete_actions(tmp_path: Path) -> None:
     (data / "train" / CMU_ACTIONS[1] / f"{CMU_ACTIONS[1]}_4.txt").unlink()
     corpus = read_expmap(data)
     assert complete(corpus) == ["basketball"]
-    errors = curves({}, corpus)[FEW][ZERO]
-    np.testing.assert_array_equal(errors[MEAN], errors["basketball"])
+    errors = protocol_results({}, corpus).errors[ZERO]
+    np.testing.assert_array_equal(errors[FEW, MEAN], errors[FEW, "basketball"])
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,8 @@
-"""The table of systems that predict: rows of several seeds, published rows, ablations, costs and stick figures."""
+"""The table of systems that predict: rows of several seeds, published rows, costs and stick figures."""
 
 import json
 import zipfile
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -26,15 +27,13 @@ from motet_train.evaluate.predict.floors import CONSTANT, DAMPED, ZERO
 from motet_train.evaluate.predict.plots import _looks
 from motet_train.evaluate.predict.seed_groups import SeedGroup, mean, pooled, seed_groups, spread
 from motet_train.papers.li2018 import published
-from motet_train.papers.li2018.ablations import ablated, ablation_table
 from motet_train.papers.li2018.convseq2seq import Config
-from motet_train.papers.li2018.curves import COUNTS, MANY, MEAN, Curves, spreads_of
 from motet_train.papers.li2018.expmap_files import CMU_LAYOUT, H36M_LAYOUT, ExpmapCorpus, Layout, parse, read_expmap
+from motet_train.papers.li2018.figures import EVERY, GIVEN, places, strips
 from motet_train.papers.li2018.material import expmap_material
 from motet_train.papers.li2018.protocol import windows
-from motet_train.papers.li2018.protocol_table import protocol_table
-from motet_train.papers.li2018.published_h36m import CONV, ERD, RRNN
-from motet_train.papers.li2018.strips import EVERY, GIVEN, places, strips
+from motet_train.papers.li2018.published import CONV, ERD, RRNN
+from motet_train.papers.li2018.report import FEW, MANY, MEAN, Errors, Results, protocol_table
 from motet_train.papers.li2018.systems import stepwise
 from motet_train.runs import Run
 
@@ -52,12 +51,10 @@ def manifest(seed: int | None, model: str = "convseq2seq", recipe: dict[str, Any
     return SimpleNamespace(manifest=SimpleNamespace(model=model, config=config, training={**training, **seeded}))
 
 
-def constant(**values: float) -> Curves:
-    """Systems of a constant error, in all actions."""
-    return {
-        kind: {name: {part: np.full(25, value) for part in (*FIVE, MEAN)} for name, value in values.items()}
-        for kind in COUNTS
-    }
+def constant(actions: Sequence[str] = FIVE, **values: float) -> Errors:
+    """Systems of a constant error, in some actions."""
+    parts = [(kind, action) for kind in (FEW, MANY) for action in (*actions, MEAN)]
+    return {name: {part: np.full(25, value) for part in parts} for name, value in values.items()}
 
 
 def line(text: str, start: str) -> str:
@@ -66,7 +63,7 @@ def line(text: str, start: str) -> str:
 
 @pytest.mark.parametrize("layout", ["cmu-expmap", "h36m-expmap"])
 def test_the_published_actions_have_the_published_averages(layout: str) -> None:
-    actions, known = published.by_action(layout), published.averages(layout)
+    actions, known = published.BY_ACTION[layout], published.AVERAGES[layout]
     found = published.mean_over(actions, actions)
     assert set(found) == {RRNN, CONV}
     for name, values in found.items():
@@ -78,8 +75,8 @@ def test_the_published_mean_of_the_complete_actions() -> None:
     assert [f"{value:.2f}" for value in found[CONV]] == ["0.33", "0.50", "0.83", "0.94", "1.39"]
     assert [f"{value:.3f}" for value in found[RRNN]] == ["0.406", "0.632", "1.036", "1.172", "1.556"]
     assert published.mean_over(published.CMU_ERRORS, ("walking", "unheard of")) == {}
-    assert set(published.by_action(H36M_LAYOUT.name)) == set(H36M_LAYOUT.test)
-    assert set(published.by_action(CMU_LAYOUT.name)) == set(CMU_LAYOUT.test)
+    assert set(published.BY_ACTION[H36M_LAYOUT.name]) == set(H36M_LAYOUT.test)
+    assert set(published.BY_ACTION[CMU_LAYOUT.name]) == set(CMU_LAYOUT.test)
 
 
 def test_runs_that_differ_in_the_seed_alone_are_one_row() -> None:
@@ -128,8 +125,8 @@ def test_rows_are_means_and_spreads() -> None:
 
 
 def shown(layout: Layout, actions: tuple[str, ...]) -> str:
-    found: Curves = {kind: {ZERO: {part: np.ones(25) for part in (*actions, MEAN)}} for kind in COUNTS}
-    return protocol_table(found, ExpmapCorpus(layout, {}, {action: {} for action in actions}, ()))
+    corpus = ExpmapCorpus(layout, {}, {action: {} for action in actions}, ())
+    return protocol_table(constant(actions, **{ZERO: 1.0}), corpus)
 
 
 def test_published_rows_stand_under_ours() -> None:
@@ -165,36 +162,6 @@ def test_published_rows_of_human36m() -> None:
     assert "goal" not in text
 
 
-def test_ablations_say_what_differs_from_the_first() -> None:
-    models = {
-        "small": manifest(0, "trajectory"),
-        "c-0": manifest(0, recipe={"adversary": 0.01}),
-        "c-1": manifest(1, recipe={"adversary": 0.01}),
-        "d": manifest(0, recipe={"adversary": 0.01}, long_term="none"),
-        "e": manifest(0, recipe={"adversary": 0.01}, long_term="recurrent"),
-        "f-0": manifest(0, recipe={"adversary": 0.01}, kernel=[4, 4], padding="same"),
-        "f-1": manifest(1, recipe={"adversary": 0.01}, kernel=[4, 4], padding="same"),
-        "g": manifest(0, recipe={"adversary": 0}, window=5),
-    }
-    rows = seed_groups(models)
-    said = ablated(models, rows)
-    assert said == {
-        "c (2 seeds)": "c (2 seeds), as it is",
-        "d": "without long-term encoder",
-        "e": "LSTM encoder",
-        "f (2 seeds)": "kernel 4x4, padding same (2 seeds)",
-        "g": "window 5, without adversary",
-    }
-    found = constant(**dict(zip(said, (0.5, 0.625, 0.75, 0.875, 1.0), strict=True)))
-    found[MANY]["g"][MEAN] = np.arange(25.0)
-    text = ablation_table(found, said)
-    few, many = text.split("256 windows of each")
-    assert line(few, "without long").split()[-5:] == line(many, "without long").split()[-5:] == ["0.62"] * 5
-    assert line(few, "window 5").split()[-5:] == ["1.00"] * 5
-    assert line(many, "window 5").split()[-5:] == ["1.00", "3.00", "7.00", "9.00", "24.00"]
-    assert ablated(models, rows[:2]) == {}  # a single row of the model shows no difference
-
-
 def test_costs_are_those_of_the_manifests() -> None:
     models = {"c-1": manifest(1), "c-2": manifest(2), "old": manifest(None)}
     text = cost_table(models, seed_groups(models))
@@ -217,11 +184,9 @@ def test_training_is_that_of_the_manifests() -> None:
 def test_spreads_stand_behind_means_of_several_seeds() -> None:
     models = {"c-0": manifest(0), "c-1": manifest(1), "d": manifest(0, window=5)}
     found = constant(**{ZERO: 0.5, "c-0": 0.25, "c-1": 0.375, "d": 1.0})
-    rows = seed_groups(models)
-    means = {kind: pooled(systems, rows) for kind, systems in found.items()}
-    text = protocol_table(
-        means, ExpmapCorpus(CMU_LAYOUT, {}, {action: {} for action in FIVE}, ()), spreads_of(found, rows)
-    )
+    corpus = ExpmapCorpus(CMU_LAYOUT, {}, {action: {} for action in FIVE}, ())
+    results = Results(models, corpus, seed_groups(models), found)
+    text = protocol_table(results.grouped(), corpus, results.spreads())
     assert line(text, "c (2 seeds)").split("seeds)")[1].split() == ["0.31", "[.12]"] * 6
     assert line(text, "d ").split() == ["d", *["1.00"] * 6]
     assert line(text, "zero velocity").split() == ["zero", "velocity", *["0.50"] * 6]
@@ -230,16 +195,12 @@ def test_spreads_stand_behind_means_of_several_seeds() -> None:
     assert len(set(ends.values())) == 1  # means stand under each other
 
 
-def test_the_head_says_which_files_are_missing() -> None:
+def test_the_mean_is_that_of_the_actions_with_all_their_files() -> None:
     gone = ("train/washwindow/washwindow_2.txt", "train/washwindow/washwindow_1.txt", "test/soccer/soccer_1.txt")
     test = {action: {} for action in (*FIVE, "washwindow") if action != "soccer"}
-    found: Curves = {kind: {ZERO: {part: np.ones(25) for part in (*test, MEAN)}} for kind in COUNTS}
+    found = constant(list(test), **{ZERO: 1.0})
     head = protocol_table(found, ExpmapCorpus(CMU_LAYOUT, {}, test, gone)).splitlines()
-    assert head[0] == "3 of 48 files are missing: washwindow (2 of 5 training), soccer (1 of 1 test)"
-    assert head[1] == "means are those of the actions with all their files"
     assert "mean of basketball, jumping, running, walking" in head
-    whole = protocol_table(found, ExpmapCorpus(CMU_LAYOUT, {}, test, ()))
-    assert whole.startswith("output frame")
 
 
 def test_twenty_systems_look_different() -> None:
@@ -302,7 +263,6 @@ def test_all_runs_are_evaluated_at_once(tmp_path: Path) -> None:
     runs.append(saved(tmp_path / "none-0", data, 0, long_term="none"))
     found, text = predict_reports({str(run): loaded(run) for run in runs}, data, tmp_path / "plots")
     assert {path.name for path in (tmp_path / "plots").iterdir()} == {"predict-error.png", "predict-running.png"}
-    assert "  without long-term encoder  " in text
     assert line(text, "none-0")
     assert json.loads(json.dumps(found)) == found
     assert set(found) == {*map(str, runs), "grouped"}

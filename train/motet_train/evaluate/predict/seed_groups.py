@@ -23,7 +23,7 @@ Ready = dict[str, dict[str, Any]]
 Figures = Callable[[str], dict[str, Any]]
 """The figures of a system or group, ready for JSON."""
 
-Errors = Mapping[str, Mapping[str, Array]]
+Errors = Mapping[str, Mapping[Any, Array]]
 """Run or group, or the baseline -> action or measure -> error at each predicted frame (N,)."""
 
 
@@ -99,7 +99,7 @@ def spread(errors: Sequence[Array]) -> Array:
 
 def pooled(
     errors: Errors, groups: Sequence[SeedGroup], how: Callable[[Sequence[Array]], Array] = mean
-) -> dict[str, dict[str, Array]]:
+) -> dict[str, dict[Any, Array]]:
     """The errors with groups, by their titles, in place of runs; what is not a run stays first."""
     runs = {name for group in groups for name in group.runs}
     found = {name: dict(parts) for name, parts in errors.items() if name not in runs}

@@ -9,10 +9,11 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from motet.models.predict import PredictModel
 from motet.motion.rotations import Array, rotvec_to_rotmat
 from motet_train.data.errors import DataError
 from motet_train.evaluate.predict.error_rows import REPORTED
-from motet_train.papers.li2018.expmap_files import CONSTANT, ROOT, Scaling
+from motet_train.papers.li2018.expmap_files import CONSTANT, ROOT, ExpmapCorpus, Scaling
 from motet_train.papers.li2018.material import STRIDE
 
 SEED, SEED_FRAMES, OUTPUT_FRAMES = 1234567890, 50, 25
@@ -115,6 +116,17 @@ def predictions(
 def errors(found: Predictions, measure: Callable[[Array, Array], Array] = window_errors) -> dict[str, Array]:
     """Error (25,) of each action: mean over windows."""
     return {action: measure(predicted, truth).mean(axis=0) for action, (predicted, truth) in found.items()}
+
+
+def predictor(name: str, model: PredictModel, corpus: ExpmapCorpus) -> Continuation:
+    """A model's predictions for windows of a corpus; DataError where it is not one of that corpus."""
+    if len(model.contract.channels) != corpus.layout.columns or model.contract.skeleton is not None:
+        raise DataError(f"{name} is not a model of these files: it has {len(model.contract.channels)} channels")
+
+    def predict(seed: Array) -> Array:
+        return model.next_frames(seed[:, -model.seed_frames :], OUTPUT_FRAMES).astype(np.float64)
+
+    return predict
 
 
 def zero_velocity(seed: Array) -> Array:

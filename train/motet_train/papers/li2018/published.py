@@ -3,13 +3,20 @@
 Li et al. 2018, tables 1 to 4, who measured RRNN themselves on CMU; of LTD the averages of Mao et al. 2019.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
-
-from motet_train.papers.li2018.published_h36m import CONV, H36M_ERRORS, RRNN, Actions, Rows
+from numpy import nan
 
 FRAMES = (1, 3, 7, 9, 24)
+
+Rows = Mapping[str, tuple[float, ...]]
+"""System -> errors at output frames 1, 3, 7, 9 and 24."""
+
+Actions = Mapping[str, Rows]
+
+ERD, LSTM_3LR, SRNN = "ERD (Fragkiadaki 2015)", "LSTM-3LR (Fragkiadaki 2015)", "SRNN (Jain 2016)"
+RRNN, LSTM_AE, CONV = "RRNN (Martinez 2017)", "LSTM-AE (Ghosh 2017)", "ConvSeq2Seq (Li 2018)"
 
 CMU_ERRORS: Actions = {
     "basketball": {RRNN: (0.50, 0.80, 1.27, 1.45, 1.78), CONV: (0.37, 0.62, 1.07, 1.18, 1.95)},
@@ -23,32 +30,74 @@ CMU_ERRORS: Actions = {
 }
 """Table 3."""
 
-CMU_AVERAGE: Rows = {
-    RRNN: (0.38, 0.62, 1.02, 1.17, 1.67),
-    CONV: (0.31, 0.52, 0.86, 0.99, 1.55),
-    "LTD (Mao 2019)": (0.25, 0.39, 0.68, 0.79, 1.33),
+H36M_ERRORS: Actions = {
+    "walking": {
+        ERD: (0.93, 1.18, 1.59, 1.78, nan),
+        LSTM_3LR: (0.77, 1.00, 1.29, 1.47, nan),
+        SRNN: (0.81, 0.94, 1.16, 1.30, nan),
+        RRNN: (0.33, 0.56, 0.78, 0.85, 1.14),
+        LSTM_AE: (1.00, 1.11, 1.39, nan, 1.39),
+        CONV: (0.33, 0.54, 0.68, 0.73, 0.92),
+    },
+    "eating": {
+        ERD: (1.27, 1.45, 1.66, 1.80, nan),
+        LSTM_3LR: (0.89, 1.09, 1.35, 1.46, nan),
+        SRNN: (0.97, 1.14, 1.35, 1.46, nan),
+        RRNN: (0.26, 0.43, 0.66, 0.81, 1.34),
+        LSTM_AE: (1.31, 1.49, 1.86, nan, 2.01),
+        CONV: (0.22, 0.36, 0.58, 0.71, 1.24),
+    },
+    "smoking": {
+        ERD: (1.66, 1.95, 2.35, 2.42, nan),
+        LSTM_3LR: (1.45, 1.68, 1.94, 2.08, nan),
+        SRNN: (1.45, 1.68, 1.94, 2.08, nan),
+        RRNN: (0.35, 0.64, 1.03, 1.15, 1.83),
+        LSTM_AE: (0.92, 1.03, 1.15, nan, 1.77),
+        CONV: (0.26, 0.49, 0.96, 0.92, 1.62),
+    },
+    "discussion": {
+        ERD: (2.27, 2.47, 2.68, 2.76, nan),
+        LSTM_3LR: (1.88, 2.12, 2.25, 2.23, nan),
+        SRNN: (1.22, 1.49, 1.83, 1.93, nan),
+        RRNN: (0.37, 0.77, 1.06, 1.10, 1.79),
+        LSTM_AE: (1.11, 1.20, 1.38, nan, 1.73),
+        CONV: (0.32, 0.67, 0.94, 1.01, 1.86),
+    },
+    "directions": {RRNN: (0.44, 0.70, 0.86, 0.97, 1.59), CONV: (0.39, 0.60, 0.80, 0.91, 1.45)},
+    "greeting": {RRNN: (0.55, 0.90, 1.34, 1.51, 2.03), CONV: (0.51, 0.82, 1.21, 1.38, 1.72)},
+    "phoning": {RRNN: (0.62, 1.10, 1.54, 1.70, 1.89), CONV: (0.59, 1.13, 1.51, 1.65, 1.81)},
+    "posing": {RRNN: (0.40, 0.76, 1.37, 1.62, 2.56), CONV: (0.29, 0.60, 1.12, 1.37, 2.65)},
+    "purchases": {RRNN: (0.59, 0.83, 1.22, 1.30, 2.30), CONV: (0.63, 0.91, 1.19, 1.29, 2.52)},
+    "sitting": {RRNN: (0.47, 0.80, 1.30, 1.53, 2.14), CONV: (0.39, 0.61, 1.02, 1.18, 1.67)},
+    "sittingdown": {RRNN: (0.50, 0.96, 1.50, 1.72, 2.72), CONV: (0.41, 0.78, 1.16, 1.31, 2.06)},
+    "takingphoto": {RRNN: (0.32, 0.63, 0.98, 1.12, 1.51), CONV: (0.23, 0.49, 0.88, 1.06, 1.40)},
+    "waiting": {RRNN: (0.35, 0.68, 1.14, 1.34, 2.34), CONV: (0.30, 0.62, 1.09, 1.30, 2.50)},
+    "walkingdog": {RRNN: (0.55, 0.91, 1.23, 1.35, 1.86), CONV: (0.59, 1.00, 1.32, 1.44, 1.92)},
+    "walkingtogether": {RRNN: (0.29, 0.59, 0.86, 0.92, 1.42), CONV: (0.27, 0.52, 0.71, 0.74, 1.28)},
 }
-"""Over all eight actions: table 4, and Mao et al."""
+"""Tables 1 and 2; NaN where none is given."""
 
-H36M_AVERAGE: Rows = {
-    RRNN: (0.43, 0.75, 1.12, 1.27, 1.90),
-    CONV: (0.38, 0.68, 1.01, 1.13, 1.77),
-    "LTD (Mao 2019)": (0.27, 0.51, 0.83, 0.95, np.nan),
+BY_ACTION = {"cmu-expmap": CMU_ERRORS, "h36m-expmap": H36M_ERRORS}
+"""Name of a layout -> the published rows of each action."""
+
+AVERAGES: Mapping[str, Rows] = {
+    "cmu-expmap": {
+        RRNN: (0.38, 0.62, 1.02, 1.17, 1.67),
+        CONV: (0.31, 0.52, 0.86, 0.99, 1.55),
+        "LTD (Mao 2019)": (0.25, 0.39, 0.68, 0.79, 1.33),
+    },
+    "h36m-expmap": {
+        RRNN: (0.43, 0.75, 1.12, 1.27, 1.90),
+        CONV: (0.38, 0.68, 1.01, 1.13, 1.77),
+        "LTD (Mao 2019)": (0.27, 0.51, 0.83, 0.95, nan),
+    },
 }
-"""Over all fifteen actions: table 2, and Mao et al."""
+"""Name of a layout -> over all its actions: tables 4 and 2, and Mao et al."""
 
-GOALS = {"windows_8": (0.26, 0.39, 0.67, 0.78, 1.20), "windows_256": (0.25, 0.39, 0.64, 0.74, 1.10)}
-"""What the small predictor is to reach on CMU's five complete actions, by the windows measured."""
-
-
-def by_action(layout: str) -> Actions:
-    """The published rows of a layout's corpus."""
-    return H36M_ERRORS if layout.startswith("h36m") else CMU_ERRORS
-
-
-def averages(layout: str) -> Rows:
-    """The published averages over all actions of a layout's corpus."""
-    return H36M_AVERAGE if layout.startswith("h36m") else CMU_AVERAGE
+GOALS: Mapping[str, Rows] = {
+    "cmu-expmap": {"windows_8": (0.26, 0.39, 0.67, 0.78, 1.20), "windows_256": (0.25, 0.39, 0.64, 0.74, 1.10)}
+}
+"""What the small predictor is to reach on the complete actions, by the windows measured."""
 
 
 def mean_over(table: Actions, actions: Iterable[str]) -> Rows:

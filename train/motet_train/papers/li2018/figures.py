@@ -1,25 +1,55 @@
-"""Poses of CMU's text files as places of joints, and what models predict of a test window (Li et al. 2018, figure 5).
+"""Errors over time, and what models predict of a test window as stick figures (Li et al. 2018, figures 3 to 5).
 
-The 38 exponential maps of a line are those of the joints of an ASF skeleton, depth first, its left leg first, tips of
-bones among them: the order of :attr:`motet.motion.skeleton.Skeleton.joints`. Vectors of joints are rows there and are
-turned by the matrix from the right, so a rotation here is the transposed one. (The .amc of a test file, 35_01 of
-walking/walking_1.txt, gives the same rotations.) Who moved is not in a file; bones are those of the skeleton given.
+The 38 exponential maps of a line of CMU's text files are those of the joints of an ASF skeleton, depth first, its left
+leg first, tips of bones among them: the order of :attr:`motet.motion.skeleton.Skeleton.joints`. Vectors of joints are
+rows there and are turned by the matrix from the right, so a rotation here is the transposed one. (The .amc of a test
+file, 35_01 of walking/walking_1.txt, gives the same rotations.) Who moved is not in a file; bones are those of
+:data:`BONES`.
 """
 
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 
 from motet.errors import MotionError
+from motet.formats import read_motion
 from motet.models.predict import PredictModel
+from motet.motion.kinematics import skeleton_of
 from motet.motion.rotations import Array, axis_to_rotmat, rotvec_to_rotmat
 from motet.motion.skeleton import Skeleton
-from motet_train.papers.li2018.curves import predictor
-from motet_train.papers.li2018.expmap_files import ExpmapCorpus
-from motet_train.papers.li2018.protocol import OUTPUT_FRAMES, SEED_FRAMES, windows
+from motet_train.data.cmu_trials import cmu_trial
+from motet_train.evaluate.figures import Drawings
+from motet_train.evaluate.predict.plots import error_over_time, strips_drawing
+from motet_train.evaluate.predict.seed_groups import drawn
+from motet_train.papers.li2018.expmap_files import CMU_LAYOUT, ExpmapCorpus
+from motet_train.papers.li2018.material import STRIDE
+from motet_train.papers.li2018.protocol import OUTPUT_FRAMES, SEED_FRAMES, predictor, windows
+from motet_train.papers.li2018.report import MANY, Results
 
 EVERY, GIVEN = 2, 4
 """Frames from one stick figure to the next, and stick figures of seed frames."""
+
+DRAWN = ("running", "jumping")
+"""Actions of which stick figures are drawn."""
+
+BONES = "39_14"
+"""The CMU trial whose skeleton they have."""
+
+
+def drawings(results: Results) -> Drawings:
+    """Errors over time, and stick figures of CMU's actions: of Human3.6M's figure there are no bones."""
+    corpus, errors = results.corpus, dict[str, dict[str, Array]]()
+    for name, parts in results.grouped().items():
+        for action in (action for kind, action in parts if kind == MANY):
+            errors.setdefault(action, {})[name] = parts[MANY, action]
+    found = {"predict-error": partial(error_over_time, errors, corpus.layout.fps / STRIDE, "Euler error")}
+    if corpus.layout is CMU_LAYOUT:
+        skeleton = skeleton_of(read_motion(cmu_trial(BONES)))
+        for action in (action for action in DRAWN if action in corpus.test):
+            poses = strips(drawn(results.models, results.groups), corpus, action, skeleton)
+            found[f"predict-{action}"] = partial(strips_drawing, poses, skeleton, GIVEN)
+    return found
 
 
 def places(frames: Array, skeleton: Skeleton) -> Array:
