@@ -9,19 +9,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from motet.errors import FormatError, MotionError
 from motet.files import File, place_of
 from motet.formats.clips import Clip, chosen, clip_names, split_clip
 from motet.formats.gltf_data import Gltf, parse
 from motet.formats.gltf_figures import Figure, above, figure_of, figures, likeliest
-from motet.formats.gltf_tracks import FPS, Tracks, moved, tracks
+from motet.formats.gltf_tracks import FPS, moved, tracks
 from motet.formats.lines import Names
 from motet.formats.nodes import Poses, motion_of_nodes, rested
 from motet.motion.humanoid import BONES
 from motet.motion.motion import Motion
-from motet.motion.rotations import Array, frames_last, product, quat_to_rotmat, rotated
+from motet.motion.rotations import Array
 
 EXTENSIONS = (".glb", ".gltf", ".vrm", ".vrma")
 """What these files are called."""
@@ -118,10 +116,10 @@ def _take(scene: _Scene, index: int | None) -> _Take:
     figure = figure_of(gltf, likeliest(gltf, scene.figures, moved(animation)))
     near = above(gltf, figure.nodes)
     values, fps = ({}, FPS) if index is None else tracks(gltf, animation, scene.names[index], near)
-    rest = poses = _world(gltf, near, {}, 1)
+    rest = poses = Poses(*gltf.world(near)[1:]).of(figure.nodes)
     if values:
-        poses = _world(gltf, near, values, len(next(iter(values.values()))))
-    return _Take(figure, rest.of(figure.nodes), poses.of(figure.nodes), fps)
+        poses = Poses(*gltf.world(near, values)[1:]).of(figure.nodes)
+    return _Take(figure, rest, poses, fps)
 
 
 def _named(gltf: Gltf, joints: Figure) -> list[str]:
@@ -129,23 +127,3 @@ def _named(gltf: Gltf, joints: Figure) -> list[str]:
     bones = {node: bone for bone, node in gltf.humanoid().items() if bone in BONES}
     given = Names(bones.values())
     return [bones.get(node) or given.unique(name) for node, name in zip(joints.nodes, joints.names, strict=True)]
-
-
-def _world(gltf: Gltf, near: set[int], values: Tracks, count: int) -> Poses:
-    """Nodes and all above them in the world in ``count`` frames, with tracks in place of the rest; others are 0."""
-    nodes = len(gltf.objects("nodes"))
-    linear, turns = frames_last((count, nodes, 3, 3)), frames_last((count, nodes, 3, 3))
-    places = frames_last((count, nodes, 3))
-    for node in (node for node in gltf.order if node in near):
-        rest = dict(zip(("translation", "rotation", "scale"), gltf.local(node), strict=True))
-        move, quat, scale = (values.get((node, name), rest[name]) for name in ("translation", "rotation", "scale"))
-        turn = quat_to_rotmat(quat / np.linalg.norm(quat, axis=-1, keepdims=True))
-        local = turn * scale[..., None, :]
-        parent = gltf.parents[node]
-        if parent < 0:
-            linear[:, node], turns[:, node], places[:, node] = local, turn, move
-        else:
-            linear[:, node] = product(linear[:, parent], local)
-            turns[:, node] = product(turns[:, parent], turn)
-            places[:, node] = places[:, parent] + rotated(linear[:, parent], move)
-    return Poses(turns, places)

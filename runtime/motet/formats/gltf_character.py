@@ -16,7 +16,7 @@ from motet.formats.character import Character
 from motet.formats.glb import Track
 from motet.formats.gltf import broken
 from motet.formats.gltf_data import Gltf, parse
-from motet.formats.gltf_rest import Rest, at_rest
+from motet.formats.gltf_figures import Rest, at_rest
 from motet.formats.gltf_skin import skin_of
 from motet.formats.gltf_tracks import FPS
 from motet.motion.humanoid import BONES, REQUIRED, JointMap, check_map

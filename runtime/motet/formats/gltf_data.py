@@ -3,6 +3,7 @@
 import base64
 import json
 import struct
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -15,7 +16,7 @@ from motet.errors import FormatError, quoted
 from motet.files import File, place_of
 from motet.formats.gltf_packed import MAX_UNPACKED, packing, unpacked
 from motet.formats.lines import read_bytes
-from motet.motion.rotations import Array, rotmat_to_quat
+from motet.motion.rotations import Array, frames_last, product, quat_to_rotmat, rotated, rotmat_to_quat
 
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 """glTF's numbers for types of numbers."""
@@ -125,6 +126,29 @@ class Gltf:
         parts = (("translation", (0.0, 0.0, 0.0)), ("rotation", (0.0, 0.0, 0.0, 1.0)), ("scale", (1.0, 1.0, 1.0)))
         move, turn, scale = (np.array(found.get(name, rest), np.float64) for name, rest in parts)
         return move, turn, scale
+
+    def world(
+        self, nodes: Iterable[int] | None = None, tracks: Mapping[tuple[int, str], Array] | None = None
+    ) -> tuple[Array, Array, Array]:
+        """Linear maps and rotations (T, N, 3, 3) and places (T, N, 3) of nodes in the world, at rest (T = 1) or moved
+        by tracks, values (T, ...) of a node's "translation", "rotation" or "scale".
+
+        nodes: of which each is there with all above it; all by default. Others are not filled.
+        """
+        tracks = tracks or {}
+        count, wanted = len(next(iter(tracks.values()), [0])), self.order if nodes is None else set(nodes)
+        linear, turns = (frames_last((count, len(self.parents), 3, 3)) for _ in range(2))
+        places = frames_last((count, len(self.parents), 3))
+        for node in (node for node in self.order if node in wanted):
+            rest = dict(zip(("translation", "rotation", "scale"), self.local(node), strict=True))
+            move, quat, scale = (tracks.get((node, name), value) for name, value in rest.items())
+            turn = quat_to_rotmat(quat / np.linalg.norm(quat, axis=-1, keepdims=True))
+            linear[:, node], turns[:, node], places[:, node] = turn * scale[..., None, :], turn, move
+            if (parent := self.parents[node]) >= 0:
+                places[:, node] = places[:, parent] + rotated(linear[:, parent], places[:, node])
+                linear[:, node] = product(linear[:, parent], linear[:, node])
+                turns[:, node] = product(turns[:, parent], turns[:, node])
+        return linear, turns, places
 
     def array(self, index: int) -> Array:
         """The numbers (N, ...) of an accessor, which are not to be changed; FormatError where it is not in the file."""

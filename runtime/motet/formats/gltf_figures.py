@@ -10,8 +10,11 @@ from dataclasses import dataclass
 
 from motet.errors import FormatError, listed, quoted
 from motet.formats.gltf_data import Gltf
+from motet.formats.gltf_tracks import moved
 from motet.formats.lines import Names
-from motet.motion.skeleton import END_SUFFIX
+from motet.formats.nodes import skeleton_of_nodes
+from motet.motion.rotations import Array
+from motet.motion.skeleton import END_SUFFIX, Skeleton
 
 log = logging.getLogger(__name__)
 
@@ -149,3 +152,28 @@ def _is_end(gltf: Gltf, node: int) -> bool:
     """Whether a node marks the tip of a bone, as motet and Blender name them."""
     found = gltf.objects("nodes")[node]
     return str(found.get("name", "")).endswith(END_SUFFIX) and not found.get("children")
+
+
+@dataclass(frozen=True)
+class Rest:
+    """The node of each joint, and the skeleton, which rests in the nodes' pose, in metres.
+
+    linear: what all nodes of the file, joints or not, make of vectors in the world (N, 3, 3), with their scales; places
+    (N, 3): where they are.
+    """
+
+    nodes: tuple[int, ...]
+    skeleton: Skeleton
+    linear: Array
+    places: Array
+
+
+def at_rest(gltf: Gltf) -> Rest:
+    """The figure of a file that its animations move the most; FormatError where there is none."""
+    all_moved = set().union(*map(moved, gltf.objects("animations")))
+    figure = figure_of(gltf, likeliest(gltf, figures(gltf, all_moved), all_moved))
+    linear, _, places = (found[0] for found in gltf.world())
+    joints = places[list(figure.nodes)]
+    offsets = [joints[i] - joints[parent] if parent >= 0 else joints[i] for i, parent in enumerate(figure.parents)]
+    skeleton = skeleton_of_nodes(gltf.path, list(figure.names), figure.parents, offsets, metres=1.0)
+    return Rest(figure.nodes, skeleton, linear, places)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from motet.errors import FormatError
 from motet.formats.gltf_data import Gltf
-from motet.formats.gltf_rest import Rest
+from motet.formats.gltf_figures import Rest
 from motet.motion.rotations import Array, rotated
 
 log = logging.getLogger(__name__)

@@ -3,7 +3,7 @@
 from motet.errors import BundleError
 from motet.representation.angles import Angles
 from motet.representation.base import Representation
-from motet.representation.root_angles import RootAngles
+from motet.representation.root_block import RootAngles
 from motet.representation.root_sixd import RootSixd
 from motet.representation.root_vectors import RootVectors
 

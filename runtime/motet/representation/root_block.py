@@ -1,5 +1,6 @@
-"""The root block: six channels that say how a figure moves over the ground, wherever it is and whichever way it faces.
+"""``root_angles``: Euler angles of the joints in degrees, and the root block in the root's place.
 
+The root block is six channels that say how a figure moves over the ground, wherever it is and whichever way it faces.
 The facing is the heading of :mod:`motet.motion.heading`, the angle about the vertical y axis; the rest of the root's
 rotation is pitch and roll: R = Ry(heading) Rx(pitch) Rz(roll). Displacements are those since the previous frame, in the
 facing frame of the previous frame, so that adding them up gives the path exactly, at the frame rate they were computed
@@ -24,8 +25,10 @@ from motet.motion.kinematics import (
     skeleton_of,
     with_channels,
 )
-from motet.motion.motion import Motion
+from motet.motion.motion import TURN, Motion
 from motet.motion.rotations import Array, euler_to_rotmat, rotmats_to_euler
+from motet.representation.angles import Angles
+from motet.representation.base import FrameMirror, in_units, lateral_x
 
 ROOT_BLOCK = ("root.forward", "root.left", "root.turn", "root.height", "root.pitch", "root.roll")
 ROOT_BLOCK_UNITS = ("m/s", "m/s", "deg/s", "m", "deg", "deg")
@@ -140,12 +143,41 @@ def plant_feet(motion: Motion) -> Motion:
     return with_channels(motion, ROOT_BLOCK[:2], block.values, ROOT_BLOCK_UNITS[:2])
 
 
-def can_be_planted(motion: Motion) -> bool:
-    """Whether a figure in features with the root block has feet, and a skeleton that knows its unit of length."""
-    skeleton = motion.skeleton
-    return skeleton is not None and skeleton.metres_per_unit is not None and has_feet(skeleton)
-
-
 def _root_channels(motion: Motion) -> tuple[str, ...]:
     root = skeleton_of(motion).names[0]
     return tuple(f"{root}.{kind}{axis}" for kind in "tr" for axis in AXES)
+
+
+class RootAngles:
+    """See :class:`motet.representation.base.Representation`."""
+
+    name = "root_angles"
+    required: tuple[str, ...] = ROOT_BLOCK
+
+    def features(self, motion: Motion, like: Motion | None = None) -> Motion:
+        """The root block, and the joints' channels of ``like`` or all there are, angles in degrees."""
+        if not set(ROOT_BLOCK) <= set(motion.channels):
+            motion = to_root_block(motion)
+        if like is not None:
+            return motion.select(like.channels, like.units)
+        return in_units(motion, lambda unit: "deg" if unit in TURN else unit)
+
+    def planted(self, features: Motion) -> Motion:
+        """By :func:`plant_feet`, of a figure that has feet and knows its unit of length."""
+        skeleton = features.skeleton
+        can_be = skeleton is not None and skeleton.metres_per_unit is not None and has_feet(skeleton)
+        return plant_feet(features) if can_be else features
+
+    def motion(self, features: Motion, after: Motion | None = None) -> Motion:
+        """With the root's translation and rotation instead of the block, where there is a skeleton to move."""
+        return features if features.skeleton is None else from_root_block(features, after)
+
+    def mirror(self, features: Motion) -> FrameMirror:
+        """The joints as :class:`motet.representation.angles.Angles` does it."""
+        lateral_x(features)
+        joints = np.flatnonzero([name not in ROOT_BLOCK for name in features.channels])
+        found = Angles().mirror(features.select(tuple(features.channels[d] for d in joints)))
+        columns = np.arange(len(features.channels))
+        signs = mirrored_signs(features.channels).astype(np.float32)
+        columns[joints], signs[joints] = joints[found.columns], found.signs
+        return FrameMirror(columns, signs)
