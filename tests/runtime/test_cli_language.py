@@ -9,7 +9,7 @@ from command_line import check_refused, run
 from fake_models import describe_model, generate_model, moving
 
 from motet.formats import read_motion, write_motion
-from motet.models.describe import DescribeModel
+from motet.models.describe import ConfidenceSettings, DescribeModel
 from motet.models.generate import GenerateModel
 from motet.models.load import load, load_as
 from motet.motion.motion import Motion
@@ -115,7 +115,8 @@ def test_a_timeline_has_a_line_for_each_part(tmp_path: Path, files: list[Path]) 
 
 def test_what_is_not_sure_has_a_question_mark(files: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
     expected = describe_model().describe(read_motion(files[0]))
-    monkeypatch.setattr("motet.models.describe.CONFIDENT", expected[1].log_probability)
+    limit = ConfidenceSettings(expected[1].log_probability)
+    monkeypatch.setattr("motet.models.describe.DescribeModel.settings", lambda self, kind: limit)
     texts = [line[10:] for line in run("describe", files[0]).stdout.splitlines()]
     assert texts == [*(found.text for found in expected[:2]), *(f"? {found.text}" for found in expected[2:])]
     (row,) = json.loads(run("describe", files[0], "--json").stdout)

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from fake_models import CHANNELS, CONTRACT, FPS, SKELETON, VOCABULARY, describe_model, moving
 
+from motet.bundle.manifest import Manifest
 from motet.errors import MotionError
 from motet.formats import read_motion
-from motet.models.describe import CONFIDENT, DescribeModel, Description
+from motet.models.describe import DescribeModel, Description
 from motet.models.load import load_as
 from motet.models.text import EOS, SOS
-from motet.models.timeline import HOP, WINDOW, best_path, edges, near_scores, windows
+from motet.models.timeline import TimelineSettings, best_path, edges, near_scores, windows
 from motet.motion.motion import Motion
 
 ONE, OTHER = (1.0, 4.0, -2.0), (3.0, 2.0, -4.0)
@@ -22,10 +23,11 @@ ONE, OTHER = (1.0, 4.0, -2.0), (3.0, 2.0, -4.0)
 
 @pytest.mark.parametrize(("frames", "fps"), [(0, 10), (1, 10), (15, 10), (16, 10), (403, 10), (999, 23.976), (50, 1)])
 def test_windows_overlap_from_the_first_frame_to_the_last(frames: int, fps: float) -> None:
-    spans = windows(frames, fps)
+    settings = TimelineSettings()
+    spans = windows(frames, fps, settings)
     assert (spans[0][0], spans[-1][1]) == (0, frames)
-    assert {stop - start for start, stop in spans} == {min(frames, max(2, round(WINDOW * fps)))}
-    assert all(0 < two - one <= max(1, round(HOP * fps)) for (one, _), (two, _) in pairwise(spans))
+    assert {stop - start for start, stop in spans} == {min(frames, max(2, round(settings.window * fps)))}
+    assert all(0 < two - one <= max(1, round(settings.hop * fps)) for (one, _), (two, _) in pairwise(spans))
 
 
 def test_the_best_path_is_that_of_all_paths() -> None:
@@ -103,7 +105,8 @@ def test_where_the_same_is_said_there_is_one_part(monkeypatch: pytest.MonkeyPatc
     told: list[tuple[int, int]] = []
     (part,) = model.timeline(motion, progress=lambda done, total: told.append((done, total)))
     assert (part.start, part.stop) == (0, 95)
-    assert told[-1] == (len(windows(950, FPS)), len(windows(950, FPS)))
+    count = len(windows(950, FPS, TimelineSettings()))
+    assert told[-1] == (count, count)
     monkeypatch.setattr("motet.models.describe.best_path", lambda scores, change: list(range(len(scores))))
     assert model.timeline(motion) == [part]
     (slow,) = model.timeline(replace(motion[:60], fps=2.0))  # of whose frames no two would be in a part
@@ -125,11 +128,23 @@ def test_what_has_no_timeline() -> None:
         model.timeline(constant(1, *ONE))
 
 
-def test_a_description_is_believed_from_a_log_probability_on() -> None:
-    assert Description("a", CONFIDENT, 0.0).confident
-    assert not Description("a", CONFIDENT - 0.01, 0.0).confident
+def test_a_description_is_believed_from_the_log_probability_of_its_bundle_on() -> None:
+    model, motion = describe_model(), moving(20)
+    found = model.describe(motion)
+    for n, limit in enumerate(one.log_probability for one in found):
+        settings = {"settings": {"confidence": {"log_probability": limit}}}
+        other = DescribeModel(Manifest.from_json({**model.manifest.source, **settings}), model.graphs)
+        assert [one.confident for one in other.describe(motion)] == [place <= n for place in range(len(found))]
     expected = {"text": "a", "log_probability": -99.0, "score": 1.0, "confident": False}
-    assert Description("a", -99.0, 1.0).to_json() == expected
+    assert Description("a", -99.0, 1.0, False).to_json() == expected
+
+
+def test_the_settings_of_a_bundle_cut_its_timelines() -> None:
+    model = describe_model()
+    motion = joined(constant(100, *ONE), constant(80, *OTHER), constant(120, *ONE))
+    settings = {"settings": {"timeline": {"change": 1000}}}
+    other = DescribeModel(Manifest.from_json({**model.manifest.source, **settings}), model.graphs)
+    assert (len(model.timeline(motion)), len(other.timeline(motion))) == (3, 1)
 
 
 def test_the_bundle_that_ships_tells_a_walk_from_a_run_in_one_motion(clips: Path) -> None:

@@ -77,7 +77,7 @@ class FakeDescribe:
 
     def describe(self, motions: Sequence[Motion], beams: int = 5) -> list[list[Description]]:
         rows = [self.said.get(motion.values.astype(np.float32).tobytes(), ("somebody dances",)) for motion in motions]
-        return [[Description(plain(text), -float(i), -float(i)) for i, text in enumerate(row[:beams])] for row in rows]
+        return [[Description(plain(text), -i, -i, True) for i, text in enumerate(row[:beams])] for row in rows]
 
     def timeline(self, motion: Motion) -> list[Part]:
         """A part for each motion of the store."""

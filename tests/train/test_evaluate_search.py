@@ -8,6 +8,7 @@ from language_models import KINDS, FakeDescribe, small_store, told
 from numpy.typing import NDArray
 
 from motet.decode.nearest import LOOP
+from motet.models.search import IndexSettings
 from motet.motion.motion import Motion
 from motet_train.data.store import Store
 from motet_train.evaluate.language.search import GOALS, search_report
@@ -27,6 +28,9 @@ class FakeSearch:
         self.manifest, self.off = told(store, "search"), off
         self.records = {store.sequence(i).tobytes(): i for i in range(len(store.records))}
         self.about = {plain(s): i for i, entry in enumerate(store.records) for s in entry.sentences[2:]}
+
+    def settings(self, kind: type[IndexSettings]) -> IndexSettings:
+        return kind()
 
     def windows(self, motion: Motion, longest: float) -> list[tuple[float, Motion]]:
         return [(0.0, motion)]

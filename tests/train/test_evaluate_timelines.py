@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from language_models import FRAMES, FakeDescribe, small_store, told
 
-from motet.models.describe import CONFIDENT, Description, Part
+from motet.models.describe import ConfidenceSettings, Description, Part
 from motet.motion.motion import Motion
 from motet_train.evaluate.language.attributes import action_right
-from motet_train.evaluate.language.confidence import confidence
+from motet_train.evaluate.language.confidence import ENOUGH, calibrated, confidence
 from motet_train.evaluate.language.split_store import SplitStore, split_as
 from motet_train.evaluate.language.timelines import joined, matched, timeline_figures
 
@@ -45,10 +45,10 @@ class Unsure(FakeDescribe):
     """Says of every other motion that somebody dances, which is wrong; how sure it is depends on that, but for one."""
 
     def describe(self, motions: Any, beams: int = 5) -> Any:
-        logs = [0.0, CONFIDENT - 1, 0.0, -0.1, CONFIDENT - 0.1]
+        logs = [0.0, -7.0, 0.0, -0.1, -6.0]
         rows = super().describe(motions, 1)
         texts = ["somebody dances" if i % 2 else row[0].text for i, row in enumerate(rows)]
-        return [[Description(text, log, log)] for text, log in zip(texts, logs, strict=True)]
+        return [[Description(text, log, log, log > -5)] for text, log in zip(texts, logs, strict=True)]
 
 
 def test_confidence_by_hand(corpus: SplitStore) -> None:
@@ -62,11 +62,24 @@ def test_confidence_by_hand(corpus: SplitStore) -> None:
     )
 
 
+def test_the_limit_is_the_one_that_is_most_often_right() -> None:
+    rng = np.random.default_rng(0)
+    for count in (ENOUGH, 61):
+        scores = rng.normal(-5, 2, count)
+        right = scores + rng.normal(0, 2, count) > -5
+        limit = calibrated(scores, right).log_probability
+        told = [int(((scores >= other) == right).sum()) for other in (limit, *scores, 0.0)]
+        assert told[0] == max(told)
+    assert calibrated(np.linspace(-9, -1, ENOUGH), np.ones(ENOUGH, np.bool_)).log_probability < -9
+    assert calibrated(np.linspace(-9, -1, ENOUGH), np.zeros(ENOUGH, np.bool_)).log_probability > -1
+    assert calibrated(scores[: ENOUGH - 1], right[: ENOUGH - 1]) == ConfidenceSettings()
+
+
 class Blind(FakeDescribe):
     """Says the same of all there is, and is not sure."""
 
     def timeline(self, motion: Motion) -> list[Part]:
-        return [Part("somebody walks", CONFIDENT - 1, 0.0, 0.0, motion.duration)]
+        return [Part("somebody walks", -7.0, 0.0, False, 0.0, motion.duration)]
 
 
 def test_timelines_of_a_model_that_sees_no_change(corpus: SplitStore) -> None:

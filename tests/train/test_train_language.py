@@ -69,6 +69,8 @@ def test_the_manifest_says_all(verb: str, store: Path, tmp_path: Path) -> None:
     assert manifest["licence"] == {"weights": None, "data": "free"}
     assert manifest["loop"] == {"describe": "beam", "generate": "mixture"}[verb]
     assert manifest["vocabulary"] == list(found.vocabulary.words)
+    limit = {"confidence": {"log_probability": -5.5}}  # which a few validation motions do not change
+    assert manifest["settings"] == {"describe": limit, "generate": {}}[verb]
     contract = read_contract(Fields(manifest["motion"], "motion"))
     np.testing.assert_allclose(contract.mean, found.contract.mean, atol=1e-9)
     np.testing.assert_allclose(run.model.scale.numpy(), contract.std, rtol=1e-6)

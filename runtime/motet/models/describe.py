@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import pairwise
-from typing import Any, overload
+from typing import Annotated, Any, ClassVar, overload
 
 import numpy as np
 
@@ -16,12 +16,17 @@ from motet.decode.score import score_words
 from motet.models.language import MAX_SECONDS, LanguageModel
 from motet.models.progress import Progress, silent
 from motet.models.text import EOS, PAD, SOS, UNK
-from motet.models.timeline import CHANGE, HOP, NEAR, best_path, edges, near_scores, windows
+from motet.models.timeline import TimelineSettings, best_path, edges, near_scores, windows
 from motet.motion.motion import Motion
+from motet.settings import Range, Settings
 
-CONFIDENT = -5.5
-"""From this log-probability on a description is believed. Chosen for the bundle that ships, on its validation people:
-where their motions' best descriptions are less probable, most are wrong (docs/language.md)."""
+
+@dataclass(frozen=True)
+class ConfidenceSettings(Settings):
+    """log_probability: from which on a description is believed. Training finds it (docs/language.md)."""
+
+    FEATURE: ClassVar[str] = "confidence"
+    log_probability: Annotated[float, Range(-1000, 0, "nats")] = -5.5
 
 
 @dataclass(frozen=True)
@@ -29,21 +34,17 @@ class Description:
     """A sentence, normalised, and the natural logarithm of its probability given the motion.
 
     score: what the sentences of a motion are ranked by: the log-probability, or how well a sentence drawn agrees with
-        all that were drawn, from 0 to 1.
+        all that were drawn, from 0 to 1. confident: whether it is as probable as right descriptions are.
     """
 
     text: str
     log_probability: float
     score: float
-
-    @property
-    def confident(self) -> bool:
-        """Whether it is as probable as right descriptions are (:data:`CONFIDENT`)."""
-        return self.log_probability >= CONFIDENT
+    confident: bool
 
     def to_json(self) -> dict[str, Any]:
         """A JSON object of all that it says."""
-        return {**asdict(self), "confident": self.confident}
+        return asdict(self)
 
 
 @dataclass(frozen=True)
@@ -63,6 +64,7 @@ class DescribeModel(LanguageModel):
     """
 
     VERB = "describe"
+    SETTINGS = (ConfidenceSettings, TimelineSettings)
 
     def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:
         super().__init__(manifest, graphs, tables)
@@ -100,8 +102,12 @@ class DescribeModel(LanguageModel):
         settings = loop.settled(loop.defaults(self.manifest.defaults), {"beams": beams, "draws": draws or None})
         contexts = self.embed([motions] if isinstance(motions, Motion) else motions)
         found = self._hypotheses(loop, contexts, settings, progress)
-        rows = [[Description(self.vocabulary.decode(ids), *scores) for ids, *scores in row] for row in found]
+        rows = [[self._description(hypothesis) for hypothesis in row] for row in found]
         return rows[0] if isinstance(motions, Motion) else rows
+
+    def _description(self, found: Hypothesis) -> Description:
+        sure = found.log_probability >= self.settings(ConfidenceSettings).log_probability
+        return Description(self.vocabulary.decode(found.ids), found.log_probability, found.score, sure)
 
     def timeline(self, motion: Motion, *, progress: Progress = silent) -> list[Part]:
         """What happens in a motion of any length: parts that follow each other, each with its best description.
@@ -114,10 +120,11 @@ class DescribeModel(LanguageModel):
         MotionError as :meth:`frames`, but for long motions.
         """
         motion = self.contract.on_figure(motion).resample(self.fps)
-        spans = windows(len(motion), motion.fps)
+        settings = self.settings(TimelineSettings)
+        spans = windows(len(motion), motion.fps, settings)
         contexts = self.embed([motion[start:stop] for start, stop in spans])
-        scores = near_scores(self.graphs["step"], contexts, self._likeliest(contexts), round(NEAR / HOP), progress)
-        return self._parts(motion, edges(spans, best_path(scores, CHANGE)))
+        scores = near_scores(self.graphs["step"], contexts, self._likeliest(contexts), settings.reach, progress)
+        return self._parts(motion, edges(spans, best_path(scores, settings.change)))
 
     def _likeliest(self, contexts: Floats) -> list[tuple[int, ...]]:
         """The most probable sentence of each context, as ids from the start to the end."""

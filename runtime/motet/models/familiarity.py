@@ -3,6 +3,7 @@
 import math
 from collections import Counter
 from dataclasses import dataclass
+from typing import Annotated, ClassVar
 
 import numpy as np
 
@@ -10,12 +11,7 @@ from motet.bundle.fields import Fields
 from motet.bundle.graph import Floats
 from motet.errors import BundleError
 from motet.models.text import TextRules
-
-CONFIDENT = 0.4
-"""Sentences with less confidence than this are said to be outside of what a model knows (docs/generate.md)."""
-
-DOUBT = 0.25
-"""The power by which the probability of the likeliest action counts: sentences share actions, so it is often low."""
+from motet.settings import Range, Settings
 
 ROUNDING = 0.01
 """By which a log-probability may be above 0."""
@@ -25,20 +21,30 @@ NEAREST = 3
 
 
 @dataclass(frozen=True)
+class FamiliaritySettings(Settings):
+    """confident: the least confidence of a sentence that the model knows (docs/generate.md).
+
+    doubt: the power by which the probability of the likeliest action counts: sentences share actions, so it is often
+        low.
+    """
+
+    FEATURE: ClassVar[str] = "familiarity"
+    confident: Annotated[float, Range(0, 1)] = 0.4
+    doubt: Annotated[float, Range(0, 10)] = 0.25
+
+
+@dataclass(frozen=True)
 class Understood:
     """confidence: from 0 to 1: how much of what a sentence says is in known words, rare words counting more, times how
     sure it is which action is meant.
 
-    nearest: sentences of the likeliest of these actions, the likeliest first.
+    nearest: sentences of the likeliest of these actions, the likeliest first. confident: whether the model knows what
+    the sentence says.
     """
 
     confidence: float
     nearest: tuple[str, ...]
-
-    @property
-    def confident(self) -> bool:
-        """Whether the sentence is within what the model knows."""
-        return self.confidence >= CONFIDENT
+    confident: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,16 +55,17 @@ class Known:
     sentences: tuple[str, ...]
     rare: dict[str, float]
     rules: TextRules
+    settings: FamiliaritySettings
 
     @staticmethod
-    def read(manifest: Fields, count: int, rules: TextRules) -> "Known":
+    def read(manifest: Fields, count: int, rules: TextRules, settings: FamiliaritySettings) -> "Known":
         """The key "actions" of a manifest; BundleError where it is not one entry for each of ``count`` actions."""
         entries = manifest.list_of_fields("actions")
         if len(entries) != count:
             raise BundleError(f"manifest, actions: {len(entries)} entries, expected {count}")
         said = Counter(word for entry in entries for word in set(entry.texts("words")))
         rare = {word: math.log((1 + count) / times) for word, times in said.items()}
-        return Known(tuple(entry.text("sentence") for entry in entries), rare, rules)
+        return Known(tuple(entry.text("sentence") for entry in entries), rare, rules, settings)
 
     def understood(self, sentence: str, context: Floats) -> Understood:
         """What a sentence is taken for, by the log-probabilities (A,) of actions; BundleError where they are none."""
@@ -70,5 +77,5 @@ class Known:
         likeliest = float(context[order[0]])
         if likeliest > ROUNDING:
             raise BundleError(f"graph encoder: its context holds {likeliest:g}, which is no log-probability")
-        confidence = share * math.exp(likeliest) ** DOUBT
-        return Understood(confidence, tuple(nearest)[:NEAREST])
+        confidence = share * math.exp(likeliest) ** self.settings.doubt
+        return Understood(confidence, tuple(nearest)[:NEAREST], confidence >= self.settings.confident)

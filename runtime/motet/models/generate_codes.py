@@ -20,7 +20,7 @@ from motet.decode.rollout import Ids
 from motet.decode.sample import Sample
 from motet.decode.streaming_decoder import Sight, Unrolled
 from motet.errors import DecodingError, MotionError, TextError, TextWarning
-from motet.models.familiarity import Known, Understood
+from motet.models.familiarity import FamiliaritySettings, Known, Understood
 from motet.models.generate import Generated, GenerateModel
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
@@ -64,6 +64,7 @@ class CodesModel(GenerateModel):
         "tokens" (frames -> codes of the body) and "memory" (row -> codes, numbers, action, age), see docs/bundle.md.
     """
 
+    SETTINGS = (FamiliaritySettings,)
     ROLES = ("encoder", "part", "decoder", "tokens", "memory", "step")
 
     def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:
@@ -80,7 +81,8 @@ class CodesModel(GenerateModel):
         largest = [self.moves, *[self.sizes["K"] - 1] * self.sizes["B"]]
         memory = Memory.of(graphs["memory"], count, self.sizes["A"], largest)
         self.source = Source(graphs["step"], graphs["part"], self.moves, self.sizes["A"], memory)
-        self.known = Known.read(Fields(manifest.source), self.sizes["A"], self.vocabulary.rules)
+        familiarity = self.settings(FamiliaritySettings)
+        self.known = Known.read(Fields(manifest.source), self.sizes["A"], self.vocabulary.rules, familiarity)
 
     def _bind(self) -> None:
         self.bind("encoder", {"words": "*batch words", "lengths": "*batch"}, {"context": "batch A"})

@@ -23,7 +23,7 @@ from motet.formats import MOCAP, clips, read_motion
 from motet.formats.clips import MARK
 from motet.formats.npy import array
 from motet.models.progress import Progress, silent
-from motet.models.search import SearchModel
+from motet.models.search import IndexSettings, SearchModel
 from motet.motion.motion import Motion
 from motet.motion.units import metres
 
@@ -34,9 +34,6 @@ NAME = ".motet-search.npz"
 
 VERSION = 2
 """Of what is in the file."""
-
-WINDOW = 10.0
-"""Seconds: longer motions are cut into windows, so that what is found says when it is."""
 
 
 @dataclass(frozen=True)
@@ -170,7 +167,7 @@ class Index:
 def direction(model: SearchModel, motion: Motion) -> Floats:
     """The unit vector (E,) float32 of a motion of any length: the mean direction of its windows; MotionError for one
     that the model cannot take."""
-    mean = model.embed([part for _, part in model.windows(motion, WINDOW)]).mean(axis=0)
+    mean = model.embed([part for _, part in model.windows(motion, model.settings(IndexSettings).window)]).mean(axis=0)
     found: Floats = mean / np.linalg.norm(mean)
     return found
 
@@ -226,7 +223,8 @@ def _embedded(path: Path, member: Member, model: SearchModel, unit: str | float 
     """A member with its windows, and their vectors; or with the reason why it has none."""
     size = model.sizes["E"]
     try:
-        parts = model.windows(read_motion(path, unit=unit, clip=member.clip or None), WINDOW)
+        motion = read_motion(path, unit=unit, clip=member.clip or None)
+        parts = model.windows(motion, model.settings(IndexSettings).window)
         vectors = model.embed([part for _, part in parts])
     except MotetError as error:
         hint = " (Index.open's unit, --unit-in)" if isinstance(error, UnitError) else ""

@@ -3,13 +3,23 @@
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
 from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
-from motet.models.language import LanguageModel
+from motet.models.language import MAX_SECONDS, LanguageModel
 from motet.motion.motion import Motion
+from motet.settings import Range, Settings
+
+
+@dataclass(frozen=True)
+class IndexSettings(Settings):
+    """window: the longest motion that is one vector; longer ones are cut, so that a hit says when it is."""
+
+    FEATURE: ClassVar[str] = "index"
+    window: Annotated[float, Range(0.5, MAX_SECONDS, "s")] = 10.0
 
 
 class SearchModel(LanguageModel):
@@ -20,6 +30,7 @@ class SearchModel(LanguageModel):
     """
 
     VERB = "search"
+    SETTINGS = (IndexSettings,)
     ROLES = ("motion", "text")
 
     def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:

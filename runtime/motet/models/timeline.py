@@ -4,7 +4,9 @@ The path of a hidden Markov model (Viterbi 1967) whose states are sentences and 
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
+from typing import Annotated, ClassVar
 
 import numpy as np
 
@@ -13,18 +15,7 @@ from motet.decode.rollout import Ids, Scores
 from motet.decode.score import score_words
 from motet.models.language import padded
 from motet.models.progress import Progress, silent
-
-WINDOW, HOP = 1.5, 0.5
-"""Seconds that a window lasts, and from one to the next. Longer windows hold less of short actions: of the joins of
-validation people's motions 1.5 s find four fifths, 3 s half."""
-
-CHANGE = 12.0
-"""What a change of sentence costs, in nats. Three windows cover each moment: a new sentence pays if it is e^4 times as
-probable for as long as a window lasts."""
-
-NEAR = 15.0
-"""Seconds around a window within which others' sentences are asked about it: what nothing so near is called is not
-what it is."""
+from motet.settings import Range, Settings
 
 ROWS = 512
 """Pairs that are scored at once."""
@@ -32,9 +23,32 @@ ROWS = 512
 Span = tuple[int, int]
 
 
-def windows(frames: int, fps: float) -> list[Span]:
-    """Frames (start, stop) of overlapping windows, evenly spread, of :data:`WINDOW` seconds or of all there is."""
-    length, hop = max(2, round(WINDOW * fps)), max(1, round(HOP * fps))
+@dataclass(frozen=True)
+class TimelineSettings(Settings):
+    """How a motion is cut into parts.
+
+    window, hop: how long a window is, and the time from one to the next. Longer windows miss short actions: of the
+        joins of validation people's motions 1.5 s find four fifths, 3 s half.
+    change: the cost of a change of sentence. Three windows cover each moment, so with 12 nats a new sentence pays where
+        it is e^4 times as probable for the length of a window.
+    near: the distance within which a window is scored for the sentences of others.
+    """
+
+    FEATURE: ClassVar[str] = "timeline"
+    window: Annotated[float, Range(0.1, 30, "s")] = 1.5
+    hop: Annotated[float, Range(0.1, 30, "s")] = 0.5
+    change: Annotated[float, Range(0, 1000, "nats")] = 12.0
+    near: Annotated[float, Range(0, 600, "s")] = 15.0
+
+    @property
+    def reach(self) -> int:
+        """``near`` in windows."""
+        return round(self.near / self.hop)
+
+
+def windows(frames: int, fps: float, settings: TimelineSettings) -> list[Span]:
+    """Frames (start, stop) of overlapping windows, evenly spread, as long as the settings say or as the motion is."""
+    length, hop = max(2, round(settings.window * fps)), max(1, round(settings.hop * fps))
     count = max(1, 1 + -(-(frames - length) // hop))
     starts = np.linspace(0, max(0, frames - length), count).round().astype(int).tolist()
     return [(start, min(start + length, frames)) for start in starts]

@@ -2,12 +2,16 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
+from functools import partial
 from itertools import chain
 from typing import Any
 
 import numpy as np
 import torch
 
+from motet.bundle.manifest import Manifest
+from motet.models.describe import ConfidenceSettings, DescribeModel
+from motet.models.language import MAX_SECONDS
 from motet.models.text import RULES, Vocabulary
 from motet.representation import named
 from motet.representation.base import FrameMirror
@@ -18,6 +22,8 @@ from motet_train.data.mirror_text import mirror_text
 from motet_train.data.split import Split, split
 from motet_train.data.store import Store
 from motet_train.descent import GradientLearner, Term, Terms
+from motet_train.evaluate.language.confidence import calibrated, judged
+from motet_train.evaluate.language.split_store import SplitStore
 from motet_train.models.language.net import LanguageNet
 from motet_train.recipes.recipe import Job
 from motet_train.runs import MODELS, Run
@@ -84,7 +90,21 @@ def train_language(store: Store, job: Job, data: str = "", by: str = "trial") ->
     net = MODELS[recipe.model](config)
     assert isinstance(net, LanguageNet)
     net.measure_by(found.contract.mean, found.contract.std)
-    return job.run(net, _learner(net.to(job.device), found, job), manifest(job, found, config, data, by))
+    learner = _learner(net.to(job.device), found, job)
+    about = manifest(job, found, config, data, by)
+    if recipe.verb != "describe":
+        return job.run(net, learner, about)
+    return job.run(net, learner, about, tuned=partial(_confidence, found))
+
+
+def _confidence(found: Divided, run: Run) -> tuple[ConfidenceSettings]:
+    """From which log-probability on descriptions are believed, by those of the validation motions."""
+    model = DescribeModel(Manifest.from_json(run.manifest), run.torch_graphs())
+    corpus = SplitStore(found.store, found.parts)
+    said = [record for record in found.parts.validation if corpus.sentences(record)]
+    fitting = [n for n in said if len(corpus.motion(n)) >= 2 and corpus.motion(n).duration <= MAX_SECONDS]
+    descriptions, right = judged(model, corpus, fitting)
+    return (calibrated(np.array([one.log_probability for one in descriptions]), right),)
 
 
 def manifest(job: Job, found: Divided, config: Mapping[str, Any], data: str, by: str) -> dict[str, Any]:

@@ -99,7 +99,7 @@ class Job:
             "motion": contract.to_json(),
             **more,
             "defaults": dict(defaults),
-            "settings": {settings.FEATURE: asdict(settings) for settings in recipe.settings},
+            "settings": _by_feature(recipe.settings),
             "config": dict(config),
             "licence": {"weights": about.licence, "data": about.data_licence or data_licence},
             "training": {"command": about.command, "seed": about.seed, **trained, **(training or {})},
@@ -113,10 +113,12 @@ class Job:
         learner: Learner,
         manifest: Mapping[str, Any],
         more: Callable[[Sequence[Line]], Mapping[str, Any]] = lambda log: {},
+        tuned: Callable[[Run], Sequence[Settings]] = lambda run: (),
     ) -> Run:
         """Train; the folder is a run after the first chunk, and one that was stopped resumes.
 
         net: what the run will hold. more: what else the manifest says of the training, from its log.
+        tuned: settings of features that are found with the trained net.
         RunError where the folder holds a run that was started with other settings; more epochs or steps are allowed.
         """
         if distributed.rank() == 0:
@@ -128,8 +130,14 @@ class Job:
         training = {**manifest["training"], **_results(net, learner, log), **more(log), **surroundings(self.device)}
         run = Run({**manifest, "training": training}, net.cpu())
         if distributed.rank() == 0:
+            settings = {**manifest["settings"], **_by_feature(tuned(run))}
+            run = Run({**run.manifest, "settings": settings}, run.model)
             run.save(self.folder)
         return run
+
+
+def _by_feature(settings: Sequence[Settings]) -> dict[str, dict[str, Any]]:
+    return {one.FEATURE: asdict(one) for one in settings}
 
 
 def _results(net: Net, learner: Learner, log: Sequence[Line]) -> dict[str, Any]:

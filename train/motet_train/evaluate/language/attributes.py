@@ -2,9 +2,12 @@
 
 import re
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from motet_train.evaluate.language.bleu import References
 from motet_train.evaluate.language.split_store import plain
+
+if TYPE_CHECKING:
+    from motet_train.evaluate.language.bleu import References  # whose package training does without
 
 Patterns = dict[str, str]
 """Name of an attribute -> regular expression of the words that say it."""
@@ -77,7 +80,7 @@ def turns(sentences: Sequence[str]) -> bool | None:
     return 2 * sum(map(turning, sentences)) >= len(sentences)
 
 
-def verbs_right(hypotheses: Sequence[str], references: References) -> Score:
+def verbs_right(hypotheses: Sequence[str], references: "References") -> Score:
     """A hypothesis is right if it names a verb people agree on, and none that nobody named."""
     found = []
     for text, sentences in zip(hypotheses, references, strict=True):
@@ -88,7 +91,7 @@ def verbs_right(hypotheses: Sequence[str], references: References) -> Score:
     return sum(found), len(found)
 
 
-def sides_right(hypotheses: Sequence[str], references: References) -> Score:
+def sides_right(hypotheses: Sequence[str], references: "References") -> Score:
     """A hypothesis is right if it names the one side people agree on, not if it names none or both."""
     sides = [(side(text), common_side(sentences)) for text, sentences in zip(hypotheses, references, strict=True)]
     found = [named == {agreed} for named, agreed in sides if agreed]
@@ -101,7 +104,7 @@ def action_right(text: str, sentences: Sequence[str]) -> bool:
     return bool(named) and named <= frozenset().union(*(said(ACTIONS, sentence) for sentence in sentences))
 
 
-def turns_right(hypotheses: Sequence[str], references: References) -> Score:
+def turns_right(hypotheses: Sequence[str], references: "References") -> Score:
     """Of walking and running: a hypothesis is right if it says about turning what people agree on."""
     pairs = [(turning(text), turns(sentences)) for text, sentences in zip(hypotheses, references, strict=True)]
     found = [named == agreed for named, agreed in pairs if agreed is not None]

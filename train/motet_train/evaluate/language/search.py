@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.models.describe import DescribeModel
-from motet.models.index import WINDOW, Index, Member
-from motet.models.search import SearchModel
+from motet.models.index import Index, Member
+from motet.models.search import IndexSettings, SearchModel
 from motet.models.text import RULES
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
@@ -102,7 +102,7 @@ def _index(model: SearchModel, corpus: SplitStore, records: Sequence[int]) -> In
     """An index of some records, whose paths are their places."""
     members, vectors = [], []
     for place, motion in enumerate(corpus.motions(records)):
-        parts = model.windows(motion, WINDOW)
+        parts = model.windows(motion, model.settings(IndexSettings).window)
         windows = tuple((start, start + part.duration) for start, part in parts)
         members.append(Member(str(place), 0, 0, windows))
         vectors.append(model.embed([part for _, part in parts]))
