@@ -13,7 +13,8 @@ from motet.bundle.graph import OnnxGraph
 from motet.bundle.manifest import Manifest
 from motet.bundle.session import SessionOptions
 from motet.files import check_place
-from motet.models.load import Model, build, kind_of
+from motet.models.base import BundleModel
+from motet.models.load import build, kind_of
 from motet_export.decoded import whole_runs
 from motet_export.examples import Examples, examples
 from motet_export.exporter import ExportError, export_graph
@@ -75,14 +76,18 @@ def halve_bundle(bundle: Bundle, out: str | Path) -> dict[str, Any]:
     return changes
 
 
-def _served(model: Model, files: Mapping[str, bytes]) -> Model:
+def _served(model: BundleModel, files: Mapping[str, bytes]) -> BundleModel:
     """The model with its graphs run by ONNX Runtime."""
     graphs = {role: OnnxGraph(files[f"{role}.onnx"], graph.spec) for role, graph in model.graphs.items()}
     return build(model.manifest, graphs, model.tables)
 
 
 def _write(
-    out: str | Path, model: Model, graphs: Mapping[str, bytes], about: Mapping[str, Any], draws: Mapping[str, Examples]
+    out: str | Path,
+    model: BundleModel,
+    graphs: Mapping[str, bytes],
+    about: Mapping[str, Any],
+    draws: Mapping[str, Examples],
 ) -> None:
     """Write the bundle of a model, with golden vectors and plain arrays."""
     vectors, golden = golden_vectors(model, draws)
@@ -109,7 +114,7 @@ def parity_of(run: Run, bundle: Bundle, options: SessionOptions | None = None) -
     return parity(model, build(bundle.manifest, run.torch_graphs(), run.tables()))
 
 
-def parity(onnx: Model, torch: Model) -> dict[str, Any]:
+def parity(onnx: BundleModel, torch: BundleModel) -> dict[str, Any]:
     """Climb the parity ladder; the report that goes into the manifest. ExportError at the first rung that fails."""
     draws = examples(onnx.manifest, torch.graphs)
     report: dict[str, Any] = {

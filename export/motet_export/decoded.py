@@ -1,19 +1,19 @@
 """Whole runs of each verb, decoded by ONNX Runtime and by torch from the same inputs and seeds."""
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Callable, Sequence
+from functools import partial, singledispatch
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motet.errors import TextWarning
+from motet.models.base import BundleModel
 from motet.models.describe import DescribeModel
 from motet.models.fill import FillModel
 from motet.models.generate import GenerateModel
 from motet.models.language import LanguageModel
-from motet.models.load import Model
 from motet.models.predict import PredictModel
 from motet.models.search import SearchModel
 from motet.models.steer import SteerModel
@@ -31,13 +31,20 @@ Named = dict[str, Callable[[Any], Decoded]]
 """By name of a run: what a model decodes."""
 
 
-def whole_runs(onnx: Model, torch: Model) -> Runs:
+def whole_runs(onnx: BundleModel, torch: BundleModel) -> Runs:
     """The runs by which a model is judged, each by its name."""
-    runs = _RUNS.get(onnx.manifest.loop, _RUNS[onnx.VERB])(onnx)
+    runs = runs_of(onnx)
     return {name: partial(_pair, (onnx, torch), run) for name, run in runs.items()}
 
 
-def _control(_: TdbnModel) -> Named:
+@singledispatch
+def runs_of(model: BundleModel) -> Named:
+    """What a model is asked to decode, by name."""
+    raise NotImplementedError(f"no whole runs of {model!r} are defined")
+
+
+@runs_of.register
+def _tdbn(_: TdbnModel) -> Named:
     return {"mean_field": partial(_controlled, 0.0), "sampled": partial(_controlled, 1.0)}
 
 
@@ -52,6 +59,7 @@ def _controlled(variety: float, model: TdbnModel) -> Decoded:
     return {"frames": session.frames(smooth.clip(0, 1))}
 
 
+@runs_of.register
 def _steer(_: SteerModel) -> Named:
     return {"steered": _steered}
 
@@ -66,6 +74,7 @@ def _steered(model: SteerModel) -> Decoded:
     return {"frames": session.frames_of(poses)}
 
 
+@runs_of.register
 def _describe(_: DescribeModel) -> Named:
     searches = {"greedy": (1, 0), "beam": (5, 0), "consensus": (5, 50)}
     runs: Named = {name: partial(_described, *settings) for name, settings in searches.items()}
@@ -89,6 +98,7 @@ def _sentence_scores(model: DescribeModel) -> Decoded:
     return {"scores": np.array([model.score(motion, sentence) for motion, sentence in pairs])}
 
 
+@runs_of.register
 def _generate(model: GenerateModel) -> Named:
     if "candidates" not in model.defaults:
         return {"decoded": partial(_generated, None)}
@@ -115,6 +125,7 @@ def _motion_scores(model: GenerateModel) -> Decoded:
     return {"scores": np.array([model.score(sentence, motion) for sentence, motion in pairs])}
 
 
+@runs_of.register
 def _predict(_: PredictModel) -> Named:
     return {"horizon": partial(_predicted, 1), "beyond": partial(_predicted, 3)}
 
@@ -127,6 +138,7 @@ def _predicted(horizons: int, model: PredictModel) -> Decoded:
     return {"frames": contract.normalised(found)}
 
 
+@runs_of.register
 def _fill(_: FillModel) -> Named:
     return {"short": partial(_filled, 4), "longest": partial(_filled, None)}
 
@@ -138,6 +150,7 @@ def _filled(frames: int | None, model: FillModel) -> Decoded:
     return {"frames": np.stack([model.frames_between(*one, frames or model.longest) for one in known])}
 
 
+@runs_of.register
 def _search(_: SearchModel) -> Named:
     return {"vectors": lambda model: {"motions": model.embed(_motions(model)), "texts": _texts(model)}}
 
@@ -167,14 +180,3 @@ def _sentences(model: LanguageModel) -> list[str]:
     rng = np.random.default_rng(4)
     words = model.vocabulary.words[len(SPECIALS) :]
     return [" ".join(rng.choice(words, length)) for length in range(1, 17, 2)]
-
-
-_RUNS: Mapping[str, Callable[..., Named]] = {
-    "control": _control,
-    "matching": _steer,
-    "describe": _describe,
-    "fill": _fill,
-    "generate": _generate,
-    "predict": _predict,
-    "search": _search,
-}

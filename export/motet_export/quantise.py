@@ -3,7 +3,7 @@
 import numpy as np
 
 from motet.bundle.graph import Floats
-from motet.models.load import Model
+from motet.models.base import BundleModel
 from motet_export.decoded import whole_runs
 from motet_export.weights import Small, stored
 
@@ -17,7 +17,7 @@ def quantised(model: bytes) -> bytes:
     return stored(model, _rows, weights="int8")
 
 
-def difference(int8: Model, exact: Model) -> dict[str, float]:
+def difference(int8: BundleModel, exact: BundleModel) -> dict[str, float]:
     """What int8 changes in the runs of the parity ladder, for the manifest.
 
     "<run>.equal": share of the decoded sentences that are the same. "<run>.score": mean |difference| of the

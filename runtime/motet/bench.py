@@ -6,6 +6,7 @@ import time
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import singledispatch
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +18,9 @@ from motet.formats import read_motion, write_motion
 from motet.models.base import BundleModel
 from motet.models.describe import DescribeModel
 from motet.models.fill import FillModel
-from motet.models.generate import GenerateModel
 from motet.models.generate_codes import CodesModel
+from motet.models.generate_mixture import MixtureModel
+from motet.models.language import LanguageModel
 from motet.models.predict import PredictModel
 from motet.models.search import SearchModel
 from motet.models.steer import SteerModel
@@ -80,17 +82,13 @@ def _until(call: Callable[[], object], seconds: float, least: int) -> list[float
     return taken
 
 
+@singledispatch
 def figures(model: BundleModel, seconds: float, file: Path | None = None) -> Figures:
     """The figures of a model by name, each measured for about ``seconds``: values and units.
 
     file: the motion file that is described; by default one of :data:`FILE_SECONDS` that is made for it.
     """
-    measured: Figures = _FIGURES[model.VERB](model, seconds)
-    if isinstance(model, DescribeModel) and (file or model.contract.skeleton):
-        with tempfile.TemporaryDirectory() as folder:
-            path = file or _made_file(model, Path(folder))
-            measured["describe.file"] = (_milliseconds(lambda: model.describe(read_motion(path)), seconds), "ms")
-    return measured
+    raise NotImplementedError(f"no figures of {model!r} are defined")
 
 
 def _made_file(model: DescribeModel, folder: Path) -> Path:
@@ -102,13 +100,12 @@ def _made_file(model: DescribeModel, folder: Path) -> Path:
     return folder / "motion.amc"
 
 
-def control_figures(model: TdbnModel | SteerModel, seconds: float) -> Figures:
+@figures.register
+def tdbn_figures(model: TdbnModel, seconds: float, _: Path | None = None) -> Figures:
     """One character's tick (median and 99th percentile) and the frame rate at the best batch, plain and sampled.
 
     Of the net alone; and of a smooth session whose control stays, and of one whose control changes at every tick.
     """
-    if isinstance(model, SteerModel):
-        return steer_figures(model, seconds)
     tick = durations(model.start(smooth=False).step, seconds) * 1e6
     smooth, changing = model.start(), model.start()
     controls = itertools.cycle([np.ones(len(model.labels)), np.zeros(len(model.labels))])
@@ -136,7 +133,8 @@ def _rate(model: TdbnModel, batch: int, variety: float, seconds: float) -> float
     return batch / float(np.median(durations(session.step, seconds)))
 
 
-def steer_figures(model: SteerModel, seconds: float) -> Figures:
+@figures.register
+def steer_figures(model: SteerModel, seconds: float, _: Path | None = None) -> Figures:
     """A tick of one character that walks, and of :data:`CROWD` that go all ways, without and with the foot lock; and
     the positions of all joints of the crowd.
 
@@ -159,6 +157,16 @@ def _steered(model: SteerModel, characters: int, hold_feet: bool) -> SteerSessio
     return session
 
 
+@figures.register
+def _(model: DescribeModel, seconds: float, file: Path | None = None) -> Figures:
+    measured = describe_figures(model, seconds)
+    if file or model.contract.skeleton:
+        with tempfile.TemporaryDirectory() as folder:
+            path = file or _made_file(model, Path(folder))
+            measured["describe.file"] = (_milliseconds(lambda: model.describe(read_motion(path)), seconds), "ms")
+    return measured
+
+
 def describe_figures(model: DescribeModel, seconds: float) -> Figures:
     """Descriptions of :data:`WORDS` words a second, many at once and one alone; encoder and step of one alone.
 
@@ -179,14 +187,12 @@ def describe_figures(model: DescribeModel, seconds: float) -> Figures:
     }
 
 
-def generate_figures(model: GenerateModel, seconds: float) -> Figures:
+@figures.register
+def mixture_figures(model: MixtureModel, seconds: float, _: Path | None = None) -> Figures:
     """Motions of :data:`SECONDS` a second, many at once and one alone; encoder and step of one alone."""
     always = {"active": np.ones_like}
     defaults = {**model.defaults, "hypotheses": BEAMS, "max_seconds": SECONDS}
-    text = " ".join(model.vocabulary.words[len(SPECIALS) :][:WORDS])
-    if isinstance(model, CodesModel):
-        return codes_figures(model, text, seconds)
-    steady = type(model)(replace(model.manifest, defaults=defaults), _steady(model.graphs, always))
+    steady, text = MixtureModel(replace(model.manifest, defaults=defaults), _steady(model.graphs, always)), _text(model)
     return {
         "generate.motions": (_batch_rate(steady.generate, [text], 64, seconds), "motions/s"),
         "generate.one": (_milliseconds(lambda: steady.generate(text), seconds), "ms"),
@@ -195,8 +201,10 @@ def generate_figures(model: GenerateModel, seconds: float) -> Figures:
     }
 
 
-def codes_figures(model: CodesModel, text: str, seconds: float) -> Figures:
+@figures.register
+def codes_figures(model: CodesModel, seconds: float, _: Path | None = None) -> Figures:
     """The first frames of a stream, and :data:`SECONDS` of motion, alone and many at once."""
+    text = _text(model)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", TextWarning)
         rate = _batch_rate(lambda texts: model.generate(texts, seconds=SECONDS), [text], 64, seconds)
@@ -207,7 +215,12 @@ def codes_figures(model: CodesModel, text: str, seconds: float) -> Figures:
         }
 
 
-def predict_figures(model: PredictModel, seconds: float) -> Figures:
+def _text(model: LanguageModel) -> str:
+    return " ".join(model.vocabulary.words[len(SPECIALS) :][:WORDS])
+
+
+@figures.register
+def predict_figures(model: PredictModel, seconds: float, _: Path | None = None) -> Figures:
     """The first frame after a new one, one of a whole horizon, and a horizon of a motion on the model's figure, for one
     figure; figures' horizons a second."""
     size = (512, model.seed_frames, len(model.contract.channels))
@@ -222,7 +235,8 @@ def predict_figures(model: PredictModel, seconds: float) -> Figures:
     }
 
 
-def fill_figures(model: FillModel, seconds: float) -> Figures:
+@figures.register
+def fill_figures(model: FillModel, seconds: float, _: Path | None = None) -> Figures:
     """The frames of a gap of a second, between placed frames, and in a motion of five on the model's own figure."""
     count, rng = round(model.fps), np.random.default_rng(0)
     steps = model.contract.std * rng.normal(size=(5 * count, len(model.contract.channels)))
@@ -235,7 +249,8 @@ def fill_figures(model: FillModel, seconds: float) -> Figures:
     }
 
 
-def search_figures(model: SearchModel, seconds: float) -> Figures:
+@figures.register
+def search_figures(model: SearchModel, seconds: float, _: Path | None = None) -> Figures:
     """A sentence of :data:`WORDS` words, a motion of :data:`SECONDS`, and a question to :data:`VECTORS` vectors."""
     rng, known = np.random.default_rng(0), model.vocabulary.words[len(SPECIALS) :]
     text, size = " ".join(rng.choice(known, WORDS)), (round(SECONDS * model.fps), len(model.contract.channels))
@@ -246,16 +261,6 @@ def search_figures(model: SearchModel, seconds: float) -> Figures:
         "search.motion": (_milliseconds(lambda: model.embed(motion), seconds), "ms"),
         "search.nearest": (_milliseconds(lambda: model.loop.run(vectors @ vectors[0], 5), seconds), "ms"),
     }
-
-
-_FIGURES: Mapping[str, Callable[[Any, float], Figures]] = {
-    "control": control_figures,
-    "describe": describe_figures,
-    "fill": fill_figures,
-    "generate": generate_figures,
-    "predict": predict_figures,
-    "search": search_figures,
-}
 
 
 class _Steady:

@@ -8,8 +8,11 @@ import pytest
 from motet.bundle.fields import Fields
 from motet.bundle.graph import Arrays, Graph, GraphSpec, TensorSpec
 from motet.bundle.manifest import Manifest, read_contract
+from motet.models.load import KINDS
+from motet_export.decoded import runs_of
 from motet_export.examples import examples, walks
 from motet_export.exporter import ExportError
+from motet_export.golden import golden_run
 from motet_export.parity import check_carried
 
 MOTION = {
@@ -123,3 +126,8 @@ def test_a_step_that_amplifies_rounding_is_held_to_what_torch_makes_of_it() -> N
         check(1e-5, 12)
     with pytest.raises(ExportError, match="the bound 1e-02"):
         check(1e-7, 20)  # by then torch is as far from itself, and nothing can be told
+
+
+def test_every_kind_of_model_has_a_golden_run_and_whole_runs() -> None:
+    for runs in (golden_run, runs_of):
+        assert all(runs.dispatch(kind) is not runs.dispatch(object) for kind in KINDS)

@@ -8,17 +8,19 @@ from collections.abc import Callable
 from contextlib import suppress
 from importlib.metadata import EntryPoint
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_overloads, get_type_hints
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from motet.bench import figures
 from motet.bundle.bundle import FORMAT, Bundle, list_bundles, write_bundle, zip_bytes
 from motet.bundle.session import SessionOptions
 from motet.cli import main
+from motet.decode.loops import LOOPS
 from motet.errors import BundleError, OutputError, SettingError
-from motet.models.load import VERBS, kind_of, load
+from motet.models.load import KINDS, kind_of, load
 from motet.models.verify import verify
 
 SHIPPED = list_bundles()["cmu-control"]
@@ -39,7 +41,7 @@ def edit(folder: Path, change: Callable[[dict[str, Any]], None]) -> None:
 
 
 def test_the_shipped_bundles_are_whole_and_give_their_golden_vectors() -> None:
-    assert list(list_bundles()) == sorted([*VERBS, "cmu-control", "cmu-generate"])
+    assert list(list_bundles()) == sorted([*{kind.VERB for kind in KINDS}, "cmu-control", "cmu-generate"])
     for name, path in list_bundles().items():
         bundle = Bundle.open(name)
         assert bundle.name == name == path.stem
@@ -49,6 +51,19 @@ def test_the_shipped_bundles_are_whole_and_give_their_golden_vectors() -> None:
         assert {*roles, "run"} <= found.errors.keys()
         assert max(found.errors.values()) < 1e-4  # on every processor
         assert found.providers == ("CPUExecutionProvider",)
+
+
+def test_the_type_of_a_bundle_loaded_by_name_is_known() -> None:
+    kinds = {}
+    for overload in get_overloads(load):
+        hints = get_type_hints(overload)
+        kinds |= {name: hints["return"] for name in get_args(hints["name_or_path"]) if isinstance(name, str)}
+    assert {name: type(load(name)) for name in list_bundles()} == kinds
+
+
+def test_every_kind_of_model_is_measured_and_has_loops_of_its_own() -> None:
+    assert all(figures.dispatch(kind) is not figures.dispatch(object) for kind in KINDS)
+    assert sorted(loop for kind in KINDS for loop in kind.LOOPS) == sorted(LOOPS)
 
 
 def test_folder_and_zip_run_alike_and_pack_to_the_same_bytes(folder: Path, tmp_path: Path) -> None:
@@ -135,7 +150,7 @@ NAN, HUGE = float("nan"), 10**400
         ("verb", ["swim"], "verb: must be a string"),
         ("verb", "describe", "loop: 'session' does not describe|text: is missing|beam"),
         ("loop", None, "loop: is missing"),
-        ("loop", "beam", "loop: 'beam' does not control; expected one of session"),
+        ("loop", "beam", "loop: 'beam' does not control; expected one of matching, session"),
         ("control", None, "control: is missing"),
         ("control.labels", ["walk", "walk", "run"], "control.labels: holds a string twice"),
         ("control.labels", ["walk", "run"], "control.starts: must be frames for each of walk, run"),
@@ -253,7 +268,7 @@ def test_packages_bring_bundles_by_an_entry_point(tmp_path: Path, monkeypatch: p
     monkeypatch.setattr("motet.bundle.bundle.entry_points", lambda group: points if group == "motet.bundles" else ())
     assert load("bends").manifest.name == "cmu-control"
     assert load("describe").manifest.name == "describe"  # motet's own come first
-    assert list(list_bundles()) == sorted([*VERBS, "bends"])
+    assert list(list_bundles()) == sorted([*{kind.VERB for kind in KINDS}, "bends"])
     monkeypatch.setattr("motet.bundle.bundle.entry_points", lambda group: ())
     with pytest.raises(BundleError, match=r"expected one of control, describe.*the package motet-papers has more"):
         load("bends")

@@ -12,8 +12,9 @@ from motet.bundle.bundle import Bundle
 from motet.bundle.graph import Arrays, Graph
 from motet.bundle.manifest import Manifest
 from motet.errors import BundleError
+from motet.models.base import BundleModel
 from motet.models.generate_codes import CodesModel
-from motet.models.load import Model, build
+from motet.models.load import build
 
 
 class Lying:
@@ -29,7 +30,7 @@ class Lying:
         return found
 
 
-def lying(name: str, role: str, output: str, value: float, row: int | None = None) -> Model:
+def lying(name: str, role: str, output: str, value: float, row: int | None = None) -> BundleModel:
     bundle = Bundle.open(name)
     graphs: dict[str, Graph] = {one: bundle.graph(one) for one in bundle.manifest.graphs}
     return build(bundle.manifest, {**graphs, role: Lying(graphs[role], output, value, row)})

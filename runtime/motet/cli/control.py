@@ -1,5 +1,6 @@
 """``motet control``: from a script to a motion."""
 
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ from motet.cli.notes import noted
 from motet.cli.options import session_options
 from motet.cli.reading import Read, naming, out_option, read_options
 from motet.cli.writing import Output, size, write_options
+from motet.errors import ControlError
 from motet.formats import names_motion
 from motet.formats.html import write as write_html
 from motet.models.control import ControlModel
@@ -63,10 +65,13 @@ def control(
     """
     output.check(out)
     model = load_as(ControlModel, bundle, session)
+    chosen = {name: value for name, value in settings.items() if value is not None}
+    if unknown := chosen.keys() - signature(model.run).parameters.keys():
+        raise ControlError(f"{model!r} has no setting {', '.join(map(repr, sorted(unknown)))}")
     captions = model.captions(script)
     with naming(start), noted():
         first = read(Path(start)) if start and (Path(start).suffix or names_motion(start)) else start
-        motion = model.run(script, first, **{name: value for name, value in settings.items() if value is not None})
+        motion = model.run(script, first, **chosen)
     motion = output.shaped(motion)
     if out.suffix.lower() == ".html":
         write_html(out, motion, captions=captions, title=script)

@@ -73,19 +73,19 @@ def generate(
     With --story the texts become one motion, each taking over from the one before.
     """
     output.check(out)
-    model = load_as(GenerateModel, bundle, session)
+    teller = load_as(CodesModel, bundle, session) if story or after is not None or stand is not None else None
+    model = teller or load_as(GenerateModel, bundle, session)
     tries = Tries()
     asked = tries.usable(model, texts)
     given = {"strict": strict, **settings}
     shown = partial(_written, plant=not no_plant, loop=loop, output=output)
     with noted():
-        if story or after is not None or stand is not None:
-            groups = [asked] if story and asked else [[index] for index in asked]
-            found = list(_stories(tries, model, texts, groups, {"after": after, "stand": stand, "seed": seed, **given}))
-        else:
+        if teller is None:
             found = _motions(tries, model, texts, asked, seed, given)
-    outs = partial(places, out, output=output)
-    rows = _rows(tries, found, outs, 1 if story else len(texts), every, shown)
+        else:
+            given |= {"after": after, "stand": stand, "seed": seed}
+            found = list(_stories(tries, teller, texts, [asked] if story else [[one] for one in asked], given))
+    rows = _rows(tries, found, partial(places, out, output=output), 1 if story else len(texts), every, shown)
     output.finish()
     if rows:
         click.echo(json.dumps(rows) if as_json else "\n".join(_lines(rows)))
@@ -109,18 +109,16 @@ def _motions(
 
 
 def _stories(
-    tries: Tries, model: GenerateModel, texts: Sequence[str], groups: list[list[int]], given: dict[str, Any]
+    tries: Tries, model: CodesModel, texts: Sequence[str], groups: list[list[int]], given: dict[str, Any]
 ) -> Iterator[Found]:
     """One motion for the texts of each group."""
-    if not isinstance(model, CodesModel):
-        raise click.UsageError(f"--story, --after and --stand need a bundle that writes codes; {model!r} does not")
     options = {key: value for key, value in given.items() if value is not None}
     if options.pop("hypotheses", 1) != 1:
         raise click.UsageError("--story, --after and --stand give one motion: leave --hypotheses out")
     source = options.get("after")
     if source is not None:
         options["after"] = read_motion(source)
-    for number, group in enumerate(groups):
+    for number, group in enumerate(filter(None, groups)):
         asked = [texts[index] for index in group]
         with tries.of(" / ".join(asked)), naming(source):
             yield number, " / ".join(asked), [model.story(asked, **{**options, "seed": given["seed"] + group[0]})]

@@ -109,4 +109,4 @@ def _hypotheses(ids: Ids, scores: Scores, end: int) -> list[Hypothesis]:
 INPUTS, OUTPUTS = {"word": "*batch", "context": "batch C"}, {"log_probabilities": "batch V"}
 """Of the step of every loop over words."""
 
-LOOP = Loop("describe", beam_search, INPUTS, OUTPUTS, BeamSettings, batch=128)
+LOOP = Loop(beam_search, INPUTS, OUTPUTS, BeamSettings, batch=128)

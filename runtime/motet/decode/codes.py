@@ -244,7 +244,6 @@ class CodesSettings(Settings):
 
 
 LOOP = Loop(
-    "generate",
     draw_codes,
     {"codes": "*batch P", "action": "*batch", "age": "*batch"},
     {"known": "batch H", "numbers": "batch L"},

@@ -85,4 +85,4 @@ class ConsensusSettings(BeamSettings):
     temperature: Annotated[float, Range(0.01, 100)] = 1.0
 
 
-LOOP = Loop("describe", consensus, INPUTS, OUTPUTS, ConsensusSettings, batch=16)
+LOOP = Loop(consensus, INPUTS, OUTPUTS, ConsensusSettings, batch=16)

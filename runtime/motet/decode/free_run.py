@@ -40,4 +40,4 @@ def free_run(encoder: Graph, step: Graph, seed: Floats, count: int, horizon: int
     return frames[:, given:]
 
 
-LOOP = Loop("predict", free_run, {}, {"frame": "batch D"}, FreeRunSettings, batch=4096)
+LOOP = Loop(free_run, {}, {"frame": "batch D"}, FreeRunSettings, batch=4096)

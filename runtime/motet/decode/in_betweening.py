@@ -26,4 +26,4 @@ def between(graph: Graph, past: Floats, plain: Floats, after: Floats) -> Floats:
     return filled
 
 
-LOOP = Loop("fill", between, {}, {}, BetweenSettings)
+LOOP = Loop(between, {}, {}, BetweenSettings)

@@ -1,4 +1,4 @@
-"""The record of a decoding loop: the verb it is for, and its settings with their ranges."""
+"""The record of a decoding loop: what it runs, and its settings with their ranges."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from motet.settings import Settings
 
 @dataclass(frozen=True)
 class Loop:
-    """A decoding loop of a verb; :mod:`motet.decode.loops` lists all, by the names that manifests use.
+    """A decoding loop; :mod:`motet.decode.loops` lists all, by the names that manifests use.
 
     run: the loop itself. What it takes is the same for all loops of a verb: see
         :class:`motet.models.describe.DescribeModel`, GenerateModel and PredictModel. Settings are given by name.
@@ -19,7 +19,6 @@ class Loop:
     batch: how many rows it decodes at once; more bring no speed and take memory.
     """
 
-    verb: str
     run: Callable[..., Any]
     inputs: Mapping[str, str]
     outputs: Mapping[str, str]

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 
 from motet.decode import beam, codes, consensus, free_run, in_betweening, matching, mixture, nearest, session
 from motet.decode.loop import Loop
-from motet.errors import BundleError
 
 LOOPS: Mapping[str, Loop] = {
     "beam": beam.LOOP,
@@ -17,11 +16,3 @@ LOOPS: Mapping[str, Loop] = {
     "nearest": nearest.LOOP,
     "between": in_betweening.LOOP,
 }
-
-
-def loop_of(name: str, verb: str) -> Loop:
-    """The loop that a manifest names; BundleError where it is unknown, or for another verb."""
-    fitting = [known for known, loop in LOOPS.items() if loop.verb == verb]
-    if name not in fitting:
-        raise BundleError(f"manifest, loop: {name!r} does not {verb}; expected one of {', '.join(fitting)}")
-    return LOOPS[name]

@@ -258,7 +258,6 @@ def tick(step: Graph, matcher: Matcher, playing: Playing, control: Floats, gait:
 
 
 LOOP = Loop(
-    "control",
     tick,
     {"recorded": "batch 2 W", "at": "batch 2", "control": "batch 3"},
     {"rotations": "batch J 4", "height": "batch 1", "contacts": "batch 2"},

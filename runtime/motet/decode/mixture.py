@@ -182,7 +182,6 @@ class MixtureSettings(Settings):
 
 
 LOOP = Loop(
-    "generate",
     mixture_search,
     {"frame": "batch F", "context": "batch C"},
     {"log_weights": "batch K", "means": "batch K D", "stds": "batch K D", "active": "batch"},

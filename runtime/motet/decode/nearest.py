@@ -25,4 +25,4 @@ def nearest(scores: Floats, count: int) -> Ids:
     return order
 
 
-LOOP = Loop("search", nearest, {}, {}, NearestSettings)
+LOOP = Loop(nearest, {}, {}, NearestSettings)

@@ -31,7 +31,6 @@ def tick(step: Graph, history: Floats, inputs: Callable[[], Arrays], iterations:
 
 
 LOOP = Loop(
-    "control",
     tick,
     {
         "history": "batch K H",

@@ -13,7 +13,7 @@ from motet.bundle.graph import Arrays, Graph, TensorSpec
 from motet.bundle.manifest import Manifest
 from motet.bundle.session import SessionOptions
 from motet.bundle.signature import Sizes, bind, bind_tensor
-from motet.decode.loops import loop_of
+from motet.decode.loops import LOOPS
 from motet.errors import BundleError
 from motet.settings import Settings
 
@@ -31,6 +31,8 @@ class BundleModel(ABC):
     """
 
     VERB: ClassVar[str]
+    LOOPS: ClassVar[tuple[str, ...]]
+    """The decoding loops of its bundles, by their names in :mod:`motet.decode.loops`."""
     ROLES: ClassVar[tuple[str, ...]] = ("encoder", "step")
     SETTINGS: ClassVar[tuple[type[Settings], ...]] = ()
     """Of the features whose numbers a bundle may hold."""
@@ -40,13 +42,16 @@ class BundleModel(ABC):
     def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:
         if manifest.verb != self.VERB:
             raise BundleError(f"manifest, verb: {manifest.verb!r}, expected {self.VERB!r}")
+        if manifest.loop not in self.LOOPS:
+            loops = ", ".join(self.LOOPS)
+            raise BundleError(f"manifest, loop: {manifest.loop!r} does not {self.VERB}; expected one of {loops}")
         for role in self.ROLES:
             if role not in graphs:
                 raise BundleError(f"manifest, graphs: there is no graph for the role {role!r}")
         self.manifest = manifest
         self.contract = manifest.motion
         self.graphs, self.tables = graphs, tables or {}
-        self.loop = loop_of(manifest.loop, self.VERB)
+        self.loop = LOOPS[manifest.loop]
         self.defaults = self.loop.defaults(manifest.defaults)
         self._tuned = _read_settings(self.SETTINGS, manifest.settings)
         self.sizes: Sizes = {"D": len(self.contract.channels)}

@@ -1,4 +1,4 @@
-"""What all models that are controlled live share: they run scripts."""
+"""Control: figures that move tick by tick as they are told; what both kinds of models have in common."""
 
 from abc import abstractmethod
 from typing import Any
@@ -8,13 +8,15 @@ from motet.motion.motion import Motion
 
 
 class ControlModel(BundleModel):
-    """A model of the verb control."""
+    """A model of figures that are controlled: :class:`motet.models.steer.SteerModel` or
+    :class:`motet.models.tdbn_control.TdbnModel`, by the bundle's loop. Both take scripts, each in its own words."""
 
     VERB = "control"
 
     @abstractmethod
-    def run(self, script: str, start: Motion | str | None = None, **settings: Any) -> Motion:
-        """The motion of one figure that runs a script; ControlError for a setting that the model does not have."""
+    def run(self, script: str, *args: Any, **settings: Any) -> Motion:
+        """The motion of one figure that runs a script, with the settings of the kind; ScriptError where it does not
+        parse."""
 
     @abstractmethod
     def captions(self, script: str) -> list[tuple[float, str]]:

@@ -65,6 +65,7 @@ class DescribeModel(LanguageModel):
 
     VERB = "describe"
     SETTINGS = (ConfidenceSettings, TimelineSettings)
+    LOOPS = ("beam", "consensus")
 
     def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:
         super().__init__(manifest, graphs, tables)

@@ -47,6 +47,7 @@ class FillModel(BundleModel):
     """
 
     VERB = "fill"
+    LOOPS = ("between",)
     ROLES = ("filler",)
 
     def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:

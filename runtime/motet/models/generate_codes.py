@@ -65,6 +65,7 @@ class CodesModel(GenerateModel):
     """
 
     SETTINGS = (FamiliaritySettings,)
+    LOOPS = ("codes",)
     ROLES = ("encoder", "part", "decoder", "tokens", "memory", "step")
 
     def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:

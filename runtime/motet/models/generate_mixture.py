@@ -23,6 +23,8 @@ class MixtureModel(GenerateModel):
     number of frames and their settings by name, and give samples for each row, best first.
     """
 
+    LOOPS = ("mixture",)
+
     def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:
         super().__init__(manifest, graphs, tables)
         self.sizes["F"] = self.sizes["D"] + 1  # with the active flag

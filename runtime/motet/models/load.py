@@ -12,7 +12,6 @@ from motet.errors import BundleError
 from motet.models.base import BundleModel
 from motet.models.describe import DescribeModel
 from motet.models.fill import FillModel
-from motet.models.generate import GenerateModel
 from motet.models.generate_codes import CodesModel
 from motet.models.generate_mixture import MixtureModel
 from motet.models.predict import PredictModel
@@ -20,15 +19,20 @@ from motet.models.search import SearchModel
 from motet.models.steer import SteerModel
 from motet.models.tdbn_control import TdbnModel
 
-Model = TdbnModel | DescribeModel | FillModel | GenerateModel | PredictModel | SearchModel | SteerModel
+KINDS: tuple[type[BundleModel], ...] = (
+    CodesModel,
+    DescribeModel,
+    FillModel,
+    MixtureModel,
+    PredictModel,
+    SearchModel,
+    SteerModel,
+    TdbnModel,
+)
+"""All kinds of models: each says for which verb it is, by which loops it is decoded and how its golden run is replayed.
+What measures or compares models has a function for each kind, registered where it is written."""
+
 Kind = TypeVar("Kind", bound=BundleModel)
-
-_KINDS: tuple[type[Model], ...] = (TdbnModel, DescribeModel, FillModel, MixtureModel, PredictModel, SearchModel)
-VERBS: dict[str, type[Model]] = {kind.VERB: kind for kind in _KINDS}
-"""Verb of a bundle -> the class of its model, where the loop does not say another."""
-
-BY_LOOP: dict[str, type[Model]] = {"codes": CodesModel, "matching": SteerModel}
-""":data:`VERBS` for some loops."""
 
 
 @overload
@@ -48,8 +52,8 @@ def load(name_or_path: Literal["predict"], options: SessionOptions | None = None
 @overload
 def load(name_or_path: Literal["search"], options: SessionOptions | None = None) -> SearchModel: ...
 @overload
-def load(name_or_path: str | Path, options: SessionOptions | None = None) -> Model: ...
-def load(name_or_path: str | Path, options: SessionOptions | None = None) -> Model:
+def load(name_or_path: str | Path, options: SessionOptions | None = None) -> BundleModel: ...
+def load(name_or_path: str | Path, options: SessionOptions | None = None) -> BundleModel:
     """The model of a bundle: a name (``motet bundle list``), or the path of a folder or zip.
 
     options: threads and execution providers; by default one thread of the CPU. BundleError if there is no such bundle,
@@ -74,13 +78,17 @@ def load_as(kind: Callable[..., Kind], name_or_path: str | Path, options: Sessio
     return cast(Kind, model)
 
 
-def build(manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> Model:
+def build(manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> BundleModel:
     """The model of a manifest's verb over graphs of any kind; BundleError where they do not fit."""
     return kind_of(manifest)(manifest, graphs, tables)
 
 
-def kind_of(manifest: Manifest) -> type[Model]:
-    """The class of a manifest's verb and loop; BundleError for a verb that is unknown."""
-    if manifest.verb not in VERBS:
-        raise BundleError(f"manifest, verb: {manifest.verb!r} is unknown; expected one of {', '.join(VERBS)}")
-    return BY_LOOP.get(manifest.loop, VERBS[manifest.verb])
+def kind_of(manifest: Manifest) -> type[BundleModel]:
+    """The class of a manifest's verb and loop; BundleError for a verb that is unknown, or that its loop does not do."""
+    if manifest.verb not in (verbs := sorted({kind.VERB for kind in KINDS})):
+        raise BundleError(f"manifest, verb: {manifest.verb!r} is unknown; expected one of {', '.join(verbs)}")
+    by_loop = {loop: kind for kind in KINDS if manifest.verb == kind.VERB for loop in kind.LOOPS}
+    if manifest.loop not in by_loop:
+        loops = ", ".join(by_loop)
+        raise BundleError(f"manifest, loop: {manifest.loop!r} does not {manifest.verb}; expected one of {loops}")
+    return by_loop[manifest.loop]

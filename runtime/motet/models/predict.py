@@ -44,6 +44,7 @@ class PredictModel(BundleModel):
     """
 
     VERB = "predict"
+    LOOPS = ("free_run",)
 
     def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:
         super().__init__(manifest, graphs, tables)

@@ -31,6 +31,7 @@ class SearchModel(LanguageModel):
 
     VERB = "search"
     SETTINGS = (IndexSettings,)
+    LOOPS = ("nearest",)
     ROLES = ("motion", "text")
 
     def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:

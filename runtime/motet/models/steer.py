@@ -33,6 +33,7 @@ class SteerModel(ControlModel):
         :mod:`motet.decode.matching`.
     """
 
+    LOOPS = ("matching",)
     ROLES = ("encoder", "rows", "step")
 
     def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:
@@ -139,13 +140,11 @@ class SteerModel(ControlModel):
         height = features.select(("root.height",)).values[:, 0].astype(np.float32)
         return Pose(np.zeros((1, 3), np.float32), quats, height, np.ones((1, 2), np.float32))
 
-    def run(self, script: str, start: Motion | str | None = None, *, hold_feet: bool = True, **other: Any) -> Motion:
+    def run(self, script: str, start: Motion | str | None = None, *, hold_feet: bool = True) -> Motion:
         """The motion of one figure that is steered by a script (:mod:`motet.models.steer_script`).
 
         start, hold_feet: as :meth:`start`; by default the script's first gait.
         """
-        if other:
-            raise ControlError(f"this model has no setting {next(iter(other))!r}")
         orders = parse_orders(script, self.gaits)
         return self.start(orders[0].gait if start is None else start, hold_feet=hold_feet).run(script)[0]
 

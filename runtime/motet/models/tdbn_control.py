@@ -37,6 +37,8 @@ class TdbnModel(ControlModel):
         next history), and for models with free hidden units also codes -> step.
     """
 
+    LOOPS = ("session",)
+
     def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:
         super().__init__(manifest, graphs, tables)
         if manifest.control is None:
@@ -109,14 +111,11 @@ class TdbnModel(ControlModel):
         temperature: float | None = None,
         in_place: bool = False,
         smooth: bool = True,
-        **other: Any,
     ) -> Motion:
         """The motion of one figure that runs a control script, from the script's first label unless ``start`` says.
 
         The parameters are those of :meth:`start` and :meth:`TdbnSession.run`.
         """
-        if other:
-            raise ControlError(f"this model has no setting {next(iter(other))!r}")
         first = parse_script(script, self.labels)[0].start
         begin = max(first, key=first.__getitem__) if start is None else start
         session = self.start(begin, seed=seed, variety=variety, temperature=temperature, smooth=smooth)

@@ -2,10 +2,10 @@
 
 import json
 import shlex
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import click
 import torch
@@ -14,16 +14,15 @@ from tqdm import tqdm
 from motet.bundle.manifest import Manifest
 from motet.bundle.session import SessionOptions
 from motet.cli.options import session_options
-from motet.models.describe import DescribeModel
+from motet.models.base import BundleModel
 from motet.models.fill import FillModel
 from motet.models.generate import GenerateModel
-from motet.models.load import Model, build, load, load_as
+from motet.models.load import build, load, load_as
 from motet.models.predict import PredictModel
 from motet.models.search import SearchModel
-from motet.models.steer import SteerModel
 from motet.models.tdbn_control import TdbnModel
 from motet_train.cli.evaluate_fill import fill_figures
-from motet_train.cli.evaluate_language import by_subject, language_reports
+from motet_train.cli.evaluate_language import Models, by_subject, language_reports
 from motet_train.cli.evaluate_predict import predict_reports
 from motet_train.cli.evaluate_says import says_reports
 from motet_train.cli.evaluate_steer import as_steered, steer_reports
@@ -42,6 +41,12 @@ from motet_train.papers.tdbn.experiments.report import GOALS, control_report, st
 from motet_train.recipes.recipe import SETTINGS
 from motet_train.runs import MANIFEST, Run
 from motet_train.settings import read_settings
+
+Measured = tuple[dict[str, Any], str]
+"""The figures of each model, ready for JSON, and all of them as text."""
+
+Experiments = Callable[[Mapping[str, Any], Path | None, Path | None, str | None], Measured]
+"""What measures models of one verb: with their data, a folder for pictures and the unit of the data."""
 
 
 @click.command()
@@ -117,15 +122,15 @@ def _own_store(runs: Iterable[str], data: Path | None) -> Path | None:
     return data
 
 
-def _model(run: Run) -> Model:
+def _model(run: Run) -> BundleModel:
     return build(Manifest.from_json(run.manifest), run.torch_graphs(), run.tables())
 
 
 def _says(
-    models: Mapping[str, Model], data: Path | None, unit: str | None, search: SearchModel, plots: Path | None
-) -> tuple[dict[str, Any], str]:
+    models: Mapping[str, BundleModel], data: Path | None, unit: str | None, search: SearchModel, plots: Path | None
+) -> Measured:
     """As :func:`_measured`, of everyday prompts."""
-    found = {name: model for name, model in models.items() if isinstance(model, GenerateModel)}
+    found = {name: cast(GenerateModel, model) for name, model in models.items() if model.VERB == "generate"}
     if others := [name for name in models if name not in found]:
         raise click.UsageError(f"--says asks generate models; {', '.join(others)} is none")
     if plots is not None:
@@ -137,54 +142,46 @@ def _says(
     return {name: json_ready(report) for name, report in reports.items()}, says_text(reports)
 
 
-def _measured(
-    models: Mapping[str, Model], data: Path | None, plots: Path | None, unit: str | None
-) -> tuple[dict[str, Any], str]:
+def _measured(models: Mapping[str, BundleModel], data: Path | None, plots: Path | None, unit: str | None) -> Measured:
     """The figures of each model, ready for JSON, and all of them as text."""
-    steered = {name: one for name, model in models.items() if (one := as_steered(model)) is not None}
-    controls = {name: m for name, m in models.items() if isinstance(m, TdbnModel) and name not in steered}
-    others = {
-        name: model for name, model in models.items() if isinstance(model, DescribeModel | GenerateModel | SearchModel)
-    }
-    predicts = {name: model for name, model in models.items() if isinstance(model, PredictModel)}
-    fills = {name: model for name, model in models.items() if isinstance(model, FillModel)}
-    if sum(map(bool, (controls, others, predicts, steered, fills))) > 1:
+    experiments = {_experiments(model) for model in models.values()}
+    if len(experiments) > 1:
         raise click.UsageError("evaluate control, fill, predict and language models separately: their data differ")
     if plots is not None:
         from motet_train.evaluate.figures import make_folder
 
         make_folder(plots)  # what cannot be written is said before hours of measuring
-    if steered:
-        return _steered(steered, data, plots)
-    if predicts:
-        return predict_reports(predicts, data, plots)
-    if fills:
-        return _filled(fills, data, plots)
-    reports = _control(controls, data, plots, unit) if controls else language_reports(others, data, plots)
-    ready: dict[str, Any] = {name: json_ready(report) for name, report in reports.items()}
-    for name in others:
-        if (other := by_subject(others, name)) is not None:
-            ready[name]["people_unseen"] = json_ready(reports[other])
-    return ready, report_table(reports, GOALS if controls else {**LANGUAGE_GOALS, **SEARCH_GOALS})
+    return experiments.pop()(models, data, plots, unit)
 
 
-def _steered(models: Mapping[str, SteerModel], data: Path | None, plots: Path | None) -> tuple[dict[str, Any], str]:
+def _steered(models: Mapping[str, BundleModel], data: Path | None, plots: Path | None, _: str | None) -> Measured:
     if plots is not None:
         raise click.UsageError("figures that are steered have no --plots")
-    reports = steer_reports(models, data)
+    reports = steer_reports({name: steered for name, m in models.items() if (steered := as_steered(m))}, data)
     return {name: json_ready(report) for name, report in reports.items()}, steer_text(reports)
 
 
-def _filled(models: Mapping[str, FillModel], data: Path | None, plots: Path | None) -> tuple[dict[str, Any], str]:
+def _filled(models: Mapping[str, FillModel], data: Path | None, plots: Path | None, _: str | None) -> Measured:
     if plots is not None:
         raise click.UsageError("models that fill gaps have no --plots")
     reports = fill_figures(models, data)
     return {name: json_ready(report) for name, report in reports.items()}, fill_text(reports)
 
 
-def _control(
-    models: Mapping[str, TdbnModel], data: Path | None, plots: Path | None, unit: str | None
-) -> dict[str, Report]:
+def _predicted(models: Mapping[str, PredictModel], data: Path | None, plots: Path | None, _: str | None) -> Measured:
+    return predict_reports(models, data, plots)
+
+
+def _language(models: Models, data: Path | None, plots: Path | None, _: str | None) -> Measured:
+    reports = language_reports(models, data, plots)
+    ready: dict[str, Any] = {name: json_ready(report) for name, report in reports.items()}
+    for name in models:
+        if (other := by_subject(models, name)) is not None:
+            ready[name]["people_unseen"] = json_ready(reports[other])
+    return ready, report_table(reports, {**LANGUAGE_GOALS, **SEARCH_GOALS})
+
+
+def _control(models: Mapping[str, TdbnModel], data: Path | None, plots: Path | None, unit: str | None) -> Measured:
     reports: dict[str, Report] = {}
     for name, model in models.items():
         study = study_of(model, _clips(name, model, data, unit))
@@ -195,7 +192,22 @@ def _control(
             from motet_train.papers.tdbn.experiments.plots import drawings
 
             save(drawings(study), plots if len(models) == 1 else plots / Path(name).name)
-    return reports
+    return {name: json_ready(report) for name, report in reports.items()}, report_table(reports, GOALS)
+
+
+_EXPERIMENTS: Mapping[str, Experiments] = {
+    "control": _control,
+    "describe": _language,
+    "fill": _filled,
+    "generate": _language,
+    "predict": _predicted,
+    "search": _language,
+}
+"""What measures the models of a verb, but for figures that are steered."""
+
+
+def _experiments(model: BundleModel) -> Experiments:
+    return _EXPERIMENTS[model.VERB] if as_steered(model) is None else _steered
 
 
 def _clips(name: str, model: TdbnModel, data: Path | None, unit: str | None = None) -> Clips:

@@ -1,15 +1,13 @@
 """``motet evaluate`` of models between motion and language."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import click
 from tqdm import tqdm
 
-from motet.models.describe import DescribeModel
-from motet.models.generate import GenerateModel
-from motet.models.search import SearchModel
+from motet.models.language import LanguageModel
 from motet_train.data.store import Store
 from motet_train.evaluate.language.prompts import ASKED
 from motet_train.evaluate.language.report import describe_report, generate_report
@@ -18,7 +16,7 @@ from motet_train.evaluate.language.split_store import SplitStore, split_as
 from motet_train.evaluate.tables import Report
 from motet_train.trainer import LOG
 
-Models = Mapping[str, DescribeModel | GenerateModel | SearchModel]
+Models = Mapping[str, LanguageModel]
 
 
 def language_reports(models: Models, data: Path | None, plots: Path | None) -> dict[str, Report]:
@@ -31,7 +29,7 @@ def language_reports(models: Models, data: Path | None, plots: Path | None) -> d
     with tqdm(unit=" parts", disable=None, leave=False) as bar:
         for name, model in models.items():
             reports[name] = _report(name, models, corpora, bar)
-            if plots is not None and not isinstance(model, SearchModel):
+            if plots is not None:
                 bar.set_description(f"{name}: pictures")
                 _draw(name, model, corpora[name], plots if len(models) == 1 else plots / Path(name).name)
     return reports
@@ -50,31 +48,35 @@ def _report(name: str, models: Models, corpora: Mapping[str, SplitStore], bar: "
         bar.update()
 
     model, corpus = models[name], corpora[name]
-    if isinstance(model, DescribeModel):
-        return describe_report(model, corpus, progress)
-    describe = (
-        other
-        for key, other in models.items()
-        if isinstance(other, DescribeModel) and corpora[key].parts == corpus.parts
-    )
-    partner = next(describe, None)
-    if isinstance(model, SearchModel):
-        return search_report(model, corpus, partner, progress)
-    if partner is None:
-        click.echo(f"{name}: tables 3 and 4 need a describe model of the same split; they are left out", err=True)
-    report = generate_report(model, corpus, partner, progress)
-    if lacking := [f"asked.{key}" for key in ASKED if key not in report.get("asked", {})]:
-        said = "training motions of that kind, or a root block, are missing"
-        click.echo(f"{name}: {', '.join(lacking)} cannot be measured: {said}", err=True)
+    alike = (other for key, other in models.items() if corpora[key].parts == corpus.parts)
+    partner = next((other for other in alike if other.VERB == "describe"), None)
+    report = _REPORTS[model.VERB](model, corpus, partner, progress)
+    if model.VERB == "generate":
+        _say_lacking(name, report, partner is None)
     return report
 
 
-def _draw(name: str, model: DescribeModel | GenerateModel, corpus: SplitStore, folder: Path) -> None:
+_REPORTS: Mapping[str, Callable[..., Report]] = {
+    "describe": lambda model, corpus, _, progress: describe_report(model, corpus, progress),
+    "generate": generate_report,
+    "search": search_report,
+}
+"""What measures a model: with its corpus, the describe model of the same split, and what progress is told to."""
+
+
+def _say_lacking(name: str, report: Report, alone: bool) -> None:
+    if alone:
+        click.echo(f"{name}: tables 3 and 4 need a describe model of the same split; they are left out", err=True)
+    if lacking := [f"asked.{key}" for key in ASKED if key not in report.get("asked", {})]:
+        said = "training motions of that kind, or a root block, are missing"
+        click.echo(f"{name}: {', '.join(lacking)} cannot be measured: {said}", err=True)
+
+
+def _draw(name: str, model: LanguageModel, corpus: SplitStore, folder: Path) -> None:
     from motet_train.evaluate.figures import save
     from motet_train.papers.plappert2017.figures import describe_drawings, generate_drawings
 
     run = Path(name) if (Path(name) / LOG).is_file() else None
-    if isinstance(model, DescribeModel):
-        save(describe_drawings(model, corpus, run), folder)
-    else:
-        save(generate_drawings(model, corpus, run), folder)
+    drawings: dict[str, Callable[..., Any]] = {"describe": describe_drawings, "generate": generate_drawings}
+    if model.VERB in drawings:
+        save(drawings[model.VERB](model, corpus, run), folder)

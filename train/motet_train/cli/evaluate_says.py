@@ -5,7 +5,6 @@ from pathlib import Path
 
 from motet.bundle.manifest import Manifest
 from motet.models.generate import GenerateModel
-from motet.models.generate_codes import CodesModel
 from motet.models.search import SearchModel
 from motet_train.data.errors import DataError
 from motet_train.evaluate.tables import Report
@@ -24,9 +23,8 @@ def says_reports(
     reports = {}
     for name, model in models.items():
         reports[name] = says_table(Best(model), trials, trained_on(model.manifest, trials), search=search)
-        if isinstance(model, CodesModel):
-            asked = {"outside": outside(), "prompts": [prompt.text for prompt in prompts()]}
-            reports[name]["said_outside"] = {key: said_to_be_outside(model, texts) for key, texts in asked.items()}
+        asked = {"outside": outside(), "prompts": [prompt.text for prompt in prompts()]}
+        reports[name]["said_outside"] = {key: said_to_be_outside(model, texts) for key, texts in asked.items()}
     return reports
 
 

@@ -1,12 +1,13 @@
 """``motet evaluate`` of figures that are steered."""
 
 from collections.abc import Mapping
+from functools import singledispatch
 from pathlib import Path
 from typing import cast
 
 import click
 
-from motet.models.load import Model
+from motet.models.base import BundleModel
 from motet.models.steer import SteerModel
 from motet.models.tdbn_control import TdbnModel
 from motet_train.data.store import Store
@@ -15,11 +16,20 @@ from motet_train.evaluate.tables import Report
 from motet_train.papers.tdbn.driven import Driven
 
 
-def as_steered(model: Model) -> SteerModel | None:
+@singledispatch
+def as_steered(_: BundleModel) -> SteerModel | None:
     """What is measured as a figure that is steered: a model of them, or what stands for it; None for all others."""
-    if isinstance(model, TdbnModel) and Driven.fits(model):
-        return cast(SteerModel, Driven(model))
-    return model if isinstance(model, SteerModel) else None
+    return None
+
+
+@as_steered.register
+def _(model: SteerModel) -> SteerModel:
+    return model
+
+
+@as_steered.register
+def _(model: TdbnModel) -> SteerModel | None:
+    return cast(SteerModel, Driven(model)) if Driven.fits(model) else None
 
 
 def steer_reports(models: Mapping[str, SteerModel], data: Path | None) -> dict[str, Report]:

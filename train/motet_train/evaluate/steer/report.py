@@ -3,7 +3,7 @@
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import partial, singledispatch
 
 from motet.errors import ControlWarning
 from motet.models.steer import SteerModel
@@ -92,18 +92,29 @@ def _parts(model: SteerModel, recorded: Recorded, minutes: float, characters: in
         "aside": aside_errors,
         "random": partial(wandering, limits=limits, seconds=60 * minutes, characters=characters),
     }
-    rivals = {"_seldom": seldom(model)} if isinstance(model, SteerModel) else {}  # a net does not search
-    for ending, one in {"": model, **rivals}.items():
+    for ending, one in {"": model, **rivals(model)}.items():
         yield from ({f"{name}{ending}": measure(one)} for name, measure in measures.items())
     for gait in SPEEDS:
         yield {f"{gait}_recorded": recorded.standing(gait, False), f"{gait}_held": recorded.standing(gait, True)}
     yield {"random_held": {"largest_turn": float(limits.turn.max()), "largest_leap": 1.0}}
 
 
+@singledispatch
+def rivals(_: object) -> dict[str, SteerModel]:
+    """What a model is measured beside, by the ends of the groups' names: nothing where it does not search."""
+    return {}
+
+
+@rivals.register
+def _(model: SteerModel) -> dict[str, SteerModel]:
+    return {"_seldom": seldom(model)}
+
+
 def seldom(model: SteerModel, every: int = 30) -> SteerModel:
     """The simplest rival: the same model, which searches only every so many ticks, a second, and when something else is
     told; until then, or until its end, the recording that fits best is played."""
-    return SteerModel(replace(model.manifest, config={**model.manifest.config, "every": every}), model.graphs)
+    manifest = replace(model.manifest, config={**model.manifest.config, "every": every})
+    return SteerModel(manifest, model.graphs, model.tables)
 
 
 def _standing(model: SteerModel, gait: str) -> dict[str, float]:

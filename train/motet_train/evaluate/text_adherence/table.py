@@ -11,7 +11,6 @@ from tqdm import tqdm
 from motet.bundle.graph import Floats
 from motet.errors import TextError
 from motet.models.generate import GenerateModel
-from motet.models.generate_codes import CodesModel
 from motet.models.search import SearchModel
 from motet.motion.motion import Motion
 from motet_train.data.errors import DataError
@@ -135,17 +134,17 @@ def real(prompt: Prompt, trials: Sequence[Trial]) -> Figures:
     return found | {"share": found["share"] if shown else np.nan, "spread": apart}
 
 
-def said_to_be_outside(model: CodesModel, sentences: Sequence[str]) -> float:
-    """The share of sentences that are refused, or said to be outside of what a model knows."""
+def said_to_be_outside(model: GenerateModel, sentences: Sequence[str]) -> float:
+    """The share of sentences that are refused, or said to be outside the model's training data."""
 
     def outside(sentence: str) -> bool:
         try:
-            return not model.understood(sentence).confident
+            model.check(sentence)
         except TextError:
             return True
+        return False
 
-    with unknown_words_allowed():
-        return sum(map(outside, sentences)) / len(sentences)
+    return sum(map(outside, sentences)) / len(sentences)
 
 
 def says_text(reports: Mapping[str, Report]) -> str:
