@@ -303,6 +303,13 @@ def test_a_snapshot_knows_what_has_been_run_ahead(model: TdbnModel) -> None:
         session.restore(plain.snapshot())
 
 
+def test_a_snapshot_of_the_first_tick_is_restored_where_another_began(model: TdbnModel) -> None:
+    walking, running = model.start("walk"), model.start("run")
+    running.restore(walking.snapshot())
+    for _ in range(10):
+        np.testing.assert_array_equal(running.step(), walking.step())
+
+
 def _track(model: TdbnModel) -> np.ndarray:
     return control_track(parse_script(SCRIPT, model.labels), model.labels, model.fps)
 

@@ -167,9 +167,10 @@ class _Settings:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TdbnSnapshot:
-    """All that changes in a session, for n characters: history (n, K, H), control (n, labels), the tick, and of a
-    smooth session what it has run ahead."""
+    """All that changes in a session, for n characters: the frames (K, n, D) that it began from, history (n, K, H),
+    control (n, labels), the tick, and of a smooth session what it has run ahead."""
 
+    first: Floats
     history: Floats
     control: Floats
     tick: int
@@ -286,7 +287,8 @@ class TdbnSession:
 
     def snapshot(self) -> TdbnSnapshot:
         """Frames, control and tick, without the noise: the session that goes on from it goes on with its own seeds."""
-        return TdbnSnapshot(self._history.copy(), self._inputs["control"].copy(), self._tick, self._ahead)
+        control = self._inputs["control"].copy()
+        return TdbnSnapshot(self._first, self._history.copy(), control, self._tick, self._ahead)
 
     def restore(self, snapshot: TdbnSnapshot) -> None:
         """Go back to a snapshot, of this session or of one with as many characters of the same model.
@@ -298,6 +300,6 @@ class TdbnSession:
         if self.smooth and snapshot.tick and snapshot.ahead is None:
             raise ControlError("a snapshot of a session that is not smooth does not fit one that is")
         self.set_control(snapshot.control)
-        self._tick = snapshot.tick
+        self._first, self._tick = snapshot.first, snapshot.tick
         self._history = np.array(snapshot.history, dtype=np.float32)
         self._ahead = snapshot.ahead if self.smooth else None
