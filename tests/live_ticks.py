@@ -14,7 +14,7 @@ import numpy as np
 import motet
 from motet.draw.page import source
 from motet.live.page import net_data
-from motet.live.protocol import Puppets
+from motet.live.protocol import ClientSession
 from motet.models.steer import SteerModel
 
 TICKS = 300
@@ -29,7 +29,7 @@ def main(bundle: str = "control") -> None:
     version = subprocess.run(["node", "--version"], capture_output=True, text=True, check=True).stdout.strip()
     print(f"one figure, node {version}: {shown(node_ticks(model))}")
     for characters in (1, 16):
-        times, size = python_ticks(Puppets(model, characters))
+        times, size = python_ticks(ClientSession(model, characters))
         print(f"{characters} in Python, with the message: {shown(times)}; {size / 1000:.1f} kB")
 
 
@@ -54,14 +54,14 @@ def node_ticks(model: SteerModel) -> list[float]:
     return found
 
 
-def python_ticks(puppets: Puppets) -> tuple[list[float], int]:
+def python_ticks(client: ClientSession) -> tuple[list[float], int]:
     """Milliseconds of each tick of the server with its message, and the bytes of one."""
     times, sent = [], ""
     for gait, speed, degrees in ORDERS:
-        puppets.hear(json.dumps({"type": "control", "gait": gait, "speed": speed, "direction": degrees}))
+        client.handle(json.dumps({"type": "control", "gait": gait, "speed": speed, "direction": degrees}))
         for _ in range(TICKS):
             start = perf_counter()
-            sent = puppets.frame(puppets.tick())
+            sent = client.frame(client.tick())
             times.append(1000 * (perf_counter() - start))
     return times, len(sent)
 

@@ -86,8 +86,6 @@ def _below(manifest: Manifest) -> dict[str, int]:
         codes = min(sizes["codec"]["moves"], math.prod(sizes["codec"]["levels"]))
         own = {"codes": codes, "action": sizes["text"]["actions"] + 1, "row": sizes["remembered"]}
         below |= own | {"age": sizes["writer"]["ages"]}
-    if manifest.loop == "matching":
-        below["row"] = manifest.config["rows"]
     return below
 
 

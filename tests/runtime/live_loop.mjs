@@ -2,9 +2,9 @@
 import { readFileSync } from 'fs';
 
 const { scripts, net: given, controls } = JSON.parse(readFileSync(0));
-const names = '{ bytesOf, netOf, standing, tell, tick, globalTransforms }';
+const names = '{ netOf, standing, tell, tick, globalTransforms }';
 const loop = new Function(`${scripts.join('\n')}\nreturn ${names};`)();
-const net = await loop.netOf(given, new Uint8Array(loop.bytesOf(given.table)));
+const net = await loop.netOf(given);
 const figure = loop.standing(net);
 const milliseconds = [];
 const poses = controls.map((control) => {

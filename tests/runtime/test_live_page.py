@@ -2,7 +2,6 @@ import json
 import re
 import shutil
 import subprocess
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -40,13 +39,6 @@ def test_what_cannot_be_steered_is_refused(tmp_path: Path, steer_model: SteerMod
             motet.write_live_page(tmp_path / "live.html", steer_model, characters)
     with pytest.raises(BundleError, match="is not steered"):
         motet.live_page(motet.load("cmu-control"))
-    graphs = {role: graph for role, graph in steer_model.graphs.items() if role != "pose"}
-    with pytest.raises(BundleError, match="graph 'pose'"):
-        motet.live_page(SteerModel(steer_model.manifest, graphs))
-    finer = SteerModel(steer_model.manifest, steer_model.graphs)
-    finer.matcher.table = replace(finer.matcher.table, features=finer.matcher.table.features + np.float32(0.01))
-    with pytest.raises(BundleError, match="no multiples of 1/16"):
-        motet.live_page(finer)
     with pytest.raises(OutputError):
         motet.write_live_page(tmp_path / "none" / "live.html", steer_model)
     assert not list(tmp_path.iterdir())
@@ -67,7 +59,7 @@ def test_the_script_of_the_page_does_what_python_does(steer_model: SteerModel) -
     session, controls, poses = steer_model.start(), [], []
     for gait, speed, way, towards in PLAN:
         session.control(gait=gait, speed=speed, direction=way, facing=towards)
-        x, z, facing = session.told[0].tolist()
+        x, z, facing = session.target[0].tolist()
         told = {"x": x, "z": z, "facing": facing, "gait": steer_model.gaits.index(gait)}
         controls += [told] * 45
         poses += [session.tick() for _ in range(45)]
@@ -75,11 +67,10 @@ def test_the_script_of_the_page_does_what_python_does(steer_model: SteerModel) -
     found = run_loop({"scripts": scripts, "net": net_data(steer_model), "controls": controls})
     assert np.ptp([pose.ground[0, :2] for pose in poses], axis=0).min() > 1.5  # it goes somewhere
     for ours, (pose, places) in zip(poses, zip(found["poses"], found["positions"], strict=True), strict=True):
-        np.testing.assert_allclose(places, ours.positions()[0], atol=1e-3)
-        cosine = np.abs((np.array(pose["rotations"]) * ours.rotations[0]).sum(axis=1))
-        assert np.degrees(2 * np.arccos(np.minimum(cosine, 1))).max() < 1
-        np.testing.assert_allclose(pose["contacts"], ours.contacts[0], atol=1e-4)
-        np.testing.assert_allclose(pose["ground"], ours.ground[0], atol=1e-3)
+        np.testing.assert_allclose(pose["ground"], ours.ground[0], atol=1e-9)
+        np.testing.assert_allclose(places, ours.positions()[0], atol=1e-5)
+        np.testing.assert_allclose(pose["rotations"], ours.rotations[0], atol=1e-5)
+        np.testing.assert_allclose(pose["contacts"], ours.contacts[0], atol=1e-6)
 
 
 def run_loop(given: dict[str, Any]) -> Any:
@@ -106,7 +97,7 @@ def ticks(page: Browser, count: int = 45) -> SimpleNamespace:
     """Where the steered figure is, and how its speed is, after so many ticks with what is pressed."""
     told = f"(() => {{ for (let n = 0; n < {count}; n++) motet.tick(motet.asked()); return motet.figures[0]; }})()"
     figure = page.value(told)
-    return SimpleNamespace(place=np.array(figure["ground"][:2]), facing=figure["ground"][2], going=figure["going"][:2])
+    return SimpleNamespace(place=np.array(figure["root"][:2]), facing=figure["root"][2], going=figure["course"][:2])
 
 
 def test_keys_steer_the_figure(page: Browser) -> None:

@@ -43,10 +43,6 @@ def lying(name: str, role: str, output: str, value: float, row: int | None = Non
         *(("generate", "memory", "action", value) for value in (-1, 374, 1 << 62)),
         *(("generate", "memory", "codes", value) for value in (-1, 625, 1 << 62)),
         *(("generate", "memory", "numbers", value) for value in (np.nan, np.inf, 1e38)),
-        *(("control", "rows", "left", value) for value in (-1, 9569 - 1000, 1 << 62)),
-        *(("control", "rows", "gaits", value) for value in (-1, 2, np.nan)),
-        *(("control", "rows", "features", value) for value in (np.nan, 1e38)),
-        *(("control", "rows", "frames", value) for value in (np.inf, -1e38)),
     ],
 )
 def test_tables_are_checked_as_they_are_loaded(name: str, role: str, output: str, value: float) -> None:
@@ -65,8 +61,15 @@ def test_a_context_of_no_log_probabilities_is_refused() -> None:
     ("name", "path", "value", "reason"),
     [
         ("control", ("motion", "channels"), None, r"motion\.channels: must be those of the humanoid"),
-        ("control", ("config", "steering", "velocity"), 0, r"config\.steering\.velocity: must be a number between"),
-        ("control", ("config", "scale"), [0] * 34, r"config\.scale: must be numbers between"),
+        ("control", ("settings", "steering", "velocity"), 0, r"settings\.steering\.velocity must be between 0\.01"),
+        ("control", ("settings", "steering", "velocity"), -1, r"settings\.steering\.velocity must be between 0\.01"),
+        ("control", ("settings", "steering", "search_every"), 2.5, r"search_every must be a whole number"),
+        ("control", ("settings", "steering", "speed"), 1, r"settings\.steering\.speed: is unknown"),
+        ("control", ("settings", "foot_lock", "fade"), 0, r"settings\.foot_lock\.fade must be between"),
+        ("control", ("settings", "steering", "lasting"), 9999, r"no row of 'walk' is followed by 9999 more"),
+        ("control", ("config", "speeds"), [[1, 2, 3, 4, -1]] * 5, r"config\.speeds: must hold a row of 5 speeds"),
+        ("control", ("config", "speeds"), [[1, 2, 3, 4, 5]], r"config\.speeds: must hold a row of 5 speeds"),
+        ("control", ("config", "odd"), 37, r"config\.odd: must be a whole number between 0 and 36"),
         ("generate", ("config", "codec", "ahead"), [1e9], r"codec\.ahead: must be 0 or 1 for each"),
     ],
 )
@@ -79,4 +82,29 @@ def test_a_manifest_that_does_not_fit_its_graphs_is_refused(
     place = reduce(lambda found, one: found[one], outer, source)
     place[key] = place[key][::-1] if value is None else value
     with pytest.raises(BundleError, match=reason):
-        build(Manifest.from_json(source), {role: bundle.graph(role) for role in bundle.manifest.graphs})
+        build(
+            Manifest.from_json(source),
+            {role: bundle.graph(role) for role in bundle.manifest.graphs},
+            {name: bundle.table(name) for name in bundle.manifest.tables},
+        )
+
+
+@pytest.mark.parametrize(
+    ("name", "row", "value", "reason"),
+    [
+        *(("left", 1000, value, "how many follow it") for value in (-1, 9569 - 1000)),
+        ("moves", 1000, 1e38, "numbers between -1e"),
+        ("shows", 1000, 2, "numbers between 0 and 1"),
+        *(("feature_scale", 3, value, "numbers between 1e-06") for value in (0, -1, np.nan)),
+        ("feature_mean", 3, np.inf, "numbers between"),
+    ],
+)
+def test_plain_arrays_are_checked_as_they_are_loaded(name: str, row: int, value: float, reason: str) -> None:
+    bundle = Bundle.open("control")
+    tables = {one: bundle.table(one) for one in bundle.manifest.tables}
+    wrong = np.array(tables[name])
+    wrong[row] = value
+    with pytest.raises(BundleError, match=f"table {name}: must hold .*{reason}"):
+        build(bundle.manifest, {}, {**tables, name: wrong})
+    with pytest.raises(BundleError, match=f"there is no table '{name}'"):
+        build(bundle.manifest, {}, {one: table for one, table in tables.items() if one != name})

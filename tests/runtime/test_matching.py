@@ -1,13 +1,16 @@
-"""Motion matching against naive twins: the search, where springs lead, mirror images, quaternions."""
+"""Motion matching against naive twins: search, desired trajectory, mirror images; poses in codes; quaternions."""
 
 import numpy as np
 import pytest
 
-from motet.decode.matching import AHEAD, ASKED, FEATURES, LAG, LASTING, Matcher, Table, mirrored_features
+from motet.decode.matching import FEATURES, TRAJECTORY, Matcher, Table, horizons, mirrored_features
+from motet.decode.playback import Playback
+from motet.decode.pose_codes import PoseCodes
+from motet.decode.steering_settings import SteeringSettings
 from motet.motion.quaternions import conjugate, quat_product, quat_rotated, wrapped
 from motet.motion.rotations import quat_to_rotmat
 
-SPRINGS = (0.22, 0.18)
+SETTINGS = SteeringSettings()
 ROWS, CODES = 300, 4
 
 
@@ -16,68 +19,98 @@ def table() -> Table:
     rng = np.random.default_rng(0)
     features = rng.normal(size=(ROWS, FEATURES)).astype(np.float32)
     frames = rng.normal(size=(ROWS, CODES + 6)).astype(np.float32)
-    gaits = np.stack([np.arange(ROWS) < 200, np.arange(ROWS) >= 100], axis=1).astype(np.float32)
+    shows = np.stack([np.arange(ROWS) < 200, np.arange(ROWS) >= 100], axis=1)
     left = np.tile(np.arange(100)[::-1], 3)
-    return Table(frames, features, gaits, left, np.zeros(FEATURES, np.float32), np.ones(FEATURES, np.float32))
+    scaling = {"mean": np.zeros(FEATURES), "scale": np.ones(FEATURES)}
+    return Table.of(frames, features, 2, shows=shows, left=left, **scaling)
 
 
 @pytest.fixture(scope="module")
 def matcher(table: Table) -> Matcher:
-    return Matcher(table, np.array([1, 1, -1, -1], np.float32), 30.0, 6, 1.25, SPRINGS)
+    return Matcher(table, SETTINGS, 30.0)
 
 
 def test_the_search_finds_what_looking_at_every_row_finds(table: Table, matcher: Matcher) -> None:
     rng = np.random.default_rng(1)
     asked, gait = rng.normal(size=(20, FEATURES)).astype(np.float32), rng.integers(2, size=20)
-    rows, sides, costs = matcher.best(asked, gait)
+    rows, mirrors, costs = matcher.best(asked, gait)
     columns, signs = mirrored_features()
-    for wanted, kind, row, side, cost in zip(asked, gait, rows, sides, costs, strict=True):
-        usable = [i for i in range(ROWS) if table.gaits[i, kind] and table.left[i] >= LASTING]
-        usable = [i for i in usable if table.frames[i, -2:].max() >= 0.1][::2]
+    for wanted, kind, row, mirror, cost in zip(asked, gait, rows, mirrors, costs, strict=True):
+        usable = [i for i in range(ROWS) if table.shows[i, kind] and table.left[i] >= SETTINGS.lasting]
+        usable = [i for i in usable if table.frames[0, i, -2:].max() >= SETTINGS.stands][:: SETTINGS.row_step]
         found = {}
         for i in usable:
-            for mirrored in (1, -1):
-                features = table.features[i] if mirrored == 1 else table.features[i][columns] * signs
+            for image in (0, 1):
+                features = table.features[0, i][columns] * signs if image else table.features[0, i]
                 far = float(np.hypot(*wanted[4:6]))  # here neither mean nor scale
                 lag = max(0.0, far / 2 - float(features[4:6] @ wanted[4:6]) / far)
-                found[i, mirrored] = float(((features - wanted) ** 2).sum() / 2 + LAG * lag)
-        assert (row, side) == min(found, key=found.__getitem__)
+                found[i, image] = float(((features - wanted) ** 2).sum() / 2 + SETTINGS.lag * lag)
+        assert (row, mirror) == min(found, key=found.__getitem__)
         assert cost + float((wanted**2).sum()) / 2 == pytest.approx(min(found.values()), rel=1e-3)
-    np.testing.assert_allclose(matcher.cost_at(asked, rows, sides), costs, atol=1e-3)
-    for one, found in enumerate(zip(rows, sides, costs, strict=True)):
+    np.testing.assert_allclose(matcher.cost_at(asked, rows, mirrors), costs, atol=1e-3)
+    for one, found in enumerate(zip(rows, mirrors, costs, strict=True)):
         assert [part[0] for part in matcher.best(asked[one : one + 1], gait[one : one + 1])] == list(found)
 
 
-def test_a_mirror_image_of_a_mirror_image_is_the_row(matcher: Matcher, table: Table) -> None:
-    columns, signs = mirrored_features()
-    once = table.features[:, columns] * signs
-    np.testing.assert_array_equal(once[:, columns] * signs, table.features)
-    at = np.arange(5)
-    np.testing.assert_array_equal(matcher.features_at(at, np.full(5, -1, np.float32)), once[:5])
+def test_a_mirror_image_of_a_mirror_image_is_the_row(table: Table) -> None:
+    scaling = {"mean": table.mean, "scale": table.scale}
+    again = Table.of(table.frames[1], table.features[1], 2, shows=table.shows, left=table.left, **scaling)
+    np.testing.assert_array_equal(again.frames, table.frames[::-1])
+    np.testing.assert_array_equal(again.features, table.features[::-1])
+    row, image = table.frames[:, 7]
+    np.testing.assert_array_equal(image, row[[0, 1, 2, 3, 4, 5, 6, 7, 9, 8]] * [1, 1, -1, -1, 1, -1, -1, 1, 1, 1])
 
 
-def test_ways_are_where_the_springs_lead(matcher: Matcher) -> None:
+def test_a_jump_is_not_seen_and_fades(matcher: Matcher) -> None:
+    playback = Playback.at(10, 3, CODES)
+    before, _ = matcher.table.at(playback)
+    matcher.jump(playback, np.array([0, 2]), np.array([50, 120]), np.array([1, 0]))
+    after, _ = matcher.table.at(playback)
+    np.testing.assert_array_equal(playback.row, [50, 10, 120])
+    np.testing.assert_allclose(after[:, :CODES] + playback.offset, before[:, :CODES], atol=1e-12)
+    np.testing.assert_array_equal(playback.offset[1], 0)
+
+
+def test_the_desired_trajectory_is_where_the_springs_lead(matcher: Matcher) -> None:
     rng = np.random.default_rng(2)
-    root = rng.normal(size=(3, 4)).astype(np.float32)
-    course, control = rng.normal(size=(3, 6)).astype(np.float32), rng.normal(size=(3, 3)).astype(np.float32)
-    ways = matcher.ways(root, course, control)
-    dt, damping = 1e-4, [2 * np.log(2) / half for half in SPRINGS]
+    playback, target = Playback.at(0, 3, CODES), rng.normal(size=(3, 3))
+    playback.root, playback.course, playback.course_rate = rng.normal(size=(3, 3, 3))
+    found = matcher.desired_trajectory(playback, target)
+    dt, damping = 1e-4, [2 * np.log(2) / half for half in (SETTINGS.velocity, SETTINGS.facing)]
     for row in range(3):
-        velocity, change = course[row, :2].astype(float), course[row, 2:4].astype(float)
-        angle, rate = float(course[row, 4]), float(course[row, 5])
-        place, time = np.zeros(2), 0.0
-        for number, ahead in enumerate(AHEAD):
+        *velocity, angle = playback.course[row]
+        *change, rate = playback.course_rate[row]
+        velocity, change, place, time = np.array(velocity), np.array(change), np.zeros(2), 0.0
+        for number, ahead in enumerate(horizons(SETTINGS)):
             while time < ahead - dt / 2:
-                pull = -(damping[0] ** 2) * (velocity - control[row, :2]) - 2 * damping[0] * change
+                pull = -(damping[0] ** 2) * (velocity - target[row, :2]) - 2 * damping[0] * change
                 place, velocity, change = place + dt * velocity, velocity + dt * change, change + dt * pull
-                turn = -(damping[1] ** 2) * (angle - control[row, 2]) - 2 * damping[1] * rate
+                turn = -(damping[1] ** 2) * (angle - target[row, 2]) - 2 * damping[1] * rate
                 angle, rate, time = angle + dt * rate, rate + dt * turn, time + dt
-            cos, sin = np.cos(root[row, 2]), np.sin(root[row, 2])
+            facing = playback.root[row, 2]
+            cos, sin = np.cos(facing), np.sin(facing)
             seen = [cos * place[0] - sin * place[1], sin * place[0] + cos * place[1]]
-            np.testing.assert_allclose(ways[row, 2 * number : 2 * number + 2], seen, atol=2e-3)
-            facing = [np.sin(angle - root[row, 2]), np.cos(angle - root[row, 2])]
-            place_of = ASKED // 2 + 2 * number
-            np.testing.assert_allclose(ways[row, place_of : place_of + 2], facing, atol=2e-3)
+            np.testing.assert_allclose(found[row, 2 * number : 2 * number + 2], seen, atol=2e-3)
+            turned = [np.sin(angle - facing), np.cos(angle - facing)]
+            at = TRAJECTORY // 2 + 2 * number
+            np.testing.assert_allclose(found[row, at : at + 2], turned, atol=2e-3)
+            if number == 1:
+                speed = np.hypot(*velocity)
+                assert found[row, -1] == pytest.approx(speed / (speed + SETTINGS.half_speed), abs=2e-3)
+
+
+def test_codes_of_a_pose_come_back_from_it() -> None:
+    rng = np.random.default_rng(4)
+    quats = rng.normal(size=(5, 3, 4)) + np.array([0, 0, 0, 9])
+    quats /= np.linalg.norm(quats, axis=-1, keepdims=True)
+    values = np.column_stack([quats.reshape(5, 12), rng.normal(size=5)])
+    poses = PoseCodes(values.mean(axis=0), rng.normal(size=(13, 13)))
+    codes = poses.encode(-quats.astype(np.float32), values[:, -1].astype(np.float32))
+    rotations, height = poses.decode(codes)
+    np.testing.assert_allclose(rotations, quats, atol=1e-5)
+    np.testing.assert_allclose(height, values[:, -1], atol=1e-5)
+    for one in range(5):
+        np.testing.assert_array_equal(poses.decode(codes[one : one + 1])[0][0], rotations[one])
 
 
 def test_quaternions_turn_as_matrices_do() -> None:

@@ -55,7 +55,7 @@ class Session:
         self.ground[:, 2] = np.radians((self.wanted if facing is None else facing) + self.model.askew)
 
     @property
-    def told(self) -> Any:
+    def target(self) -> Any:
         way = np.radians(self.wanted)
         return np.stack([self.speed * np.sin(way), self.speed * np.cos(way), self.ground[:, 2]], axis=1)
 
@@ -76,7 +76,7 @@ def resting(ground: Any) -> Pose:
     count = len(ground)
     rotations = np.tile(np.array([0, 0, 0, 1], np.float32), (count, len(BONES), 1))
     contacts = np.ones((count, 2), np.float32)
-    return Pose(np.array(ground, dtype=np.float32), rotations, np.full(count, 0.98, np.float32), contacts)
+    return Pose(np.array(ground, dtype=np.float64), rotations, np.full(count, 0.98, np.float32), contacts)
 
 
 def turned(pose: Pose, bone: str, degrees: float) -> Pose:

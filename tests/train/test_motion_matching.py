@@ -7,20 +7,27 @@ import pytest
 import torch
 
 from motet import to_humanoid
-from motet.decode.matching import ASKED, mirrored_features
+from motet.decode.matching import TRAJECTORY, Matcher, Table, mirrored_features
+from motet.decode.playback import Playback
+from motet.decode.pose_codes import PoseCodes
+from motet.decode.steering import tick
+from motet.decode.steering_settings import SteeringSettings
 from motet.formats import read_motion
+from motet.models.steer import FEATURE_STEPS
 from motet.motion.humanoid.bones import BONES, HUMANOID
 from motet.motion.kinematics import positions
 from motet.motion.mirroring import mirror
 from motet.motion.motion import Motion
+from motet.motion.pose import Pose
+from motet.motion.rotations import Array
 from motet.representation import named
 from motet.representation.contract import MotionContract
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.gaits import Gait, read_gaits
 from motet_train.data.locomotion import Recording
-from motet_train.data.matching_rows import MatchingRows, mirrored_poses, rows_of, scaling
+from motet_train.data.matching_rows import MatchingRows, mirrored_poses, rows_of
 from motet_train.models.codes.sixd_places import tree_of
-from motet_train.models.control.matching import Matching, MatchingConfig, from_config
+from motet_train.models.control.matching import DTYPES, Matching, MatchingConfig, from_config
 from motet_train.recipes.matching_table import take
 
 CLIPS = CMU_FOLDER
@@ -33,7 +40,7 @@ def walk() -> Motion:
 
 @pytest.fixture(scope="module")
 def rows(walk: Motion) -> MatchingRows:
-    return rows_of([recording(walk)], ("walk",))
+    return rows_of([recording(walk)], ("walk",), SteeringSettings())
 
 
 def recording(motion: Motion) -> Recording:
@@ -45,15 +52,13 @@ def net(walk: Motion, rows: MatchingRows) -> Matching:
     features = named("root_sixd").features(walk)
     zeros = np.zeros(len(features.channels))
     contract = MotionContract("root_sixd", features.channels, features.units, 30.0, zeros, zeros + 1, HUMANOID)
-    mean, scale = scaling(rows.features)
     config = MatchingConfig(
         len(zeros),
         tree_of(contract),
         len(rows),
+        features=rows.features.shape[1],
         gaits=("walk",),
         speeds=((0.0, 1.3, 2.0, 0.0, 0.0),),
-        mean=tuple(mean.tolist()),
-        scale=tuple(scale.tolist()),
     )
     made = Matching(config)
     take(made, rows)
@@ -61,7 +66,7 @@ def net(walk: Motion, rows: MatchingRows) -> Matching:
 
 
 def test_rows_of_a_mirrored_recording_are_mirrored_rows(walk: Motion, rows: MatchingRows) -> None:
-    other = rows_of([recording(mirror(walk))], ("walk",))
+    other = rows_of([recording(mirror(walk))], ("walk",), SteeringSettings())
     columns, signs = mirrored_features()
     np.testing.assert_allclose(other.features, rows.features[:, columns] * signs, atol=1e-3)
     np.testing.assert_allclose(other.moves, rows.moves * (1, -1, -1), atol=1e-4)
@@ -76,7 +81,7 @@ def test_features_say_where_the_recording_goes(walk: Motion, rows: MatchingRows)
     far = np.linalg.norm(hips[30:, [0, 2]] - hips[:-30, [0, 2]], axis=1)
     np.testing.assert_allclose(np.hypot(*rows.features[:-30, 4:6].T), far, atol=1e-6)
     np.testing.assert_allclose(np.hypot(rows.features[:, 6], rows.features[:, 7]), 1)
-    assert rows.features[0, ASKED + 3 * 0 + 1] == pytest.approx(positions(walk)[0, HUMANOID.index("leftToes"), 1])
+    assert rows.features[0, TRAJECTORY + 3 * 0 + 1] == pytest.approx(positions(walk)[0, HUMANOID.index("leftToes"), 1])
     assert (rows.left == np.arange(len(rows))[::-1]).all()
     assert 0.3 < rows.contacts.mean() < 0.9
 
@@ -105,52 +110,68 @@ def test_points_are_those_of_the_recording(net: Matching, walk: Motion, rows: Ma
 
 def test_codes_of_a_mirror_image_differ_by_signs(net: Matching, rows: MatchingRows) -> None:
     with torch.no_grad():
-        quats, _ = net.poses(net.codes * net.signs[: net.codes.shape[1]])
+        quats, _ = net.poses(net.codes * torch.tensor([1.0] * net.config.even + [-1.0] * net.config.odd))
     at, sign = mirrored_poses()
     image = (rows.poses[:, at] * sign)[:, :-1].reshape(len(rows), -1, 4)
     assert np.abs((quats.numpy() * image).sum(axis=-1)).min() > 0.99
 
 
-@torch.no_grad()
-def test_the_encoder_is_the_inverse_of_poses(net: Matching) -> None:
-    net.graphs()
-    codes = net.encode(*net.poses(net.codes[:20]))
-    again, _ = net.poses(codes)
-    np.testing.assert_allclose((again * net.poses(net.codes[:20])[0]).sum(-1).abs().numpy(), 1, atol=1e-4)
+def test_tables_are_the_rows(net: Matching, rows: MatchingRows) -> None:
+    tables = net.tables()
+    assert {name: table.dtype for name, table in tables.items()} == DTYPES
+    np.testing.assert_array_equal(tables["left"], rows.left)
+    np.testing.assert_array_equal(tables["shows"], rows.gaits)
+    np.testing.assert_allclose(tables["moves"], np.column_stack([rows.moves, rows.speed, rows.contacts]), atol=1e-5)
+    features = tables["features"] / FEATURE_STEPS / tables["feature_scale"] + tables["feature_mean"]
+    off = np.abs(features - rows.features) * tables["feature_scale"]
+    assert off[np.abs(tables["features"]) < 127].max() <= 0.51 / FEATURE_STEPS
+    poses = PoseCodes(tables["pose_mean"].astype(np.float64), tables["pose_basis"].astype(np.float64))
+    quats, height = poses.decode(tables["codes"].astype(np.float64))
+    with torch.no_grad():
+        expected, tall = net.poses(net.codes)
+    np.testing.assert_allclose(quats, expected.numpy(), atol=2e-3)
+    np.testing.assert_allclose(height, tall[:, 0].numpy(), atol=2e-3)
+    again, _ = poses.decode(poses.encode(quats, height))
+    np.testing.assert_allclose(np.abs((again * quats).sum(axis=-1)), 1, atol=1e-4)
 
 
-@torch.no_grad()
-def test_a_step_plays_the_row_and_follows_the_springs(net: Matching, rows: MatchingRows) -> None:
-    frames, _, _, _ = net.table(torch.arange(len(rows)))
-    width, count = frames.shape[1], net.codes.shape[1]
-    at = 40
+@pytest.fixture(scope="module")
+def matcher(net: Matching) -> Matcher:
+    tables = net.tables()
+    frames = np.concatenate([tables["codes"], tables["moves"]], axis=1, dtype=np.float32)
+    features = tables["features"].astype(np.float32) / FEATURE_STEPS
+    scaling = {"mean": tables["feature_mean"], "scale": tables["feature_scale"]}
+    others = {"shows": tables["shows"] > 0, "left": tables["left"].astype(np.int64), **scaling}
+    return Matcher(Table.of(frames, features, net.config.odd, **others), SteeringSettings(), 30.0)
+
+
+def test_a_tick_plays_the_row_and_follows_the_springs(net: Matching, matcher: Matcher, rows: MatchingRows) -> None:
+    at, facing, gait = 40, 0.7, np.zeros(1, np.int64)
     speed = float(rows.speed[at])
-    facing = 0.7
-    going = [float(speed * np.sin(facing)), float(speed * np.cos(facing))]
-    states = [torch.tensor([[1.0, 2.0, facing, 1.0]]), torch.tensor([[*going, 0.0, 0.0, facing, 0.0]])]
-    recorded = torch.stack([frames[at], frames[at + 1]])[None]
-    assert recorded.shape == (1, 2, width)
-    control = torch.tensor([[*going, facing]])
-    bend = torch.zeros(1, 2 * count)
-    rotations, height, contacts, root, course, bent = net.step(
-        recorded, torch.tensor([[0.0, 1.0]]), control, *states, bend
-    )
-    np.testing.assert_allclose(rotations.numpy()[0], net.poses(net.codes[at])[0].numpy(), atol=1e-6)
-    np.testing.assert_allclose(contacts[0].numpy(), rows.contacts[at], atol=1e-6)
-    assert not bent.any()
-    np.testing.assert_allclose(course.numpy(), states[1].numpy(), atol=1e-5)  # asked for what it has
+    target = np.array([[speed * np.sin(facing), speed * np.cos(facing), facing]])
+    poses = PoseCodes(*(net.tables()[f"pose_{name}"].astype(np.float64) for name in ("mean", "basis")))
+
+    def played(wanted: Array) -> tuple[Pose, Playback]:
+        playback = Playback.at(at - 1, 1, matcher.table.codes)
+        playback.ticks_to_search[:] = 9
+        playback.root, playback.course = np.array([[1.0, 2.0, facing]]), target
+        return tick(matcher, poses, playback, wanted, gait), playback
+
+    pose, playback = played(target)
+    expected, height = poses.decode(net.tables()["codes"][at : at + 1].astype(np.float64))
+    np.testing.assert_allclose(pose.rotations, expected, atol=1e-6)
+    np.testing.assert_allclose(pose.height, height, atol=1e-6)
+    np.testing.assert_allclose(pose.contacts[0], rows.contacts[at], atol=1e-6)
+    assert not playback.offset.any()
+    np.testing.assert_allclose(playback.course, target, atol=1e-12)  # asked for what it has
     forward, left, _ = rows.moves[at] / 30
-    step = np.array(
-        [np.sin(facing) * forward + np.cos(facing) * left, np.cos(facing) * forward - np.sin(facing) * left]
-    )
-    moved = root[0, :2].numpy() - [1, 2]
-    assert np.linalg.norm(moved) == pytest.approx(np.linalg.norm(step), rel=0.05)
-    assert height[0, 0] == pytest.approx(rows.poses[at, -1], abs=0.02)
-    # asked for a stop, the springs slow down as critically damped ones do
-    damping, dt = 2 * np.log(2) / net.config.steering.velocity, net.config.steering.dt
-    stopped = net.step(recorded, torch.tensor([[0.0, 1.0]]), torch.tensor([[0.0, 0.0, facing]]), *states, bend)
+    moved = np.linalg.norm(pose.ground[0, :2] - [1, 2])
+    assert moved == pytest.approx(np.hypot(forward, left), rel=0.05)
+    # asked for a stop, the springs slow down like critically damped ones
+    damping, dt = 2 * np.log(2) / matcher.settings.velocity, 1 / 30
+    _, stopped = played(np.array([[0.0, 0.0, facing]]))
     left_over = np.exp(-damping * dt) * (1 + damping * dt)
-    np.testing.assert_allclose(stopped[4][0, :2].numpy(), np.array(going) * left_over, rtol=1e-4)
+    np.testing.assert_allclose(stopped.course[0, :2], target[0, :2] * left_over)
 
 
 def test_a_net_is_built_from_its_manifest(net: Matching) -> None:

@@ -8,6 +8,7 @@ import pytest
 from steer_puppets import FPS, Puppets, resting, turned
 
 from motet import to_humanoid
+from motet.decode.steering_settings import SteeringSettings
 from motet.formats import read_motion
 from motet.motion.humanoid.bones import BONES, HUMANOID
 from motet.motion.kinematics import positions
@@ -36,7 +37,7 @@ def walk() -> Motion:
 @pytest.fixture(scope="module")
 def track(walk: Motion) -> Track:
     found = [Recording(walk, frozenset({"walk"}))] * 2
-    return tracks_of(found, rows_of(found, ("walk",)))[1]
+    return tracks_of(found, rows_of(found, ("walk",), SteeringSettings()))[1]
 
 
 def test_a_track_is_where_the_recording_is(walk: Motion, track: Track) -> None:

@@ -26,7 +26,6 @@ from motet_train.data.errors import DataError
 from motet_train.data.locomotion import gaits_of, recordings
 from motet_train.data.records import Record
 from motet_train.data.store import Store, prepare
-from motet_train.eager import eager_model
 from motet_train.evaluate.steer import following, standing
 from motet_train.evaluate.steer.report import Recorded, seldom, steer_report, steer_text
 from motet_train.evaluate.tables import report_table
@@ -63,7 +62,7 @@ def folder(store: Store, tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def model(folder: Path) -> SteerModel:
     run = Run.load(folder / "run")
-    found = build(Manifest.from_json(run.manifest), run.torch_graphs())
+    found = build(Manifest.from_json(run.manifest), {}, run.tables())
     assert isinstance(found, SteerModel)
     return found
 
@@ -112,11 +111,11 @@ def test_columns_beside_need_not_reach_goals() -> None:
 
 def test_the_rival_searches_seldom(model: SteerModel) -> None:
     rival = seldom(model)
-    assert (model.matcher.every, rival.matcher.every) == (6, 30)
+    assert (model.matcher.settings.search_every, rival.matcher.settings.search_every) == (6, 30)
     assert rival.matcher.reserve > 30
     session = rival.start("walk")
     session.control(speed=1.3)
-    rows = [session.tick() and float(session._playing.row[0]) for _ in range(90)]
+    rows = [session.tick() and int(session._playback.row[0]) for _ in range(90)]
     assert np.count_nonzero(np.abs(np.diff(rows)) > 2) <= 3
 
 
@@ -130,7 +129,7 @@ def test_what_does_not_fit_is_refused(model: SteerModel, store: Store, folder: P
     with pytest.raises(DataError, match=r"root_sixd \(motet prepare --for codes\), not angles"):
         Recorded.of(replace(store, representation="angles"))
     recorded = Recorded.of(store)
-    other = build(replace(model.manifest, config={**model.manifest.config, "gaits": ["walk", "hop"]}), model.graphs)
+    other = build(replace(model.manifest, config={**model.manifest.config, "gaits": ["walk", "hop"]}), {}, model.tables)
     assert isinstance(other, SteerModel)
     with pytest.raises(DataError, match="has no 'run'"):
         steer_report(other, recorded)
@@ -159,7 +158,7 @@ def test_the_command_prints_and_saves(folder: Path, monkeypatch: pytest.MonkeyPa
 def test_bench_measures_a_tick_and_a_crowd(model: SteerModel) -> None:
     kinds = ("tick", "tick_locked", "crowd", "crowd_locked")
     names = [*(f"{kind}{of}" for kind in kinds for of in ("", "_mean", "_p99")), "crowd_positions"]
-    for one in (model, eager_model(model.manifest, 1)):
+    for one in (model,):
         found = figures(one, 0.001)
         assert list(found) == [f"control.{name}" for name in names]
         assert all(value > 0 for value, _ in found.values())

@@ -28,7 +28,7 @@ def bench(
     model = load(bundle, session)
     found = figures(model, seconds, motion)
     baseline = None
-    if torch and importlib.util.find_spec("torch"):
+    if torch and model.graphs and importlib.util.find_spec("torch"):
         # by name: the runtime does not depend on the training package
         eager = importlib.import_module("motet_train.eager").eager_model(model.manifest, session.threads)
         baseline = figures(eager, seconds, motion)
@@ -36,7 +36,8 @@ def bench(
     if as_json:
         click.echo(json.dumps([asdict(row) for row in table]))
         return
-    click.echo("\n".join([f"on {', '.join(model.providers)}, threads: {session.threads}", *map(_line, table)]))
+    providers = ", ".join(model.providers) or "numpy"
+    click.echo("\n".join([f"on {providers}, threads: {session.threads}", *map(_line, table)]))
 
 
 def _line(row: Row) -> str:

@@ -87,7 +87,7 @@ def verify(name: str, session: SessionOptions) -> None:
     found = verify_bundle(opened, session)
     worst = max(found.errors, key=found.errors.__getitem__)
     click.echo(f"{opened.path}: {len(found.files)} files match the manifest")
-    click.echo(f"the model runs on {', '.join(found.providers)}")
+    click.echo(f"the model runs on {', '.join(found.providers) or 'numpy alone'}")
     click.echo(
         f"golden vectors: the largest difference is {found.errors[worst]:.1e} ({worst}), tolerance {found.tolerance:g}"
     )

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from motet.decode import beam, codes, consensus, free_run, in_betweening, matching, mixture, nearest, session
+from motet.decode import beam, codes, consensus, free_run, in_betweening, mixture, nearest, session, steering
 from motet.decode.loop import Loop
 
 LOOPS: Mapping[str, Loop] = {
@@ -12,7 +12,7 @@ LOOPS: Mapping[str, Loop] = {
     "codes": codes.LOOP,
     "free_run": free_run.LOOP,
     "session": session.LOOP,
-    "matching": matching.LOOP,
+    "matching": steering.LOOP,
     "nearest": nearest.LOOP,
     "between": in_betweening.LOOP,
 }

@@ -10,8 +10,8 @@ function randomFrom(seed) {
 
 /** What another figure does next: it goes after the first figure, or where its mood leads it. n: from 1. */
 function ownControl(net, figures, n, follows) {
-  const figure = figures[n], leader = figures[0], [x, z] = figure.ground;
-  const away = Math.hypot(leader.ground[0] - x, leader.ground[1] - z);
+  const figure = figures[n], leader = figures[0], [x, z] = figure.root;
+  const away = Math.hypot(leader.root[0] - x, leader.root[1] - z);
   if (follows || away > FAR) return followed(net, figures, n);
   const mood = (figure.mood ??= { left: 0, random: randomFrom(n) });
   if (--mood.left <= 0) Object.assign(mood, newMood(net, figure, mood.random));
@@ -21,33 +21,33 @@ function ownControl(net, figures, n, follows) {
 /** A way to go for a while, sometimes none. */
 function newMood(net, figure, random) {
   const rests = random() < 0.25, [, usual] = net.speeds[net.gaits[0]];
-  const way = figure.ground[2] + (random() - 0.5) * 4;
+  const way = figure.root[2] + (random() - 0.5) * 4;
   return { left: net.fps * (2 + 4 * random()), way, pace: rests ? 0 : usual * (0.6 + 0.4 * random()) };
 }
 
 /** Behind the first figure, left and right in turns, and ever farther behind. */
 function followed(net, figures, n) {
-  const [x, z, facing] = figures[0].ground, angle = facing + Math.PI + (n % 2 ? 0.6 : -0.6);
+  const [x, z, facing] = figures[0].root, angle = facing + Math.PI + (n % 2 ? 0.6 : -0.6);
   const behind = 0.7 + 0.5 * n, point = [x + behind * Math.sin(angle), z + behind * Math.cos(angle)];
-  const [dx, dz] = [point[0] - figures[n].ground[0], point[1] - figures[n].ground[1]], away = Math.hypot(dx, dz);
-  const stays = away < (Math.hypot(...figures[n].going.slice(0, 2)) < 0.1 ? 0.8 : 0.3);
+  const [dx, dz] = [point[0] - figures[n].root[0], point[1] - figures[n].root[1]], away = Math.hypot(dx, dz);
+  const stays = away < (Math.hypot(...figures[n].course.slice(0, 2)) < 0.1 ? 0.8 : 0.3);
   return towardsPoint(net, figures, n, point, stays ? 0 : Math.max(0.7, 1.3 * away));
 }
 
 /** The control that leads to a point at a pace, around others; faster than the first gait has, it runs. */
 function towardsPoint(net, figures, n, [toX, toZ], pace) {
-  const figure = figures[n], [x, z] = figure.ground;
+  const figure = figures[n], [x, z] = figure.root;
   let [vx, vz] = unit([toX - x, toZ - z]).map((part) => part * pace);
   figures.forEach((other, i) => {
-    const dx = x - other.ground[0], dz = z - other.ground[1], gap = Math.hypot(dx, dz);
+    const dx = x - other.root[0], dz = z - other.root[1], gap = Math.hypot(dx, dz);
     if (i === n || gap > ROOM || gap < 1e-6) return;
     vx += dx / gap * (ROOM - gap) * 2;
     vz += dz / gap * (ROOM - gap) * 2;
   });
   const wanted = Math.hypot(vx, vz), fast = fastest(net), top = net.speeds[net.gaits[0]][2];
-  const gait = wanted > (figure.control.gait === fast ? 0.8 : 1) * top ? fast : 0;
+  const gait = wanted > (figure.target.gait === fast ? 0.8 : 1) * top ? fast : 0;
   const speed = wanted < 0.25 ? 0 : inRange(net, gait, wanted), ratio = wanted ? speed / wanted : 0;
-  const facing = speed ? Math.atan2(vx, vz) : figure.control.facing;
+  const facing = speed ? Math.atan2(vx, vz) : figure.target.facing;
   return { gait, x: vx * ratio, z: vz * ratio, facing };
 }
 
@@ -60,6 +60,7 @@ function fastest(net) {
 /** A speed that a gait has at an angle from the facing; 0 is always one. */
 function inRange(net, gait, speed, aside = 0) {
   const [low, , ...fastest] = net.speeds[net.gaits[gait]];
-  const high = fastest[net.sectors.filter((edge) => Math.abs(wrapped(aside)) >= edge).length];
+  const sectors = [net.steering.aside, net.steering.back];
+  const high = fastest[sectors.filter((edge) => Math.abs(wrapped(aside)) >= edge).length];
   return speed > 0 ? clamp(speed, Math.min(low, high), high) : 0;
 }

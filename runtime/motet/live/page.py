@@ -1,8 +1,7 @@
 """Write a steered figure as one HTML page that runs it: no network, no other file, any browser.
 
-The page is ``page.html`` with ``loop.js``, which does in JavaScript what :mod:`motet.decode.matching` and
-:mod:`motet.motion.feet.lock` do, and with the numbers of the bundle: its table with codes as 16-bit floats and features
-as int8, gzipped; the linear map from codes to poses, which its graph "pose" gives; and the constants of both modules.
+The page is ``page.html`` with ``loop.js``, the twin in JavaScript of :mod:`motet.decode.steering` and
+:mod:`motet.motion.feet.lock`, and with the bundle's own numbers: its settings, and its tables, gzipped.
 """
 
 import gzip
@@ -13,25 +12,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.decode.matching import AHEAD, BEFORE, BEHIND, EVERY, HASTE, LAG, LASTING, STANDS
+from motet.decode.matching import mirrored_features
+from motet.decode.steering_settings import SteeringSettings
 from motet.draw.body import Body
 from motet.draw.page import bone_data, filled, source
 from motet.errors import BundleError, ControlError
 from motet.files import File, place_of, write_whole
-from motet.models import steer_session
-from motet.models.steer import SteerModel
+from motet.models.steer import FEATURE_STEPS, SteerModel
 from motet.motion import two_bone
 from motet.motion.feet import lock as foot_lock
 from motet.motion.humanoid import BONES, HUMANOID
 
-FINE = 16
-"""Steps of a feature in 8 bits: features are multiples of 1 / FINE."""
-
 MOST = 8
 """Characters of a page at most."""
-
-Packed = tuple[str, str, NDArray[Any]]
-"""Name, kind (such as "f2") and values (N, W) of an array of the table."""
 
 
 def write_live_page(file: File, model: SteerModel, characters: int = 1, title: str | None = None) -> None:
@@ -47,7 +40,7 @@ def live_page(model: SteerModel, characters: int = 1, title: str = "motet") -> s
     """The HTML of a page in which a figure is steered with keys, a gamepad or a finger, and others go with it.
 
     characters: how many figures there are at first, 1 to :data:`MOST`. ControlError for another number, BundleError for
-    another model, a bundle without a graph "pose" or with features that are no multiples of 1 / :data:`FINE`.
+    another model.
     """
     if not isinstance(model, SteerModel):
         raise BundleError(f"{model} is not steered: a page needs a model such as motet.load('control')")
@@ -59,42 +52,38 @@ def live_page(model: SteerModel, characters: int = 1, title: str = "motet") -> s
 
 
 def net_data(model: SteerModel) -> dict[str, Any]:
-    """All that ``loop.js`` steers a figure with, ready for JSON; errors as :func:`live_page`."""
-    matcher, table = model.matcher, model.matcher.table
-    arrays = _arrays(model)
-    middle, basis = _linear(model)
+    """All that ``loop.js`` steers a figure with, ready for JSON."""
+    columns, signs = mirrored_features()
+    tables = {name: array.reshape(len(array), -1) for name, array in model.tables.items()}
+    shapes = {name: {"kind": array.dtype.str[1:], "shape": array.shape} for name, array in tables.items()}
     return {
         "fps": model.fps,
         "gaits": list(model.gaits),
         "speeds": dict(zip(model.gaits, model.manifest.config["speeds"], strict=True)),
-        "sectors": steer_session.SECTORS.tolist(),
-        "forward": steer_session.FORWARD,
-        "steering": model.manifest.config["steering"],
-        **{
-            "every": matcher.every,
-            "reserve": matcher.reserve,
-            "lasting": LASTING,
-            "everyRow": EVERY,
-            "stands": STANDS,
-            "lag": float(LAG),
-        },
-        **{"behind": BEHIND, "before": BEFORE, "ahead": list(AHEAD), "haste": HASTE, "fine": FINE},
-        "mean": table.mean.tolist(),
-        "scale": table.scale.tolist(),
-        "columns": matcher.columns.tolist(),
-        "signs": matcher.signs.tolist(),
-        "codeSigns": matcher.code_signs.tolist(),
-        "still": int(model.start().snapshot().playing.row[0]),
-        "middle": middle.tolist(),
-        "basis": np.round(basis.astype(np.float64), 7).ravel().tolist(),
+        "steering": asdict(model.settings(SteeringSettings)),
+        "still": model.matcher.stillest(0),
+        "odd": model.manifest.config["odd"],
+        "columns": columns.tolist(),
+        "signs": signs.tolist(),
+        "featureSteps": FEATURE_STEPS,
+        "figure": figure_data(model),
+        "tables": shapes,
+        "bytes": b64encode(gzip.compress(b"".join(map(_shuffled, tables.values())), mtime=0)).decode(),
+    }
+
+
+def figure_data(model: SteerModel) -> dict[str, Any]:
+    """The humanoid, its legs and soles, and how its feet are held."""
+    joints = [[HUMANOID.index(BONES[bone]) for bone in leg] for leg in foot_lock.COLUMNS]
+    legs = zip(joints, foot_lock.COLUMNS.tolist(), strict=True)
+    return {
         "parents": HUMANOID.parents.tolist(),
         "offsets": HUMANOID.offsets.tolist(),
         "bones": [HUMANOID.index(bone) for bone in BONES],
-        "lock": _lock(),
-        "leg": {"shortest": two_bone.SHORTEST, "share": two_bone.SHARE, "gives": list(two_bone.GIVES)},
-        "rows": len(table.left),
-        "arrays": [{"name": name, "kind": kind, "width": values.shape[1]} for name, kind, values in arrays],
-        "table": b64encode(gzip.compress(b"".join(map(_shuffled, arrays)), mtime=0)).decode(),
+        "legs": [{"joints": joints, "bones": bones} for joints, bones in legs],
+        "soles": list(zip(foot_lock.CARRIERS, foot_lock.POINTS.tolist(), strict=True)),
+        "knee": {"shortest": two_bone.SHORTEST, "share": two_bone.SHARE, "gives": list(two_bone.GIVES)},
+        "lock": asdict(model.settings(foot_lock.FootLockSettings)),
     }
 
 
@@ -109,49 +98,8 @@ def body_data() -> dict[str, Any]:
     return {"height": body.height, "carrier": carrier, "skull": skull.tolist(), "bones": bones}
 
 
-def _arrays(model: SteerModel) -> list[Packed]:
-    table, codes = model.matcher.table, len(model.matcher.code_signs)
-    features = table.features * FINE
-    if np.abs(features).max() > 127 or not np.array_equal(features, np.round(features)):
-        raise BundleError(f"bundle {model.manifest.name!r}: its features are no multiples of 1/{FINE} in 8 bits")
-    shown = (table.gaits > 0) @ (1 << np.arange(table.gaits.shape[1]))
-    left = np.minimum(table.left, 65535)
-    return [
-        ("codes", "f2", table.frames[:, :codes]),
-        ("moves", "f4", table.frames[:, codes:]),
-        ("features", "i1", features),
-        ("left", "u2", left[:, None]),
-        ("shown", "u1", shown[:, None]),
-    ]
-
-
-def _shuffled(array: Packed) -> bytes:
+def _shuffled(values: NDArray[Any]) -> bytes:
     """The bytes of an array, column by column, of each column first all first bytes: so they are pressed best."""
-    _, kind, values = array
-    columns = np.ascontiguousarray(values.T.astype(f"<{kind}"))
+    columns = np.ascontiguousarray(values.T)
     split = columns.view(np.uint8).reshape(*columns.shape, -1)
     return np.ascontiguousarray(np.swapaxes(split, 1, 2)).tobytes()
-
-
-def _linear(model: SteerModel) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """The numbers (P,) of a pose whose codes are 0, and what each code adds (K, P)."""
-    if "pose" not in model.graphs:
-        raise BundleError(
-            f"bundle {model.manifest.name!r}: a page needs its graph 'pose', and it has none: export it again"
-        )
-    count = len(model.matcher.code_signs)
-    codes = np.concatenate([np.zeros((1, count)), np.eye(count)]).astype(np.float32)
-    values = model.graphs["pose"]({"codes": codes})["values"]
-    return values[0], values[1:] - values[0]
-
-
-def _lock() -> dict[str, Any]:
-    points = zip(foot_lock.CARRIERS, foot_lock.POINTS.tolist(), strict=True)
-    bones = foot_lock.COLUMNS.tolist()
-    joints = [[HUMANOID.index(BONES[bone]) for bone in leg] for leg in bones]
-    legs = zip(joints, bones, strict=True)
-    return {
-        **asdict(foot_lock.LockSettings()),
-        "soles": [[part, point] for part, point in points],
-        "legs": [{"joints": joints, "bones": bones} for joints, bones in legs],
-    }

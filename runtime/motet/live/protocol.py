@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from motet.errors import ControlError, ControlWarning, MotetError, quoted
 from motet.models.steer import SteerModel
@@ -40,14 +41,14 @@ class ProtocolError(MotetError, ValueError):
     """A message that is not one of the protocol."""
 
 
-class Puppets:
+class ClientSession:
     """The characters of one client. heard: how many of its messages they have obeyed. ticks: since they started."""
 
     def __init__(self, model: SteerModel, characters: int = 1) -> None:
         self.model, self.heard = model, 0
         self._start({"characters": characters})
 
-    def hear(self, text: str | bytes) -> list[str]:
+    def handle(self, text: str | bytes) -> list[str]:
         """Obey a message; what is to be said of it, such as a speed that was brought into its gait's range.
 
         ProtocolError or ControlError for one that cannot be obeyed; nothing has changed then.
@@ -76,7 +77,7 @@ class Puppets:
 
     def frame(self, pose: Pose) -> str:
         """The message that gives a pose."""
-        parts = {
+        parts: dict[str, NDArray[Any]] = {
             "position": pose.place,
             "rotation": pose.heading,
             "height": pose.height,

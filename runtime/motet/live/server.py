@@ -12,7 +12,7 @@ from typing import Self
 
 from motet.errors import MotetError, OutputError
 from motet.live import protocol
-from motet.live.protocol import ProtocolError, Puppets
+from motet.live.protocol import ClientSession, ProtocolError
 from motet.models.steer import SteerModel
 from motet.motion.pose import Pose
 
@@ -109,9 +109,9 @@ class LiveServer:
     ) -> None:
         self.model, self.host, self.port, self.characters = model, host, port, characters
         self.rate, self.stall, self.watch = rate or model.fps, stall, watch
-        Puppets(model, characters)  # refuses now what it would refuse every client
+        ClientSession(model, characters)  # refuses now what it would refuse every client
         self._origins = [None, LOCAL, *map(Origin, origins)]
-        self._clients: list[Puppets] = []
+        self._clients: list[ClientSession] = []
         self._server: Server | None = None
 
     async def __aenter__(self) -> Self:
@@ -149,25 +149,25 @@ class LiveServer:
             )
             return
         _bound(connection)
-        puppets = Puppets(self.model, self.characters)
-        self._clients.append(puppets)
+        client = ClientSession(self.model, self.characters)
+        self._clients.append(client)
         try:
             await connection.send(protocol.hello(self.model))
-            reason = await self._until_fault(connection, puppets)
+            reason = await self._until_fault(connection, client)
         except ConnectionClosed:
             return
         finally:
-            self._clients.remove(puppets)
+            self._clients.remove(client)
         if isinstance(reason, MotetError):
             log.warning("dropped a client: %s", reason)
             await self._drop(connection, reason)
 
     def _figures(self) -> int:
-        return sum(puppets.session.characters for puppets in self._clients)
+        return sum(client.session.characters for client in self._clients)
 
-    async def _until_fault(self, connection: ServerConnection, puppets: Puppets) -> BaseException | None:
+    async def _until_fault(self, connection: ServerConnection, client: ClientSession) -> BaseException | None:
         """Tick and listen side by side; why one of the two came to an end."""
-        both = [asyncio.create_task(run(connection, puppets)) for run in (self._listen, self._tick)]
+        both = [asyncio.create_task(run(connection, client)) for run in (self._listen, self._tick)]
         try:
             done, _ = await asyncio.wait(both, return_when=asyncio.FIRST_COMPLETED)
         finally:
@@ -180,26 +180,26 @@ class LiveServer:
                 raise fault
         return next((fault for fault in faults if isinstance(fault, MotetError)), None)
 
-    async def _listen(self, connection: ServerConnection, puppets: Puppets) -> None:
+    async def _listen(self, connection: ServerConnection, client: ClientSession) -> None:
         tick, count = 0, 0
         async for text in connection:
-            tick, count = puppets.ticks, (count + 1 if tick == puppets.ticks else 1)
+            tick, count = client.ticks, (count + 1 if tick == client.ticks else 1)
             if count > MAX_MESSAGES:
                 raise ProtocolError(f"more than {MAX_MESSAGES} messages between two frames")
-            notes = puppets.hear(text)
+            notes = client.handle(text)
             if self._figures() > MAX_FIGURES:
                 raise ProtocolError(f"all clients together may have {MAX_FIGURES} figures")
             for said in notes:
                 await self._send(connection, protocol.note(said))
 
-    async def _tick(self, connection: ServerConnection, puppets: Puppets) -> None:
+    async def _tick(self, connection: ServerConnection, client: ClientSession) -> None:
         clock = asyncio.get_running_loop().time
         due = clock()
         while True:
-            pose = puppets.tick()
-            if self.watch and puppets is self._clients[0]:
-                self.watch(pose, puppets.ticks / self.model.fps)
-            await self._send(connection, puppets.frame(pose))
+            pose = client.tick()
+            if self.watch and client is self._clients[0]:
+                self.watch(pose, client.ticks / self.model.fps)
+            await self._send(connection, client.frame(pose))
             due = max(due + 1 / self.rate, clock() - 0.1)  # what is late is not made up for
             await asyncio.sleep(due - clock())
 

@@ -101,8 +101,8 @@ class BundleModel(ABC):
 
     @property
     def providers(self) -> tuple[str, ...]:
-        """The execution providers of ONNX Runtime that are active, the preferred first; torch's models have none."""
-        return tuple(getattr(self.graphs[self.ROLES[-1]], "providers", ()))
+        """The execution providers of ONNX Runtime that are active, the preferred first; none without its graphs."""
+        return tuple(getattr(self.graphs[self.ROLES[-1]], "providers", ())) if self.ROLES else ()
 
     @abstractmethod
     def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:

@@ -7,15 +7,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from motet.arguments import checked_int
-from motet.bundle.fields import Fields
+from motet.bundle.fields import LARGEST, Fields
 from motet.bundle.graph import Arrays, Graph
 from motet.bundle.manifest import Manifest
-from motet.decode.matching import FEATURES, Matcher, Playing, Table
+from motet.decode.matching import FEATURES, Matcher, Table
+from motet.decode.playback import Playback
+from motet.decode.pose_codes import PoseCodes
+from motet.decode.steering_settings import SteeringSettings
 from motet.errors import BundleError, ControlError
 from motet.models.control import ControlModel
+from motet.models.steer_command import Gaits
 from motet.models.steer_script import captions, parse_orders
 from motet.models.steer_session import SteerSession
 from motet.models.tdbn_control import MAX_CHARACTERS
+from motet.motion.feet.lock import FootLockSettings
 from motet.motion.humanoid import BONES
 from motet.motion.motion import Motion
 from motet.motion.pose import Pose
@@ -25,64 +30,71 @@ from motet.representation.root_sixd import KINDS, ROOT_SIXD, joint_rotations
 CHANNELS = (*ROOT_SIXD, *(f"{bone}.{kind}" for bone in BONES for kind in KINDS))
 """In the order of a pose's numbers."""
 
+FEATURE_STEPS = 16
+"""Steps of a feature in a table: they are kept in 8 bits, in sixteenths of their scaled unit."""
+
+LEAST_ROWS = 2
+"""Of a table."""
+
 
 class SteerModel(ControlModel):
     """A figure to be steered; any number of sessions and threads share it.
 
-    graphs: "encoder" (rotations, height -> codes), "rows" (row -> frames, features, gaits, left), and "step", see
-        :mod:`motet.decode.matching`.
+    tables: of N rows "codes" (N, K), "moves" (N, 6), "features" (N, F), "shows" (N, G) and "left" (N,), what
+        :class:`motet.decode.matching.Table` is made of; "feature_mean" and "feature_scale" (F,); "pose_mean" (P,) and
+        "pose_basis" (K, P), see :class:`motet.decode.pose_codes.PoseCodes`.
     """
 
     LOOPS = ("matching",)
-    ROLES = ("encoder", "rows", "step")
+    ROLES = ()
+    SETTINGS = (SteeringSettings, FootLockSettings)
 
     def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:
         super().__init__(manifest, graphs, tables)
         config = Fields(manifest.config, "config")
-        self.gaits = config.texts("gaits")
-        speeds = config.table("speeds", 5)
-        if len(speeds) != len(self.gaits):
-            raise BundleError("manifest, config.speeds: must hold a row for each gait")
-        self.slowest, self.fastest = speeds[:, 0], speeds[:, 2:]
-        self.speeds = {
-            gait: (low, high) for gait, (low, _, high, _, _) in zip(self.gaits, speeds.tolist(), strict=True)
-        }
-        self.usual = dict(zip(self.gaits, speeds[:, 1].tolist(), strict=True))
+        how = self.settings(SteeringSettings)
+        self.abilities = Gaits.read(config, how)
+        self.gaits = self.abilities.names
+        low, usual, high = (column.tolist() for column in self.abilities.speeds.T[:3])
+        self.speeds = dict(zip(self.gaits, zip(low, high, strict=True), strict=True))
+        self.usual = dict(zip(self.gaits, usual, strict=True))
         if self.contract.channels != CHANNELS:
             raise BundleError("manifest, motion.channels: must be those of the humanoid, in its order")
-        self.sizes |= {"G": len(self.gaits), "F": FEATURES, "J": len(BONES)}
-        self._bind()
-        self.matcher = self._matcher(config)
+        self.sizes |= {"G": len(self.gaits), "F": FEATURES, "P": 4 * len(BONES) + 1}
+        self.matcher = Matcher(self._table(config), how, self.fps)
+        self.pose_codes = PoseCodes(
+            self.table("pose_mean", "P", "float32").astype(np.float64),
+            self.table("pose_basis", "K P", "float16").astype(np.float64),
+        )
+        for gait, goals in zip(self.gaits, self.matcher.goals, strict=True):
+            if not len(goals.rows):
+                need = self.matcher.least_left
+                raise BundleError(f"table left: no row of {gait!r} is followed by {need} more of its recording")
 
-    def _bind(self) -> None:
-        self.bind("encoder", {"rotations": "batch J 4", "height": "batch 1"}, {"codes": "batch K"})
-        rows = {"frames": "batch W", "features": "batch F", "gaits": "batch G", "left": "*batch"}
-        self.bind("rows", {"row": "*batch"}, rows)
-        self.bind("step", self.loop.inputs, self.loop.outputs)
-        codes = self.sizes["K"]
-        if self.sizes["W"] != codes + 6:
-            raise BundleError(f"manifest, graphs.rows: 'frames' has {self.sizes['W']} numbers, expected {codes + 6}")
-        for name, size in {"root": 4, "course": 6, "bend": 2 * codes}.items():
-            found = self.graphs["step"].spec.input(name).size(1)
-            if found != size:
-                raise BundleError(f"manifest, graphs.step: {name!r} has {found} numbers, expected {size}")
-
-    def _matcher(self, config: Fields) -> Matcher:
-        mean, scale = config.numbers("mean", FEATURES), config.numbers("scale", FEATURES, low=1e-6)
-        count = config.whole("rows", 100, 1 << 20)
-        table = Table.of(self.graphs["rows"], count, mean.astype(np.float32), scale.astype(np.float32))
-        even, odd = (config.whole(name, 0, 1000) for name in ("even", "odd"))
-        if even + odd != self.sizes["K"]:
-            raise BundleError(f"manifest, config.even and odd: must be {self.sizes['K']} together, not {even + odd}")
-        signs = np.repeat(np.array([1, -1], dtype=np.float32), [even, odd])
-        how = config.fields("steering")
-        springs = how.number("velocity", 0.01, 10), how.number("facing", 0.01, 10)
-        fastest = how.numbers("rates", 2)[1]
-        found = Matcher(table, signs, self.fps, config.whole("every", 1, 60), fastest, springs)
-        for gait, (rows, *_) in zip(self.gaits, found.goals, strict=True):
-            if not len(rows):
-                raise BundleError(f"graph rows: the gait {gait!r} has no row that goes on for {found.reserve} more")
-        return found
+    def _table(self, config: Fields) -> Table:
+        codes, moves = self.table("codes", "N K", "float16"), self.table("moves", "N 6", "float32")
+        features, shows = self.table("features", "N F", "int8"), self.table("shows", "N G", "uint8")
+        left, mean = self.table("left", "N", "int32"), self.table("feature_mean", "F", "float32")
+        scale = self.table("feature_scale", "F", "float32")
+        if len(left) < LEAST_ROWS or not ((left >= 0) & (left < np.arange(len(left), 0, -1))).all():
+            raise BundleError("table left: must hold for each row how many follow it, at least 2 rows in all")
+        for name, values, low, high in (
+            ("moves", moves, -LARGEST, LARGEST),
+            ("shows", shows, 0, 1),
+            ("feature_mean", mean, -LARGEST, LARGEST),
+            ("feature_scale", scale, 1e-6, LARGEST),
+        ):
+            if not ((values >= low) & (values <= high)).all():
+                raise BundleError(f"table {name}: must hold numbers between {low:g} and {high:g}")
+        return Table.of(
+            np.concatenate([codes, moves], axis=1, dtype=np.float32),
+            (features / FEATURE_STEPS).astype(np.float32),
+            config.whole("odd", 0, self.sizes["K"]),
+            shows=shows > 0,
+            left=left.astype(np.int64),
+            mean=mean.astype(np.float64),
+            scale=scale.astype(np.float64),
+        )
 
     def start(
         self,
@@ -103,33 +115,14 @@ class SteerModel(ControlModel):
         """
         characters = checked_int("characters", characters, 1, MAX_CHARACTERS, ControlError)
         gait = self.gaits[0] if start is None or isinstance(start, Motion) else start
-        playing = self._standing(characters, self.gait(gait))
-        session = SteerSession(self, playing, gait, hold_feet, strict)
+        number = self.abilities.number(gait)
+        playback = Playback.at(self.matcher.stillest(number), characters, self.sizes["K"])
+        session = SteerSession(self, playback, number, hold_feet, strict)
         if isinstance(start, Motion):
             session.take(self.pose_of(start))
         if places is not None:
             session.put(places)
         return session
-
-    def gait(self, name: str) -> int:
-        """The number of a gait; ControlError for one that the model does not have."""
-        if name not in self.gaits:
-            raise ControlError(f"unknown gait {name!r}; expected one of {', '.join(self.gaits)}")
-        return self.gaits.index(name)
-
-    def _standing(self, characters: int, gait: int) -> Playing:
-        """Characters that do what is stillest of a gait."""
-        table = self.matcher.table
-        usable = np.flatnonzero((table.gaits[:, gait] > 0) & (table.left >= self.matcher.reserve))
-        still = usable[table.frames[usable, -3].argmin()]
-        states = {
-            name: np.zeros((characters, self.graphs["step"].spec.input(name).size(1)), dtype=np.float32)
-            for name in self.graphs["step"].spec.feedback
-        }
-        states["root"][:, 3] = 1  # played as fast as it was recorded
-        side = np.ones(characters, dtype=np.float32)
-        due = np.zeros(characters, dtype=np.int64)  # the same for all: each moves as it would alone
-        return Playing(np.full(characters, still, dtype=np.float32), side, due, states)
 
     def pose_of(self, motion: Motion) -> Pose:
         """The last pose of a motion, at the origin; MotionError for one that is not of a human figure."""
@@ -138,7 +131,7 @@ class SteerModel(ControlModel):
         local = joint_rotations(features)
         quats = np.stack([rotmat_to_quat(local[bone]) for bone in BONES], axis=1).astype(np.float32)
         height = features.select(("root.height",)).values[:, 0].astype(np.float32)
-        return Pose(np.zeros((1, 3), np.float32), quats, height, np.ones((1, 2), np.float32))
+        return Pose(np.zeros((1, 3)), quats, height, np.ones((1, 2), np.float32))
 
     def run(self, script: str, start: Motion | str | None = None, *, hold_feet: bool = True) -> Motion:
         """The motion of one figure that is steered by a script (:mod:`motet.models.steer_script`).
@@ -155,5 +148,5 @@ class SteerModel(ControlModel):
     def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
         """A track (T, 3) of velocities along x and z, m/s, and facings, radians, to frames (T, D)."""
         session = self.start(hold_feet=False)
-        poses = [session.tick_to(control[None]) for control in given["track"]]
+        poses = [session.tick_to(target[None]) for target in given["track"].astype(np.float64)]
         return {"frames": session.frames_of(poses)[0]}

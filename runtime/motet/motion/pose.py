@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from motet.motion.humanoid import BONES, HUMANOID
 from motet.motion.quaternions import quat_product, quat_rotated, wrapped
+from motet.motion.rotations import Array
 
 Floats = NDArray[np.float32]
 
@@ -16,7 +17,7 @@ LEVELS = [[int(joint) for joint in level] for level in HUMANOID.levels]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Pose:
-    """The pose of B characters on the humanoid; arrays are float32, metres, y up.
+    """The pose of B characters on the humanoid; metres, y up. Places in the world are float64, all else float32.
 
     ground: (B, 3) x, z, and the facing in radians: 0 along z, positive to the left. rotations: (B, J, 4) quaternions
     (x, y, z, w) of the bones (:data:`motet.motion.BONES`) in their parents' frames; of the hips in the frame of the
@@ -24,7 +25,7 @@ class Pose:
     foot stand.
     """
 
-    ground: Floats
+    ground: Array
     rotations: Floats
     height: Floats
     contacts: Floats
@@ -37,28 +38,28 @@ class Pose:
         return f"Pose({len(self)} characters)"
 
     @property
-    def place(self) -> Floats:
+    def place(self) -> Array:
         """Where the characters stand (B, 3): on the ground under the hips."""
-        return np.insert(self.ground[:, :2], 1, np.float32(0), axis=1)
+        return np.insert(self.ground[:, :2], 1, 0.0, axis=1)
 
     @property
     def heading(self) -> Floats:
         """Quaternions (B, 4), (x, y, z, w), of the facing: with :attr:`place` the transform of an engine's root."""
-        half = self.ground[:, 2] / 2
+        half = (self.ground[:, 2] / 2).astype(np.float32)
         zero = np.zeros_like(half)
         return np.stack([zero, np.sin(half), zero, np.cos(half)], axis=1)
 
-    def positions(self) -> Floats:
+    def positions(self) -> Array:
         """Places (B, J', 3) of all joints of the humanoid in the world, in the order of ``HUMANOID.names``."""
         return self.global_transforms()[1]
 
-    def global_transforms(self) -> tuple[Floats, Floats]:
+    def global_transforms(self) -> tuple[Floats, Array]:
         """Rotations (B, J', 4) and places (B, J', 3) of all joints of the humanoid in the world."""
         count = len(HUMANOID.names)
         turned = np.zeros((count, len(self), 4), dtype=np.float32)
         turned[..., 3] = 1
         turned[[HUMANOID.index(bone) for bone in BONES]] = np.swapaxes(self.rotations, 0, 1)
-        places = np.empty((count, len(self), 3), dtype=np.float32)
+        places = np.empty((count, len(self), 3))
         turned[0] = quat_product(self.heading, turned[0])
         places[0] = self.place
         places[0, :, 1] = self.height
@@ -78,7 +79,7 @@ class Pose:
         mixed = self.rotations + share * (signs * other.rotations - self.rotations)
         return replace(
             self,
-            ground=self.ground + share * step,
+            ground=self.ground + part * step,
             rotations=mixed / np.linalg.norm(mixed, axis=-1, keepdims=True),
             height=self.height + share * (other.height - self.height),
             contacts=self.contacts + share * (other.contacts - self.contacts),

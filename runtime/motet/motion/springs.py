@@ -1,9 +1,16 @@
-"""Critically damped springs: what comes back to rest as fast as it can without going beyond it."""
+"""Critically damped springs: what comes back to rest as fast as it can without going beyond it.
+
+The distance from rest after t seconds is (d + (v + d y) t) exp(-y t): d and v are its start and its rate there, y the
+damping.
+"""
 
 import math
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
+
+Values = NDArray[Any]
 
 
 def damping_of(half_life: float) -> float:
@@ -11,7 +18,17 @@ def damping_of(half_life: float) -> float:
     return 2 * math.log(2) / half_life
 
 
-def damped(off: NDArray[Any], speed: NDArray[Any], damping: float, seconds: float) -> tuple[NDArray[Any], NDArray[Any]]:
-    """A distance from rest and its speed, arrays of one shape, so many seconds later (exact)."""
-    rise, left = (speed + damping * off) * seconds, math.exp(-damping * seconds)
-    return (off + rise) * left, (speed - damping * rise) * left
+def damped(off: Values, rate: Values, damping: float | Values, seconds: float) -> tuple[Values, Values]:
+    """A distance from rest and its rate, arrays of one shape, so many seconds later (exact).
+
+    damping: one for all, or an array that broadcasts.
+    """
+    rise, left = (rate + damping * off) * seconds, np.exp(-damping * seconds).astype(off.dtype)
+    return (off + rise) * left, (rate - damping * rise) * left
+
+
+def damped_path(off: Values, rate: Values, damping: float, seconds: float) -> Values:
+    """The integral of the distance of :func:`damped` over so many seconds (exact)."""
+    rise, left = rate / damping + off, math.exp(-damping * seconds)
+    found: Values = (rise + off - left * (rise + off + rise * damping * seconds)) / damping
+    return found

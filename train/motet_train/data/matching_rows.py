@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.decode.matching import AHEAD, haste, mirrored_features
+from motet.decode.matching import HORIZONS, horizons, mirrored_features, speed_feature
+from motet.decode.steering_settings import SteeringSettings
 from motet.motion.feet.contacts import contacts_of
 from motet.motion.humanoid import BONES, HUMANOID, LEFT_RIGHT, ground_under, sided, sole_points
 from motet.motion.kinematics import global_transforms
@@ -20,7 +21,7 @@ from motet_train.data.sixd_windows import poses_of
 WEIGHTS = {
     "places": 1.0,
     "facings": 1.5,
-    "haste": 2.5,
+    "speed": 2.5,
     "feet": 0.75,
     "feet_speeds": 1.0,
     "hips_speed": 1.0,
@@ -28,7 +29,7 @@ WEIGHTS = {
 }
 """How much each group of features counts; most as in Holden's "Learned Motion Matching" (2020)."""
 
-LENGTHS = (2 * len(AHEAD), 2 * len(AHEAD), 1, 6, 6, 3, 6)
+LENGTHS = (2 * HORIZONS, 2 * HORIZONS, 1, 6, 6, 3, 6)
 """Of the groups."""
 
 AS_RECORDED = frozenset({"jump"})
@@ -62,12 +63,12 @@ class MatchingRows:
         return len(self.poses)
 
 
-def rows_of(found: list[Recording], gaits: tuple[str, ...]) -> MatchingRows:
+def rows_of(found: list[Recording], gaits: tuple[str, ...], how: SteeringSettings) -> MatchingRows:
     """The rows of recordings on the humanoid; quaternions of a bone lie on one half of their sphere, where they can.
 
     Those of gaits in ``AS_RECORDED`` have no speed: they are played as they are.
     """
-    parts = [_rows(one.features) for one in found]
+    parts = [_rows(one.features, how) for one in found]
     poses, moves, speed, contacts, features = (np.concatenate(column) for column in zip(*parts, strict=True))
     lengths = [len(one.features) for one in found]
     shown = np.repeat([[gait in one.gaits for gait in gaits] for one in found], lengths, axis=0)
@@ -76,7 +77,7 @@ def rows_of(found: list[Recording], gaits: tuple[str, ...]) -> MatchingRows:
     return MatchingRows(_aligned(poses), moves, speed, contacts, features, shown, left)
 
 
-def _rows(features: Motion) -> tuple[Array, Array, Array, Array, Array]:
+def _rows(features: Motion, how: SteeringSettings) -> tuple[Array, Array, Array, Array, Array]:
     turned, places = global_transforms(named("root_sixd").motion(features))
     block = features.select(ROOT_SIXD).values
     way = poses_of(block, features.fps)  # x, z, facing
@@ -89,17 +90,18 @@ def _rows(features: Motion) -> tuple[Array, Array, Array, Array, Array]:
     quats = np.stack([rotmat_to_quat(local[bone]) for bone in BONES], axis=1)
     poses = np.column_stack([quats.reshape(len(features), -1), block[:, 3]])
     points = places[:, [HUMANOID.index(joint) for joint in TRACKED]]
-    soon = speed[np.minimum(np.arange(len(speed)) + round(AHEAD[1] * features.fps), len(speed) - 1)]
-    known = [_ways(way, features.fps), haste(soon)[:, None], _now(points, way, features.fps)]
+    times = horizons(how)
+    soon = speed[np.minimum(np.arange(len(speed)) + round(times[1] * features.fps), len(speed) - 1)]
+    known = [_trajectory(way, times, features.fps), speed_feature(soon, how)[:, None], _now(points, way, features.fps)]
     return poses, block[:, :3], speed, contacts, np.concatenate(known, axis=1)
 
 
-def _ways(way: Array, fps: float) -> Array:
-    """Where rows go (T, 12); after the last one straight on, as fast as at the end."""
+def _trajectory(way: Array, times: list[float], fps: float) -> Array:
+    """Where rows go (T, 12), so many seconds later; after the last one straight on, as fast as at the end."""
     last = len(way) - 1
     end = (way[last] - way[max(0, last - round(fps / 10))]) * fps / max(1, min(last, round(fps / 10)))
     found = []
-    for time in AHEAD:
+    for time in times:
         at = np.arange(len(way)) + round(time * fps)
         beyond = np.maximum(at - last, 0)[:, None] / fps
         found.append(way[np.minimum(at, last)] - way + beyond * end * (1, 1, 0))

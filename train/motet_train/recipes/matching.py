@@ -9,16 +9,17 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from motet.decode.steering_settings import SteeringSettings
+from motet.motion.feet.lock import FootLockSettings
 from motet.motion.humanoid import LEFT_RIGHT, sided
-from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
 from motet_train.data.errors import DataError
 from motet_train.data.locomotion import gaits_of, recordings
-from motet_train.data.matching_rows import MatchingRows, rows_of, scaling
+from motet_train.data.matching_rows import MatchingRows, rows_of
 from motet_train.data.store import Store
 from motet_train.descent import GradientLearner, Term, Terms, Training
 from motet_train.models.codes.sixd_places import tree_of
-from motet_train.models.control.matching import Matching, MatchingConfig, Speeds, Steering
+from motet_train.models.control.matching import Matching, MatchingConfig, Speeds
 from motet_train.recipes.matching_table import take
 from motet_train.recipes.recipe import Job, Recipe
 from motet_train.runs import Run
@@ -47,14 +48,17 @@ class MatchingVisits:
     feet: float = 6.0
 
 
+STEERING = SteeringSettings()
+
 DEFAULT = Recipe(
     "control",
     "motion-matching",
     "matching",
     MatchingConfig(0),
-    ("channels", "tree", "rows", "gaits", "speeds", "mean", "scale"),
+    ("channels", "tree", "rows", "features", "gaits", "speeds"),
     Training(steps=4000, every=250, batch=64, optimiser="adamw", learning_rate=2e-3, cosine=True, keep="last"),
     MatchingVisits(),
+    settings=(STEERING, FootLockSettings()),
 )
 
 RECIPES = {"default": DEFAULT}
@@ -70,7 +74,7 @@ def train_matching(store: Store, job: Job, data: str = "") -> Run:
     names = tuple(gait.name for gait in gaits)
     found = recordings(store, gaits)
     contract = store.contract(tuple(range(len(store.records))))
-    rows = rows_of(found, names)
+    rows = rows_of(found, names, STEERING)
     torch.manual_seed(job.about.seed)
     net = _untrained(recipe, contract, rows, names).to(job.device)
     true = Truth.of(net, rows)
@@ -82,24 +86,24 @@ def train_matching(store: Store, job: Job, data: str = "") -> Run:
         yield starts[drawn][:, None] + torch.arange(recipe.visits.window)
 
     learner = GradientLearner(
-        net, training, lambda drawn: _loss(net, drawn, true, weights), batches, lambda: _measured(net, true)
+        net,
+        training,
+        lambda drawn: _loss(net, drawn, true, weights, contract.fps),
+        batches,
+        lambda: _measured(net, true),
     )
     about = {"data": {"name": data, "recordings": len(found), "rows": len(rows)}}
     return job.run(net, learner, job.manifest(contract, asdict(net.config), {}, None, about))
 
 
 def _untrained(recipe: Recipe, contract: MotionContract, rows: MatchingRows, names: tuple[str, ...]) -> Matching:
-    mean, scale = scaling(rows.features)
-    how = recipe.config.steering
-    speeds = [_speeds(rows, shown, how) for shown in rows.gaits.T]
     config = recipe.sized(
         channels=len(contract.channels),
         tree=tree_of(contract),
         rows=len(rows),
+        features=rows.features.shape[1],
         gaits=names,
-        speeds=tuple(speeds),
-        mean=tuple(mean.round(6).tolist()),
-        scale=tuple(scale.round(6).tolist()),
+        speeds=tuple(_speeds(rows, shown, STEERING) for shown in rows.gaits.T),
     )
     net = Matching(config)
     net.measure_by(contract.mean, contract.std)
@@ -107,24 +111,18 @@ def _untrained(recipe: Recipe, contract: MotionContract, rows: MatchingRows, nam
     return net
 
 
-def _speeds(rows: MatchingRows, shown: NDArray[np.bool_], how: Steering) -> Speeds:
+def _speeds(rows: MatchingRows, shown: NDArray[np.bool_], how: SteeringSettings) -> Speeds:
     """Those of a gait's rows, that can be played slower and faster; all 0 for a gait that is played as it is."""
     speed = rows.speed[shown]
     moving = speed > how.idle
     if not moving.any():
         return (0.0,) * 5
-    angle = _aside(rows, shown)
-    low = np.percentile(speed[moving], SPAN[0]) * how.rates[0] * how.strides[0]
-    sectors = [moving & (angle <= 60), moving & (angle > 60) & (angle <= 120), moving & (angle > 120)]
-    fastest = [np.percentile(speed[part], SPAN[1]) * how.rates[1] if part.sum() > RARE else 0.0 for part in sectors]
+    angle = np.abs(np.arctan2(rows.moves[shown, 1], rows.moves[shown, 0]))  # from the facing
+    low = np.percentile(speed[moving], SPAN[0]) * how.slowest * how.shortest
+    sectors = [moving & (np.digitize(angle, (how.aside, how.back), right=True) == sector) for sector in range(3)]
+    fastest = [np.percentile(speed[part], SPAN[1]) * how.fastest if part.sum() > RARE else 0.0 for part in sectors]
     forward, aside, back = (round(float(one), 2) for one in fastest)
     return round(float(low), 2), round(float(np.median(speed[sectors[0]])), 2), forward, aside, back
-
-
-def _aside(rows: MatchingRows, shown: NDArray[np.bool_]) -> Array:
-    """How far from its facing a gait's rows (N,) go, degrees."""
-    found: Array = np.degrees(np.abs(np.arctan2(rows.moves[shown, 1], rows.moves[shown, 0])))
-    return found
 
 
 @dataclass(frozen=True)
@@ -147,11 +145,11 @@ def _weights(contract: MotionContract, feet: float) -> Tensor:
     return torch.from_numpy(found / found.mean()).float()
 
 
-def _loss(net: Matching, rows: Tensor, true: Truth, weights: Tensor) -> Terms:
+def _loss(net: Matching, rows: Tensor, true: Truth, weights: Tensor, fps: float) -> Terms:
     """Errors of joints' places and speeds, and of quaternions, in windows of rows (B, W)."""
     codes = net.codes[rows]
     off = (net.points(*net.poses(codes)) - true.points[rows]) * weights[:, None]
-    speeds = off.diff(dim=1) / net.config.steering.dt
+    speeds = off.diff(dim=1) * fps
     turns = (net.values(codes) - true.poses[rows]).abs().mean()
     return (Term(off.abs().mean() + SPEEDS * speeds.abs().mean() + TURNS * turns, len(rows)),)
 

@@ -3,10 +3,11 @@
 import numpy as np
 import torch
 
+from motet.models.steer import FEATURE_STEPS
 from motet.motion.rotations import Array
-from motet_train.data.matching_rows import MatchingRows, mirrored_poses
+from motet_train.data.matching_rows import MatchingRows, mirrored_poses, scaling
 from motet_train.models.codes.sixd_places import Tree
-from motet_train.models.control.matching import FINE, Matching
+from motet_train.models.control.matching import Matching
 
 SHORTEST = 0.05
 """Metres: how far a bone that carries nothing counts as reaching."""
@@ -18,19 +19,26 @@ MOST = 4000
 @torch.no_grad()
 def take(net: Matching, rows: MatchingRows) -> None:
     """Fill a net with rows: their table, and codes that are the principal components of poses and mirrored poses."""
-    mean, scale = (np.array(part) for part in (net.config.mean, net.config.scale))
-    features = np.clip(np.round((rows.features - mean) * scale * FINE), -127, 127)
-    rest = np.column_stack([rows.moves, rows.speed, rows.contacts])
+    mean, scale = (part.round(6) for part in scaling(rows.features))
     columns, signs = mirrored_poses()
     mean_pose = rows.poses.mean(axis=0)
-    middle = (mean_pose + mean_pose[columns] * signs) / 2
-    weights, off = _reach(net.config.tree), rows.poses - middle
+    pose_mean = (mean_pose + mean_pose[columns] * signs) / 2
+    weights, off = _reach(net.config.tree), rows.poses - pose_mean
     halves = [(off + sign * off[:, columns] * signs) / 2 * weights for sign in (1, -1)]
     axes = np.concatenate([_axes(half, n) for half, n in zip(halves, (net.config.even, net.config.odd), strict=True)])
-    values = (features, rest, rows.gaits, rows.left, middle, off * weights @ axes.T, axes / weights)
-    parts = (net.features, net.rest, net.shown, net.left, net.middle, net.codes, net.basis)
-    for part, value in zip(parts, values, strict=True):
-        part.copy_(torch.from_numpy(value))
+    values = {
+        "codes": off * weights @ axes.T,
+        "moves": np.column_stack([rows.moves, rows.speed, rows.contacts]),
+        "features": np.clip(np.round((rows.features - mean) * scale * FEATURE_STEPS), -127, 127),
+        "shows": rows.gaits,
+        "left": rows.left,
+        "feature_mean": mean,
+        "feature_scale": scale,
+        "pose_mean": pose_mean,
+        "pose_basis": axes / weights,
+    }
+    for name, value in values.items():
+        getattr(net, name).copy_(torch.from_numpy(value))
 
 
 def _axes(poses: Array, count: int) -> Array:

@@ -8,26 +8,31 @@ how long a foot is going to stand, is :mod:`motet.motion.feet.hold`.
 """
 
 from dataclasses import dataclass, replace
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from motet.motion.humanoid import BONES, HUMANOID, LEFT_RIGHT, SOLE, sided
 from motet.motion.pose import Floats, Pose
 from motet.motion.quaternions import conjugate, quat_product, quat_rotated
-from motet.motion.rotations import rotmat_to_quat
+from motet.motion.rotations import Array, rotmat_to_quat
 from motet.motion.springs import damped, damping_of
 from motet.motion.two_bone import Leg
+from motet.settings import Range, Settings
 
 
 @dataclass(frozen=True)
-class LockSettings:
-    """fade: seconds, the half-life in which a released foot comes back to where it is played. farthest: metres, the
-    largest correction; beyond it the foot is released. swings: m/s; above this speed a foot is swinging, even if the
-    clip that was just jumped to marks a contact."""
+class FootLockSettings(Settings):
+    """fade: half-life in which a released foot comes back to where it is played. farthest: largest correction; beyond
+    it the foot is released. swings: above this speed a foot is swinging, even if a clip that was just jumped to marks a
+    contact. stands: contact above which a foot stands."""
 
-    fade: float = 0.06
-    farthest: float = 0.2
-    swings: float = 1.0
+    FEATURE: ClassVar[str] = "foot_lock"
+
+    fade: Annotated[float, Range(0.001, 10, "s")] = 0.06
+    farthest: Annotated[float, Range(0, 1, "m")] = 0.2
+    swings: Annotated[float, Range(0, 100, "m/s")] = 1.0
+    stands: Annotated[float, Range(0, 1)] = 0.5
 
 
 CHAIN = ("UpperLeg", "LowerLeg", "Foot", "Toes")
@@ -47,19 +52,15 @@ class FootLock:
     """The lock of B characters. dt: seconds of a tick.
 
     shift, drift: (B, 2, 2) by how much each foot is moved along x and z, and how fast that changes. soles: (B, 2, 3, 3)
-    where the points of the soles were, None before the first tick.
+    where the points of the soles were, None before the first tick. All float64; they are replaced, never written into.
     """
 
     characters: int
     dt: float
-    shift: Floats | None = None
-    drift: Floats | None = None
-    soles: Floats | None = None
-    settings: LockSettings = LockSettings()
-
-    def copy(self) -> "FootLock":
-        """One that goes on by itself."""
-        return replace(self)  # its arrays are replaced, never written into
+    settings: FootLockSettings = FootLockSettings()
+    shift: Array | None = None
+    drift: Array | None = None
+    soles: Array | None = None
 
     def held(self, pose: Pose) -> Pose:
         """The next pose with feet that stay where they stand, and not under the ground; a tick after the last."""
@@ -72,31 +73,32 @@ class FootLock:
         target = places[:, :, 2] + np.stack([shift[..., 0], lift, shift[..., 1]], axis=-1)
         return replace(pose, rotations=_reached(pose.rotations, hips, turned, places, target))
 
-    def _shift(self, soles: Floats, contacts: Floats) -> Floats:
+    def _shift(self, soles: Array, contacts: Floats) -> Array:
         """By how much each foot is moved now (B, 2, 2), from the points of the soles (B, 2, 3, 3)."""
+        how = self.settings
         if self.soles is None or self.shift is None or self.drift is None:
-            self.shift = self.drift = np.zeros((*soles.shape[:2], 2), dtype=np.float32)
+            self.shift = self.drift = np.zeros((*soles.shape[:2], 2))
             self.soles = soles
         lowest = soles[..., 1].argmin(axis=2)[..., None, None]
         moved = np.take_along_axis(soles - self.soles, lowest, axis=2)[:, :, 0, ::2]
-        faded, slower = damped(self.shift, self.drift, damping_of(self.settings.fade), self.dt)
+        faded, slower = damped(self.shift, self.drift, damping_of(how.fade), self.dt)
         held = self.shift - moved
-        stands = contacts[..., None] > 0.5
-        stands &= np.linalg.norm(held, axis=-1, keepdims=True) < self.settings.farthest
-        stands &= np.linalg.norm(moved, axis=-1, keepdims=True) < self.settings.swings * self.dt
-        self.drift = np.where(stands, np.float32(0), slower).astype(np.float32)
-        self.shift = np.where(stands, held, faded).astype(np.float32)
+        stands = contacts[..., None] > how.stands
+        stands &= np.linalg.norm(held, axis=-1, keepdims=True) < how.farthest
+        stands &= np.linalg.norm(moved, axis=-1, keepdims=True) < how.swings * self.dt
+        self.drift = np.where(stands, 0, slower)
+        self.shift = np.where(stands, held, faded)
         self.soles = soles
         return self.shift
 
 
-def _legs(pose: Pose) -> tuple[Floats, Floats, Floats]:
+def _legs(pose: Pose) -> tuple[Floats, Floats, Array]:
     """World rotations of the hips (B, 4), and rotations (B, 2, 4, 4) and places (B, 2, 4, 3) of the legs' joints."""
     hips = quat_product(pose.heading, pose.rotations[:, 0])
     place = pose.place[:, None]
     place[..., 1] = pose.height[:, None]
     local, above = pose.rotations[:, COLUMNS], hips[:, None]
-    turned, places = np.empty_like(local), np.empty((*local.shape[:3], 3), dtype=np.float32)
+    turned, places = np.empty_like(local), np.empty((*local.shape[:3], 3))
     for joint, offset in enumerate(np.swapaxes(OFFSETS, 0, 1).astype(np.float32)):
         place = place + quat_rotated(above, offset)
         above = quat_product(above, local[:, :, joint])
@@ -104,11 +106,9 @@ def _legs(pose: Pose) -> tuple[Floats, Floats, Floats]:
     return hips, turned, places
 
 
-def _reached(rotations: Floats, hips: Floats, turned: Floats, places: Floats, target: Floats) -> Floats:
+def _reached(rotations: Floats, hips: Floats, turned: Floats, places: Array, target: Array) -> Floats:
     """Rotations (B, J, 4) with ankles at targets (B, 2, 3), from those of :func:`_legs`."""
-    hip, knee, ankle, goal = (
-        p.reshape(-1, 3).astype(np.float64) for p in (*np.moveaxis(places[:, :, :3], 2, 0), target)
-    )
+    hip, knee, ankle, goal = (p.reshape(-1, 3) for p in (*np.moveaxis(places[:, :, :3], 2, 0), target))
     thigh, shin, foot = (turned[:, :, joint] for joint in range(3))
     hinge = quat_rotated(shin, np.array([1, 0, 0], dtype=np.float32)).reshape(-1, 3).astype(np.float64)
     leg = Leg(hip, knee, ankle, hinge)

@@ -2,9 +2,10 @@
 
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial, singledispatch
 
+from motet.decode.steering_settings import SteeringSettings
 from motet.errors import ControlWarning
 from motet.models.steer import SteerModel
 from motet_train.data.errors import DataError
@@ -66,7 +67,8 @@ class Recorded:
 def _shown(store: Store, held: bool) -> list[tuple[Recording, Track]]:
     gaits = gaits_of(store)
     found = recordings(store, gaits, held)
-    return list(zip(found, tracks_of(found, rows_of(found, tuple(gait.name for gait in gaits))), strict=True))
+    rows = rows_of(found, tuple(gait.name for gait in gaits), SteeringSettings())
+    return list(zip(found, tracks_of(found, rows), strict=True))
 
 
 def steer_report(model: SteerModel, recorded: Recorded, minutes: float = 10.0, characters: int = 100) -> Report:
@@ -113,8 +115,9 @@ def _(model: SteerModel) -> dict[str, SteerModel]:
 def seldom(model: SteerModel, every: int = 30) -> SteerModel:
     """The simplest rival: the same model, which searches only every so many ticks, a second, and when something else is
     told; until then, or until its end, the recording that fits best is played."""
-    manifest = replace(model.manifest, config={**model.manifest.config, "every": every})
-    return SteerModel(manifest, model.graphs, model.tables)
+    own = {**asdict(model.settings(SteeringSettings)), "search_every": every}
+    manifest = replace(model.manifest, settings={**model.manifest.settings, SteeringSettings.FEATURE: own})
+    return SteerModel(manifest, {}, model.tables)
 
 
 def _standing(model: SteerModel, gait: str) -> dict[str, float]:

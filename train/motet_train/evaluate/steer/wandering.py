@@ -109,7 +109,7 @@ class _Teller:
         self.facing[who] = np.where(rng.random(count) < 0.5, self.direction[who], facing)
         gaits = self.names[self.gait].tolist()
         self.session.control(gait=gaits, speed=self.speed, direction=self.direction, facing=self.facing)
-        self.speed = np.hypot(*self.session.told[:, :2].T)  # within what gaits can do that way
+        self.speed = np.hypot(*self.session.target[:, :2].T)  # within what gaits can do that way
 
 
 def watched(model: SteerModel, limits: Limits, seconds: float, characters: int, seed: int = 1) -> Watch:

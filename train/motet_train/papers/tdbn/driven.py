@@ -84,6 +84,12 @@ class DrivenSession:
             if angles is not None:
                 self.told[row] = np.radians(angles)
 
+    @property
+    def target(self) -> Array:
+        """What the figures were told (B, 3): velocity along x and z, m/s, and facing, radians."""
+        speed, direction, facing = self.told
+        return np.stack([speed * np.sin(direction), speed * np.cos(direction), facing], axis=1)
+
     def tick(self) -> Pose:
         """The next pose of all figures."""
         speed, direction, facing = self.told
@@ -99,7 +105,7 @@ class DrivenSession:
         self.ground = moved(self.ground, values[:, : len(ROOT_SIXD) - 1] / self.fps)
         quats = rotmat_to_quat(sixd_to_rotmat(values[:, len(ROOT_SIXD) :].reshape(len(values), -1, 6)))
         flat = np.zeros((len(values), 2), dtype=np.float32)
-        pose = Pose(self.ground.astype(np.float32), quats.astype(np.float32), frames[:, len(ROOT_SIXD) - 1], flat)
+        pose = Pose(self.ground, quats.astype(np.float32), frames[:, len(ROOT_SIXD) - 1], flat)
         return Pose(pose.ground, pose.rotations, pose.height, _contacts(pose))
 
 
