@@ -76,14 +76,18 @@ def _steered(model: SteerModel) -> Decoded:
 
 @runs_of.register
 def _describe(_: DescribeModel) -> Named:
-    searches = {"greedy": (1, 0), "beam": (5, 0), "consensus": (5, 50)}
+    searches = {"greedy": (1, None), "beam": (5, None), "consensus": (5, 50)}
     runs: Named = {name: partial(_described, *settings) for name, settings in searches.items()}
     return {**runs, "scores": _sentence_scores}
 
 
-def _described(beams: int, draws: int, model: DescribeModel) -> Decoded:
+def _described(beams: int, draws: int | None, model: DescribeModel) -> Decoded:
     """Sentences of eight motions: ids of their words and log-probabilities, and the motions' contexts."""
-    found = [row for motion in model.describe(_motions(model), beams, draws) for row in motion]
+    found = [
+        row
+        for motion in model.describe(_motions(model), beams, draws, decoding="consensus" if draws else "beam")
+        for row in motion
+    ]
     ids = np.zeros((len(found), MAX_WORDS), dtype=np.int64)
     for row, description in zip(ids, found, strict=True):
         if description.text:

@@ -154,12 +154,27 @@ def test_a_motion_is_described_by_draws_as_it_is_alone_and_every_time() -> None:
 def test_the_bundle_says_how_hypotheses_are_ranked(model: DescribeModel) -> None:
     motion, searched = moving(20), model.describe(moving(20))
     cold, hot = drawing(1.0), drawing(6.0)
-    assert searched == model.describe(motion, draws=0) == hot.describe(motion, draws=0)
+    assert searched == model.describe(motion, decoding="beam") == hot.describe(motion, decoding="beam")
     assert cold.describe(motion) == model.describe(motion, draws=30)  # without a default the temperature is 1
     assert hot.describe(motion) not in (searched, cold.describe(motion))
+    assert model.describe(motion, decoding="consensus") == model.describe(motion, draws=100)
+    with pytest.raises(DecodingError, match="no setting 'draws'"):
+        model.describe(motion, draws=30, decoding="beam")
+    with pytest.raises(DecodingError, match="decoding must be one of beam, consensus, not 'greedy'"):
+        model.describe(motion, decoding="greedy")  # type: ignore[call-overload]
 
 
-@pytest.mark.parametrize("draws", [-1, 1001])
+def test_draws_are_of_their_seed() -> None:
+    model = drawing(6.0)
+    motions = [moving(20), moving(9)]
+    other = model.describe(motions, seed=1)
+    assert other == [model.describe(motion, seed=np.int64(1)) for motion in motions] != model.describe(motions)
+    assert model.describe(motions, seed=0) == model.describe(motions)
+    with pytest.raises(DecodingError, match="seed of 0 or more"):
+        model.describe(motions, seed=-1)
+
+
+@pytest.mark.parametrize("draws", [-1, 0, 1001])
 def test_draws_out_of_range(model: DescribeModel, draws: int) -> None:
     with pytest.raises(DecodingError, match=f"draws must be between 1 and 1000, not {draws}"):
         model.describe(moving(20), draws=draws)

@@ -27,8 +27,8 @@ def check_equal(together: Sequence[NDArray[np.float32]], alone: Sequence[NDArray
         np.testing.assert_array_equal(row, single)
 
 
-@pytest.mark.parametrize("draws", [0, 30])
-def test_descriptions(motions: list[Motion], draws: int) -> None:
+@pytest.mark.parametrize("draws", [None, 30])
+def test_descriptions(motions: list[Motion], draws: int | None) -> None:
     model = load("describe")
     assert model.describe(motions, draws=draws) == [model.describe([one], draws=draws)[0] for one in motions]
 

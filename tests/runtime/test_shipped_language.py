@@ -26,8 +26,8 @@ def test_five_ranked_sentences_for_each_motion_as_json(clips: Path, draws: int) 
         assert verb in row["hypotheses"][0]["text"]
 
 
-@pytest.mark.parametrize("draws", [0, 100])
-def test_a_description_scores_what_the_search_gave_it(clips: Path, draws: int) -> None:
+@pytest.mark.parametrize("draws", [None, 100])
+def test_a_description_scores_what_the_search_gave_it(clips: Path, draws: int | None) -> None:
     model, motion = load("describe"), read_motion(clips / "39_14.amc")
     for found in model.describe(motion, draws=draws):
         assert model.score(motion, found.text) == pytest.approx(found.log_probability, abs=1e-4)

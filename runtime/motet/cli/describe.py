@@ -32,6 +32,7 @@ from motet.models.load import load_as
     type=click.IntRange(0, 1000),
     help="Samples for consensus (MBR) decoding; 0: beam search. [default: the bundle's; of describe: beam search]",
 )
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the samples.")
 @click.option("--timeline", is_flag=True, help="Say what happens when: a sentence for each part of a motion.")
 @session_options
 @read_options
@@ -41,6 +42,7 @@ def describe(
     bundle: str,
     beams: int | None,
     draws: int | None,
+    seed: int,
     timeline: bool,
     session: SessionOptions,
     read: Read,
@@ -54,7 +56,8 @@ def describe(
     if timeline:
         _timelines(model, sources, read, tries, as_json)
     else:
-        _hypotheses(model, sources, read, tries, beams, draws, as_json)
+        settings = {"beams": beams, "draws": draws or None, "decoding": "beam" if draws == 0 else None, "seed": seed}
+        _hypotheses(model, sources, read, tries, settings, as_json)
     tries.finish()
 
 
@@ -63,8 +66,7 @@ def _hypotheses(
     sources: Sequence[Source],
     read: Read,
     tries: Tries,
-    beams: int | None,
-    draws: int | None,
+    settings: dict[str, Any],
     as_json: bool,
 ) -> None:
     rows, parts, rates = [], [], []
@@ -77,7 +79,7 @@ def _hypotheses(
             parts += [part for *_, part in windows]
     say_resampled(rates, model.fps)
     with bar("describing") as progress:
-        found = model.describe(parts, beams, draws, progress=progress)
+        found = model.describe(parts, progress=progress, **settings)
     _print(rows, found, as_json, several=len(sources) > 1)
 
 

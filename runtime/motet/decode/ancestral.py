@@ -8,9 +8,6 @@ from motet.bundle.graph import Floats, Graph
 from motet.decode.beam import Limits
 from motet.decode.rollout import Ids, Scores, advance, two_rows, zero_state
 
-SEED = 0
-"""Every row draws by the noise of this seed: a row gets the same sequences each time, and in any batch."""
-
 
 class Drawn(NamedTuple):
     """A sequence without start and end, the sum of its steps' log-probabilities, end included, and how often it came.
@@ -23,9 +20,9 @@ class Drawn(NamedTuple):
     times: int
 
 
-def noise_of(limits: Limits, draws: int) -> Floats:
-    """The uniform numbers (longest + 1, draws) float32 that every row is drawn with."""
-    return np.random.Generator(np.random.PCG64(SEED)).random((limits.longest + 1, draws), np.float32)
+def noise_of(limits: Limits, draws: int, seed: int = 0) -> Floats:
+    """The uniform numbers (longest + 1, draws) float32 that every row is drawn with, and so as it would be alone."""
+    return np.random.Generator(np.random.PCG64(seed)).random((limits.longest + 1, draws), np.float32)
 
 
 def draw_sequences(

@@ -3,22 +3,28 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import pairwise
-from typing import Annotated, Any, ClassVar, overload
+from typing import Annotated, Any, ClassVar, Literal, SupportsIndex, overload
 
 import numpy as np
 
 from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
+from motet.decode.ancestral import noise_of
 from motet.decode.beam import Hypothesis, Limits
 from motet.decode.loop import Loop
 from motet.decode.loops import LOOPS
 from motet.decode.score import score_words
+from motet.errors import DecodingError
 from motet.models.language import MAX_SECONDS, LanguageModel
 from motet.models.progress import Progress, silent
+from motet.models.seeds import seeds_of
 from motet.models.text import EOS, PAD, SOS, UNK
 from motet.models.timeline import TimelineSettings, best_path, edges, near_scores, windows
 from motet.motion.motion import Motion
 from motet.settings import Range, Settings
+
+Decoding = Literal["beam", "consensus"]
+"""How descriptions are found."""
 
 
 @dataclass(frozen=True)
@@ -74,11 +80,25 @@ class DescribeModel(LanguageModel):
 
     @overload
     def describe(
-        self, motions: Motion, beams: int | None = None, draws: int | None = None, *, progress: Progress = ...
+        self,
+        motions: Motion,
+        beams: int | None = None,
+        draws: int | None = None,
+        *,
+        decoding: Decoding | None = None,
+        seed: SupportsIndex = 0,
+        progress: Progress = ...,
     ) -> list[Description]: ...
     @overload
     def describe(
-        self, motions: Sequence[Motion], beams: int | None = None, draws: int | None = None, *, progress: Progress = ...
+        self,
+        motions: Sequence[Motion],
+        beams: int | None = None,
+        draws: int | None = None,
+        *,
+        decoding: Decoding | None = None,
+        seed: SupportsIndex = 0,
+        progress: Progress = ...,
     ) -> list[list[Description]]: ...
     def describe(
         self,
@@ -86,21 +106,30 @@ class DescribeModel(LanguageModel):
         beams: int | None = None,
         draws: int | None = None,
         *,
+        decoding: Decoding | None = None,
+        seed: SupportsIndex = 0,
         progress: Progress = silent,
     ) -> list[Description] | list[list[Description]]:
         """Up to ``beams`` descriptions of a motion, the best first; of several motions a list for each.
 
-        draws: 0 for beam search, whose best is the most probable sentence. More: so many sentences are drawn, and the
-            best is the one that has most in common with all of them (:mod:`motet.decode.consensus`), which need not be
-            probable itself. By default the bundle's loop.
+        decoding: "beam" for beam search, whose best is the most probable sentence; "consensus" for ``draws`` sentences
+            drawn, of which the best has most in common with all (:mod:`motet.decode.consensus`), and need not be
+            probable itself. By default consensus where ``draws`` is given, and otherwise the bundle's loop.
+        seed: of the draws; each motion gets those that it gets alone.
         progress: called with the number of motions done and of all.
 
-        A motion at another frame rate is resampled. Each motion gets what it would get alone, and the same every time.
-        MotionError as :meth:`frames`: longer motions go in :meth:`windows`. DecodingError where ``beams`` (the bundle's
-        by default) is not between 1 and 100, or ``draws`` not between 0 and 1,000.
+        A motion at another frame rate is resampled. MotionError as :meth:`frames`: longer motions go in
+        :meth:`windows`. DecodingError where ``beams`` (the bundle's by default) is not between 1 and 100, ``draws`` not
+        between 1 and 1,000 or given for beam search, and for a negative seed.
         """
-        loop = self.loop if draws is None else LOOPS["consensus" if draws else "beam"]
-        settings = loop.settled(loop.defaults(self.manifest.defaults), {"beams": beams, "draws": draws or None})
+        if decoding not in (None, *self.LOOPS):
+            raise DecodingError(f"decoding must be one of {', '.join(self.LOOPS)}, not {decoding!r}")
+        name = decoding or (None if draws is None else "consensus")
+        loop, (first,) = LOOPS[name] if name else self.loop, seeds_of(seed, 1, DecodingError)
+        given = {"beams": beams, "draws": draws}
+        settings: dict[str, Any] = {**loop.settled(loop.defaults(self.manifest.defaults), given)}
+        if "draws" in settings:
+            settings["noise"] = noise_of(self.limits(settings), settings["draws"], first)
         contexts = self.embed([motions] if isinstance(motions, Motion) else motions)
         found = self._hypotheses(loop, contexts, settings, progress)
         rows = [[self._description(hypothesis) for hypothesis in row] for row in found]

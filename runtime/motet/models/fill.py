@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,6 +12,7 @@ from motet.bundle.manifest import Manifest
 from motet.errors import BundleError, MotionError
 from motet.models.base import BundleModel
 from motet.models.gaps import Gap, at_own_rate, log_elsewhere, spans_of
+from motet.models.progress import Progress, silent
 from motet.motion.follow import alike, following
 from motet.motion.humanoid import HUMANOID, on_humanoid
 from motet.motion.motion import Motion
@@ -64,16 +65,41 @@ class FillModel(BundleModel):
         """How long a gap may be."""
         return self.longest / self.fps
 
-    def fill(self, motion: Motion, gaps: Sequence[Gap]) -> Motion:
-        """The motion with what may have happened in its gaps; what is there in their frames is not looked at.
+    @overload
+    def fill(self, motions: Motion, gaps: Sequence[Gap], *, progress: Progress = ...) -> Motion: ...
+    @overload
+    def fill(
+        self, motions: Sequence[Motion], gaps: Sequence[Sequence[Gap]], *, progress: Progress = ...
+    ) -> list[Motion]: ...
+    def fill(
+        self,
+        motions: Motion | Sequence[Motion],
+        gaps: Sequence[Gap] | Sequence[Sequence[Gap]],
+        *,
+        progress: Progress = silent,
+    ) -> Motion | list[Motion]:
+        """A motion with what may have happened in its gaps; what is there in their frames is not looked at.
 
-        gaps: (start, stop) in seconds: frames from ``start`` on, up to and without that at ``stop``, are replaced. All
-            others stay as they are, to the bit, and so do channels, units, figure and frame rate. A motion of a figure
-            whose own world or channels do not allow that comes on the humanoid at the model's rate, which is logged.
+        gaps: of several motions a list for each. A gap is (start, stop) in seconds: frames from ``start`` on, up to and
+            without that at ``stop``, are replaced. All others stay as they are, to the bit, and so do channels, units,
+            figure and frame rate. A motion of a figure whose own world or channels do not allow that comes on the
+            humanoid at the model's rate, which is logged.
+        progress: called with the number of motions done and of all.
         MotionError, with what would be right, for gaps that are empty, longer than :attr:`seconds`, not within the
         motion, that overlap, or with fewer than :attr:`least` frames at the model's rate before or after them; and for
         a figure that is no human's.
         """
+        if isinstance(motions, Motion):
+            return self._filled(motions, cast(Sequence[Gap], gaps))
+        if len(gaps) != len(motions):
+            raise MotionError(f"{len(motions)} motions need a list of gaps for each, not {len(gaps)}")
+        found = list[Motion]()
+        for motion, own in zip(motions, cast(Sequence[Sequence[Gap]], gaps), strict=True):
+            found.append(self._filled(motion, own))
+            progress(len(found), len(motions))
+        return found
+
+    def _filled(self, motion: Motion, gaps: Sequence[Gap]) -> Motion:
         spans = spans_of(motion, gaps, self.seconds)
         result = motion
         for number, (start, stop) in enumerate(spans):
@@ -81,7 +107,7 @@ class FillModel(BundleModel):
             new = self._between(result[:start], result[stop:end], stop - start)
             if new is None:
                 log_elsewhere()
-                return self.fill(self._on_humanoid(motion), gaps)
+                return self._filled(self._on_humanoid(motion), gaps)
             values = np.array(result.values)
             values[start:stop] = new.values
             result = replace(result, values=values)

@@ -23,6 +23,8 @@ Span = tuple[int, int]
 def spans_of(motion: Motion, gaps: Sequence[Gap], longest: float) -> list[Span]:
     """The frames of gaps of at most ``longest`` seconds, in the order of time; MotionError as
     :meth:`motet.models.fill.FillModel.fill`."""
+    if not isinstance(gaps, Sequence):
+        raise MotionError(f"gaps are a list of (start, stop) in seconds, not {gaps!r}")
     if not gaps:
         raise MotionError("there is no gap to fill: give one, in seconds, such as (1.0, 2.0)")
     for gap in gaps:

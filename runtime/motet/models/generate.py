@@ -5,7 +5,7 @@ from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, overload
+from typing import Any, TypedDict, Unpack, cast, overload
 
 import numpy as np
 
@@ -29,6 +29,20 @@ SETTLED = 0.3
 
 PLAYED = 30.0
 """Frames per second of what is generated, whatever the model's own rate is."""
+
+
+class GenerateSettings(TypedDict, total=False):
+    """What may be chosen for each call where its loop has it: :meth:`GenerateModel.generate`. None: the bundle's."""
+
+    candidates: int | None
+    certainty: float | None
+    first_temperature: float | None
+    guidance: float | None
+    max_seconds: float | None
+    memory: float | None
+    seconds: float | None
+    temperature: float | None
+    top_p: float | None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -102,7 +116,7 @@ class GenerateModel(LanguageModel):
         seed: Seed = 0,
         strict: bool = False,
         progress: Progress = silent,
-        **settings: float | None,
+        **settings: Unpack[GenerateSettings],
     ) -> list[Generated]: ...
     @overload
     def generate(
@@ -113,7 +127,7 @@ class GenerateModel(LanguageModel):
         seed: Seed = 0,
         strict: bool = False,
         progress: Progress = silent,
-        **settings: float | None,
+        **settings: Unpack[GenerateSettings],
     ) -> list[list[Generated]]: ...
     def generate(
         self,
@@ -123,7 +137,7 @@ class GenerateModel(LanguageModel):
         seed: Seed = 0,
         strict: bool = False,
         progress: Progress = silent,
-        **settings: float | None,
+        **settings: Unpack[GenerateSettings],
     ) -> list[Generated] | list[list[Generated]]:
         """``hypotheses`` motions for a sentence; for several sentences a list for each.
 
@@ -141,7 +155,8 @@ class GenerateModel(LanguageModel):
         """
         texts = [sentences] if isinstance(sentences, str) else list(sentences)
         ids, seeds = [self.ids(text) for text in texts], seeds_of(seed, len(texts), DecodingError)
-        chosen = self.loop.settled(self.defaults, {"hypotheses": hypotheses, **settings})
+        given = {"hypotheses": hypotheses, **cast(Mapping[str, float | None], settings)}
+        chosen = self.loop.settled(self.defaults, given)
         noise = [np.random.Generator(np.random.PCG64(one)) for one in seeds]
         contexts, found = self.contexts(ids), []
         for text, context in zip(texts, contexts, strict=True):

@@ -12,7 +12,7 @@ import zipfile
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 
@@ -28,6 +28,9 @@ from motet.motion.motion import Motion
 from motet.motion.units import metres
 
 log = logging.getLogger(__name__)
+
+Query = str | Motion
+"""What is asked for: a sentence, or a motion to which others are alike."""
 
 NAME = ".motet-search.npz"
 """The file of a folder's index, in the folder."""
@@ -137,13 +140,25 @@ class Index:
         """The motion files that cannot be found by any question, and why."""
         return {self.folder / member.name: member.fault for member in self.members if member.fault}
 
-    def search(self, query: str | Motion, count: int | None = None) -> list[Hit]:
-        """The ``count`` files or clips nearest to a sentence or a motion, best first, each with its best window.
+    @overload
+    def search(  # type: ignore[overload-overlap]  # a string is a sequence of strings, too
+        self, queries: Query, count: int | None = None
+    ) -> list[Hit]: ...
+    @overload
+    def search(self, queries: Sequence[Query], count: int | None = None) -> list[list[Hit]]: ...
+    def search(self, queries: Query | Sequence[Query], count: int | None = None) -> list[Hit] | list[list[Hit]]:
+        """The ``count`` files or clips nearest to a sentence or a motion, best first, each with its best window; for
+        several queries a list for each.
 
         count: the bundle's by default. TextError for a sentence without a known word, MotionError for a motion that
         the model cannot take, DecodingError for a count that is not between 1 and 1,000.
         """
-        wanted = self.model.loop.settled(self.model.defaults, {"count": count})["count"]
+        wanted = int(self.model.loop.settled(self.model.defaults, {"count": count})["count"])
+        if isinstance(queries, str | Motion):
+            return self._nearest(queries, wanted)
+        return [self._nearest(query, wanted) for query in queries]
+
+    def _nearest(self, query: Query, wanted: int) -> list[Hit]:
         scores = self.vectors @ self._vector(query)
         found: dict[str, Hit] = {}
         for row in self.model.loop.run(scores, len(scores)):
@@ -159,7 +174,7 @@ class Index:
         """What the file says, but for the vectors and the model."""
         return self.folder.absolute(), self.unit, self.members
 
-    def _vector(self, query: str | Motion) -> Floats:
+    def _vector(self, query: Query) -> Floats:
         """The vector (E,) of a sentence or a motion."""
         return self.model.embed_text(query) if isinstance(query, str) else direction(self.model, query)
 
