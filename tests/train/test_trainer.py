@@ -121,7 +121,7 @@ families = pytest.mark.parametrize("family", LEARNERS)
 
 @pytest.fixture(autouse=True)
 def short_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("motet_train.papers.tdbn.divergence.EVERY", 2)
+    monkeypatch.setattr("motet_train.papers.tdbn.divergence.EPOCHS_A_CHUNK", 2)
 
 
 def trained(learner: Learner, folder: Path, **options: Any) -> dict[str, Tensor]:

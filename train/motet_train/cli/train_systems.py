@@ -9,9 +9,9 @@ import click
 from motet_train.cli.train_options import train_command
 from motet_train.cli.train_predict import AUGMENTATION, read_expmap_files
 from motet_train.papers.li2018.material import expmap_material, validation_files
-from motet_train.papers.li2018.protocol import WINDOW
+from motet_train.papers.li2018.protocol import PROTOCOL_WINDOW
 from motet_train.papers.li2018.recipe import RECIPES, train_system
-from motet_train.papers.li2018.systems import TITLES
+from motet_train.papers.li2018.systems import SYSTEM_TITLES
 from motet_train.recipes.recipe import Job
 from motet_train.runs import Run
 
@@ -40,10 +40,13 @@ SWITCHES = (
 def _command(name: str, title: str, *switches: Callable[..., Any]) -> click.Command:
     def run(job: Job, data: Path, all_files: bool) -> Run:
         corpus = read_expmap_files(data)
-        return train_system(expmap_material(corpus, () if all_files else validation_files(corpus, WINDOW)), job)
+        kept_back = () if all_files else validation_files(corpus, PROTOCOL_WINDOW)
+        return train_system(expmap_material(corpus, kept_back), job)
 
     run.__doc__ = f"Train {title}, which `motet train predict` is compared with."
     return train_command(name, RECIPES[name], *OPTIONS, *switches)(run)
 
 
-COMMANDS = tuple(_command(name, title, *(SWITCHES if name == "convseq2seq" else ())) for name, title in TITLES.items())
+COMMANDS = tuple(
+    _command(name, title, *(SWITCHES if name == "convseq2seq" else ())) for name, title in SYSTEM_TITLES.items()
+)

@@ -16,10 +16,10 @@ from motet.motion.rotations import Array
 from motet_train.data.archive import Archive
 from motet_train.data.errors import DataError
 
-CONSTANT = 1e-4
+CONSTANT_STD = 1e-4
 """A column whose standard deviation over the training files is smaller is dropped (protocol)."""
 
-ROOT = 6
+ROOT_COLUMNS = 6
 """Columns of the root: translation and rotation."""
 
 Files = Mapping[str, Mapping[str, Array]]
@@ -130,7 +130,7 @@ def scaling_of(train: Files) -> Scaling:
         raise DataError("there are no training files")
     frames = np.concatenate(motions)
     std = frames.std(axis=0)
-    kept = tuple(int(column) for column in np.flatnonzero(std >= CONSTANT))
+    kept = tuple(int(column) for column in np.flatnonzero(std >= CONSTANT_STD))
     return Scaling(frames.mean(axis=0), std, kept)
 
 

@@ -4,7 +4,7 @@ The 38 exponential maps of a line of CMU's text files are those of the joints of
 leg first, tips of bones among them: the order of :attr:`motet.motion.skeleton.Skeleton.joints`. Vectors of joints are
 rows there and are turned by the matrix from the right, so a rotation here is the transposed one. (The .amc of a test
 file, 35_01 of walking/walking_1.txt, gives the same rotations.) Who moved is not in a file; bones are those of
-:data:`BONES`.
+:data:`DRAWN_TRIAL`.
 """
 
 from collections.abc import Mapping
@@ -27,13 +27,13 @@ from motet_train.papers.li2018.material import STRIDE
 from motet_train.papers.li2018.protocol import OUTPUT_FRAMES, SEED_FRAMES, predictor, windows
 from motet_train.papers.li2018.report import MANY, Results
 
-EVERY, GIVEN = 2, 4
+FRAMES_APART, SEED_POSES = 2, 4
 """Frames from one stick figure to the next, and stick figures of seed frames."""
 
 DRAWN = ("running", "jumping")
 """Actions of which stick figures are drawn."""
 
-BONES = "39_14"
+DRAWN_TRIAL = "39_14"
 """The CMU trial whose skeleton they have."""
 
 
@@ -45,10 +45,10 @@ def drawings(results: Results) -> Drawings:
             errors.setdefault(action, {})[name] = parts[MANY, action]
     found = {"predict-error": partial(error_over_time, errors, corpus.layout.fps / STRIDE, "Euler error")}
     if corpus.layout is CMU_LAYOUT:
-        skeleton = skeleton_of(read_motion(cmu_trial(BONES)))
+        skeleton = skeleton_of(read_motion(cmu_trial(DRAWN_TRIAL)))
         for action in (action for action in DRAWN if action in corpus.test):
             poses = strips(drawn(results.models, results.groups), corpus, action, skeleton)
-            found[f"predict-{action}"] = partial(strips_drawing, poses, skeleton, GIVEN)
+            found[f"predict-{action}"] = partial(strips_drawing, poses, skeleton, SEED_POSES)
     return found
 
 
@@ -83,11 +83,11 @@ def strips(
 ) -> dict[str, Array]:
     """The first test window of an action: the truth, and each prediction; places (K, J, 3) of every second frame.
 
-    The first :data:`GIVEN` poses are seed frames. The root's rotation is drawn as predicted, though not measured.
+    The first :data:`SEED_POSES` poses are seed frames. The root's rotation is drawn as predicted, though not measured.
     """
     window = windows(next(iter(corpus.test[action].values())), 1)
     seed = window[:, :SEED_FRAMES]
     found = {"truth": window}
     found |= {name: np.concatenate([seed, predictor(name, m, corpus)(seed)], axis=1) for name, m in models.items()}
-    shown = slice(SEED_FRAMES - GIVEN * EVERY, SEED_FRAMES + OUTPUT_FRAMES, EVERY)
+    shown = slice(SEED_FRAMES - SEED_POSES * FRAMES_APART, SEED_FRAMES + OUTPUT_FRAMES, FRAMES_APART)
     return {name: places(frames[0, shown], skeleton) for name, frames in found.items()}

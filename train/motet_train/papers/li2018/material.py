@@ -10,7 +10,7 @@ from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
 from motet_train.data.cmu_trials import CMU_LICENCE
 from motet_train.data.predict_data import Material
-from motet_train.papers.li2018.expmap_files import ROOT, ExpmapCorpus, Layout, scaling_of
+from motet_train.papers.li2018.expmap_files import ROOT_COLUMNS, ExpmapCorpus, Layout, scaling_of
 
 STRIDE = 2
 """Of the protocol: every second frame of a text file."""
@@ -36,7 +36,7 @@ def expmap_material(corpus: ExpmapCorpus, kept_back: Sequence[str] = ()) -> Expm
     contract = MotionContract("angles", channels, units, layout.fps / STRIDE, scaling.mean, std, None)
     sequences, chances = _visited(corpus, kept_back)
     mirrored, signs = _mirrored_columns(layout)
-    held = sum(column < ROOT for column in scaling.kept)
+    held = sum(column < ROOT_COLUMNS for column in scaling.kept)
     about = {"name": layout.name, "files": len(sequences), "missing": list(corpus.missing)}
     if kept_back:
         about["validation"] = list(kept_back)

@@ -13,13 +13,13 @@ from motet.models.predict import PredictModel
 from motet.motion.rotations import Array, rotvec_to_rotmat
 from motet_train.data.errors import DataError
 from motet_train.evaluate.predict.error_rows import REPORTED
-from motet_train.papers.li2018.expmap_files import CONSTANT, ROOT, ExpmapCorpus, Scaling
+from motet_train.papers.li2018.expmap_files import CONSTANT_STD, ROOT_COLUMNS, ExpmapCorpus, Scaling
 from motet_train.papers.li2018.material import STRIDE
 
-SEED, SEED_FRAMES, OUTPUT_FRAMES = 1234567890, 50, 25
-WINDOW = SEED_FRAMES + OUTPUT_FRAMES
+WINDOW_SEED, SEED_FRAMES, OUTPUT_FRAMES = 1234567890, 50, 25
+PROTOCOL_WINDOW = SEED_FRAMES + OUTPUT_FRAMES
 
-LABELS = (80, 160, 320, 400, 560, 1000)
+LABELLED_MS = (80, 160, 320, 400, 560, 1000)
 """The milliseconds customary in tables; files of 120 Hz have others, see :func:`true_times`."""
 
 Continuation = Callable[[Array], Array]
@@ -52,22 +52,22 @@ def euler_frames(frames: Array) -> Array:
     vectors = frames[..., 3:].reshape(*frames.shape[:-1], -1, 3)
     angles = rotmat_to_protocol_euler(rotvec_to_rotmat(vectors)).reshape(*frames.shape[:-1], -1)
     result = np.zeros(frames.shape)
-    result[..., ROOT:] = angles[..., ROOT - 3 :]
+    result[..., ROOT_COLUMNS:] = angles[..., ROOT_COLUMNS - 3 :]
     return result
 
 
 def window_starts(length: int, count: int = 8) -> NDArray[np.int64]:
     """Starts (W,) of the test windows in a motion of ``length`` sub-sampled frames, from the protocol's generator."""
-    if length <= WINDOW:
-        raise DataError(f"a test motion of {length} frames is too short: windows need more than {WINDOW}")
-    generator = np.random.RandomState(SEED)
-    return np.array([generator.randint(0, length - WINDOW) for _ in range(count)], dtype=np.int64)
+    if length <= PROTOCOL_WINDOW:
+        raise DataError(f"a test motion of {length} frames is too short: windows need more than {PROTOCOL_WINDOW}")
+    generator = np.random.RandomState(WINDOW_SEED)
+    return np.array([generator.randint(0, length - PROTOCOL_WINDOW) for _ in range(count)], dtype=np.int64)
 
 
 def windows(motion: Array, count: int = 8) -> Array:
     """The test windows (W, 75, C) of a motion (T, C) at its file's frame rate."""
     frames = motion[::STRIDE]
-    return np.stack([frames[start : start + WINDOW] for start in window_starts(len(frames), count)])
+    return np.stack([frames[start : start + PROTOCOL_WINDOW] for start in window_starts(len(frames), count)])
 
 
 def window_errors(predicted: Array, truth: Array) -> Array:
@@ -77,7 +77,7 @@ def window_errors(predicted: Array, truth: Array) -> Array:
 
 def euler_errors(predicted: Array, angles: Array) -> Array:
     """As :func:`window_errors`, against windows (W, 75, C) whose frames are Euler angles, :func:`euler_frames`."""
-    counted = angles.std(axis=1, keepdims=True) > CONSTANT
+    counted = angles.std(axis=1, keepdims=True) > CONSTANT_STD
     difference = np.where(counted, euler_frames(predicted) - angles[:, SEED_FRAMES:], 0.0)
     error: Array = np.linalg.norm(difference, axis=-1)
     return error
@@ -89,8 +89,8 @@ def rotation_errors(predicted: Array, truth: Array) -> Array:
     Not of the protocol: Euler errors leap where a joint passes gimbal lock, these do not. Arguments as in
     :func:`window_errors`.
     """
-    vectors, said = (frames[..., ROOT:].reshape(*frames.shape[:-1], -1, 3) for frames in (truth, predicted))
-    moving = (vectors.std(axis=1, keepdims=True) > CONSTANT).any(axis=-1)
+    vectors, said = (frames[..., ROOT_COLUMNS:].reshape(*frames.shape[:-1], -1, 3) for frames in (truth, predicted))
+    moving = (vectors.std(axis=1, keepdims=True) > CONSTANT_STD).any(axis=-1)
     apart = rotvec_to_rotmat(said) - rotvec_to_rotmat(vectors[:, SEED_FRAMES:])
     half_sin = np.linalg.norm(apart, axis=(-2, -1)) / np.sqrt(8)
     angles = 2 * np.degrees(np.arcsin(np.minimum(half_sin, 1.0)))

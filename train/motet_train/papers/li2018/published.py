@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from numpy import nan
 
-FRAMES = (1, 3, 7, 9, 24)
+PUBLISHED_FRAMES = (1, 3, 7, 9, 24)
 
 Rows = Mapping[str, tuple[float, ...]]
 """System -> errors at output frames 1, 3, 7, 9 and 24."""
@@ -94,7 +94,7 @@ AVERAGES: Mapping[str, Rows] = {
 }
 """Name of a layout -> over all its actions: tables 4 and 2, and Mao et al."""
 
-GOALS: Mapping[str, Rows] = {
+PREDICTOR_GOALS: Mapping[str, Rows] = {
     "cmu-expmap": {"windows_8": (0.26, 0.39, 0.67, 0.78, 1.20), "windows_256": (0.25, 0.39, 0.64, 0.74, 1.10)}
 }
 """What the small predictor is to reach on the complete actions, by the windows measured."""

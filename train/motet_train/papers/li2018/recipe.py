@@ -16,7 +16,7 @@ from motet_train.data.windows import Windows
 from motet_train.descent import Descent, GradientLearner, Term, Terms, Training
 from motet_train.papers.li2018 import convseq2seq, lstm_3lr, lstm_ae, rrnn, srnn
 from motet_train.papers.li2018.material import ExpmapMaterial
-from motet_train.papers.li2018.protocol import OUTPUT_FRAMES, SEED_FRAMES, WINDOW
+from motet_train.papers.li2018.protocol import OUTPUT_FRAMES, PROTOCOL_WINDOW, SEED_FRAMES
 from motet_train.papers.li2018.stepwise import Stepwise
 from motet_train.papers.li2018.systems import stepwise
 from motet_train.recipes.predict import possible
@@ -93,7 +93,7 @@ def train_system(material: ExpmapMaterial, job: Job) -> Run:
     )
     net, kept = stepwise(job.recipe.model, manifest["config"]), list(material.kept)
     net.measure_by(material.contract.mean[kept], material.contract.std[kept])
-    learner = _learner(net.to(job.device), config, Windows(material, WINDOW, **asdict(visits)), job)
+    learner = _learner(net.to(job.device), config, Windows(material, PROTOCOL_WINDOW, **asdict(visits)), job)
     trained = learner.kept
     assert isinstance(trained, Stepwise)
     return job.run(trained, learner, manifest)
@@ -117,7 +117,7 @@ def _learner(net: Stepwise, config: Any, windows: Windows, job: Job) -> Gradient
         return learner
     if not isinstance(config, convseq2seq.Config):
         raise DataError("this system is not trained against an adversary")
-    adversary = Adversary(net, convseq2seq.Discriminator(config, WINDOW).to(job.device), training)
+    adversary = Adversary(net, convseq2seq.Discriminator(config, PROTOCOL_WINDOW).to(job.device), training)
     learner = GradientLearner(*given, adversary.loss, batches, validated, net.system.progress, adversary.parts)
     return learner
 
@@ -158,7 +158,7 @@ def validation_error(net: Stepwise, material: Material) -> float:
 
     Over windows of the held-out motions, or of all where none could be held out.
     """
-    long = [s for s in material.validation or material.sequences if len(s) > material.stride * (WINDOW - 1)]
+    long = [s for s in material.validation or material.sequences if len(s) > material.stride * (PROTOCOL_WINDOW - 1)]
     windows = torch.from_numpy(np.concatenate([_spread(s, material.stride) for s in long])).to(net.mean.device)
     off = net(windows[:, :SEED_FRAMES], OUTPUT_FRAMES) - windows[:, SEED_FRAMES:]
     moved = list(material.kept[material.held :])
@@ -167,5 +167,5 @@ def validation_error(net: Stepwise, material: Material) -> float:
 
 def _spread(sequence: NDArray[np.float32], stride: int) -> NDArray[np.float32]:
     """Windows (W, L + N, C) all along a sequence (T, C)."""
-    starts = np.linspace(0, len(sequence) - stride * (WINDOW - 1) - 1, VALIDATION_WINDOWS).astype(int)
-    return sequence[starts[:, None] + stride * np.arange(WINDOW)]
+    starts = np.linspace(0, len(sequence) - stride * (PROTOCOL_WINDOW - 1) - 1, VALIDATION_WINDOWS).astype(int)
+    return sequence[starts[:, None] + stride * np.arange(PROTOCOL_WINDOW)]

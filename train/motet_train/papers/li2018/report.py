@@ -16,7 +16,7 @@ from motet_train.evaluate.predict.floors import FLOORS
 from motet_train.evaluate.predict.seed_groups import Models, Ready, SeedGroup, mean, pooled, ready, seed_groups, spread
 from motet_train.papers.li2018.expmap_files import ExpmapCorpus, Scaling, scaling_of
 from motet_train.papers.li2018.protocol import (
-    LABELS,
+    LABELLED_MS,
     Continuation,
     errors,
     predictions,
@@ -24,27 +24,27 @@ from motet_train.papers.li2018.protocol import (
     rotation_errors,
     true_times,
 )
-from motet_train.papers.li2018.published import AVERAGES, BY_ACTION, FRAMES, GOALS, Rows, mean_over
+from motet_train.papers.li2018.published import AVERAGES, BY_ACTION, PREDICTOR_GOALS, PUBLISHED_FRAMES, Rows, mean_over
 from motet_train.papers.li2018.text_floors import text_floors
 
-FEW, MANY, ROTATION = "windows_8", "windows_256", "rotation"
+FEW, MANY, ANGLES = "windows_8", "windows_256", "rotation"
 """As many windows of each action as papers take; enough for a figure without much noise; and of those, not the Euler
 error but :func:`motet_train.papers.li2018.protocol.rotation_errors`."""
 
-TITLES = {
+KIND_TITLES = {
     FEW: "8 windows of each action",
     MANY: "256 windows of each action",
-    ROTATION: "256 windows, mean angle between predicted and true rotations of the joints that move, degrees",
+    ANGLES: "256 windows, mean angle between predicted and true rotations of the joints that move, degrees",
 }
 
-MEAN, EVERY = "mean", "every"
+MEAN, ALL = "mean", "every"
 """In place of an action: the mean of those with all their files, and that of all, which only papers measured."""
 
 PUBLISHED = "published: "
 """What the names of systems begin with that were not measured here."""
 
 Errors = Mapping[str, Mapping[tuple[str, str], Array]]
-"""System -> FEW, MANY or ROTATION, and an action or MEAN -> error (25,)."""
+"""System -> FEW, MANY or ANGLES, and an action or MEAN -> error (25,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +90,7 @@ def protocol_results(models: Models, corpus: ExpmapCorpus) -> Results:
 def _errors(system: Continuation, corpus: ExpmapCorpus, scaling: Scaling) -> dict[tuple[str, str], Array]:
     test = {action: list(files.values()) for action, files in corpus.test.items()}
     few, many = (predictions(system, test, scaling, count) for count in (8, 256))
-    found = {FEW: errors(few), MANY: errors(many), ROTATION: errors(many, rotation_errors)}
+    found = {FEW: errors(few), MANY: errors(many), ANGLES: errors(many, rotation_errors)}
     for measured in found.values():
         measured[MEAN] = np.mean([measured[action] for action in complete(corpus)], axis=0)
     return {(kind, action): error for kind, measured in found.items() for action, error in measured.items()}
@@ -110,17 +110,17 @@ def protocol_table(found: Errors, corpus: ExpmapCorpus, spreads: Errors | None =
     beside = spreads or {}
     rows = ErrorRows(bool(beside))
     rows.head("milliseconds, true", (f"{time:.0f}" for time in true_times(corpus.layout.fps)))
-    rows.head("milliseconds, as papers label them", map(str, LABELS))
+    rows.head("milliseconds, as papers label them", map(str, LABELLED_MS))
     if beside:
         rows.title(BRACKETS)
     known = published(corpus)
     for kind, action in dict.fromkeys(part for parts in (*found.values(), *known.values()) for part in parts):
-        if action in (EVERY, next(iter(corpus.test))):
+        if action in (ALL, next(iter(corpus.test))):
             rows.title()
         if action == next(iter(corpus.test)):
-            rows.title(TITLES[kind])
+            rows.title(KIND_TITLES[kind])
         means = {MEAN: f"mean of {', '.join(complete(corpus))}"}
-        means[EVERY] = f"average of all {len(corpus.layout.test)} actions, 8 windows"
+        means[ALL] = f"average of all {len(corpus.layout.test)} actions, 8 windows"
         rows.title(means.get(action, action))
         for name, parts in (*found.items(), *known.items()):
             if (kind, action) in parts:
@@ -132,18 +132,18 @@ def published(corpus: ExpmapCorpus) -> Errors:
     """What papers report of a corpus, on eight windows, and the goals of the small predictor."""
     actions, found = BY_ACTION[corpus.layout.name], dict[str, dict[tuple[str, str], Array]]()
     parts: dict[str, Rows] = {action: actions.get(action, {}) for action in corpus.test}
-    parts |= {MEAN: mean_over(actions, complete(corpus)), EVERY: AVERAGES[corpus.layout.name]}
+    parts |= {MEAN: mean_over(actions, complete(corpus)), ALL: AVERAGES[corpus.layout.name]}
     for action in sorted(parts, key=lambda action: -len(parts[action])):  # so that systems keep the papers' order
         for name, values in parts[action].items():
             found.setdefault(PUBLISHED + name, {})[FEW, action] = at_frames(values)
-    goals = GOALS.get(corpus.layout.name, {})
+    goals = PREDICTOR_GOALS.get(corpus.layout.name, {})
     return {**found, "goal": {(kind, MEAN): at_frames(values) for kind, values in goals.items()}}
 
 
 def at_frames(values: Sequence[float]) -> Array:
     """Published values as an error (N,), NaN at frames that papers do not report."""
-    error = np.full(max(FRAMES) + 1, np.nan)
-    error[list(FRAMES)] = values
+    error = np.full(max(PUBLISHED_FRAMES) + 1, np.nan)
+    error[list(PUBLISHED_FRAMES)] = values
     return error
 
 

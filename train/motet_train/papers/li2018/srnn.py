@@ -20,7 +20,7 @@ Tensors = dict[str, Tensor]
 Halves = tuple[Tensor, Tensor]
 """Hidden units and memory of the members of a type, each (B, K, U)."""
 
-LIMBS = ("arm", "leg")
+PAIRED_NODES = ("arm", "leg")
 NODES = {"spine": 1, "arm": 2, "leg": 2}
 """Type -> its members; of limbs the left one, then the right one."""
 
@@ -194,7 +194,7 @@ def _each(rnns: nn.ModuleDict, given: Tensors, state: Tensor) -> tuple[Tensors, 
 
 
 def _relations() -> list[tuple[str, str]]:
-    return [pair for limb in LIMBS for pair in (("spine", limb), (limb, limb))]
+    return [pair for limb in PAIRED_NODES for pair in (("spine", limb), (limb, limb))]
 
 
 def _widths(config: Config) -> dict[str, int]:
@@ -210,7 +210,7 @@ def _widths(config: Config) -> dict[str, int]:
 def _concatenated(now: Tensors, before: Tensors) -> Tensors:
     """The edges' features: those of both nodes, summed over edges of one type to one node (the authors' code)."""
     found = {name: torch.cat([before[name], now[name]], dim=-1) for name in NODES}
-    for limb in LIMBS:
+    for limb in PAIRED_NODES:
         pair = now[limb]
         spine = torch.cat([now["spine"].expand(-1, -1, 2, -1), pair], dim=-1)
         found[f"spine_{limb}"] = torch.cat([spine.sum(2, keepdim=True), spine], dim=2)
@@ -220,6 +220,6 @@ def _concatenated(now: Tensors, before: Tensors) -> Tensors:
 
 def _known(features: Tensors, told: Tensors) -> Tensors:
     """What each node is given: its features and what the edges that lead to it tell."""
-    spine = [told["spine"], *(told[f"spine_{limb}"][:, :, :1] for limb in LIMBS)]
-    limbs = {limb: [told[limb], told[f"spine_{limb}"][:, :, 1:], told[f"{limb}_{limb}"]] for limb in LIMBS}
+    spine = [told["spine"], *(told[f"spine_{limb}"][:, :, :1] for limb in PAIRED_NODES)]
+    limbs = {limb: [told[limb], told[f"spine_{limb}"][:, :, 1:], told[f"{limb}_{limb}"]] for limb in PAIRED_NODES}
     return {name: torch.cat([features[name], *rest], dim=-1) for name, rest in {"spine": spine, **limbs}.items()}

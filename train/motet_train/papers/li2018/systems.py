@@ -17,7 +17,7 @@ SYSTEMS: Mapping[str, tuple[type[Any], type[Any]]] = {
 }
 """Name -> the system and its configuration, a dataclass."""
 
-TITLES = {
+SYSTEM_TITLES = {
     "convseq2seq": "the convolutional sequence-to-sequence model (Li et al. 2018)",
     "rrnn": "the residual recurrent net (Martinez et al. 2017)",
     "erd": "the encoder-recurrent-decoder (Fragkiadaki et al. 2015)",

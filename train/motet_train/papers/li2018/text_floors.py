@@ -11,8 +11,8 @@ from motet_train.papers.li2018.expmap_files import ExpmapCorpus, Files, Scaling,
 from motet_train.papers.li2018.material import STRIDE
 from motet_train.papers.li2018.protocol import (
     OUTPUT_FRAMES,
+    PROTOCOL_WINDOW,
     SEED_FRAMES,
-    WINDOW,
     Continuation,
     euler_errors,
     euler_frames,
@@ -52,7 +52,9 @@ def chosen(corpus: ExpmapCorpus) -> Array:
     measured = {group: files for group, files in corpus.train.items() if group in corpus.test} or corpus.train
     windows = training_windows(measured, scaling_of(corpus.train))
     if not windows:
-        raise DataError(f"no training file has a window of {WINDOW} frames, by which damped velocity is chosen")
+        raise DataError(
+            f"no training file has a window of {PROTOCOL_WINDOW} frames, by which damped velocity is chosen"
+        )
     angles = {group: euler_frames(truth) for group, truth in windows.items()}
     return best([_error(velocity(decay), windows, angles) for decay in DECAYS])
 
@@ -68,12 +70,12 @@ def training_windows(train: Files, scaling: Scaling) -> dict[str, Array]:
     found = {}
     for group, files in train.items():
         # a file's first frame can be a T-pose that was added
-        long = [frames[1::STRIDE] for frames in files.values() if len(frames[1::STRIDE]) >= WINDOW]
+        long = [frames[1::STRIDE] for frames in files.values() if len(frames[1::STRIDE]) >= PROTOCOL_WINDOW]
         if long:
             found[group] = scaling.with_constants(np.concatenate([_spread(frames) for frames in long]))
     return found
 
 
 def _spread(frames: Array) -> Array:
-    starts = np.linspace(0, len(frames) - WINDOW, EACH).astype(int)
-    return np.stack([frames[start : start + WINDOW] for start in starts])
+    starts = np.linspace(0, len(frames) - PROTOCOL_WINDOW, EACH).astype(int)
+    return np.stack([frames[start : start + PROTOCOL_WINDOW] for start in starts])

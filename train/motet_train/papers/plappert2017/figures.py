@@ -21,7 +21,7 @@ from motet_train.evaluate.language.prompts import ASKED
 from motet_train.evaluate.language.split_store import SplitStore, unknown_words_allowed
 from motet_train.trainer import LOG
 
-STRIPS = 6
+DRAWN_MOTIONS = 6
 """Strips of a picture of test motions."""
 
 ELSE = "other"
@@ -101,7 +101,7 @@ class Contexts:
 
 def descriptions(model: DescribeModel, corpus: SplitStore) -> Figure:
     """Figure 6: test motions with the three best descriptions and their log-probabilities."""
-    test = corpus.described(corpus.parts.test, STRIPS)
+    test = corpus.described(corpus.parts.test, DRAWN_MOTIONS)
     motions = corpus.motions(test)
     rows = [
         "\n".join(f"{found.text}   {found.log_probability:.2f}" for found in row[:3]) for row in model.describe(motions)

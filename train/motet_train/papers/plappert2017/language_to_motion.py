@@ -22,7 +22,7 @@ from motet_train.models.language.summary import SummaryHead
 from motet_train.models.net import Part, tuples
 from motet_train.models.normalised import normalised
 from motet_train.papers.plappert2017.layer_norm_gru import LayerNormGRU
-from motet_train.papers.plappert2017.mixture import Mixture, MixtureHead
+from motet_train.papers.plappert2017.mixture_head import Mixture, MixtureHead
 
 LOSSES = {"surrogate": Mixture.surrogate_loss, "likelihood": lambda *given: -Mixture.log_likelihood(*given)}
 """Eq. 12, on which the paper's net was trained, and eq. 11, the true likelihood."""

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from motet.motion.sides import LEFT, MIDDLE, sides_of
 from motet.motion.skeleton import Skeleton
 
-TRUNK = "trunk"
+TRUNK_PART = "trunk"
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,11 +31,11 @@ def body_parts(skeleton: Skeleton, channels: tuple[str, ...]) -> BodyParts:
     the trunk's.
     """
     sides = sides_of(skeleton.names)
-    limb_of = [TRUNK] * len(skeleton.joints)
+    limb_of = [TRUNK_PART] * len(skeleton.joints)
     for i, joint in enumerate(skeleton.joints[1:], start=1):
-        limb_of[i] = limb_of[joint.parent] if limb_of[joint.parent] != TRUNK or sides[i] == MIDDLE else joint.name
+        limb_of[i] = limb_of[joint.parent] if limb_of[joint.parent] != TRUNK_PART or sides[i] == MIDDLE else joint.name
     limbs = dict(zip(skeleton.names, limb_of, strict=True))
-    of_joint = [limbs.get(channel.rpartition(".")[0], TRUNK) for channel in channels]
+    of_joint = [limbs.get(channel.rpartition(".")[0], TRUNK_PART) for channel in channels]
     names = tuple(dict.fromkeys(of_joint))
     legs = [names.index(limb) for limb in _legs(skeleton, limb_of, sides) if limb in names]
     return BodyParts(names, np.array([names.index(limb) for limb in of_joint]), tuple(legs) if len(legs) == 2 else ())
@@ -45,6 +45,6 @@ def _legs(skeleton: Skeleton, limb_of: list[str], sides: tuple[str, ...]) -> lis
     """The limbs of the lowest tip on each side at rest, left first."""
     lowest: dict[str, tuple[float, str]] = {}
     for limb, side, (_, height, _) in zip(limb_of, sides, skeleton.rest_positions, strict=True):
-        if limb != TRUNK:
+        if limb != TRUNK_PART:
             lowest[side] = min(lowest.get(side, (np.inf, "")), (float(height), limb))
     return [limb for _, (_, limb) in sorted(lowest.items(), key=lambda item: item[0] != LEFT)]

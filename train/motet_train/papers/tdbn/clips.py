@@ -12,13 +12,9 @@ from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
 from motet.representation.base import phases
-from motet.representation.contract import FLOORS
 from motet.representation.retargeting import in_joints_of
 from motet_train.data.cmu_trials import CMU_CLIPS, CMU_LICENCE, cmu_trial
 from motet_train.data.errors import DataError
-
-CONSTANT = FLOORS["deg"]
-"""Degrees: a channel with a smaller standard deviation is as good as constant."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from motet_train.papers.tdbn.contrastive import (
     parameter,
 )
 
-LARGEST = 1e3
+LARGEST_WEIGHT = 1e3
 """A weight beyond this shows that training diverged; normally weights stay near 1."""
 
 
@@ -134,8 +134,8 @@ class CRBMLayer(Layer):
         """Visit the epoch's batches; DivergedError where the weights leave all bounds."""
         for rows in epoch.batches:
             error = self._update(self.data.past[rows], self.data.visible[rows], self.data.control[rows], epoch)
-        if not self.crbm.past_weight.abs().max() <= LARGEST:
-            raise DivergedError(f"training diverged: the CRBM has weights beyond {LARGEST:g}")
+        if not self.crbm.past_weight.abs().max() <= LARGEST_WEIGHT:
+            raise DivergedError(f"training diverged: the CRBM has weights beyond {LARGEST_WEIGHT:g}")
         return float(error.square().mean())
 
     def _update(self, past: Tensor, visible: Tensor, control: Tensor, epoch: Epoch) -> Tensor:

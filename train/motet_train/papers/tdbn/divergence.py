@@ -13,10 +13,10 @@ from motet_train.papers.tdbn.contrastive import Layer, Stage
 from motet_train.runs import RunError
 from motet_train.trainer import Part
 
-EVERY = 200
+EPOCHS_A_CHUNK = 200
 """Epochs from one checkpoint to the next, within a stage."""
 
-MANY = 1000
+MORE_GOALS = 1000
 """More goals than exist."""
 
 
@@ -48,10 +48,10 @@ class DivergenceLearner:
         self.stages, self.generator, self.missed = stages, generator, missed
         self.bounds = list(accumulate((stage.epochs for stage in stages), initial=0))
         spans = zip(self.bounds, self.bounds[1:], strict=False)
-        self.ends = [end for start, stop in spans for end in (*range(start + EVERY, stop, EVERY), stop)]
+        self.ends = [end for span in spans for end in (*range(*span, EPOCHS_A_CHUNK)[1:], span[1])]
         self.parts: dict[str, Part] = {"net": net, **others, "learning": self}
         self.layer: Layer | None = None
-        self.done, self.fewest = 0, MANY
+        self.done, self.fewest = 0, MORE_GOALS
 
     def chunk(self, start: int, stop: int, rng: np.random.Generator) -> Iterator[tuple[int, float, float]]:
         """Train from one epoch to another of the same stage; all random numbers are the generator's."""

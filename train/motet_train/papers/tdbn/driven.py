@@ -22,13 +22,13 @@ from motet.motion.rotations import Array, quat_to_rotmat, rotmat_to_quat
 from motet.representation.root_sixd import ROOT_SIXD, sixd_to_rotmat
 from motet_train.papers.tdbn.courses import LABELS, controls_of
 
-HASTE = 3.0
+TURN_RATE = 3.0
 """1/s: how fast a figure is told to turn, for each radian that its facing is off."""
 
-STANDS = ContactSettings(heights=(0.03, 0.03))
+SOLE_CONTACTS = ContactSettings(heights=(0.03, 0.03))
 """A foot stands, for the foot lock, by the height of its lowest point: the net says nothing of contacts."""
 
-SPEEDS = {"walk": (0.3, 1.8), "run": (1.8, 4.0)}
+GAIT_SPEEDS = {"walk": (0.3, 1.8), "run": (1.8, 4.0)}
 """m/s. The net has no gaits: it walks or runs as the speed asks."""
 
 
@@ -38,7 +38,7 @@ class Driven:
     :class:`motet.models.steer.SteerModel`: the part of it that measures use."""
 
     model: TdbnModel
-    gaits: tuple[str, ...] = tuple(SPEEDS)
+    gaits: tuple[str, ...] = tuple(GAIT_SPEEDS)
 
     @staticmethod
     def fits(model: TdbnModel) -> bool:
@@ -53,7 +53,7 @@ class Driven:
     @property
     def speeds(self) -> dict[str, tuple[float, float]]:
         """The slowest and the fastest that each gait is asked for, m/s."""
-        return SPEEDS
+        return GAIT_SPEEDS
 
     def start(self, start: str | None = None, *, characters: int = 1, hold_feet: bool = True) -> "DrivenSession":
         """A session of figures that stand, whatever the gait. hold_feet: with the foot lock."""
@@ -94,7 +94,7 @@ class DrivenSession:
         """The next pose of all figures."""
         speed, direction, facing = self.told
         aside, off = direction - self.ground[:, 2], wrapped(facing - self.ground[:, 2])
-        velocities = np.stack([speed * np.cos(aside), speed * np.sin(aside), HASTE * off], axis=-1)
+        velocities = np.stack([speed * np.cos(aside), speed * np.sin(aside), TURN_RATE * off], axis=-1)
         self.session.set_control(controls_of(velocities))
         pose = self.pose(self.session.step())
         return pose if self.lock is None else self.lock.held(pose)
@@ -121,4 +121,4 @@ def _contacts(pose: Pose) -> Floats:
     """Which feet (B, 2) stand, by how high their soles are."""
     turned, places = (part.astype(np.float64) for part in pose.global_transforms())
     heights = sole_points(quat_to_rotmat(turned), places)[..., 1].reshape(len(pose), 2, 3).min(axis=2)
-    return standing(heights, None, STANDS).astype(np.float32)
+    return standing(heights, None, SOLE_CONTACTS).astype(np.float32)

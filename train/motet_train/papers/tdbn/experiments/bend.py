@@ -7,7 +7,7 @@ from motet.motion.rotations import Array
 from motet_train.papers.tdbn.experiments.measures import upsample
 from motet_train.papers.tdbn.experiments.study import ControlStudy, Recording
 
-DOWN, RISEN, NEAR = 0.8, 0.3, 0.5
+BEND_DOWN, BEND_RISEN, BEND_NEAR = 0.8, 0.3, 0.5
 """Depth that counts as down, depth after it that counts as risen, z to the clip's deepest poses."""
 
 MOMENTS = {"early": 0.3, "middle": 0.6, "late": 0.95}
@@ -37,11 +37,11 @@ def depth(study: ControlStudy, frames: Array) -> Array:
 def executed(study: ControlStudy, frames: Array) -> NDArray[np.bool_]:
     """Which of frames (T, B, D) bend: down to the training motion's deepest poses, and then up again."""
     bottom = deepest(study)
-    near = study.reference.distance(frames, upsample(clip(study)[bottom - 4 : bottom + 5])) < NEAR
-    down = near & (depth(study, frames) > DOWN)
+    near = study.reference.distance(frames, upsample(clip(study)[bottom - 4 : bottom + 5])) < BEND_NEAR
+    down = near & (depth(study, frames) > BEND_DOWN)
     first = np.where(down.any(axis=0), down.argmax(axis=0), len(frames))
     after = np.arange(len(frames))[:, None] > first
-    risen: NDArray[np.bool_] = np.any(after & (depth(study, frames) < RISEN), axis=0)
+    risen: NDArray[np.bool_] = np.any(after & (depth(study, frames) < BEND_RISEN), axis=0)
     return risen
 
 

@@ -14,7 +14,7 @@ from motet_train.papers.tdbn.experiments.bend import interrupted
 from motet_train.papers.tdbn.experiments.gaits import gait_control, late_left_leg, ramp
 from motet_train.papers.tdbn.experiments.study import ControlStudy
 
-WALK, RUN, BEND = "#2f6fdb", "#d2452f", "#2f9e5b"
+WALK_COLOUR, RUN_COLOUR, BEND_COLOUR = "#2f6fdb", "#d2452f", "#2f9e5b"
 
 
 def drawings(study: ControlStudy) -> Drawings:
@@ -41,9 +41,9 @@ def limit_cycle(study: ControlStudy) -> Figure:
     plane = _plane(study, study.loop("walk").frames[:, 0])
     figure, (left, right) = panels(1, 2, (9, 4.5), "100 starts with Gaussian noise on the past codes")
     for row in range(frames.shape[1]):
-        left.plot(*plane(frames[:, row]).T, color=WALK, linewidth=0.4, alpha=0.5)
-    _dots(right, plane(frames[0]), RUN, "first frame")
-    _dots(right, plane(frames[-1]), WALK, "after 3 s")
+        left.plot(*plane(frames[:, row]).T, color=WALK_COLOUR, linewidth=0.4, alpha=0.5)
+    _dots(right, plane(frames[0]), RUN_COLOUR, "first frame")
+    _dots(right, plane(frames[-1]), WALK_COLOUR, "after 3 s")
     right.legend()
     _label(left, right)
     return figure
@@ -55,7 +55,7 @@ def perturbed_walk(study: ControlStudy) -> Figure:
     after = late_left_leg(study, 1)[0][: study.frames(1.2), 0]
     figure, (axes,) = panels(1, 1, (13, 2.6), "The left leg is forced to be half a cycle late where the line is")
     _sticks(study, axes, np.concatenate([before, after])[::4])
-    axes.axvline(SPACING * (len(before) / 4 - 0.5), color=RUN, linewidth=1)
+    axes.axvline(SPACING * (len(before) / 4 - 0.5), color=RUN_COLOUR, linewidth=1)
     return figure
 
 
@@ -64,7 +64,7 @@ def synchronisation(study: ControlStudy) -> Figure:
     before = study.hold(study.loop("walk").histories([study.model.taps], study.model.taps), "walk", 2.0).frames[:, 0]
     frames = np.concatenate([before, late_left_leg(study, 1)[0][:, 0]])
     figure, (axes,) = panels(1, 1, (9, 3.5), "The right leg follows the left one")
-    for leg, colour, name in zip(_thighs(study), (RUN, WALK), ("left", "right"), strict=True):
+    for leg, colour, name in zip(_thighs(study), (RUN_COLOUR, WALK_COLOUR), ("left", "right"), strict=True):
         axes.plot(np.arange(len(frames)) / study.fps, frames[:, leg], color=colour, label=name)
     axes.axvline(len(before) / study.fps, color="grey", linestyle=":")
     axes.set(xlabel="seconds", ylabel="thigh, degrees")
@@ -78,7 +78,7 @@ def transition(study: ControlStudy) -> Figure:
     frames = study.play(study.start(study.phases("walk", 1)[0]), gait_control(study, track)).frames[:, 0]
     figure, (axes,) = panels(1, 1, (13, 2.6), "Control changes from walking to running at the line")
     _sticks(study, axes, frames[::4])
-    axes.axvline(SPACING * (study.frames(1.0) / 4 - 0.5), color=RUN, linewidth=1)
+    axes.axvline(SPACING * (study.frames(1.0) / 4 - 0.5), color=RUN_COLOUR, linewidth=1)
     return figure
 
 
@@ -91,11 +91,11 @@ def hysteresis(study: ControlStudy) -> Figure:
     half, sweep = len(gait) // 2, study.frames(5.0)
     figure, axes = panels(1, 3, (13, 3.8), "A gait parameter from 0 (walk) to 1 (run) and back in 5 s")
     for panel, part in zip(axes, (slice(0, half), slice(half, None)), strict=False):
-        panel.plot(np.arange(half) / study.fps, line[part], color=WALK)
+        panel.plot(np.arange(half) / study.fps, line[part], color=WALK_COLOUR)
         panel.twinx().plot(np.arange(half) / study.fps, gait[part], color="grey", linestyle=":")
         panel.set(xlabel="seconds", ylabel="first component")
-    axes[2].plot(gait[:sweep], line[:sweep], color=WALK, label="up")
-    axes[2].plot(gait[half : half + sweep], line[half : half + sweep], color=RUN, label="down")
+    axes[2].plot(gait[:sweep], line[:sweep], color=WALK_COLOUR, label="up")
+    axes[2].plot(gait[half : half + sweep], line[half : half + sweep], color=RUN_COLOUR, label="down")
     axes[2].set(xlabel="gait parameter", ylabel="first component")
     axes[2].legend()
     return figure
@@ -114,7 +114,7 @@ def bifurcation(study: ControlStudy) -> Figure:
     ]
     figure, axes = panels(1, 3, (13, 4.3), "From the walking loop (blue) to the running loop (red)")
     for panel, runs, name in zip(axes, paths, ("sudden", "5 s ramp", "sampled, four runs"), strict=True):
-        for loop, colour in zip(loops, (WALK, RUN), strict=True):
+        for loop, colour in zip(loops, (WALK_COLOUR, RUN_COLOUR), strict=True):
             panel.plot(*plane(loop).T, color=colour, linewidth=2.5, alpha=0.5)
         for run in runs:
             panel.plot(*plane(run).T, ".-", color="black", linewidth=0.7, markersize=2.5)
@@ -136,7 +136,7 @@ def interruption(study: ControlStudy) -> Figure:
     runs |= {name: run.frames[:, 0] for name, run in reversed(interrupted(study, 1).items())}
     figure, axes = panels(1, len(runs), (15, 4.2), "Training motions (dots) and the path of a run (line)")
     for panel, (name, frames) in zip(axes, runs.items(), strict=True):
-        for clip, colour in zip(training, (WALK, BEND, RUN), strict=True):
+        for clip, colour in zip(training, (WALK_COLOUR, BEND_COLOUR, RUN_COLOUR), strict=True):
             _dots(panel, plane(clip), colour)
         panel.plot(*plane(frames).T, color="black", linewidth=0.8)
         panel.set_title(name)

@@ -15,7 +15,7 @@ from motet_train.evaluate.feet import acceleration, leap, slide, speed, stances
 from motet_train.papers.tdbn.experiments.gaits import Figures
 from motet_train.papers.tdbn.experiments.study import ControlStudy
 
-SECONDS = 20.0
+GAIT_S = 20.0
 """Of each gait."""
 
 RANDOM_S, CHANGES = 60.0, (0.25, 0.5, 1.0)
@@ -39,7 +39,7 @@ def standing_feet(study: ControlStudy) -> Figures:
         if label is None:
             continue
         clips = [lay_root_path(model.contract.features(clip)) for clip in study.reference.motions[label]]
-        script = f"{label} {SECONDS:g}s"
+        script = f"{label} {GAIT_S:g}s"
         of = {f"_{role}": [model.run(script)], f"_{role}_plain": [model.run(script, smooth=False)]}
         for ending, motions in {**of, f"_{role}_recorded": clips}.items():
             measured = [_measured(motion, balls) for motion in motions]

@@ -29,8 +29,8 @@ from motet_train.data.store import Store, prepare
 from motet_train.evaluate.steer import following, standing
 from motet_train.evaluate.steer.report import Recorded, steer_report
 from motet_train.manifest import About
-from motet_train.papers.tdbn.body import TRUNK, body_parts
-from motet_train.papers.tdbn.courses import LABELS, MOST, controls_of, course
+from motet_train.papers.tdbn.body import TRUNK_PART, body_parts
+from motet_train.papers.tdbn.courses import FULL_CONTROL, LABELS, controls_of, course
 from motet_train.papers.tdbn.driven import Driven, DrivenSession, moved
 from motet_train.papers.tdbn.steered import RECIPES, mirrored_too, train_steered
 from motet_train.recipes.recipe import Job
@@ -75,7 +75,10 @@ def test_control_values_are_shares_of_each_way() -> None:
     for values, velocity in zip(controls_of(velocities), velocities, strict=True):
         named_values = dict(zip(LABELS, values, strict=True))
         for (plus, minus), speed, most in zip(
-            (("forward", "backward"), ("left", "right"), ("turn_left", "turn_right")), velocity, MOST, strict=True
+            (("forward", "backward"), ("left", "right"), ("turn_left", "turn_right")),
+            velocity,
+            FULL_CONTROL,
+            strict=True,
         ):
             assert named_values[plus] == pytest.approx(min(max(speed, 0) / most, 1))
             assert named_values[minus] == pytest.approx(min(max(-speed, 0) / most, 1))
@@ -103,7 +106,7 @@ def test_mirror_images_balance_left_and_right(store: Store) -> None:
 def test_where_the_root_goes_is_the_trunk_s(store: Store) -> None:
     parts = body_parts(HUMANOID, store.channels)
     by_name = {name: parts.names[part] for name, part in zip(store.channels, parts.of_channel, strict=True)}
-    assert {by_name[name] for name in ROOT_SIXD} == {by_name["head.xx"]} == {TRUNK}
+    assert {by_name[name] for name in ROOT_SIXD} == {by_name["head.xx"]} == {TRUNK_PART}
     assert len(parts.names) == 5
     assert by_name["leftFoot.xy"] != by_name["rightFoot.xy"]
 

@@ -29,7 +29,7 @@ from motet_train.evaluate.predict.seed_groups import SeedGroup, mean, pooled, se
 from motet_train.papers.li2018 import published
 from motet_train.papers.li2018.convseq2seq import Config
 from motet_train.papers.li2018.expmap_files import CMU_LAYOUT, H36M_LAYOUT, ExpmapCorpus, Layout, parse, read_expmap
-from motet_train.papers.li2018.figures import EVERY, GIVEN, places, strips
+from motet_train.papers.li2018.figures import FRAMES_APART, SEED_POSES, places, strips
 from motet_train.papers.li2018.material import expmap_material
 from motet_train.papers.li2018.protocol import windows
 from motet_train.papers.li2018.published import CONV, ERD, RRNN
@@ -281,8 +281,8 @@ def test_strips_are_seed_frames_and_what_follows(tmp_path: Path) -> None:
     corpus = read_expmap(data)
     found = strips({"run": loaded(saved(tmp_path / "run", data, 0))}, corpus, "walking", SKELETON)
     window = windows(corpus.test["walking"]["test/walking/walking_1.txt"])[0]
-    assert [points.shape for points in found.values()] == [(GIVEN + 13, 38, 3)] * 2
-    np.testing.assert_allclose(found["truth"][GIVEN - 1], places(window[50 - EVERY], SKELETON))
+    assert [points.shape for points in found.values()] == [(SEED_POSES + 13, 38, 3)] * 2
+    np.testing.assert_allclose(found["truth"][SEED_POSES - 1], places(window[50 - FRAMES_APART], SKELETON))
     np.testing.assert_allclose(found["truth"][-1], places(window[-1], SKELETON))
-    np.testing.assert_array_equal(found["run"][:GIVEN], found["truth"][:GIVEN])
-    assert np.abs(found["run"][GIVEN:] - found["truth"][GIVEN:]).max(axis=(1, 2)).min() > 0
+    np.testing.assert_array_equal(found["run"][:SEED_POSES], found["truth"][:SEED_POSES])
+    assert np.abs(found["run"][SEED_POSES:] - found["truth"][SEED_POSES:]).max(axis=(1, 2)).min() > 0
