@@ -30,11 +30,12 @@ from motet.formats import clips
 from motet.formats import read_motion as read
 from motet.formats import write_motion as write
 from motet.live.page import live_page, write_live_page
+from motet.models.base import BundleModel
 from motet.models.control import ControlModel
 from motet.models.describe import DescribeModel, Description, Part
 from motet.models.familiarity import Understood
 from motet.models.fill import FillModel
-from motet.models.generate import Generated, GenerateModel
+from motet.models.generate import Generated, GenerateModel, GenerateSettings
 from motet.models.generate_codes import CodesModel, Passage, Story
 from motet.models.generate_mixture import MixtureModel
 from motet.models.index import Hit, Index
@@ -53,6 +54,7 @@ __version__ = version("motet")
 __all__ = [
     "Bundle",
     "BundleError",
+    "BundleModel",
     "Checked",
     "CodesModel",
     "ControlError",
@@ -64,6 +66,7 @@ __all__ = [
     "FillModel",
     "FormatError",
     "GenerateModel",
+    "GenerateSettings",
     "Generated",
     "Hit",
     "Humanoid",

@@ -1,0 +1,98 @@
+"""Write the reference of the Python interface, docs/api.md, from signatures and docstrings: ``python docs/api.py``."""
+
+import ast
+import inspect
+import re
+import textwrap
+from collections.abc import Iterator
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import motet
+import motet.motion
+
+PAGE = Path(__file__).with_suffix(".md")
+HEAD = """# The Python interface
+
+All public names of `motet`, then those of `motet.motion`, in the order of the alphabet. This page is made from
+docstrings by `python docs/api.py`; [architecture.md](architecture.md) has the conventions.
+"""
+
+
+def page() -> str:
+    """The text of docs/api.md."""
+    geometry = [name for name in motet.motion.__all__ if name not in motet.__all__]
+    parts = [HEAD]
+    for module, names in ((motet, motet.__all__), (motet.motion, geometry)):
+        parts += [f"## {module.__name__}\n", *(entry(name, getattr(module, name)) for name in names)]
+    return "\n".join(parts)
+
+
+def entry(name: str, found: Any) -> str:
+    """A public name: a class with its public methods and properties, a function, a module or a constant."""
+    if inspect.isclass(found):
+        code = "\n".join([f"class {name}", *fields(found)])
+        return f"### {name}\n\n{described(code, found)}{''.join(members(found))}"
+    if inspect.isfunction(found):
+        return f"### {name}\n\n{described(signature(found, name), found)}"
+    return (
+        f"### {name}\n\n{prose(inspect.getdoc(found)) if inspect.ismodule(found) else f'A {type(found).__name__}.'}\n"
+    )
+
+
+def fields(kind: type) -> Iterator[str]:
+    """The public fields of a dataclass or of a typed dictionary, as they are written."""
+    for node in tree(kind).body:
+        text = ast.unparse(node)
+        if isinstance(node, ast.AnnAssign) and not text.startswith("_") and "ClassVar" not in text:
+            yield f"    {text}"
+
+
+def members(kind: type) -> Iterator[str]:
+    """What a class gives its users, but for what it has from another class of this page."""
+    for name, found in inspect.getmembers_static(kind):
+        owner = next(one for one in kind.__mro__ if name in vars(one))
+        if name.startswith("_") or not owner.__module__.startswith("motet") or (owner is not kind and public(owner)):
+            continue
+        if isinstance(found, property | cached_property):
+            getter = found.fget if isinstance(found, property) else found.func
+            yield described(f"{kind.__name__}.{name}: {ast.unparse(tree(getter).returns)}", getter)
+        elif inspect.isroutine(found):
+            call = getattr(found, "__func__", found)
+            if not (call.__doc__ or "").startswith("See :"):  # what it overrides is described
+                yield described(signature(call, f"{kind.__name__}.{name}"), call)
+
+
+def public(kind: type) -> bool:
+    """Whether a class is on this page."""
+    return getattr(motet, kind.__name__, None) is kind
+
+
+def described(code: str, found: Any) -> str:
+    """Code with its docstring; "py", as blocks of "python" in the docs are run."""
+    return f"```py\n{code}\n```\n{prose(inspect.getdoc(found))}\n"
+
+
+def tree(found: Any) -> Any:
+    """The definition of a class or function as it is written."""
+    return ast.parse(textwrap.dedent(inspect.getsource(found))).body[0]
+
+
+def signature(call: Any, name: str) -> str:
+    """The name and parameters of a function, a line for each where one line is too long."""
+    node = tree(call)
+    node.args.args = [one for one in node.args.args if one.arg not in ("self", "cls")]
+    text = f"{name}({ast.unparse(node.args)}) -> {ast.unparse(node.returns)}"
+    return text if len(text) <= 110 else re.sub(r", (?=(\*\*?)?\w+:|\*,)", ",\n    ", text.replace("(", "(\n    ", 1))
+
+
+def prose(text: str | None) -> str:
+    """A docstring as Markdown: roles as code, and parameters as a list."""
+    plain = re.sub(r":\w+:`[~.]?([^`]+)`", r"`\1`", text or "").replace("``", "`")
+    listed = re.sub(r"^((?:\w+, )*\w+): ", r"* `\1`: ", plain, flags=re.MULTILINE)
+    return re.sub(r"(?<!\n)\n(?=\* `)", "\n", listed) + "\n"
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
