@@ -14,7 +14,7 @@ from motet.formats.clips import Clip, chosen, split_clip
 from motet.motion.heading import heading
 from motet.motion.humanoid import (
     HUMANOID,
-    SURE,
+    SURE_OF_JOINTS,
     Humanoid,
     ground_under,
     is_mmm,
@@ -77,7 +77,7 @@ class Checked:
     @property
     def sure(self) -> bool:
         """Whether it is a human's motion beyond doubt."""
-        return self.confidence is not None and self.confidence >= SURE
+        return self.confidence is not None and self.confidence >= SURE_OF_JOINTS
 
     @property
     def in_place(self) -> bool:

@@ -18,7 +18,7 @@ from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.kinematics import positions
 from motet.motion.skeleton import END_SUFFIX
 from motet.representation.contract import MotionContract
-from motet.representation.root_sixd import KINDS, ROOT_SIXD, ROOT_SIXD_UNITS
+from motet.representation.root_sixd import ROOT_SIXD, ROOT_SIXD_UNITS, SIXD_KINDS
 from motet_export.bundles import export_run, parity_of
 from motet_export.examples import example, walks
 from motet_train.models.codes.actions import ActionsConfig, stems_of
@@ -34,7 +34,7 @@ pytestmark = pytest.mark.slow  # torch's exporter
 WORDS = [*SPECIALS, "a", "person", "walks", "runs", "left", "right", "stands", "still"]
 SAID = ("a person walks", "a person runs left", "a person stands still")
 BONES = [name for name in HUMANOID.names if not name.endswith(END_SUFFIX)]
-CHANNELS = (*ROOT_SIXD, *(f"{bone}.{kind}" for bone in BONES for kind in KINDS))
+CHANNELS = (*ROOT_SIXD, *(f"{bone}.{kind}" for bone in BONES for kind in SIXD_KINDS))
 D, MOVES, PARTS = len(CHANNELS), 6, 3
 MEAN = np.array([0.5, 0, 0, 0.9] + [1.0, 0, 0, 0, 1.0, 0] * len(BONES))
 CONTRACT = MotionContract(

@@ -13,8 +13,8 @@ from motet.models.load import load
 from motet.models.verify import verify
 from motet.motion.humanoid.bones import BONES, HUMANOID
 from motet.representation.contract import MotionContract
-from motet.representation.placed import CHANNELS
-from motet.representation.root_sixd import KINDS, ROOT_SIXD, ROOT_SIXD_UNITS
+from motet.representation.placed import PLACED_CHANNELS
+from motet.representation.root_sixd import ROOT_SIXD, ROOT_SIXD_UNITS, SIXD_KINDS
 from motet_export.bundles import export_run, parity_of
 from motet_export.examples import sides
 from motet_train.models.codes.sixd_places import tree_of
@@ -23,7 +23,7 @@ from motet_train.runs import Run
 
 pytestmark = pytest.mark.slow  # torch's exporter
 
-NAMES = (*ROOT_SIXD, *(f"{bone}.{kind}" for bone in BONES for kind in KINDS))
+NAMES = (*ROOT_SIXD, *(f"{bone}.{kind}" for bone in BONES for kind in SIXD_KINDS))
 D = len(NAMES)
 AT_REST = np.array([0.0, 0.0, 0.0, 0.95, *(1.0, 0.0, 0.0, 0.0, 1.0, 0.0) * len(BONES)])
 CONTRACT = MotionContract(
@@ -33,7 +33,7 @@ CONTRACT = MotionContract(
 
 def run() -> Run:
     torch.manual_seed(0)
-    net = Filler(FillerConfig(CHANNELS, tree_of(CONTRACT), width=16, layers=2, heads=2, inner=16, waves=2))
+    net = Filler(FillerConfig(PLACED_CHANNELS, tree_of(CONTRACT), width=16, layers=2, heads=2, inner=16, waves=2))
     torch.nn.init.normal_(net.outward.weight, std=0.1)
     named = {"name": "small-fill", "verb": "fill", "model": "gap-filler", "loop": "between"}
     known = {"config": asdict(net.config), "defaults": {"context": 20, "least": 4, "longest": 60}}
@@ -53,7 +53,7 @@ def test_the_bundle_computes_what_torch_does(bundle: Path) -> None:
     rng = np.random.default_rng(1)
     for before, gap, behind in ((20, 30, 20), (4, 1, 7), (2, 60, 20)):
         given = {
-            name: rng.normal(size=(2, count, CHANNELS)).astype(np.float32)
+            name: rng.normal(size=(2, count, PLACED_CHANNELS)).astype(np.float32)
             for name, count in (("past", before), ("plain", gap), ("after", behind))
         }
         found = model.graphs["filler"](given)["filled"]

@@ -15,7 +15,7 @@ from motet.models.generate import GenerateModel
 from motet.models.load import load
 from motet.models.text import RULES, SPECIALS
 from motet.models.verify import verify
-from motet.representation.contract import LIMIT
+from motet.representation.contract import Z_LIMIT
 from motet_export.bundles import export_run, parity_of
 from motet_export.examples import example
 from motet_export.exporter import ExportError
@@ -117,7 +117,7 @@ def test_normalisation_is_inside_the_encoder_of_motions(bundles: dict[str, Path]
     lengths = np.array([9, 9])
     found = Bundle.open(bundles["describe"]).graph("encoder")({"frames": frames, "lengths": lengths})["context"]
     normal = load(bundles["describe"]).contract.normalised(frames)
-    assert (np.abs(normal).max(), np.abs(normal[..., 2]).max()) == (LIMIT, 0)
+    assert (np.abs(normal).max(), np.abs(normal[..., 2]).max()) == (Z_LIMIT, 0)
     with torch.no_grad():
         flagged = torch.cat([torch.tensor(normal).float(), torch.ones(2, 9, 1)], dim=-1)
         expected = net.encoder(flagged, torch.tensor(lengths))

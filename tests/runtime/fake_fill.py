@@ -7,10 +7,10 @@ from motet.models.fill import FillModel
 from motet.motion.humanoid.bones import BONES, HUMANOID
 from motet.motion.motion import Motion
 from motet.representation.contract import MotionContract
-from motet.representation.placed import CHANNELS
-from motet.representation.root_sixd import KINDS, ROOT_SIXD, ROOT_SIXD_UNITS
+from motet.representation.placed import PLACED_CHANNELS
+from motet.representation.root_sixd import ROOT_SIXD, ROOT_SIXD_UNITS, SIXD_KINDS
 
-NAMES = (*ROOT_SIXD, *(f"{bone}.{kind}" for bone in BONES for kind in KINDS))
+NAMES = (*ROOT_SIXD, *(f"{bone}.{kind}" for bone in BONES for kind in SIXD_KINDS))
 D = len(NAMES)
 CONTRACT = MotionContract(
     "root_sixd", NAMES, (*ROOT_SIXD_UNITS, *("1",) * (D - 4)), 30.0, np.zeros(D), np.ones(D), HUMANOID
@@ -23,10 +23,10 @@ def fill_model(added: float = 0.0) -> FillModel:
 
     def filler(past: np.ndarray, plain: np.ndarray, after: np.ndarray) -> tuple[np.ndarray]:
         assert past.dtype == plain.dtype == after.dtype == np.float32
-        return (plain + added * (np.arange(CHANNELS) == 1),)
+        return (plain + added * (np.arange(PLACED_CHANNELS) == 1),)
 
     inputs = {"past": "batch before E", "plain": "batch gap E", "after": "batch behind E"}
-    graph = FakeGraph(spec(inputs, {"filled": "batch gap E"}, {"E": CHANNELS}), filler)
+    graph = FakeGraph(spec(inputs, {"filled": "batch gap E"}, {"E": PLACED_CHANNELS}), filler)
     return FillModel(manifest("fill", "between", CONTRACT, DEFAULTS), {"filler": graph})
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from gltf_player import Array, matrix
 
-from motet.motion.humanoid.bones import REST
+from motet.motion.humanoid.bones import T_POSE
 from motet.motion.humanoid.rigs import MIXAMO
 
 QUARTER = 0.5**0.5
@@ -35,7 +35,7 @@ def joints(above: Array, size: float, backwards: bool, matrices: bool) -> tuple[
     random = np.random.default_rng(3)
     turn = np.diag([-1.0, 1, -1]) if backwards else np.eye(3)
     scale = np.linalg.det(above[:3, :3]) ** (1 / 3)
-    worlds = matrix(size * REST @ turn, random.normal(size=(len(REST), 4)), np.full((len(REST), 3), scale))
+    worlds = matrix(size * T_POSE @ turn, random.normal(size=(len(T_POSE), 4)), np.full((len(T_POSE), 3), scale))
     nodes = []
     for i, joint in enumerate(MIXAMO.joints):
         own = np.linalg.inv(worlds[joint.parent] if i else above) @ worlds[i]
@@ -65,7 +65,7 @@ def soles(size: float, backwards: bool) -> tuple[Array, Array]:
     """Corners (P, 3) of the mesh in the world at rest, and the joint of each."""
     turn = np.diag([-1.0, 1, -1]) if backwards else np.eye(3)
     parts = [
-        (REST[i] + np.array(corner), i)
+        (T_POSE[i] + np.array(corner), i)
         for i, joint in enumerate(MIXAMO.joints)
         for corner in SOLES.get(joint.name.removeprefix("mixamorig:").removeprefix("Left").removeprefix("Right"), ())
     ]

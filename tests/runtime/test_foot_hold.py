@@ -6,7 +6,7 @@ import pytest
 from motet.errors import MotionError
 from motet.formats import read_motion
 from motet.motion import HUMANOID, global_transforms, hold_feet, positions, to_humanoid
-from motet.motion.feet.hold import BENT, RECORDED
+from motet.motion.feet.hold import BENT, HOLD_RECORDED
 from motet.motion.humanoid.bones import LEFT_RIGHT, ground_under, sole_points
 from motet.motion.motion import Motion
 from motet.motion.rotations import euler_to_rotmat
@@ -166,7 +166,7 @@ def test_who_stands_still_stays_as_it_is():
 def test_what_slides_on_is_moved_no_farther_than_a_leg_reaches():
     motion = standing(30, seconds=10, knee=40, z=lambda t: 0.1 * t)
     shift = soles_of(hold_feet(motion)) - soles_of(motion)
-    assert RECORDED.farthest * 0.9 < np.linalg.norm(shift, axis=-1).max() < RECORDED.farthest + 0.01
+    assert HOLD_RECORDED.farthest * 0.9 < np.linalg.norm(shift, axis=-1).max() < HOLD_RECORDED.farthest + 0.01
 
 
 def test_a_foot_that_sinks_is_lifted_softly():

@@ -170,7 +170,7 @@ def test_without_the_extra_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_file_that_is_too_large_is_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fbx, "MAX_BYTES", 1000)
+    monkeypatch.setattr(fbx, "FBX_MAX_BYTES", 1000)
     (tmp_path / "a.fbx").write_bytes(bytes(1001))
     for file in (tmp_path / "a.fbx", io.BytesIO(bytes(1001))):
         with pytest.raises(FormatError, match="too large: expected at most 1000 bytes"):
@@ -191,7 +191,7 @@ def test_a_process_that_breaks_down_is_a_broken_file(
     pytest.importorskip("ufbx")
     (tmp_path / "program.py").write_text(program)
     monkeypatch.setattr(fbx, "PROGRAM", tmp_path / "program.py")
-    monkeypatch.setattr(fbx, "SECONDS", 0.2 if "sleep" in program else 60)
+    monkeypatch.setattr(fbx, "FBX_SECONDS", 0.2 if "sleep" in program else 60)
     with pytest.raises(FormatError, match=said):
         load(b"")
 

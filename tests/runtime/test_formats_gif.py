@@ -15,7 +15,7 @@ if find_spec("PIL") is None:
 
 from PIL import Image
 
-from motet.draw.stage import FINE, Stage
+from motet.draw.stage import DRAWN_LARGER, Stage
 from motet.formats import gif
 from motet.motion.resample import resampled
 
@@ -56,8 +56,8 @@ def test_a_joint_is_drawn_where_the_camera_sees_it():
     stage = Stage(100, 0.0)
     middle, right, up, near = np.array([[0, 0.47, 0], [0.1, 0.47, 0], [0, 0.57, 0], [0, 0.47, 1.0]])
     places, scale = stage._seen(np.array([middle, right, up, near]))
-    assert places[0] == pytest.approx([50 * FINE, 50 * FINE])
-    assert scale[0] == pytest.approx(2.35 * 100 * FINE / 3.4)
+    assert places[0] == pytest.approx([50 * DRAWN_LARGER, 50 * DRAWN_LARGER])
+    assert scale[0] == pytest.approx(2.35 * 100 * DRAWN_LARGER / 3.4)
     assert places[1] - places[0] == pytest.approx([0.1 * scale[0], 0])
     assert places[2][0] == pytest.approx(places[0][0])
     assert places[2][1] < places[0][1]

@@ -10,7 +10,7 @@ import pytest
 
 from motet.errors import FormatError, MotionError
 from motet.formats import glb, gltf, gltf_data, read_character, read_motion, vrma
-from motet.motion.humanoid.bones import BONES, HUMANOID, REST, ground_under, sole_points
+from motet.motion.humanoid.bones import BONES, HUMANOID, T_POSE, ground_under, sole_points
 from motet.motion.humanoid.retarget import from_humanoid, grounded, to_humanoid
 from motet.motion.humanoid.rigs import MIXAMO
 from motet.motion.kinematics import global_transforms, local_rotations, positions, skeleton_of
@@ -66,7 +66,7 @@ def test_vrma_holds_the_bones_of_the_humanoid(tmp_path: Path) -> None:
     extension = document["extensions"]["VRMC_vrm_animation"]
     assert extension["specVersion"] == "1.0"
     bones = {bone: document["nodes"][place["node"]] for bone, place in extension["humanoid"]["humanBones"].items()}
-    fingers = vrma.SKELETON.names[len(HUMANOID.names) :]
+    fingers = vrma.VRMA_SKELETON.names[len(HUMANOID.names) :]
     assert len(fingers) == 30
     assert {bone: node["name"] for bone, node in bones.items()} == {bone: bone for bone in (*BONES, *fingers)}
     assert bones["hips"]["translation"] == [0.0, 0.98, 0.0]
@@ -116,7 +116,7 @@ def test_an_avatar_with_rest_rotations_of_its_own_moves_as_the_humanoid(tmp_path
     avatar = twisted(tmp_path / "avatar.vrm")
     still = gltf.read(avatar)
     assert len(still) == 1
-    np.testing.assert_allclose(in_order(still, list(BONES))[0], REST[BONE_INDICES], atol=1e-6)
+    np.testing.assert_allclose(in_order(still, list(BONES))[0], T_POSE[BONE_INDICES], atol=1e-6)
     character = read_character(avatar)
     motion = moving()
     out = from_humanoid(motion, character.rest, character.joint_map)
@@ -252,7 +252,7 @@ def test_of_a_buffer_no_more_is_read_than_it_declares(tmp_path: Path) -> None:
     document["buffers"][0]["byteLength"] = 100
     file.write_text(json.dumps(document))
     assert gltf_data.parse(file).buffers == (binary[:100],)
-    document["buffers"] *= 2 * gltf_data.MAX_BYTES // 100
+    document["buffers"] *= 2 * gltf_data.GLTF_MAX_BYTES // 100
     file.write_text(json.dumps(document))
     with pytest.raises(FormatError, match="over 536870912 bytes together"):
         gltf_data.parse(file)

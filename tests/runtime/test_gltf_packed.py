@@ -13,7 +13,7 @@ import motet
 from motet.errors import FormatError
 from motet.formats import gltf_packed
 
-EXT, KHR = gltf_packed.EXTENSIONS
+EXT, KHR = gltf_packed.MESHOPT
 
 
 def pack(path: Path, out: Path, extension: str = EXT) -> tuple[dict[str, Any], bytes]:

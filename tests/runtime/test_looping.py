@@ -188,7 +188,7 @@ def test_shortest_is_how_long_a_loop_takes_at_least():
 
 
 def test_where_nothing_repeats(clips):
-    with pytest.raises(MotionError, match=r"nothing in this motion repeats: .* differ by .*, over 4%; cut it"):
+    with pytest.raises(MotionError, match=r"no loop found: .* differs by .*, more than 4%; cut the motion"):
         looped(read_motion(clips / f"{BEND}.amc"))
     with pytest.raises(MotionError, match="no skeleton"):
         looped(replace(periodic(20, 60), skeleton=None))

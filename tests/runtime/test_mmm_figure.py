@@ -5,7 +5,7 @@ import pytest
 
 from motet.formats import read_motion
 from motet.motion.humanoid.bones import HUMANOID, sole_points
-from motet.motion.humanoid.mmm_figure import SKELETON, is_mmm, with_figure
+from motet.motion.humanoid.mmm_figure import MMM_SKELETON, is_mmm, with_figure
 from motet.motion.humanoid.retarget import to_humanoid
 from motet.motion.kinematics import global_transforms, positions
 from motet.motion.motion import Motion
@@ -35,7 +35,7 @@ def test_turns_about_the_axis_to_the_right_swing_limbs(angle: str, degrees: floa
 def test_arms_hang_at_rest_and_left_is_left() -> None:
     assert is_mmm(mmm())
     figure = positions(with_figure(mmm()))[0]
-    place = dict(zip(SKELETON.names, figure, strict=True))
+    place = dict(zip(MMM_SKELETON.names, figure, strict=True))
     assert place["LW"][0] > 0.2 > -0.2 > place["RW"][0]
     assert place["LW"][1] < place["LE"][1] < place["LS"][1]
     humanoid = to_humanoid(mmm())

@@ -12,7 +12,7 @@ from motet.errors import FormatError, MotionError
 from motet.formats import read_motion
 from motet.formats.writable import with_names
 from motet.motion.humanoid.bones import HUMANOID
-from motet.motion.humanoid.retarget import SURE, from_humanoid, to_humanoid
+from motet.motion.humanoid.retarget import SURE_OF_JOINTS, from_humanoid, to_humanoid
 from motet.motion.kinematics import global_transforms, motion_of, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, product
@@ -240,7 +240,7 @@ def test_a_rest_pose_out_of_a_motion_is_said_and_taken_from_another_file(tmp_pat
     lies = resting_in_its_start(write_clips(tmp_path / "a.glb", [("Dance", motion)], skin=False))
     guessed = to_humanoid(read_motion(lies))
     assert "the rest pose is out of a motion" in guessed.notes[0]
-    assert guessed.confidence < SURE
+    assert guessed.confidence < SURE_OF_JOINTS
     given = to_humanoid(read_motion(lies, rest=stands))
     assert (given.confidence, given.notes) == (1.0, ())
     assert apart(given.motion, dance) < 0.01

@@ -10,8 +10,8 @@ from motet.motion.mirroring import mirror as mirrored
 from motet.motion.motion import Motion
 from motet.motion.rotations import axis_to_rotmat, rotvec_to_rotmat
 from motet.representation.placed import (
-    CHANNELS,
-    PLACE,
+    PLACED_CHANNELS,
+    ROOT_PLACE,
     bridge,
     mirror,
     placed,
@@ -39,8 +39,8 @@ def dancer(frames: int = 40, seed: int = 0) -> Motion:
 def test_a_motion_comes_back_from_its_frames() -> None:
     motion = dancer()
     frames = placed(motion)
-    assert frames.shape == (40, CHANNELS)
-    np.testing.assert_allclose(frames[:, :PLACE], motion.values[:, :3], atol=1e-12)
+    assert frames.shape == (40, PLACED_CHANNELS)
+    np.testing.assert_allclose(frames[:, :ROOT_PLACE], motion.values[:, :3], atol=1e-12)
     back = unplaced(frames[10:], motion[:10])
     assert back.channels == motion.channels
     np.testing.assert_allclose(back.values, motion.values[10:], atol=1e-6)
@@ -83,8 +83,8 @@ def test_a_batch_is_seen_as_each_row_alone() -> None:
 
 def test_the_facing_of_a_tilted_figure_is_the_turn_before_the_tilt() -> None:
     tilt = rotvec_to_rotmat(np.array([0.7, 0.0, 0.4]))  # about a level axis: it has no turn of its own
-    frame = np.zeros(CHANNELS)
-    frame[PLACE : PLACE + 6] = rotmat_to_sixd(axis_to_rotmat("y", np.array(1.1)) @ tilt)
+    frame = np.zeros(PLACED_CHANNELS)
+    frame[ROOT_PLACE : ROOT_PLACE + 6] = rotmat_to_sixd(axis_to_rotmat("y", np.array(1.1)) @ tilt)
     np.testing.assert_allclose(pose_of(frame)[2], 1.1, atol=1e-12)
 
 
@@ -92,18 +92,18 @@ def test_an_even_movement_is_bridged_as_it_was() -> None:
     frames = placed(glider())
     for way in (bridge, straight):
         np.testing.assert_allclose(way(frames[:30], frames[60:], 30), frames[30:60], atol=1e-9)
-    assert bridge(frames[:30], frames[30:], 0).shape == (0, CHANNELS)
+    assert bridge(frames[:30], frames[30:], 0).shape == (0, PLACED_CHANNELS)
 
 
 def test_the_root_leaves_and_arrives_as_fast_as_it_is_and_joints_take_the_shortest_way() -> None:
     frames = placed(dancer(60))
     past, after = frames[:20], frames[40:]
     way = np.concatenate([past[-1:], bridge(past, after, 199, pace=0.1), after[:1]])
-    speeds = np.diff(way[:, :PLACE], axis=0) / 0.1
-    np.testing.assert_allclose(speeds[0], (past[-1] - past[-4])[:PLACE] / 3, atol=2e-3)
-    np.testing.assert_allclose(speeds[-1], (after[3] - after[0])[:PLACE] / 3, atol=2e-3)
+    speeds = np.diff(way[:, :ROOT_PLACE], axis=0) / 0.1
+    np.testing.assert_allclose(speeds[0], (past[-1] - past[-4])[:ROOT_PLACE] / 3, atol=2e-3)
+    np.testing.assert_allclose(speeds[-1], (after[3] - after[0])[:ROOT_PLACE] / 3, atol=2e-3)
     for bone in range(len(BONES)):
-        turned = sixd_to_rotmat(way[:, PLACE + 6 * bone : PLACE + 6 * bone + 6])
+        turned = sixd_to_rotmat(way[:, ROOT_PLACE + 6 * bone : ROOT_PLACE + 6 * bone + 6])
         steps = np.einsum("tij,tik->tjk", turned[:-1], turned[1:])
         np.testing.assert_allclose(steps, np.broadcast_to(steps[0], steps.shape), atol=1e-6)
 
@@ -112,5 +112,5 @@ def test_the_root_leaves_and_arrives_as_fast_as_it_is_and_joints_take_the_shorte
 def test_a_line_is_even_whatever_the_speeds(count: int) -> None:
     frames = placed(dancer())
     way = np.concatenate([frames[9:10], straight(frames[:10], frames[20:], count), frames[20:21]])
-    steps = np.diff(way[:, :PLACE], axis=0)
+    steps = np.diff(way[:, :ROOT_PLACE], axis=0)
     np.testing.assert_allclose(steps, np.broadcast_to(steps[0], steps.shape), atol=1e-9)

@@ -15,7 +15,7 @@ from motet.formats import read_motion, write_motion
 from motet.motion import Joint, Motion, Skeleton, heading, mirror, positions
 from motet.motion.kinematics import euler_of, local_rotations
 from motet.representation import REPRESENTATIONS, named
-from motet.representation.contract import FLOORS, LIMIT, MotionContract, living, sequences
+from motet.representation.contract import LIVING_STD, Z_LIMIT, MotionContract, living, sequences
 
 NAMES = tuple(REPRESENTATIONS)
 
@@ -154,15 +154,15 @@ def test_dead_channels_and_values_far_off_do_not_reach_a_net() -> None:
     frames[0, 8] += 1e6
     again = contract.normalised(frames)
     np.testing.assert_array_equal(again[1:], z[1:])
-    assert again[0, 8] == LIMIT
+    assert again[0, 8] == Z_LIMIT
     back = contract.denormalised(z)
     np.testing.assert_array_equal(back[:, 7], contract.mean[7])
     np.testing.assert_allclose(back[:, live], contract.frames(motion)[:, live])
 
 
 def test_the_floor_depends_on_the_unit() -> None:
-    units = tuple(FLOORS)
-    floors = np.array(list(FLOORS.values()))
+    units = tuple(LIVING_STD)
+    floors = np.array(list(LIVING_STD.values()))
     np.testing.assert_array_equal(living(floors, units), floors)
     assert not living(floors * 0.99, units).any()
 

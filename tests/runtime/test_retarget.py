@@ -7,7 +7,7 @@ import pytest
 from motet.errors import MotionError
 from motet.formats import read_motion, write_motion
 from motet.formats.writable import with_names
-from motet.motion.humanoid.bones import BONES, HUMANOID, REST, sole_points
+from motet.motion.humanoid.bones import BONES, HUMANOID, T_POSE, sole_points
 from motet.motion.humanoid.joint_tree import map_by_tree
 from motet.motion.humanoid.retarget import Humanoid, from_humanoid, to_humanoid
 from motet.motion.kinematics import global_transforms, motion_of, skeleton_of
@@ -72,13 +72,13 @@ def angles_between(one: Array, other: Array) -> Array:
 
 
 def test_the_humanoid_stands_on_the_ground_in_a_t_pose() -> None:
-    place = dict(zip(HUMANOID.names, REST, strict=True))
+    place = dict(zip(HUMANOID.names, T_POSE, strict=True))
     assert place["leftToes_end"][1] == pytest.approx(0.0)
     assert place["head_end"][1] == pytest.approx(1.70)
     assert place["leftHand"][0] > place["leftUpperArm"][0] > 0
     np.testing.assert_allclose(place["rightHand"] * [-1, 1, 1], place["leftHand"])
     still = np.broadcast_to(np.eye(3), (1, len(HUMANOID.names), 3, 3))
-    np.testing.assert_allclose(sole_points(still, REST[None])[..., 1], 0, atol=1e-12)
+    np.testing.assert_allclose(sole_points(still, T_POSE[None])[..., 1], 0, atol=1e-12)
 
 
 @pytest.mark.parametrize("name", CONVENTIONS)

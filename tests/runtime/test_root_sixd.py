@@ -14,7 +14,7 @@ from motet.motion.kinematics import euler_of, local_rotations
 from motet.motion.rotations import axis_to_rotmat, rotvec_to_rotmat
 from motet.representation import named
 from motet.representation.contract import MotionContract, sequences
-from motet.representation.root_sixd import CALM, KINDS, ROOT_SIXD, facing, in_world, sixd_to_rotmat
+from motet.representation.root_sixd import FACING_CALM, ROOT_SIXD, SIXD_KINDS, facing, in_world, sixd_to_rotmat
 
 SIXD = named("root_sixd")
 CLIPS = ("02_06", "09_07", "39_14")
@@ -50,7 +50,7 @@ def test_the_channels_are_what_their_names_say() -> None:
     features = SIXD.features(motion)
     assert features.channels[:4] == ROOT_SIXD
     joints = [name for name in motion.skeleton.names if not name.endswith("_end")]
-    assert features.channels[4:] == tuple(f"{joint}.{kind}" for joint in joints for kind in KINDS)
+    assert features.channels[4:] == tuple(f"{joint}.{kind}" for joint in joints for kind in SIXD_KINDS)
     place = joints.index("left_leg")
     axes = local_rotations(motion, [motion.skeleton.index("left_leg")])[:, 0]
     found = features.values[:, 4 + 6 * place : 10 + 6 * place]
@@ -148,7 +148,7 @@ def test_the_facing_smooths_what_hips_do_in_a_stride() -> None:
     values[:, motion.channels.index("hips.ry")] = np.degrees(sway)
     found = facing(replace(motion, values=values))
     # twice the angle is smoothed as a complex number: nearly by what a Gaussian leaves of two swings a second
-    left = np.exp(-0.5 * (2 * np.pi * 2 * CALM) ** 2)
+    left = np.exp(-0.5 * (2 * np.pi * 2 * FACING_CALM) ** 2)
     assert np.abs(found[20:-20]).max() == pytest.approx(0.3 * left, rel=0.1)
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from motet.motion.humanoid.bones import HUMANOID, REST
+from motet.motion.humanoid.bones import HUMANOID, T_POSE
 from motet_train.evaluate.text_adherence.track import RATE
 
 INDEX = HUMANOID.index
@@ -16,7 +16,7 @@ def times(seconds: float) -> np.ndarray:
 
 def hanging() -> np.ndarray:
     """The rest pose (J, 3) with the arms down."""
-    points = REST.copy()
+    points = T_POSE.copy()
     for side in ("left", "right"):
         shoulder = points[INDEX(f"{side}UpperArm")]
         for part, length in (("LowerArm", 0.28), ("Hand", 0.53), ("Hand_end", 0.71)):

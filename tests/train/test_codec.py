@@ -20,7 +20,7 @@ from motet.motion.kinematics import positions
 from motet.motion.rotations import axis_to_rotmat, rotvec_to_rotmat
 from motet.motion.skeleton import END_SUFFIX
 from motet.representation.contract import MotionContract
-from motet.representation.root_sixd import KINDS, ROOT_SIXD, ROOT_SIXD_UNITS
+from motet.representation.root_sixd import ROOT_SIXD, ROOT_SIXD_UNITS, SIXD_KINDS
 from motet_train.data.errors import DataError
 from motet_train.data.sixd_windows import SixdWindows, poses_of, window_of, with_way
 from motet_train.data.store import Store
@@ -30,7 +30,7 @@ from motet_train.models.codes.sixd_places import SixdPlaces, tree_of
 from motet_train.runs import MODELS
 
 BONES = [name for name in HUMANOID.names if not name.endswith(END_SUFFIX)]
-CHANNELS = (*ROOT_SIXD, *(f"{bone}.{kind}" for bone in BONES for kind in KINDS))
+CHANNELS = (*ROOT_SIXD, *(f"{bone}.{kind}" for bone in BONES for kind in SIXD_KINDS))
 D = len(CHANNELS)
 CONTRACT = MotionContract(
     "root_sixd", CHANNELS, (*ROOT_SIXD_UNITS, *("1",) * (D - 4)), 30.0, np.zeros(D), np.ones(D), HUMANOID

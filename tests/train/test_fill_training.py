@@ -20,7 +20,7 @@ from motet.models.load import build
 from motet.motion.humanoid.bones import BONES, HUMANOID
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
-from motet.representation.placed import CHANNELS, bridge, mirror, placed, placed_by_way, pose_of, unplaced
+from motet.representation.placed import PLACED_CHANNELS, bridge, mirror, placed, placed_by_way, pose_of, unplaced
 from motet_train.data.batches import frame_mirror
 from motet_train.data.errors import DataError
 from motet_train.data.gap_windows import GapWindow, GapWindows, gap_window
@@ -84,7 +84,7 @@ def net(store: Store, **sizes: int) -> Filler:
     """A net whose last layer is not zero."""
     torch.manual_seed(0)
     small = {"width": 16, "layers": 1, "heads": 2, "inner": 16, "waves": 2, **sizes}
-    found = Filler(FillerConfig(CHANNELS, tree_of(store.contract((0,))), **small))
+    found = Filler(FillerConfig(PLACED_CHANNELS, tree_of(store.contract((0,))), **small))
     torch.nn.init.normal_(found.outward.weight, std=0.3)
     return found.eval()
 
@@ -110,7 +110,7 @@ def test_windows_are_parts_of_motions_seen_from_the_last_frame_before_the_gap(st
 def test_windows_are_drawn_within_a_motion_and_as_often_mirrored(store: Store) -> None:
     window = drawn(store, (5, 6, 5), batch=64)
     frames = torch.cat([window.past, window.truth, window.after], dim=1)
-    assert frames.shape == (64, 16, CHANNELS)
+    assert frames.shape == (64, 16, PLACED_CHANNELS)
     # within a motion nothing leaps: joints go 10 m/s at most
     places = net(store).joints(frames)
     assert places.diff(dim=1).norm(dim=-1).max() < 10 / 30
@@ -127,7 +127,7 @@ def test_joints_are_where_numpy_says(store: Store) -> None:
 def test_an_untrained_net_fills_plainly(store: Store) -> None:
     window = drawn(store, (5, 6, 5))
     torch.manual_seed(0)
-    fresh = Filler(FillerConfig(CHANNELS, tree_of(store.contract((0,)))))
+    fresh = Filler(FillerConfig(PLACED_CHANNELS, tree_of(store.contract((0,)))))
     with torch.no_grad():
         np.testing.assert_allclose(fresh(window.past, window.plain, window.after), window.plain, atol=1e-6)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from motet.representation.contract import LIMIT, MotionContract
+from motet.representation.contract import Z_LIMIT, MotionContract
 from motet_train.models.language.motion_to_language import MotionToLanguage, MotionToLanguageConfig
 from motet_train.models.normalised import normalised
 from motet_train.models.predict.predictor import Predictor, PredictorConfig
@@ -18,7 +18,7 @@ def test_it_is_what_the_contract_says() -> None:
     frames[0, 0, 0], frames[1, 1, 1] = 1e6, -1e6
     found = normalised(*(torch.tensor(values) for values in (frames, MEAN, STD)))
     np.testing.assert_allclose(found.numpy(), CONTRACT.normalised(frames), atol=1e-12)
-    assert (found[0, 0, 0], found[1, 1, 1]) == (LIMIT, -LIMIT)
+    assert (found[0, 0, 0], found[1, 1, 1]) == (Z_LIMIT, -Z_LIMIT)
     assert not found[..., 2].any()
 
 
@@ -45,7 +45,7 @@ def test_a_predictor_sees_no_further_either() -> None:
         for parameter in net.parameters():
             parameter.add_(0.05 * torch.randn_like(parameter))
     frames = torch.randn(2, 10, 4)
-    frames[0, 4, 1] = 2 * LIMIT
+    frames[0, 4, 1] = 2 * Z_LIMIT
     further = frames.clone()
     further[0, 4, 1] = 1e6
     assert torch.equal(net(further), net(frames))

@@ -17,7 +17,7 @@ from motet.motion.humanoid.retarget import from_humanoid, to_humanoid
 from motet.motion.humanoid.rigs import MIXAMO
 from motet.motion.kinematics import euler_of, local_rotations, positions, with_channels
 from motet.motion.motion import Motion
-from motet.representation.contract import FLOORS
+from motet.representation.contract import LIVING_STD
 from motet.representation.root_block import ROOT_BLOCK, from_root_block
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.corpus import read_corpus
@@ -60,7 +60,7 @@ def test_mean_and_deviation_are_those_of_the_records_asked_for(store: Store) -> 
         np.testing.assert_allclose(contract.mean, frames.mean(axis=0), rtol=1e-6, atol=1e-9)
         std = frames.std(axis=0)
         np.testing.assert_allclose(
-            contract.std, np.where(std < [FLOORS[unit] for unit in store.units], 0, std), rtol=1e-6
+            contract.std, np.where(std < [LIVING_STD[unit] for unit in store.units], 0, std), rtol=1e-6
         )
         assert not contract.std[contract.channels.index("lfingers.rx")]
     with pytest.raises(DataError, match="at least one record"):

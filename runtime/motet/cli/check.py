@@ -19,7 +19,7 @@ from motet.errors import FormatError, MotetError
 from motet.files import files_in
 from motet.formats import CLIPPED, MOCAP, READS, html
 from motet.formats.clips import MARK
-from motet.motion.humanoid import UNITS, to_humanoid
+from motet.motion.humanoid import LENGTH_UNITS, to_humanoid
 from motet.motion.motion import Motion
 
 HEAD = ("figure", "sure", "tall m", "seconds", "fps", "facing", "ground m", "travel m", "notes")
@@ -210,5 +210,5 @@ def _metres(value: float | None) -> str:
 
 
 def _unit(found: Checked) -> str:
-    near = [name for name, metres in UNITS.items() if found.unit and abs(found.unit / metres - 1) < 1e-3]
+    near = [name for name, metres in LENGTH_UNITS.items() if found.unit and abs(found.unit / metres - 1) < 1e-3]
     return f"; lengths are in {near[0] if near else f'units of {found.unit:g} m'}"

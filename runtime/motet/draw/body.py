@@ -20,16 +20,10 @@ COLOURS = {LEFT: (236, 122, 52), RIGHT: (58, 124, 226), MIDDLE: (176, 182, 196)}
 THICKNESS, TAPER, THINNEST = 0.07, 0.65, 0.014
 """A bone has the radius THICKNESS * (length beyond it) ** TAPER, and at least THINNEST."""
 
-SMALL = 1e-6
+SAME_SPOT = 1e-6
 """A joint nearer than this to its parent is on the same spot."""
 
-HEAD = 0.15
-"""The length that a head counts for in the thickness of the neck."""
-
-LIMB = 0.2
-"""A limb has at least this length; one that hangs on the trunk above the root gets a flank down to the root."""
-
-PATH = 0.62
+HEIGHT_OF_PATH = 0.62
 """What part of the longest way along bones from tip to tip a figure is high at least: people in an A- or a T-pose are
 .63 to .76. Figures that rest with all their bones in a line would be taken for half as high."""
 
@@ -60,7 +54,7 @@ class Body:
     @cached_property
     def height(self) -> float:
         """The height in the skeleton's length unit, even where the rest pose is no body; 1 where there is no extent."""
-        return max(self.skeleton.height, PATH * _longest_path(self.skeleton)) or 1.0
+        return max(self.skeleton.height, HEIGHT_OF_PATH * _longest_path(self.skeleton)) or 1.0
 
     @cached_property
     def sides(self) -> tuple[str, ...]:
@@ -92,7 +86,8 @@ class Body:
     def beyond(self) -> Array:
         """For each joint (J) how much body hangs on it: along a limb lengths add up, where limbs meet their squares."""
         squares = np.zeros(len(self.lengths))
-        squares[self.head] = HEAD**2
+        # the length that a head counts for in the thickness of the neck
+        squares[self.head] = 0.15**2
         for i in range(len(squares) - 1, 0, -1):
             squares[self.skeleton.joints[i].parent] += (self.lengths[i] + np.sqrt(squares[i])) ** 2
         return np.sqrt(squares)
@@ -111,17 +106,18 @@ class Body:
         """Whether each joint belongs to the trunk: it is in the middle, or rests on the spot of one that is."""
         rest = self.skeleton.rest_positions / self.height
         middle = rest[[side == MIDDLE for side in self.sides]]
-        return tuple(bool(np.any(np.linalg.norm(middle - place, axis=1) <= SMALL)) for place in rest)
+        return tuple(bool(np.any(np.linalg.norm(middle - place, axis=1) <= SAME_SPOT)) for place in rest)
 
     def _bones_to(self, i: int) -> list[Bone]:
         parent, side = self.skeleton.joints[i].parent, self.sides[i]
         in_skull = i == self.head and self.head_is_tip
-        if self.lengths[i] <= SMALL or in_skull or (self.trunk[i] and side != MIDDLE):
+        if self.lengths[i] <= SAME_SPOT or in_skull or (self.trunk[i] and side != MIDDLE):
             return []
         thick, thin = _radius(self.lengths[i] + self.beyond[i]), _radius(self.beyond[i])
         bone = Bone(parent, i, thick, thin, MIDDLE if self.trunk[parent] else side, (parent, parent))
         rise = np.linalg.norm(self.skeleton.rest_positions[parent]) / self.height
-        if self.trunk[parent] and side != MIDDLE and self.beyond[i] > LIMB and rise > SMALL:
+        # a limb that hangs on the trunk above the root gets a flank down to the root
+        if self.trunk[parent] and side != MIDDLE and self.beyond[i] > 0.2 and rise > SAME_SPOT:
             return [bone, Bone(i, 0, 0.8 * thick, thick, MIDDLE, (parent, 0))]
         return [bone]
 

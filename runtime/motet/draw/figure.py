@@ -12,10 +12,7 @@ from motet.motion.rotations import Array
 from motet.motion.sides import LEFT, RIGHT
 from motet.motion.skeleton import Skeleton
 
-NEAR_GROUND = 0.1
-"""Within this height of y = 0 the lowest point of a motion is taken to stand on y = 0."""
-
-LARGEST = 1e6
+LARGEST_COORDINATE = 1e6
 """Positions further than this from the origin are refused: such a motion is broken and cannot be drawn."""
 
 
@@ -43,8 +40,10 @@ def figure_of(motion: Motion) -> Figure:
     skeleton, places = _moving_part(motion, skeleton)
     body = Body(skeleton)
     points = places / body.height
-    if not np.abs(points).max() < LARGEST:
-        raise MotionError(f"joints are further than {LARGEST:g} body heights from the origin: too far to be shown")
+    if not np.abs(points).max() < LARGEST_COORDINATE:
+        raise MotionError(
+            f"joints are further than {LARGEST_COORDINATE:g} body heights from the origin: too far to be shown"
+        )
     points[:, :, 1] -= _ground(points, moves=f"{skeleton.names[0]}.ty" in motion.channels)
     return Figure(body.points(points), body.bones, _heading(points[0], body.sides), motion.fps)
 
@@ -68,7 +67,8 @@ def _moving_part(motion: Motion, skeleton: Skeleton) -> tuple[Skeleton, Array]:
 
 def _ground(points: Array, moves: bool) -> float:
     lowest = float(points[..., 1].min())
-    return 0.0 if moves and abs(lowest) < NEAR_GROUND else lowest
+    # metres: a lowest point this near y = 0 stands on it
+    return 0.0 if moves and abs(lowest) < 0.1 else lowest
 
 
 def _heading(points: Array, sides: tuple[str, ...]) -> float:

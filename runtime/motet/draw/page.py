@@ -8,14 +8,14 @@ from typing import Any
 
 from motet.draw.body import Bone
 
-SHARED = {"STYLE": "page.css", "NUMBERS": "numbers.js", "STAGE": "stage.js"}
+SHARED_PARTS = {"STYLE": "page.css", "NUMBERS": "numbers.js", "STAGE": "stage.js"}
 """What templates include by name."""
 
 
 def filled(template: str, title: str, data: dict[str, Any], **parts: str) -> str:
-    """The HTML of a template: ``{{TITLE}}`` and ``{{DATA}}`` (as JSON), :data:`SHARED`, and ``parts`` by name."""
+    """The HTML of a template: ``{{TITLE}}`` and ``{{DATA}}`` (as JSON), :data:`SHARED_PARTS`, and ``parts`` by name."""
     text = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-    shared = {name: source("motet.draw", file) for name, file in SHARED.items()}
+    shared = {name: source("motet.draw", file) for name, file in SHARED_PARTS.items()}
     found = {"TITLE": escape(title), "DATA": text, **shared, **parts}
     return re.sub(r"\{\{([A-Z]+)\}\}", lambda place: found[place[1]], template)
 

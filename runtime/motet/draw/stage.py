@@ -9,14 +9,14 @@ from motet.motion.rotations import Array
 Colour = tuple[int, int, int]
 
 BACK, GRID, SHADOW = (232, 235, 241), (150, 158, 176), (166, 172, 186)
-CELL, REACH = 0.5, 2.2
+CELL, GRID_REACH = 0.5, 2.2
 """Side of the ground's squares, and how far from the target they have faded away, in heights."""
 
 DISTANCE, FOCAL, PITCH, TARGET_HEIGHT = 3.4, 2.35, np.radians(12.0), 0.47
 LIGHT = np.array([0.35, 1.0, 0.45])
 """Where the light comes from."""
 
-FINE = 3
+DRAWN_LARGER = 3
 """A picture is drawn so many times as large, and made smaller: edges come out smooth."""
 
 CIRCLE = np.stack([np.cos(np.arange(12) * np.pi / 6), 0 * np.arange(12), np.sin(np.arange(12) * np.pi / 6)], axis=1)
@@ -26,7 +26,7 @@ class Stage:
     """A square picture of ``size`` pixels, seen from ``yaw`` (radians about y; 0 looks at the +z side)."""
 
     def __init__(self, size: int, yaw: float) -> None:
-        self.size, self.pixels = size, size * FINE
+        self.size, self.pixels = size, size * DRAWN_LARGER
         sin, cos = np.sin(yaw), np.cos(yaw)
         toward = np.array([np.cos(PITCH) * sin, np.sin(PITCH), np.cos(PITCH) * cos])
         right = np.array([cos, 0.0, -sin])
@@ -56,16 +56,16 @@ class Stage:
 
     def _draw_ground(self, draw: ImageDraw.ImageDraw, target: Array) -> None:
         """Lines of the squares, piece by piece, each fainter the further it is from the target."""
-        steps = np.arange(-REACH, REACH + CELL, CELL / 2)
+        steps = np.arange(-GRID_REACH, GRID_REACH + CELL, CELL / 2)
         for axis in (0, 1):
             across = np.ceil((steps + target[axis]) / CELL) * CELL - target[axis]
             for place in np.unique(np.round(across, 9)):
                 line = np.zeros((len(steps), 3))
                 line[:, 2 * axis], line[:, 2 - 2 * axis] = place, steps
-                fade = np.clip(1 - np.hypot(place, (steps[1:] + steps[:-1]) / 2) / REACH, 0, 1) ** 1.2
+                fade = np.clip(1 - np.hypot(place, (steps[1:] + steps[:-1]) / 2) / GRID_REACH, 0, 1) ** 1.2
                 seen = self._seen(line)[0].tolist()
                 for start, end, part in zip(seen[:-1], seen[1:], fade.tolist(), strict=True):
-                    draw.line([*start, *end], fill=_mixed(BACK, GRID, part), width=FINE - 1)
+                    draw.line([*start, *end], fill=_mixed(BACK, GRID, part), width=DRAWN_LARGER - 1)
 
     def _shadow(self, points: Array, bones: tuple[Bone, ...]) -> Image.Image:
         """How much of a shadow there is at each pixel."""

@@ -93,10 +93,10 @@ FORMATS = (
     Format(".gif", "picture", _GIF, writer="gif", needs="PIL"),
 )
 
-CHARACTERS = {"gltf": "gltf_character", "fbx": "fbx"}
+CHARACTER_READERS = {"gltf": "gltf_character", "fbx": "fbx"}
 """For readers of files whose nodes have axes of their own the modules that read these, by ``read_character``."""
 
-OTHERS = {
+NO_MOTIONS = {
     ".c3d": ", which hold markers and no skeleton: solve them for one first, with the program that recorded them",
 }
 """What is known of other types of motion files: it is said when they are refused."""
@@ -192,10 +192,10 @@ def read_character(file: File) -> Character:
     if isinstance(file, str | Path) and not Path(file).suffix and not Path(file).exists():
         return _character(_rig(Path(file)))
     reader = _format(file, None, READABLE, "read").reader
-    if reader not in CHARACTERS:
+    if reader not in CHARACTER_READERS:
         return Character(read_motion(file))
     with np.errstate(over="ignore", invalid="ignore"):  # what gets infinite is refused by Skeleton
-        found: Character = import_module(f"motet.formats.{CHARACTERS[reader]}").read_character(file)
+        found: Character = import_module(f"motet.formats.{CHARACTER_READERS[reader]}").read_character(file)
     return found
 
 
@@ -278,7 +278,7 @@ def _format(file: File, format: str | None, allowed: tuple[str, ...], verb: str)
     if extension in allowed:
         return next(kind for kind in FORMATS if kind.extension == extension)
     what = f"files of type {extension!r}" if extension else "a file without an extension"
-    why = OTHERS.get(extension, "")
+    why = NO_MOTIONS.get(extension, "")
     raise FormatError(place_of(file), f"cannot {verb} {what}{why}; expected one of {' '.join(allowed)}")
 
 

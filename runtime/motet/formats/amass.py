@@ -20,7 +20,7 @@ from motet.motion.motion import Motion
 from motet.motion.rotations import Array, product, rotvec_to_rotmat
 from motet.motion.skeleton import Joint, Skeleton
 
-JOINTS = (
+AMASS_JOINTS = (
     ("pelvis", -1, (0.0, 0.0, 0.0)),
     ("left_hip", 0, (0.07, -0.08, 0.0)),
     ("right_hip", 0, (-0.07, -0.08, 0.0)),
@@ -46,12 +46,14 @@ JOINTS = (
 )
 """SMPL's joints in its order, with parents and offsets in metres of a plain body in a T-pose that faces z, y up."""
 
-SKELETON = Skeleton(tuple(Joint(name, parent, offset) for name, parent, offset in JOINTS), metres_per_unit=1.0)
+AMASS_SKELETON = Skeleton(
+    tuple(Joint(name, parent, offset) for name, parent, offset in AMASS_JOINTS), metres_per_unit=1.0
+)
 
-UPRIGHT = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+Z_TO_Y = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """Turns z up to y up."""
 
-RATES = ("mocap_framerate", "mocap_frame_rate")
+RATE_NAMES = ("mocap_framerate", "mocap_frame_rate")
 
 
 def is_amass(content: bytes) -> bool:
@@ -89,10 +91,10 @@ def parse(path: Path, content: bytes) -> Motion:
     if trans.shape != (len(vectors), 3) or not (np.isfinite(vectors).all() and np.isfinite(trans).all()):
         raise FormatError(path, f"trans must be ({len(vectors)}, 3) finite numbers, here it is {trans.shape}")
     turned = rotvec_to_rotmat(vectors)
-    turned[:, 0] = UPRIGHT @ turned[:, 0]
-    for i, joint in enumerate(SKELETON.joints[1:], start=1):
+    turned[:, 0] = Z_TO_Y @ turned[:, 0]
+    for i, joint in enumerate(AMASS_SKELETON.joints[1:], start=1):
         turned[:, i] = product(turned[:, joint.parent], turned[:, i])
-    return motion_of(SKELETON, turned, {0: trans @ UPRIGHT.T}, fps)
+    return motion_of(AMASS_SKELETON, turned, {0: trans @ Z_TO_Y.T}, fps)
 
 
 def _array(archive: zipfile.ZipFile, name: str) -> Array:
@@ -103,13 +105,13 @@ def _vectors(path: Path, archive: zipfile.ZipFile) -> Array:
     """Rotation vectors (T, 22, 3)."""
     parts = ("poses",) if "poses.npy" in archive.namelist() else ("root_orient", "pose_body")
     poses = np.concatenate([_array(archive, part) for part in parts], axis=-1)
-    if poses.ndim != 2 or poses.shape[1] < 3 * len(JOINTS):
-        raise FormatError(path, f"poses of shape {poses.shape}: expected (frames, {3 * len(JOINTS)} or more)")
-    return poses[:, : 3 * len(JOINTS)].reshape(len(poses), len(JOINTS), 3)
+    if poses.ndim != 2 or poses.shape[1] < 3 * len(AMASS_JOINTS):
+        raise FormatError(path, f"poses of shape {poses.shape}: expected (frames, {3 * len(AMASS_JOINTS)} or more)")
+    return poses[:, : 3 * len(AMASS_JOINTS)].reshape(len(poses), len(AMASS_JOINTS), 3)
 
 
 def _rate(path: Path, archive: zipfile.ZipFile) -> float:
-    names = [name for name in RATES if f"{name}.npy" in archive.namelist()]
+    names = [name for name in RATE_NAMES if f"{name}.npy" in archive.namelist()]
     if not names:
-        raise FormatError(path, f"the frame rate is missing: expected an array {' or '.join(RATES)}")
+        raise FormatError(path, f"the frame rate is missing: expected an array {' or '.join(RATE_NAMES)}")
     return frame_rate(float(_array(archive, names[0])), path)

@@ -10,10 +10,10 @@ import numpy as np
 
 from motet.errors import FormatError, quoted
 from motet.files import File, check_place, place_of, write_whole
-from motet.formats.asf import CMU_METRES, ROOT, Asf, read_skeleton, write_skeleton
+from motet.formats.asf import ASF_ROOT, CMU_METRES, Asf, read_skeleton, write_skeleton
 from motet.formats.lines import frame_rate, number, numbers, plain_names, read_text
 from motet.formats.words import Words
-from motet.formats.writable import ANGLES, TRANSLATIONS, with_names, with_still_offsets
+from motet.formats.writable import ANGLE_KINDS, TRANSLATION_KINDS, with_names, with_still_offsets
 from motet.motion.kinematics import skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
@@ -21,13 +21,9 @@ from motet.motion.skeleton import Joint
 
 log = logging.getLogger(__name__)
 
-CMU_FPS = 120.0
 FPS_COMMENT = "# fps "
 EACH_LINE = r".+\n?|\n"
 """Finds one line after the other: a file need not be split as a whole for the sake of its first lines."""
-
-FORBIDDEN = r"[\s#]|^(?=\d+$)|^(?=:)"
-"""What a bone's name cannot hold: blanks, comments; and it is neither a number nor a keyword."""
 
 Layout = list[tuple[str, int]]
 
@@ -59,7 +55,8 @@ def read(file: File, asf: str | Path | None = None, fps: float | None = None, pa
 def _rate(path: Path, said: float | None, given: float | None) -> float:
     if said is not None and given is not None and abs(said - given) > 1e-6 * said:
         raise FormatError(path, f"its frame rate is {said:g} according to the file, not {given:g} as given")
-    return frame_rate(CMU_FPS if said is None and given is None else said or given or 0.0, path)
+    # CMU's files do not say: they have 120
+    return frame_rate(120.0 if said is None and given is None else said or given or 0.0, path)
 
 
 def _find_asf(path: Path) -> Path:
@@ -203,7 +200,8 @@ def write(file: File, motion: Motion) -> None:
         raise FormatError(path, f"only the root can move in an AMC file, not {', '.join(moving)}")
     if skeleton_of(motion).metres_per_unit not in (None, CMU_METRES):
         motion = motion.scaled(CMU_METRES)
-    names = plain_names([ROOT, *skeleton_of(motion).names[1:]], FORBIDDEN)
+    # a bone's name holds no blanks and comments, and is neither a number nor a keyword
+    names = plain_names([ASF_ROOT, *skeleton_of(motion).names[1:]], r"[\s#]|^(?=\d+$)|^(?=:)")
     motion = with_names(motion, names)
     joints = skeleton_of(motion).joints
     asf = Asf(skeleton_of(motion), {joint.name: dofs for joint in joints if (dofs := _dofs(motion, joint))}, "deg")
@@ -217,9 +215,9 @@ def _dofs(motion: Motion, joint: Joint) -> tuple[str, ...]:
     prefix = f"{joint.name}."
     dofs = tuple(name.removeprefix(prefix) for name in motion.channels if name.rpartition(".")[0] == joint.name)
     turns = [f"r{axis}" for axis in reversed(joint.order) if f"r{axis}" in dofs]
-    if [dof for dof in dofs if dof in ANGLES] == turns:
+    if [dof for dof in dofs if dof in ANGLE_KINDS] == turns:
         return dofs
-    return (*(dof for dof in dofs if dof in TRANSLATIONS), *turns)
+    return (*(dof for dof in dofs if dof in TRANSLATION_KINDS), *turns)
 
 
 def _text(motion: Motion, dofs: Mapping[str, tuple[str, ...]]) -> str:

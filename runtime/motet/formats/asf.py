@@ -23,7 +23,7 @@ CMU_LENGTH = 0.45
 CMU_METRES = 0.0254 / CMU_LENGTH
 """CMU writes ``length 0.45`` for lengths in inches times 0.45. Other values have no known meaning."""
 
-ROOT = "root"
+ASF_ROOT = "root"
 Triple = tuple[float, float, float]
 Lines = list[tuple[int, list[str]]]
 
@@ -69,7 +69,7 @@ def _skeleton(path: Path, text: str) -> Asf:
         raise FormatError(path, f"angles in {quoted(units['angle'])}: expected deg or rad")
     factor = 1.0 if angle == "deg" else 180 / np.pi
     root, position = _root(path, sections.get("root", []), factor)
-    bones = {ROOT: root}
+    bones = {ASF_ROOT: root}
     for line, block in _blocks(path, sections.get("bonedata", [])):
         bone = _bone(path, line, block, factor)
         if not bone.name or bone.name in bones:
@@ -122,7 +122,7 @@ def _blocks(path: Path, lines: Lines) -> Iterator[tuple[int, Lines]]:
 
 
 def _root(path: Path, lines: Lines, factor: float) -> tuple[_Bone, Triple]:
-    root, position, order, angles = _Bone(ROOT), (0.0, 0.0, 0.0), "XYZ", [(0, ["0", "0", "0"])]
+    root, position, order, angles = _Bone(ASF_ROOT), (0.0, 0.0, 0.0), "XYZ", [(0, ["0", "0", "0"])]
     for line, words in lines:
         match words[0].lower():
             case "order":
@@ -190,7 +190,7 @@ def _dofs(path: Path, line: int, words: list[str], known: tuple[str, ...]) -> tu
 
 
 def _hang_children(path: Path, lines: Lines, bones: dict[str, _Bone]) -> None:
-    hung = {ROOT}
+    hung = {ASF_ROOT}
     for line, words in lines:
         if len(words) == 1 and words[0].lower() in ("begin", "end"):
             continue
@@ -207,7 +207,7 @@ def _hang_children(path: Path, lines: Lines, bones: dict[str, _Bone]) -> None:
 def _joints(bones: dict[str, _Bone], position: Triple) -> list[Joint]:
     """The joints in the hierarchy's order, each branch to its end before the next."""
     joints: list[Joint] = []
-    waiting = [(ROOT, -1, position)]
+    waiting = [(ASF_ROOT, -1, position)]
     while waiting:
         name, parent, offset = waiting.pop()
         bone = bones[name]

@@ -28,16 +28,8 @@ from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
 
 log = logging.getLogger(__name__)
 
-ORDER = "zyx"
-POSITION, ROTATION = "Xposition Yposition Zposition", "Zrotation Yrotation Xrotation"
-FORBIDDEN = r"[^\w.-]"
-"""What the writer keeps out of names: readers stumble over blanks and colons."""
-
-MAX_FRAMES = 10**7
-"""Of a file without channels, whose number of frames nothing else bears out."""
-
-DEEPEST = 40
-"""Tabs before a line at most: a long chain of joints is not a long file."""
+BVH_ORDER = "zyx"
+BVH_POSITION, BVH_ROTATION = "Xposition Yposition Zposition", "Zrotation Yrotation Xrotation"
 
 
 def read(file: File, partial: bool = False) -> Motion:
@@ -53,7 +45,8 @@ def read(file: File, partial: bool = False) -> Motion:
     nodes, motion_line = _hierarchy(path, lines)
     start, declared, fps = _motion_header(path, lines, motion_line)
     channels = [f"{node.name}.{kind}" for node in nodes for kind in node.channels]
-    if not channels and declared > MAX_FRAMES:
+    # without channels nothing else bears the number out
+    if not channels and declared > (10**7):
         raise FormatError(path, f"the file declares {declared} frames and has no channels", start)
     kept = _without_broken_end(lines, start, len(channels)) if partial else lines
     values = _values(path, kept, start, len(channels)) if channels else np.zeros((declared, 0))
@@ -215,7 +208,8 @@ def write(file: File, motion: Motion) -> None:
     FormatError for channels other than Euler angles and translations; MotionError for a motion without skeleton.
     """
     motion, moving = with_still_offsets(place_of(file), motion)
-    names = plain_names(skeleton_of(motion).names, FORBIDDEN)
+    # readers stumble over blanks and colons in names
+    names = plain_names(skeleton_of(motion).names, r"[^\w.-]")
     translated = {names[0], *(names[skeleton_of(motion).index(name)] for name in moving)}
     motion = with_names(motion, names)
     joints = _jointed(motion)
@@ -246,7 +240,8 @@ def _jointed(motion: Motion) -> list[int]:
 def _tree(skeleton: Skeleton, joints: list[int], translated: set[str]) -> Iterator[str]:
     """The lines of the hierarchy; ``joints`` come each branch to its end before the next."""
     written = set(joints)
-    indents = ["\t" * min(depth, DEEPEST) for depth in range(len(joints))]
+    # 40 tabs at most: a long chain of joints is not a long file
+    indents = ["\t" * min(depth, 40) for depth in range(len(joints))]
     open_joints: list[int] = []
     for i in joints:
         joint, children = skeleton.joints[i], skeleton.children[i]
@@ -264,7 +259,7 @@ def _tree(skeleton: Skeleton, joints: list[int], translated: set[str]) -> Iterat
 
 def _joint_lines(skeleton: Skeleton, i: int, translated: bool) -> list[str]:
     name, offset = skeleton.joints[i].name, skeleton.joints[i].offset if i else (0.0, 0.0, 0.0)
-    channels = f"6 {POSITION} {ROTATION}" if translated else f"3 {ROTATION}"
+    channels = f"6 {BVH_POSITION} {BVH_ROTATION}" if translated else f"3 {BVH_ROTATION}"
     return [f"{'JOINT' if i else 'ROOT'} {name}", "{", f"\tOFFSET {_text(offset)}", f"\tCHANNELS {channels}"]
 
 
@@ -286,14 +281,14 @@ def _rows(motion: Motion, joints: list[int], translated: set[str]) -> Array:
 def _zyx_degrees(motion: Motion) -> Array:
     """Angles (T, J, 3) about z, y, x in degrees, as they are where they are of this kind already."""
     skeleton = skeleton_of(motion)
-    converted = rotmats_to_euler(local_rotations(motion), ORDER)
+    converted = rotmats_to_euler(local_rotations(motion), BVH_ORDER)
     angles: Array = np.round(np.degrees(converted), 9).astype(np.float64)
-    kept = [i for i, joint in enumerate(skeleton.joints) if joint.order == ORDER and not any(joint.axis)]
+    kept = [i for i, joint in enumerate(skeleton.joints) if joint.order == BVH_ORDER and not any(joint.axis)]
     angles[:, kept] = 0.0
     for joint, columns in motion.rotation_columns().items():
         if skeleton.index(joint) in kept:
             for column in columns:
                 factor = TURN["deg"] / TURN[motion.units[column]]
-                place = ORDER.index(motion.channels[column][-1])
+                place = BVH_ORDER.index(motion.channels[column][-1])
                 angles[:, skeleton.index(joint), place] = motion.values[:, column] * factor
     return angles

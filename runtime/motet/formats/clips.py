@@ -16,9 +16,6 @@ Clip = str | int | None
 MARK = "#"
 """What stands between a file and its clip."""
 
-LONGEST = 200
-"""Characters of a clip's name; more of it are cut off."""
-
 
 def clip_names(given: Iterable[str]) -> tuple[str, ...]:
     """Names for a file's clips, in their order, none twice: printable and on one line, "clip3" for an empty third."""
@@ -28,7 +25,8 @@ def clip_names(given: Iterable[str]) -> tuple[str, ...]:
 
 def _tidy(name: str) -> str:
     printable = "".join(letter if letter.isprintable() else " " for letter in name)
-    return " ".join(printable.split())[:LONGEST]
+    # more characters are cut off
+    return " ".join(printable.split())[:200]
 
 
 def chosen(path: Path, names: Sequence[str], clip: Clip) -> int:

@@ -21,10 +21,10 @@ from motet.motion.motion import Motion
 
 PROGRAM = Path(__file__).with_name("fbx_to_gltf.py")
 
-MAX_BYTES = 2**29
+FBX_MAX_BYTES = 2**29
 """The largest file that is read."""
 
-SECONDS = 600
+FBX_SECONDS = 600
 """How long one may take."""
 
 
@@ -35,7 +35,7 @@ def read(file: File, clip: Clip = None, rest: File | None = None) -> Motion:
     move in "length". FormatError names what the file lacks, and the extra where ufbx is not installed.
     rest: as of :func:`motet.formats.gltf.read`, or an FBX file, whose own rest pose it then is.
     """
-    path, content = place_of(file), read_bytes(file, MAX_BYTES)
+    path, content = place_of(file), read_bytes(file, FBX_MAX_BYTES)
     found = _gltf(path, content, 0 if clip is None else None)
     names = _takes(found)
     if clip is not None:
@@ -43,18 +43,18 @@ def read(file: File, clip: Clip = None, rest: File | None = None) -> Motion:
     elif names:
         chosen(path, names, None)  # which says that there are others
     if rest is not None and place_of(rest).suffix.lower() == ".fbx":
-        rest = _gltf(place_of(rest), read_bytes(rest, MAX_BYTES), None)
+        rest = _gltf(place_of(rest), read_bytes(rest, FBX_MAX_BYTES), None)
     return gltf.read(found, rest=rest)
 
 
 def clips(file: File) -> tuple[str, ...]:
     """The names of the takes that move a bone, in the file's order; FormatError as :func:`read`."""
-    return _takes(_gltf(place_of(file), read_bytes(file, MAX_BYTES), None))
+    return _takes(_gltf(place_of(file), read_bytes(file, FBX_MAX_BYTES), None))
 
 
 def read_character(file: File) -> Character:
     """Read a character's skeleton to put motions onto; FormatError as :func:`read`."""
-    return gltf_character.read_character(_gltf(place_of(file), read_bytes(file, MAX_BYTES), None))
+    return gltf_character.read_character(_gltf(place_of(file), read_bytes(file, FBX_MAX_BYTES), None))
 
 
 def _takes(found: BytesIO) -> tuple[str, ...]:
@@ -74,9 +74,9 @@ def _run(path: Path, content: bytes, number: str) -> bytes:
         raise FormatError(path, "FBX files need the package ufbx: install the extra with  pip install 'motet[fbx]'")
     command = [sys.executable, "-P", str(PROGRAM), number]
     try:
-        done = subprocess.run(command, input=content, capture_output=True, timeout=SECONDS, check=False)
+        done = subprocess.run(command, input=content, capture_output=True, timeout=FBX_SECONDS, check=False)
     except subprocess.TimeoutExpired as error:
-        raise FormatError(path, f"it takes more than {SECONDS} s to read") from error
+        raise FormatError(path, f"it takes more than {FBX_SECONDS} s to read") from error
     except OSError as error:
         raise FormatError(path, f"no process to read it can be started: {error.strerror}") from error
     if done.returncode:

@@ -27,17 +27,14 @@ import ufbx
 MEMORY, MEMORY_PER_BYTE = 2**28, 32
 """Bytes of memory that a file may take: these, and so many for each of its own."""
 
-FREE_VALUES = 10**5
+FBX_FREE_VALUES = 10**5
 """Frames times nodes of a file of any size; one of more has four bytes for each, so that a small one stays cheap."""
 
-FPS, MAX_FPS = 30.0, 1000.0
+FBX_FPS, FBX_MAX_FPS = 30.0, 1000.0
 """The frame rate of a file that says none, and the highest."""
 
-PARTS = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3"}
+TRACK_TYPES = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3"}
 """What glTF and ufbx both call the parts of a node's transform, and glTF's types of them."""
-
-SAME = 1e-5
-"""A node that no curve moves gets samples where it is further than this from its rest."""
 
 Vector = Sequence[float]
 Matrix = Sequence[Vector]
@@ -189,7 +186,7 @@ def frame_times(scene: Scene, take: Take) -> list[float]:
     """When a take's frames are, in seconds; ValueError for more of them than a file of its size may have."""
     begin, end = span(take)
     fps = frame_rate(scene, take)
-    if not (end - begin) * fps * len(scene.near) < FREE_VALUES + scene.size / 4:
+    if not (end - begin) * fps * len(scene.near) < FBX_FREE_VALUES + scene.size / 4:
         raise ValueError(f"{end - begin:g} s at {fps:g} fps are too many frames")
     return [begin + i / fps for i in range(round((end - begin) * fps) + 1)]
 
@@ -209,9 +206,9 @@ def frame_rate(scene: Scene, take: Take) -> float:
     times = [key.time for key in keys]
     steps = sorted(later - time for time, later in pairwise(times))
     step = steps[len(steps) // 2] if len(steps) > 1 else 0.0
-    keyed = 1 / step if step * MAX_FPS >= 1 else 0.0
+    keyed = 1 / step if step * FBX_MAX_FPS >= 1 else 0.0
     fps = keyed if keyed > 1.01 * said else said
-    return fps if 0 < fps <= MAX_FPS else FPS
+    return fps if 0 < fps <= FBX_MAX_FPS else FBX_FPS
 
 
 def as_gltf(scene: Scene, take: Take | None) -> dict[str, Any]:
@@ -219,7 +216,7 @@ def as_gltf(scene: Scene, take: Take | None) -> dict[str, Any]:
     rest = scene.rest()
     nodes: list[dict[str, Any]] = [{"name": node.name} for node in scene.nodes]
     for i, node in enumerate(scene.nodes):
-        parts = {name: getattr(node.local_transform, name) for name in PARTS}
+        parts = {name: getattr(node.local_transform, name) for name in TRACK_TYPES}
         nodes[i] |= {"matrix": _columns(rest[i])} if i in scene.bound else parts
     for i, parent in enumerate(scene.parents):
         if parent >= 0:
@@ -243,7 +240,7 @@ def _animation(scene: Scene, take: Take, rest: list[Matrix]) -> dict[str, Any]:
         poses = [ufbx.evaluate_transform(take.stack.anim, scene.nodes[node], time) for time in times]
         if node not in take.moved and not any(_differ(matrix_of(pose), rest[node]) for pose in poses):
             continue
-        for name, kind in PARTS.items():
+        for name, kind in TRACK_TYPES.items():
             channels.append({"sampler": len(channels), "target": {"node": node, "path": name}})
             accessors.append({**accessors[0], "byteOffset": 4 * len(values), "type": kind})
             values.extend(number for pose in poses for number in getattr(pose, name))
@@ -261,7 +258,8 @@ def _animation(scene: Scene, take: Take, rest: list[Matrix]) -> dict[str, Any]:
 
 def _differ(a: Matrix, b: Matrix) -> bool:
     pairs = ((x, y) for left, right in zip(a, b, strict=True) for x, y in zip(left, right, strict=True))
-    return any(abs(x - y) > SAME * max(1.0, abs(y)) for x, y in pairs)
+    # a node that no curve moves gets samples where it is further than this from its rest
+    return any(abs(x - y) > 1e-5 * max(1.0, abs(y)) for x, y in pairs)
 
 
 def limit_memory(size: int) -> None:

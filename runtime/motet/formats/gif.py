@@ -16,24 +16,18 @@ from motet.motion.motion import Motion
 from motet.motion.resample import resampled
 from motet.motion.rotations import Array
 
-SIZE = 320
 YAW = np.radians(40.0)
 """Camera yaw relative to where the figure faces."""
 
-STILL = 0.5
-"""A figure that stays within this many heights is seen by a camera that stands still."""
 
-COLOURS = 64
-
-
-def write(file: File, motion: Motion, size: int = SIZE) -> None:
+def write(file: File, motion: Motion, size: int = 320) -> None:
     """Write a square GIF of ``size`` pixels; MotionError for a motion without skeleton or frames."""
     figure = figure_of(motion)
     delay = delay_of(figure.fps)
     points = resampled(figure.points, figure.fps * delay / 100)
     stage, targets = Stage(size, figure.heading + YAW), _targets(points[:, 0, ::2], 100 / delay)
     pictures = (stage.picture(pose, figure.bones, target) for pose, target in zip(points, targets, strict=True))
-    first = next(pictures).quantize(COLOURS)
+    first = next(pictures).quantize(64)
     rest = (picture.quantize(palette=first, dither=Image.Dither.NONE) for picture in pictures)
     content = io.BytesIO()
     first.save(content, "GIF", save_all=True, append_images=rest, duration=10 * delay, loop=0, optimize=False)
@@ -50,7 +44,8 @@ def delay_of(fps: float) -> int:
 
 def _targets(path: Array, fps: float) -> Array:
     """Where the camera looks (T, 2): the root's path (T, 2) without its sway, or the middle if it hardly moves."""
-    if np.ptp(path, axis=0).max() < STILL:
+    # half a height: the camera stands still
+    if np.ptp(path, axis=0).max() < 0.5:
         return np.tile((path.min(axis=0) + path.max(axis=0)) / 2, (len(path), 1))
     half = round(fps / 2)
     sums = np.concatenate([np.zeros((1, 2)), np.cumsum(path, axis=0)])

@@ -25,12 +25,12 @@ from motet.motion.skeleton import Skeleton
 FLOAT, UINT8, UINT16, UINT32 = 5126, 5121, 5123, 5125
 """glTF's numbers for the types of components."""
 
-SHAPES: dict[tuple[int, ...], str] = {(): "SCALAR", (3,): "VEC3", (4,): "VEC4", (4, 4): "MAT4"}
+GLB_TYPES: dict[tuple[int, ...], str] = {(): "SCALAR", (3,): "VEC3", (4,): "VEC4", (4, 4): "MAT4"}
 
 VERTICES, INDICES = 34962, 34963
 """glTF's numbers for what a buffer of a mesh holds."""
 
-AROUND = 10
+LIMB_CORNERS = 10
 """Corners around a bone of the body."""
 
 
@@ -52,7 +52,7 @@ class Buffer:
         view = {"buffer": 0, "byteOffset": len(self.content), "byteLength": content.nbytes}
         self.views.append(view | ({"target": target} if target else {}))
         self.content += content.tobytes() + bytes(-content.nbytes % 4)
-        shape = SHAPES[content.shape[1:]]
+        shape = GLB_TYPES[content.shape[1:]]
         accessor = {"bufferView": len(self.views) - 1, "componentType": kind, "count": len(content), "type": shape}
         self.accessors.append(accessor | more)
         return len(self.accessors) - 1
@@ -177,9 +177,9 @@ def _body(buffer: Buffer, skeleton: Skeleton) -> dict[str, Any]:
     prisms = [_prism(bone, points[bone.start], points[bone.end]) for bone in body.bones]
     corners, normals = (np.concatenate(arrays) for arrays in zip(*prisms, strict=True))
     joints = np.zeros((len(corners), 4))
-    joints[:, 0] = np.repeat([bone.carriers for bone in body.bones], AROUND + 1)
-    colours = np.repeat([COLOURS[bone.side] for bone in body.bones], 2 * AROUND + 2, axis=0)
-    triangles = _triangles() + (2 * AROUND + 2) * np.arange(len(body.bones))[:, None]
+    joints[:, 0] = np.repeat([bone.carriers for bone in body.bones], LIMB_CORNERS + 1)
+    colours = np.repeat([COLOURS[bone.side] for bone in body.bones], 2 * LIMB_CORNERS + 2, axis=0)
+    triangles = _triangles() + (2 * LIMB_CORNERS + 2) * np.arange(len(body.bones))[:, None]
     attributes = {
         "POSITION": buffer.add_bounded(corners * body.height, VERTICES),
         "NORMAL": buffer.add(normals, FLOAT, VERTICES),
@@ -197,13 +197,13 @@ def _linear(colours: NDArray[Any]) -> Array:
 
 
 def _prism(bone: Bone, start: Array, end: Array) -> tuple[Array, Array]:
-    """Corners and normals (2 * AROUND + 2, 3): tip and ring at the start, ring and tip at the end."""
+    """Corners and normals (2 * LIMB_CORNERS + 2, 3): tip and ring at the start, ring and tip at the end."""
     axis = end - start
     length = float(np.linalg.norm(axis))
     axis = axis / length if length else np.array([0.0, 1.0, 0.0])
     side = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     side /= np.linalg.norm(side)
-    angles = np.arange(AROUND)[:, None] * 2 * np.pi / AROUND
+    angles = np.arange(LIMB_CORNERS)[:, None] * 2 * np.pi / LIMB_CORNERS
     ring = np.cos(angles) * side + np.sin(angles) * np.cross(axis, side)
     thick, thin = bone.start_radius, bone.end_radius
     corners = [start - 0.7 * thick * axis, *(start + thick * ring), *(end + thin * ring), end + 0.7 * thin * axis]
@@ -212,10 +212,10 @@ def _prism(bone: Bone, start: Array, end: Array) -> tuple[Array, Array]:
 
 def _triangles() -> NDArray[np.int64]:
     """Corners of the triangles of a prism, counterclockwise from outside."""
-    now = np.arange(AROUND)
-    after = (now + 1) % AROUND
-    low, high, tip = now + 1, now + 1 + AROUND, 2 * AROUND + 1
-    low_after, high_after = after + 1, after + 1 + AROUND
+    now = np.arange(LIMB_CORNERS)
+    after = (now + 1) % LIMB_CORNERS
+    low, high, tip = now + 1, now + 1 + LIMB_CORNERS, 2 * LIMB_CORNERS + 1
+    low_after, high_after = after + 1, after + 1 + LIMB_CORNERS
     cap, lid = np.stack([0 * now, low_after, low]), np.stack([0 * now + tip, high, high_after])
     wall = [np.stack([low, low_after, high]), np.stack([low_after, high_after, high])]
     return np.concatenate([part.T.reshape(-1) for part in (cap, *wall, lid)])

@@ -14,14 +14,14 @@ from motet.files import File, place_of
 from motet.formats.clips import Clip, chosen, clip_names, split_clip
 from motet.formats.gltf_data import Gltf, parse
 from motet.formats.gltf_figures import Figure, above, figure_of, figures, likeliest
-from motet.formats.gltf_tracks import FPS, moved, tracks
+from motet.formats.gltf_tracks import GLTF_FPS, moved, tracks
 from motet.formats.lines import Names
 from motet.formats.nodes import Poses, motion_of_nodes, rested
 from motet.motion.humanoid import BONES
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 
-EXTENSIONS = (".glb", ".gltf", ".vrm", ".vrma")
+GLTF_EXTENSIONS = (".glb", ".gltf", ".vrm", ".vrma")
 """What these files are called."""
 
 
@@ -101,9 +101,9 @@ def _read(scene: _Scene, clip: Clip, turns: Mapping[str, Array]) -> Motion:
 
 def _stance(file: File) -> dict[str, Array]:
     """How a file's joints are turned (3, 3) in the world, by name: at rest, or where a clip is named in its start."""
-    file, clip = split_clip(file, EXTENSIONS)
-    if isinstance(file, str | Path) and Path(file).suffix.lower() not in EXTENSIONS:
-        raise FormatError(place_of(file), f"a rest pose is taken from one of {' '.join(EXTENSIONS)}")
+    file, clip = split_clip(file, GLTF_EXTENSIONS)
+    if isinstance(file, str | Path) and Path(file).suffix.lower() not in GLTF_EXTENSIONS:
+        raise FormatError(place_of(file), f"a rest pose is taken from one of {' '.join(GLTF_EXTENSIONS)}")
     with broken(place_of(file)):
         scene = _parsed(file)
         take = _take(scene, None if clip is None else chosen(scene.gltf.path, scene.names, clip))
@@ -115,7 +115,7 @@ def _take(scene: _Scene, index: int | None) -> _Take:
     animation = {} if index is None else scene.animations[index]
     figure = figure_of(gltf, likeliest(gltf, scene.figures, moved(animation)))
     near = above(gltf, figure.nodes)
-    values, fps = ({}, FPS) if index is None else tracks(gltf, animation, scene.names[index], near)
+    values, fps = ({}, GLTF_FPS) if index is None else tracks(gltf, animation, scene.names[index], near)
     rest = poses = Poses(*gltf.world(near)[1:]).of(figure.nodes)
     if values:
         poses = Poses(*gltf.world(near, values)[1:]).of(figure.nodes)

@@ -18,14 +18,14 @@ from motet.formats.gltf import broken
 from motet.formats.gltf_data import Gltf, parse
 from motet.formats.gltf_figures import Rest, at_rest
 from motet.formats.gltf_skin import skin_of
-from motet.formats.gltf_tracks import FPS
+from motet.formats.gltf_tracks import GLTF_FPS
 from motet.motion.humanoid import BONES, REQUIRED, JointMap, check_map
 from motet.motion.kinematics import local_rotations, local_translations
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, product, quat_to_rotmat, rotmat_to_quat
 from motet.motion.skeleton import Skeleton
 
-STILL = 1e-6
+STAYS_WITHIN = 1e-6
 """A joint that stays this near to its rest, in radians and heights, has no track."""
 
 
@@ -42,12 +42,12 @@ class Nodes:
         The root has both tracks, other joints those by which they leave their rest. Exact where scales are uniform, or
         mirror; of stretched parents the rotation is the nearest one.
         """
-        skeleton, still = self.rest.skeleton, STILL * self.rest.skeleton.height
+        skeleton, still = self.rest.skeleton, STAYS_WITHIN * self.rest.skeleton.height
         turns, moves = local_rotations(motion), local_translations(motion)
         for i, node in enumerate(self.rest.nodes):
             to_parent, origin = self._above(node)
             frame, turn = _orthogonal(to_parent), self.gltf.local(node)[1]
-            if not i or np.abs(turns[:, i] - np.eye(3)).max() > STILL:
+            if not i or np.abs(turns[:, i] - np.eye(3)).max() > STAYS_WITHIN:
                 at_rest = frame @ quat_to_rotmat(turn / np.linalg.norm(turn))
                 yield node, "rotation", rotmat_to_quat(product(product(frame.T, turns[:, i]), at_rest))
             if not i or np.abs(moves[:, i] - skeleton.offsets[i]).max() > still:
@@ -83,7 +83,7 @@ def read_character(file: File) -> Character:
         scales = np.abs(np.linalg.det(rest.linear[list(rest.nodes)]))
         if not scales.min() > 0:
             raise FormatError(path, "nodes of its skeleton have the scale 0: apply scales when exporting")
-        still = Motion(np.zeros((1, 0)), (), (), FPS, rest.skeleton)
+        still = Motion(np.zeros((1, 0)), (), (), GLTF_FPS, rest.skeleton)
         return Character(still, _map(path, gltf, rest), Nodes(gltf, rest), skin_of(gltf, rest))
 
 

@@ -21,12 +21,12 @@ from motet.motion.rotations import Array, frames_last, product, quat_to_rotmat, 
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 """glTF's numbers for types of numbers."""
 
-SHAPES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+TYPE_SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 MAX_NODES = 20_000
 """Nodes of a file; a figure has some hundreds."""
 
-MAX_BYTES = 2**29
+GLTF_MAX_BYTES = 2**29
 """Bytes of all buffers of a file together."""
 
 
@@ -163,7 +163,7 @@ class Gltf:
     def _decoded(self, index: int) -> Array:
         try:
             accessor = self.objects("accessors")[index]
-            kind, width, count = COMPONENTS[accessor["componentType"]], SHAPES[accessor["type"]], accessor["count"]
+            kind, width, count = COMPONENTS[accessor["componentType"]], TYPE_SIZES[accessor["type"]], accessor["count"]
             if "bufferView" not in accessor or "sparse" in accessor:
                 raise FormatError(self.path, f"accessor {index} is sparse: export it without compression")
             size = np.dtype(kind).itemsize * width
@@ -237,8 +237,8 @@ def _chunks(path: Path, content: bytes) -> tuple[bytes, bytes]:
 def _buffers(path: Path, buffers: list[dict[str, Any]], binary: bytes, beside: Path | None) -> tuple[bytes, ...]:
     """The content of each buffer, as much as it declares; that of files in the folder ``beside`` only where given."""
     sizes = [buffer["byteLength"] for buffer in buffers]
-    if not all(isinstance(size, int) and size >= 0 for size in sizes) or sum(sizes) > MAX_BYTES:
-        raise FormatError(path, f"its buffers declare sizes that are none, or over {MAX_BYTES} bytes together")
+    if not all(isinstance(size, int) and size >= 0 for size in sizes) or sum(sizes) > GLTF_MAX_BYTES:
+        raise FormatError(path, f"its buffers declare sizes that are none, or over {GLTF_MAX_BYTES} bytes together")
     return tuple(_buffer(path, buffer, binary, beside)[:size] for buffer, size in zip(buffers, sizes, strict=True))
 
 

@@ -8,10 +8,7 @@ from typing import Any
 
 from motet.errors import FormatError
 
-EXTENSIONS = ("EXT_meshopt_compression", "KHR_meshopt_compression")
-
-MAX_RATIO = 1024
-"""Bytes that one packed byte can stand for: a block of 256 equal bytes takes two bits."""
+MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
 MAX_UNPACKED = 2**25
 """Bytes that all parts together may hold: a key each frame for 12 minutes of a figure of 90 joints at 60 a second."""
@@ -20,7 +17,7 @@ MAX_UNPACKED = 2**25
 def packing(view: Mapping[str, Any]) -> Mapping[str, Any] | None:
     """What an extension says of how a view of a buffer is packed; None where it is not."""
     found = view.get("extensions", {})
-    return next((found[name] for name in EXTENSIONS if name in found), None)
+    return next((found[name] for name in MESHOPT if name in found), None)
 
 
 def unpacked(path: Path, packed: Mapping[str, Any], buffers: tuple[bytes, ...], room: int) -> bytes:
@@ -36,7 +33,8 @@ def unpacked(path: Path, packed: Mapping[str, Any], buffers: tuple[bytes, ...], 
     content = buffers[packed["buffer"]][start : start + length]
     if not 0 <= start <= start + length or len(content) < length:
         raise FormatError(path, "a packed part reaches beyond its buffer: the file is truncated")
-    if not (count > 0 and stride > 0 and count * stride <= min(room, MAX_RATIO * length)):
+    # bytes that one packed byte can stand for: a block of 256 equal bytes takes two bits
+    if not (count > 0 and stride > 0 and count * stride <= min(room, 1024 * length)):
         raise FormatError(path, f"a packed part of {length} bytes cannot hold {count} times {stride} of them")
     decode = import_module("meshopt").decode_gltf_buffer
     try:

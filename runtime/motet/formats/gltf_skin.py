@@ -14,7 +14,7 @@ from motet.motion.rotations import Array, rotated
 
 log = logging.getLogger(__name__)
 
-DIRECTIONS = 200
+SKIN_DIRECTIONS = 200
 """Directions, all around, in each of which the outermost point is kept."""
 
 
@@ -39,9 +39,9 @@ def skin_of(gltf: Gltf, rest: Rest) -> dict[int, Array]:
 
 
 def _directions() -> Array:
-    """Unit vectors (DIRECTIONS, 3), spread evenly by the golden angle."""
-    height = 1 - (2 * np.arange(DIRECTIONS) + 1) / DIRECTIONS
-    angle, radius = np.arange(DIRECTIONS) * np.pi * (3 - 5**0.5), np.sqrt(1 - height**2)
+    """Unit vectors (SKIN_DIRECTIONS, 3), spread evenly by the golden angle."""
+    height = 1 - (2 * np.arange(SKIN_DIRECTIONS) + 1) / SKIN_DIRECTIONS
+    angle, radius = np.arange(SKIN_DIRECTIONS) * np.pi * (3 - 5**0.5), np.sqrt(1 - height**2)
     return np.stack([radius * np.cos(angle), height, radius * np.sin(angle)], axis=-1)
 
 

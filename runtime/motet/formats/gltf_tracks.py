@@ -9,17 +9,8 @@ from motet.errors import FormatError, quoted
 from motet.formats.gltf_data import Gltf
 from motet.motion.rotations import Array
 
-FPS = 30.0
+GLTF_FPS = 30.0
 """The frame rate of a file that has no animation or keys too sparse to tell one."""
-
-MAX_VALUES = 10**7
-"""Frames times nodes: an hour at 30 frames a second of a figure of 90 nodes."""
-
-FREE_VALUES = 10**6
-"""Frames times nodes of a file of any size; a file of more has a byte for each, so that a small one stays cheap."""
-
-SPARSE = 0.1
-"""Keys further apart than this many seconds do not tell a frame rate."""
 
 PATHS = {"rotation": 4, "translation": 3, "scale": 3}
 """What of a node is animated here, with the numbers it has; weights of meshes are left out."""
@@ -48,10 +39,12 @@ def tracks(gltf: Gltf, animation: Mapping[str, Any], name: str, nodes: set[int])
         raise FormatError(gltf.path, f"its animation {quoted(name)} has tracks without keys")
     start, end = min(times[0] for times, _, _ in keys.values()), max(times[-1] for times, _, _ in keys.values())
     steps = min((float(np.median(np.diff(times))) for times, _, _ in keys.values() if len(times) > 1), default=0.0)
-    rate = 1 / steps if 0 < steps < SPARSE else FPS
+    # keys that are further apart do not tell a frame rate
+    rate = 1 / steps if 0 < steps < 0.1 else GLTF_FPS
     fps = float(round(rate)) if abs(rate - round(rate)) < 0.01 * rate else rate
     count = (end - start) * fps + 1
-    if not count * len(gltf.objects("nodes")) < min(MAX_VALUES, FREE_VALUES + gltf.size):
+    # an hour at 30 frames a second of 90 nodes; of a small file a million, and one more for each byte
+    if not count * len(gltf.objects("nodes")) < min((10**7), (10**6) + gltf.size):
         raise FormatError(gltf.path, f"{end - start:g} s at {fps:g} fps are too many frames")
     frames = start + np.arange(round(count)) / fps
     return {place: _sampled(*key, frames, place[1]) for place, key in keys.items()}, fps

@@ -21,8 +21,6 @@ from motet.motion.motion import Motion
 Captions = Sequence[tuple[float, str]]
 """What is shown when: (start in seconds, text), each until the next one starts."""
 
-STEP = 1e-4
-
 
 def write(file: File, motion: Motion, captions: Captions | None = None, title: str | None = None) -> None:
     """Write the page of one motion, with captions that change with time and a title (the file's name if None).
@@ -51,7 +49,7 @@ def figure_data(motion: Motion, name: str, captions: Captions | None = None) -> 
     figure = figure_of(motion)
     root = figure.points[:, 0].astype("<f4")
     relative = figure.points - root[:, None]
-    step = max(STEP, float(np.abs(relative).max()) / 32767)
+    step = max(1e-4, float(np.abs(relative).max()) / 32767)
     return {
         "name": name,
         "fps": figure.fps,

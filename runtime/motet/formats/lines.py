@@ -9,9 +9,6 @@ from pathlib import Path
 from motet.errors import FormatError, quoted
 from motet.files import File, place_of
 
-MAX_FPS = 1e6
-MIN_FPS = 1e-3
-
 
 def read_bytes(file: File, most: int | None = None) -> bytes:
     """All bytes of a file or file object; FormatError if there is no such file or it cannot be read.
@@ -73,7 +70,7 @@ def number(word: str, path: Path, line: int | None) -> float:
 
 def frame_rate(fps: float, path: Path, line: int | None = None) -> float:
     """A frame rate that a file states, if a motion can have it; else FormatError."""
-    if not MIN_FPS <= fps <= MAX_FPS:
+    if not 1e-3 <= fps <= 1e6:
         raise FormatError(path, f"a motion cannot have {fps:g} frames a second", line)
     return fps
 

@@ -17,13 +17,11 @@ from motet.formats.lines import frame_rate, numbers, read_bytes
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 
-ROOT = ("root.tx", "root.ty", "root.tz", "root.rx", "root.ry", "root.rz")
-ROOT_UNITS = ("m",) * 3 + ("rad",) * 3
-MILLIMETRE = 0.001
-CHUNK = 2**20
+MMM_ROOT = ("root.tx", "root.ty", "root.tz", "root.rx", "root.ry", "root.rz")
+XML_CHUNK = 2**20
 """Bytes that the XML parser is given at once: it starts anew on a token that is longer, so few large ones are fast."""
 
-PARTS = {"Timestep": 1, "RootPosition": 3, "RootRotation": 3}
+FRAME_PARTS = {"Timestep": 1, "RootPosition": 3, "RootRotation": 3}
 """Element of a frame -> how many numbers it has; after these come the joints' angles."""
 
 
@@ -50,7 +48,8 @@ def read(file: File) -> Motion:
         raise FormatError(path, "not an MMM motion: it needs a Motion with JointOrder and MotionFrames")
     rows = np.array(frames)
     values = np.column_stack([_root(rows[:, 1:4], rows[:, 4:7]), rows[:, 7:]])
-    return Motion(values, (*ROOT, *joints), ROOT_UNITS + ("rad",) * len(joints), _fps(path, rows[:, 0]))
+    units = ("m",) * 3 + ("rad",) * (3 + len(joints))
+    return Motion(values, (*MMM_ROOT, *joints), units, _fps(path, rows[:, 0]))
 
 
 def motion_name(file: File) -> str:
@@ -63,8 +62,8 @@ def _elements(file: File, event: Literal["start", "end"] = "end") -> Iterator[El
     path, content = place_of(file), read_bytes(file)
     parser: ElementTree.XMLPullParser[Any] = ElementTree.XMLPullParser([event])
     try:
-        for start in range(0, len(content), CHUNK):
-            parser.feed(content[start : start + CHUNK])
+        for start in range(0, len(content), XML_CHUNK):
+            parser.feed(content[start : start + XML_CHUNK])
             events: Iterator[Any] = parser.read_events()
             for _, element in events:
                 yield element
@@ -80,7 +79,7 @@ def _elements(file: File, event: Literal["start", "end"] = "end") -> Iterator[El
 def _frame(path: Path, element: ElementTree.Element, joints: int, number: int) -> Array:
     """Time step, root position and rotation, and the joints' angles of one frame: (7 + J,)."""
     found: list[float] = []
-    for tag, count in {**PARTS, "JointPosition": joints}.items():
+    for tag, count in {**FRAME_PARTS, "JointPosition": joints}.items():
         words = (element.findtext(tag) or "").split()
         if len(words) != count:
             raise FormatError(path, f"frame {number}: {tag} needs {count} values, not {len(words)}")
@@ -93,7 +92,8 @@ def _frame(path: Path, element: ElementTree.Element, joints: int, number: int) -
 
 def _root(positions: Array, rotations: Array) -> Array:
     """Root channels (T, 6) from positions (T, 3) in millimetres and angles (T, 3): roll, pitch, yaw, R = Rz Ry Rx."""
-    (x, y, z), (roll, pitch, yaw) = positions.T * MILLIMETRE, rotations.T
+    # millimetres
+    (x, y, z), (roll, pitch, yaw) = positions.T * 0.001, rotations.T
     return np.column_stack([-x, z, y, -roll, yaw, pitch])
 
 

@@ -16,9 +16,6 @@ from motet.motion.motion import Motion
 from motet.motion.rotations import Array, inverse, product, rotated
 from motet.motion.skeleton import Joint, Skeleton
 
-STILL = 1e-4
-"""A joint stays at its offset where it is nowhere further from it than this part of the figure's height."""
-
 
 @dataclass(frozen=True)
 class Poses:
@@ -80,6 +77,7 @@ def _moved(skeleton: Skeleton, turned: Array, places: Array) -> dict[int, Array]
     for i, joint in enumerate(skeleton.joints[1:], start=1):
         from_parent = places[:, i] - places[:, joint.parent]
         local = rotated(inverse(turned[:, joint.parent]), from_parent)
-        if np.abs(local - joint.offset).max(initial=0.0) > STILL * max(skeleton.height, 1e-9):
+        # of the figure's height: a joint that is nowhere further from its offset stays there
+        if np.abs(local - joint.offset).max(initial=0.0) > 1e-4 * max(skeleton.height, 1e-9):
             moved[i] = local
     return moved

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-MAX_BYTES = 2**29
+NPY_MAX_BYTES = 2**29
 """Of an array, unpacked: an hour of a hundred channels at 120 frames a second, and more."""
 
 
@@ -20,8 +20,8 @@ def array(archive: zipfile.ZipFile, name: str, kinds: str) -> NDArray[Any]:
     a damaged archive makes zipfile and its unpackers raise errors of a dozen types.
     """
     info = archive.getinfo(f"{name}.npy")
-    if info.file_size > MAX_BYTES:
-        raise ValueError(f"array {name!r} has {info.file_size} bytes, and at most {MAX_BYTES} are read")
+    if info.file_size > NPY_MAX_BYTES:
+        raise ValueError(f"array {name!r} has {info.file_size} bytes, and at most {NPY_MAX_BYTES} are read")
     content = archive.read(info)
     stream = io.BytesIO(content)
     headers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}

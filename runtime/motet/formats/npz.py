@@ -15,11 +15,11 @@ from motet.errors import FormatError
 from motet.files import File, place_of, write_whole
 from motet.formats import amass
 from motet.formats.lines import frame_rate, read_bytes
-from motet.formats.npy import MAX_BYTES, array
+from motet.formats.npy import NPY_MAX_BYTES, array
 from motet.motion.motion import Motion
 from motet.motion.skeleton import Skeleton
 
-OTHERS = {
+OTHER_NPZ = {
     "posed_joints": "Kimodo's npz, which has no skeleton: convert it to BVH with its own kimodo_convert",
     "body_pos_w": "a robot's motion as controllers are trained on, and no human's",
     "dof_pos": "angles of a robot's motors, and no human's",
@@ -27,7 +27,7 @@ OTHERS = {
 }
 """An array -> what a file that has it is."""
 
-KINDS = {"values": "fiu", "channels": "U", "units": "U", "fps": "fiu", "skeleton": "U"}
+NPZ_ARRAYS = {"values": "fiu", "channels": "U", "units": "U", "fps": "fiu", "skeleton": "U"}
 """Array -> the kinds of dtype that it may have."""
 
 
@@ -39,7 +39,7 @@ def read(file: File) -> Motion:
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             _refuse_others(path, {name.removesuffix(".npy") for name in archive.namelist()})
-            values, channels, units, fps, skeleton = (array(archive, name, kinds) for name, kinds in KINDS.items())
+            values, channels, units, fps, skeleton = (array(archive, name, kinds) for name, kinds in NPZ_ARRAYS.items())
         names, kinds, text = map(str, channels.tolist()), map(str, units.tolist()), str(skeleton)
         bones = Skeleton.from_json(json.loads(text)) if text else None
         return Motion(values, tuple(names), tuple(kinds), frame_rate(float(fps), path), bones)
@@ -52,14 +52,14 @@ def read(file: File) -> Motion:
 
 def _refuse_others(path: Path, arrays: set[str]) -> None:
     """Say what a file is whose arrays are those of another program, not what motet's own files have."""
-    for name, kind in OTHERS.items():
-        if name in arrays and not arrays >= KINDS.keys():
+    for name, kind in OTHER_NPZ.items():
+        if name in arrays and not arrays >= NPZ_ARRAYS.keys():
             raise FormatError(path, f"this is {kind}; expected a motion of motet or of AMASS")
 
 
 def write(file: File, motion: Motion) -> None:
     """Write a motion; FormatError if it is too long to be read again, OutputError if it cannot be written."""
-    if motion.values.nbytes >= MAX_BYTES:
+    if motion.values.nbytes >= NPY_MAX_BYTES:
         raise FormatError(place_of(file), f"{motion.values.nbytes} bytes of values are too many for one file: cut it")
     content = io.BytesIO()
     skeleton = "" if motion.skeleton is None else json.dumps(motion.skeleton.to_json())

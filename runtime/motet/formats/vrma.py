@@ -22,7 +22,7 @@ EXTENSION = "VRMC_vrm_animation"
 THUMB, FINGER = ("Metacarpal", "Proximal", "Distal"), ("Proximal", "Intermediate", "Distal")
 """What VRM calls the joints of the thumb, and of other fingers."""
 
-FINGERS = {
+FINGER_BONES = {
     "Thumb": ((0.025, -0.01, 0.025), (0.035, -0.005, 0.02), (0.025, -0.005, 0.015)),
     "Index": ((0.09, 0.0, 0.03), (0.04, 0.0, 0.0), (0.025, 0.0, 0.0)),
     "Middle": ((0.09, 0.0, 0.01), (0.045, 0.0, 0.0), (0.03, 0.0, 0.0)),
@@ -35,7 +35,7 @@ FINGERS = {
 def _with_fingers() -> Skeleton:
     joints = list(HUMANOID.joints)
     for side, sign in zip(LEFT_RIGHT, (1.0, -1.0), strict=True):
-        for finger, offsets in FINGERS.items():
+        for finger, offsets in FINGER_BONES.items():
             parent = HUMANOID.index(sided(side, "Hand"))
             for part, (x, y, z) in zip(THUMB if finger == "Thumb" else FINGER, offsets, strict=True):
                 joints.append(Joint(sided(side, finger + part), parent, (sign * x, y, z)))
@@ -43,7 +43,7 @@ def _with_fingers() -> Skeleton:
     return Skeleton(tuple(joints), metres_per_unit=1.0)
 
 
-SKELETON = _with_fingers()
+VRMA_SKELETON = _with_fingers()
 """The humanoid with the fingers of VRM's."""
 
 
@@ -62,7 +62,7 @@ def write(file: File, motion: Motion) -> None:
         "extensions": {EXTENSION: {"specVersion": "1.0", "humanoid": {"humanBones": _bones()}}},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
-        "nodes": joint_nodes(SKELETON),
+        "nodes": joint_nodes(VRMA_SKELETON),
         "animations": [animation(buffer, "motion", motion, (*joint_tracks(motion, HUMANOID), *_fingers()))],
         **buffer.parts(),
     }
@@ -70,13 +70,13 @@ def write(file: File, motion: Motion) -> None:
 
 
 def _bones() -> dict[str, dict[str, int]]:
-    fingers = SKELETON.names[len(HUMANOID.names) :]
-    return {bone: {"node": SKELETON.index(bone)} for bone in (*BONES, *fingers)}
+    fingers = VRMA_SKELETON.names[len(HUMANOID.names) :]
+    return {bone: {"node": VRMA_SKELETON.index(bone)} for bone in (*BONES, *fingers)}
 
 
 def _fingers() -> Iterator[Track]:
     """The tracks of a relaxed hand's fingers, each of one frame."""
-    still = np.broadcast_to(np.eye(3), (len(SKELETON.names), 3, 3))
-    turned = relaxed(SKELETON, still, SKELETON.places)
-    for joint in range(len(HUMANOID.names), len(SKELETON.names)):
+    still = np.broadcast_to(np.eye(3), (len(VRMA_SKELETON.names), 3, 3))
+    turned = relaxed(VRMA_SKELETON, still, VRMA_SKELETON.places)
+    for joint in range(len(HUMANOID.names), len(VRMA_SKELETON.names)):
         yield joint, "rotation", rotmat_to_quat(turned[joint : joint + 1])

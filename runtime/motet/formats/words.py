@@ -5,14 +5,14 @@ from numpy.typing import NDArray
 
 from motet.motion.rotations import Array
 
-LONGEST = 32
+LONGEST_WORD = 32
 """Characters of a word that is read as a number; no program writes longer ones."""
 
-EXACT = 15
+EXACT_DIGITS = 15
 """Digits of a number that float64 holds as an integer. It and a power of ten up to this are exact, so their quotient is
 rounded once, which is right."""
 
-_POWERS = np.array([float(10**power) for power in range(EXACT + 1)])
+_POWERS = np.array([float(10**power) for power in range(EXACT_DIGITS + 1)])
 _BLANK = np.zeros(256, dtype=bool)
 _BLANK[[*b" \t\n\r\v\f\x1c\x1d\x1e\x1f"]] = True  # what str.split() takes for such
 
@@ -22,7 +22,7 @@ class Words:
 
     def __init__(self, text: str) -> None:
         # blanks at both ends, so that each word has an edge before and one behind it, and can be read past its end
-        content = np.frombuffer(b" " + text.encode("ascii") + b" " * (LONGEST + 1), dtype=np.uint8)
+        content = np.frombuffer(b" " + text.encode("ascii") + b" " * (LONGEST_WORD + 1), dtype=np.uint8)
         blank = _BLANK[content]
         edges = np.flatnonzero(blank[1:] != blank[:-1]) + 1
         self._content, self.starts, self.lengths = content, edges[::2], edges[1::2] - edges[::2]
@@ -49,7 +49,7 @@ class Words:
         if read is None:
             return None if len(starts) else np.zeros(0)
         mantissa, digits, behind, plain = read
-        exact = plain & (digits > 0) & (digits <= EXACT)
+        exact = plain & (digits > 0) & (digits <= EXACT_DIGITS)
         values = mantissa / _POWERS[np.where(exact, behind, 0)]
         values = np.where(self._content[starts] == ord("-"), -values, values)
         if not exact.all():
@@ -64,7 +64,7 @@ class Words:
 
         A plain word has digits, at most one point, and perhaps a minus in front. None for words that are too long.
         """
-        if not len(starts) or lengths.max() > LONGEST:
+        if not len(starts) or lengths.max() > LONGEST_WORD:
             return None
         mantissa, digits, behind = (np.zeros(len(starts), dtype=np.int64) for _ in range(3))
         points = np.zeros(len(starts), dtype=np.int64)

@@ -10,7 +10,7 @@ from motet.motion.kinematics import local_translations, skeleton_of
 from motet.motion.motion import TURN, Motion
 from motet.motion.skeleton import Skeleton
 
-ANGLES, TRANSLATIONS = ("rx", "ry", "rz"), ("tx", "ty", "tz")
+ANGLE_KINDS, TRANSLATION_KINDS = ("rx", "ry", "rz"), ("tx", "ty", "tz")
 
 
 def with_still_offsets(path: str | Path, motion: Motion) -> tuple[Motion, tuple[str, ...]]:
@@ -25,7 +25,7 @@ def with_still_offsets(path: str | Path, motion: Motion) -> tuple[Motion, tuple[
     translations = local_translations(motion)
     joints, moving = list(skeleton.joints), []
     for i, joint in enumerate(skeleton.joints[1:], start=1):
-        if not any(f"{joint.name}.{kind}" in motion.channels for kind in TRANSLATIONS):
+        if not any(f"{joint.name}.{kind}" in motion.channels for kind in TRANSLATION_KINDS):
             continue
         if len(motion) and np.ptp(translations[:, i], axis=0).max() > 1e-9 * skeleton.height:
             moving.append(joint.name)
@@ -50,14 +50,14 @@ def with_names(motion: Motion, names: list[str]) -> Motion:
 
 def _is_kept(channel: str, translated: tuple[str, ...]) -> bool:
     joint, _, kind = channel.rpartition(".")
-    return kind in ANGLES or joint in translated
+    return kind in ANGLE_KINDS or joint in translated
 
 
 def _check(path: str | Path, motion: Motion, skeleton: Skeleton) -> None:
     bad = []
     for name, unit in zip(motion.channels, motion.units, strict=True):
         joint, _, kind = name.rpartition(".")
-        allowed = {**dict.fromkeys(ANGLES, tuple(TURN)), **dict.fromkeys(TRANSLATIONS, ("length", "m"))}.get(kind, ())
+        allowed = tuple(TURN) if kind in ANGLE_KINDS else ("length", "m") if kind in TRANSLATION_KINDS else ()
         if joint not in skeleton.names or unit not in allowed:
             bad.append(f"{name} [{unit}]")
     if bad:

@@ -82,7 +82,7 @@ def figure_data(model: SteerModel) -> dict[str, Any]:
         "bones": [HUMANOID.index(bone) for bone in BONES],
         "legs": [{"joints": joints, "bones": bones} for joints, bones in legs],
         "soles": list(zip(foot_lock.CARRIERS, foot_lock.POINTS.tolist(), strict=True)),
-        "knee": {"shortest": two_bone.SHORTEST, "share": two_bone.SHARE, "gives": list(two_bone.GIVES)},
+        "knee": {"shortest": two_bone.MOST_BENT, "share": two_bone.EASED_SHARE, "gives": list(two_bone.GIVES)},
         "lock": asdict(model.settings(foot_lock.FootLockSettings)),
     }
 

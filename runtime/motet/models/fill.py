@@ -17,7 +17,7 @@ from motet.motion.follow import alike, following
 from motet.motion.humanoid import HUMANOID, on_humanoid
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
-from motet.representation.placed import CHANNELS, bridge, placed, pose_of, put_at, seen_from, unplaced
+from motet.representation.placed import PLACED_CHANNELS, bridge, placed, pose_of, put_at, seen_from, unplaced
 from motet.representation.retargeting import from_model_figure
 from motet.representation.root_sixd import facing
 
@@ -55,7 +55,7 @@ class FillModel(BundleModel):
         super().__init__(manifest, graphs, tables)
         if self.contract.skeleton != HUMANOID:
             raise BundleError("manifest, motion.skeleton: a model that fills gaps needs motet's humanoid")
-        self.sizes["E"] = CHANNELS
+        self.sizes["E"] = PLACED_CHANNELS
         filled = "batch gap E"
         self.bind("filler", {"past": "batch before E", "plain": filled, "after": "batch behind E"}, {"filled": filled})
         self.context, self.least, self.longest = (int(self.defaults[key]) for key in ("context", "least", "longest"))

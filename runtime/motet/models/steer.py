@@ -25,9 +25,9 @@ from motet.motion.humanoid import BONES
 from motet.motion.motion import Motion
 from motet.motion.pose import Pose
 from motet.motion.rotations import rotmat_to_quat
-from motet.representation.root_sixd import KINDS, ROOT_SIXD, joint_rotations
+from motet.representation.root_sixd import ROOT_SIXD, SIXD_KINDS, joint_rotations
 
-CHANNELS = (*ROOT_SIXD, *(f"{bone}.{kind}" for bone in BONES for kind in KINDS))
+CHANNELS = (*ROOT_SIXD, *(f"{bone}.{kind}" for bone in BONES for kind in SIXD_KINDS))
 """In the order of a pose's numbers."""
 
 FEATURE_STEPS = 16

@@ -20,12 +20,6 @@ from motet.motion.rotations import Array, axis_to_rotmat, inverse, product, rota
 
 log = logging.getLogger(__name__)
 
-SAME = 1e-3
-"""Of the figure's height: joints whose offsets differ by less are those of one figure."""
-
-VELOCITY = 0.2
-"""Seconds over which the velocity at the end of a motion, and at the start of one, is taken."""
-
 
 def alike(motion: Motion, like: Motion) -> Motion:
     """A motion at the frame rate, on the skeleton and in the channels of another.
@@ -53,7 +47,7 @@ def same_figure(motion: Motion, other: Motion) -> bool:
     if told[0] != told[1]:
         return False
     apart = np.abs(one.offsets[1:] - two.offsets[1:]).max(initial=0)
-    return one.metres_per_unit == two.metres_per_unit and bool(apart <= SAME * two.height)
+    return one.metres_per_unit == two.metres_per_unit and bool(apart <= 1e-3 * two.height)
 
 
 def following(motion: Motion, before: Motion, seconds: float, turn: float) -> Motion | None:
@@ -84,7 +78,8 @@ def _carrier(motion: Motion) -> int | None:
 
 def _velocity(motion: Motion, carrier: int, to_end: bool = False) -> Array:
     """Lengths a second (3,) at which a joint moves at the start of a motion, or at its end; 0 for a lone frame."""
-    frames = max(1, round(VELOCITY * motion.fps)) + 1
+    # the mean over .2 s
+    frames = max(1, round(0.2 * motion.fps)) + 1
     part = motion[-frames:] if to_end else motion[:frames]
     if len(part) < 2:
         return np.zeros(3)

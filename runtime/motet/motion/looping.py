@@ -15,26 +15,13 @@ from motet.motion.kinematics import AXES, global_transforms, local_rotations, lo
 from motet.motion.motion import TURN, Motion
 from motet.motion.rotations import UP, Array, inverse, product, rotated, rotmat_to_rotvec, rotvec_to_rotmat, twist
 
-SHORTEST = 0.7
-"""Seconds that a loop takes at least: a stride of a run."""
-
-LIMIT = 0.04
+REPEATS_WITHIN = 0.04
 """Of the figure's height: frames that differ by more do not show the same. Of 40 recorded walks, on the humanoid at 30
 frames a second, nine in ten repeat within 0.03, steady strides within 0.01 to 0.02; what is most alike in a bend, CMU's
 02_06, differs by 0.08, and half of the takes of running, which are short and turn or leap, repeat within 0.06 only."""
 
-AHEAD = 0.1
-"""Seconds: velocities differ by how far they lead apart in this time."""
 
-NEARLY = (1.25, 0.01)
-"""A loop is nearly as good as the best one up to so many times its difference, or up to so much of the figure's height,
-which is no more than strides of a steady walk differ by."""
-
-MOST = 1500
-"""Frames that are compared, each with each: of longer motions every second or third, and then those in between."""
-
-
-def looped(motion: Motion, shortest: float = SHORTEST) -> Motion:
+def looped(motion: Motion, shortest: float = 0.7) -> Motion:
     """The part of the motion that can be repeated: its last frame is one frame before its first pose in every joint.
 
     The place on the ground and the heading go on as they did, by the same from each repetition to the next.
@@ -68,18 +55,19 @@ def _repetition(motion: Motion, shortest: float) -> tuple[int, int]:
         raise MotionError(
             f"this motion of {motion.duration:.2g} s is too short for a loop of {shortest:g} s: take a longer one"
         )
-    seen, step = _seen(motion), -(-len(motion) // MOST)
+    # 1,500 frames are compared, each with each: of longer motions every second or third, then those in between
+    seen, step = _seen(motion), -(-len(motion) // 1500)
     lengths = np.arange(-(-least // step), -(-len(motion) // step))
     apart = _apart(seen[::step], seen[::step])
     along = [apart.diagonal(length) for length in lengths]
     length = _longest_of_the_best(np.array([each.min() for each in along]))
     start = int(along[length].argmin()) * step
     start, stop, off = _refined(seen, start, start + int(lengths[length]) * step, step - 1, least)
-    if off > LIMIT:
+    if off > REPEATS_WITHIN:
         raise MotionError(
-            f"nothing in this motion repeats: {start / motion.fps:.2f} s and {stop / motion.fps:.2f} s are the most "
-            f"alike, and differ by {off:.1%} of the figure's height, over {LIMIT:.0%}; cut it to what repeats, or take "
-            f"a longer one, of two strides or more"
+            f"no loop found: the closest pair, {start / motion.fps:.2f} s and {stop / motion.fps:.2f} s, differs by "
+            f"{off:.1%} of the figure's height, more than {REPEATS_WITHIN:.0%}; cut the motion to what repeats, or "
+            f"take a longer one, of two strides or more"
         )
     return start, stop
 
@@ -89,7 +77,8 @@ def _longest_of_the_best(off: Array) -> int:
     low = np.zeros(len(off), dtype=bool)
     low[1:-1] = (off[1:-1] <= off[:-2]) & (off[1:-1] <= off[2:])
     low[off.argmin()] = True
-    return int(np.flatnonzero(low & (off <= max(NEARLY[0] * off.min(), NEARLY[1])))[-1])
+    # nearly as good: 1.25 times the best difference, or .01 of the height, by which strides of a steady walk differ
+    return int(np.flatnonzero(low & (off <= max(1.25 * off.min(), 0.01)))[-1])
 
 
 def _refined(seen: Array, start: int, stop: int, reach: int, least: int) -> tuple[int, int, float]:
@@ -114,7 +103,8 @@ def _seen(motion: Motion) -> Array:
     facing = inverse(twist(turned[:, carrier], UP))[:, None]
     ground = places[:, [carrier]] * (1 - UP)
     places = places[:, skeleton.subtree(skeleton.names[carrier])]
-    moved = np.gradient(places, axis=0, edge_order=2 if len(motion) > 2 else 1) * motion.fps * AHEAD
+    # velocities differ by how far they lead apart in .1 s
+    moved = np.gradient(places, axis=0, edge_order=2 if len(motion) > 2 else 1) * motion.fps * 0.1
     points = np.concatenate([rotated(facing, places - ground), rotated(facing, moved)], axis=1)
     found: Array = points.reshape(len(motion), -1) / (np.sqrt(places.shape[1]) * skeleton.height)
     return found

@@ -8,9 +8,6 @@ from motet.motion.kinematics import AXES, global_transforms, local_translations,
 from motet.motion.motion import Motion
 from motet.motion.rotations import UP, Array, inverse, rotated
 
-AT_FLOOR = 0.3
-"""Of the figure's height: a root this far below what carries legs and back rests at the floor."""
-
 
 def in_place(motion: Motion) -> Motion:
     """The motion with the root over the origin in every frame: its way over the ground goes, height and turns stay.
@@ -38,7 +35,8 @@ def travel_on_root(motion: Motion, joint_map: JointMap | None = None) -> Motion:
     """
     skeleton = skeleton_of(motion)
     joint = (joint_map or map_of(motion)).carrier(skeleton)
-    if float(np.linalg.norm(skeleton.rest_positions[joint])) < AT_FLOOR * skeleton.height:
+    # a root that far below what carries legs and back, in heights, rests at the floor
+    if float(np.linalg.norm(skeleton.rest_positions[joint])) < 0.3 * skeleton.height:
         return motion
     moves = local_translations(motion)[:, [0, joint]]
     rotations, places = global_transforms(motion)

@@ -5,8 +5,8 @@ from collections.abc import Iterator, Sequence
 
 LEFT, MIDDLE, RIGHT = "left", "middle", "right"
 
-SIDES = {"l": "r", "L": "R", "r": "l", "R": "L", "left": "right", "Left": "Right", "LEFT": "RIGHT"}
-SIDES |= {right: left for left, right in SIDES.items()}
+OTHER_SIDE = {"l": "r", "L": "R", "r": "l", "R": "L", "left": "right", "Left": "Right", "LEFT": "RIGHT"}
+OTHER_SIDE |= {right: left for left, right in OTHER_SIDE.items()}
 
 PATTERNS = (
     r"left|Left|LEFT|right|Right|RIGHT",  # LeftArm, arm_left, mixamorig:RightHand
@@ -38,4 +38,4 @@ def _other_names(name: str) -> Iterator[tuple[str, str]]:
     for pattern in PATTERNS:
         for match in re.finditer(pattern, name):
             side = LEFT if match[0][0] in "lL" else RIGHT
-            yield name[: match.start()] + SIDES[match[0]] + name[match.end() :], side
+            yield name[: match.start()] + OTHER_SIDE[match[0]] + name[match.end() :], side

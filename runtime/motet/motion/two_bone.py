@@ -7,10 +7,10 @@ import numpy as np
 
 from motet.motion.rotations import Array, product, rotated, rotvec_to_rotmat, swing, unit
 
-SHORTEST = -0.95
+MOST_BENT = -0.95
 """The cosine of the angle by which a knee bends at most, 162 degrees: what would bend it more is not reached."""
 
-SHARE = 0.5
+EASED_SHARE = 0.5
 """The share of what is left until a leg is straight that it is lengthened by at most."""
 
 GIVES = (0.012, 0.006)
@@ -37,7 +37,7 @@ class Leg:
         away = target - self.hip
         now, wanted = _length(self.ankle - self.hip), _length(away)
         left = np.maximum(self._longest - now, 1e-9)
-        longer = -SHARE * left * np.expm1(-np.maximum(wanted - now, 0) / (SHARE * left))
+        longer = -EASED_SHARE * left * np.expm1(-np.maximum(wanted - now, 0) / (EASED_SHARE * left))
         less = np.maximum(now - wanted, 0)
         give, fade = (part * self._longest for part in GIVES)
         shorter = less**2 / np.maximum(less + give * np.exp(-left / fade), 1e-12)
@@ -55,7 +55,7 @@ class Leg:
         upper, lower = self._upper, self._lower
         cosine = (_length(target - self.hip) ** 2 - upper**2 - lower**2) / (2 * upper * lower * self._in_plane)
         bent = self._bent
-        after = np.arccos(np.clip(cosine, SHORTEST, 1.0))
+        after = np.arccos(np.clip(cosine, MOST_BENT, 1.0))
         bend = rotvec_to_rotmat(self._axis * (after - bent))
         ankle = self.knee - self.hip + rotated(bend, self.ankle - self.knee)
         turn = swing(ankle, target - self.hip)

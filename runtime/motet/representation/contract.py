@@ -17,11 +17,11 @@ from motet.representation import named
 from motet.representation.base import FrameMirror, phases
 from motet.representation.retargeting import foreign, in_joints_of, in_known_unit, to_model_figure
 
-LIMIT = 50.0
+Z_LIMIT = 50.0
 """Standard deviations: z is clipped to this, in the nets' graphs too. Of 256 of CMU's trials one frame in a thousand
 is further than 36 from the mean in any channel, and two of them, by glitches of the recording, further than 50."""
 
-FLOORS = {
+LIVING_STD = {
     "deg": 0.25,
     "rad": np.radians(0.25),
     "deg/s": 1.0,
@@ -132,9 +132,9 @@ class MotionContract:
         return named(self.representation).motion(self.features(frames, plant), after)
 
     def normalised(self, frames: ArrayLike) -> Array:
-        """Frames (..., D) in standard deviations from the mean: 0 in dead channels, and within LIMIT."""
+        """Frames (..., D) in standard deviations from the mean: 0 in dead channels, and within Z_LIMIT."""
         scale = np.where(self.std > 0, self.std, np.inf)
-        z: Array = np.clip((np.asarray(frames, dtype=np.float64) - self.mean) / scale, -LIMIT, LIMIT)
+        z: Array = np.clip((np.asarray(frames, dtype=np.float64) - self.mean) / scale, -Z_LIMIT, Z_LIMIT)
         return z
 
     def denormalised(self, z: ArrayLike) -> Array:
@@ -168,6 +168,6 @@ def sequences(representation: str, motion: Motion, fps: float, like: Motion | No
 
 def living(std: ArrayLike, units: Sequence[str]) -> Array:
     """Standard deviations (D,) of training data, 0 where they are under the floor of their unit."""
-    floors = np.array([FLOORS[unit] for unit in units])
+    floors = np.array([LIVING_STD[unit] for unit in units])
     found: Array = np.where(np.asarray(std, dtype=np.float64) < floors, 0.0, std)
     return found

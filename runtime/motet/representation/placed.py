@@ -15,16 +15,13 @@ from motet.motion.motion import Motion
 from motet.motion.rotations import Array, inverse, product, rotmat_to_rotvec, rotvec_to_rotmat
 from motet.motion.sides import partners_of
 from motet.representation.base import FrameMirror
-from motet.representation.root_sixd import KINDS, ROOT_SIXD, SIGNS, rotmat_to_sixd, sixd_to_rotmat
+from motet.representation.root_sixd import ROOT_SIXD, SIXD_KINDS, SIXD_SIGNS, rotmat_to_sixd, sixd_to_rotmat
 
-PLACE = 3
+ROOT_PLACE = 3
 """Channels of the root's place, before all axes."""
 
-CHANNELS = PLACE + 6 * len(BONES)
+PLACED_CHANNELS = ROOT_PLACE + 6 * len(BONES)
 """E."""
-
-STEPS = 3
-"""Frames over which the hips' velocity at either end of a gap is taken."""
 
 
 def placed(motion: Motion) -> Array:
@@ -37,16 +34,16 @@ def placed(motion: Motion) -> Array:
 
 def placed_by_way(frames: Array, fps: float) -> Array:
     """Frames (..., T, 4 + 6 K) of ``root_sixd`` as placed frames (..., T, E), the first at the origin, facing z."""
-    steps = frames[..., :PLACE] / fps
+    steps = frames[..., :ROOT_PLACE] / fps
     steps[..., :1, :] = 0
     forward, left, turn = np.moveaxis(steps, -1, 0)
     now = np.cumsum(turn, axis=-1)
     sin, cos = np.sin(now - turn), np.cos(now - turn)
     x, z = (np.cumsum(step, axis=-1) for step in (forward * sin + left * cos, forward * cos - left * sin))
     found = np.empty((*frames.shape[:-1], frames.shape[-1] - 1))
-    found[..., 0], found[..., 1], found[..., 2] = x, frames[..., PLACE], z
-    found[..., PLACE:] = frames[..., len(ROOT_SIXD) :]
-    _turn(found[..., PLACE : PLACE + 6], now)
+    found[..., 0], found[..., 1], found[..., 2] = x, frames[..., ROOT_PLACE], z
+    found[..., ROOT_PLACE:] = frames[..., len(ROOT_SIXD) :]
+    _turn(found[..., ROOT_PLACE : ROOT_PLACE + 6], now)
     return found
 
 
@@ -56,7 +53,7 @@ def pose_of(frames: Array) -> Array:
     The angle is that of the turn about the vertical axis after which the root is tilted, as that of
     :func:`motet.representation.root_sixd.facing`, but of one frame alone.
     """
-    hips = sixd_to_rotmat(frames[..., PLACE : PLACE + 6])
+    hips = sixd_to_rotmat(frames[..., ROOT_PLACE : ROOT_PLACE + 6])
     angle = np.arctan2(hips[..., 0, 2] - hips[..., 2, 0], hips[..., 0, 0] + hips[..., 2, 2])
     return np.stack([frames[..., 0], frames[..., 2], angle], axis=-1)
 
@@ -85,19 +82,20 @@ def bridge(past: Array, after: Array, count: int, pace: float = 1.0) -> Array:
     """
     part = (np.arange(1, count + 1) / (count + 1))[:, None]
     start, end = past[..., -1:, :], after[..., :1, :]
-    leaves, arrives = (_speed(past[..., -STEPS - 1 :, :]), _speed(after[..., : STEPS + 1, :]))
+    # the hips' velocities are taken over 3 frames
+    leaves, arrives = (_speed(past[..., -3 - 1 :, :]), _speed(after[..., : 3 + 1, :]))
     span = (count + 1) * pace
     found = np.empty((*past.shape[:-2], count, past.shape[-1]))
-    found[..., :PLACE] = (
-        (1 + 2 * part) * (1 - part) ** 2 * start[..., :PLACE]
+    found[..., :ROOT_PLACE] = (
+        (1 + 2 * part) * (1 - part) ** 2 * start[..., :ROOT_PLACE]
         + part * (1 - part) ** 2 * span * leaves
-        + part**2 * (3 - 2 * part) * end[..., :PLACE]
+        + part**2 * (3 - 2 * part) * end[..., :ROOT_PLACE]
         - part**2 * (1 - part) * span * arrives
     )
     one, other = (_rotations(frames) for frames in (start, end))
     turns = rotmat_to_rotvec(product(inverse(one), other)) * part[..., None]
     axes = rotmat_to_sixd(np.matmul(one, rotvec_to_rotmat(turns)))
-    found[..., PLACE:] = axes.reshape(*found.shape[:-1], found.shape[-1] - PLACE)
+    found[..., ROOT_PLACE:] = axes.reshape(*found.shape[:-1], found.shape[-1] - ROOT_PLACE)
     return found
 
 
@@ -105,15 +103,15 @@ def straight(past: Array, after: Array, count: int) -> Array:
     """As :func:`bridge`, the root on a line at an even speed: the plainest interpolation."""
     part = (np.arange(1, count + 1) / (count + 1))[:, None]
     found = bridge(past, after, count)
-    start, end = past[..., -1:, :PLACE], after[..., :1, :PLACE]
-    found[..., :PLACE] = start + part * (end - start)
+    start, end = past[..., -1:, :ROOT_PLACE], after[..., :1, :ROOT_PLACE]
+    found[..., :ROOT_PLACE] = start + part * (end - start)
     return found
 
 
 def _speed(frames: Array) -> Array:
     """Metres a frame (..., 1, 3) that the root moves in frames (..., S, E), 0 where there is only one."""
     steps = max(1, frames.shape[-2] - 1)
-    found: Array = (frames[..., -1:, :PLACE] - frames[..., :1, :PLACE]) / steps
+    found: Array = (frames[..., -1:, :ROOT_PLACE] - frames[..., :1, :ROOT_PLACE]) / steps
     return found
 
 
@@ -121,28 +119,28 @@ def unplaced(frames: Array, after: Motion) -> Motion:
     """Placed frames (T, E) as what follows a motion on the humanoid, in its channels."""
     turned = _rotations(frames)
     rotations = {name: turned[:, place] for place, name in enumerate(BONES)}
-    return continued(after[-1:], rotations, {BONES[0]: frames[:, :PLACE]})
+    return continued(after[-1:], rotations, {BONES[0]: frames[:, :ROOT_PLACE]})
 
 
 def mirror() -> FrameMirror:
     """How placed frames are mirrored, in the plane x = 0."""
-    columns, signs = np.arange(CHANNELS), np.ones(CHANNELS, dtype=np.float32)
+    columns, signs = np.arange(PLACED_CHANNELS), np.ones(PLACED_CHANNELS, dtype=np.float32)
     signs[0] = -1
     for bone, partner in enumerate(partners_of(BONES)):
-        own, other = (np.arange(len(KINDS)) + PLACE + len(KINDS) * one for one in (bone, partner))
-        columns[own], signs[own] = other, SIGNS
+        own, other = (np.arange(len(SIXD_KINDS)) + ROOT_PLACE + len(SIXD_KINDS) * one for one in (bone, partner))
+        columns[own], signs[own] = other, SIXD_SIGNS
     return FrameMirror(columns, signs)
 
 
 def _rotations(frames: Array) -> Array:
     """Local rotations (..., K, 3, 3) of placed frames (..., E)."""
-    return sixd_to_rotmat(frames[..., PLACE:].reshape(*frames.shape[:-1], len(BONES), 6))
+    return sixd_to_rotmat(frames[..., ROOT_PLACE:].reshape(*frames.shape[:-1], len(BONES), 6))
 
 
 def _turned(frames: Array, angle: Array) -> Array:
     """The frames (..., T, E), changed in place, turned about the world's vertical axis by angles (..., T)."""
-    _turn(frames[..., :PLACE], angle)
-    _turn(frames[..., PLACE : PLACE + 6], angle)
+    _turn(frames[..., :ROOT_PLACE], angle)
+    _turn(frames[..., ROOT_PLACE : ROOT_PLACE + 6], angle)
     return frames
 
 

@@ -34,10 +34,7 @@ ROOT_BLOCK = ("root.forward", "root.left", "root.turn", "root.height", "root.pit
 ROOT_BLOCK_UNITS = ("m/s", "m/s", "deg/s", "m", "deg", "deg")
 """Forward, to the left, turning to the left (counterclockwise seen from above), above y = 0, and what remains."""
 
-ORDER = "yxz"
-
-TRUST = 0.1
-"""Weight of the velocity that a motion has already, where its feet are planted; a point on the ground has 1."""
+BLOCK_ORDER = "yxz"
 
 
 def to_root_block(motion: Motion) -> Motion:
@@ -51,7 +48,7 @@ def to_root_block(motion: Motion) -> Motion:
     missing = [name for name in names if name not in motion.channels]
     if missing:
         raise MotionError(f"the root's path and rotation are needed, and this motion lacks {', '.join(missing)}")
-    angles = rotmats_to_euler(local_rotations(motion, [0])[:, 0], ORDER)
+    angles = rotmats_to_euler(local_rotations(motion, [0])[:, 0], BLOCK_ORDER)
     places = motion.select(names[:3], ("m",) * 3).values
     velocities = ground_velocities(places, angles[:, 0], motion.fps)
     velocities[:, 2] = np.degrees(velocities[:, 2])
@@ -94,7 +91,7 @@ def root_in_world(motion: Motion, after: Motion | None = None) -> tuple[Array, A
         facing, x, z = way(steps)
     else:
         facing, x, z = way(steps, last_place(after), heading(after[-1])[0])
-    rotations = euler_to_rotmat(np.column_stack([facing, np.radians(block[:, 4:])]), ORDER)
+    rotations = euler_to_rotmat(np.column_stack([facing, np.radians(block[:, 4:])]), BLOCK_ORDER)
     return rotations, np.column_stack([x, block[:, 3], z])
 
 
@@ -126,9 +123,10 @@ def mirrored_signs(channels: Sequence[str]) -> Array:
 def plant_feet(motion: Motion) -> Motion:
     """A motion with the root block whose figure goes where its feet take it, wherever they are on the ground.
 
-    root.forward and root.left change, nothing else. What they were is one more vote for the velocity, of weight TRUST:
-    it decides in flight, and where hands or a seat carry the figure. The ground is where the feet are at their lowest.
-    MotionError for a motion without the root block, or without a skeleton with feet and a unit of length.
+    root.forward and root.left change, nothing else. What they were is one more vote for the velocity, of weight 0.1, as
+    a point on the ground has 1: it decides in flight, and where hands or a seat carry the figure. The ground is where
+    the feet are at their lowest. MotionError for a motion without the root block, or without a skeleton with feet and a
+    unit of length.
     """
     skeleton, placed = skeleton_of(motion), from_root_block(motion)
     joints, metres = feet_of(skeleton), skeleton.unit_factor(1.0)
@@ -138,7 +136,7 @@ def plant_feet(motion: Motion) -> Motion:
     root, feet = places[:, 0], places[:, joints]
     above = feet[..., 1] - ground_of(feet[..., 1])
     was = np.diff(root[:, [0, 2]], axis=0) * motion.fps
-    velocity = velocity_by_feet((feet - root[:, None])[..., [0, 2]], above, motion.fps, was, TRUST)
+    velocity = velocity_by_feet((feet - root[:, None])[..., [0, 2]], above, motion.fps, was, trust=0.1)
     block = to_root_block(led_along(placed, velocity, root[:, 1], metres)).select(ROOT_BLOCK[:2])
     return with_channels(motion, ROOT_BLOCK[:2], block.values, ROOT_BLOCK_UNITS[:2])
 

@@ -27,13 +27,13 @@ ROOT_SIXD = ("root.forward", "root.left", "root.turn", "root.height")
 ROOT_SIXD_UNITS = ("m/s", "m/s", "rad/s", "m")
 """As in :mod:`motet.representation.root_block`, but for the facing and for radians."""
 
-KINDS = ("xx", "xy", "xz", "yx", "yy", "yz")
+SIXD_KINDS = ("xx", "xy", "xz", "yx", "yy", "yz")
 """Where the x axis and where the y axis points."""
 
-SIGNS = (1.0, -1.0, -1.0, -1.0, 1.0, 1.0)
+SIXD_SIGNS = (1.0, -1.0, -1.0, -1.0, 1.0, 1.0)
 """What a mirror image in the plane x = 0 makes of them."""
 
-CALM = 4 / 30
+FACING_CALM = 4 / 30
 """Seconds: the standard deviation of the window by which the facing is smoothed. Hips sway by a stride, .5 s."""
 
 
@@ -68,7 +68,7 @@ class RootSixd:
         columns, signs = np.arange(len(places)), np.ones(len(places), dtype=np.float32)
         signs[[places["root.left"], places["root.turn"]]] = -1
         for joint, partner in zip(joints, partners_of(joints), strict=True):
-            for kind, sign in zip(KINDS, SIGNS, strict=True):
+            for kind, sign in zip(SIXD_KINDS, SIXD_SIGNS, strict=True):
                 columns[places[f"{joint}.{kind}"]] = places[f"{joints[partner]}.{kind}"]
                 signs[places[f"{joint}.{kind}"]] = sign
         return FrameMirror(columns, signs)
@@ -112,7 +112,7 @@ def to_sixd(motion: Motion) -> Motion:
     places = motion.select(tuple(f"{skeleton.names[0]}.t{axis}" for axis in AXES), ("m",) * 3).values
     axes = rotmat_to_sixd(rotations).reshape(len(motion), -1)
     values = np.column_stack([ground_velocities(places, angles, motion.fps), places[:, 1], axes])
-    names = tuple(f"{skeleton.names[joint]}.{kind}" for joint in joints for kind in KINDS)
+    names = tuple(f"{skeleton.names[joint]}.{kind}" for joint in joints for kind in SIXD_KINDS)
     return replace(motion, values=values, channels=ROOT_SIXD + names, units=ROOT_SIXD_UNITS + ("1",) * len(names))
 
 
@@ -124,7 +124,7 @@ def facing(motion: Motion) -> Array:
     """
     quat = rotmat_to_quat(local_rotations(motion, [0])[:, 0])
     half = quat[:, 3] + 1j * quat[:, 1]
-    smooth = _smoothed(half * half, CALM * motion.fps)
+    smooth = _smoothed(half * half, FACING_CALM * motion.fps)
     return np.unwrap(np.angle(smooth))
 
 
@@ -138,7 +138,7 @@ def _smoothed(values: NDArray[np.complex128], spread: float) -> NDArray[np.compl
 def joint_rotations(features: Motion) -> dict[str, Array]:
     """Local rotations (T, 3, 3) by joint; the root's is seen from the facing."""
     joints = joints_of(features)
-    values = features.select(tuple(f"{joint}.{kind}" for joint in joints for kind in KINDS)).values
+    values = features.select(tuple(f"{joint}.{kind}" for joint in joints for kind in SIXD_KINDS)).values
     matrices = sixd_to_rotmat(values.reshape(len(features), len(joints), 6))
     return {joint: matrices[:, place] for place, joint in enumerate(joints)}
 

@@ -25,9 +25,9 @@ from motet.representation.root_block import (
     to_root_block,
 )
 
-KINDS = ("ex", "ey", "ez")
+VECTOR_KINDS = ("ex", "ey", "ez")
 
-ROOT_UNITS = tuple(unit.replace("deg", "rad") for unit in ROOT_BLOCK_UNITS)
+ROOT_VECTOR_UNITS = tuple(unit.replace("deg", "rad") for unit in ROOT_BLOCK_UNITS)
 
 
 class RootVectors:
@@ -61,7 +61,7 @@ class RootVectors:
         places = {name: column for column, name in enumerate(features.channels)}
         columns, signs = np.arange(len(places)), mirrored_signs(features.channels).astype(np.float32)
         for joint, partner in zip(joints, partners_of(joints), strict=True):
-            for kind, sign in zip(KINDS, (1, -1, -1), strict=True):
+            for kind, sign in zip(VECTOR_KINDS, (1, -1, -1), strict=True):
                 columns[places[f"{joint}.{kind}"]] = places[f"{joints[partner]}.{kind}"]
                 signs[places[f"{joint}.{kind}"]] = sign
         return FrameMirror(columns, signs)
@@ -85,10 +85,10 @@ def to_joint_vectors(motion: Motion, joints: Sequence[str] | None = None) -> Mot
     lacking = [name for name in joints if name not in skeleton.places]
     if lacking:
         raise MotionError(f"the model's figure has joints that this motion lacks: {listed(lacking)}")
-    block = to_root_block(motion).select(ROOT_BLOCK, ROOT_UNITS)
+    block = to_root_block(motion).select(ROOT_BLOCK, ROOT_VECTOR_UNITS)
     vectors = rotmat_to_rotvec(local_rotations(motion, [skeleton.places[name] for name in joints]))
-    channels = (*ROOT_BLOCK, *(f"{name}.{kind}" for name in joints for kind in KINDS))
-    units = (*ROOT_UNITS, *["rad"] * (3 * len(joints)))
+    channels = (*ROOT_BLOCK, *(f"{name}.{kind}" for name in joints for kind in VECTOR_KINDS))
+    units = (*ROOT_VECTOR_UNITS, *["rad"] * (3 * len(joints)))
     values = np.concatenate([block.values, vectors.reshape(len(motion), 3 * len(joints))], axis=1)
     return replace(motion, values=values, channels=channels, units=units)
 
@@ -109,6 +109,6 @@ def carry_on(after: Motion | None, features: Motion) -> Motion:
 def _rotations(features: Motion) -> dict[str, Array]:
     """Local rotations (T, 3, 3) by joint."""
     joints = joints_of(features.channels)
-    vectors = features.select(tuple(f"{name}.{kind}" for name in joints for kind in KINDS)).values
+    vectors = features.select(tuple(f"{name}.{kind}" for name in joints for kind in VECTOR_KINDS)).values
     matrices = rotvec_to_rotmat(vectors.reshape(len(features), len(joints), 3))
     return {name: matrices[:, n] for n, name in enumerate(joints)}

@@ -8,7 +8,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from motet.representation.root_vectors import KINDS, joints_of
+from motet.representation.root_vectors import VECTOR_KINDS, joints_of
 from motet_train.data.errors import DataError
 from motet_train.data.predict_data import Material
 
@@ -32,7 +32,7 @@ class Windows:
     ) -> None:
         self.material, self.frames, self.seed = material, frames, seed
         joints = joints_of(material.contract.channels)
-        self.maps = [material.contract.channels.index(f"{joint}.{kind}") for joint in joints for kind in KINDS]
+        self.maps = [material.contract.channels.index(f"{joint}.{kind}") for joint in joints for kind in VECTOR_KINDS]
         self.warp, self.reverse, self.mirror = warp, reverse, mirror
         lengths = np.array([len(sequence) for sequence in material.sequences])
         usable = lengths > material.stride * (frames - 1) + 1

@@ -3,10 +3,10 @@
 import torch
 from torch import Tensor
 
-from motet.representation.contract import LIMIT
+from motet.representation.contract import Z_LIMIT
 
 
-def normalised(frames: Tensor, mean: Tensor, scale: Tensor, limit: float = LIMIT) -> Tensor:
+def normalised(frames: Tensor, mean: Tensor, scale: Tensor, limit: float = Z_LIMIT) -> Tensor:
     """Frames (..., D) as z = (frames - mean) / scale within +-limit, and 0 where the scale (D,) is 0.
 
     As :meth:`motet.representation.contract.MotionContract.normalised`, and part of the graphs that are exported.

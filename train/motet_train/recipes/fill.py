@@ -12,7 +12,7 @@ from torch.nn import functional
 from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, sided
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
-from motet.representation.placed import CHANNELS
+from motet.representation.placed import PLACED_CHANNELS
 from motet_train.data.batches import frame_mirror
 from motet_train.data.errors import DataError
 from motet_train.data.gap_windows import GapWindow, GapWindows
@@ -128,7 +128,7 @@ def _sizes(visits: FillVisits, rng: np.random.Generator) -> tuple[int, int, int]
 def _untrained(recipe: Recipe, contract: MotionContract, windows: GapWindows) -> Filler:
     """A net that knows how frames lie about a gap, from some windows."""
     assert contract.skeleton is not None
-    net = Filler(recipe.sized(channels=CHANNELS, tree=tree_of(contract)))
+    net = Filler(recipe.sized(channels=PLACED_CHANNELS, tree=tree_of(contract)))
     context, (_, longest) = recipe.visits.context, recipe.visits.gaps
     some = windows.draw(1024, (context, longest // 2, context), np.random.default_rng(0))
     frames = torch.cat([some.past, some.truth, some.after], dim=1).flatten(0, 1).numpy().astype(np.float64)

@@ -40,8 +40,8 @@ class HoldSettings:
     tremble: float = 0.015
 
 
-RECORDED = HoldSettings()
-TREMBLING = HoldSettings(contact=ContactSettings(speeds=(0.7, 3.0), calm=0.06))
+HOLD_RECORDED = HoldSettings()
+HOLD_TREMBLING = HoldSettings(contact=ContactSettings(speeds=(0.7, 3.0), calm=0.06))
 """For feet that tremble and slide: where they stand is seen over longer, and what slides faster stands, too."""
 
 BENT = ("UpperLeg", "LowerLeg", "Foot")
@@ -64,7 +64,7 @@ def hold_feet(motion: Motion, trembling: bool = False) -> Motion:
     skeleton, (rotations, places) = skeleton_of(motion), global_transforms(motion)
     known = _of_humanoid(rotations, places) if skeleton == HUMANOID else None
     legs, scale, soles = known or _measured(motion, rotations, places)
-    settings, places = TREMBLING if trembling else RECORDED, places * scale
+    settings, places = HOLD_TREMBLING if trembling else HOLD_RECORDED, places * scale
     turned = np.array(rotations)
     for (joints, hinge), points in zip(legs, np.split(soles, 2, axis=1), strict=True):
         hip, knee, ankle = (places[:, joint] for joint in joints)

@@ -28,7 +28,7 @@ from motet.motion.rotations import Array
 
 GRAVITY = 9.81  # m/s^2
 ADULT_HEIGHT = 1.7  # m: taken for a figure whose skeleton does not know its unit of length
-NEAR = ContactSettings(heights=(0.0, 0.07))  # a vote counts the less, the higher its point is
+VOTES = ContactSettings(heights=(0.0, 0.07))  # a vote counts the less, the higher its point is
 TREMBLE = 0.015  # s: what is shorter is no movement but noise
 
 
@@ -102,7 +102,7 @@ def velocity_by_feet(
     guess: (T - 1, 2) in m/s, a vote of weight ``trust`` that always counts.
     """
     between = (above[1:] + above[:-1]) / 2
-    near = contacts(between, None, NEAR)
+    near = contacts(between, None, VOTES)
     slip = 0.2  # m/s: how far off a slower vote may be; a faster one three times as far
     votes = -np.diff(points, axis=0) * fps
     velocity = _agreed(votes, near, fps, guess, trust)

@@ -11,8 +11,8 @@ from motet.motion.humanoid.bones import (
     LEG,
     PARENTS,
     REQUIRED,
-    REST,
     SOLE,
+    T_POSE,
     ground_under,
     leg_length,
     sided,
@@ -21,10 +21,10 @@ from motet.motion.humanoid.bones import (
 from motet.motion.humanoid.fingers import relaxed
 from motet.motion.humanoid.joint_map import JointMap, check_map, read_map
 from motet.motion.humanoid.joint_tree import map_of
-from motet.motion.humanoid.measure import UNITS, unit_by_legs
+from motet.motion.humanoid.measure import LENGTH_UNITS, unit_by_legs
 from motet.motion.humanoid.mmm_figure import is_mmm, with_figure
 from motet.motion.humanoid.retarget import (
-    SURE,
+    SURE_OF_JOINTS,
     Figure,
     Humanoid,
     from_humanoid,
@@ -40,14 +40,14 @@ __all__ = [
     "HUMANOID",
     "LEFT_RIGHT",
     "LEG",
+    "LENGTH_UNITS",
     "MIXAMO",
     "PARENTS",
     "REQUIRED",
-    "REST",
     "RIGS",
     "SOLE",
-    "SURE",
-    "UNITS",
+    "SURE_OF_JOINTS",
+    "T_POSE",
     "Figure",
     "Humanoid",
     "JointMap",

@@ -82,7 +82,7 @@ REQUIRED = tuple(
 PARENTS = {name: HUMANOID.names[max(0, HUMANOID.joints[HUMANOID.index(name)].parent)] for name in BONES[1:]}
 """For each bone but the hips its parent."""
 
-REST = HUMANOID.rest_positions + HUMANOID.offsets[0]
+T_POSE = HUMANOID.rest_positions + HUMANOID.offsets[0]
 """Positions (J, 3) of the humanoid's joints in the T-pose, with the soles at y = 0."""
 
 SOLE = {"Foot": ((0.0, -0.08, -0.05), (0.0, -0.08, 0.13)), "Toes": ((0.0, -0.02, 0.07),)}

@@ -24,16 +24,7 @@ from motet.motion.humanoid.rest_pose import (
 )
 from motet.motion.rotations import Array, angle_between, product, swing, unit
 
-NEAR_AXES = 30.0
-"""Degrees within which a joint's alignment is taken to be along its axes."""
-
-ALONG_AXIS = 0.995
-"""Cosine above which a bone lies along an axis of its joint."""
-
-AGREES = 0.7
-"""Cosine from which on a direction is that of an axis that a convention says; feet slope away from theirs."""
-
-SMALL = 0.05
+SWING_WEIGHT = 0.05
 """The weight of a limb's shortest turn beside its hinge, which counts by the sine of its bend."""
 
 
@@ -70,7 +61,8 @@ class _Frames:
         joint = self.joint_map.joints[bone]
         self.settle(joint, turns)
         local = _mean_direction(self.rotations[:, joint], along)
-        if not bone.endswith(("Foot", "Toes")) or np.abs(local).max() > ALONG_AXIS:
+        # a cosine: feet count that lie along an axis of their joint
+        if not bone.endswith(("Foot", "Toes")) or np.abs(local).max() > 0.995:
             start = self.aligned[joint] @ humanoid_direction(bone)
             self.aligned[joint] = swing(start, local) @ self.aligned[joint]
 
@@ -87,7 +79,7 @@ def axes_agree(rotations: Array, positions: Array, joint_map: JointMap, aims: Ai
         expected[joint], seen[joint] = np.array([1.0, 0.0, 0.0]), to_left(positions, joint_map, part)
     known = [joint for joint in seen if joint in joint_map.axes]
     return bool(known) and all(
-        _mean_direction(rotations[:, joint], seen[joint]) @ _known(joint_map.axes[joint]) @ expected[joint] > AGREES
+        _mean_direction(rotations[:, joint], seen[joint]) @ _known(joint_map.axes[joint]) @ expected[joint] > 0.7
         for joint in known
     )
 
@@ -128,7 +120,7 @@ def _leg(frames: _Frames, side: str) -> None:
     """Knees are hinges that bend backwards; feet and toes have the hinge's axis."""
     joints, bones = frames.joint_map.joints, [sided(side, part) for part in LEG]
     thigh, shin = (frames.toward(bone) for bone in bones[:2])
-    hinge = np.cross(thigh, shin) + SMALL * frames.turns(joints["hips"])[:, :, 0]
+    hinge = np.cross(thigh, shin) + SWING_WEIGHT * frames.turns(joints["hips"])[:, :, 0]
     frames.settle_limb(bones[0], thigh, frame(hinge, -thigh))
     frames.settle_limb(bones[1], shin, frame(hinge, -shin))
     shins = frames.turns(joints[bones[1]])
@@ -152,7 +144,7 @@ def _arm(frames: _Frames, side: str) -> None:
     upper = frames.toward(bones[1])
     lower = frames.toward(bones[2]) if frames.aims[bones[2]] else upper
     plain = swing(chest @ humanoid_direction(bones[1]), upper) @ chest
-    up = -sign * np.cross(upper, lower) + SMALL * plain[:, :, 1]
+    up = -sign * np.cross(upper, lower) + SWING_WEIGHT * plain[:, :, 1]
     frames.settle_limb(bones[1], upper, _arm_frame(sign * upper, up))
     frames.settle_limb(bones[2], lower, _arm_frame(sign * lower, up))
     if bones[3] in joints:
@@ -183,7 +175,8 @@ def _known(axes: str) -> Array:
 
 def _near_axes(rotation: Array) -> Array:
     nearest = nearest_axes(rotation)
-    return nearest if angle_between(rotation, nearest) < NEAR_AXES else rotation
+    # within 30 degrees the axes are along bones and hinges
+    return nearest if angle_between(rotation, nearest) < 30 else rotation
 
 
 def _mean(rotations: Array, turns: Array) -> Array:

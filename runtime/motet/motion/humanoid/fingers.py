@@ -16,17 +16,17 @@ from motet.motion.kinematics import chained
 from motet.motion.rotations import Array, rotvec_to_rotmat, unit
 from motet.motion.skeleton import Skeleton
 
-BEND = (15.0, 25.0, 15.0)
+FINGER_BEND = (15.0, 25.0, 15.0)
 """Degrees by which the three joints of a finger are bent in a hand at rest."""
 
-FINGERS = {"thumb": 0.5, "index": 0.8, "mid": 1.0, "ring": 1.15, "pinky|little": 1.3}
-"""What the names of a finger's joints hold, and how far it is bent, times :data:`BEND`."""
+FINGER_SHARES = {"thumb": 0.5, "index": 0.8, "mid": 1.0, "ring": 1.15, "pinky|little": 1.3}
+"""What the names of a finger's joints hold, and how far it is bent, times :data:`FINGER_BEND`."""
 
 PALM = "meta|carpal|palm|inhand"
 """What the names of bones within the palm hold."""
 
 Chains = dict[str, list[int]]
-"""A finger out of :data:`FINGERS` -> its joints, from the knuckle on."""
+"""A finger out of :data:`FINGER_SHARES` -> its joints, from the knuckle on."""
 
 
 def relaxed(skeleton: Skeleton, still: Array, bones: Mapping[str, int]) -> Array:
@@ -50,7 +50,7 @@ def relaxed(skeleton: Skeleton, still: Array, bones: Mapping[str, int]) -> Array
             pointing = _bones(places[0], joints)
             start = pointing[0] if thumb else along
             axis = np.cross(start, palm + across if thumb else palm)
-            for joint, turn in zip(joints, _bends([start, *pointing], axis, FINGERS[finger]), strict=False):
+            for joint, turn in zip(joints, _bends([start, *pointing], axis, FINGER_SHARES[finger]), strict=False):
                 bent[joint] = bent[joint] @ rotvec_to_rotmat(turns[0, joint].T @ turn)
     return bent
 
@@ -63,7 +63,7 @@ def _bones(places: Array, joints: list[int]) -> list[Array]:
 
 def _bends(bones: list[Array], axis: Array, share: float) -> Iterator[Array]:
     """Rotation vectors (3,) that bend each bone against the one before it, about what of the axis is across it."""
-    for before, bone, degrees in zip(bones, bones[1:], BEND, strict=False):
+    for before, bone, degrees in zip(bones, bones[1:], FINGER_BEND, strict=False):
         across = unit(axis - (axis @ bone) * bone)
         now = np.arctan2(np.cross(before, bone) @ across, before @ bone - (before @ across) * (bone @ across))
         yield max(0.0, np.radians(degrees) * share - float(now)) * across
@@ -74,10 +74,10 @@ def _chains(skeleton: Skeleton, hand: int) -> Chains:
     chains: Chains = {}
     for joint in skeleton.subtree(skeleton.names[hand]):
         name = skeleton.names[joint].lower()
-        finger = next((words for words in FINGERS if re.search(words, name)), None)
+        finger = next((words for words in FINGER_SHARES if re.search(words, name)), None)
         if joint == hand or finger is None or (finger != "thumb" and re.search(PALM, name)):
             continue
         chain = chains.setdefault(finger, [joint])
         if skeleton.joints[joint].parent == chain[-1]:
             chain.append(joint)
-    return {finger: chains[finger] for finger in FINGERS if finger in chains}
+    return {finger: chains[finger] for finger in FINGER_SHARES if finger in chains}

@@ -22,7 +22,7 @@ PAIRED = tuple((sided("left", part), sided("right", part)) for part in (*LEG, *A
 PARTNERS = dict(PAIRED) | {right: left for left, right in PAIRED}
 """For each bone of one side its partner."""
 
-KEYS = tuple(bone for bone in BONES if bone not in (*SPINE[1:], *NECK[:1]))
+MAP_KEYS = tuple(bone for bone in BONES if bone not in (*SPINE[1:], *NECK[:1]))
 """What a map can name, besides "neck": the joints of the back all go by the name "spine"."""
 
 
@@ -127,8 +127,9 @@ def read_map(path: str | Path, skeleton: Skeleton) -> JointMap:
     path = Path(path)
     places: dict[str, tuple[int, ...]] = {}
     for bone, names in _entries(path).items():
-        if bone not in (*KEYS, "neck"):
-            raise FormatError(path, f"{bone!r} is not a bone of the humanoid: expected {', '.join((*KEYS, 'neck'))}")
+        if bone not in (*MAP_KEYS, "neck"):
+            expected = ", ".join((*MAP_KEYS, "neck"))
+            raise FormatError(path, f"{bone!r} is not a bone of the humanoid: expected {expected}")
         unknown = [name for name in names if name not in skeleton.names]
         if unknown:
             raise FormatError(path, f"{bone}: the skeleton has no joint {unknown[0]!r}; it has {_list(skeleton)}")

@@ -29,7 +29,7 @@ class HalfKnownError(MotionError):
 
 
 CHAINS = ("spine", "neck")
-TRUNK = ("hips", "head", *CHAINS)
+UNSIDED = ("hips", "head", *CHAINS)
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ def conventions() -> tuple[Convention, ...]:
 def _convention(content: dict[str, Any], sides: Sequence[str]) -> Convention:
     names = {}
     for bone, known in content["joints"].items():
-        if bone in TRUNK:
+        if bone in UNSIDED:
             names[bone] = tuple(map(plain, known))
         else:
             for side, word in zip(LEFT_RIGHT, sides, strict=True):
@@ -103,7 +103,7 @@ def _of_both_sides(of_left: dict[str, list[float]], signs: tuple[int, int, int])
     found: dict[str, Triple] = {}
     for bone, (x, y, z) in of_left.items():
         right = (signs[0] * x, signs[1] * y, signs[2] * z)
-        found |= {bone: (x, y, z)} if bone in TRUNK else {sided("left", bone): (x, y, z), sided("right", bone): right}
+        found |= {bone: (x, y, z)} if bone in UNSIDED else {sided("left", bone): (x, y, z), sided("right", bone): right}
     return found
 
 

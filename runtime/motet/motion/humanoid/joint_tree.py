@@ -20,25 +20,6 @@ from motet.motion.rotations import Array, unit
 from motet.motion.sides import LEFT, RIGHT, partners_of, sides_of
 from motet.motion.skeleton import END_SUFFIX, Skeleton
 
-ALIKE = 0.15
-"""How much two limbs of a pair may differ in length, relative to the longer one."""
-
-FOOT = (0.08, 0.35)
-"""Within these parts of a leg lies what comes after the ankle."""
-
-FINGERS = 0.35
-"""Within this part of an arm lies what comes after the wrist."""
-
-PIECE = 0.15
-"""A bone begins with at least this part of its limb: hips and buttocks often have a short one before the thigh."""
-
-STRAIGHT = 1.1
-"""A bone that has joints within it, as those that take its twist, is at most this times as long as its ends are apart.
-Limbs of beasts have more bones than a human's: what would be one bone is bent."""
-
-CONFIDENCE = {True: 0.8, False: 0.6}
-"""How sure a map is with left and right from names, and without."""
-
 NO_HUMAN = "this skeleton is no human's: expected hips with two legs, and a back with two arms"
 
 
@@ -116,7 +97,7 @@ def map_by_tree(motion: Motion) -> JointMap:
     neck, head = _neck(tree, arms)
     joints |= {} if head is None else {"head": head}
     _check_straight(skeleton, frames, joints)
-    found = JointMap(joints, tuple(shared[::-1]), neck, BY_THE_TREE, CONFIDENCE[named])
+    found = JointMap(joints, tuple(shared[::-1]), neck, BY_THE_TREE, 0.8 if named else 0.6)
     return check_map(skeleton, found)
 
 
@@ -132,7 +113,8 @@ def _check_straight(skeleton: Skeleton, frames: Array, joints: dict[str, int]) -
         while within[-1] != upper:
             within.append(skeleton.joints[within[-1]].parent)
         pieces = sum(np.linalg.norm(frames[:, one] - frames[:, next_], axis=-1) for one, next_ in pairwise(within))
-        if np.median(pieces) > STRAIGHT * np.median(np.linalg.norm(frames[:, upper] - frames[:, lower], axis=-1)):
+        # joints that take a bone's twist lie in line with it; limbs of beasts have more bones, and bend at them
+        if np.median(pieces) > 1.1 * np.median(np.linalg.norm(frames[:, upper] - frames[:, lower], axis=-1)):
             bent = f"this one is bent between {skeleton.names[upper]!r} and {skeleton.names[lower]!r}"
             raise MotionError(f"a human's bones are straight, {bent}: where it is a human all the same, give a map")
 
@@ -174,7 +156,8 @@ def _fork(tree: _Tree, joint: int) -> _Fork | None:
     for one, other in combinations(tree.skeleton.children[joint], 2):
         longer, shorter = sorted((tree.lengths[i] + tree.reach[i] for i in (one, other)), reverse=True)
         enough = min(len(tree.path(one)), len(tree.path(other))) >= 3
-        if not enough or not longer or 1 - shorter / longer > ALIKE:
+        # two limbs of a pair may differ in length by 15 %
+        if not enough or not longer or 1 - shorter / longer > 0.15:
             continue
         unlike = 1 - shorter / longer + 0.1 * abs(len(tree.path(one)) - len(tree.path(other)))
         unlike -= 1.0 if partners[one] == other else 0.0
@@ -196,7 +179,8 @@ def _legs(tree: _Tree, fork: _Fork) -> list[dict[str, int]]:
     """Thighs, shins, feet and toes: the ankle leaves the foot's length, the knee halves what is above it."""
     paths, places = _pair(tree, fork)
     count = len(places) - 1
-    feet = [k for k in range(2, count) if FOOT[0] <= 1 - places[k] / places[-1] <= FOOT[1]] or [count - 1]
+    # what comes after the ankle is within these parts of a leg
+    feet = [k for k in range(2, count) if 0.08 <= 1 - places[k] / places[-1] <= 0.35] or [count - 1]
     choices = [(start, knee, foot) for foot in feet for start, knee in combinations(range(foot), 2)]
     start, knee, foot = min(choices, key=lambda choice: _unlike(places, *choice))
     parts = {"UpperLeg": start, "LowerLeg": knee, "Foot": foot} | ({"Toes": foot + 1} if foot + 1 < count else {})
@@ -210,7 +194,8 @@ def _arms(tree: _Tree, fork: _Fork) -> list[dict[str, int]]:
     paths, places = _pair(tree, fork)
     forks = [k for k, joint in enumerate(paths[0]) if k >= 2 and len(tree.skeleton.children[joint]) >= 2]
     count = len(places) - 1
-    hands = forks[:1] or [k for k in range(2, count) if 1 - places[k] / places[-1] <= FINGERS] or [count]
+    # what comes after the wrist is within this part of an arm
+    hands = forks[:1] or [k for k in range(2, count) if 1 - places[k] / places[-1] <= 0.35] or [count]
     choices = [(start, elbow, hand) for hand in hands for start, elbow in combinations(range(hand), 2)]
     start, elbow, hand = min(choices, key=lambda choice: _unlike(places, *choice))
     parts = {"UpperArm": start, "LowerArm": elbow} | ({"Shoulder": 0} if start else {})
@@ -222,7 +207,8 @@ def _unlike(places: list[float], start: int, middle: int, end: int) -> float:
     """How far two bones are from being of one length and most of the limb; a short piece does not begin a bone."""
     upper, lower = places[middle] - places[start], places[end] - places[middle]
     whole, first = upper + lower, places[start + 1] - places[start]
-    return abs(upper - lower) / whole - 0.1 * whole / places[-1] if first > PIECE * whole > 0 else np.inf
+    # a bone begins with at least .15 of its limb: hips and buttocks often have a short one before the thigh
+    return abs(upper - lower) / whole - 0.1 * whole / places[-1] if first > 0.15 * whole > 0 else np.inf
 
 
 def _neck(tree: _Tree, arms: _Fork) -> tuple[tuple[int, ...], int | None]:

@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from motet.errors import MotionError, listed
-from motet.motion.humanoid.bones import HUMANOID, LEFT_RIGHT, LEG, REST, SOLE, SPINE, leg_length, sided
+from motet.motion.humanoid.bones import HUMANOID, LEFT_RIGHT, LEG, SOLE, SPINE, T_POSE, leg_length, sided
 from motet.motion.humanoid.calibrate import alignments_of_frames, axes_agree
 from motet.motion.humanoid.joint_map import BY_THE_TREE, NEEDED, JointMap
 from motet.motion.humanoid.joint_tree import map_of
 from motet.motion.humanoid.rest_pose import (
-    LIMBS,
+    LIMB_BONES,
     Aims,
     aims_of,
     alignments_of_pose,
@@ -32,7 +32,7 @@ from motet.motion.motion import Motion
 from motet.motion.rotations import UP, Array, product, rotated, swing, unit
 from motet.motion.skeleton import Skeleton
 
-UNITS = {
+LENGTH_UNITS = {
     "metres": 1.0,
     "decimetres": 0.1,
     "CMU's unit": 0.0254 / 0.45,
@@ -161,7 +161,7 @@ def _rests_as_known(rest: Array, body: Array, joint_map: JointMap, aims: Aims) -
 
 def _is_t_pose(pose: Array, body: Array, joint_map: JointMap, aims: Aims) -> bool:
     """Whether the bones of arms and legs point where the humanoid's do in its T-pose, within 16 degrees."""
-    bones = [bone for limb in LIMBS for bone in limb[:2] if aims[bone]]
+    bones = [bone for limb in LIMB_BONES for bone in limb[:2] if aims[bone]]
     along = [
         float(unit(direction(pose, joint_map.joints[bone], aims[bone])) @ body @ humanoid_direction(bone))
         for bone in bones
@@ -220,7 +220,8 @@ def unit_of(skeleton: Skeleton, leg: float) -> Unit:
     guess = _guess(leg)
     if guess is None:
         return Unit(None, "unit not known: the figure is taken to be an adult's size")
-    return Unit(UNITS[guess], f"unit taken to be {guess} from the length of the legs, {leg * UNITS[guess]:.2f} m")
+    metres = LENGTH_UNITS[guess]
+    return Unit(metres, f"unit taken to be {guess} from the length of the legs, {leg * metres:.2f} m")
 
 
 def unit_by_legs(motion: Motion) -> Unit:
@@ -237,7 +238,7 @@ def height_of(skeleton: Skeleton, joint_map: JointMap, leg: float) -> float:
     joint = joint_map.joints.get("head", (*joint_map.spine, *joint_map.neck)[-1])
     own = _back(skeleton, joint_map.carrier(skeleton), joint)
     usual = _back(HUMANOID, 0, HUMANOID.index(top))
-    return leg + own + (float(REST[:, 1].max()) - leg_length() - usual) * leg / leg_length()
+    return leg + own + (float(T_POSE[:, 1].max()) - leg_length() - usual) * leg / leg_length()
 
 
 def _back(skeleton: Skeleton, hips: int, joint: int) -> float:
@@ -251,8 +252,8 @@ def _back(skeleton: Skeleton, hips: int, joint: int) -> float:
 
 def _guess(leg: float) -> str | None:
     """The unit in which legs are nearest to an adult's 0.82 m, of those in which they are 0.55 to 1.1 m."""
-    likely = [name for name, metres in UNITS.items() if 0.55 < leg * metres < 1.1]
-    return min(likely, key=lambda name: abs(np.log(leg * UNITS[name] / 0.82)), default=None)
+    likely = [name for name, metres in LENGTH_UNITS.items() if 0.55 < leg * metres < 1.1]
+    return min(likely, key=lambda name: abs(np.log(leg * LENGTH_UNITS[name] / 0.82)), default=None)
 
 
 def check_stance(positions: Array, joint_map: JointMap) -> None:
@@ -306,7 +307,7 @@ class Up(NamedTuple):
     note: str | None
 
 
-STANDS = Up(np.eye(3), None)
+STANDS_UP = Up(np.eye(3), None)
 """What stands along y, or of which nothing tells."""
 
 
@@ -317,11 +318,11 @@ def upright(fitted: Fitted, places: Array) -> Up:
     of its frames (T, J, 3) say so, or where the frames alone do and it walks about: a body that lies down does not.
     """
     if not len(places):
-        return STANDS
+        return STANDS_UP
     if fitted.up is None or fitted.up[1] > 0.5:
         return _turned_frames(fitted, places)
     stands = float(np.median(trunk_up(places, fitted.joint_map) @ fitted.up)) > 0.7
-    return Up(swing(fitted.up, UP), "turned upright: the figure does not stand along y") if stands else STANDS
+    return Up(swing(fitted.up, UP), "turned upright: the figure does not stand along y") if stands else STANDS_UP
 
 
 def _turned_frames(fitted: Fitted, places: Array) -> Up:
@@ -333,7 +334,7 @@ def _turned_frames(fitted: Fitted, places: Array) -> Up:
     along = 0.82  # the cosine from which on a body stands along an axis
     stands = trunk @ up > along
     if axis == 1 or np.mean(stands) < 0.5 or np.mean(trunk[:, 1] > along) > 0.1 or np.median(legs @ up) < along:
-        return STANDS
+        return STANDS_UP
     name = "xyz"[axis]
     if not _walks(fitted, places[stands], up):
         return Up(

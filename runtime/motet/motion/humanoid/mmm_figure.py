@@ -12,10 +12,10 @@ import numpy as np
 from motet.motion.motion import Motion
 from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
 
-HEIGHT = 1.7
+MMM_HEIGHT = 1.7
 """Metres of the body, which the angles do not tell."""
 
-TRUNK = (
+MMM_TRUNK = (
     ("root", "", (0.0, 0.0, 0.0)),
     ("BP", "root", (0.0, 0.08, 0.0)),
     ("BT", "BP", (0.0, 0.12, 0.0)),
@@ -24,7 +24,7 @@ TRUNK = (
     ("BUN" + END_SUFFIX, "BUN", (0.0, 0.13, 0.0)),
 )
 
-SIDE = (
+MMM_SIDE = (
     ("H", "root", (0.052, 0.0, 0.0)),
     ("K", "H", (0.0, -0.245, 0.0)),
     ("A", "K", (0.0, -0.246, 0.0)),
@@ -38,25 +38,25 @@ SIDE = (
 )
 """Joints with parents and offsets in heights; those of a side without its L or R, for the left."""
 
-AXES = {"x": ("rx", -1.0), "y": ("rz", 1.0), "z": ("ry", 1.0)}
+MMM_AXES = {"x": ("rx", -1.0), "y": ("rz", 1.0), "z": ("ry", 1.0)}
 """An angle of MMM, whose x points right, y forward and z up -> the channel here, and its sign."""
 
 
 def _skeleton() -> Skeleton:
-    places = list(TRUNK)
+    places = list(MMM_TRUNK)
     for side, sign in (("L", 1.0), ("R", -1.0)):
-        parts = [name for name, _, _ in SIDE]
-        for name, parent, (x, y, z) in SIDE:
+        parts = [name for name, _, _ in MMM_SIDE]
+        for name, parent, (x, y, z) in MMM_SIDE:
             places.append((side + name, side + parent if parent in parts else parent, (sign * x, y, z)))
     names = [name for name, _, _ in places]
     joints = [
-        Joint(name, names.index(parent) if parent else -1, (HEIGHT * x, HEIGHT * y, HEIGHT * z), "xyz")
+        Joint(name, names.index(parent) if parent else -1, (MMM_HEIGHT * x, MMM_HEIGHT * y, MMM_HEIGHT * z), "xyz")
         for name, parent, (x, y, z) in places
     ]
     return Skeleton((replace(joints[0], order="yzx"), *joints[1:]), metres_per_unit=1.0)
 
 
-SKELETON = _skeleton()
+MMM_SKELETON = _skeleton()
 """The figure, 1.7 m tall, in metres."""
 
 
@@ -73,9 +73,9 @@ def with_figure(motion: Motion) -> Motion:
         if channel.startswith("root."):
             names.append(channel)
             columns.append(motion.values[:, i])
-        elif axis in AXES and joint in SKELETON.names:
-            kind, sign = AXES[axis]
+        elif axis in MMM_AXES and joint in MMM_SKELETON.names:
+            kind, sign = MMM_AXES[axis]
             names.append(f"{joint}.{kind}")
             columns.append(sign * motion.values[:, i])
     units = tuple("m" if name[-2] == "t" else "rad" for name in names)
-    return Motion(np.stack(columns, axis=1), tuple(names), units, motion.fps, SKELETON)
+    return Motion(np.stack(columns, axis=1), tuple(names), units, motion.fps, MMM_SKELETON)

@@ -16,16 +16,7 @@ from motet.motion.humanoid.joint_map import JointMap
 from motet.motion.rotations import Array, angle_between, frames_last, rotvec_to_rotmat, swing, unit
 from motet.motion.skeleton import Skeleton
 
-LIMBS = tuple(tuple(sided(side, part) for part in limb) for side in LEFT_RIGHT for limb in (LEG, ARM[1:]))
-
-IN_LINE = np.cos(np.radians(15))
-"""A foot that goes on from the shin within this cosine has no direction of its own."""
-
-ALIKE = np.cos(np.radians(6))
-"""Limbs of left and right whose directions mirror each other's by less than this cosine do not rest."""
-
-ALONG_AXES = np.cos(np.radians(18))
-"""Bones that point along axes by more than this cosine are in one line because nobody has posed them."""
+LIMB_BONES = tuple(tuple(sided(side, part) for part in limb) for side in LEFT_RIGHT for limb in (LEG, ARM[1:]))
 
 Aims = Mapping[str, tuple[int, ...]]
 """For a bone of a limb the joints whose mean place it points to."""
@@ -43,7 +34,7 @@ def aims_of(skeleton: Skeleton, joint_map: JointMap) -> Aims:
     A foot without toes whose tip lies in line with the shin, as in old files, is no more than the shin's end.
     """
     aims = {}
-    for limb in LIMBS:
+    for limb in LIMB_BONES:
         for bone, after in zip(limb, (*limb[1:], ""), strict=True):
             if bone in joint_map.joints:
                 joint = joint_map.joints[bone]
@@ -53,7 +44,8 @@ def aims_of(skeleton: Skeleton, joint_map: JointMap) -> Aims:
     ):
         if aims.get(foot) and toes not in joint_map.joints:
             ends = [unit(direction(skeleton.rest_positions, joint_map.joints[i], aims[i])) for i in (shin, foot)]
-            aims[foot] = () if ends[0] @ ends[1] > IN_LINE else aims[foot]
+            # a foot that continues the shin within 15 degrees has no direction of its own
+            aims[foot] = () if ends[0] @ ends[1] > np.cos(np.radians(15)) else aims[foot]
     return aims
 
 
@@ -133,14 +125,17 @@ def body_frame(rest: Array, joint_map: JointMap, aims: Aims, exact: bool = False
 def moves(rest: Array, joint_map: JointMap, aims: Aims) -> bool:
     """Whether a rest pose (J, 3) is one out of a motion: limbs of left and right differ, and are not along axes."""
     body = frame(to_left(rest, joint_map, "UpperLeg"), trunk_up(rest, joint_map))
-    bones = [(bone, sided("right", bone.removeprefix("left"))) for limb in LIMBS[:2] for bone in limb[:2] if aims[bone]]
+    bones = [
+        (bone, sided("right", bone.removeprefix("left"))) for limb in LIMB_BONES[:2] for bone in limb[:2] if aims[bone]
+    ]
     left, right = (
         np.array([unit(direction(rest, joint_map.joints[pair[side]], aims[pair[side]])) for pair in bones])
         for side in (0, 1)
     )
     alike = np.sum((left @ body) * (right @ body) * [-1.0, 1.0, 1.0], axis=-1)
     along = np.abs([left, right]).max(axis=-1)
-    return bool(alike.min() < ALIKE and along.min() < ALONG_AXES)
+    # limbs that rest mirror each other within 6 degrees; bones within 18 of axes are in line as nobody has posed them
+    return bool(alike.min() < np.cos(np.radians(6)) and along.min() < np.cos(np.radians(18)))
 
 
 def _leg_bones() -> list[str]:
@@ -199,7 +194,7 @@ def _known_turns(body: Array, joint_map: JointMap) -> dict[str, Array]:
 def _found_turns(rest: Array, body: Array, joint_map: JointMap, aims: Aims) -> dict[str, Array]:
     """Rotations (3, 3) of the humanoid's bones that make its limbs point where those of the pose do."""
     turns = dict.fromkeys(("hips", "head", *(sided(side, "Shoulder") for side in LEFT_RIGHT)), body)
-    for limb in LIMBS:
+    for limb in LIMB_BONES:
         carried = body
         for bone in limb:
             if bone in joint_map.joints:

@@ -48,7 +48,7 @@ from motet.motion.skeleton import END_SUFFIX, Skeleton
 
 log = logging.getLogger(__name__)
 
-SURE = 0.75
+SURE_OF_JOINTS = 0.75
 """Confidence from which on what was found needs no warning: less has a skeleton whose names do not even tell sides."""
 
 HIPS = [HUMANOID.index(sided(side, "UpperLeg")) for side in LEFT_RIGHT]
@@ -137,7 +137,7 @@ class Humanoid:
 
     def logged(self) -> "Humanoid":
         """The same, which is logged."""
-        level = logging.INFO if self.confidence >= SURE else logging.WARNING
+        level = logging.INFO if self.confidence >= SURE_OF_JOINTS else logging.WARNING
         log.log(level, "brought to the humanoid: %s", self.summary)
         return self
 

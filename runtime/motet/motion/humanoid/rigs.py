@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from motet.errors import MotionError
-from motet.motion.humanoid.bones import ARM, HUMANOID, LEFT_RIGHT, LEG, NECK, REST, SPINE, sided
+from motet.motion.humanoid.bones import ARM, HUMANOID, LEFT_RIGHT, LEG, NECK, SPINE, T_POSE, sided
 from motet.motion.rotations import Array
 from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
 
@@ -32,7 +32,7 @@ def rig(name: str) -> Skeleton:
 
 
 def _skeleton(content: dict[str, Any], rig: dict[str, Any]) -> Skeleton:
-    known, place = content["joints"], dict(zip(HUMANOID.names, REST, strict=True))
+    known, place = content["joints"], dict(zip(HUMANOID.names, T_POSE, strict=True))
     tree: list[tuple[str, str, Array]] = [(rig["root"], "", np.zeros(3))] if "root" in rig else []
     above = rig.get("root", "")
     back = _shared_out([place[bone] for bone in ("hips", *SPINE)], len(known["spine"]))

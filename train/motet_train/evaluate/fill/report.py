@@ -12,7 +12,7 @@ from motet.models.fill import FillModel
 from motet.motion.feet.contacts import ContactSettings, ground_speeds, standing
 from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, sided
 from motet.motion.rotations import Array
-from motet.representation.placed import PLACE, bridge, placed_by_way, straight
+from motet.representation.placed import ROOT_PLACE, bridge, placed_by_way, straight
 from motet_train.data.errors import DataError
 from motet_train.data.split import split
 from motet_train.data.store import Store
@@ -130,7 +130,7 @@ def _places(joints: SixdPlaces, windows: list[Window], filled: list[Array]) -> A
     ]
     frames = torch.from_numpy(np.stack(rows).astype(np.float32))
     with torch.inference_mode():
-        found: Array = (joints(frames[..., PLACE:]) + frames[..., None, :PLACE]).numpy().astype(np.float64)
+        found: Array = (joints(frames[..., ROOT_PLACE:]) + frames[..., None, :ROOT_PLACE]).numpy().astype(np.float64)
     return found
 
 

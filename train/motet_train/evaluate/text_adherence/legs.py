@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, REST, sided
+from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, T_POSE, sided
 from motet_train.evaluate.text_adherence.track import RATE, Track, longest, spells, swings
 
 CLEAR = 0.1
@@ -15,7 +15,7 @@ def jumps(track: Track, rise: float, count: int = 1, metres: float = 0.0, most_m
     A jump: both feet are off the ground between two frames in which one is on it. Shorter flights than 0.12 s are
     running steps, longer ones than 0.9 s stand on something. metres, most_metres: how far each goes over the ground.
     """
-    hips, path, standing = track.height("hips"), track.path, REST[HUMANOID.index("hips"), 1]
+    hips, path, standing = track.height("hips"), track.path, T_POSE[HUMANOID.index("hips"), 1]
     found = [
         hips[start:stop].max() - standing >= rise
         and metres <= np.linalg.norm(path[stop] - path[start - 1]) <= most_metres

@@ -8,7 +8,7 @@ from torch.nn import functional
 
 from motet.motion.skeleton import END_SUFFIX
 from motet.representation.contract import MotionContract
-from motet.representation.root_sixd import KINDS
+from motet.representation.root_sixd import SIXD_KINDS
 from motet_train.models.tree import levels
 
 
@@ -47,7 +47,7 @@ class SixdPlaces(nn.Module):
 
     def forward(self, sixd: Tensor) -> Tensor:
         """Axes (..., 6 K) of the K bones to places (..., J, 3) in metres from the root, in the frame of the facing."""
-        local = axes_to_rotmat(sixd.reshape(*sixd.shape[:-1], len(self.bones), len(KINDS)))
+        local = axes_to_rotmat(sixd.reshape(*sixd.shape[:-1], len(self.bones), len(SIXD_KINDS)))
         count, lead = len(self.parents), local.shape[:-3]
         turned: list[Tensor | None] = [None] * count
         places: list[Tensor] = [sixd.new_zeros(*lead, 3)] * count

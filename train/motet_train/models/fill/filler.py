@@ -19,7 +19,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from motet.bundle.graph import GraphSpec, TensorSpec
-from motet.representation.placed import PLACE, mirror
+from motet.representation.placed import ROOT_PLACE, mirror
 from motet_train.models.codes.sixd_places import SixdPlaces, Tree
 from motet_train.models.net import Net, tuples
 from motet_train.models.normalised import normalised
@@ -116,7 +116,7 @@ class Filler(Net):
         before, count = past.shape[1], plain.shape[1]
         place = torch.arange(given.shape[1], device=given.device) - before + 1
         left = count + 1 - place
-        seen = [normalised(given, self.mean, self.scale), self.places(given[..., PLACE:]).flatten(2) / SIZE]
+        seen = [normalised(given, self.mean, self.scale), self.places(given[..., ROOT_PLACE:]).flatten(2) / SIZE]
         x = self.inward(_around(torch.cat(seen, dim=-1)))
         ends = self.ends(torch.cat([x[:, before - 1], x[:, before + count]], dim=-1))
         x = x + ends[:, None] + self.told(self._told(place, left))
@@ -136,7 +136,7 @@ class Filler(Net):
 
     def joints(self, frames: Tensor) -> Tensor:
         """Joints (..., J, 3) in metres of placed frames (..., E)."""
-        found: Tensor = self.places(frames[..., PLACE:]) + frames[..., None, :PLACE]
+        found: Tensor = self.places(frames[..., ROOT_PLACE:]) + frames[..., None, :ROOT_PLACE]
         return found
 
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:

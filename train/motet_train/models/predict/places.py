@@ -9,7 +9,7 @@ from torch import Tensor, nn
 from motet.motion.skeleton import END_SUFFIX
 from motet.representation.contract import MotionContract
 from motet.representation.root_block import ROOT_BLOCK
-from motet.representation.root_vectors import KINDS, joints_of
+from motet.representation.root_vectors import VECTOR_KINDS, joints_of
 from motet_train.models.tree import levels
 
 
@@ -29,7 +29,7 @@ class VectorPlaces(nn.Module):
         channels, joints = list(contract.channels), joints_of(contract.channels)
         self.root = [channels.index(name) for name in ROOT_BLOCK]
         names = [skeleton.names[i] for i in kept]
-        self.vectors = [channels.index(f"{joint}.{kind}") for joint in joints for kind in KINDS]
+        self.vectors = [channels.index(f"{joint}.{kind}") for joint in joints for kind in VECTOR_KINDS]
         self.moved = [names.index(joint) for joint in joints]
         self.fps = contract.fps
 

@@ -13,7 +13,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from motet.bundle.graph import GraphSpec, TensorSpec
-from motet.representation.contract import LIMIT
+from motet.representation.contract import Z_LIMIT
 from motet_train.data.batch import Batch, before
 from motet_train.models.language.dropout import WordEmbedding
 from motet_train.models.language.net import LanguageNet
@@ -75,7 +75,7 @@ class LanguageToMotion(LanguageNet):
 
     def outputs(self, frames: Tensor, context: Tensor) -> Tensor:
         """Outputs of the decoder (B, T, S) from which each of the frames (B, T, D + 1) is predicted."""
-        given = torch.cat([torch.ones_like(frames[:, :1]), frames[:, :-1]], dim=1).clamp(-LIMIT, LIMIT)
+        given = torch.cat([torch.ones_like(frames[:, :1]), frames[:, :-1]], dim=1).clamp(-Z_LIMIT, Z_LIMIT)
         found: Tensor = self.decoder(given, context)
         return found
 
@@ -116,7 +116,7 @@ class LanguageToMotion(LanguageNet):
 
         log_weights (B, K), means and standard deviations (B, K, D) in normalised units, probability of the flag (B,).
         """
-        following = self.decoder.step(frame.clamp(-LIMIT, LIMIT), context, state)
+        following = self.decoder.step(frame.clamp(-Z_LIMIT, Z_LIMIT), context, state)
         mixture = self.mixture(following)
         stds = mixture.variances.sqrt()
         return mixture.log_weights, mixture.means, stds, mixture.active.sigmoid(), following

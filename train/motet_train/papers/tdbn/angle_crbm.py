@@ -15,7 +15,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from motet.representation.contract import LIMIT
+from motet.representation.contract import Z_LIMIT
 from motet_train.models.net import tuples
 from motet_train.models.normalised import normalised
 from motet_train.papers.tdbn.contrastive import Learning, Stage
@@ -64,7 +64,7 @@ class AngleCRBM(ControlNet):
 
     def encode(self, frames: Tensor) -> Tensor:
         """Frames (B, D) to z-scored angles (B, D)."""
-        return normalised(frames, self.mean, self.scale, LIMIT / self.config.sigma)
+        return normalised(frames, self.mean, self.scale, Z_LIMIT / self.config.sigma)
 
     def decode(self, codes: Tensor) -> Tensor:
         """Z-scored angles (B, D) to frames (B, D)."""

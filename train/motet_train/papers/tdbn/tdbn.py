@@ -15,7 +15,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from motet.representation.contract import LIMIT
+from motet.representation.contract import Z_LIMIT
 from motet_train.models.net import tuples
 from motet_train.models.normalised import normalised
 from motet_train.papers.tdbn.contrastive import Learning, Stage, balanced
@@ -101,7 +101,7 @@ class TDBN(ControlNet):
 
     def normalised(self, frames: Tensor) -> Tensor:
         """Frames (B, D) as the RBM sees them: over sigma standard deviations."""
-        return normalised(frames, self.mean, self.scale, LIMIT / self.config.sigma)
+        return normalised(frames, self.mean, self.scale, Z_LIMIT / self.config.sigma)
 
     def decode(self, codes: Tensor) -> Tensor:
         """Codes (B, H) to frames (B, D)."""

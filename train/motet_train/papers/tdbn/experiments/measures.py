@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from motet.motion.resample import lines
 from motet.motion.rotations import Array
-from motet.representation.contract import FLOORS
+from motet.representation.contract import LIVING_STD
 from motet_train.papers.tdbn.period import period
 
 ARRIVED = 0.25
@@ -39,7 +39,7 @@ class Reference:
     def std(self) -> Array:
         """Standard deviation (D,) over all training frames, infinite where a channel is constant."""
         std = np.concatenate([clip for clips in self.motions.values() for clip in clips]).std(axis=0)
-        return np.where(std < FLOORS["deg"], np.inf, std)
+        return np.where(std < LIVING_STD["deg"], np.inf, std)
 
     @cached_property
     def moving(self) -> NDArray[np.intp]:
