@@ -131,10 +131,8 @@ def test_the_chain_of_perfect_models(corpus: SplitStore) -> None:
 
 
 def test_the_report_of_a_perfect_describe_model(corpus: SplitStore) -> None:
-    parts: list[str] = []
     model: Any = FakeDescribe(STORE)
-    report = describe_report(model, corpus, parts.append)
-    assert parts == ["describe train", "describe test", "floors", "likelihood", "timelines"]
+    report = describe_report(model, corpus)
     assert report["train"] == {"seconds": 1.5, "epochs": 3}
     assert report["data"] == {
         **{"train": 20, "validation": 5, "test": 5},
@@ -269,7 +267,7 @@ def test_evaluate_refuses_before_it_measures(runs: Path, monkeypatch: pytest.Mon
     def measured(*_: object) -> None:
         raise AssertionError("it has measured")
 
-    monkeypatch.setattr("motet_train.cli.evaluate_language.describe_report", measured)
+    monkeypatch.setattr("motet_train.cli.suites.describe_report", measured)
     (runs / "file").touch()
     arguments = ["evaluate", str(runs / "describe"), "--data", str(runs / "store")]
     result = CliRunner().invoke(main, [*arguments, "--plots", str(runs / "file" / "plots")])

@@ -27,7 +27,8 @@ from motet_train.data.gap_windows import GapWindow, GapWindows, gap_window
 from motet_train.data.records import Record
 from motet_train.data.split import split
 from motet_train.data.store import Store, prepare
-from motet_train.evaluate.fill.report import fill_reports, fill_text
+from motet_train.evaluate.fill.report import GOALS, fill_report
+from motet_train.evaluate.tables import reached
 from motet_train.models.codes.sixd_places import tree_of
 from motet_train.models.fill.filler import Filler, FillerConfig
 from motet_train.runs import Run
@@ -198,7 +199,7 @@ def test_a_model_that_knows_has_no_error_and_standing_has_that_of_the_way(run: R
     tested = split(only.records, 0, "subject").test
     assert len(tested) == 1
     model.truth = placed_by_way(np.array(only.sequence(tested[0]), np.float64), 30.0)
-    report = fill_reports({"knows": model}, only, lambda name: None)["knows"]
+    report = fill_report(model, only)
     half = report["gap_0.5"]
     frames = len(model.truth)
     windows = range(5, frames - 5 - 15 + 1, 15)
@@ -211,8 +212,7 @@ def test_a_model_that_knows_has_no_error_and_standing_has_that_of_the_way(run: R
     places = positions(unplaced(model.truth, dancer(0, 1)))
     expected = np.mean([np.linalg.norm(places[i : i + 15] - places[i - 1], axis=-1).mean() for i in windows])
     assert half["cm_standing"] == pytest.approx(100 * expected, rel=1e-4)
-    assert "goal at 1 s: <= 0.5" in fill_text({"knows": report})
-    assert "NOT REACHED" not in fill_text({"knows": report})
+    assert reached(GOALS, "gap_1.of_interpolation", report["gap_1"]["of_interpolation"])
 
 
 def test_evaluate_prints_the_table(run: Run, store: Store, tmp_path: Path) -> None:

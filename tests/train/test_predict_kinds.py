@@ -1,31 +1,21 @@
 """Predictions of recorded motions by kinds, and whether a model's errors are what it expects them to be."""
 
-import json
 from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet_train.data.errors import DataError
 from motet_train.data.store import Entry
-from motet_train.evaluate.predict.calibration import (
-    ALL,
-    QUARTERS,
-    calibrated,
-    calibration_of,
-    calibration_table,
-    to_json,
-)
-from motet_train.evaluate.predict.floors import CONSTANT, DAMPED, FLOORS, ZERO
+from motet_train.evaluate.predict.calibration import QUARTERS, calibration, calibration_rows
+from motet_train.evaluate.predict.floors import FLOORS
 from motet_train.evaluate.predict.kinds import KINDS, REST, by_kind, kind_of
-from motet_train.evaluate.predict.mocap import PLACE, POSE, Measured, held_out
-from motet_train.evaluate.predict.mocap_table import distance_table, kinds_table, part_json, part_of, parts_of, worse
-from motet_train.evaluate.predict.seed_groups import SeedGroup
+from motet_train.evaluate.predict.mocap import PLACE, POSE, Measured, held_out, mocap_report, mocap_text
+from motet_train.evaluate.tables import json_ready
 
 
 def entry(name: str, action: str = "", *sentences: str, subject: str = "1") -> Entry:
@@ -78,47 +68,40 @@ ENTRIES = [
 ]
 
 
+class Unsure:
+    """A model that does not know its errors."""
+
+    knows_errors = False
+
+
 def test_distances_are_means_over_the_windows_of_a_kind() -> None:
-    found = measured(a=1.0, b=2.0)
-    parts = parts_of(found, ENTRIES, [SeedGroup("ab (2 seeds)", ("a", "b"))])
-    assert list(parts) == ["boxing", "walks and runs", REST]
-    boxing, walks = parts["boxing"], parts["walks and runs"]
-    assert (boxing.recordings, boxing.people, boxing.windows) == (("box",), 1, 2)
-    assert (walks.recordings, walks.people, walks.windows) == (("walk", "run"), 1, 2)
-    np.testing.assert_allclose(boxing.means["ab (2 seeds)"][PLACE], 15.0)
-    np.testing.assert_allclose(boxing.spreads["ab (2 seeds)"][PLACE], 10.0)
-    np.testing.assert_allclose(walks.means[ZERO][POSE], 1.0)
-    assert list(walks.means) == [*FLOORS, "ab (2 seeds)"]
-    one = part_json(found, boxing, "b")
-    assert one["place_cm"]["frame_24"] == 20.0
-    assert one["constant_velocity"]["pose_cm"]["frame_1"] == 15.0
-    assert (one["recordings"], one["windows"]) == (1, 2)
-    with pytest.raises(DataError, match="no window"):
-        part_of(found, ENTRIES[-1:], [])
+    models: Any = {"a": Unsure(), "b": Unsure()}
+    reports = mocap_report(models, measured(a=1.0, b=2.0), ENTRIES[:4])
+    assert list(reports) == ["a", "b"]
+    assert list(reports["b"]["kinds"]) == ["boxing", "walks and runs", REST]
+    boxing, walks = reports["b"]["kinds"]["boxing"], reports["b"]["kinds"]["walks and runs"]
+    assert [boxing[count] for count in ("recordings", "people", "windows")] == [1, 1, 2]
+    assert [walks[count] for count in ("recordings", "people", "windows")] == [2, 1, 2]
+    assert boxing["place_cm"]["frame_24"] == 20.0
+    assert boxing["constant_velocity"]["pose_cm"]["frame_1"] == 15.0
+    assert walks["zero_velocity"]["pose_cm"]["frame_1"] == 1.0
+    assert reports["a"]["place_cm"]["frame_3"] == pytest.approx((10 + 10 + 1 + 1 + 2) / 5)
+    assert "calibration" not in reports["a"]
 
 
-def test_tables_say_where_a_model_is_worse_than_a_floor() -> None:
-    found = measured(a=1.0)
-    found.distances["a"][PLACE][:2, 13:] = 25.0  # of the boxing, where standing still is off by 20 and damped by 10
-    parts = parts_of(found, ENTRIES, [SeedGroup("a", ("a",))])
-    text = kinds_table(parts, 30.0)
-    boxing = text.split("boxing: 1 person, 1 recording, 2 windows")[1].split("walks and runs: ")[0]
-    assert "a: worse than standing still at 13, 24; worse than damped velocity at 13, 24" in boxing
-    assert "constant velocity at" not in boxing
-    assert "walks and runs: 1 person, 2 recordings, 2 windows" in text
-    assert "a: nowhere worse than standing still, constant velocity, damped velocity" in text
-    whole = distance_table(part_of(found, ENTRIES[:4], [SeedGroup("a", ("a",))]), 30.0).splitlines()
-    assert whole[1].split() == ["milliseconds", "67", "133", "267", "333", "467", "833"]
-    assert whole[2] == "2 people, 4 recordings, 5 windows"
-    assert next(row.split() for row in whole if row.startswith("  a ")) == ["a", *["4.8"] * 4, *["10.8"] * 2]
-
-
-def test_what_looks_the_same_is_not_worse() -> None:
-    even = {ZERO: 1.0, CONSTANT: 1.0, DAMPED: 0.96, "a": 1.04}
-    means = {name: {PLACE: np.full(25, value)} for name, value in even.items()}
-    assert worse(means) == ["a: nowhere worse than standing still, constant velocity, damped velocity"]
-    means["a"][PLACE][9] = 1.06
-    assert worse(means) == [f"a: {'; '.join(f'worse than {w} at 9' for w in ('standing still', CONSTANT, DAMPED))}"]
+def test_the_table_has_a_row_of_each_system_for_each_kind() -> None:
+    models: Any = {"a": Unsure()}
+    text = mocap_text(mocap_report(models, measured(a=1.0), ENTRIES[:4]), 30.0)
+    rows = [row.split() for row in text.splitlines()]
+    assert rows[1] == ["milliseconds", "67", "133", "267", "333", "467", "833"]
+    assert text.splitlines()[2] == "all: 2 people, 4 recordings, 5 windows"
+    assert [row[1:] for row in rows if row[0] == "a"] == [
+        ["4.8"] * 6,
+        ["2.4"] * 6,
+        *([v] * 6 for v in ("10.0", "1.0", "2.0")),
+    ]
+    assert "walks and runs: 1 people, 2 recordings, 2 windows" in text
+    assert sum(row[:2] == ["zero", "velocity"] for row in rows) == 5
 
 
 def test_what_one_model_was_trained_on_is_not_held_out() -> None:
@@ -140,8 +123,10 @@ def test_what_one_model_was_trained_on_is_not_held_out() -> None:
 class Honest:
     """A model that says how far it will be off."""
 
-    def __init__(self, expected: Array, knows: bool = True) -> None:
-        self.expected, self.knows_errors = expected, knows
+    knows_errors = True
+
+    def __init__(self, expected: Array) -> None:
+        self.expected = expected
 
     def expected_errors(self, motions: Sequence[Motion], /) -> Array:
         assert len(motions) == len(self.expected)
@@ -153,45 +138,42 @@ def test_calibration_is_measured_over_expected() -> None:
     expected = rng.uniform(1, 5, (40, 25))
     true = 2 * expected
     true[:10] = 3 * expected[:10]
-    kinds: dict[str, NDArray[Any]] = {"first": np.arange(10), "rest": np.arange(10, 40), "none": np.arange(0)}
-    found = calibrated(expected, true, kinds)
-    assert list(found.ratios) == [ALL, "first", "rest"]
-    np.testing.assert_allclose(found.ratios["first"], 3.0)
-    np.testing.assert_allclose(found.ratios["rest"], 2.0)
-    np.testing.assert_allclose(found.ratios[ALL], true.mean(axis=0) / expected.mean(axis=0))
-    least, _ = found.quarters[QUARTERS[0]]
-    np.testing.assert_allclose(least, np.sort(expected, axis=0)[:10].mean(axis=0))
-    most, measured_most = found.quarters[QUARTERS[3]]
+    found = calibration(expected, true, {"first": np.arange(10), "rest": np.arange(10, 40)})
+    ratio = found["ratio"]
+    assert list(ratio) == ["all", "first", "rest"]
+    for kind, times in (("first", 3.0), ("rest", 2.0)):
+        assert list(ratio[kind].values()) == pytest.approx([times] * 6)
+    assert ratio["all"]["frame_7"] == pytest.approx(true[:, 7].mean() / expected[:, 7].mean())
+    assert len(found["quarters"]) == len(QUARTERS) == 4
+    least, most = found["quarters"][0], found["quarters"][3]
+    assert least["expected_cm"]["frame_9"] == pytest.approx(np.sort(expected[:, 9])[:10].mean())
     picked = np.argsort(expected[:, 7])[30:]
-    assert (most[7], measured_most[7]) == pytest.approx((expected[picked, 7].mean(), true[picked, 7].mean()))
-    assert [list(found.quarters), len(found.quarters)] == [list(QUARTERS), 4]
+    assert most["measured_cm"]["frame_7"] == pytest.approx(true[picked, 7].mean())
 
 
 def test_ranks_are_correlated_whatever_the_scale() -> None:
-    expected = np.array([[1.0, 5], [2, 5], [3, 5], [4, 5]])
-    true = np.array([[1.0, 1], [10, 2], [1000, 3], [100, 4]])
-    found = calibrated(expected, true, {}).ranks
-    assert found[0] == pytest.approx(1 - 6 * 2 / (4 * 15))  # by Spearman's own formula, two ranks exchanged
-    assert np.isnan(found[1])
+    expected = np.repeat(np.array([[1.0], [2], [3], [4]]), 25, axis=1)
+    expected[:, 3] = 5.0
+    true = np.repeat(np.array([[1.0], [10], [1000], [100]]), 25, axis=1)
+    found = calibration(expected, true, {})["rank_correlation"]
+    assert found["frame_1"] == pytest.approx(1 - 6 * 2 / (4 * 15))  # by Spearman's own formula, two ranks exchanged
+    assert np.isnan(found["frame_3"])
 
 
 def test_a_model_is_asked_for_its_errors_where_it_knows_them() -> None:
-    found = Measured(
-        ("box", "walk", "walk"), {"m": {PLACE: np.outer([4.0, 1, 3], np.ones(25))}}, tuple[Any]([None] * 3)
-    )
-    model = Honest(np.outer([2.0, 1, 1], np.ones(25)))
-    one = calibration_of(model, found, "m", {"boxing": ["box"], "walks": ["walk"], "dance": []})
-    assert one is not None
-    assert {kind: ratio[24] for kind, ratio in one.ratios.items()} == {ALL: 2.0, "boxing": 2.0, "walks": 2.0}
-    said = json.loads(json.dumps(to_json(one)))
-    assert said["ratio"]["boxing"]["frame_24"] == 2.0
-    assert said["quarters"][0] == {
-        "expected_cm": dict.fromkeys(said["ratio"]["boxing"], 1.0),
-        "measured_cm": dict.fromkeys(said["ratio"]["boxing"], 1.0),
+    distances = {
+        name: {measure: np.outer([4.0, 1, 3], np.ones(25)) for measure in (PLACE, POSE)} for name in (*FLOORS, "m")
     }
-    assert said["rank_correlation"]["frame_1"] == pytest.approx(0.866, abs=1e-3)
-    text = calibration_table(one, "m")
-    assert "m: measured mean error over the expected one" in text
-    assert [row.split() for row in text.splitlines() if row.startswith("  boxing")] == [["boxing", *["2.00"] * 6]]
-    assert calibration_of(Honest(model.expected, knows=False), found, "m", {}) is None
-    assert calibration_of(object(), found, "m", {}) is None
+    found = Measured(("box", "walk", "walk"), distances, tuple[Any]([None] * 3))
+    models: Any = {"m": Honest(np.outer([2.0, 1, 1], np.ones(25)))}
+    reports = mocap_report(models, found, ENTRIES[:2])
+    one = json_ready(reports["m"]["calibration"])
+    assert {kind: ratio["frame_24"] for kind, ratio in one["ratio"].items()} == {
+        "all": 2,
+        "boxing": 2,
+        "walks and runs": 2,
+    }
+    assert set(one["quarters"][0]["expected_cm"].values()) == set(one["quarters"][0]["measured_cm"].values()) == {1.0}
+    assert one["rank_correlation"]["frame_1"] == pytest.approx(0.866, abs=1e-3)
+    assert ["  boxing", *["2.00"] * 6] in calibration_rows(reports["m"]["calibration"])
+    assert "measured mean error over the expected one" in mocap_text(reports, 30.0)

@@ -14,7 +14,6 @@ from motet.errors import TextError
 from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.motion import Motion
 from motet.representation.root_block import to_root_block
-from motet_train.cli.evaluate_says import trained_on
 from motet_train.data.errors import DataError
 from motet_train.data.store import Entry, Store
 from motet_train.evaluate.text_adherence import table
@@ -22,7 +21,7 @@ from motet_train.evaluate.text_adherence.measures import depth, distance, jerk, 
 from motet_train.evaluate.text_adherence.prompts import Prompt, prompts
 from motet_train.evaluate.text_adherence.table import says_table, says_text
 from motet_train.evaluate.text_adherence.track import RATE, Track
-from motet_train.evaluate.text_adherence.trials import LookUp, Trial, of_store, read_trials
+from motet_train.evaluate.text_adherence.trials import LookUp, Trial, of_store, read_trials, trained_on
 
 CMU = Path(__file__).parents[2] / "train/motet_train/data/cmu"
 STILL, LYING, LEFT, ZOMBIE = (

@@ -143,7 +143,7 @@ def test_what_does_not_fit_is_refused(model: SteerModel, store: Store, folder: P
 
 
 def test_the_command_prints_and_saves(folder: Path, monkeypatch: pytest.MonkeyPatch, report: Any) -> None:
-    monkeypatch.setattr("motet_train.cli.evaluate_steer.steer_report", lambda model, recorded: report)
+    monkeypatch.setattr("motet_train.cli.suites.steer_report", lambda model, recorded: report)
     asked = ["evaluate", str(folder / "run"), "--data", str(folder / "store")]
     result = CliRunner().invoke(main, [*asked, "--json", "--save"])
     assert result.exit_code == 0, result.output

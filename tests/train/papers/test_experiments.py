@@ -8,18 +8,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click import UsageError
 from control_runs import control_run
 from numpy.typing import NDArray
 
 from motet.bundle.graph import Arrays, GraphSpec, TensorSpec
 from motet.bundle.manifest import Manifest
 from motet.errors import OutputError
-from motet.formats import read_motion, write_motion
 from motet.models.load import load
 from motet.models.tdbn_control import TdbnModel
 from motet.representation.contract import MotionContract
-from motet_train.cli.evaluate import _clips
-from motet_train.data.cmu_trials import CMU_FOLDER
+from motet_train.cli.evaluate import data_of
+from motet_train.cli.suites import SUITES, Suite
 from motet_train.data.errors import DataError
 from motet_train.evaluate.figures import save
 from motet_train.evaluate.tables import reached
@@ -38,7 +38,7 @@ def clips() -> Clips:
 
 def test_the_shipped_bundle_reaches_every_goal_and_says_what_is_measured(clips: Clips) -> None:
     model = load("cmu-control")
-    report = control_report(study_of(model, clips), lambda _: None)
+    report = control_report(study_of(model, clips))
     missed = {
         name: report[name.split(".")[0]][name.split(".")[1]]
         for name in GOALS
@@ -94,20 +94,32 @@ def test_figures_that_the_clips_allow_are_drawn(clips: Clips, tmp_path: Path) ->
         save({}, tmp_path / "file")
 
 
-def test_a_run_is_evaluated_on_the_clips_that_it_was_trained_on(tmp_path: Path) -> None:
-    def clips_of(command: str, data: Path | None = None, run: Path = Path("runs/x")) -> tuple[str, ...]:
-        model: Any = SimpleNamespace(manifest=SimpleNamespace(training={"command": command}))
-        return _clips(str(run), model, data).labels
+def test_a_run_is_evaluated_on_what_it_was_trained_on(tmp_path: Path) -> None:
+    control, fill = SUITES["control"], SUITES["fill"]
 
-    write_motion(tmp_path / "stroll.bvh", read_motion(CMU_FOLDER / "39_14.amc")[:50])
-    assert clips_of(f"motet train tdbn --data {tmp_path} --out x") == ("stroll",)
-    assert clips_of(f"motet train tdbn --data={tmp_path} --out x") == ("stroll",)
-    assert clips_of("motet train tdbn --out x") == ("walk", "run", "bend")
-    (tmp_path / "run.toml").write_text(f"data = '{tmp_path}'\n")
-    assert clips_of("motet train tdbn --config own.toml --out x", run=tmp_path) == ("stroll",)
-    assert clips_of("motet train tdbn --data gone --out x", tmp_path) == ("stroll",)
+    def found(
+        command: str, data: Path | None = None, run: Path = Path("runs/x"), suite: Suite = control
+    ) -> Path | None:
+        model: Any = SimpleNamespace(manifest=SimpleNamespace(training={"command": command}))
+        return data_of({str(run): model}, suite, data)[str(run)]
+
+    assert found(f"motet train tdbn --data {tmp_path} --out x") == tmp_path
+    assert found(f"motet train tdbn --data={tmp_path} --out x") == tmp_path
+    assert found("motet train tdbn --out x") is None
+    assert found("motet train tdbn --data gone --out x", tmp_path) == tmp_path
     with pytest.raises(DataError, match=r"runs/x was trained on, gone, are missing: give --data"):
-        clips_of("motet train tdbn --data gone")
+        found("motet train tdbn --data gone")
+    run = tmp_path / "run"
+    run.mkdir()
+    (run / "run.toml").write_text(f"data = '{tmp_path}'\n")
+    assert found("motet train tdbn --config own.toml --out x", run=run) == tmp_path
+    assert found("motet train fill --config own.toml --out x", run=run, suite=fill) == tmp_path
+    (tmp_path / "run-store").mkdir()
+    (tmp_path / "run-store" / "store.json").touch()
+    assert found("", run=run, suite=fill) == found("", tmp_path, run, fill) == tmp_path / "run-store"
+    assert found("", tmp_path / "other", run, fill) == tmp_path / "other"
+    with pytest.raises(UsageError, match=r"need --data: .*\(runs/x was trained on gone, which is not here\)"):
+        found("motet train fill --data gone --out x", suite=fill)
 
 
 def _of(report: Mapping[str, Mapping[str, float]], name: str) -> float:

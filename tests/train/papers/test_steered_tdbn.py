@@ -20,7 +20,7 @@ from motet.motion.kinematics import positions
 from motet.representation import named
 from motet.representation.root_block import way
 from motet.representation.root_sixd import ROOT_SIXD
-from motet_train.cli.evaluate_steer import as_steered
+from motet_train.cli.suites import as_steered
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.errors import DataError
 from motet_train.data.locomotion import gaits_of, recordings

@@ -16,7 +16,7 @@ from motet.representation.placed import ROOT_PLACE, bridge, placed_by_way, strai
 from motet_train.data.errors import DataError
 from motet_train.data.split import split
 from motet_train.data.store import Store
-from motet_train.evaluate.tables import Report, aligned
+from motet_train.evaluate.tables import Goals, Report, gathered
 from motet_train.models.codes.sixd_places import SixdPlaces, tree_of
 
 SECONDS = (0.5, 1.0, 2.0)
@@ -33,12 +33,15 @@ GOING = 0.5
 MARGIN = 3
 """Frames before and after a gap whose joints are looked at with it, so that joins count."""
 
-GOAL = 0.5
-"""Of the error of interpolation, at a gap of a second."""
+GOALS: Goals = {"gap_1.of_interpolation": (None, 0.5)}
+"""Figure -> (least, most) that the model that comes with motet is to reach."""
 
-FLOORS = {"hermite": "curved root", "interpolation": "interpolation", "standing": "standing"}
-"""Plain ways, and what the table calls them: joints by slerp and the root on a cubic Hermite curve, or on a line; and
-the last frame held."""
+FLOORS: Mapping[str, "Fill"] = {
+    "hermite": bridge,
+    "interpolation": straight,
+    "standing": lambda past, after, count: np.repeat(past[-1:], count, axis=0),
+}
+"""Plain ways: joints by slerp and the root on a cubic Hermite curve, or on a line; and the last frame held."""
 
 Fill = Callable[[Array, Array, int], Array]
 
@@ -52,29 +55,26 @@ class Window:
     after: Array
 
 
-def fill_reports(models: Mapping[str, FillModel], store: Store, told: Callable[[str], object]) -> dict[str, Report]:
-    """The figures of models on the test part of a store in ``root_sixd``; DataError for another store.
+def fill_report(model: FillModel, store: Store) -> Report:
+    """The figures of a model on the test part of a store in ``root_sixd``; DataError for another store.
 
     Of each gap, "gap_0.5" and so on: joints' mean distance in the world "cm", and in gaps where the figure is on its
     way (:data:`GOING`) "cm_going", the speed of feet that stood "slide" in cm a second, "jerk" over the recorded; each
-    of the model as it is, of :data:`FLOORS` with their names behind, and of the recording. told: what is measured next.
+    of the model as it is, of :data:`FLOORS` with their names behind, and of the recording.
     """
     if store.representation != "root_sixd":
         raise DataError(f"gaps are measured in root_sixd (motet prepare --for codes), not in {store.representation}")
+    return gathered(_parts(model, store), model.manifest.name)
+
+
+def _parts(model: FillModel, store: Store) -> Iterator[Report]:
     joints = SixdPlaces(tree_of(store.contract((0,))))
-    reports: dict[str, Report] = {}
-    for name, model in models.items():
-        told(name)
-        report: Report = {}
-        for seconds in SECONDS:
-            frames = round(seconds * model.fps)
-            windows = list(_windows(model, store, frames))
-            if not windows:
-                raise DataError(f"no test trial is long enough for a gap of {seconds:g} s")
-            systems: dict[str, Fill] = {"": model.frames_between, **_floors()}
-            report[f"gap_{seconds:g}"] = _figures(joints, systems, windows, model.fps)
-        reports[name] = report
-    return reports
+    for seconds in SECONDS:
+        windows = list(_windows(model, store, round(seconds * model.fps)))
+        if not windows:
+            raise DataError(f"no test trial is long enough for a gap of {seconds:g} s")
+        systems: dict[str, Fill] = {"": model.frames_between, **FLOORS}
+        yield {f"gap_{seconds:g}": _figures(joints, systems, windows, model.fps)}
 
 
 def _windows(model: FillModel, store: Store, frames: int) -> Iterator[Window]:
@@ -89,14 +89,6 @@ def _windows(model: FillModel, store: Store, frames: int) -> Iterator[Window]:
             yield Window(placed[start - context : start], placed[start:stop], placed[stop : stop + context])
 
 
-def _floors() -> dict[str, Fill]:
-    return {"hermite": bridge, "interpolation": straight, "standing": _standing}
-
-
-def _standing(past: Array, after: Array, count: int) -> Array:
-    return np.repeat(past[-1:], count, axis=0)
-
-
 def _figures(joints: SixdPlaces, systems: Mapping[str, Fill], windows: list[Window], fps: float) -> dict[str, float]:
     true = _places(joints, windows, [one.truth for one in windows])
     feet = true[:, :, FEET]
@@ -105,8 +97,8 @@ def _figures(joints: SixdPlaces, systems: Mapping[str, Fill], windows: list[Wind
     ways = np.array([np.linalg.norm((one.after[0] - one.past[-1])[[0, 2]]) for one in windows])
     going = ways * fps / (len(windows[0].truth) + 1) > GOING
     found: dict[str, float] = {
-        "gaps": len(windows),
-        "gaps_going": int(going.sum()),
+        "gaps": float(len(windows)),
+        "gaps_going": float(going.sum()),
         "jerk_recorded": _jerk(true) * fps**3,
     }
     for name, fill in systems.items():
@@ -143,41 +135,3 @@ def _slide(places: Array, stands: NDArray[np.bool_], fps: float) -> float:
 def _jerk(places: Array) -> float:
     """The mean length of the third difference of joints, metres per frame cubed."""
     return float(np.linalg.norm(np.diff(places, n=3, axis=1), axis=-1).mean())
-
-
-def fill_text(reports: Mapping[str, Report]) -> str:
-    """The figures as a table for each measure."""
-    titles = {
-        "cm": "joints' mean error, cm",
-        "cm_going": f"the same, where the hips go {GOING:g} m/s and more",
-        "slide": "speed of feet that stand, cm/s",
-        "jerk": "jerk over recorded",
-    }
-    first = next(iter(reports.values()))
-    rows = [["gap", *(f"{seconds:g} s" for seconds in SECONDS)]]
-    for title, key in (("gaps measured", "gaps"), ("of them where the hips go", "gaps_going")):
-        rows.append([title, *(f"{first[_key(seconds)][key]:.0f}" for seconds in SECONDS)])
-    for measure, title in titles.items():
-        rows.append([title])
-        rows += [_row(name, report, measure) for name, report in reports.items()]
-        rows += [_row(title, first, f"{measure}_{name}") for name, title in FLOORS.items()]
-        if measure == "slide":
-            rows.append(_row("recorded", first, "slide_recorded"))
-    rows.append(["over interpolation's error"])
-    rows += [[*_row(name, report, "of_interpolation"), _goal(report)] for name, report in reports.items()]
-    rows.append(["the same, where the hips go"])
-    rows += [_row(name, report, "of_interpolation_going") for name, report in reports.items()]
-    return aligned(rows)
-
-
-def _row(name: str, report: Report, key: str) -> list[str]:
-    return [name, *(f"{report[_key(seconds)][key]:.2f}" for seconds in SECONDS)]
-
-
-def _goal(report: Report) -> str:
-    reached = report[_key(1.0)]["of_interpolation"] <= GOAL
-    return f"goal at 1 s: <= {GOAL:g}" + ("" if reached else "  NOT REACHED")
-
-
-def _key(seconds: float) -> str:
-    return f"gap_{seconds:g}"

@@ -1,6 +1,6 @@
 """All figures of a describe or generate model in one nested object with stable keys, and the goals of those we ship."""
 
-from collections.abc import Callable
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 
 import numpy as np
@@ -19,10 +19,7 @@ from motet_train.evaluate.language.motions import measures, quiet_energy
 from motet_train.evaluate.language.prompts import kinds, measurable, prompted, recognised, thresholds
 from motet_train.evaluate.language.split_store import SplitStore, unknown_words_allowed
 from motet_train.evaluate.language.timelines import timeline_figures
-from motet_train.evaluate.tables import Goals, Report
-
-Told = Callable[[str], object]
-"""What is told the name of each part before it starts."""
+from motet_train.evaluate.tables import Goals, Report, gathered
 
 GOALS: Goals = {
     "gain.nearest": (0.10, None),
@@ -48,7 +45,7 @@ LENGTHS = (1, 2, 3, 4)
 TRAINING = ("seconds", "epochs", "kept_epoch", "loss", "validation", "steps_per_second")
 
 
-def describe_report(model: DescribeModel, corpus: SplitStore, progress: Told = lambda group: None) -> Report:
+def describe_report(model: DescribeModel, corpus: SplitStore) -> Report:
     """Table 2, with and without SOS and EOS; floors and ceiling; what the best description of test motions gets right.
 
     "confidence" and "timeline" are of validation motions, as the constants behind them were chosen on these.
@@ -58,39 +55,33 @@ def describe_report(model: DescribeModel, corpus: SplitStore, progress: Told = l
     by the same references, and beside it that of copying what was said about the nearest training motion.
     A figure that does not exist is NaN.
     """
-    report = origin(model.manifest, corpus)
-    test = corpus.described(corpus.parts.test)
+    return origin(model.manifest, corpus) | gathered(_described(model, corpus), model.manifest.name)
+
+
+def _described(model: DescribeModel, corpus: SplitStore) -> Iterator[Report]:
+    test, found = corpus.described(corpus.parts.test), dict[str, list[list[str]]]()
     references = corpus.references(test)
-    found: dict[str, list[list[str]]] = {}
     for part, records in (("train", corpus.described(corpus.parts.train, SAMPLE)), ("test", test)):
-        progress(f"describe {part}")
-        found[part] = hypotheses(model, corpus, records)
+        found[part] = [[one.text for one in row] for row in model.describe(corpus.motions(records), RANKS)]
         said = corpus.references(records)
-        report[f"bleu_{part}"] = ranks(found[part], said)
-        report[f"bleu_{part}_marked"] = ranks(found[part], said, marks=True)
-    progress("floors")
+        yield {f"bleu_{part}": ranks(found[part], said), f"bleu_{part}_marked": ranks(found[part], said, marks=True)}
     copied = nearest_said(corpus, test)
-    report |= _unseen(found["test"], copied, corpus, test)
-    report["floor"] = _floors(corpus, copied, references)
-    best = report["bleu_test"]["1"]
-    report["gain"] = {key: best - report["floor"][key] for key in ("nearest", "frequent")}
-    report["words"] = _words([row[0] for row in found["test"]], references)
-    progress("likelihood")
-    report["likelihood"] = {"test": _log_probability(model, corpus, test)}
-    progress("timelines")
-    validation = [record for record in corpus.parts.validation if corpus.sentences(record)]
-    if validation:
-        report["confidence"] = confidence(model, corpus, validation)
-        report["timeline"] = timeline_figures(model, corpus, validation)
-    return report
+    yield _unseen(found["test"], copied, corpus, test)
+    best = [row[0] for row in found["test"]]
+    floors = {
+        "nearest": copied_bleu(copied, references),
+        "frequent": frequent_bleu(corpus, references),
+        "human": agreement(references),
+    }
+    own = bleu(best, references)
+    yield {"floor": floors, "gain": {key: own - floors[key] for key in ("nearest", "frequent")}}
+    yield {"words": _words(best, references), "likelihood": {"test": _log_probability(model, corpus, test)}}
+    if validation := [record for record in corpus.parts.validation if corpus.sentences(record)]:
+        yield {"confidence": confidence(model, corpus, validation)}
+        yield {"timeline": timeline_figures(model, corpus, validation)}
 
 
-def generate_report(
-    model: GenerateModel,
-    corpus: SplitStore,
-    describe: DescribeModel | None = None,
-    progress: Told = lambda group: None,
-) -> Report:
+def generate_report(model: GenerateModel, corpus: SplitStore, describe: DescribeModel | None = None) -> Report:
     """Tables 3 and 4 between their bounds; prompts; measures of generated motions beside the data's.
 
     "motion" is measured on the likeliest motion for each test sentence, "motion_data" on the motions they are about.
@@ -98,33 +89,24 @@ def generate_report(
     describe: the model that closes the chain, trained on the same part of the corpus; without it the tables are left
         out. Relative performance is chained BLEU over its first training BLEU, as in the paper (there .387).
     """
-    report = origin(model.manifest, corpus)
+    return origin(model.manifest, corpus) | gathered(_generated(model, corpus, describe), model.manifest.name)
+
+
+def _generated(model: GenerateModel, corpus: SplitStore, describe: DescribeModel | None) -> Iterator[Report]:
     test = corpus.described(corpus.parts.test)
-    progress("generate test")
     found = answers(model, corpus, test)
     if describe is not None:
-        report |= _chain(model, describe, corpus, found, progress)
-    progress("prompts")
+        yield _chain(model, describe, corpus, found)
     known = kinds(corpus)
     limits, quiet = thresholds(known), quiet_energy(corpus.motions(corpus.parts.train), corpus.contract)
-    report["threshold"] = {
-        "quiet": quiet,
-        **{key: value for key, value in asdict(limits).items() if np.isfinite(value)},
-    }
+    kept = {key: value for key, value in asdict(limits).items() if np.isfinite(value)}
+    yield {"threshold": {"quiet": quiet, **kept}}
     if measurable(limits):
-        report["asked"], report["asked_data"] = prompted(model, limits), recognised(known, limits)
-    progress("motions")
-    report["motion"] = measures(found.best, corpus.contract, quiet)
-    report["motion_data"] = measures(corpus.motions(found.records), corpus.contract, quiet)
-    progress("likelihood")
+        yield {"asked": prompted(model, limits), "asked_data": recognised(known, limits)}
+    motions = {"motion": found.best, "motion_data": corpus.motions(found.records)}
+    yield {key: measures(shown, corpus.contract, quiet) for key, shown in motions.items()}
     parts = {"train": corpus.described(corpus.parts.train, CHAIN_SAMPLE), "test": test}
-    report["likelihood"] = {part: likelihood(model, corpus, records) for part, records in parts.items()}
-    return report
-
-
-def hypotheses(model: DescribeModel, corpus: SplitStore, records: tuple[int, ...]) -> list[list[str]]:
-    """Five ranked descriptions of each record's motion."""
-    return [[found.text for found in row] for row in model.describe(corpus.motions(records), RANKS)]
+    yield {"likelihood": {part: likelihood(model, corpus, records) for part, records in parts.items()}}
 
 
 def origin(manifest: Manifest, corpus: SplitStore) -> Report:
@@ -163,14 +145,6 @@ def _unseen(hypotheses: list[list[str]], copied: References, corpus: SplitStore,
     return {"wording": counts, "bleu_unseen": ranks(found, references), "unseen": by_length | floor}
 
 
-def _floors(corpus: SplitStore, copied: References, references: References) -> dict[str, float]:
-    return {
-        "nearest": copied_bleu(copied, references),
-        "frequent": frequent_bleu(corpus, references),
-        "human": agreement(references),
-    }
-
-
 def _words(texts: list[str], references: References) -> dict[str, float]:
     """Shares that are right, and of how many."""
     scores: dict[str, Score] = {
@@ -197,23 +171,18 @@ def _log_probability(model: DescribeModel, corpus: SplitStore, records: tuple[in
     return total / count if count else np.nan
 
 
-def _chain(model: GenerateModel, describe: DescribeModel, corpus: SplitStore, found: Answers, progress: Told) -> Report:
-    progress("describe train")
+def _chain(model: GenerateModel, describe: DescribeModel, corpus: SplitStore, found: Answers) -> Report:
     train = corpus.described(corpus.parts.train, SAMPLE)
     base = bleu(best_descriptions(describe, corpus.motions(train)), corpus.references(train))
-    progress("chain train")
     some = answers(model, corpus, corpus.described(corpus.parts.train, CHAIN_SAMPLE))
-    rows = {"train": chained(describe, some, corpus)}
-    progress("chain test")
-    rows["test"] = chained(describe, found, corpus)
+    rows = {"train": chained(describe, some, corpus), "test": chained(describe, found, corpus)}
     bounds = bounds_chained(describe, found, corpus)
-    report = {f"chain_{part}": row for part, row in rows.items()}
-    for part, row in rows.items():
-        report[f"relative_{part}"] = {rank: _ratio(value, base) for rank, value in row.items()}
-    relative = {f"{key}_relative": _ratio(value, base) for key, value in bounds.items()}
-    report["bound"] = {"describe_train": base, **bounds, **relative}
-    return report
 
+    def relative(row: Mapping[str, float], ending: str = "") -> dict[str, float]:
+        return {f"{key}{ending}": value / base if base else np.nan for key, value in row.items()}
 
-def _ratio(value: float, base: float) -> float:
-    return value / base if base else np.nan
+    return {
+        **{f"chain_{part}": row for part, row in rows.items()},
+        **{f"relative_{part}": relative(row) for part, row in rows.items()},
+        "bound": {"describe_train": base, **bounds, **relative(bounds, "_relative")},
+    }

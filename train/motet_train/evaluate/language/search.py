@@ -1,11 +1,12 @@
 """How well a model finds: motions by sentences that no training saw, and motions by motions."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.distance import cdist
 
 from motet.models.describe import DescribeModel
 from motet.models.index import Index, Member
@@ -16,9 +17,9 @@ from motet.motion.rotations import Array
 from motet_train.data.alike import alike
 from motet_train.evaluate.language.floors import retrieved
 from motet_train.evaluate.language.looks import Looks
-from motet_train.evaluate.language.report import Told, origin
+from motet_train.evaluate.language.report import origin
 from motet_train.evaluate.language.split_store import SplitStore, unknown_words_allowed
-from motet_train.evaluate.tables import Goals, Report
+from motet_train.evaluate.tables import Goals, Report, gathered
 
 GOALS: Goals = {"text.first_5": (0.8, None)}
 
@@ -29,9 +30,7 @@ Order = NDArray[np.intp]
 """For each question (Q, N) the things that were searched, best first."""
 
 
-def search_report(
-    model: SearchModel, corpus: SplitStore, describe: DescribeModel | None = None, progress: Told = lambda group: None
-) -> Report:
+def search_report(model: SearchModel, corpus: SplitStore, describe: DescribeModel | None = None) -> Report:
     """Ranks of test motions, asked for by sentences, and nearest training motions of test motions; beside floors.
 
     "asked": how many sentences there are, the share of them that are about what a training motion shows ("known"), and
@@ -42,19 +41,20 @@ def search_report(
     are nearest to it. "likelihood_": by a describe model of the same split, where one is given. "motion": the share of
     test motions whose nearest training motion is one of which the same was said, of those ("of") that have any.
     """
+    return origin(model.manifest, corpus) | gathered(_found(model, corpus, describe), model.manifest.name)
+
+
+def _found(model: SearchModel, corpus: SplitStore, describe: DescribeModel | None) -> Iterator[Report]:
     asked, looks = _Asked(corpus), Looks(corpus)
-    report: Report = {**origin(model.manifest, corpus), "asked": asked.told()}
-    progress("sentences")
+    yield {"asked": asked.told()}
     with unknown_words_allowed():
         index = _index(model, corpus, corpus.parts.test)
-        report |= asked.measured("", np.array([_order(index, sentence) for sentence in asked.sentences]))
-    progress("floors")
-    report |= asked.measured("words_", _by_words(looks, asked.sentences))
+        found = np.array([_order(index, sentence) for sentence in asked.sentences])
+    yield asked.measured("", found)
+    yield asked.measured("words_", _by_words(looks, asked.sentences))
     if describe is not None:
-        progress("likelihood")
-        report |= asked.measured("likelihood_", _by_likelihood(describe, corpus, asked.sentences))
-    progress("motions")
-    return {**report, "motion": _motions(model, looks, asked.groups)}
+        yield asked.measured("likelihood_", _by_likelihood(describe, corpus, asked.sentences))
+    yield {"motion": _motions(model, looks, asked.groups)}
 
 
 class _Asked:
@@ -115,7 +115,7 @@ def _order(index: Index, query: str | Motion) -> list[int]:
 
 def _by_words(looks: Looks, sentences: Sequence[str]) -> Order:
     looked_up = _features(looks, retrieved(looks.corpus, sentences))
-    return _distances(looked_up, _features(looks, looks.corpus.parts.test)).argsort(axis=1, kind="stable")
+    return cdist(looked_up, _features(looks, looks.corpus.parts.test)).argsort(axis=1, kind="stable")
 
 
 def _by_likelihood(describe: DescribeModel, corpus: SplitStore, sentences: Sequence[str]) -> Order:
@@ -131,7 +131,7 @@ def _motions(model: SearchModel, looks: Looks, groups: NDArray[np.int64]) -> dic
     known = np.isin(groups[test], groups[train])
     index = _index(model, corpus, corpus.parts.train)
     by_model = [int(index.search(motion, 1)[0].path.name) for motion in corpus.motions(test.tolist())]
-    by_features = _distances(_features(looks, test.tolist()), _features(looks, train.tolist())).argmin(axis=1)
+    by_features = cdist(_features(looks, test.tolist()), _features(looks, train.tolist())).argmin(axis=1)
     right = {
         "alike": groups[train[by_model]] == groups[test],
         "features_alike": groups[train[by_features]] == groups[test],
@@ -142,9 +142,3 @@ def _motions(model: SearchModel, looks: Looks, groups: NDArray[np.int64]) -> dic
 
 def _features(looks: Looks, records: Sequence[int]) -> Array:
     return looks.features(looks.corpus.motions(records))
-
-
-def _distances(some: Array, others: Array) -> Array:
-    """Squared distances (M, N) of points (M, D) and (N, D)."""
-    found: Array = ((some[:, None] - others) ** 2).sum(axis=-1)
-    return found

@@ -1,18 +1,18 @@
 """What is predicted for half a minute: whether who walked walks on, as fast, as lively, and on feet that stand.
 
 It is asked of recordings, held out in training of predictor and writer, whose end **goes**: in no half second of their
-last GIVEN seconds the root's mean speed over the ground is under SLOWEST; those from RUNNING on are runs, the others
-walks. The whole recording is given. What follows is measured over SPANS of seconds:
+last two the root's mean speed over the ground is under .5 m/s; those from 2 m/s on are runs, the others walks. The
+whole recording is given. What follows is measured over :data:`SPANS`:
 
-speed: the root's mean speed over the ground, relative to that of the given motion's last GIVEN seconds.
+speed: the root's mean speed over the ground, relative to that of the given motion's last two seconds.
+kept: the share of motions whose speed is within 15 % of that.
 energy: the mean speed of all joints as seen from the root, relative to the same.
 slide: how far the balls of the feet slide in a stance (:mod:`motet_train.evaluate.feet`), centimetres.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from pathlib import Path
 
 import numpy as np
 from tqdm import tqdm
@@ -25,41 +25,20 @@ from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet_train.evaluate.feet import slide, stances
-from motet_train.evaluate.tables import Report, aligned
+from motet_train.evaluate.tables import Report, aligned, short_names
 from motet_train.evaluate.text_adherence.measures import BALLS
 
 GIVEN = 2.0
 """Seconds of a recording's end by which its pace is known; or all of it, where it is shorter."""
 
-SLOWEST, RUNNING, LEAST = 0.5, 2.0, 1.0
-"""m/s; m/s; and seconds that a recording takes at least."""
-
 SPANS = ((0, 1), (1, 5), (5, 30))
 """Seconds after the recording's end."""
 
-NEAR = 0.15
-"""The speed is kept where it is within so much of what it was."""
-
-SAMPLES = 3
-"""Futures that are compared."""
-
-RECORDED, STILL, ALONE, BEYOND = "recorded", "still", "alone", "beyond"
-"""The recordings themselves, standing still, the predictor alone, and with what goes on beyond its horizon."""
-
-TITLES = {
-    RECORDED: "the recordings",
-    STILL: "standing still",
-    ALONE: "{name}, alone",
-    BEYOND: "{name}, then the writer",
-}
-
-SHOWN = (("speed", ".2f"), ("kept", "4.0%"), ("energy", ".2f"), ("slide_cm", "4.1f"))
-"""Figures of the table, and how they are written."""
-
-APART = ("place", "pose")
+SYSTEMS = {"still": "standing still", "alone": "{name}, alone", "beyond": "{name}, then the writer"}
+"""Standing still, the predictor alone, and with what continues beyond its horizon; and what tables call them."""
 
 Figures = dict[str, Report]
-"""Group of recordings -> system -> its figures, see :func:`figures`; "samples" is among the systems."""
+"""Group of recordings -> system -> its figures, see :func:`figures`; "recorded" and "samples" are among the systems."""
 
 
 @dataclass(frozen=True)
@@ -91,25 +70,20 @@ class Seen:
         moved = np.diff(self.points - self.points[:, :1], axis=0)
         return float(np.linalg.norm(moved, axis=-1).mean() * self.fps)
 
-    @property
-    def stances(self) -> list[Array]:
-        """Where the balls of the feet are in each of their stances."""
-        return stances(self.points[:, BALLS], self.points[:, 0], self.fps)
-
     def last(self, seconds: float) -> "Seen":
         """The last seconds."""
         return Seen(self.points[-round(seconds * self.fps) - 1 :], self.fps)
 
 
 def gait(seen: Seen) -> str | None:
-    """ "walks" or "runs" for a recording whose end goes, else None."""
+    """ "walks" or "runs" for a recording of a second at least whose end goes, else None."""
     paces = seen.last(GIVEN).paces
-    if len(paces) < round(LEAST * seen.fps) - 1:
+    if len(paces) < round(seen.fps) - 1:
         return None
-    halves = np.array_split(paces, max(1, round(len(paces) / seen.fps / 0.5)))
-    if min(half.mean() for half in halves) < SLOWEST:
+    halves = np.array_split(paces, max(1, round(2 * len(paces) / seen.fps)))
+    if min(half.mean() for half in halves) < 0.5:
         return None
-    return "runs" if paces.mean() >= RUNNING else "walks"
+    return "runs" if paces.mean() >= 2.0 else "walks"
 
 
 def going(trials: Mapping[str, Motion], writer: CodesModel) -> dict[str, dict[str, Motion]]:
@@ -119,13 +93,9 @@ def going(trials: Mapping[str, Motion], writer: CodesModel) -> dict[str, dict[st
     """
     divided = writer.manifest.training.get("split", {})
     unseen = {name.partition(".")[0] for name in divided.get("test", ())}
-    found: dict[str, dict[str, Motion]] = {"walks": {}, "runs": {}}
-    for name, motion in trials.items():
-        if not unseen or name.partition(".")[0] in unseen:
-            kind = gait(Seen.of(motion))
-            if kind is not None:
-                found[kind][name] = motion
-    return found
+    asked = {name: motion for name, motion in trials.items() if not unseen or name.partition(".")[0] in unseen}
+    kinds = {name: gait(Seen.of(motion)) for name, motion in asked.items()}
+    return {kind: {name: asked[name] for name in asked if kinds[name] == kind} for kind in ("walks", "runs")}
 
 
 def measured(model: PredictModel, writer: CodesModel, trials: Mapping[str, Motion]) -> Figures:
@@ -138,21 +108,19 @@ def measured(model: PredictModel, writer: CodesModel, trials: Mapping[str, Motio
 
 
 def _group(model: PredictModel, writer: CodesModel, motions: Sequence[Motion]) -> Report:
-    found: dict[str, list[tuple[Seen, Seen]]] = {STILL: [], ALONE: [], BEYOND: []}
-    apart, seconds = list[Report](), SPANS[-1][1]
+    found: dict[str, list[tuple[Seen, Seen]]] = {system: [] for system in SYSTEMS}
+    samples, count = list[dict[str, float]](), round(SPANS[-1][1] * model.fps)
     for motion in tqdm(motions, unit=" motions", disable=None, leave=False):
         whole = motion.resample(model.fps, to_end=True)
-        given, count = Seen.of(whole), round(seconds * model.fps)
-        alone, beyond = (model.predict(whole, frames=count, beyond=one) for one in (None, writer))
+        given = Seen.of(whole)
+        alone, beyond = (Seen.of(model.predict(whole, frames=count, beyond=one)).points for one in (None, writer))
         still = np.repeat(given.points[-1:], count, axis=0)
-        for system, points in ((STILL, still), (ALONE, Seen.of(alone).points), (BEYOND, Seen.of(beyond).points)):
+        for system, points in zip(SYSTEMS, (still, alone, beyond), strict=True):
             found[system].append((given, Seen(np.concatenate([given.points[-1:], points]), model.fps)))
-        apart.append(_apart(model, writer, whole))
-    recorded = [(given, given) for given, _ in found[STILL]]
-    report = {RECORDED: {"recordings": float(len(motions)), "slide_cm": _slide([given for given, _ in recorded])}}
-    report |= {system: figures(pairs) for system, pairs in found.items()}
-    report["samples"] = {key: float(np.mean([one["apart"][key] for one in apart])) for key in apart[0]["apart"]}
-    return report
+        samples.append(_apart(model, writer, whole))
+    recorded = {"recordings": float(len(motions)), "slide_cm": _slide(given for given, _ in found["still"])}
+    means = {key: float(np.mean([one[key] for one in samples])) for key in samples[0]}
+    return {"recorded": recorded, **{system: figures(pairs) for system, pairs in found.items()}, "samples": means}
 
 
 def figures(pairs: Sequence[tuple[Seen, Seen]]) -> dict[str, float]:
@@ -164,60 +132,60 @@ def figures(pairs: Sequence[tuple[Seen, Seen]]) -> dict[str, float]:
         speeds = np.array([part.paces.mean() / given.paces.mean() for given, part in parts])
         key = f"{start}_{stop}_s"
         found[f"speed_{key}"] = float(np.median(speeds))
-        found[f"kept_{key}"] = float(np.mean(np.abs(speeds - 1) <= NEAR))
+        found[f"kept_{key}"] = float(np.mean(np.abs(speeds - 1) <= 0.15))
         found[f"energy_{key}"] = float(np.median([part.energy / given.energy for given, part in parts]))
-        found[f"slide_cm_{key}"] = _slide([part for _, part in parts])
+        found[f"slide_cm_{key}"] = _slide(part for _, part in parts)
     return found
 
 
-def _slide(parts: Sequence[Seen]) -> float:
-    """The mean over all stances, centimetres; NaN without any."""
-    return 100 * slide(stance for part in parts for stance in part.stances)
+def _slide(parts: Iterable[Seen]) -> float:
+    """The mean over all stances of the balls of the feet, centimetres; NaN without any."""
+    stood = [stances(part.points[:, BALLS], part.points[:, 0], part.fps) for part in parts]
+    return 100 * slide(stance for places in stood for stance in places)
 
 
-def _apart(model: PredictModel, writer: CodesModel, motion: Motion) -> Report:
-    """How far apart joints of different futures are, centimetres, in the world and as seen from the root, at the end of
-    the first two spans."""
-    seconds = [stop for _, stop in SPANS[:2]]
-    frames = round(seconds[-1] * model.fps)
-    futures = [Seen.of(one).points for one in model.futures(motion, frames=frames, beyond=writer, samples=SAMPLES)]
+def _apart(model: PredictModel, writer: CodesModel, motion: Motion) -> dict[str, float]:
+    """How far apart joints of three futures are, centimetres, at the end of the first two spans: in the world ("place")
+    and as seen from the root ("pose")."""
+    frames = round(SPANS[1][1] * model.fps)
+    futures = [Seen.of(one).points for one in model.futures(motion, frames=frames, beyond=writer, samples=3)]
     found = {}
-    for stop in seconds:
+    for _, stop in SPANS[:2]:
         poses = [points[round(stop * model.fps) - 1] for points in futures]
-        for key, seen in zip(APART, (poses, [pose - pose[:1] for pose in poses]), strict=True):
+        for key, seen in (("place", poses), ("pose", [pose - pose[:1] for pose in poses])):
             far = [np.linalg.norm(one - other, axis=-1).mean() for one, other in combinations(seen, 2)]
             found[f"{key}_cm_{stop}_s"] = 100 * float(np.mean(far))
-    return {"apart": found}
+    return found
 
 
 def alive_table(found: Mapping[str, Figures]) -> str:
     """The figures of several models, by name, as text; "" where there are none."""
-    rows: list[tuple[str, ...]] = []
+    rows: list[Sequence[str]] = []
     for kind in dict.fromkeys(kind for figures in found.values() for kind in figures):
-        reports = {name: figures[kind] for name, figures in found.items() if kind in figures}
-        rows += [*([()] if rows else []), *_rows(kind, reports)]
-    return aligned([row or ("",) for row in rows])
+        shown = {name: figures[kind] for name, figures in found.items() if kind in figures}
+        rows += [[""]] if rows else []
+        rows += _rows(kind, dict(zip(short_names(list(shown)), shown.values(), strict=True)))
+    return aligned(rows)
 
 
-def _rows(kind: str, reports: Mapping[str, Report]) -> list[tuple[str, ...]]:
-    first = next(iter(reports.values()))
-    spans = ", ".join(f"{start}-{stop}" for start, stop in SPANS)
-    rows: list[tuple[str, ...]] = [
-        (f"{first[RECORDED]['recordings']:.0f} {kind} gone on with; after {spans} s",),
-        ("", "speed / given", f"within {NEAR:.0%}", "energy / given", "slide, cm"),
-        (f"  {TITLES[RECORDED]}", "", "", "", f"{first[RECORDED]['slide_cm']:.1f}"),
+def _rows(kind: str, reports: Mapping[str, Report]) -> list[Sequence[str]]:
+    written = {"speed": ".2f", "kept": "4.0%", "energy": ".2f", "slide_cm": "4.1f"}
+    spans = [f"{start}_{stop}_s" for start, stop in SPANS]
+    recorded = next(iter(reports.values()))["recorded"]
+    said = ", ".join(span.removesuffix("_s").replace("_", "-") for span in spans)
+    rows: list[Sequence[str]] = [
+        [f"{recorded['recordings']:.0f} {kind} continued; after {said} s"],
+        ["", "speed / given", "within 15%", "energy / given", "slide, cm"],
+        ["  the recordings", "", "", "", f"{recorded['slide_cm']:.1f}"],
     ]
+    for number, (name, report) in enumerate(reports.items()):
+        for system in list(SYSTEMS)[min(number, 1) :]:
+            cells = [
+                "  ".join(f"{report[system][f'{key}_{span}']:{how}}" for span in spans) for key, how in written.items()
+            ]
+            rows.append([f"  {SYSTEMS[system].format(name=name)}", *cells])
+    rows.append(["  joints of different futures apart, cm: in the world, seen from the root"])
     for name, report in reports.items():
-        for system in (STILL, ALONE, BEYOND) if report is first else (ALONE, BEYOND):
-            cells = [_spans(report[system], *one) for one in SHOWN]
-            rows.append((f"  {TITLES[system].format(name=Path(name).name)}", *cells))
-    for name, report in reports.items():
-        far = [", ".join(f"{report['samples'][f'{key}_cm_{stop}_s']:.0f}" for _, stop in SPANS[:2]) for key in APART]
-        ends = ", ".join(str(stop) for _, stop in SPANS[:2])
-        said = f"{far[0]} in the world, {far[1]} seen from the root"
-        rows.append((f"  {Path(name).name}: joints of different futures are apart after {ends} s, cm: {said}",))
+        far = [f"{report['samples'][f'{key}_cm_{stop}_s']:.0f}" for key in ("place", "pose") for _, stop in SPANS[:2]]
+        rows.append([f"  {name} after {SPANS[0][1]}, {SPANS[1][1]} s", "  ".join(far[:2]), "", "  ".join(far[2:]), ""])
     return rows
-
-
-def _spans(figures: Mapping[str, float], key: str, how: str) -> str:
-    return "  ".join(format(figures[f"{key}_{start}_{stop}_s"], how) for start, stop in SPANS)

@@ -1,4 +1,4 @@
-"""Error over time, and stick figures of predictions beside the truth (figures 4, 3 and 5 of Li et al. 2018)."""
+"""Errors of predictions over time (as figures 3 and 4 of Li et al. 2018)."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -7,12 +7,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from motet.motion.rotations import Array
-from motet.motion.skeleton import Skeleton
-from motet_train.evaluate.figures import SPACING, bones_of, in_profile, panels, stick_figures
+from motet_train.evaluate.figures import panels
 from motet_train.evaluate.predict.floors import CONSTANT, FLOORS
-
-WIDTH = 13
-"""Inches of a strip."""
 
 INSIDE = 4
 """Systems whose names have room in a panel."""
@@ -22,9 +18,6 @@ STYLES = ("-", "--", ":", "-.")
 
 GREYS = ("-", "--", ":", "-.", (0, (1, 3)))
 """Of the lines of floors."""
-
-TRUE, GIVEN, PREDICTED = "0.75", "tab:blue", "black"
-"""Colours of stick figures: what was, seed frames, what is predicted."""
 
 
 def error_over_time(errors: Mapping[str, Mapping[str, Array]], fps: float, unit: str) -> Figure:
@@ -62,21 +55,3 @@ def _looks(names: Sequence[str]) -> dict[str, dict[str, Any]]:
     greys = {name: {"color": "0.6", "linewidth": 1.8, "linestyle": GREYS[n]} for n, name in enumerate(floors)}
     looks = {name: {"color": f"C{n % 10}", "linestyle": STYLES[n // 10 % len(STYLES)]} for n, name in enumerate(others)}
     return {**greys, **looks}
-
-
-def strips_drawing(strips: Mapping[str, Array], skeleton: Skeleton, given: int = 0) -> Figure:
-    """Places of joints (K, J, 3) in profile, a strip below the other.
-
-    The first strip is the truth, which is drawn in grey behind the others too. given: how many poses of each are seed
-    frames, and blue.
-    """
-    truth, bones = next(iter(strips.values())), bones_of(skeleton)
-    height = 0.4 + 1.1 * WIDTH / (SPACING * (len(truth) + 1))
-    figure, axes = panels(len(strips), 1, (WIDTH, height * len(strips)))
-    for axis, (title, points) in zip(axes, strips.items(), strict=True):
-        if points is not truth:
-            stick_figures(axis, in_profile(truth, skeleton), bones, [TRUE] * len(truth))
-        colours = [GIVEN] * given + [PREDICTED] * (len(points) - given)
-        stick_figures(axis, in_profile(points, skeleton), bones, colours)
-        axis.set_title(title, loc="left")
-    return figure

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from motet.bundle.manifest import Manifest
 from motet.errors import MotionError
 from motet.models.text import RULES
 from motet.motion.motion import Motion
@@ -84,3 +85,10 @@ class LookUp:
         with the fewest different words, and where they are as many, of the first trial by name."""
         asked = frozenset(RULES.words(text))
         return max(self._known, key=lambda pair: (len(asked & pair[1]), -len(pair[1])))[0]
+
+
+def trained_on(manifest: Manifest, trials: Sequence[Trial]) -> set[str]:
+    """The names of the trials that are neither validation nor test motions of a model; all, where it does not say."""
+    split = manifest.training.get("split", {})
+    held_out = {name for part in ("validation", "test") for name in split.get(part, ())}
+    return {trial.name for trial in trials} - held_out

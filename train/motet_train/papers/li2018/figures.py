@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from functools import partial
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from motet.errors import MotionError
 from motet.formats import read_motion
@@ -19,13 +20,13 @@ from motet.motion.kinematics import skeleton_of
 from motet.motion.rotations import Array, axis_to_rotmat, rotvec_to_rotmat
 from motet.motion.skeleton import Skeleton
 from motet_train.data.cmu_trials import cmu_trial
-from motet_train.evaluate.figures import Drawings
-from motet_train.evaluate.predict.plots import error_over_time, strips_drawing
-from motet_train.evaluate.predict.seed_groups import drawn
+from motet_train.evaluate.figures import SPACING, Drawings, bones_of, in_profile, panels, stick_figures
+from motet_train.evaluate.predict.plots import error_over_time
 from motet_train.papers.li2018.expmap_files import CMU_LAYOUT, ExpmapCorpus
 from motet_train.papers.li2018.material import STRIDE
 from motet_train.papers.li2018.protocol import OUTPUT_FRAMES, SEED_FRAMES, predictor, windows
 from motet_train.papers.li2018.report import MANY, Results
+from motet_train.papers.li2018.seed_groups import drawn
 
 FRAMES_APART, SEED_POSES = 2, 4
 """Frames from one stick figure to the next, and stick figures of seed frames."""
@@ -91,3 +92,21 @@ def strips(
     found |= {name: np.concatenate([seed, predictor(name, m, corpus)(seed)], axis=1) for name, m in models.items()}
     shown = slice(SEED_FRAMES - SEED_POSES * FRAMES_APART, SEED_FRAMES + OUTPUT_FRAMES, FRAMES_APART)
     return {name: places(frames[0, shown], skeleton) for name, frames in found.items()}
+
+
+def strips_drawing(strips: Mapping[str, Array], skeleton: Skeleton, given: int = 0) -> Figure:
+    """Places of joints (K, J, 3) in profile, a strip below the other.
+
+    The first strip is the truth, which is drawn in grey behind the others too. given: how many poses of each are seed
+    frames, and blue.
+    """
+    truth, bones, width = next(iter(strips.values())), bones_of(skeleton), 13
+    height = 0.4 + 1.1 * width / (SPACING * (len(truth) + 1))
+    figure, axes = panels(len(strips), 1, (width, height * len(strips)))
+    for axis, (title, points) in zip(axes, strips.items(), strict=True):
+        if points is not truth:
+            stick_figures(axis, in_profile(truth, skeleton), bones, ["0.75"] * len(truth))
+        colours = ["tab:blue"] * given + ["black"] * (len(points) - given)
+        stick_figures(axis, in_profile(points, skeleton), bones, colours)
+        axis.set_title(title, loc="left")
+    return figure

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from motet.models.predict import PredictModel
 from motet.motion.rotations import Array, rotvec_to_rotmat
 from motet_train.data.errors import DataError
-from motet_train.evaluate.predict.error_rows import REPORTED
+from motet_train.evaluate.predict.frames import REPORTED
 from motet_train.papers.li2018.expmap_files import CONSTANT_STD, ROOT_COLUMNS, ExpmapCorpus, Scaling
 from motet_train.papers.li2018.material import STRIDE
 

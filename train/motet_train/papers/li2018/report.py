@@ -10,10 +10,10 @@ from tqdm import tqdm
 
 from motet.motion.rotations import Array
 from motet_train.data.errors import DataError
-from motet_train.evaluate.predict.costs import cost_table, harness_table
-from motet_train.evaluate.predict.error_rows import BRACKETS, REPORTED, ErrorRows
 from motet_train.evaluate.predict.floors import FLOORS
-from motet_train.evaluate.predict.seed_groups import Models, Ready, SeedGroup, mean, pooled, ready, seed_groups, spread
+from motet_train.evaluate.predict.frames import by_frame
+from motet_train.papers.li2018.costs import cost_table, harness_table
+from motet_train.papers.li2018.error_rows import BRACKETS, ErrorRows
 from motet_train.papers.li2018.expmap_files import ExpmapCorpus, Scaling, scaling_of
 from motet_train.papers.li2018.protocol import (
     LABELLED_MS,
@@ -25,6 +25,7 @@ from motet_train.papers.li2018.protocol import (
     true_times,
 )
 from motet_train.papers.li2018.published import AVERAGES, BY_ACTION, PREDICTOR_GOALS, PUBLISHED_FRAMES, Rows, mean_over
+from motet_train.papers.li2018.seed_groups import Models, Ready, SeedGroup, mean, pooled, ready, seed_groups, spread
 from motet_train.papers.li2018.text_floors import text_floors
 
 FEW, MANY, ANGLES = "windows_8", "windows_256", "rotation"
@@ -71,7 +72,7 @@ class Results:
         return "\n\n".join((protocol_table(self.grouped(), self.corpus, self.spreads()), *tables))
 
     def to_json(self) -> Ready:
-        """See :func:`motet_train.evaluate.predict.seed_groups.ready`."""
+        """See :func:`motet_train.papers.li2018.seed_groups.ready`."""
         figures = (partial(_nested, found) for found in (self.errors, self.grouped(), self.spreads()))
         return ready(self.models, self.groups, [name for name in self.errors if name in FLOORS], *figures)
 
@@ -151,6 +152,5 @@ def _nested(found: Errors, name: str) -> dict[str, Any]:
     """The errors of one system: "windows_8" and so on -> action, or "mean" -> "frame_1" and so on."""
     nested: dict[str, Any] = {}
     for (kind, action), error in found[name].items():
-        frames = {f"frame_{frame}": round(float(error[frame]), 6) for frame in REPORTED}
-        nested.setdefault(kind, {})[action] = frames
+        nested.setdefault(kind, {})[action] = by_frame(error)
     return nested

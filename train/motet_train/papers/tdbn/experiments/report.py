@@ -8,7 +8,7 @@ import numpy as np
 
 from motet.models.tdbn_control import TdbnModel
 from motet_train.data.errors import DataError
-from motet_train.evaluate.tables import Goals, Report, reached
+from motet_train.evaluate.tables import Goals, Report, gathered, reached
 from motet_train.papers.tdbn.body import BodyParts, body_parts
 from motet_train.papers.tdbn.clips import Clips
 from motet_train.papers.tdbn.experiments.bend import bends, interruptions
@@ -113,19 +113,18 @@ def missed_goals(study: ControlStudy, enough: int) -> list[str]:
     return missed
 
 
-def control_report(study: ControlStudy, progress: Callable[[str], None]) -> Report:
-    """Run all experiments; ``progress`` is called with the name of each group before it starts.
+def control_report(study: ControlStudy) -> Report:
+    """All experiments. "train" repeats what training measured.
 
-    "train" repeats what training measured. A figure that does not exist (a period of no loop) is NaN, a time that
-    never came infinite.
+    A figure that does not exist (a period of no loop) is NaN, a time that never came infinite.
     """
     training: Mapping[str, Any] = study.model.manifest.training
     report: Report = {"train": {key: float(training[key]) for key in ("seconds", "reconstruction") if key in training}}
-    for name, group in experiments(study).items():
-        progress(name)
-        figures = {by_label(study, key): value for run in group for key, value in run().items()}
-        report[by_label(study, name)] = figures
-    return report
+    parts = (
+        {by_label(study, name): {by_label(study, key): value for run in group for key, value in run().items()}}
+        for name, group in experiments(study).items()
+    )
+    return report | gathered(parts, study.model.manifest.name)
 
 
 def by_label(study: ControlStudy, name: str) -> str:

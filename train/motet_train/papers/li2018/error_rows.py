@@ -5,10 +5,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from motet.motion.rotations import Array
+from motet_train.evaluate.predict.frames import REPORTED
 from motet_train.evaluate.tables import aligned
-
-REPORTED = (1, 3, 7, 9, 13, 24)
-"""Output frames of which errors are reported, from 0: those of the protocol of Martinez et al. 2017."""
 
 ROOM = 6
 """Of a spread in brackets, with a space before it."""

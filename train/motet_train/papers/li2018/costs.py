@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from motet.models.predict import PredictModel
-from motet_train.evaluate.predict.seed_groups import SeedGroup
 from motet_train.evaluate.tables import aligned
+from motet_train.papers.li2018.seed_groups import SeedGroup
 
 AUGMENTATION = ("warp", "reverse", "mirror", "average")
 """What varies the windows (:class:`motet_train.data.windows.Windows`), and the running mean of the weights."""

@@ -1,0 +1,247 @@
+"""What ``motet evaluate`` measures: one record for each kind of model."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial, singledispatch
+from itertools import islice
+from pathlib import Path
+from typing import Any, cast
+
+import click
+
+from motet.models.base import BundleModel
+from motet.models.fill import FillModel
+from motet.models.generate import GenerateModel
+from motet.models.generate_codes import CodesModel
+from motet.models.language import LanguageModel
+from motet.models.load import load_as
+from motet.models.predict import PredictModel
+from motet.models.search import SearchModel
+from motet.models.steer import SteerModel
+from motet.models.tdbn_control import TdbnModel
+from motet_train.cli.train_predict import read_expmap_files
+from motet_train.data.errors import DataError
+from motet_train.data.store import Store
+from motet_train.evaluate.figures import Drawings, strips
+from motet_train.evaluate.fill.report import GOALS as FILL_GOALS
+from motet_train.evaluate.fill.report import fill_report
+from motet_train.evaluate.language.prompts import ASKED
+from motet_train.evaluate.language.report import GOALS as LANGUAGE_GOALS
+from motet_train.evaluate.language.report import describe_report, generate_report
+from motet_train.evaluate.language.search import GOALS as SEARCH_GOALS
+from motet_train.evaluate.language.search import search_report
+from motet_train.evaluate.language.split_store import SplitStore, split_as
+from motet_train.evaluate.predict import liveliness, mocap
+from motet_train.evaluate.predict.plots import error_over_time
+from motet_train.evaluate.steer.report import Recorded, steer_report, steer_text
+from motet_train.evaluate.tables import Goals, Report, json_ready, report_table
+from motet_train.evaluate.text_adherence.prompts import outside, prompts
+from motet_train.evaluate.text_adherence.table import Best, said_to_be_outside, says_drawings, says_table, says_text
+from motet_train.evaluate.text_adherence.trials import read_trials, trained_on
+from motet_train.papers.li2018.expmap_files import is_expmap
+from motet_train.papers.li2018.figures import drawings as protocol_drawings
+from motet_train.papers.li2018.report import protocol_results
+from motet_train.papers.plappert2017.figures import describe_drawings, generate_drawings
+from motet_train.papers.tdbn.clips import read_clips
+from motet_train.papers.tdbn.driven import Driven
+from motet_train.papers.tdbn.experiments.plots import drawings as control_drawings
+from motet_train.papers.tdbn.experiments.report import GOALS as CONTROL_GOALS
+from motet_train.papers.tdbn.experiments.report import control_report, study_of
+from motet_train.trainer import LOG
+
+
+@dataclass(frozen=True)
+class Given:
+    """What a command gives to measure with. data: where each model's is. unit: of files that do not state theirs.
+    search: the model in whose space motions and prompts are compared."""
+
+    data: Mapping[str, Path | None]
+    unit: str | None = None
+    search: SearchModel | None = None
+
+    @property
+    def first(self) -> Path:
+        """The first data that there is, on which all models are measured; of a suite that needs data."""
+        return next(found for found in self.data.values() if found is not None)
+
+    def store(self) -> Store:
+        """The store there; DataError where there is none."""
+        return Store.open(self.first)
+
+
+@dataclass(frozen=True)
+class Results:
+    """Figures of each model, ready for JSON; all of them as text; and pictures, by the folder that they go into."""
+
+    figures: dict[str, Any]
+    text: str
+    drawings: Callable[[], Mapping[str, Drawings]] | None = None
+
+    @staticmethod
+    def of(reports: Mapping[str, Report], goals: Goals) -> "Results":
+        """Those of reports, beside their goals."""
+        return Results(json_ready(reports), report_table(reports, goals))
+
+
+@dataclass(frozen=True)
+class Suite:
+    """What is measured of a kind of models, called ``what``; and the data that it takes, "" where it can do without."""
+
+    what: str
+    measure: Callable[[Mapping[str, Any], Given], Results]
+    data: str = "the store that they were trained on"
+    draws: bool = True
+
+
+@singledispatch
+def as_steered(_: BundleModel) -> SteerModel | None:
+    """What is measured as a figure that is steered: a model of them, or what stands for it; None for all others."""
+    return None
+
+
+@as_steered.register
+def _(model: SteerModel) -> SteerModel:
+    return model
+
+
+@as_steered.register
+def _(model: TdbnModel) -> SteerModel | None:
+    return cast(SteerModel, Driven(model)) if Driven.fits(model) else None
+
+
+def _steered(models: Mapping[str, BundleModel], given: Given) -> Results:
+    recorded = Recorded.of(given.store())
+    steered = {name: one for name, model in models.items() if (one := as_steered(model))}
+    reports = {name: steer_report(model, recorded) for name, model in steered.items()}
+    return Results(json_ready(reports), steer_text(reports))
+
+
+def _control(models: Mapping[str, TdbnModel], given: Given) -> Results:
+    studies = {name: study_of(model, read_clips(given.data[name], unit=given.unit)) for name, model in models.items()}
+    found = Results.of({name: control_report(study) for name, study in studies.items()}, CONTROL_GOALS)
+    return Results(found.figures, found.text, lambda: {name: control_drawings(one) for name, one in studies.items()})
+
+
+def _filled(models: Mapping[str, FillModel], given: Given) -> Results:
+    store = given.store()
+    return Results.of({name: fill_report(model, store) for name, model in models.items()}, FILL_GOALS)
+
+
+def _language(models: Mapping[str, LanguageModel], given: Given) -> Results:
+    """Others are compared with the first describe model that had the same split."""
+    store = given.store()
+    corpora = {name: split_as(model.manifest, store) for name, model in models.items()}
+    reports = {name: _language_report(name, models, corpora) for name in models}
+    found = Results.of(reports, {**LANGUAGE_GOALS, **SEARCH_GOALS})
+    for name in models:
+        if (other := _by_subject(models, name)) is not None:
+            found.figures[name]["people_unseen"] = json_ready(reports[other])
+    return Results(found.figures, found.text, lambda: _language_drawings(models, corpora))
+
+
+_REPORTS: Mapping[str, Callable[..., Report]] = {
+    "describe": lambda model, corpus, _: describe_report(model, corpus),
+    "generate": generate_report,
+    "search": search_report,
+}
+"""What measures a model of a verb: with its corpus, and the describe model of the same split."""
+
+
+def _language_report(name: str, models: Mapping[str, LanguageModel], corpora: Mapping[str, SplitStore]) -> Report:
+    model, corpus = models[name], corpora[name]
+    alike = (other for key, other in models.items() if corpora[key].parts == corpus.parts)
+    partner = next((other for other in alike if other.VERB == "describe"), None)
+    report = _REPORTS[model.VERB](model, corpus, partner)
+    if model.VERB == "generate" and partner is None:
+        click.echo(f"{name}: tables 3 and 4 need a describe model of the same split; they are left out", err=True)
+    lacking = [f"asked.{key}" for key in ASKED if key not in report.get("asked", {})]
+    if model.VERB == "generate" and lacking:
+        said = "training motions of that kind, or a root block, are missing"
+        click.echo(f"{name}: {', '.join(lacking)} cannot be measured: {said}", err=True)
+    return report
+
+
+def _by_subject(models: Mapping[str, LanguageModel], name: str) -> str | None:
+    """The model that shows how well this one would do with people never seen: the same verb, split by subject."""
+    by = {other: model.manifest.training["split"]["by"] for other, model in models.items()}
+    alike = (other for other, model in models.items() if model.VERB == models[name].VERB)
+    return next((other for other in alike if by[other] == "subject" and by[name] != "subject"), None)
+
+
+def _language_drawings(models: Mapping[str, LanguageModel], corpora: Mapping[str, SplitStore]) -> dict[str, Drawings]:
+    draw: dict[str, Callable[..., Drawings]] = {"describe": describe_drawings, "generate": generate_drawings}
+    logged = {name: Path(name) if (Path(name) / LOG).is_file() else None for name in models}
+    drawn = {name: model for name, model in models.items() if model.VERB in draw}
+    return {name: draw[model.VERB](model, corpora[name], logged[name]) for name, model in drawn.items()}
+
+
+def _predict(models: Mapping[str, PredictModel], given: Given) -> Results:
+    """By the protocol where its text files are given, else the joints' distances in trials that were held out."""
+    if not is_expmap(given.first):
+        return _in_mocap(models, given.store())
+    found = protocol_results(models, read_expmap_files(given.first))
+    return Results(json_ready(found.to_json()), found.text(), lambda: {"": protocol_drawings(found)})
+
+
+def _in_mocap(models: Mapping[str, PredictModel], store: Store) -> Results:
+    trials = mocap.held_out(models, store)
+    motions, fps = {entry.name: motion for entry, motion in trials.items()}, next(iter(models.values())).fps
+    found = mocap.measured(models, motions, mocap.chosen_decays(models, store))
+    reports = mocap.mocap_report(models, found, list(trials))
+    writer = load_as(CodesModel, "generate")
+    alive = {name: liveliness.measured(model, writer, motions) for name, model in models.items()}
+    text = "\n\n".join(part for part in (mocap.mocap_text(reports, fps), liveliness.alive_table(alive)) if part)
+    figures = json_ready({name: {**report, "alive": alive[name]} for name, report in reports.items()})
+
+    def drawings() -> dict[str, Drawings]:
+        every = {
+            title: {name: system[measure].mean(axis=0) for name, system in found.distances.items()}
+            for measure, title in mocap.TITLES.items()
+        }
+        drawn: dict[str, Any] = {"predict-distance": partial(error_over_time, every, fps, "cm")}
+        for name in islice(motions, 0, None, max(1, len(motions) // 3)):  # of about three trials
+            rows = mocap.shown(models, motions[name])
+            drawn[f"predict-{name}"] = partial(strips, list(rows.values()), list(rows), name)
+        return {"": drawn}
+
+    return Results(figures, text, drawings)
+
+
+def _says(models: Mapping[str, GenerateModel], given: Given) -> Results:
+    data = next(iter(given.data.values()))
+    trials = [] if data is None else list(read_trials(data, given.unit))
+    if data is not None and not trials:
+        raise DataError(f"{data} has no motion that can be used")
+    reports = {}
+    for name, model in models.items():
+        training = trained_on(model.manifest, trials)
+        reports[name] = says_table(Best(model), trials, training, search=given.search)
+        asked = {"outside": outside(), "prompts": [prompt.text for prompt in prompts()]}
+        reports[name]["said_outside"] = {key: said_to_be_outside(model, texts) for key, texts in asked.items()}
+    drawings = {name: says_drawings(Best(model)) for name, model in models.items()}
+    return Results(json_ready(reports), says_text(reports), lambda: drawings)
+
+
+SAYS = Suite("generate models", _says, data="")
+
+STEERED = Suite("figures that are steered", _steered, draws=False)
+
+_LANGUAGE = Suite("describe, generate and search models", _language)
+
+SUITES = {
+    "control": Suite("control models", _control, data=""),
+    "describe": _LANGUAGE,
+    "fill": Suite("models that fill gaps", _filled, draws=False),
+    "generate": _LANGUAGE,
+    "predict": Suite("predictors", _predict, "text files of the protocol, or the store they were trained on"),
+    "search": _LANGUAGE,
+}
+"""Verb -> what measures its models, but for figures that are steered."""
+
+
+def suite_of(models: Mapping[str, BundleModel]) -> Suite:
+    """What measures all of some models; UsageError where several would."""
+    first, *others = {SUITES[model.VERB] if as_steered(model) is None else STEERED for model in models.values()}
+    if others:
+        raise click.UsageError("evaluate control, fill, predict and language models separately: their data differ")
+    return first
