@@ -108,7 +108,7 @@ class Figure:
 class Humanoid:
     """A motion brought to the humanoid, and what was found on the way.
 
-    motion: on :data:`motet.motion.humanoid.bones.HUMANOID`, at the file's frame rate, root translation in metres.
+    motion: on :data:`motet.motion.HUMANOID`, at the file's frame rate, root translation in metres.
     joints: bone -> the names of the joints that it was taken from.
     convention: the convention of the joints' names, "by the tree", or the name of the user's map.
     confidence: from 0 to 1, how sure it is that every joint was taken for what it is.
