@@ -97,7 +97,7 @@ def ticks(page: Browser, count: int = 45) -> SimpleNamespace:
     """Where the steered figure is, and how its speed is, after so many ticks with what is pressed."""
     told = f"(() => {{ for (let n = 0; n < {count}; n++) motet.tick(motet.asked()); return motet.figures[0]; }})()"
     figure = page.value(told)
-    return SimpleNamespace(place=np.array(figure["root"][:2]), facing=figure["root"][2], going=figure["course"][:2])
+    return SimpleNamespace(place=np.array(figure["root"][:2]), facing=figure["root"][2], going=figure["spring"][:2])
 
 
 def test_keys_steer_the_figure(page: Browser) -> None:

@@ -74,12 +74,12 @@ def test_a_jump_is_not_seen_and_fades(matcher: Matcher) -> None:
 def test_the_desired_trajectory_is_where_the_springs_lead(matcher: Matcher) -> None:
     rng = np.random.default_rng(2)
     playback, target = Playback.at(0, 3, CODES), rng.normal(size=(3, 3))
-    playback.root, playback.course, playback.course_rate = rng.normal(size=(3, 3, 3))
+    playback.root, playback.spring, playback.spring_rate = rng.normal(size=(3, 3, 3))
     found = matcher.desired_trajectory(playback, target)
     dt, damping = 1e-4, [2 * np.log(2) / half for half in (SETTINGS.velocity, SETTINGS.facing)]
     for row in range(3):
-        *velocity, angle = playback.course[row]
-        *change, rate = playback.course_rate[row]
+        *velocity, angle = playback.spring[row]
+        *change, rate = playback.spring_rate[row]
         velocity, change, place, time = np.array(velocity), np.array(change), np.zeros(2), 0.0
         for number, ahead in enumerate(horizons(SETTINGS)):
             while time < ahead - dt / 2:

@@ -307,6 +307,6 @@ def test_the_last_rows_of_a_long_table_are_played_at_any_rate(model: SteerModel)
     playback = Playback.at(9000, 1, model.matcher.table.codes)
     playback.rate = np.array([0.8123])
     playback.ticks_to_search = np.array([100])
-    playback.course = np.array([[0.0, 0.0, 0.0]])
+    playback.spring = np.array([[0.0, 0.0, 0.0]])
     steering.tick(model.matcher, model.pose_codes, playback, np.zeros((1, 3)), np.zeros(1, np.int64))
     assert playback.row[0] + playback.part[0] == 9000.8123

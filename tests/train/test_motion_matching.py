@@ -154,7 +154,7 @@ def test_a_tick_plays_the_row_and_follows_the_springs(net: Matching, matcher: Ma
     def played(wanted: Array) -> tuple[Pose, Playback]:
         playback = Playback.at(at - 1, 1, matcher.table.codes)
         playback.ticks_to_search[:] = 9
-        playback.root, playback.course = np.array([[1.0, 2.0, facing]]), target
+        playback.root, playback.spring = np.array([[1.0, 2.0, facing]]), target
         return tick(matcher, poses, playback, wanted, gait), playback
 
     pose, playback = played(target)
@@ -163,7 +163,7 @@ def test_a_tick_plays_the_row_and_follows_the_springs(net: Matching, matcher: Ma
     np.testing.assert_allclose(pose.height, height, atol=1e-6)
     np.testing.assert_allclose(pose.contacts[0], rows.contacts[at], atol=1e-6)
     assert not playback.offset.any()
-    np.testing.assert_allclose(playback.course, target, atol=1e-12)  # asked for what it has
+    np.testing.assert_allclose(playback.spring, target, atol=1e-12)  # asked for what it has
     forward, left, _ = rows.moves[at] / 30
     moved = np.linalg.norm(pose.ground[0, :2] - [1, 2])
     assert moved == pytest.approx(np.hypot(forward, left), rel=0.05)
@@ -171,7 +171,7 @@ def test_a_tick_plays_the_row_and_follows_the_springs(net: Matching, matcher: Ma
     damping, dt = 2 * np.log(2) / matcher.settings.velocity, 1 / 30
     _, stopped = played(np.array([[0.0, 0.0, facing]]))
     left_over = np.exp(-damping * dt) * (1 + damping * dt)
-    np.testing.assert_allclose(stopped.course[0, :2], target[0, :2] * left_over)
+    np.testing.assert_allclose(stopped.spring[0, :2], target[0, :2] * left_over)
 
 
 def test_a_net_is_built_from_its_manifest(net: Matching) -> None:

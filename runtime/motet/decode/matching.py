@@ -159,7 +159,7 @@ class Matcher:
         """Where the springs lead: features (B, TRAJECTORY), not yet scaled."""
         how, facing = self.settings, playback.root[:, 2]
         cos, sin = np.cos(facing), np.sin(facing)
-        off, rate = playback.course - target, playback.course_rate
+        off, rate = playback.spring - target, playback.spring_rate
         travel, turns = (off[:, :2], rate[:, :2]), (wrapped(off[:, 2]), rate[:, 2])
         slow, calm = damping_of(how.velocity), damping_of(how.facing)
         places, facings, times = [], [], horizons(how)

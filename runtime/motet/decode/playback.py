@@ -16,7 +16,7 @@ class Playback:
 
     row, part: (B,) the row that is played, and the part of the way to the next one. mirror: (B,) 1 for the mirror image
     of the row, else 0. rate: (B,) rows that are played in the next tick. ticks_to_search: (B,).
-    root: (B, 3) x, z in metres and facing in radians. course, course_rate: (B, 3) the springs that approach the target:
+    root: (B, 3) x, z in metres and facing in radians. spring, spring_rate: (B, 3) the springs that approach the target:
     velocity along x and z in m/s and facing in radians, and how fast they change. offset, offset_rate: (B, K) the
     inertialization offset of the codes, and how fast it changes.
     """
@@ -27,8 +27,8 @@ class Playback:
     rate: Array
     ticks_to_search: Rows
     root: Array
-    course: Array
-    course_rate: Array
+    spring: Array
+    spring_rate: Array
     offset: Array
     offset_rate: Array
 

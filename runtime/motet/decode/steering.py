@@ -39,21 +39,21 @@ def tick(matcher: Matcher, poses: PoseCodes, playback: Playback, target: Array, 
 
 def _approach(playback: Playback, target: Array, how: SteeringSettings, dt: float) -> None:
     """The springs of velocity and facing, a tick later."""
-    off = playback.course - target
+    off = playback.spring - target
     off[:, 2] = wrapped(off[:, 2])
     damping = np.array([damping_of(how.velocity)] * 2 + [damping_of(how.facing)])
-    off, playback.course_rate = damped(off, playback.course_rate, damping, dt)
-    playback.course = target + off
+    off, playback.spring_rate = damped(off, playback.spring_rate, damping, dt)
+    playback.spring = target + off
 
 
 def _moved(playback: Playback, moves: Array, recorded: Array, how: SteeringSettings, dt: float) -> tuple[Array, Array]:
     """The next root (B, 3) and playback rate (B,), of recorded moves (3, B) forward, left and turn, and speeds (B,)."""
     x, z, facing = playback.root.T
-    velocity, rate = playback.course[:, :2].T, playback.rate
+    velocity, rate = playback.spring[:, :2].T, playback.rate
     pace = np.hypot(*velocity)
     moving, ratio = np.minimum(recorded, pace) > how.idle, pace / np.maximum(recorded, how.idle)
     forward, left, turn = moves * (rate * dt)
-    error = wrapped(playback.course[:, 2] - facing)
+    error = wrapped(playback.spring[:, 2] - facing)
     most = (how.turn_still + how.turn_moving * np.minimum(pace, how.turn_speed)) * dt + how.turn_turning * np.abs(turn)
     turned = wrapped(facing + turn + (error * (1 - 0.5 ** (dt / how.turn))).clip(-most, most))
     stride = np.where(moving, (ratio / rate).clip(how.shortest, how.longest), 1)

@@ -108,7 +108,7 @@ function standing(net, [x, z, facing] = [0, 0, 0], n = 0) {
   const nothing = () => new Float64Array(net.codeSigns.length);
   return {
     row: net.still, part: 0, mirror: 0, rate: 1, ticksToSearch: n % net.steering.search_every,
-    root: [x, z, facing], course: [0, 0, facing], courseRate: [0, 0, 0], offset: nothing(), offsetRate: nothing(),
+    root: [x, z, facing], spring: [0, 0, facing], springRate: [0, 0, 0], offset: nothing(), offsetRate: nothing(),
     target: { x: 0, z: 0, facing, gait: 0 }, shift: [[0, 0], [0, 0]], drift: [[0, 0], [0, 0]], soles: null,
   };
 }
@@ -153,17 +153,17 @@ const rowOf = (net, row) => net.features.subarray(row * net.count, (row + 1) * n
 const mirrored = (net, features) => net.columns.map((column, i) => features[column] * net.signs[i]);
 
 /** Where the springs lead at each of the horizons, as features that are not yet scaled. */
-function desiredTrajectory(net, { root, course, courseRate, target }) {
+function desiredTrajectory(net, { root, spring, springRate, target }) {
   const { velocity, facing: halfLife, half_speed } = net.steering, facing = root[2];
   const cos = Math.cos(facing), sin = Math.sin(facing), wanted = [target.x, target.z];
-  const turned = wrapped(course[2] - target.facing), places = [], facings = [];
+  const turned = wrapped(spring[2] - target.facing), places = [], facings = [];
   for (const time of net.horizons) {
-    const [x, z] = wanted.map((v, i) => v * time + dampedPath(course[i] - v, courseRate[i], velocity, time));
+    const [x, z] = wanted.map((v, i) => v * time + dampedPath(spring[i] - v, springRate[i], velocity, time));
     places.push(cos * x - sin * z, sin * x + cos * z);
-    const angle = target.facing + damped(turned, courseRate[2], halfLife, time)[0] - facing;
+    const angle = target.facing + damped(turned, springRate[2], halfLife, time)[0] - facing;
     facings.push(Math.sin(angle), Math.cos(angle));
   }
-  const soon = wanted.map((v, i) => v + damped(course[i] - v, courseRate[i], velocity, net.horizons[1])[0]);
+  const soon = wanted.map((v, i) => v + damped(spring[i] - v, springRate[i], velocity, net.horizons[1])[0]);
   const speed = Math.hypot(...soon);
   return [...places, ...facings, speed / (speed + half_speed)];
 }
@@ -234,12 +234,12 @@ function step(net, figure) {
   const how = net.steering, dt = 1 / net.fps, { codes } = codesAt(net, figure), side = figure.mirror ? -1 : 1;
   const [forward, left, turn, recorded, leftFoot, rightFoot] = movesAt(net, figure);
   approach(figure, how, dt);
-  const pace = Math.hypot(figure.course[0], figure.course[1]), { rate, root: [x, z, facing] } = figure;
+  const pace = Math.hypot(figure.spring[0], figure.spring[1]), { rate, root: [x, z, facing] } = figure;
   const moving = Math.min(recorded, pace) > how.idle, ratio = pace / Math.max(recorded, how.idle);
   const stride = rate * dt * (moving ? clamp(ratio / rate, how.shortest, how.longest) : 1);
-  const turning = turn * rate * dt * side, error = wrapped(figure.course[2] - facing);
+  const turning = turn * rate * dt * side, error = wrapped(figure.spring[2] - facing);
   const steps = inWorld(forward * stride, left * side * stride, facing);
-  const [stepX, stepZ] = moving ? veered(how, steps, figure.course) : steps;
+  const [stepX, stepZ] = moving ? veered(how, steps, figure.spring) : steps;
   figure.root = [x + stepX, z + stepZ, wrapped(facing + turning + corrected(how, dt, error, pace, turning))];
   figure.rate = moving ? clamp(ratio, how.slowest, how.fastest) : 1;
   for (let k = 0; k < codes.length; k++) {
@@ -257,13 +257,13 @@ function movesAt(net, { row, part }) {
 
 /** The springs of velocity and facing, a tick later. */
 function approach(figure, how, dt) {
-  const { target: { x, z, facing }, course, courseRate } = figure;
+  const { target: { x, z, facing }, spring, springRate } = figure;
   const next = [x, z, facing].map((wanted, i) => {
-    const off = course[i] - wanted, halfLife = i < 2 ? how.velocity : how.facing;
-    return damped(i < 2 ? off : wrapped(off), courseRate[i], halfLife, dt);
+    const off = spring[i] - wanted, halfLife = i < 2 ? how.velocity : how.facing;
+    return damped(i < 2 ? off : wrapped(off), springRate[i], halfLife, dt);
   });
-  figure.course = [x + next[0][0], z + next[1][0], facing + next[2][0]];
-  figure.courseRate = next.map(([, rate]) => rate);
+  figure.spring = [x + next[0][0], z + next[1][0], facing + next[2][0]];
+  figure.springRate = next.map(([, rate]) => rate);
 }
 
 function inWorld(forward, left, facing) {

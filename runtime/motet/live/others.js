@@ -30,7 +30,7 @@ function followed(net, figures, n) {
   const [x, z, facing] = figures[0].root, angle = facing + Math.PI + (n % 2 ? 0.6 : -0.6);
   const behind = 0.7 + 0.5 * n, point = [x + behind * Math.sin(angle), z + behind * Math.cos(angle)];
   const [dx, dz] = [point[0] - figures[n].root[0], point[1] - figures[n].root[1]], away = Math.hypot(dx, dz);
-  const stays = away < (Math.hypot(...figures[n].course.slice(0, 2)) < 0.1 ? 0.8 : 0.3);
+  const stays = away < (Math.hypot(...figures[n].spring.slice(0, 2)) < 0.1 ? 0.8 : 0.3);
   return towardsPoint(net, figures, n, point, stays ? 0 : Math.max(0.7, 1.3 * away));
 }
 

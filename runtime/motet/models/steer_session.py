@@ -164,7 +164,7 @@ class SteerSession:
     def push(self, velocity: ArrayLike) -> None:
         """Push the characters by a velocity (2,) or (characters, 2) along x and z, m/s, which they catch."""
         pushed = self._rows("a velocity needs x and z", velocity, 2)
-        self._playback.course[:, :2] += pushed
+        self._playback.spring[:, :2] += pushed
         self._playback.ticks_to_search[:] = 0
 
     def put(self, places: ArrayLike) -> None:
@@ -172,7 +172,7 @@ class SteerSession:
         wanted = self._rows("places need x, z and facing", places, 3)
         wanted[:, 2] = wrapped(np.radians(wanted[:, 2]))
         self._playback.root = wanted
-        self._playback.course[:, 2] = wanted[:, 2]
+        self._playback.spring[:, 2] = wanted[:, 2]
         self._command = self._command.put(wanted[:, 2])
         self._target, _ = self._command.target(self.model.abilities)
         self._poses = None  # nothing lies between there and here
