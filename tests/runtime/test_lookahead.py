@@ -3,10 +3,11 @@
 import numpy as np
 
 from motet.bundle.graph import Floats
-from motet.decode.lookahead import Run, begun, ticked
+from motet.decode.lookahead import Lookahead, LookaheadSettings, Run
 
 FPS, TICKS, CHANNELS = 30.0, 150, 4
-MOST = np.full(CHANNELS, 0.05, dtype=np.float32)
+TURNS = np.ones(CHANNELS, dtype=np.float32)
+SETTINGS = LookaheadSettings(fastest=0.05 * FPS)
 """A change of the control moves the net's frames faster than that."""
 
 
@@ -28,10 +29,11 @@ def shown(track: Floats) -> Floats:
 
     history = np.tile(np.linspace(-1, 1, 2 * CHANNELS, dtype=np.float32).reshape(1, 2, -1), (track.shape[1], 1, 1))
     past = np.swapaxes(history, 0, 1)
-    now = begun(run_at(track[0]), history, past, track[0], FPS)
+    lookahead = Lookahead(SETTINGS, FPS, TURNS)
+    now = lookahead.begun(run_at(track[0]), history, past, track[0])
     found = []
     for control in track:
-        now = ticked(now, run_at(control), control, FPS, MOST)
+        now = lookahead.ticked(now, run_at(control), control)
         found.append(now.shown)
     return np.stack(found)
 

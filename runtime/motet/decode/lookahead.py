@@ -10,18 +10,32 @@ Letters in shapes: R frames of reach, B characters, D channels, K taps, H codes,
 """
 
 from collections.abc import Callable
-from functools import cache
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 
 from motet.bundle.graph import Floats
 from motet.motion.springs import damped
+from motet.settings import Range, Settings
 
-WIDTH = 0.04  # s: the window's standard deviation
-REACH = 2  # standard deviations that the window reaches to both sides
-FADING = 20.0  # 1/s: how fast a difference fades, to a quarter in 0.13 s
-FADED = 1e-3  # units of the channel: a smaller difference is none
+
+@dataclass(frozen=True)
+class LookaheadSettings(Settings):
+    """width: the window's standard deviation. reach: how many of them it reaches to both sides. fading: the damping of
+    a difference, which comes down to a quarter in 0.13 s. faded: a smaller difference, in units of the channel, counts
+    for none. fastest: no angle changes faster; a little less than the fastest in recorded walking and running that does
+    not tremble, a foot's 1.9, as the three angles of a joint add up.
+    """
+
+    FEATURE: ClassVar[str] = "lookahead"
+
+    width: Annotated[float, Range(0.001, 1, "s")] = 0.04
+    reach: Annotated[float, Range(0.5, 10)] = 2.0
+    fading: Annotated[float, Range(0.1, 1000, "1/s")] = 20.0
+    faded: Annotated[float, Range(0, 1)] = 1e-3
+    fastest: Annotated[float, Range(0.1, 100, "turns/s")] = 1.8
+
 
 Run = Callable[[Floats, int], tuple[Floats, Floats]]
 """From a history (B, K, H) and how many ticks from now it is, the next frame (B, D) and the next history."""
@@ -49,46 +63,61 @@ class Ahead(NamedTuple):
     fade: Fade
 
 
-def begun(run: Run, history: Floats, past: Floats, control: Floats, fps: float) -> Ahead:
-    """Before the first tick: from the history (B, K, H) after some frames (T, B, D), of which the last is not shown any
-    more."""
-    reach = reach_of(fps)
-    before = past[np.maximum(np.arange(-reach - 1, 0), -len(past))]
-    frames, histories = _run_on(run, before, (history,), reach)
-    shown = _mean(frames, fps)
-    return Ahead(frames, histories, control, shown, Fade(np.zeros_like(shown), np.zeros_like(shown)))
+class Lookahead:
+    """What is shown of a net's run at ``fps``. whole_turn: (D,) a turn in the units of each channel, infinite for
+    channels that are no angles."""
 
+    def __init__(self, settings: LookaheadSettings, fps: float, whole_turn: Floats) -> None:
+        self.settings, self.seconds = settings, 1 / fps
+        self.most: Floats = whole_turn * np.float32(settings.fastest / fps)
+        self.reach = max(1, round(settings.reach * settings.width * fps))
+        window = np.exp(-0.5 * (np.arange(-self.reach, self.reach + 1) / (settings.width * fps)) ** 2)
+        self.window: Floats = (window / window.sum()).astype(np.float32)[:, None, None]
 
-def ticked(now: Ahead, run: Run, control: Floats, fps: float, most: Floats) -> Ahead:
-    """One tick later; ``run`` counts from the tick that is now. A channel changes by no more than ``most`` (D)."""
-    reach, fade = reach_of(fps), _faded(now.fade, 1 / fps)
-    if control is now.control or np.array_equal(control, now.control):
-        frames, histories = _run_on(run, now.frames[1:], now.histories, 1)
-    else:
-        frames, histories = _run_on(run, now.frames[1 : reach + 1], now.histories[:1], reach + 1)
-        # what is farthest ahead was not run before: it is taken to differ as what is before it does
-        apart = now.frames[reach + 1 :] - frames[reach:-1]
-        offset = _mean(np.concatenate([np.zeros_like(apart), apart, apart[-1:]]), fps)
-        fade = Fade(fade.offset + offset, fade.speed)
-    return _held_back(now.shown, Ahead(frames, histories[1:], control, _mean(frames, fps), fade), most)
+    def begun(self, run: Run, history: Floats, past: Floats, control: Floats) -> Ahead:
+        """Before the first tick: from the history (B, K, H) after some frames (T, B, D), of which the last is not shown
+        any more."""
+        before = past[np.maximum(np.arange(-self.reach - 1, 0), -len(past))]
+        frames, histories = _run_on(run, before, (history,), self.reach)
+        shown = self._mean(frames)
+        return Ahead(frames, histories, control, shown, Fade(np.zeros_like(shown), np.zeros_like(shown)))
 
+    def ticked(self, now: Ahead, run: Run, control: Floats) -> Ahead:
+        """One tick later; ``run`` counts from the tick that is now."""
+        reach, fade = self.reach, self._faded(now.fade)
+        if control is now.control or np.array_equal(control, now.control):
+            frames, histories = _run_on(run, now.frames[1:], now.histories, 1)
+        else:
+            frames, histories = _run_on(run, now.frames[1 : reach + 1], now.histories[:1], reach + 1)
+            # what is farthest ahead was not run before: it is taken to differ as what is before it does
+            apart = now.frames[reach + 1 :] - frames[reach:-1]
+            offset = self._mean(np.concatenate([np.zeros_like(apart), apart, apart[-1:]]))
+            fade = Fade(fade.offset + offset, fade.speed)
+        return self._held_back(now.shown, Ahead(frames, histories[1:], control, self._mean(frames), fade))
 
-def _held_back(before: Floats, after: Ahead, most: Floats) -> Ahead:
-    """What is shown (B, D) after a frame: with what fades, and no faster than ``most`` (D); what is too fast fades.
+    def _held_back(self, before: Floats, after: Ahead) -> Ahead:
+        """What is shown (B, D) after a frame: with what fades, and no faster than allowed; what is too fast fades.
 
-    Each character by itself: it moves as it would alone, to the bit.
-    """
-    wanted = after.shown + after.fade.offset
-    step = wanted - before
-    fast = (np.abs(step) > most).any(axis=1, keepdims=True)
-    shown = np.where(fast, before + np.clip(step, -most, most), wanted)
-    offset = np.where(fast, shown - after.shown, after.fade.offset)
-    return after._replace(shown=shown, fade=Fade(offset, after.fade.speed))
+        Each character by itself: it moves as it would alone, to the bit.
+        """
+        wanted = after.shown + after.fade.offset
+        step = wanted - before
+        fast = (np.abs(step) > self.most).any(axis=1, keepdims=True)
+        shown = np.where(fast, before + np.clip(step, -self.most, self.most), wanted)
+        offset = np.where(fast, shown - after.shown, after.fade.offset)
+        return after._replace(shown=shown, fade=Fade(offset, after.fade.speed))
 
+    def _mean(self, frames: Floats) -> Floats:
+        """The mean (B, D) of frames (2R + 1, B, D) by the window."""
+        # not as a product of matrices, which rounds a character by how many there are
+        mean: Floats = (self.window * frames).sum(axis=0)
+        return mean
 
-def reach_of(fps: float) -> int:
-    """How many frames before and after the one that is shown have a part in it."""
-    return max(1, round(REACH * WIDTH * fps))
+    def _faded(self, fade: Fade) -> Fade:
+        """A critically damped spring at rest at 0, a tick later (exact), for each character that is not there."""
+        offset, speed = damped(fade.offset, fade.speed, self.settings.fading, self.seconds)
+        moving = (np.maximum(np.abs(offset), np.abs(speed)) > self.settings.faded).any(axis=1, keepdims=True)
+        return Fade(np.where(moving, offset, 0), np.where(moving, speed, 0))
 
 
 def _run_on(run: Run, frames: Floats, histories: tuple[Floats, ...], count: int) -> tuple[Floats, tuple[Floats, ...]]:
@@ -99,25 +128,3 @@ def _run_on(run: Run, frames: Floats, histories: tuple[Floats, ...], count: int)
         found.append(frame[None])
         histories = (*histories, history)
     return np.concatenate([frames, *found]), histories
-
-
-def _mean(frames: Floats, fps: float) -> Floats:
-    """The mean (B, D) of frames (2R + 1, B, D) by the window."""
-    # not as a product of matrices, which rounds a character by how many there are
-    mean: Floats = (_window(fps)[:, None, None] * frames).sum(axis=0)
-    return mean
-
-
-@cache
-def _window(fps: float) -> Floats:
-    reach = reach_of(fps)
-    window = np.exp(-0.5 * (np.arange(-reach, reach + 1) / (WIDTH * fps)) ** 2)
-    weights: Floats = (window / window.sum()).astype(np.float32)
-    return weights
-
-
-def _faded(fade: Fade, seconds: float) -> Fade:
-    """A critically damped spring at rest at 0, so many seconds later (exact), for each character that is not there."""
-    offset, speed = damped(fade.offset, fade.speed, FADING, seconds)
-    moving = (np.maximum(np.abs(offset), np.abs(speed)) > FADED).any(axis=1, keepdims=True)
-    return Fade(np.where(moving, offset, 0), np.where(moving, speed, 0))

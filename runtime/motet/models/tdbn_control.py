@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from motet.arguments import checked_int
 from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
-from motet.decode.lookahead import Ahead, begun, ticked
+from motet.decode.lookahead import Ahead, Lookahead, LookaheadSettings
 from motet.decode.noise import RowNoise, RowsOfNoise
 from motet.decode.session import tick
 from motet.errors import BundleError, ControlError, DecodingError, MotionError
@@ -24,10 +24,6 @@ from motet.motion.motion import TURN, Motion
 MAX_CHARACTERS = 100_000
 """Of one session, whose state is in memory."""
 
-FASTEST = 1.8
-"""Turns a second: no angle of a smooth session changes faster. A little less than the fastest in recorded walking and
-running that does not tremble, a foot's 1.9, as the three angles of a joint add up."""
-
 
 class TdbnModel(ControlModel):
     """A model of labelled motions that runs live; any number of sessions and threads share it.
@@ -38,6 +34,7 @@ class TdbnModel(ControlModel):
     """
 
     LOOPS = ("session",)
+    SETTINGS = (LookaheadSettings,)
 
     def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:
         super().__init__(manifest, graphs, tables)
@@ -51,8 +48,8 @@ class TdbnModel(ControlModel):
         free = {"codes": "batch H"} if self.has_free_units else {}
         self.bind("step", {**self.loop.inputs, **free}, self.loop.outputs)
         self.taps, self.codes = self.sizes["K"], self.sizes["H"]
-        turns = [TURN.get(unit, np.inf) for unit in self.contract.units]
-        self.fastest = np.array(turns, dtype=np.float32) * np.float32(FASTEST / self.fps)
+        turns = np.array([TURN.get(unit, np.inf) for unit in self.contract.units], dtype=np.float32)
+        self.lookahead = Lookahead(self.settings(LookaheadSettings), self.fps, turns)
         if "history" not in self.stepper.spec.feedback:
             raise BundleError("manifest, graphs.step.feedback: nothing gives the next history")
         for label, frames in self.starts.items():
@@ -246,9 +243,9 @@ class TdbnSession:
     def step(self) -> Floats:
         """One tick: the next frame (characters, D) float32, in the units of ``model.contract``."""
         if self.smooth:
-            control, fps = self._inputs["control"], self.model.fps
-            now = self._ahead or begun(self._run, self._history, self._first, control, fps)
-            self._ahead = ticked(now, self._run, control, fps, self.model.fastest)
+            control, lookahead = self._inputs["control"], self.model.lookahead
+            now = self._ahead or lookahead.begun(self._run, self._history, self._first, control)
+            self._ahead = lookahead.ticked(now, self._run, control)
             frame, self._history = self._ahead.shown.copy(), self._ahead.histories[0]
         else:
             frame, self._history = self._run(self._history, 0)
