@@ -176,6 +176,25 @@ def test_a_batch_gives_what_each_seed_gives_alone() -> None:
         np.testing.assert_array_equal(model.next_frames(seed[None], 5)[0], row)
 
 
+def test_a_length_in_seconds_is_one_in_frames() -> None:
+    whole = circle()
+    model = model_of(to_joint_vectors(whole))
+    assert len(model.predict(whole)) == HORIZON
+    for seconds, frames in ((0.2, 6), (np.float64(1 / 30), 1), (0.001, 1)):
+        found, expected = model.predict(whole, seconds=seconds), model.predict(whole, frames=frames)
+        np.testing.assert_array_equal(found.values, expected.values)
+        assert len(model.stream(whole).predict(seconds=seconds)) == frames
+    for given in (
+        {"seconds": 0},
+        {"seconds": 1e9},
+        {"seconds": "1"},
+        {"seconds": np.nan},
+        {"seconds": 1, "frames": 30},
+    ):
+        with pytest.raises(DecodingError, match=r"give seconds, more than 0 and at most 3333.33, or frames"):
+            model.predict(whole, **given)  # type: ignore[call-overload]
+
+
 def test_what_does_not_fit_is_refused() -> None:
     whole = circle()
     model = model_of(to_joint_vectors(whole))

@@ -27,6 +27,7 @@ NOBODY = "none"
 @out_option
 @click.option("--bundle", default="predict", show_default=True, help="Name or path of a bundle.")
 @click.option("--frames", type=click.IntRange(1, 100_000), help="Frames to predict. [default: the bundle's horizon]")
+@click.option("--seconds", type=click.FloatRange(0, min_open=True), help="The same in seconds.")
 @click.option("--append", is_flag=True, help="Write the motion too, then the prediction.")
 @click.option("--samples", type=click.IntRange(1, MAX_SAMPLES), help="Write so many different futures of each motion.")
 @click.option(
@@ -48,6 +49,7 @@ def predict(
     out: Path,
     bundle: str,
     frames: int | None,
+    seconds: float | None,
     append: bool,
     samples: int | None,
     seed: int,
@@ -61,14 +63,13 @@ def predict(
 
     A file may be of any human figure, and is continued on its own skeleton, at the bundle's frame rate. With several
     files or samples OUT holds {name} or {clip} for their names, or the results are numbered: out-1.bvh, out-2.bvh, ...
-
     More frames than the bundle's horizon come from a bundle that writes codes (--beyond): walks walk on, runs run.
     With --samples all frames do, and the futures differ as far as the motion leaves it open.
     """
     given = read.sources(sources)
     outs = places(out, given, samples or 1, output)
     model, tries, rates, rows = load_as(PredictModel, bundle, session), Tries(), list[float](), list[dict[str, Any]]()
-    asked = Asked(model, frames or model.horizon, append, samples, seed)
+    asked = Asked(model, model.count(seconds, frames), append, samples, seed)
     writer = asked.writer(beyond, session)
     for number, source in enumerate(given):
         with tries.of(source):

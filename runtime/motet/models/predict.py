@@ -19,10 +19,11 @@ from motet.models.base import BundleModel
 from motet.models.continuation import carried_on, futures, together
 from motet.models.generate import GenerateModel
 from motet.models.progress import Progress, silent
-from motet.models.seeds import seeds_of
+from motet.models.seeds import Seed, seeds_of
 from motet.motion.humanoid import Figure
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
+from motet.settings import is_number
 
 MAX_FRAMES, MAX_GOLDEN = 100_000, 1000
 """Of one prediction, which is in memory as a whole; and of one among the golden vectors."""
@@ -68,63 +69,76 @@ class PredictModel(BundleModel):
         """Whether :meth:`expected_errors` can tell anything."""
         return "error" in self.graphs
 
+    def count(self, seconds: float | None = None, frames: int | None = None) -> int:
+        """How many frames a prediction has that lasts so long; DecodingError for both, or for a length out of range."""
+        if seconds is None:
+            return checked_int("frames", self.horizon if frames is None else frames, 1, MAX_FRAMES, DecodingError)
+        longest = MAX_FRAMES / self.fps
+        if frames is not None or not is_number(seconds) or not 0 < seconds <= longest:
+            given = f"not {seconds} and {frames}"
+            raise DecodingError(f"give seconds, more than 0 and at most {longest:g}, or frames; {given}")
+        return max(1, round(seconds * self.fps))
+
     @overload
     def predict(
         self,
         motions: Motion,
         *,
+        seconds: float | None = None,
         frames: int | None = None,
         append: bool = False,
         progress: Progress = ...,
         beyond: GenerateModel | None = None,
-        seed: int = 0,
+        seed: Seed = 0,
     ) -> Motion: ...
     @overload
     def predict(
         self,
         motions: Sequence[Motion],
         *,
+        seconds: float | None = None,
         frames: int | None = None,
         append: bool = False,
         progress: Progress = ...,
         beyond: GenerateModel | None = None,
-        seed: int = 0,
+        seed: Seed = 0,
     ) -> list[Motion]: ...
     def predict(
         self,
         motions: Motion | Sequence[Motion],
         *,
+        seconds: float | None = None,
         frames: int | None = None,
         append: bool = False,
         progress: Progress = silent,
         beyond: GenerateModel | None = None,
-        seed: int = 0,
+        seed: Seed = 0,
     ) -> Motion | list[Motion]:
-        """The ``frames`` (as many as the horizon by default) that follow a motion, at the model's frame rate.
+        """The ``seconds`` or ``frames`` (the horizon by default) that follow a motion, at the model's frame rate.
 
-        A mocap motion is continued in its own channels, units and skeleton, from where its root is; features, in the
-        channels of :attr:`contract`, as features. One of another human figure is brought onto the model's, and what
-        follows back, or given on the model's figure where that is not possible (docs/humanoid.md). The model
-        sees the last :attr:`seed_frames` at its frame rate; of another figure, all frames tell how its joints stand and
-        where its ground is. A motion at another rate is resampled, so that its last frame is kept.
+        A motion is continued in its own channels, units and skeleton, from where its root is. One of another human
+        figure is brought onto the model's, and what follows back, or given on the model's where that is not possible
+        (docs/humanoid.md). The model sees the last :attr:`seed_frames` at its frame rate; of another figure, all frames
+        tell how its joints stand and where its ground is. A motion is resampled so that its last frame is kept.
         append: give the motion, resampled, and what follows it.
         progress: called with the number of motions done and of all.
-        beyond: a model that writes codes, as ``motet.load("generate")``, which goes on where more frames than
-            the horizon are asked, alive and at the motion's pace (docs/alive.md): the first SURE seconds are the
-            predictor's, with feet that stand, what follows the writer's. By default the predictor goes on from its own
-            last frames, and its motion dies away. seed: of what the writer draws; the same for each motion.
+        beyond: a model that writes codes, such as ``motet.load("generate")``. It continues a prediction longer than the
+            horizon, at the motion's pace (docs/alive.md), after SURE seconds of the predictor's. Without it the
+            predictor continues from its own last frames, and its motion dies away.
+        seed: of what ``beyond`` draws; motion i has seed + i (or seed[i]).
         Several motions are carried on in one batch, each as it would be alone. MotionError for a motion that is too
-        short, lacks channels of the model, or is of a figure that is no human's; DecodingError for a number of frames
-        out of range, and where ``beyond`` does not write codes.
+        short, lacks channels of the model, or is of a figure that is no human's; DecodingError for a length out of
+        range, and where ``beyond`` does not write codes.
         """
-        if beyond is not None and frames is not None and frames > self.horizon:
-            return self._beyond(motions, checked(frames), append, progress, beyond, seed)
+        count = self.count(seconds, frames)
+        if beyond is not None and count > self.horizon:
+            return self._beyond(motions, count, append, progress, beyond, seed)
         given = [motions] if isinstance(motions, Motion) else list(motions)
         seeds = [self._seed(motion) for motion in given]
         found: list[Motion] = []
         for place in range(0, len(given), self.loop.batch):
             part = seeds[place : place + self.loop.batch]
-            following = self.next_frames([last for _, _, last in part], frames)
+            following = self.next_frames([last for _, _, last in part], count)
             found += [self._carried_on(*one[:2], new, append) for one, new in zip(part, following, strict=True)]
             progress(len(found), len(given))
         return found[0] if isinstance(motions, Motion) else found
@@ -136,30 +150,30 @@ class PredictModel(BundleModel):
         append: bool,
         progress: Progress,
         writer: GenerateModel,
-        seed: int,
+        seed: Seed,
     ) -> Motion | list[Motion]:
         """See :meth:`predict`: more frames than the horizon, all but the first by a writer."""
         given, found = [motions] if isinstance(motions, Motion) else list(motions), list[Motion]()
-        seeds = seeds_of(seed, 1, DecodingError)
-        for motion in given:
+        for motion, own in zip(given, seeds_of(seed, len(given), DecodingError), strict=True):
             start = self.predict(motion, frames=self.sure, append=True)
-            ((following, before),) = futures(writer, start, frames, seeds, predicted=self.sure / self.fps)
+            ((following, before),) = futures(writer, start, frames, [own], predicted=self.sure / self.fps)
             found.append(together(before, following) if append else following)
             progress(len(found), len(given))
         return found[0] if isinstance(motions, Motion) else found
 
-    def futures(
+    def futures(  # noqa: PLR0913  settings, all but the first of which have a default
         self,
         motion: Motion,
         *,
         beyond: GenerateModel,
         samples: int = 1,
+        seconds: float | None = None,
         frames: int | None = None,
         append: bool = False,
-        seed: int = 0,
+        seed: Seed = 0,
         progress: Progress = silent,
     ) -> list[Motion]:
-        """So many different futures of a motion, each of ``frames`` frames (as many as the horizon by default).
+        """So many different futures of a motion, each of ``seconds`` or ``frames`` (the horizon by default).
 
         beyond: a model that writes codes, as ``motet.load("generate")``. From the first frame on they are what it draws
         (docs/alive.md): they differ as far as the future is open, where :meth:`predict` begins with what is likeliest
@@ -167,7 +181,7 @@ class PredictModel(BundleModel):
         called with the number of samples done and of all. DecodingError for other than 1 to MAX_SAMPLES samples.
         """
         samples = checked_int("samples", samples, 1, MAX_SAMPLES, DecodingError)
-        count, seeds = checked(self.horizon if frames is None else frames), seeds_of(seed, samples, DecodingError)
+        count, seeds = self.count(seconds, frames), seeds_of(seed, samples, DecodingError)
         whole = self._at_rate(motion)
         found = futures(beyond, whole, count, seeds, progress)
         return [together(before, following) if append else following for following, before in found]
@@ -176,7 +190,7 @@ class PredictModel(BundleModel):
         """The figure of a motion, measured for all predictions of it; None where it is the model's."""
         return self.contract.measured(self._at_rate(motion))
 
-    def following(self, motion: Motion, frames: int | None, measured: Figure | None) -> Motion:
+    def following(self, motion: Motion, frames: int, measured: Figure | None) -> Motion:
         """As :meth:`predict`, of a figure that is measured already."""
         whole, figure, last = self._seed(motion, measured)
         return carried_on(self.contract, self.next_frames([last], frames)[0], whole, figure, measured)[0]
@@ -205,7 +219,7 @@ class PredictModel(BundleModel):
         DecodingError for a number of frames out of range, MotionError for seeds of another shape.
         """
         given = np.asarray(seeds, dtype=np.float32)
-        count = checked(self.horizon if frames is None else frames)
+        count = self.count(None, frames)
         shape = (self.seed_frames, len(self.contract.channels))
         if given.ndim != 3 or given.shape[1:] != shape:
             raise MotionError(
@@ -252,11 +266,6 @@ class PredictModel(BundleModel):
         return PredictSession(self, start)
 
 
-def checked(frames: int) -> int:
-    """The number of frames to predict; DecodingError where it is out of range."""
-    return checked_int("frames", frames, 1, MAX_FRAMES, DecodingError)
-
-
 class PredictSession:
     """A growing motion: push new frames, predict the next. Keeps only the frames that the model uses.
 
@@ -283,9 +292,9 @@ class PredictSession:
     def __repr__(self) -> str:
         return f"PredictSession({self._motion!r} kept, {self.model!r})"
 
-    def predict(self, frames: int | None = None) -> Motion:
+    def predict(self, frames: int | None = None, *, seconds: float | None = None) -> Motion:
         """As :meth:`PredictModel.predict`, after all that was pushed so far."""
-        return self.model.following(self._motion, frames, self._figure)
+        return self.model.following(self._motion, self.model.count(seconds, frames), self._figure)
 
     @cached_property
     def _figure(self) -> Figure | None:
