@@ -34,7 +34,7 @@ from motet_train.evaluate.language.chain import answers, best_descriptions, boun
 from motet_train.evaluate.language.floors import copied_bleu, nearest_said
 from motet_train.evaluate.language.motions import energy, feet_of, last_energy, measures, skate, speed
 from motet_train.evaluate.language.prompts import kinds, measurable, prompted, recognised, thresholds, travel
-from motet_train.evaluate.language.report import GOALS, describe_report, generate_report
+from motet_train.evaluate.language.report import LANGUAGE_GOALS, describe_report, generate_report
 from motet_train.evaluate.language.split_store import SplitStore, split_as
 from motet_train.evaluate.tables import aligned, json_ready, reached, report_table
 from motet_train.runs import MODELS, Run
@@ -157,8 +157,8 @@ def test_the_report_of_a_perfect_describe_model(corpus: SplitStore) -> None:
     assert {key: value for key, value in report["confidence"].items() if np.isfinite(value)} == right
     shares = ("joins_found", "cuts_right", "time_right", "time_confident", "time_right_if_confident", "alone_right")
     assert report["timeline"] == {**dict.fromkeys(shares, 1.0), "parts": 3}
-    assert reached(GOALS, "words.verbs", report["words"]["verbs"])
-    assert "words.sides1>=0.8" in report_table({"fake": report}, GOALS).replace(" ", "").splitlines()
+    assert reached(LANGUAGE_GOALS, "words.verbs", report["words"]["verbs"])
+    assert "words.sides1>=0.8" in report_table({"fake": report}, LANGUAGE_GOALS).replace(" ", "").splitlines()
 
 
 def test_the_report_of_a_perfect_generate_model(corpus: SplitStore) -> None:
@@ -172,7 +172,7 @@ def test_the_report_of_a_perfect_generate_model(corpus: SplitStore) -> None:
         assert report["motion"][key] == pytest.approx(report["motion_data"][key])
     alone = generate_report(model, corpus)
     assert set(report) - set(alone) == {"chain_train", "chain_test", "relative_train", "relative_test", "bound"}
-    rows = report_table({"with": report, "alone": alone}, GOALS).splitlines()
+    rows = report_table({"with": report, "alone": alone}, LANGUAGE_GOALS).splitlines()
     assert len(rows) == 1 + sum(map(len, report.values()))
 
 
@@ -202,7 +202,7 @@ def test_columns_are_as_wide_as_their_widest_cell() -> None:
 
 def test_numbers_that_json_lacks_are_null() -> None:
     assert json_ready({"a": {"b": np.nan, "c": 1 / 3}}) == {"a": {"b": None, "c": 0.333333}}
-    assert not reached(GOALS, "relative_test.1", np.nan)
+    assert not reached(LANGUAGE_GOALS, "relative_test.1", np.nan)
 
 
 SIZES = {"encoder_units": [4], "decoder_units": [6], "embedding": 3}

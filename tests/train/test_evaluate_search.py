@@ -11,7 +11,7 @@ from motet.decode.nearest import LOOP
 from motet.models.search import IndexSettings
 from motet.motion.motion import Motion
 from motet_train.data.store import Store
-from motet_train.evaluate.language.search import GOALS, search_report
+from motet_train.evaluate.language.search import SEARCH_GOALS, search_report
 from motet_train.evaluate.language.split_store import SplitStore, plain, split_as
 from motet_train.evaluate.tables import report_table
 
@@ -73,7 +73,7 @@ def test_a_perfect_model_finds_all_at_once(corpus: SplitStore) -> None:
     # whoever turns right in training swings the legs as whoever walks in the test: by looks that is nearer
     assert report["words_text"] == {**first, "first_1": 0.8}
     assert report["motion"] == {"alike": 1, "features_alike": 1, "of": 5}
-    assert "text.first_5" in report_table({"fake": report}, GOALS)
+    assert "text.first_5" in report_table({"fake": report}, SEARCH_GOALS)
 
 
 def test_the_rank_of_a_model_that_takes_the_next_one(corpus: SplitStore) -> None:

@@ -27,7 +27,7 @@ from motet_train.data.gap_windows import GapWindow, GapWindows, gap_window
 from motet_train.data.records import Record
 from motet_train.data.split import split
 from motet_train.data.store import Store, prepare
-from motet_train.evaluate.fill.report import GOALS, fill_report
+from motet_train.evaluate.fill.report import FILL_GOALS, fill_report
 from motet_train.evaluate.tables import reached
 from motet_train.models.codes.sixd_places import tree_of
 from motet_train.models.fill.filler import Filler, FillerConfig
@@ -212,7 +212,7 @@ def test_a_model_that_knows_has_no_error_and_standing_has_that_of_the_way(run: R
     places = positions(unplaced(model.truth, dancer(0, 1)))
     expected = np.mean([np.linalg.norm(places[i : i + 15] - places[i - 1], axis=-1).mean() for i in windows])
     assert half["cm_standing"] == pytest.approx(100 * expected, rel=1e-4)
-    assert reached(GOALS, "gap_1.of_interpolation", report["gap_1"]["of_interpolation"])
+    assert reached(FILL_GOALS, "gap_1.of_interpolation", report["gap_1"]["of_interpolation"])
 
 
 def test_evaluate_prints_the_table(run: Run, store: Store, tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from motet_train.data.preparation import VECTORS
 from motet_train.data.records import Record
 from motet_train.data.store import prepare
 from motet_train.evaluate.predict import mocap_floors
-from motet_train.evaluate.predict.floors import CONSTANT, DAMPED, FLOORS, JOINTS, ZERO, best, gone_on, key, reach
+from motet_train.evaluate.predict.floors import CONSTANT, DAMPED, FLOORS, OF_JOINTS, ZERO, best, gone_on, key, reach
 from motet_train.evaluate.predict.mocap_floors import Windows, apart, chosen, floors, places
 from motet_train.papers.li2018 import text_floors
 from motet_train.papers.li2018.expmap_files import ExpmapCorpus, read_expmap, scaling_of
@@ -96,15 +96,15 @@ def test_places_in_the_world_are_those_of_the_motion() -> None:
 
 def test_floors_of_recorded_motions_go_on_as_their_names_say() -> None:
     windows = walk_windows()
-    decays = {DAMPED: (np.zeros(5), np.zeros(5)), DAMPED + JOINTS: (np.ones(5), np.zeros(5))}
+    decays = {DAMPED: (np.zeros(5), np.zeros(5)), DAMPED + OF_JOINTS: (np.ones(5), np.zeros(5))}
     found = floors(windows, decays)
     assert list(found) == list(FLOORS)
     last, step = windows.given[:, 1:], windows.given[:, 1:] - windows.given[:, :1]
     count = np.arange(1.0, 6)[:, None, None]
     np.testing.assert_allclose(found[ZERO], np.broadcast_to(last, windows.truth.shape), atol=1e-9)
-    np.testing.assert_allclose(found[CONSTANT + JOINTS], last + count * step, atol=1e-9)
+    np.testing.assert_allclose(found[CONSTANT + OF_JOINTS], last + count * step, atol=1e-9)
     np.testing.assert_allclose(found[DAMPED], found[ZERO], atol=1e-6)
-    np.testing.assert_allclose(found[DAMPED + JOINTS], last + count * step[:, :, :1], atol=1e-9)
+    np.testing.assert_allclose(found[DAMPED + OF_JOINTS], last + count * step[:, :, :1], atol=1e-9)
     # bones keep their lengths where rotations turn on, and the root goes on in a line
     joint = windows.skeleton.places["lfemur"]
     parent = windows.skeleton.joints[joint].parent
@@ -135,7 +135,7 @@ def test_decays_of_recorded_motions_are_chosen_on_those_not_held_out(tmp_path: P
     names = [entry.name for entry in store.records]
     found = chosen(store, names[1:], 30.0, 10)
     path, rest = found[DAMPED]
-    assert set(found) == {DAMPED, DAMPED + JOINTS}
+    assert set(found) == {DAMPED, DAMPED + OF_JOINTS}
     assert path.min() > 0.8  # the root of a walk goes on
     assert rest.min() < path.min()  # its limbs turn back
     assert not np.any(list(chosen(store, names[:2], 30.0, 10).values()))  # of who stands still nothing goes on

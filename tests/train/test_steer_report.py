@@ -73,8 +73,8 @@ def report(model: SteerModel, store: Store) -> Any:
         warnings.simplefilter("error")
         patch.setattr(following, "PHASES", 1)
         patch.setattr(following, "SETTLE", 0.2)
-        patch.setattr(standing, "SETTLE", 0.2)
-        patch.setattr(standing, "MEASURED", 2.0)
+        patch.setattr(standing, "STRAIGHT_SETTLE", 0.2)
+        patch.setattr(standing, "STRAIGHT_MEASURED", 2.0)
         return steer_report(model, Recorded.of(store), minutes=0.02, characters=3)
 
 

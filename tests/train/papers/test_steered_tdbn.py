@@ -154,8 +154,8 @@ def test_it_is_measured_as_a_steered_figure_without_a_rival(model: TdbnModel, st
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(following, "PHASES", 1)
         patch.setattr(following, "SETTLE", 0.2)
-        patch.setattr(standing, "SETTLE", 0.2)
-        patch.setattr(standing, "MEASURED", 2.0)
+        patch.setattr(standing, "STRAIGHT_SETTLE", 0.2)
+        patch.setattr(standing, "STRAIGHT_MEASURED", 2.0)
         report = steer_report(steered, Recorded.of(store), minutes=0.02, characters=3)
     groups = ["walk", "run", "speed", "turn_walk", "turn_run", "aside", "random"]
     beside = [f"{gait}_{kind}" for gait in ("walk", "run") for kind in ("recorded", "held")]

@@ -23,13 +23,10 @@ from motet_train.cli.train_predict import read_expmap_files
 from motet_train.data.errors import DataError
 from motet_train.data.store import Store
 from motet_train.evaluate.figures import Drawings, strips
-from motet_train.evaluate.fill.report import GOALS as FILL_GOALS
-from motet_train.evaluate.fill.report import fill_report
+from motet_train.evaluate.fill.report import FILL_GOALS, fill_report
 from motet_train.evaluate.language.prompts import ASKED
-from motet_train.evaluate.language.report import GOALS as LANGUAGE_GOALS
-from motet_train.evaluate.language.report import describe_report, generate_report
-from motet_train.evaluate.language.search import GOALS as SEARCH_GOALS
-from motet_train.evaluate.language.search import search_report
+from motet_train.evaluate.language.report import LANGUAGE_GOALS, describe_report, generate_report
+from motet_train.evaluate.language.search import SEARCH_GOALS, search_report
 from motet_train.evaluate.language.split_store import SplitStore, split_as
 from motet_train.evaluate.predict import liveliness, mocap
 from motet_train.evaluate.predict.plots import error_over_time

@@ -20,17 +20,17 @@ from motet.motion.kinematics import local_rotations
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 
-STANDS = ContactSettings(heights=(0.03, 0.03), speeds=(0.0, 0.0), calm=0.05)
+STANCE = ContactSettings(heights=(0.03, 0.03), speeds=(0.0, 0.0), calm=0.05)
 """The speed is that along the root's way, less half of the root's."""
 
 
 def standing(points: Array, root: Array, fps: float) -> NDArray[np.bool_]:
     """In which frames points (T, K, 3) stand, (T, K), beside the root's positions (T, 3)."""
-    calm, way = smoothed(points, STANDS.calm, fps), np.gradient(smoothed(root[:, None], STANDS.calm, fps)[:, 0], axis=0)
+    calm, way = smoothed(points, STANCE.calm, fps), np.gradient(smoothed(root[:, None], STANCE.calm, fps)[:, 0], axis=0)
     ground = np.array([ground_of(calm[:, [k], 1]) for k in range(points.shape[1])])
     ahead = np.gradient(calm, axis=0) - way[:, None] / 2
     forward = (ahead[..., [0, 2]] * way[:, None, [0, 2]]).sum(axis=-1)
-    return feet_standing(calm[..., 1] - ground, forward, STANDS)
+    return feet_standing(calm[..., 1] - ground, forward, STANCE)
 
 
 def stances(points: Array, root: Array, fps: float) -> list[Array]:

@@ -19,12 +19,12 @@ from motet_train.data.store import Store
 from motet_train.evaluate.tables import Goals, Report, gathered
 from motet_train.models.codes.sixd_places import SixdPlaces, tree_of
 
-SECONDS = (0.5, 1.0, 2.0)
+GAP_SECONDS = (0.5, 1.0, 2.0)
 """Of the gaps."""
 
-FEET = [HUMANOID.index(sided(side, part)) for side in LEFT_RIGHT for part in ("Foot", "Toes")]
+FOOT_JOINTS = [HUMANOID.index(sided(side, part)) for side in LEFT_RIGHT for part in ("Foot", "Toes")]
 
-STANDS = ContactSettings(heights=(0.15, 0.15), speeds=(0.2, 0.2))
+FEET_STAND = ContactSettings(heights=(0.15, 0.15), speeds=(0.2, 0.2))
 """Joints of feet: the ankle of a foot that stands is 8 cm above the ground."""
 
 GOING = 0.5
@@ -33,10 +33,10 @@ GOING = 0.5
 MARGIN = 3
 """Frames before and after a gap whose joints are looked at with it, so that joins count."""
 
-GOALS: Goals = {"gap_1.of_interpolation": (None, 0.5)}
+FILL_GOALS: Goals = {"gap_1.of_interpolation": (None, 0.5)}
 """Figure -> (least, most) that the model that comes with motet is to reach."""
 
-FLOORS: Mapping[str, "Fill"] = {
+PLAIN_WAYS: Mapping[str, "Fill"] = {
     "hermite": bridge,
     "interpolation": straight,
     "standing": lambda past, after, count: np.repeat(past[-1:], count, axis=0),
@@ -60,7 +60,7 @@ def fill_report(model: FillModel, store: Store) -> Report:
 
     Of each gap, "gap_0.5" and so on: joints' mean distance in the world "cm", and in gaps where the figure is on its
     way (:data:`GOING`) "cm_going", the speed of feet that stood "slide" in cm a second, "jerk" over the recorded; each
-    of the model as it is, of :data:`FLOORS` with their names behind, and of the recording.
+    of the model as it is, of :data:`PLAIN_WAYS` with their names behind, and of the recording.
     """
     if store.representation != "root_sixd":
         raise DataError(f"gaps are measured in root_sixd (motet prepare --for codes), not in {store.representation}")
@@ -69,11 +69,11 @@ def fill_report(model: FillModel, store: Store) -> Report:
 
 def _parts(model: FillModel, store: Store) -> Iterator[Report]:
     joints = SixdPlaces(tree_of(store.contract((0,))))
-    for seconds in SECONDS:
+    for seconds in GAP_SECONDS:
         windows = list(_windows(model, store, round(seconds * model.fps)))
         if not windows:
             raise DataError(f"no test trial is long enough for a gap of {seconds:g} s")
-        systems: dict[str, Fill] = {"": model.frames_between, **FLOORS}
+        systems: dict[str, Fill] = {"": model.frames_between, **PLAIN_WAYS}
         yield {f"gap_{seconds:g}": _figures(joints, systems, windows, model.fps)}
 
 
@@ -91,9 +91,9 @@ def _windows(model: FillModel, store: Store, frames: int) -> Iterator[Window]:
 
 def _figures(joints: SixdPlaces, systems: Mapping[str, Fill], windows: list[Window], fps: float) -> dict[str, float]:
     true = _places(joints, windows, [one.truth for one in windows])
-    feet = true[:, :, FEET]
+    feet = true[:, :, FOOT_JOINTS]
     speeds = np.linalg.norm(np.diff(feet, axis=1), axis=-1) * fps
-    stands = standing(feet[:, 1:, :, 1], speeds, STANDS)
+    stands = standing(feet[:, 1:, :, 1], speeds, FEET_STAND)
     ways = np.array([np.linalg.norm((one.after[0] - one.past[-1])[[0, 2]]) for one in windows])
     going = ways * fps / (len(windows[0].truth) + 1) > GOING
     found: dict[str, float] = {
@@ -128,7 +128,7 @@ def _places(joints: SixdPlaces, windows: list[Window], filled: list[Array]) -> A
 
 def _slide(places: Array, stands: NDArray[np.bool_], fps: float) -> float:
     """Centimetres a second over the ground of feet while those recorded stand."""
-    over = ground_speeds(places[:, :, FEET], fps)
+    over = ground_speeds(places[:, :, FOOT_JOINTS], fps)
     return 100 * float(over[stands].mean()) if stands.any() else float("nan")
 
 

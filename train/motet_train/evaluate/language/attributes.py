@@ -21,7 +21,7 @@ SIDES: Patterns = {
     "left": r"left(?:wards?|most|handed)?",
     "right": r"right(?:wards?|most|handed)?(?! (?:angles?|angled|away))",
 }
-TURNS: Patterns = {"turn": r"(?<!in )turn\w*|veer\w*|swerv\w*|curv\w*|corner|rotat\w*|spin\w*|dodg\w*|circle"}
+TURN_WORDS: Patterns = {"turn": r"(?<!in )turn\w*|veer\w*|swerv\w*|curv\w*|corner|rotat\w*|spin\w*|dodg\w*|circle"}
 DIRECTIONS: Patterns = SIDES | {"backward": r"backwards?"}
 ACTIONS: Patterns = VERBS | {
     "dance": r"danc\w*|ballet|arabesque|pirouette\w*",
@@ -58,7 +58,7 @@ def common(found: Sequence[frozenset[str]]) -> frozenset[str]:
 
 def turning(sentence: str) -> bool:
     """Whether a sentence about walking or running says that the path is not straight."""
-    return bool(said(TURNS, sentence) or side(sentence))
+    return bool(said(TURN_WORDS, sentence) or side(sentence))
 
 
 def common_verbs(sentences: Sequence[str]) -> frozenset[str]:

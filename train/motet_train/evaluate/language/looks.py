@@ -13,11 +13,8 @@ from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS, from_r
 from motet_train.evaluate.language.motions import moves
 from motet_train.evaluate.language.split_store import SplitStore
 
-PATH, PATH_UNITS = ROOT_BLOCK[:3], ROOT_BLOCK_UNITS[:3]
+ROOT_PATH, ROOT_PATH_UNITS = ROOT_BLOCK[:3], ROOT_BLOCK_UNITS[:3]
 """The channels of the root block by which a figure goes over the ground and turns."""
-
-LEAST = 1e-3
-"""The least standard deviation by which a feature is divided: what differs by less is the same."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,9 +37,9 @@ class Looks:
         channels (T, D)."""
         if not moves(motion):
             return (self.corpus.z(motion),)
-        path = motion.select(PATH, PATH_UNITS).values
+        path = motion.select(ROOT_PATH, ROOT_PATH_UNITS).values
         on_the_spot = motion.values.copy()
-        on_the_spot[:, [motion.channels.index(name) for name in PATH]] = 0
+        on_the_spot[:, [motion.channels.index(name) for name in ROOT_PATH]] = 0
         placed = from_root_block(replace(motion, values=on_the_spot))
         places = positions(placed) * skeleton_of(motion).unit_factor(1.0)
         speeds = np.linalg.norm(np.diff(places, axis=0, prepend=places[:1]), axis=-1) * motion.fps
@@ -50,12 +47,12 @@ class Looks:
 
     @cached_property
     def _training(self) -> tuple[Array, Array]:
-        """Mean (F,), and by what features are divided (F,)."""
+        """Mean (F,), and by what features are divided (F,): at least by .001, what differs by less is the same."""
         motions = self.corpus.motions(self.corpus.parts.train)
         found = self._statistics(motions)
         sizes = [frames.shape[1] for frames in self.seen(motions[0])]
         weights = np.repeat(1 / np.sqrt(sizes), [2 * size for size in sizes])
-        return found.mean(axis=0), np.maximum(found.std(axis=0), LEAST) / weights
+        return found.mean(axis=0), np.maximum(found.std(axis=0), 1e-3) / weights
 
     def _statistics(self, motions: Sequence[Motion]) -> Array:
         """(N, F): for each array its means, then its standard deviations."""

@@ -11,11 +11,8 @@ from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
 from motet.representation.root_block import ROOT_BLOCK, from_root_block
 
-STANDS = ContactSettings(heights=(0.05, 0.05))
+LOW_FEET_STAND = ContactSettings(heights=(0.05, 0.05))
 """Joints of feet, by their heights alone."""
-
-QUIET = 5
-"""Per cent of the training motions whose last second has less energy than what counts as frozen."""
 
 
 def measures(motions: Sequence[Motion], contract: MotionContract, quiet: float) -> dict[str, float]:
@@ -56,9 +53,9 @@ def last_energy(z: Array, fps: float) -> float:
 
 
 def quiet_energy(motions: Sequence[Motion], contract: MotionContract) -> float:
-    """The energy of the last second below which QUIET per cent of the motions are."""
+    """The energy of the last second below which one motion in twenty is: it counts as frozen."""
     ends = [last_energy(contract.normalised(contract.frames(motion)), contract.fps) for motion in motions]
-    return float(np.percentile(ends, QUIET))
+    return float(np.percentile(ends, 5))
 
 
 def speed(motion: Motion) -> float:
@@ -75,7 +72,7 @@ def skate(motion: Motion) -> float:
     """
     skeleton = skeleton_of(motion)
     feet = positions(from_root_block(motion))[:, feet_of(skeleton)] * skeleton.unit_factor(1.0)
-    low = standing(feet[..., 1] - ground_of(feet[..., 1]), None, STANDS)
+    low = standing(feet[..., 1] - ground_of(feet[..., 1]), None, LOW_FEET_STAND)
     slides = ground_speeds(feet, motion.fps)
     slides[~(low[1:] & low[:-1])] = np.inf
     slowest = slides.min(axis=1)

@@ -16,8 +16,6 @@ from motet_train.evaluate.language.attributes import common_side, common_verbs, 
 from motet_train.evaluate.language.chain import knows
 from motet_train.evaluate.language.split_store import SplitStore, unknown_words_allowed
 
-SEEDS = 10
-
 
 class Travel(NamedTuple):
     """How a motion moves over the ground.
@@ -126,7 +124,7 @@ def _between(*samples: Sequence[float]) -> float:
     return float(np.mean([np.median(sample) for sample in samples])) if all(samples) else np.nan
 
 
-def prompted(model: GenerateModel, limits: Thresholds, seeds: int = SEEDS) -> dict[str, float]:
+def prompted(model: GenerateModel, limits: Thresholds, seeds: int = 10) -> dict[str, float]:
     """For each measurable one of ASKED the share of seeds whose likeliest motion is what the sentence says.
 
     A sentence of which the model knows no word counts as failed.

@@ -21,7 +21,7 @@ from motet_train.evaluate.language.split_store import SplitStore, unknown_words_
 from motet_train.evaluate.language.timelines import timeline_figures
 from motet_train.evaluate.tables import Goals, Report, gathered
 
-GOALS: Goals = {
+LANGUAGE_GOALS: Goals = {
     "gain.nearest": (0.10, None),
     "gain.frequent": (0.10, None),
     "words.verbs": (0.9, None),
@@ -38,11 +38,6 @@ GOALS: Goals = {
 
 SAMPLE, CHAIN_SAMPLE = 200, 40
 """Training motions, always the same, of which training BLEU is taken, and chained training BLEU."""
-
-LENGTHS = (1, 2, 3, 4)
-"""n-grams up to so many words count in BLEU of wordings that no training saw."""
-
-TRAINING = ("seconds", "epochs", "kept_epoch", "loss", "validation", "steps_per_second")
 
 
 def describe_report(model: DescribeModel, corpus: SplitStore) -> Report:
@@ -112,9 +107,10 @@ def _generated(model: GenerateModel, corpus: SplitStore, describe: DescribeModel
 def origin(manifest: Manifest, corpus: SplitStore) -> Report:
     """How the model was trained, and how many motions and people are in each part of the data."""
     training, parts, store = manifest.training, corpus.parts, corpus.store
+    told = ("seconds", "epochs", "kept_epoch", "loss", "validation", "steps_per_second")
     people = [{store.records[i].subject for i in part} for part in (parts.train, parts.test)]
     return {
-        "train": {key: float(training[key]) for key in TRAINING if key in training},
+        "train": {key: float(training[key]) for key in told if key in training},
         "data": {
             "train": float(len(parts.train)),
             "validation": float(len(parts.validation)),
@@ -140,8 +136,8 @@ def _unseen(hypotheses: list[list[str]], copied: References, corpus: SplitStore,
         return {"wording": counts, "bleu_unseen": dict.fromkeys(map(str, range(1, RANKS + 1)), np.nan)}
     found, said, references = ([rows[i] for i in kept] for rows in (hypotheses, copied, unseen))
     best = [row[0] for row in found]
-    by_length = {f"bleu_{n}": bleu(best, references, longest=n) for n in LENGTHS}
-    floor = {f"nearest_{n}": copied_bleu(said, references, n) for n in LENGTHS}
+    by_length = {f"bleu_{n}": bleu(best, references, longest=n) for n in (1, 2, 3, 4)}
+    floor = {f"nearest_{n}": copied_bleu(said, references, n) for n in (1, 2, 3, 4)}
     return {"wording": counts, "bleu_unseen": ranks(found, references), "unseen": by_length | floor}
 
 

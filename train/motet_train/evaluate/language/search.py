@@ -21,10 +21,7 @@ from motet_train.evaluate.language.report import origin
 from motet_train.evaluate.language.split_store import SplitStore, unknown_words_allowed
 from motet_train.evaluate.tables import Goals, Report, gathered
 
-GOALS: Goals = {"text.first_5": (0.8, None)}
-
-FIRST = (1, 5, 10)
-"""Among so many the right one is looked for."""
+SEARCH_GOALS: Goals = {"text.first_5": (0.8, None)}
 
 Order = NDArray[np.intp]
 """For each question (Q, N) the things that were searched, best first."""
@@ -92,9 +89,9 @@ class _Asked:
 
 
 def _ranks(right: NDArray[np.bool_]) -> dict[str, float]:
-    """Of which of the found (Q, N) are right, best first."""
+    """Of which of the found (Q, N) are right, best first: the shares among the first, and the median rank."""
     ranks = right.argmax(axis=1) + 1
-    shares = {f"first_{count}": float((ranks <= count).mean()) for count in FIRST}
+    shares = {f"first_{count}": float((ranks <= count).mean()) for count in (1, 5, 10)}
     return {**shares, "median_rank": float(np.median(ranks))}
 
 

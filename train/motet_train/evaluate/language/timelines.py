@@ -12,14 +12,8 @@ from motet.motion.motion import Motion
 from motet_train.evaluate.language.attributes import ACTIONS, action_right, common, said
 from motet_train.evaluate.language.split_store import SplitStore
 
-SECONDS = (2.0, 12.0)
-"""How long the motions are that are joined."""
-
 JOINED, COUNT = 3, 60
 """Motions in a timeline, and timelines."""
-
-NEAR = 1.0
-"""Seconds from a join within which a cut has found it."""
 
 Others = Mapping[int, Sequence[tuple[str, int]]]
 """For each record the records of other actions, each as often as it has actions, with the action."""
@@ -38,7 +32,8 @@ class _Measured(NamedTuple):
 def timeline_figures(
     model: DescribeModel, corpus: SplitStore, records: Sequence[int], seed: int = 0
 ) -> dict[str, float]:
-    """Of motions joined at random, neighbours of different actions: which joins are found, and what is said rightly.
+    """Of motions of 2 to 12 s, joined at random, neighbours of different actions: which joins are found, and what is
+    said rightly.
 
     "joins_found", "cuts_right": the shares of joins that have a cut within a second, and of cuts that have a join.
     "parts": how many a timeline has. "time_right": the share of time at which an action is named that people named of
@@ -65,11 +60,7 @@ def timeline_figures(
 
 def _others(corpus: SplitStore, records: Sequence[int]) -> Others:
     named = {record: [said(ACTIONS, sentence) for sentence in corpus.sentences(record)] for record in records}
-    agreed = {
-        record: common(found)
-        for record, found in named.items()
-        if SECONDS[0] <= corpus.motion(record).duration <= SECONDS[1]
-    }
+    agreed = {record: common(found) for record, found in named.items() if 2.0 <= corpus.motion(record).duration <= 12.0}
     anyone = {record: frozenset().union(*found) for record, found in named.items()}
     found = {
         one: [
@@ -118,11 +109,11 @@ def joined(motions: Sequence[Motion]) -> Motion:
 
 
 def matched(joins: Sequence[float], cuts: Sequence[float]) -> int:
-    """How many joins have a cut of their own within :data:`NEAR`, the nearest first."""
+    """How many joins have a cut of their own within a second, the nearest first."""
     pairs = sorted((abs(join - cut), join, cut) for join in joins for cut in cuts)
     free_joins, free_cuts = set(joins), set(cuts)
     for distance, join, cut in pairs:
-        if distance <= NEAR + 1e-9 and join in free_joins and cut in free_cuts:
+        if distance <= 1.0 + 1e-9 and join in free_joins and cut in free_cuts:
             free_joins.remove(join)
             free_cuts.remove(cut)
     return len(joins) - len(free_joins)

@@ -12,10 +12,10 @@ import numpy as np
 from motet.motion.rotations import Array, inverse, product, rotmat_to_rotvec, rotvec_to_rotmat
 
 ZERO, CONSTANT, DAMPED = "zero velocity", "constant velocity", "damped velocity"
-JOINTS = " of joints"
+OF_JOINTS = " of joints"
 """What follows the name of a floor whose velocities are those of joints' positions, not of rotations and the root."""
 
-FLOORS = (ZERO, CONSTANT, DAMPED, CONSTANT + JOINTS, DAMPED + JOINTS)
+FLOORS = (ZERO, CONSTANT, DAMPED, CONSTANT + OF_JOINTS, DAMPED + OF_JOINTS)
 
 DECAYS = np.linspace(0.0, 1.0, 21)
 """Those that are tried."""

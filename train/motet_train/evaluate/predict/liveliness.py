@@ -28,13 +28,13 @@ from motet_train.evaluate.feet import slide, stances
 from motet_train.evaluate.tables import Report, aligned, short_names
 from motet_train.evaluate.text_adherence.measures import BALLS
 
-GIVEN = 2.0
+GIVEN_SECONDS = 2.0
 """Seconds of a recording's end by which its pace is known; or all of it, where it is shorter."""
 
 SPANS = ((0, 1), (1, 5), (5, 30))
 """Seconds after the recording's end."""
 
-SYSTEMS = {"still": "standing still", "alone": "{name}, alone", "beyond": "{name}, then the writer"}
+CONTINUED = {"still": "standing still", "alone": "{name}, alone", "beyond": "{name}, then the writer"}
 """Standing still, the predictor alone, and with what continues beyond its horizon; and what tables call them."""
 
 Figures = dict[str, Report]
@@ -77,7 +77,7 @@ class Seen:
 
 def gait(seen: Seen) -> str | None:
     """ "walks" or "runs" for a recording of a second at least whose end goes, else None."""
-    paces = seen.last(GIVEN).paces
+    paces = seen.last(GIVEN_SECONDS).paces
     if len(paces) < round(seen.fps) - 1:
         return None
     halves = np.array_split(paces, max(1, round(2 * len(paces) / seen.fps)))
@@ -108,14 +108,14 @@ def measured(model: PredictModel, writer: CodesModel, trials: Mapping[str, Motio
 
 
 def _group(model: PredictModel, writer: CodesModel, motions: Sequence[Motion]) -> Report:
-    found: dict[str, list[tuple[Seen, Seen]]] = {system: [] for system in SYSTEMS}
+    found: dict[str, list[tuple[Seen, Seen]]] = {system: [] for system in CONTINUED}
     samples, count = list[dict[str, float]](), round(SPANS[-1][1] * model.fps)
     for motion in tqdm(motions, unit=" motions", disable=None, leave=False):
         whole = motion.resample(model.fps, to_end=True)
         given = Seen.of(whole)
         alone, beyond = (Seen.of(model.predict(whole, frames=count, beyond=one)).points for one in (None, writer))
         still = np.repeat(given.points[-1:], count, axis=0)
-        for system, points in zip(SYSTEMS, (still, alone, beyond), strict=True):
+        for system, points in zip(CONTINUED, (still, alone, beyond), strict=True):
             found[system].append((given, Seen(np.concatenate([given.points[-1:], points]), model.fps)))
         samples.append(_apart(model, writer, whole))
     recorded = {"recordings": float(len(motions)), "slide_cm": _slide(given for given, _ in found["still"])}
@@ -128,7 +128,7 @@ def figures(pairs: Sequence[tuple[Seen, Seen]]) -> dict[str, float]:
     of each span, the share of motions that keep their speed, and slides."""
     found = {}
     for start, stop in SPANS:
-        parts = [(given.last(GIVEN), following.part(start, stop)) for given, following in pairs]
+        parts = [(given.last(GIVEN_SECONDS), following.part(start, stop)) for given, following in pairs]
         speeds = np.array([part.paces.mean() / given.paces.mean() for given, part in parts])
         key = f"{start}_{stop}_s"
         found[f"speed_{key}"] = float(np.median(speeds))
@@ -179,11 +179,11 @@ def _rows(kind: str, reports: Mapping[str, Report]) -> list[Sequence[str]]:
         ["  the recordings", "", "", "", f"{recorded['slide_cm']:.1f}"],
     ]
     for number, (name, report) in enumerate(reports.items()):
-        for system in list(SYSTEMS)[min(number, 1) :]:
+        for system in list(CONTINUED)[min(number, 1) :]:
             cells = [
                 "  ".join(f"{report[system][f'{key}_{span}']:{how}}" for span in spans) for key, how in written.items()
             ]
-            rows.append([f"  {SYSTEMS[system].format(name=name)}", *cells])
+            rows.append([f"  {CONTINUED[system].format(name=name)}", *cells])
     rows.append(["  joints of different futures apart, cm: in the world, seen from the root"])
     for name, report in reports.items():
         far = [f"{report['samples'][f'{key}_cm_{stop}_s']:.0f}" for key in ("place", "pose") for _, stop in SPANS[:2]]

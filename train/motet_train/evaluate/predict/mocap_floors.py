@@ -20,16 +20,13 @@ from motet_train.evaluate.predict.floors import (
     DAMPED,
     DECAYS,
     FLOORS,
-    JOINTS,
+    OF_JOINTS,
     ZERO,
     best,
     gone_on,
     reach,
     turned_on,
 )
-
-CHOSEN = 512
-"""Windows of training motions, about, by which decays are chosen."""
 
 Decays = Mapping[str, tuple[Array, Array]]
 """Damped floor -> decays (N,) of the root's path, and of everything relative to it."""
@@ -90,7 +87,7 @@ def floors(windows: Windows, decays: Decays) -> dict[str, Array]:
     """What each floor predicts: places (W, N, J, 3)."""
     same = np.ones(windows.frames), np.ones(windows.frames)
     found = {ZERO: _of_joints(windows, 0.0) + _path(windows, 0.0)}
-    for end, relative in ENDS.items():
+    for end, relative in RELATIVE.items():
         for name, (path, rest) in {CONSTANT: same, DAMPED: decays[DAMPED + end]}.items():
             found[name + end] = relative(windows, rest) + _path(windows, path)
     return {name: found[name] for name in FLOORS}
@@ -115,7 +112,7 @@ def _of_joints(windows: Windows, decays: Array | float) -> Array:
     return gone_on(windows.given - windows.given[:, :, :1], reach(decays, windows.frames))
 
 
-ENDS: Mapping[str, Callable[[Windows, Array | float], Array]] = {"": _of_rotations, JOINTS: _of_joints}
+RELATIVE: Mapping[str, Callable[[Windows, Array | float], Array]] = {"": _of_rotations, OF_JOINTS: _of_joints}
 """End of a floor's name -> what it says of joints relative to the root."""
 
 
@@ -126,7 +123,7 @@ def chosen(store: Store, held_out: Sequence[str], fps: float, frames: int) -> di
     DataError where no training motion is long enough.
     """
     windows, found = Windows.of(training_windows(store, held_out, fps, frames), frames), {}
-    for end, relative in ENDS.items():
+    for end, relative in RELATIVE.items():
         rest = best([apart(relative(windows, decay), windows.truth)[1].mean(axis=0) for decay in DECAYS])
         there = relative(windows, rest)
         path = best([apart(there + _path(windows, decay), windows.truth)[0].mean(axis=0) for decay in DECAYS])
@@ -134,8 +131,8 @@ def chosen(store: Store, held_out: Sequence[str], fps: float, frames: int) -> di
     return found
 
 
-def training_windows(store: Store, held_out: Sequence[str], fps: float, frames: int) -> list[Motion]:
-    """About :data:`CHOSEN` evenly spaced windows of training motions at ``fps``: two frames and ``frames`` to come."""
+def training_windows(store: Store, held_out: Sequence[str], fps: float, frames: int, most: int = 512) -> list[Motion]:
+    """About ``most`` evenly spaced windows of training motions at ``fps``: two frames and ``frames`` to come."""
     playable, test = named(store.representation).motion, set(held_out)
     long = int(np.ceil((frames + 1) * store.fps / fps)) + 1
     starts = [
@@ -146,5 +143,5 @@ def training_windows(store: Store, held_out: Sequence[str], fps: float, frames: 
     ]
     return [
         playable(store.motion(number)[start : start + long]).resample(fps, to_end=True)[-frames - 2 :]
-        for number, start in starts[:: max(1, len(starts) // CHOSEN)]
+        for number, start in starts[:: max(1, len(starts) // most)]
     ]

@@ -19,8 +19,8 @@ from motet_train.evaluate.arrival import arrival
 from motet_train.evaluate.steer.standing import standing
 from motet_train.evaluate.steer.track import Track
 
-PHASES, APART = 8, 4
-"""Times of a change, and ticks between them."""
+PHASES = 8
+"""Times of a change, four ticks apart."""
 
 SETTLE = 3.0
 """Seconds before a change."""
@@ -49,7 +49,7 @@ def responses(model: SteerModel, before: Asked, after: Asked, seconds: float, ho
     for phase in range(PHASES):
         session = model.start(characters=len(before.gait), hold_feet=hold_feet)
         before.tell(session)
-        poses = [session.tick() for _ in range(round(SETTLE * model.fps) + APART * phase)][-1:]
+        poses = [session.tick() for _ in range(round(SETTLE * model.fps) + 4 * phase)][-1:]
         after.tell(session)
         poses += [session.tick() for _ in range(round(seconds * model.fps))]
         tracks.append(Track.of(poses, model.fps))

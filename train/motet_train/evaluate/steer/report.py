@@ -13,12 +13,12 @@ from motet_train.data.locomotion import Recording, gaits_of, recordings
 from motet_train.data.matching_rows import rows_of
 from motet_train.data.store import Store
 from motet_train.evaluate.steer.following import aside_errors, speed_errors, turn_errors
-from motet_train.evaluate.steer.standing import SPEEDS, held_on, standing, stretches
+from motet_train.evaluate.steer.standing import MEASURED_SPEEDS, held_on, standing, stretches
 from motet_train.evaluate.steer.track import Track, tracks_of
 from motet_train.evaluate.steer.wandering import Limits, wandering
 from motet_train.evaluate.tables import Goals, Report, gathered, report_table
 
-GOALS: Goals = {
+STEER_GOALS: Goals = {
     "walk.slide_cm": (None, 2.5),
     "walk.toe_speed": (None, 0.15),
     "walk.acceleration": (None, 6),
@@ -34,7 +34,7 @@ GOALS: Goals = {
 }
 """Figure -> (least, most) that the model that comes with motet is to reach."""
 
-BESIDE = {"recorded": "as recorded", "held": "feet held", "seldom": "seldom searched"}
+BESIDE_COLUMNS = {"recorded": "as recorded", "held": "feet held", "seldom": "seldom searched"}
 """What stands beside a model's figures, GROUP_NAME in a report, and the heads of their columns: recordings as they are
 and with their feet held, as they are played; and the rival."""
 
@@ -61,7 +61,7 @@ class Recorded:
     def standing(self, gait: str, held: bool) -> dict[str, float]:
         """The figures of :func:`standing`, of stretches of a gait's recordings."""
         own = [track for one, track in (self.held if held else self.plain) if gait in one.gaits]
-        return standing([part for track in own for part in stretches(track, SPEEDS[gait])])
+        return standing([part for track in own for part in stretches(track, MEASURED_SPEEDS[gait])])
 
 
 def _shown(store: Store, held: bool) -> list[tuple[Recording, Track]]:
@@ -78,7 +78,7 @@ def steer_report(model: SteerModel, recorded: Recorded, minutes: float = 10.0, c
     minutes, characters: how long how many figures are told anything at random.
     DataError for a model without a walk and a run.
     """
-    if missing := [gait for gait in SPEEDS if gait not in model.gaits]:
+    if missing := [gait for gait in MEASURED_SPEEDS if gait not in model.gaits]:
         raise DataError(f"a model that is steered is measured at a walk and a run; this one has no {missing[0]!r}")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ControlWarning)  # speeds that a gait does not have show in the figures
@@ -88,15 +88,15 @@ def steer_report(model: SteerModel, recorded: Recorded, minutes: float = 10.0, c
 def _parts(model: SteerModel, recorded: Recorded, minutes: float, characters: int) -> Iterator[Report]:
     limits = recorded.limits()
     measures: dict[str, Callable[[SteerModel], dict[str, float]]] = {
-        **{gait: partial(_standing, gait=gait) for gait in SPEEDS},
+        **{gait: partial(_standing, gait=gait) for gait in MEASURED_SPEEDS},
         "speed": speed_errors,
-        **{f"turn_{gait}": partial(turn_errors, gait=gait, pace=pace) for gait, pace in SPEEDS.items()},
+        **{f"turn_{gait}": partial(turn_errors, gait=gait, pace=pace) for gait, pace in MEASURED_SPEEDS.items()},
         "aside": aside_errors,
         "random": partial(wandering, limits=limits, seconds=60 * minutes, characters=characters),
     }
     for ending, one in {"": model, **rivals(model)}.items():
         yield from ({f"{name}{ending}": measure(one)} for name, measure in measures.items())
-    for gait in SPEEDS:
+    for gait in MEASURED_SPEEDS:
         yield {f"{gait}_recorded": recorded.standing(gait, False), f"{gait}_held": recorded.standing(gait, True)}
     yield {"random_held": {"largest_turn": float(limits.turn.max()), "largest_leap": 1.0}}
 
@@ -130,12 +130,12 @@ def steer_text(reports: Mapping[str, Report]) -> str:
     """A table of the figures of each model, with recordings and the rival of the first one beside them, and goals."""
     own = {name: _of(report, "") for name, report in reports.items()}
     first = next(iter(reports.values()))
-    return report_table(own, GOALS, {head: _of(first, f"_{kind}") for kind, head in BESIDE.items()})
+    return report_table(own, STEER_GOALS, {head: _of(first, f"_{kind}") for kind, head in BESIDE_COLUMNS.items()})
 
 
 def _of(report: Report, ending: str) -> Report:
     """The groups of a kind, without the ending that says which."""
-    endings = tuple(f"_{kind}" for kind in BESIDE)
+    endings = tuple(f"_{kind}" for kind in BESIDE_COLUMNS)
     return {
         group.removesuffix(ending): found
         for group, found in report.items()

@@ -16,19 +16,19 @@ from motet.motion.rotations import Array
 from motet_train.evaluate.feet import acceleration, slide, speed, stances
 from motet_train.evaluate.steer.track import Track
 
-SPEEDS = {"walk": 1.4, "run": 3.0}
+MEASURED_SPEEDS = {"walk": 1.4, "run": 3.0}
 """m/s at which a gait is measured."""
 
-CHARACTERS, SETTLE, MEASURED = 6, 3.0, 10.0
+STRAIGHT_FIGURES, STRAIGHT_SETTLE, STRAIGHT_MEASURED = 6, 3.0, 10.0
 """Figures that are steered straight on, in different directions; seconds that pass before, and that are measured."""
 
 
 def held_on(model: SteerModel, gait: str, hold_feet: bool) -> Track:
-    """Figures that go straight on at the speed of :data:`SPEEDS`."""
-    session = model.start(gait, characters=CHARACTERS, hold_feet=hold_feet)
-    session.control(speed=SPEEDS[gait], direction=np.arange(CHARACTERS) * 360 / CHARACTERS)
-    poses = [session.tick() for _ in range(round((SETTLE + MEASURED) * model.fps))]
-    return Track.of(poses, model.fps)[round(SETTLE * model.fps) :]
+    """Figures that go straight on at the speed of :data:`MEASURED_SPEEDS`."""
+    session = model.start(gait, characters=STRAIGHT_FIGURES, hold_feet=hold_feet)
+    session.control(speed=MEASURED_SPEEDS[gait], direction=np.arange(STRAIGHT_FIGURES) * 360 / STRAIGHT_FIGURES)
+    poses = [session.tick() for _ in range(round((STRAIGHT_SETTLE + STRAIGHT_MEASURED) * model.fps))]
+    return Track.of(poses, model.fps)[round(STRAIGHT_SETTLE * model.fps) :]
 
 
 def stretches(track: Track, pace: float) -> list[Track]:

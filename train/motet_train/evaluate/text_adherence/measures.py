@@ -9,7 +9,7 @@ from motet.motion.humanoid import HUMANOID
 from motet.motion.rotations import Array
 from motet_train.evaluate.text_adherence.track import RATE, Track, pair
 
-STANDS = ContactSettings(heights=(0.04, 0.04))
+BALLS_STAND = ContactSettings(heights=(0.04, 0.04))
 """The ball of a foot that is no higher than 2 cm above where it is in standing is on the ground."""
 
 BALLS = [HUMANOID.index(name) for name in pair("Toes")]
@@ -20,7 +20,7 @@ def slide(track: Track) -> float:
     """How fast feet on the ground slide, m/s: the mean speed over the ground of the balls of the feet from one frame to
     the next, in both of which they stand. NaN where none ever does."""
     balls = track.points[:, BALLS]
-    low = standing(balls[..., 1] - ground_of(track.points[:, feet_of(HUMANOID), 1]), None, STANDS)
+    low = standing(balls[..., 1] - ground_of(track.points[:, feet_of(HUMANOID), 1]), None, BALLS_STAND)
     stands = low[1:] & low[:-1]
     return float(ground_speeds(balls, RATE)[stands].mean()) if stands.any() else np.nan
 

@@ -25,7 +25,7 @@ RULES: Mapping[str, Callable[..., bool]] = MappingProxyType(
 )
 """Name -> rule: a track, and parameters by name, to whether it is so."""
 
-SHORTEST = 0.3
+SHORTEST_MOTION = 0.3
 """Seconds: a motion that is shorter does nothing that a sentence could say."""
 
 
@@ -64,7 +64,7 @@ def holds(track: Track, rules: Sequence[Mapping[str, Any]]) -> bool:
     """Whether all of some rules are so."""
     given = ({key: value for key, value in rule.items() if key != "is"} for rule in rules)
     found = (RULES[rule["is"]](track, **more) for rule, more in zip(rules, given, strict=True))
-    return track.seconds >= SHORTEST and all(found)
+    return track.seconds >= SHORTEST_MOTION and all(found)
 
 
 @cache

@@ -16,7 +16,7 @@ from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet_train.evaluate.language.split_store import unknown_words_allowed
 from motet_train.evaluate.tables import Report
-from motet_train.evaluate.text_adherence.prompts import SHORTEST, Prompt, actions
+from motet_train.evaluate.text_adherence.prompts import SHORTEST_MOTION, Prompt, actions
 from motet_train.evaluate.text_adherence.trials import Trial
 
 CHOICES = 32
@@ -60,10 +60,10 @@ def space_report(
 
 
 def embedded(model: SearchModel, motions: Sequence[Motion]) -> Floats:
-    """The directions (N, E) of motions, NaN for one that is shorter than :data:`SHORTEST`; MotionError as
+    """The directions (N, E) of motions, NaN for one that is shorter than :data:`SHORTEST_MOTION`; MotionError as
     :func:`direction` for others that the model cannot take."""
     nothing = np.full(model.sizes["E"], np.nan, np.float32)
-    found = [direction(model, motion) if motion.duration >= SHORTEST else nothing for motion in motions]
+    found = [direction(model, motion) if motion.duration >= SHORTEST_MOTION else nothing for motion in motions]
     return np.array(found, np.float32).reshape(-1, len(nothing))
 
 

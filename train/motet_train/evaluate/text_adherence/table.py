@@ -25,7 +25,7 @@ from motet_train.evaluate.text_adherence.trials import LookUp, Trial
 
 LEFT_90, RIGHT_90 = (f"a person walks forward and turns {side} 90 degrees" for side in ("left", "right"))
 
-GOALS: Goals = {
+SAYS_GOALS: Goals = {
     "says.all": (0.8, None),
     "says.locomotion": (0.95, None),
     "says.rest": (0.7, None),
@@ -161,7 +161,7 @@ def says_text(reports: Mapping[str, Report]) -> str:
         name: {group: found for group, found in report.items() if not group.startswith("prompt")}
         for name, report in reports.items()
     }
-    return f"{aligned(rows)}\n\n{report_table(rest, GOALS)}"
+    return f"{aligned(rows)}\n\n{report_table(rest, SAYS_GOALS)}"
 
 
 def says_drawings(generator: Generator, every: int = 8) -> Drawings:
