@@ -24,9 +24,6 @@ MAX_SKINS = 500
 MAX_JOINTS = 3000
 """Joints of a figure; one with a face of many bones has a thousand."""
 
-THINGS = ("mesh", "camera")
-"""What makes a node something else than a bone, unless it is animated; an extension, such as a light, does so, too."""
-
 
 @dataclass(frozen=True)
 class Figure:
@@ -102,7 +99,8 @@ def _animated(gltf: Gltf, moved: set[int]) -> list[set[int]]:
     hanging: set[int] = set()
     for node in gltf.order:
         held = gltf.parents[node] in bones or gltf.parents[node] in hanging
-        if held and (node in bones or not _is_thing(gltf, node, THINGS)):
+        # an extension, such as a light, makes a node a thing, too
+        if held and (node in bones or not _is_thing(gltf, node, ("mesh", "camera"))):
             hanging.add(node)
     parts = [part for part in _by_tree(gltf, bones | hanging) if part & bones & hanging]
     if not parts:

@@ -13,7 +13,7 @@ from motet.errors import BundleError, MotionError
 from motet.models.base import BundleModel
 from motet.models.gaps import Gap, at_own_rate, log_elsewhere, spans_of
 from motet.models.progress import Progress, silent
-from motet.motion.follow import alike, following
+from motet.motion.follow import placed_after, to_figure_of
 from motet.motion.humanoid import HUMANOID, on_humanoid
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
@@ -172,11 +172,11 @@ class FillModel(BundleModel):
         if None in (first.skeleton, second.skeleton) or not self._in_its_world(first):
             return self._elsewhere(first, second, seconds)
         count = max(1, round(seconds * first.fps))
-        other = second if second is first else alike(second, first)
+        other = second if second is first else to_figure_of(second, first)
         known = self._sides(first, other)
         ends = len(known.past)
         turn = float(facing(known.figure[:ends])[-1] - facing(known.figure[ends:])[0])
-        after = following(other, first, (count + 1) / first.fps, turn)
+        after = placed_after(other, first, (count + 1) / first.fps, turn)
         new = None if after is None else self._between(first, after, count)
         if after is None or new is None:
             return self._elsewhere(first, second, seconds)

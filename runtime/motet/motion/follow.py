@@ -21,7 +21,7 @@ from motet.motion.rotations import Array, axis_to_rotmat, inverse, product, rota
 log = logging.getLogger(__name__)
 
 
-def alike(motion: Motion, like: Motion) -> Motion:
+def to_figure_of(motion: Motion, like: Motion) -> Motion:
     """A motion at the frame rate, on the skeleton and in the channels of another.
 
     It is resampled, and put on the other's figure by way of the humanoid, where it has to be; both are logged as
@@ -50,7 +50,7 @@ def same_figure(motion: Motion, other: Motion) -> bool:
     return one.metres_per_unit == two.metres_per_unit and bool(apart <= 1e-3 * two.height)
 
 
-def following(motion: Motion, before: Motion, seconds: float, turn: float) -> Motion | None:
+def placed_after(motion: Motion, before: Motion, seconds: float, turn: float) -> Motion | None:
     """A motion set down so that its first frame is ``seconds`` after the last one of another of the same figure.
 
     turn: radians about the vertical axis y that it is turned by. In between the hips go, over the ground, at the mean
