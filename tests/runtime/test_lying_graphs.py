@@ -90,21 +90,21 @@ def test_a_manifest_that_does_not_fit_its_graphs_is_refused(
 
 
 @pytest.mark.parametrize(
-    ("name", "row", "value", "reason"),
+    ("name", "row", "value"),
     [
-        *(("left", 1000, value, "how many follow it") for value in (-1, 9569 - 1000)),
-        ("moves", 1000, 1e38, "numbers between -1e"),
-        ("shows", 1000, 2, "numbers between 0 and 1"),
-        *(("feature_scale", 3, value, "numbers between 1e-06") for value in (0, -1, np.nan)),
-        ("feature_mean", 3, np.inf, "numbers between"),
+        *(("left", 1000, value) for value in (-1, 9569 - 1000)),
+        ("moves", 1000, 1e38),
+        ("shows", 1000, 2),
+        *(("feature_scale", 3, value) for value in (0, -1, np.nan)),
+        ("feature_mean", 3, np.inf),
     ],
 )
-def test_plain_arrays_are_checked_as_they_are_loaded(name: str, row: int, value: float, reason: str) -> None:
+def test_plain_arrays_are_checked_as_they_are_loaded(name: str, row: int, value: float) -> None:
     bundle = Bundle.open("control")
     tables = {one: bundle.table(one) for one in bundle.manifest.tables}
     wrong = np.array(tables[name])
     wrong[row] = value
-    with pytest.raises(BundleError, match=f"table {name}: must hold .*{reason}"):
+    with pytest.raises(BundleError, match=f"table {name}: holds a number that is out of range"):
         build(bundle.manifest, {}, {**tables, name: wrong})
     with pytest.raises(BundleError, match=f"there is no table '{name}'"):
         build(bundle.manifest, {}, {one: table for one, table in tables.items() if one != name})

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from motet.arguments import checked_int
 from motet.bundle.fields import LARGEST, Fields
@@ -32,9 +32,6 @@ CHANNELS = (*ROOT_SIXD, *(f"{bone}.{kind}" for bone in BONES for kind in SIXD_KI
 
 FEATURE_STEPS = 16
 """Steps of a feature in a table: they are kept in 8 bits, in sixteenths of their scaled unit."""
-
-LEAST_ROWS = 2
-"""Of a table."""
 
 
 class SteerModel(ControlModel):
@@ -72,29 +69,25 @@ class SteerModel(ControlModel):
                 raise BundleError(f"table left: no row of {gait!r} is followed by {need} more of its recording")
 
     def _table(self, config: Fields) -> Table:
-        codes, moves = self.table("codes", "N K", "float16"), self.table("moves", "N 6", "float32")
-        features, shows = self.table("features", "N F", "int8"), self.table("shows", "N G", "uint8")
-        left, mean = self.table("left", "N", "int32"), self.table("feature_mean", "F", "float32")
-        scale = self.table("feature_scale", "F", "float32")
-        if len(left) < LEAST_ROWS or not ((left >= 0) & (left < np.arange(len(left), 0, -1))).all():
-            raise BundleError("table left: must hold for each row how many follow it, at least 2 rows in all")
-        for name, values, low, high in (
-            ("moves", moves, -LARGEST, LARGEST),
-            ("shows", shows, 0, 1),
-            ("feature_mean", mean, -LARGEST, LARGEST),
-            ("feature_scale", scale, 1e-6, LARGEST),
-        ):
-            if not ((values >= low) & (values <= high)).all():
-                raise BundleError(f"table {name}: must hold numbers between {low:g} and {high:g}")
+        codes, moves = self.table("codes", "N K", "float16"), self._bounded("moves", "N 6", "float32")
         return Table.of(
             np.concatenate([codes, moves], axis=1, dtype=np.float32),
-            (features / FEATURE_STEPS).astype(np.float32),
+            (self.table("features", "N F", "int8") / FEATURE_STEPS).astype(np.float32),
             config.whole("odd", 0, self.sizes["K"]),
-            shows=shows > 0,
-            left=left.astype(np.int64),
-            mean=mean.astype(np.float64),
-            scale=scale.astype(np.float64),
+            shows=self._bounded("shows", "N G", "uint8", 0, 1) > 0,
+            left=self._bounded("left", "N", "int32", 0, np.arange(len(codes))[::-1]).astype(np.int64),
+            mean=self._bounded("feature_mean", "F", "float32").astype(np.float64),
+            scale=self._bounded("feature_scale", "F", "float32", 1e-6).astype(np.float64),
         )
+
+    def _bounded(
+        self, name: str, shape: str, dtype: str, low: float = -LARGEST, high: ArrayLike = LARGEST
+    ) -> NDArray[Any]:
+        """A table whose numbers are within limits, one for all or one for each; BundleError where one is not."""
+        found = self.table(name, shape, dtype)
+        if not ((found >= low) & (found <= np.asarray(high))).all():
+            raise BundleError(f"table {name}: holds a number that is out of range")
+        return found
 
     def start(
         self,
