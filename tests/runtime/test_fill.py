@@ -248,7 +248,7 @@ def test_frames_between_are_the_same_wherever_they_are(model: FillModel) -> None
         model.replay(given, {"frames": 61})
     with pytest.raises(MotionError, match="at least 4 frames of 135 channels before it, not \\(3, 135\\)"):
         model.frames_between(frames[:3], frames[60:], 30)
-    with pytest.raises(MotionError, match="0 to 120 frames can be filled at once, not 121"):
+    with pytest.raises(MotionError, match="frames must be a whole number from 0 to 120, not 121"):
         model.frames_between(frames[:30], frames[60:], 121)
     with pytest.raises(MotionError, match="finite numbers"):
         model.frames_between(frames[:30] * np.nan, frames[60:], 30)

@@ -34,9 +34,9 @@ def test_a_page_needs_no_other_file(tmp_path: Path, steer_model: SteerModel) -> 
 
 
 def test_what_cannot_be_steered_is_refused(tmp_path: Path, steer_model: SteerModel) -> None:
-    for characters in (0, 9):
-        with pytest.raises(ControlError, match="1 to 8 characters"):
-            motet.write_live_page(tmp_path / "live.html", steer_model, characters)
+    for characters in (0, 9, 2.5):
+        with pytest.raises(ControlError, match="characters must be a whole number from 1 to 8"):
+            motet.write_live_page(tmp_path / "live.html", steer_model, characters)  # type: ignore[arg-type]
     with pytest.raises(BundleError, match="is not steered"):
         motet.live_page(motet.load("cmu-control"))
     with pytest.raises(OutputError):

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from motet.arguments import checked_int
 from motet.decode.matching import mirrored_features
 from motet.decode.steering_settings import SteeringSettings
 from motet.draw.body import Body
@@ -44,8 +45,7 @@ def live_page(model: SteerModel, characters: int = 1, title: str = "motet") -> s
     """
     if not isinstance(model, SteerModel):
         raise BundleError(f"{model} is not steered: a page needs a model such as motet.load('control')")
-    if not 1 <= characters <= MOST:
-        raise ControlError(f"a page has 1 to {MOST} characters, not {characters}")
+    characters = checked_int("characters", characters, 1, MOST, ControlError)
     data = {"net": net_data(model), "body": body_data(), "characters": characters, "most": MOST}
     scripts = {"LOOP": source("motet.live", "loop.js"), "OTHERS": source("motet.live", "others.js")}
     return filled(source("motet.live", "page.html"), title, data, **scripts)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from motet.arguments import checked_int
 from motet.errors import ControlError, ControlWarning, MotetError, quoted
 from motet.models.steer import SteerModel
 from motet.models.steer_session import LARGEST
@@ -65,8 +66,7 @@ class ClientSession:
 
     def _start(self, given: dict[str, Any]) -> None:
         characters, positions = given.pop("characters", 1), given.pop("positions", False)
-        if not isinstance(characters, int) or isinstance(characters, bool) or not 1 <= characters <= MOST:
-            raise ControlError(f"characters: expected a whole number from 1 to {MOST}")
+        checked_int("characters", characters, 1, MOST, ControlError)
         self.session = self.model.start(given.pop("gait", None), characters=characters, **given)
         self.positions, self.ticks = positions, 0
 

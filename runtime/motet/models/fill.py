@@ -7,6 +7,7 @@ from typing import Any, cast, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
+from motet.arguments import checked_int
 from motet.bundle.graph import Arrays, Graph
 from motet.bundle.manifest import Manifest
 from motet.errors import BundleError, MotionError
@@ -147,8 +148,7 @@ class FillModel(BundleModel):
                 raise MotionError(f"a gap needs {need}, not {part.shape}")
             if not np.isfinite(part).all():
                 raise MotionError("frames must be finite numbers")
-        if not 0 <= frames <= 2 * self.longest:
-            raise MotionError(f"0 to {2 * self.longest} frames can be filled at once, not {frames}")
+        frames = checked_int("frames", frames, 0, 2 * self.longest, MotionError)
         pose = pose_of(known[0][-1])
         past, after = seen_from(known[0][-self.context :], pose), seen_from(known[1][: self.context], pose)
         plain = bridge(past, after, frames, pace)
