@@ -133,13 +133,8 @@ def test_what_does_not_fit_is_refused(model: SteerModel, store: Store, folder: P
     assert isinstance(other, SteerModel)
     with pytest.raises(DataError, match="has no 'run'"):
         steer_report(other, recorded)
-    for more, said in (
-        ((), "--data: the store"),
-        (("--data", folder / "store", "--plots", folder / "p"), "no --plots"),
-    ):
-        result = CliRunner().invoke(main, ["evaluate", str(folder / "run"), *map(str, more)])
-        assert result.exit_code == 2
-        assert said in result.output
+    result = CliRunner().invoke(main, ["evaluate", str(folder / "run"), "--plots", str(folder / "p")])
+    assert (result.exit_code, "no --plots" in result.output) == (2, True)
 
 
 def test_the_command_prints_and_saves(folder: Path, monkeypatch: pytest.MonkeyPatch, report: Any) -> None:
@@ -150,7 +145,7 @@ def test_the_command_prints_and_saves(folder: Path, monkeypatch: pytest.MonkeyPa
     found = json.loads(result.stdout)
     assert found["random"]["broken"] == report["random"]["broken"]
     assert Run.load(folder / "run").manifest["quality"] == found
-    result = CliRunner().invoke(main, asked)
+    result = CliRunner().invoke(main, asked[:2])  # the store that it was trained on is found
     assert "seldom searched" in result.stdout
     assert "walk.slide_cm" in result.stdout
 

@@ -175,7 +175,8 @@ def test_a_store_of_angles_is_refused(store: Store, tmp_path: Path) -> None:
         train_steered(replace(store, representation="angles"), job)
 
 
-def test_the_command_asks_for_a_store(folder: Path) -> None:
+def test_the_command_finds_the_store_of_the_run(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("motet_train.cli.suites.steer_report", lambda model, recorded: {"walk": {"slide_cm": 1.5}})
     result = CliRunner().invoke(main, ["evaluate", str(folder / "run")])
-    assert result.exit_code == 2
-    assert "--data: the store" in result.output
+    assert result.exit_code == 0, result.output
+    assert "walk.slide_cm" in result.output
