@@ -9,18 +9,22 @@ import click
 from motet.bundle.bundle import Bundle
 from motet.bundle.session import SessionOptions
 from motet.cli.options import session_options
+from motet.models.load import KINDS
 from motet_export.bundles import export_run, halve_bundle, parity_of
-from motet_train.runs import Run
+from motet_train.runs import MANIFEST, Run
 
 
 @click.command()
 @click.argument("run", type=Path)
-@click.option("-o", "--out", required=True, type=Path, help="Bundle to write: a .zip, or a new folder.")
+@click.option(
+    "-o", "--out", required=True, type=Path, help="Bundle to write: a .zip, or a new folder; of runs, a folder."
+)
 @click.option("--int8", is_flag=True, help="8-bit weights: a quarter of the size; reports changes.")
 @click.option("--half", is_flag=True, help="16-bit weights, computed with in 32 bits: half the size.")
 def export(run: Path, out: Path, int8: bool, half: bool) -> None:
     """Export the training run RUN to ONNX as a bundle, if ONNX Runtime computes what torch does.
 
+    RUN may be the folder that `motet train all` wrote: then OUT gets a bundle of each run that is a model by itself.
     With --half, RUN may be a bundle, too: it is written anew with its weights rounded.
     """
     if half and run.suffix == ".zip":
@@ -28,7 +32,22 @@ def export(run: Path, out: Path, int8: bool, half: bool) -> None:
             click.echo(f"half {name:<20} {value:.3g}")
         click.echo(str(out))
         return
-    report = export_run(Run.load(run), out, int8, half)
+    if (run / MANIFEST).is_file() or not (runs := _models_in(run)):
+        _export(Run.load(run), out, int8, half)
+        return
+    out.mkdir(parents=True, exist_ok=True)
+    for name, one in runs.items():
+        _export(one, out / f"{name}.zip", int8, half)
+
+
+def _models_in(folder: Path) -> dict[str, Run]:
+    """The runs in a folder that are models by themselves, by name."""
+    runs = {path.parent.name: Run.load(path.parent) for path in sorted(folder.glob(f"*/{MANIFEST}"))}
+    return {name: run for name, run in runs.items() if run.manifest["verb"] in {kind.VERB for kind in KINDS}}
+
+
+def _export(run: Run, out: Path, int8: bool, half: bool) -> None:
+    report = export_run(run, out, int8, half)
     click.echo(_lines(report))
     for name, value in report.get("int8", {}).items():
         click.echo(f"int8 {name:<20} {value:.3g}")

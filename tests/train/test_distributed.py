@@ -23,7 +23,7 @@ dropout = 0.0
 """
 NETS = {
     "describe": "embedding = 4\nframe_noise = 0.0",
-    "generate": "embedding = 4\ncomponents = 2\nfeed_noise = 0.0\nframe_dropout = 0.0\n[visits]\noffsets = 2",
+    "mixture": "embedding = 4\ncomponents = 2\nfeed_noise = 0.0\nframe_dropout = 0.0\n[visits]\noffsets = 2",
 }
 
 

@@ -27,7 +27,7 @@ from motet_train.recipes.recipe import SETTINGS, Job, Recipe
 from motet_train.runs import Run
 from motet_train.trainer import CHECKPOINT, LOG
 
-VERBS = ("describe", "generate")
+COMMANDS = {"describe": "describe", "mixture": "generate"}
 
 
 @pytest.fixture(scope="module")
@@ -60,9 +60,11 @@ def trained(verb: str, store: Path, out: Path, *options: object) -> Run:
     return Run.load(out)
 
 
-@pytest.mark.parametrize("verb", VERBS)
-def test_the_manifest_says_all(verb: str, store: Path, tmp_path: Path) -> None:
-    run = trained(verb, store, tmp_path / "run", "--name", "mine", "--data-licence", "free", "--seed", 3, "--no-mirror")
+@pytest.mark.parametrize(("command", "verb"), COMMANDS.items())
+def test_the_manifest_says_all(command: str, verb: str, store: Path, tmp_path: Path) -> None:
+    run = trained(
+        command, store, tmp_path / "run", "--name", "mine", "--data-licence", "free", "--seed", 3, "--no-mirror"
+    )
     manifest, training = run.manifest, run.manifest["training"]
     found = divided(Store.open(store), mirror=False)
     assert (manifest["name"], manifest["verb"]) == ("mine", verb)
@@ -90,7 +92,7 @@ def test_the_manifest_says_all(verb: str, store: Path, tmp_path: Path) -> None:
     assert training["validation"] == min(line["validation"] for line in lines)
 
 
-@pytest.mark.parametrize("verb", VERBS)
+@pytest.mark.parametrize("verb", COMMANDS)
 def test_resumed_training_is_the_same_to_the_bit(verb: str, store: Path, tmp_path: Path) -> None:
     whole = trained(verb, store, tmp_path / "whole")
     trained(verb, store, tmp_path / "parts", "--epochs", 1)
@@ -115,7 +117,7 @@ def test_nothing_is_left_of_a_run_without_an_epoch(
     store: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stop_at(monkeypatch, epoch=1)
-    assert motet("train", "generate", "--data", store, "--out", tmp_path / "run").exit_code == 130
+    assert motet("train", "mixture", "--data", store, "--out", tmp_path / "run").exit_code == 130
     assert list(tmp_path.iterdir()) == []
 
 
@@ -200,7 +202,7 @@ def test_only_channels_that_travel_are_summed(store: Path, tmp_path: Path, repre
 
 
 def test_either_loss_can_be_trained(store: Path, tmp_path: Path) -> None:
-    runs = [trained("generate", store, tmp_path / loss, "--loss", loss) for loss in ("surrogate", "likelihood")]
+    runs = [trained("mixture", store, tmp_path / loss, "--loss", loss) for loss in ("surrogate", "likelihood")]
     assert [run.manifest["config"]["loss"] for run in runs] == ["surrogate", "likelihood"]
     assert runs[0].manifest["training"]["loss"] != runs[1].manifest["training"]["loss"]
 

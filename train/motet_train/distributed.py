@@ -20,7 +20,7 @@ Value = TypeVar("Value")
 @contextmanager
 def processes(device: str) -> Iterator[str]:
     """Join the processes that ``torchrun`` started, where it did; gives the device of this one."""
-    if not (dist.is_available() and dist.is_torchelastic_launched()):
+    if not launched():
         yield device
         return
     if device == "cuda":
@@ -31,6 +31,11 @@ def processes(device: str) -> Iterator[str]:
         yield device
     finally:
         dist.destroy_process_group()
+
+
+def launched() -> bool:
+    """Whether ``torchrun`` started this process."""
+    return dist.is_available() and dist.is_torchelastic_launched()
 
 
 def rank() -> int:

@@ -4,19 +4,21 @@ import logging
 import math
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol
 
 from tqdm import tqdm
 
 from motet_train import distributed
+from motet_train.data.records import Record, Skipped
 from motet_train.runs import RunError
 
 log = logging.getLogger("motet.train")
 
 SOON = 10.0
-"""Seconds after which a line is said, as a chunk may take many minutes."""
+"""Seconds after which a line is said, as a chunk, or preparing motions, may take many minutes."""
 
 
 class Watcher(Protocol):
@@ -91,6 +93,25 @@ class Shown:
             self.bar.close()
         if self.writer is not None:
             self.writer.close()
+
+
+@contextmanager
+def preparing(total: int) -> Iterator[Callable[[Record | Skipped], None]]:
+    """A bar of motions that are prepared, and the names of those skipped; where nobody watches, a line now and then."""
+    count, due = 0, time.monotonic() + SOON
+    with tqdm(total=total, unit=" motions", disable=None) as bar:
+
+        def done(item: Record | Skipped) -> None:
+            nonlocal count, due
+            count += 1
+            bar.update()
+            if isinstance(item, Skipped):
+                bar.write(f"skipped {item.name}: {item.reason}")
+            if bar.disable and time.monotonic() > due:
+                due = time.monotonic() + SOON
+                log.info("prepared %d of %d motions", count, total)
+
+        yield done
 
 
 def _writer(folder: Path) -> Any:

@@ -14,7 +14,7 @@ Such as::
 import json
 import tomllib
 import types
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
@@ -32,14 +32,31 @@ class SettingsError(MotetError, ValueError):
 
 def read_settings(path: Path) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
     """The options and the tables in a file, with underscores for hyphens in names; SettingsError if it is not TOML."""
+    data = _read(path)
+    tables = {key: value for key, value in data.items() if isinstance(value, dict)}
+    _known(path, tables, TABLES)
+    return {key: value for key, value in data.items() if key not in tables}, tables
+
+
+def read_stages(path: Path, stages: Collection[str]) -> dict[str, dict[str, dict[str, Any]]]:
+    """The tables in a file for each of several trainings, such as ``[describe.training]``; as :func:`read_settings`."""
+    data = _read(path)
+    _known(path, data, stages)
+    for stage, tables in data.items():
+        _known(path, tables if isinstance(tables, dict) else {"": tables}, TABLES, f"{stage}.")
+    return data
+
+
+def _read(path: Path) -> dict[str, Any]:
     try:
-        data = _named(tomllib.loads(path.read_text(encoding="utf-8")))
+        return _named(tomllib.loads(path.read_text(encoding="utf-8")))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise SettingsError(f"the settings {path} cannot be read: {error}") from error
-    tables = {key: value for key, value in data.items() if isinstance(value, dict)}
-    if unknown := sorted(tables.keys() - TABLES.keys()):
-        raise SettingsError(f"{path}: unknown table [{unknown[0]}]: expected one of {', '.join(TABLES)}")
-    return {key: value for key, value in data.items() if key not in tables}, tables
+
+
+def _known(path: Path, given: Mapping[str, Any], expected: Collection[str], inside: str = "") -> None:
+    if unknown := sorted(given.keys() - set(expected)):
+        raise SettingsError(f"{path}: unknown table [{inside}{unknown[0]}]: expected one of {', '.join(expected)}")
 
 
 def changed(recipe: Recipe, tables: Mapping[str, Mapping[str, Any]], options: Mapping[str, Any]) -> Recipe:

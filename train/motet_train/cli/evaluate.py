@@ -19,7 +19,7 @@ from motet_train.cli.prepared import store_beside
 from motet_train.cli.suites import SAYS, Given, Results, Suite, suite_of
 from motet_train.cli.train_options import unit_in
 from motet_train.data.errors import DataError
-from motet_train.data.store import INDEX
+from motet_train.data.store import INDEX, part
 from motet_train.evaluate.figures import make_folder, save
 from motet_train.recipes.recipe import SETTINGS
 from motet_train.runs import MANIFEST, Run
@@ -129,7 +129,7 @@ def data_of(models: Mapping[str, BundleModel], suite: Suite, data: Path | None) 
         raise click.UsageError(f"{suite.what} need --data: {suite.data}{was}")
     if lost is not None and not suite.data:
         raise DataError(f"the clips that {lost[0]} was trained on, {lost[1]}, are missing: give --data")
-    return found
+    return {name: at and part(at, models[name].manifest.motion.representation) for name, at in found.items()}
 
 
 def _found(run: Path, told: Path | None, data: Path | None, bundled: bool) -> Path | None:

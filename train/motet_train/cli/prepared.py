@@ -9,6 +9,7 @@ from motet_train import distributed
 from motet_train.cli.prepare import prepare
 from motet_train.data.errors import DataError
 from motet_train.data.store import INDEX, Store
+from motet_train.plan import kind_for, store_for
 from motet_train.recipes.recipe import Job
 from motet_train.trainer import CHECKPOINT
 
@@ -18,12 +19,12 @@ def prepared(data: Path, job: Job, **corpus: Any) -> Store:
 
     corpus: options of ``motet prepare``.
     """
-    if (data / INDEX).is_file():
-        return Store.open(data)
+    if ((found := store_for(data, job.recipe)) / INDEX).is_file():
+        return Store.open(found)
     place = store_beside(job.folder)
     if (job.folder / CHECKPOINT).is_file():
         return Store.open(place)
-    verb = "codes" if job.recipe.loop == "codes" or job.recipe.verb in ("control", "fill") else job.recipe.verb
+    verb = kind_for(job.recipe)
     if distributed.count() > 1:
         raise DataError(f"several processes need a prepared store: motet prepare {data} --for {verb} --out {place}")
     click.get_current_context().invoke(prepare, data=(data,), out=place, verb=verb, fps=None, **corpus)

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -35,8 +36,7 @@ class Preparation:
 
     def pieces(self, motion: Motion) -> list[Motion]:
         """The motion that is trained on, in equal pieces shorter than ``longest``; MotionError where it is unfit."""
-        motion = on_humanoid(motion) if self.humanoid else motion
-        motion = trim(motion) if self.trim else motion
+        motion = _brought(motion, self.humanoid, self.trim)
         if motion.duration < SHORTEST or not (self.cut or motion.duration < self.longest):
             limits = f"at least {SHORTEST:g} s" + ("" if self.cut else f" and less than {self.longest:g} s")
             raise MotionError(f"{motion.duration:.3g} s ({len(motion)} frames): a training motion has {limits}")
@@ -52,6 +52,12 @@ class Preparation:
         return sequences(self.representation, piece, self.fps, like)
 
 
+@lru_cache(maxsize=1)  # the parts of a store bring each motion to the humanoid once
+def _brought(motion: Motion, humanoid: bool, trimmed: bool) -> Motion:
+    motion = on_humanoid(motion) if humanoid else motion
+    return trim(motion) if trimmed else motion
+
+
 ANGLES = Preparation("angles", humanoid=False, trim=False, cut=False)
 """The paper's: joint angles alone, every motion as it is."""
 
@@ -63,6 +69,9 @@ SIXD = Preparation("root_sixd", humanoid=True, trim=True, cut=True, fps=30.0)
 
 VECTORS = Preparation("root_vectors", humanoid=True, trim=True, cut=False, fps=30.0, longest=math.inf)
 """The root block and exponential maps: what predictors continue."""
+
+ALL = {one.representation: one for one in (FULL, SIXD, VECTORS)}
+"""The parts of a store that every verb is trained on."""
 
 FIGURES = ("humanoid", "own")
 

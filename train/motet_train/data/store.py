@@ -1,11 +1,13 @@
 """The store: a corpus prepared once, its frames in one memory-mapped array.
 
 A folder with ``frames.npy``, (N, D) float32 in the contract's channels, and ``store.json``, which says what they
-are, where each record's sequences lie, and what was skipped.
+are, where each record's sequences lie, and what was skipped. Or a folder with such a store in each of several
+representations, by their names.
 """
 
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -120,27 +122,52 @@ def _entry(data: dict[str, Any]) -> Entry:
     return Entry(**{**data, **said, "spans": spans})
 
 
+def is_store(path: Path) -> bool:
+    """Whether a store is at a place, of one representation or several."""
+    return (path / INDEX).is_file() or any(path.glob(f"*/{INDEX}"))
+
+
+def part(path: Path, representation: str) -> Path:
+    """The store in a representation at a place: the part of that name, or else the place itself."""
+    return path / representation if (path / representation / INDEX).is_file() else path
+
+
 def prepare(
     items: Iterable[Item],
     path: Path,
     preparation: Preparation,
     progress: Callable[[Item], object] = lambda item: None,
 ) -> Store:
-    """Write the store of a corpus into the new folder ``path``, whole or not at all, one motion in memory at a time.
+    """Write the store of a corpus, see :func:`prepare_parts`."""
+    prepare_parts(items, path, {".": preparation}, progress)
+    return Store.open(path)
+
+
+def prepare_parts(
+    items: Iterable[Item],
+    path: Path,
+    parts: Mapping[str, Preparation],
+    progress: Callable[[Item], object] = lambda item: None,
+) -> None:
+    """Write stores of a corpus into the new folder ``path``, whole or not at all, one motion in memory at a time.
+
+    parts: the preparation of each, by its folder inside.
 
     The first motion that can be used sets channels and the joints' axes; others are brought to these, and one that
     lacks channels, or whose bones point elsewhere at rest, is skipped, as is any that the representation refuses.
-    progress: called with each item when it is done; what could not be used comes as Skipped.
+    progress: called with each item when it is done; what some part could not use comes as Skipped.
     OutputError if there is something at ``path``, DataError if no motion can be used.
     """
-    with new_folder(path) as folder:
-        with (folder / FRAMES).open("wb") as file:
-            writer = _Writer(file, preparation)
-            for item in items:
-                progress(writer.add(item))
-            index = writer.finish()
-        (folder / INDEX).write_text(json.dumps(index), encoding="utf-8")
-    return Store.open(path)
+    with new_folder(path) as folder, ExitStack() as files:
+        writers = []
+        for name, preparation in parts.items():
+            (folder / name).mkdir(exist_ok=True)
+            writers.append(_Writer(files.enter_context((folder / name / FRAMES).open("wb")), preparation))
+        for item in items:
+            added = [writer.add(item) for writer in writers]
+            progress(next((one for one in added if isinstance(one, Skipped)), item))
+        for name, writer in zip(parts, writers, strict=True):
+            (folder / name / INDEX).write_text(json.dumps(writer.finish()), encoding="utf-8")
 
 
 class _Writer:

@@ -57,14 +57,15 @@ TRAINING = Training(
 
 DEFAULT = Recipe("codec", "motion-codec", "codes", CodecConfig(0), ("channels", "tree"), TRAINING, CodecVisits())
 
-DECODER = replace(
-    DEFAULT,
-    training=replace(TRAINING, steps=4000, learning_rate=1e-3),
-    visits=CodecVisits(sharp=1.0),
-)
+DECODING = replace(TRAINING, steps=4000, learning_rate=1e-3)
+
+DECODER = replace(DEFAULT, training=DECODING, visits=CodecVisits(sharp=1.0))
 """What the decoder of a codec is trained on with, when its codes are settled."""
 
-RECIPES = {"default": DEFAULT, "decoder": DECODER}
+SHARP = replace(DECODER, training=replace(DECODING, steps=1000, precision="float32"))
+"""The last of its decoder's training: rounding to bfloat16 adds jerk, by which the decoder learns to be too smooth."""
+
+RECIPES = {"default": DEFAULT, "decoder": DECODER, "sharp": SHARP}
 
 
 def train_codec(store: Store, job: Job, data: str = "", by: str = "trial", start: Run | None = None) -> Run:
@@ -78,13 +79,14 @@ def train_codec(store: Store, job: Job, data: str = "", by: str = "trial", start
         raise DataError(f"a codec is trained on root_sixd (motet prepare --for codes), not {store.representation}")
     parts = split(store.records, 0, by)
     contract = store.contract(parts.train)
-    config = recipe.sized(channels=len(contract.channels), tree=tree_of(contract))
+    settled = None if start is None else _settled(start)
+    config = settled.config if settled else recipe.sized(channels=len(contract.channels), tree=tree_of(contract))
     train, validation = (
         SixdWindows(store, part, recipe.visits.frames, config.hop, frame_mirror(contract))
         for part in (parts.train, parts.validation)
     )
     torch.manual_seed(job.about.seed)
-    net = _untrained(config, contract, train, job.about.seed) if start is None else _settled(start)
+    net = settled or _untrained(config, contract, train, job.about.seed)
     book = net.book.numpy().astype(np.float64)
     weights = _weights(contract, recipe.visits.ends).to(job.device)
 

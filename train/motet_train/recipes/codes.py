@@ -50,7 +50,7 @@ DEFAULT = Recipe(
     CodeModelConfig(0),
     ("actions",),
     Training(
-        steps=6000,
+        steps=4500,
         every=300,
         batch=16,
         optimiser="muon",
@@ -69,27 +69,27 @@ DEFAULT = Recipe(
 RECIPES = {"default": DEFAULT}
 
 
-def train_codes(store: Store, codec: Run, text: Run, job: Job, data: str = "", by: str = "trial") -> Run:
+def train_codes(store: Store, job: Job, data: str, by: str, codec: Run, actions: Run) -> Run:
     """Train a writer on a store, for the runs of a codec and of a net of actions that were trained on the same store,
     divided alike. DataError where they were not."""
     recipe, training = job.recipe, job.recipe.training
     assert training is not None
     found = divided(store, mirror=True, by=by)
     mirror = frame_mirror(found.contract)
-    actions = spoken(store, found.parts.train)
-    coder, reader = _codec(codec), _reader(text, found.vocabulary, actions)
+    shown = spoken(store, found.parts.train)
+    coder, reader = _codec(codec), _reader(actions, found.vocabulary, shown)
     torch.manual_seed(job.about.seed)
-    motions = coded(store, found.parts.train, coder.eval(), actions, mirror)
-    net = _untrained(recipe.sized(actions=len(actions)), coder, reader, memory_of(motions))
+    motions = coded(store, found.parts.train, coder.eval(), shown, mirror)
+    net = _untrained(recipe.sized(actions=len(shown)), coder, reader, memory_of(motions))
     windows = CodeWindows(motions, recipe.visits.window, net.end, recipe.visits.first)
 
     def batches(rng: np.random.Generator) -> Iterator[CodeBatch]:
-        yield windows.draw(training.batch, net.config.writer.unsaid, len(actions), rng)
+        yield windows.draw(training.batch, net.config.writer.unsaid, len(shown), rng)
 
     learner = GradientLearner(net.to(job.device), training, lambda batch: _loss(net, batch), batches)
     about = manifest(job, found, asdict(net.config), data, by)
-    about["actions"] = text.manifest["actions"]
-    about["training"] |= {"codec": _made(codec.manifest["training"]), "actions": _made(text.manifest["training"])}
+    about["actions"] = actions.manifest["actions"]
+    about["training"] |= {"codec": _made(codec.manifest["training"]), "actions": _made(actions.manifest["training"])}
     return job.run(net, learner, about)
 
 
