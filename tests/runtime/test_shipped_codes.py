@@ -103,6 +103,13 @@ def test_a_figure_stands_where_that_is_asked(model: CodesModel) -> None:
     assert [one.text for one in story.passages] == ["a person stands still", WALK, "a person stands still"]
 
 
+def test_more_hypotheses_begin_with_the_same(model: CodesModel) -> None:
+    alone, several = (model.generate([WALK, "a person waves"], n, seconds=1.0, seed=3) for n in (1, 3))
+    for (one,), (first, *others) in zip(alone, several, strict=True):
+        np.testing.assert_array_equal(one.frames, first.frames)
+        assert not any(np.array_equal(other.frames, first.frames) for other in others)
+
+
 def test_it_says_what_it_does_not_know(model: CodesModel) -> None:
     assert model.understood(WALK).confident
     assert not model.understood("a person plays tennis").confident  # .28

@@ -23,6 +23,11 @@ class Noise(Protocol):
         """Uniform numbers in [0, 1)."""
 
 
+def apart(noise: Noise, count: int) -> list[Noise]:
+    """Noise for each of several draws, whose first draws what it would draw alone; what is recorded is one for all."""
+    return [noise, *noise.spawn(count - 1)] if isinstance(noise, np.random.Generator) else [noise] * count
+
+
 class RowNoise:
     """Uniform numbers in [0, 1) for each row and tick; row i depends on ``seeds[i]`` and the tick alone.
 

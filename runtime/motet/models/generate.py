@@ -141,7 +141,7 @@ class GenerateModel(LanguageModel):
     ) -> list[Generated] | list[list[Generated]]:
         """``hypotheses`` motions for a sentence; for several sentences a list for each.
 
-        A mixture ranks them, the likeliest per frame first. Of codes they are independent, in the order of their draws.
+        A mixture ranks them, the likeliest per frame first. Of codes they are independent, the first what it is alone.
         seed: sentence i has seed + i (or seed[i]), and the motions it would have alone with that seed.
         progress: called with the number of sentences done and of all.
         strict: refuse a sentence of which the model knows only a part, instead of warning.

@@ -14,7 +14,7 @@ from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
 from motet.decode.codes import Drawing, Source, Writer, draw_codes, drawn_actions, drawn_steps
 from motet.decode.memory import Memory
-from motet.decode.noise import Noise
+from motet.decode.noise import Noise, apart
 from motet.decode.planar import nearest_moves
 from motet.decode.rollout import Ids
 from motet.decode.sample import Sample
@@ -119,7 +119,7 @@ class CodesModel(GenerateModel):
         """See :meth:`GenerateModel.decode`."""
         count = settings["hypotheses"]
         rows = np.repeat(np.arange(len(contexts)), count)
-        each = [noise[row] for row in rows.tolist()]
+        each = [one for own in noise for one in apart(own, count)]
         actions = drawn_actions(self.source, contexts[rows], each, settings["certainty"])
         longest = self.steps(settings["seconds"] or settings["max_seconds"])
         found = draw_codes(self._writer(each, settings), actions, longest, exactly=settings["seconds"] > 0)
