@@ -165,7 +165,11 @@ def test_files_are_read_and_missing_ones_named(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("line", "said"),
-    [("1,2,3", "3 numbers instead of 117"), (",".join("x" * 117), "could not convert"), ("nan," * 116 + "1", "finite")],
+    [
+        ("1,2,3", "3 numbers instead of 117"),
+        (",".join("x" * 117), "'x' is not a finite number"),
+        ("nan," * 116 + "1", "finite"),
+    ],
 )
 def test_a_bad_line_is_named(tmp_path: Path, line: str, said: str) -> None:
     path = write_files(tmp_path) / "train" / "walking" / "walking_2.txt"

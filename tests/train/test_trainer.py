@@ -19,7 +19,6 @@ from motet_train.descent import GradientLearner, Term, Terms, Training, rate
 from motet_train.papers.li2018.convseq2seq import Config, ConvSeq2Seq, Discriminator
 from motet_train.papers.li2018.recipe import Adversary
 from motet_train.papers.li2018.stepwise import Stepwise
-from motet_train.papers.tdbn import angle_crbm, tdbn
 from motet_train.papers.tdbn.angle_crbm import AngleCRBM, AngleCRBMConfig
 from motet_train.papers.tdbn.body import body_parts
 from motet_train.papers.tdbn.clips import read_clips
@@ -92,7 +91,7 @@ def control(restarts: int = 2, missed: Callable[[int], list[str]] | None = None)
     controls = [
         [label.expand(len(one), -1) for one in group] for label, group in zip(torch.eye(3), frames, strict=True)
     ]
-    stages, others = tdbn.stages(net, frames, controls, (1.0, 1.0, 1.0), generator)
+    stages, others = net.stages(frames, controls, (1.0, 1.0, 1.0), generator)
     return DivergenceLearner(net, stages, generator, missed or (lambda enough: ["a", "b"]), others)
 
 
@@ -104,7 +103,7 @@ def baseline() -> DivergenceLearner:
 
 
 def _baseline(net: AngleCRBM, frames: list[list[Tensor]], generator: torch.Generator) -> Any:
-    stages, others = angle_crbm.stages(net, frames, [[torch.ones(40, 1)]], (1.0,), generator)
+    stages, others = net.stages(frames, [[torch.ones(40, 1)]], (1.0,), generator)
     return stages, generator, None, others
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from motet.errors import FormatError
+from motet.formats.lines import numbers
 from motet.motion.rotations import Array
 from motet_train.data.archive import Archive
 from motet_train.data.errors import DataError
@@ -152,13 +153,7 @@ def _row(line: str, path: str | Path, number: int, columns: int) -> list[float]:
     parts = line.split(",")
     if len(parts) != columns:
         raise FormatError(path, f"{len(parts)} numbers instead of {columns}", number)
-    try:
-        row = [float(part) for part in parts]
-    except ValueError as error:
-        raise FormatError(path, str(error), number) from error
-    if not np.isfinite(row).all():
-        raise FormatError(path, "a number that is not finite", number)
-    return row
+    return numbers(parts, Path(path), number)
 
 
 def _layout(archive: Archive) -> Layout | None:

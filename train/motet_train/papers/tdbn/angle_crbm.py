@@ -10,17 +10,16 @@ Letters in shapes: B rows, T frames, D channels, K taps, L labels, C control uni
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from typing import Any
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
-from motet.representation.contract import Z_LIMIT
 from motet_train.models.net import tuples
-from motet_train.models.normalised import normalised
 from motet_train.papers.tdbn.contrastive import Learning, Stage
-from motet_train.papers.tdbn.control_net import ControlNet
-from motet_train.papers.tdbn.crbm import CRBM, CRBMLayer, Past, transitions
+from motet_train.papers.tdbn.control_net import ControlNet, Sequences
+from motet_train.papers.tdbn.crbm import CRBM, Past
 
 
 @dataclass(frozen=True)
@@ -64,7 +63,7 @@ class AngleCRBM(ControlNet):
 
     def encode(self, frames: Tensor) -> Tensor:
         """Frames (B, D) to z-scored angles (B, D)."""
-        return normalised(frames, self.mean, self.scale, Z_LIMIT / self.config.sigma)
+        return self.normalised(frames)
 
     def decode(self, codes: Tensor) -> Tensor:
         """Z-scored angles (B, D) to frames (B, D)."""
@@ -74,6 +73,20 @@ class AngleCRBM(ControlNet):
         """Means (variety 0) and normal samples about them (variety 1), by Box and Muller from noise (B, 2 D)."""
         first, second = noise.chunk(2, dim=1)
         return mean + variety * torch.sqrt(-2 * torch.log(1 - first)) * torch.cos(2 * math.pi * second)
+
+    @property
+    def defaults(self) -> dict[str, float]:
+        """Also the Gibbs iterations."""
+        return {**super().defaults, "iterations": self.config.iterations}
+
+    def stages(
+        self, sequences: Sequences, controls: Sequences, onsets: Sequence[float], generator: torch.Generator
+    ) -> tuple[list[Stage], dict[str, nn.Module]]:
+        """The CRBM learns; nothing else has a state."""
+        config = self.config
+        past = Past(config.past_noise, config.past_rate / config.crbm.rate)
+        layer = partial(self.crbm_layer, sequences, controls, onsets, generator, past)
+        return [Stage(config.crbm.epochs, partial(self.begin_crbm, generator), layer, whole=True)], {}
 
     def to_config(self) -> dict[str, Any]:
         """As :meth:`motet_train.papers.tdbn.control_net.ControlNet.to_config`."""
@@ -85,31 +98,3 @@ def from_config(config: Mapping[str, Any]) -> AngleCRBM:
     values = tuples(config)
     channels, labels = values.pop("channels"), values.pop("labels")
     return AngleCRBM(AngleCRBMConfig(**{**values, "crbm": Learning(**values["crbm"])}), channels, labels)
-
-
-def stages(
-    net: AngleCRBM,
-    sequences: Sequence[Sequence[Tensor]],
-    controls: Sequence[Sequence[Tensor]],
-    onsets: Sequence[float],
-    generator: torch.Generator,
-) -> tuple[list[Stage], dict[str, Any]]:
-    """The CRBM learns on the sequences (T, D) of each label, with control values (T, L); nothing else has a state.
-
-    net.mean and net.scale must be set. onsets: see :func:`motet_train.papers.tdbn.crbm.transitions`.
-    """
-    config, crbm = net.config, net.crbm
-
-    def begin() -> None:
-        for weight in (crbm.past_weight, crbm.hidden_weight, crbm.free_past_weight):
-            assert weight is not None
-            weight.normal_(0.0, config.initial, generator=generator)
-
-    def layer() -> CRBMLayer:
-        codes = [[net.encode(frames) for frames in found] for found in sequences]
-        units = [[values @ net.expansion for values in found] for found in controls]
-        data = transitions(codes, units, config.taps, onsets)
-        recall = Past(config.past_noise, config.past_rate / config.crbm.rate)
-        return CRBMLayer(crbm, data, config.crbm, generator, clamped=True, recall=recall)
-
-    return [Stage(config.crbm.epochs, begin, layer, whole=True)], {}

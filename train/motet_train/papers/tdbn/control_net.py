@@ -4,22 +4,30 @@ Letters in shapes: B rows, D channels, H codes, K taps, L labels, C control unit
 """
 
 from abc import abstractmethod
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import torch
 from torch import Tensor, nn
 
 from motet.bundle.graph import GraphSpec, TensorSpec
+from motet.representation.contract import Z_LIMIT
 from motet_train.models.net import Net, Part
-from motet_train.papers.tdbn.crbm import CRBM
+from motet_train.models.normalised import normalised
+from motet_train.papers.tdbn.contrastive import Stage
+from motet_train.papers.tdbn.crbm import CRBM, CRBMLayer, Past, transitions
+
+Sequences = Sequence[Sequence[Tensor]]
+"""For each group, such as a label, its sequences of frames (T, D), or the labels' values (T, L) at these."""
 
 
 class ControlNet(Net):
     """A CRBM over codes of frames; subclasses say how frames become codes, and codes frames.
 
-    noise_units: N, numbers of noise for the codes of a frame.
+    config: sizes and training, see the subclasses. noise_units: N, numbers of noise for the codes of a frame.
     """
 
+    config: Any
     expansion: Tensor
 
     def __init__(self, crbm: CRBM, labels: int, channels: int, taps: int) -> None:
@@ -28,6 +36,15 @@ class ControlNet(Net):
         self.noise_units = len(crbm.visible_bias)
         # each label has its own control units, which are all 1 or all 0 (thesis 5.4)
         self.register_buffer("expansion", torch.eye(labels).repeat_interleave(crbm.control_units // labels, dim=1))
+
+    @property
+    def defaults(self) -> dict[str, float]:
+        """How a session runs that is told nothing else."""
+        return {"temperature": self.config.temperature}
+
+    def normalised(self, frames: Tensor) -> Tensor:
+        """Frames (B, D) as Gaussian units of variance 1 see them: over sigma standard deviations."""
+        return normalised(frames, self.mean, self.scale, Z_LIMIT / self.config.sigma)
 
     @abstractmethod
     def encode(self, frames: Tensor) -> Tensor:
@@ -44,6 +61,38 @@ class ControlNet(Net):
     @abstractmethod
     def to_config(self) -> dict[str, Any]:
         """Everything that the model's ``from_config`` needs, but for tuples ready for JSON."""
+
+    @abstractmethod
+    def stages(
+        self, sequences: Sequences, controls: Sequences, onsets: Sequence[float], generator: torch.Generator
+    ) -> tuple[list[Stage], Mapping[str, nn.Module]]:
+        """How the net learns, one layer after the other (thesis 3.3), and what else has a state.
+
+        The mean and the scale must be set. onsets: see :func:`motet_train.papers.tdbn.crbm.transitions`.
+        """
+
+    def begin_crbm(self, generator: torch.Generator) -> None:
+        """Set the first weights of the CRBM."""
+        for parameter in self.crbm.parameters():
+            parameter.zero_()
+        for weight in (self.crbm.past_weight, self.crbm.hidden_weight, self.crbm.free_past_weight):
+            if weight is not None:
+                weight.normal_(0.0, self.config.initial, generator=generator)
+
+    def crbm_layer(
+        self,
+        sequences: Sequences,
+        controls: Sequences,
+        onsets: Sequence[float],
+        generator: torch.Generator,
+        past: Past,
+        clamped: bool = True,
+    ) -> CRBMLayer:
+        """The CRBM as what learns, from sequences encoded as they are now."""
+        codes = [[self.encode(frames) for frames in found] for found in sequences]
+        units = [[values @ self.expansion for values in found] for found in controls]
+        data = transitions(codes, units, self.taps, onsets, past.own)
+        return CRBMLayer(self.crbm, data, self.config.crbm, generator, clamped, past)
 
     def step(
         self,

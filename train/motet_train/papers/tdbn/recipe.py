@@ -2,11 +2,11 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import torch
-from torch import Tensor
 
 from motet.bundle.manifest import Manifest
 from motet.models.tdbn_control import TdbnModel
@@ -14,18 +14,17 @@ from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
 from motet.representation.contract import MotionContract, living
 from motet_train.data.errors import DataError
-from motet_train.papers.tdbn import angle_crbm, tdbn
 from motet_train.papers.tdbn.angle_crbm import AngleCRBM, AngleCRBMConfig
 from motet_train.papers.tdbn.body import body_parts
 from motet_train.papers.tdbn.clips import Clips
-from motet_train.papers.tdbn.contrastive import Stage
+from motet_train.papers.tdbn.control_net import ControlNet
 from motet_train.papers.tdbn.divergence import DivergenceLearner
 from motet_train.papers.tdbn.experiments.report import missed_goals, study_of
 from motet_train.papers.tdbn.period import is_periodic
-from motet_train.papers.tdbn.tdbn import TDBN, Sequences, TDBNConfig
+from motet_train.papers.tdbn.tdbn import TDBN, TDBNConfig
 from motet_train.recipes.recipe import Job, Recipe
 from motet_train.runs import Run
-from motet_train.trainer import Line, Part, kept
+from motet_train.trainer import Line, kept
 
 RECIPES = {
     "default": Recipe("control", "tdbn", "session", TDBNConfig()),
@@ -34,7 +33,15 @@ RECIPES = {
 }
 BASELINES = {"default": Recipe("control", "angle-crbm", "session", AngleCRBMConfig())}
 
-Net = TDBN | AngleCRBM
+
+@dataclass(frozen=True, eq=False)
+class Lessons:
+    """For each group, such as the clips of a label, sequences (T, D), control values (T, L) of their frames, and
+    onsets: see :func:`motet_train.papers.tdbn.crbm.transitions`."""
+
+    sequences: Sequence[Sequence[Array]]
+    controls: Sequence[Sequence[Array]]
+    onsets: Sequence[float]
 
 
 def train_control(clips: Clips, job: Job) -> Run:
@@ -42,80 +49,68 @@ def train_control(clips: Clips, job: Job) -> Run:
     config = job.recipe.config
     found = clips.frames(config.fps)
     _check_lengths(found, config.taps)
-    net = untrained(config, clips.skeleton, clips.channels, len(clips.labels))
+    net = untrained(config, clips.skeleton, clips.channels, len(found))
     units = ("deg",) * len(clips.channels)
     mean, std = _statistics(found, units)
-    net.measure_by(mean, std * config.sigma)
-    onsets = [1.0 if is_periodic(frames) else config.onset for frames in found.values()]
     contract = MotionContract("angles", clips.channels, units, config.fps, mean, std, clips.skeleton)
-    manifest = _manifest(job, clips, contract, net, found)
-    net.to(job.device)
-    generator = torch.Generator(job.device).manual_seed(job.about.seed)
-    given = [[frames.to(job.device) for frames in group] for group in _tensors(found)]
-    labels = torch.eye(len(given), device=job.device)
-    controls = [[label.expand(len(frames), -1) for frames in group] for label, group in zip(labels, given, strict=True)]
-    stages, others = stages_of(net, given, controls, onsets, generator)
-    learner = DivergenceLearner(net, stages, generator, _missed(net, manifest, clips, found), others)
+    net.measure_by(mean, std * config.sigma)
+    starts = {label: np.round(group[0][: net.taps], 6).tolist() for label, group in found.items()}
+    control = {"labels": list(found), "starts": starts}
+    manifest = job.manifest(contract, net.to_config(), net.defaults, clips.licence, control=control)
+    labels = zip(np.eye(len(found)), found.values(), strict=True)
+    controls = [[np.tile(label, (len(frames), 1)) for frames in group] for label, group in labels]
+    periodic = [is_periodic(frames) for frames in found.values()]
+    lessons = Lessons(list(found.values()), controls, [1.0 if one else config.onset for one in periodic])
+
+    def missed(run: Run, enough: int) -> list[str]:
+        model = TdbnModel(Manifest.from_json(run.manifest), run.torch_graphs())
+        return missed_goals(study_of(model, clips), enough)
 
     def more(log: Sequence[Line]) -> dict[str, Any]:
         tried = sum("missed" in line for line in log)
         chosen = {"candidates": tried, "missed": kept(log, "best")["missed"]} if tried else {}
         return {"reconstruction": round(reconstruction(net.cpu(), found, std), 6), **chosen}
 
-    return job.run(net, learner, manifest, more)
+    # clips that show no gait have none to try a candidate with
+    return train_lessons(net, job, manifest, lessons, missed if any(periodic) else None, more)
 
 
-def untrained(config: TDBNConfig | AngleCRBMConfig, skeleton: Skeleton, channels: tuple[str, ...], labels: int) -> Net:
+def untrained(
+    config: TDBNConfig | AngleCRBMConfig, skeleton: Skeleton, channels: tuple[str, ...], labels: int
+) -> ControlNet:
     """A net of the sizes that a figure's channels need."""
     if isinstance(config, AngleCRBMConfig):
         return AngleCRBM(config, len(channels), labels)
     return TDBN(config, body_parts(skeleton, channels).of_channel.tolist(), labels)
 
 
-def stages_of(
-    net: Net, sequences: Sequences, controls: Sequences, onsets: Sequence[float], generator: torch.Generator
-) -> tuple[list[Stage], Mapping[str, Part]]:
-    """How a net learns, and what else has a state; see :func:`motet_train.papers.tdbn.tdbn.stages`."""
-    if isinstance(net, TDBN):
-        return tdbn.stages(net, sequences, controls, onsets, generator)
-    return angle_crbm.stages(net, sequences, controls, onsets, generator)
+def train_lessons(
+    net: ControlNet,
+    job: Job,
+    manifest: Mapping[str, Any],
+    lessons: Lessons,
+    missed: Callable[[Run, int], list[str]] | None = None,
+    more: Callable[[Sequence[Line]], Mapping[str, Any]] = lambda log: {},
+) -> Run:
+    """Train a net that has its mean and scale; missed: the goals that a candidate misses, of several to choose from."""
+    generator = torch.Generator(job.device).manual_seed(job.about.seed)
+    given, told = (
+        [[torch.tensor(rows, dtype=torch.float32, device=job.device) for rows in group] for group in part]
+        for part in (lessons.sequences, lessons.controls)
+    )
+    stages, others = net.to(job.device).stages(given, told, lessons.onsets, generator)
+
+    def misses(enough: int) -> list[str]:
+        assert missed is not None
+        return missed(Run(manifest, deepcopy(net).cpu()), enough)
+
+    choose = missed is not None and sum(stage.whole for stage in stages) > 1
+    return job.run(net, DivergenceLearner(net, stages, generator, misses if choose else None, others), manifest, more)
 
 
-def _missed(
-    net: Net, manifest: Mapping[str, Any], clips: Clips, found: Mapping[str, list[Array]]
-) -> Callable[[int], list[str]] | None:
-    """How candidates are chosen; None if there is one only, or if the clips show no gait to try it with."""
-    single = not isinstance(net, TDBN) or net.config.restarts * net.config.tries == 1
-    if single or not any(map(is_periodic, found.values())):
-        return None
-
-    def missed(enough: int) -> list[str]:
-        run = Run(manifest, deepcopy(net).cpu())
-        model = TdbnModel(Manifest.from_json(run.manifest), run.torch_graphs())
-        return missed_goals(study_of(model, clips), enough)
-
-    return missed
-
-
-def _manifest(
-    job: Job, clips: Clips, contract: MotionContract, net: Net, found: Mapping[str, list[Array]]
-) -> dict[str, Any]:
-    starts = {label: np.round(group[0][: net.taps], 6).tolist() for label, group in found.items()}
-    control = {"labels": list(found), "starts": starts}
-    return job.manifest(contract, net.to_config(), defaults_of(net), clips.licence, control=control)
-
-
-def defaults_of(net: Net) -> dict[str, float]:
-    """How a session runs that is told nothing else."""
-    defaults: dict[str, float] = {"temperature": net.config.temperature}
-    if isinstance(net, AngleCRBM):
-        defaults["iterations"] = net.config.iterations
-    return defaults
-
-
-def reconstruction(net: Net, found: Mapping[str, Sequence[Array]], std: Array) -> float:
+def reconstruction(net: ControlNet, found: Mapping[str, Sequence[Array]], std: Array) -> float:
     """RMS error in z units of frames encoded and decoded, over the channels that are not constant."""
-    frames = torch.cat([s for group in _tensors(found) for s in group])
+    frames = torch.tensor(np.concatenate([s for group in found.values() for s in group]), dtype=torch.float32)
     with torch.no_grad():
         error = (net.decode(net.encode(frames)) - frames).numpy()[:, std > 0] / std[std > 0]
     return float(np.sqrt(np.mean(error**2)))
@@ -124,10 +119,6 @@ def reconstruction(net: Net, found: Mapping[str, Sequence[Array]], std: Array) -
 def _statistics(found: Mapping[str, Sequence[Array]], units: Sequence[str]) -> tuple[Array, Array]:
     every = np.concatenate([s for group in found.values() for s in group])
     return every.mean(axis=0), living(every.std(axis=0), units)
-
-
-def _tensors(found: Mapping[str, Sequence[Array]]) -> list[list[Tensor]]:
-    return [[torch.tensor(s).float() for s in group] for group in found.values()]
 
 
 def _check_lengths(found: Mapping[str, Sequence[Array]], taps: int) -> None:

@@ -4,8 +4,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import torch
-from torch import Tensor
 
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
@@ -18,8 +16,7 @@ from motet_train.data.store import Store
 from motet_train.papers.tdbn.angle_crbm import AngleCRBMConfig
 from motet_train.papers.tdbn.contrastive import Learning
 from motet_train.papers.tdbn.courses import LABELS, controls_of, course
-from motet_train.papers.tdbn.divergence import DivergenceLearner
-from motet_train.papers.tdbn.recipe import defaults_of, stages_of, untrained
+from motet_train.papers.tdbn.recipe import Lessons, train_lessons, untrained
 from motet_train.papers.tdbn.tdbn import TDBNConfig
 from motet_train.recipes.recipe import Job, Recipe
 from motet_train.runs import Run
@@ -65,21 +62,15 @@ def train_steered(store: Store, job: Job, data: str = "") -> Run:
     shown = {gait.name: gait for gait in gaits_of(store)}
     found = recordings(store, tuple(shown.get(name, Gait(name, (), ())) for name in GAITS))
     contract, motions = mirrored_too(store, found)
-    frames, controls = _rows([motion.values for motion in motions]), _rows([controls_of(course(m)) for m in motions])
+    controls = [controls_of(course(motion)) for motion in motions]
     assert contract.skeleton is not None
     config = replace(job.recipe.config, fps=store.fps)
-    net = untrained(config, contract.skeleton, contract.channels, len(LABELS)).to(job.device)
+    net = untrained(config, contract.skeleton, contract.channels, len(LABELS))
     net.measure_by(contract.mean, contract.std * config.sigma)
-    generator = torch.Generator(job.device).manual_seed(job.about.seed)
-    given, told = ([rows.to(job.device) for rows in part] for part in (frames, controls))
-    stages, others = stages_of(net, [given], [told], [1.0], generator)
-    learner = DivergenceLearner(net, stages, generator, None, others)
-    start = _stillest(found, net.taps).round(6).tolist()
-    control = {"labels": LABELS, "starts": dict.fromkeys(LABELS, start)}
-    about = {"data": {"name": data, "recordings": len(found), "frames": sum(map(len, frames))}}
-    return job.run(
-        net, learner, job.manifest(contract, net.to_config(), defaults_of(net), None, about, control=control)
-    )
+    control = {"labels": LABELS, "starts": dict.fromkeys(LABELS, _stillest(found, net.taps).round(6).tolist())}
+    about = {"data": {"name": data, "recordings": len(found), "frames": sum(map(len, motions))}}
+    manifest = job.manifest(contract, net.to_config(), net.defaults, None, about, control=control)
+    return train_lessons(net, job, manifest, Lessons([[motion.values for motion in motions]], [controls], [1.0]))
 
 
 def mirrored_too(store: Store, found: Sequence[Recording]) -> tuple[MotionContract, list[Motion]]:
@@ -96,7 +87,3 @@ def _stillest(found: Sequence[Recording], taps: int) -> Array:
     """The frames (K, D) at the start of the recording in which the root moves least there."""
     starts = [one.features.values[:taps] for one in found if len(one.features) >= taps]
     return min(starts, key=lambda frames: float(np.abs(frames[:, : len(ROOT_SIXD) - 1]).sum()))
-
-
-def _rows(values: Sequence[Array]) -> list[Tensor]:
-    return [torch.tensor(rows, dtype=torch.float32) for rows in values]

@@ -15,16 +15,11 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from motet.representation.contract import Z_LIMIT
 from motet_train.models.net import tuples
-from motet_train.models.normalised import normalised
 from motet_train.papers.tdbn.contrastive import Learning, Stage, balanced
-from motet_train.papers.tdbn.control_net import ControlNet, binary
-from motet_train.papers.tdbn.crbm import CRBM, CRBMLayer, Past, transitions
+from motet_train.papers.tdbn.control_net import ControlNet, Sequences, binary
+from motet_train.papers.tdbn.crbm import CRBM, Past
 from motet_train.papers.tdbn.rbm import RBM, RBMLayer, block_mask
-
-Sequences = Sequence[Sequence[Tensor]]
-"""For each group, such as a label, its sequences of frames (T, D)."""
 
 
 @dataclass(frozen=True)
@@ -99,10 +94,6 @@ class TDBN(ControlNet):
         """Frames (B, D) to codes (B, H)."""
         return self.rbm.encode(self.normalised(frames), self.config.temperature)
 
-    def normalised(self, frames: Tensor) -> Tensor:
-        """Frames (B, D) as the RBM sees them: over sigma standard deviations."""
-        return normalised(frames, self.mean, self.scale, Z_LIMIT / self.config.sigma)
-
     def decode(self, codes: Tensor) -> Tensor:
         """Codes (B, H) to frames (B, D)."""
         return self.rbm.decode(codes) * self.scale + self.mean
@@ -110,6 +101,32 @@ class TDBN(ControlNet):
     def vary(self, mean: Tensor, noise: Tensor, variety: Tensor) -> Tensor:
         """Between the probabilities (variety 0) and binary samples of them (variety 1)."""
         return binary(mean, noise, variety)
+
+    def stages(
+        self, sequences: Sequences, controls: Sequences, onsets: Sequence[float], generator: torch.Generator
+    ) -> tuple[list[Stage], dict[str, RBM]]:
+        """The RBM, then the CRBM again and again with other random numbers: ``tries`` times on each of the
+        ``restarts`` of the RBM, which are what else has a state."""
+        config = self.config
+        rbms = RBM(self.rbm.mask, config.restarts).to(self.mean.device)
+        frames = self.normalised(torch.cat([frames for found in sequences for frames in found]))
+        uniform = balanced([torch.ones(sum(map(len, found))) for found in sequences]).to(self.mean.device)
+        past = Past(config.past_noise, own=config.own)
+
+        def lower() -> None:
+            rbms.weight.normal_(0.0, config.initial, generator=generator).mul_(rbms.mask)
+
+        def upper(number: int) -> None:
+            self.rbm.take(rbms, number)
+            self.begin_crbm(generator)
+
+        first = Stage(
+            config.rbm.epochs, lower, lambda: RBMLayer(rbms, frames, uniform, config.rbm, generator), whole=False
+        )
+        crbm = partial(self.crbm_layer, sequences, controls, onsets, generator, past, config.clamped)
+        numbers = list(range(config.restarts)) * config.tries
+        tries = [Stage(config.crbm.epochs, partial(upper, number), crbm, whole=True) for number in numbers]
+        return [first, *tries], {"rbms": rbms}
 
     def to_config(self) -> dict[str, Any]:
         """As :meth:`motet_train.papers.tdbn.control_net.ControlNet.to_config`."""
@@ -122,42 +139,3 @@ def from_config(config: Mapping[str, Any]) -> TDBN:
     values = tuples(config)
     parts, labels = values.pop("parts"), values.pop("labels")
     return TDBN(TDBNConfig(**{**values, **{key: Learning(**values[key]) for key in ("rbm", "crbm")}}), parts, labels)
-
-
-def stages(
-    net: TDBN, sequences: Sequences, controls: Sequences, onsets: Sequence[float], generator: torch.Generator
-) -> tuple[list[Stage], dict[str, RBM]]:
-    """RBM and CRBM learn one after the other on the sequences (T, D) of each group, such as a label's (thesis 3.3).
-
-    controls: the labels' values (T, L) at the frames of each sequence.
-
-    The CRBM learns again and again with other random numbers: ``tries`` times on each of the ``restarts`` of the RBM,
-    which are what else has a state. net.mean and net.scale must be set. onsets: see
-    :func:`motet_train.papers.tdbn.crbm.transitions`.
-    """
-    config = net.config
-    rbms = RBM(net.rbm.mask, config.restarts).to(net.mean.device)
-    frames = net.normalised(torch.cat([frames for found in sequences for frames in found]))
-    uniform = balanced([torch.ones(sum(map(len, found))) for found in sequences]).to(net.mean.device)
-
-    def lower() -> None:
-        rbms.weight.normal_(0.0, config.initial, generator=generator).mul_(rbms.mask)
-
-    def upper(number: int) -> None:
-        net.rbm.take(rbms, number)
-        for parameter in net.crbm.parameters():
-            parameter.zero_()
-        for weight in (net.crbm.past_weight, net.crbm.hidden_weight):
-            weight.normal_(0.0, config.initial, generator=generator)
-
-    def crbm() -> CRBMLayer:
-        codes = [[net.encode(frames) for frames in found] for found in sequences]
-        past = Past(config.past_noise, own=config.own)
-        units = [[values @ net.expansion for values in found] for found in controls]
-        data = transitions(codes, units, config.taps, onsets, config.own)
-        return CRBMLayer(net.crbm, data, config.crbm, generator, config.clamped, past)
-
-    first = Stage(config.rbm.epochs, lower, lambda: RBMLayer(rbms, frames, uniform, config.rbm, generator), whole=False)
-    numbers = list(range(config.restarts)) * config.tries
-    tries = [Stage(config.crbm.epochs, partial(upper, number), crbm, whole=True) for number in numbers]
-    return [first, *tries], {"rbms": rbms}

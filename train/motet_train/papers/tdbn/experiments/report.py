@@ -18,12 +18,12 @@ from motet_train.papers.tdbn.experiments.gaits import (
     gait_transitions,
     limit_cycle,
     ramp_hysteresis,
+    sampled_runs,
     synchronisation,
 )
 from motet_train.papers.tdbn.experiments.measures import Reference
 from motet_train.papers.tdbn.experiments.shown import leaps, standing_feet
 from motet_train.papers.tdbn.experiments.study import ControlStudy, Leg
-from motet_train.papers.tdbn.experiments.variety import sampled_runs
 from motet_train.papers.tdbn.period import is_periodic
 
 GOALS: Goals = {
