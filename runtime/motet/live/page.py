@@ -74,8 +74,8 @@ def net_data(model: SteerModel) -> dict[str, Any]:
 
 def figure_data(model: SteerModel) -> dict[str, Any]:
     """The humanoid, its legs and soles, and how its feet are held."""
-    joints = [[HUMANOID.index(BONES[bone]) for bone in leg] for leg in foot_lock.COLUMNS]
-    legs = zip(joints, foot_lock.COLUMNS.tolist(), strict=True)
+    joints = [[HUMANOID.index(BONES[bone]) for bone in leg] for leg in foot_lock.LEG_BONES]
+    legs = zip(joints, foot_lock.LEG_BONES.tolist(), strict=True)
     return {
         "parents": HUMANOID.parents.tolist(),
         "offsets": HUMANOID.offsets.tolist(),

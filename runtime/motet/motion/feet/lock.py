@@ -36,10 +36,10 @@ class FootLockSettings(Settings):
 
 
 CHAIN = ("UpperLeg", "LowerLeg", "Foot", "Toes")
-COLUMNS = np.array([[BONES.index(sided(side, part)) for part in CHAIN] for side in LEFT_RIGHT])
+LEG_BONES = np.array([[BONES.index(sided(side, part)) for part in CHAIN] for side in LEFT_RIGHT])
 """Bones (2, 4) of both legs among the humanoid's."""
 
-OFFSETS = np.array([[HUMANOID.offsets[HUMANOID.index(sided(side, part))] for part in CHAIN] for side in LEFT_RIGHT])
+LEG_OFFSETS = np.array([[HUMANOID.offsets[HUMANOID.index(sided(side, part))] for part in CHAIN] for side in LEFT_RIGHT])
 """Where they begin in their parents' frames (2, 4, 3), the hips' for the first."""
 
 POINTS = np.array([place for places in SOLE.values() for place in places], dtype=np.float32)
@@ -97,9 +97,9 @@ def _legs(pose: Pose) -> tuple[Floats, Floats, Array]:
     hips = quat_product(pose.heading, pose.rotations[:, 0])
     place = pose.place[:, None]
     place[..., 1] = pose.height[:, None]
-    local, above = pose.rotations[:, COLUMNS], hips[:, None]
+    local, above = pose.rotations[:, LEG_BONES], hips[:, None]
     turned, places = np.empty_like(local), np.empty((*local.shape[:3], 3))
-    for joint, offset in enumerate(np.swapaxes(OFFSETS, 0, 1).astype(np.float32)):
+    for joint, offset in enumerate(np.swapaxes(LEG_OFFSETS, 0, 1).astype(np.float32)):
         place = place + quat_rotated(above, offset)
         above = quat_product(above, local[:, :, joint])
         turned[:, :, joint], places[:, :, joint] = above, place
@@ -118,7 +118,7 @@ def _reached(rotations: Floats, hips: Floats, turned: Floats, places: Array, tar
         for turn, before in zip(turns, (thigh, shin), strict=True)
     )
     found = rotations.copy()
-    found[:, COLUMNS[:, 0]] = quat_product(conjugate(hips)[:, None], new_thigh)
-    found[:, COLUMNS[:, 1]] = quat_product(conjugate(new_thigh), new_shin)
-    found[:, COLUMNS[:, 2]] = quat_product(conjugate(new_shin), foot)
+    found[:, LEG_BONES[:, 0]] = quat_product(conjugate(hips)[:, None], new_thigh)
+    found[:, LEG_BONES[:, 1]] = quat_product(conjugate(new_thigh), new_shin)
+    found[:, LEG_BONES[:, 2]] = quat_product(conjugate(new_shin), foot)
     return found
