@@ -139,7 +139,7 @@ def test_a_text_in_another_language_is_said_to_be_outside(model: CodesModel) -> 
 
 
 def test_settings_out_of_range_are_refused(model: CodesModel) -> None:
-    for seconds in (-1.0, 601.0, float("nan")):
+    for seconds in (-1.0, 0, 601.0, float("nan")):
         with pytest.raises(DecodingError):
             model.generate(WALK, seconds=seconds)
     with pytest.raises(DecodingError, match="one for each of 2"):

@@ -77,7 +77,7 @@ def generate(
     model = teller or load_as(GenerateModel, bundle, session)
     tries = Tries()
     asked = tries.usable(model, texts)
-    given = {"strict": strict, **settings}
+    given = {"strict": strict, **settings, "seconds": settings["seconds"] or None}
     shown = partial(_written, plant=not no_plant, loop=loop, output=output)
     with noted():
         if teller is None:

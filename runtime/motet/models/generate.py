@@ -153,6 +153,8 @@ class GenerateModel(LanguageModel):
         TextError for a sentence that is empty, too long or wholly unknown; DecodingError for a setting out of range, or
         that the loop does not have. Unknown words are named by a TextWarning and in the result.
         """
+        if settings.get("seconds") == 0:
+            raise DecodingError("seconds must be more than 0: leave them out, and a motion ends by itself")
         texts = [sentences] if isinstance(sentences, str) else list(sentences)
         ids, seeds = [self.ids(text) for text in texts], seeds_of(seed, len(texts), DecodingError)
         given = {"hypotheses": hypotheses, **cast(Mapping[str, float | None], settings)}
