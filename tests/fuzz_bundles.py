@@ -58,7 +58,8 @@ def mutate(rng: Generator) -> Mutant:
     with zipfile.ZipFile(io.BytesIO(zips[name])) as archive:
         files = {member: archive.read(member) for member in archive.namelist()}
     manifest = json.loads(files.pop("manifest.json"))
-    said = _KINDS[kind](rng, manifest, files)
+    change = _KINDS[kind] if manifest["graphs"] else _in_graph
+    said = change(rng, manifest, files)
     return f"{name}, {kind}: {said}", {"mutated.zip": _zipped(manifest, files)}
 
 
@@ -87,7 +88,8 @@ def _in_manifest(rng: Generator, manifest: dict[str, Any], files: Files) -> str:
 
 
 def _in_graph(rng: Generator, manifest: dict[str, Any], files: Files) -> str:
-    name = str(rng.choice([file for file in files if file.endswith(".onnx")]))
+    """A graph or a table."""
+    name = str(rng.choice([file for file in files if file.endswith((".onnx", ".npy"))]))
     files[name] = damaged(rng, files[name])
     return name
 

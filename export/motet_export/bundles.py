@@ -3,13 +3,14 @@
 import logging
 import platform
 from collections.abc import Mapping
+from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from motet.bundle.arrays import array_bytes
 from motet.bundle.bundle import Bundle, write_bundle
-from motet.bundle.graph import OnnxGraph
+from motet.bundle.graph import GraphSpec, OnnxGraph
 from motet.bundle.manifest import Manifest
 from motet.bundle.session import SessionOptions
 from motet.files import check_place
@@ -41,11 +42,10 @@ def export_run(run: Run, out: str | Path, int8: bool = False, half: bool = False
         round_weights(run.model)
     modules, torch = run.graphs(), build(Manifest.from_json(run.manifest), run.torch_graphs(), run.tables())
     manifest = torch.manifest
-    label = {"motet": version("motet"), "bundle": manifest.name, "model": manifest.model}
     files = {}
     for role, (module, spec) in modules.items():
         log.info("exporting the graph %s", role)
-        graph = export_graph(module, spec, {**label, "role": role})
+        graph = export_graph(module, spec, label(manifest, role, spec))
         files[f"{role}.onnx"] = halved(graph) if half else graph
     log.info("comparing it with torch")
     onnx = _served(torch, files)
@@ -58,6 +58,24 @@ def export_run(run: Run, out: str | Path, int8: bool = False, half: bool = False
         report["int8"] = difference(onnx, exact)
     _write(out, onnx, files, {**run.manifest, "parity": report}, examples(manifest, torch.graphs))
     return report
+
+
+def label(manifest: Manifest, role: str, spec: GraphSpec) -> dict[str, str]:
+    """The metadata of a graph, by which it can be told without its bundle; "state=next_state" under "feedback"."""
+    contract = manifest.motion
+    return {
+        "motet": version("motet"),
+        "bundle": manifest.name,
+        "model": manifest.model,
+        "role": role,
+        "verb": manifest.verb,
+        "loop": manifest.loop,
+        "fps": f"{contract.fps:g}",
+        "representation": contract.representation,
+        "channels": str(len(contract.channels)),
+        "feedback": " ".join(f"{name}={source}" for name, source in spec.feedback.items()),
+        "start": " ".join(f"{name}={','.join(map(str, sizes))}" for name, sizes in spec.start.items()),
+    }
 
 
 def halve_bundle(bundle: Bundle, out: str | Path) -> dict[str, Any]:
@@ -97,7 +115,8 @@ def _write(
         for name, array in model.tables.items()
     }
     arrays = {f"{name}.npy": array_bytes(array) for name, array in model.tables.items()}
-    manifest = {**about, "graphs": specs, "tables": tables, "golden": golden}
+    settings = {kind.FEATURE: asdict(model.settings(kind)) for kind in model.SETTINGS}
+    manifest = {**about, "settings": settings, "graphs": specs, "tables": tables, "golden": golden}
     write_bundle(out, manifest, {**graphs, **arrays, FILE: vectors})
 
 

@@ -51,8 +51,13 @@ def examples(manifest: Manifest, torch: Mapping[str, Graph]) -> dict[str, Exampl
 
     draws: dict[str, Examples] = {role: partial(draw, graph.spec) for role, graph in torch.items()}
     if manifest.verb == "predict":
-        draws["step"] = lambda rng, rows: torch["encoder"](draws["encoder"](rng, rows))
+        draws["step"] = partial(_first_states, torch["encoder"], torch["step"].spec, draws["encoder"])
     return draws
+
+
+def _first_states(encoder: Graph, step: GraphSpec, draw: Examples, rng: np.random.Generator, rows: int) -> Arrays:
+    """What an encoder gives to the step."""
+    return {name: value for name, value in encoder(draw(rng, rows)).items() if step.takes(name)}
 
 
 def example(
@@ -84,8 +89,7 @@ def _below(manifest: Manifest) -> dict[str, int]:
     if manifest.loop == "codes":
         sizes = manifest.config
         codes = min(sizes["codec"]["moves"], math.prod(sizes["codec"]["levels"]))
-        own = {"codes": codes, "action": sizes["text"]["actions"] + 1, "row": sizes["remembered"]}
-        below |= own | {"age": sizes["writer"]["ages"]}
+        below |= {"codes": codes, "action": sizes["text"]["actions"] + 1, "age": sizes["writer"]["ages"]}
     return below
 
 

@@ -15,8 +15,8 @@ from motet.bundle.graph_safety import check_graph
 from motet.errors import BundleError, MotetError
 
 OPSET = 18
-MAX_IR_VERSION = 10
-"""The newest IR version that older versions of ONNX Runtime still read."""
+MAX_IR_VERSION = 8
+"""The first IR version that has the opset, which every ONNX Runtime from 1.14 on reads."""
 
 
 class ExportError(MotetError, RuntimeError):

@@ -81,7 +81,8 @@ def test_a_bundle_keeps_its_contracts_and_carries_its_parity(bundle: Path) -> No
     opened = Bundle.open(bundle)
     found = verify(opened)
     roles = CodesModel.ROLES
-    assert found.files == tuple(sorted(("golden.npz", *(f"{role}.onnx" for role in roles))))
+    tables = ("body.npy", "memory.npy", "moves.npy")
+    assert found.files == tuple(sorted(("golden.npz", *tables, *(f"{role}.onnx" for role in roles))))
     assert max(found.errors.values()) < 1e-4
     report = opened.manifest.parity
     rungs = {name: rung for name, rung in report.items() if isinstance(rung, dict) and "bound" in rung}
@@ -94,7 +95,7 @@ def test_a_bundle_keeps_its_contracts_and_carries_its_parity(bundle: Path) -> No
 @pytest.mark.parametrize("role", CodesModel.ROLES)
 def test_a_row_of_a_batch_gets_what_it_gets_alone(bundle: Path, role: str) -> None:
     graph = Bundle.open(bundle).graph(role)
-    below = {"words": len(WORDS), "codes": MOVES, "action": 4, "age": 16, "row": 36}
+    below = {"words": len(WORDS), "codes": MOVES, "action": 4, "age": 16}
     feeds = example(graph.spec, np.random.default_rng(0), batch=5, below=below)
     together = graph(feeds)
     for row in range(5):

@@ -69,21 +69,14 @@ def remembered(seed: int = 2, motions: int = 6, steps: int = 7) -> list[tuple[in
     return [(number % ACTIONS, np.concatenate([codes, last])) for number, codes in enumerate(drawn)]
 
 
-def memory_graph(motions: list[tuple[int, Array]]) -> tuple[FakeGraph, int, int, list[int]]:
-    """The graph that holds some motions, how many steps these are, and of how many actions and up to which codes."""
-    codes = np.concatenate([codes for _, codes in motions])
-    action = np.concatenate([np.full(len(codes), action) for action, codes in motions])
-    age = np.concatenate([np.arange(len(codes)) for _, codes in motions])
-
-    def run(row: Array) -> tuple[Array, Array, Array, Array]:
-        return codes[row], numbers_of(codes[row]), action[row], age[row]
-
-    given = {"codes": "*batch P", "numbers": "batch L", "action": "*batch", "age": "*batch"}
-    graph = FakeGraph(spec({"row": "*batch"}, given, {"P": PARTS, "L": NUMBERS}), run)
-    return graph, len(codes), ACTIONS, [END, *[BODY - 1] * GROUPS]
+def memory_tables(motions: list[tuple[int, Array]]) -> tuple[Array, Array, Array, int]:
+    """The tables that hold some motions: steps, numbers of moves and of codes; and how many actions there are."""
+    steps = [(*code, action, age) for action, codes in motions for age, code in enumerate(codes)]
+    moves, body = (2.0 * np.arange(1, count + 1, dtype=np.float32)[:, None] for count in (MOVES, BODY))
+    return np.array(steps, dtype=np.int16), moves, body, ACTIONS
 
 
 def source(sharpness: float = 1.0, ending: float = 0.0) -> Source:
     """What writers draw from."""
-    memory = Memory.of(*memory_graph(remembered()))
+    memory = Memory.of(*memory_tables(remembered()))
     return Source(step(), part(sharpness=sharpness, ending=ending), END, NOBODY, memory)

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, get_args, get_overloads, get_type_hints
 
 import numpy as np
+import onnxruntime
 import pytest
 from click.testing import CliRunner
 
@@ -124,7 +125,8 @@ NAN, HUGE = float("nan"), 10**400
     ("path", "value", "reason"),
     [
         ("format", 1, "format 1, of an older motet: export its training run again"),
-        ("format", 3, f"format 3; this motet reads format {FORMAT}"),
+        ("format", 2, r"format 2, of an older motet: export its training run again \(motet export RUN\)"),
+        ("format", 4, f"format 4; this motet reads format {FORMAT}"),
         ("format", True, "format True"),
         ("motion", None, "manifest, motion: is missing"),
         ("motion", [1], r"motion: must be an object, not \[1\]"),
@@ -380,6 +382,31 @@ def test_long_figures_are_shown_as_json_alone(folder: Path) -> None:
     assert "frame_1: 0.75" in shown
     assert "boxing" not in shown
     assert json.loads(whole)["quality"] == figures
+
+
+def test_a_session_is_configured_before_it_is_made() -> None:
+    seen: list[Any] = []
+
+    def configure(options: Any) -> None:
+        assert options.intra_op_num_threads == 2
+        options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+        options.graph_optimization_level = onnxruntime.GraphOptimizationLevel.ORT_DISABLE_ALL
+        seen.append(options)
+
+    model = load("search", SessionOptions(threads=2, configure=configure))
+    assert len(seen) == len(model.graphs) == 2
+    assert all(one.get_session_config_entry("session.load_model_format") == "ONNX" for one in seen)
+    np.testing.assert_allclose(
+        model.embed_text("a person walks"), load("search").embed_text("a person walks"), atol=1e-5
+    )
+
+
+def test_a_graph_alone_says_what_it_is() -> None:
+    session = onnxruntime.InferenceSession(Bundle.open("generate").read("step.onnx"))
+    told = session.get_modelmeta().custom_metadata_map
+    assert (told["verb"], told["loop"], told["role"], told["fps"]) == ("generate", "codes", "step", "30")
+    assert told["feedback"] == "past=next_past"
+    assert told["channels"] == str(len(Bundle.open("generate").manifest.motion.channels))
 
 
 @pytest.mark.parametrize("threads", [0, -1, 257, 10_000, True, 1.5])

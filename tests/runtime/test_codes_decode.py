@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fake_codes import ACTIONS, END, KNOWN, NOBODY, PARTS, memory_graph, numbers_of, remembered, source
+from fake_codes import ACTIONS, END, KNOWN, NOBODY, PARTS, memory_tables, numbers_of, remembered, source
 from numpy.typing import NDArray
 
 from motet.decode.codes import Drawing, Source, Writer, draw_codes, drawn_actions, drawn_steps, nucleus
@@ -86,7 +86,7 @@ STARTS = np.cumsum([0, *(len(codes) for _, codes in MOTIONS)])
 
 
 def memory() -> Memory:
-    return Memory.of(*memory_graph(MOTIONS))
+    return Memory.of(*memory_tables(MOTIONS))
 
 
 def recent_of(codes: Array, at: int) -> list[Array]:

@@ -33,21 +33,28 @@ class Lying:
 def lying(name: str, role: str, output: str, value: float, row: int | None = None) -> BundleModel:
     bundle = Bundle.open(name)
     graphs: dict[str, Graph] = {one: bundle.graph(one) for one in bundle.manifest.graphs}
-    return build(bundle.manifest, {**graphs, role: Lying(graphs[role], output, value, row)})
+    return build(bundle.manifest, {**graphs, role: Lying(graphs[role], output, value, row)}, tables_of(bundle))
+
+
+def tables_of(bundle: Bundle) -> dict[str, NDArray[Any]]:
+    return {name: bundle.table(name) for name in bundle.manifest.tables}
 
 
 @pytest.mark.parametrize(
-    ("name", "role", "output", "value"),
-    [
-        *(("generate", "memory", "age", value) for value in (-1, 1001, 1 << 62)),
-        *(("generate", "memory", "action", value) for value in (-1, 374, 1 << 62)),
-        *(("generate", "memory", "codes", value) for value in (-1, 625, 1 << 62)),
-        *(("generate", "memory", "numbers", value) for value in (np.nan, np.inf, 1e38)),
-    ],
+    ("column", "value", "reason"),
+    [(0, 257, "move"), (3, 625, "code"), (-2, 374, "action"), (-1, 1001, "age"), *((n, -1, "") for n in range(-6, 0))],
 )
-def test_tables_are_checked_as_they_are_loaded(name: str, role: str, output: str, value: float) -> None:
-    with pytest.raises(BundleError, match=f"the table's '{output}' is out of range"):
-        lying(name, role, output, value, row=1000)
+def test_a_memory_is_checked_as_it_is_loaded(column: int, value: int, reason: str) -> None:
+    bundle = Bundle.open("generate")
+    tables = tables_of(bundle)
+    memory = tables["memory"].copy()
+    memory[1000, column] = value
+    graphs = {role: bundle.graph(role) for role in bundle.manifest.graphs}
+    with pytest.raises(BundleError, match=f"table memory: {reason}.* is out of range"):
+        build(bundle.manifest, graphs, {**tables, "memory": memory})
+    for other in ({}, {**tables, "moves": tables["moves"][:-1]}, {**tables, "body": tables["body"][:, :-1]}):
+        with pytest.raises(BundleError, match="manifest, tables"):
+            build(bundle.manifest, graphs, other)
 
 
 def test_a_context_of_no_log_probabilities_is_refused() -> None:
@@ -70,6 +77,8 @@ def test_a_context_of_no_log_probabilities_is_refused() -> None:
         ("control", ("config", "speeds"), [[1, 2, 3, 4, -1]] * 5, r"config\.speeds: must hold a row of 5 speeds"),
         ("control", ("config", "speeds"), [[1, 2, 3, 4, 5]], r"config\.speeds: must hold a row of 5 speeds"),
         ("control", ("config", "odd"), 37, r"config\.odd: must be a whole number between 0 and 36"),
+        ("generate", ("config", "codec", "moves"), 625, r"codec\.moves: must be at most 624"),
+        ("generate", ("config", "codec", "moves"), 255, "tables: 'moves' is float32 .256, 3., expected"),
         ("generate", ("config", "codec", "ahead"), [1e9], r"codec\.ahead: must be 0 or 1 for each"),
     ],
 )
@@ -85,7 +94,7 @@ def test_a_manifest_that_does_not_fit_its_graphs_is_refused(
         build(
             Manifest.from_json(source),
             {role: bundle.graph(role) for role in bundle.manifest.graphs},
-            {name: bundle.table(name) for name in bundle.manifest.tables},
+            tables_of(bundle),
         )
 
 
@@ -101,7 +110,7 @@ def test_a_manifest_that_does_not_fit_its_graphs_is_refused(
 )
 def test_plain_arrays_are_checked_as_they_are_loaded(name: str, row: int, value: float) -> None:
     bundle = Bundle.open("control")
-    tables = {one: bundle.table(one) for one in bundle.manifest.tables}
+    tables = tables_of(bundle)
     wrong = np.array(tables[name])
     wrong[row] = value
     with pytest.raises(BundleError, match=f"table {name}: holds a number that is out of range"):

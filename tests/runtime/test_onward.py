@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fake_codes import ACTIONS, END, MOVES, memory_graph, numbers_of, remembered, source
+from fake_codes import ACTIONS, END, MOVES, memory_tables, numbers_of, remembered, source
 
 from motet.decode.codes import Drawing
 from motet.decode.continue_codes import (
@@ -39,7 +39,7 @@ TURNING = np.array([[0.2, 0.0, turn] for turn in (-0.4, -0.2, 0.0, 0.2, 0.4)])
 
 
 def memory() -> Memory:
-    return Memory.of(*memory_graph(MOTIONS))
+    return Memory.of(*memory_tables(MOTIONS))
 
 
 def drawn(pace: Pace, seed: int = 0, steps: int = 60, book: Any = BOOK) -> Any:

@@ -246,16 +246,26 @@ def test_what_knows_its_errors_tells_them_in_centimetres() -> None:
     with pytest.raises(DecodingError, match="does not know its errors"):
         model.expected_errors(motion)
     sizes = {"L": SEED, "N": HORIZON, "C": len(motion.channels)}
-    told = spec({"frames": "batch L C"}, {"error": "batch N"}, sizes)
-    graph = FakeGraph(told, lambda frames: (np.abs(frames[:, -1, :1]) * np.arange(1, HORIZON + 1),))
-    sure = PredictModel(model.manifest, {**model.graphs, "error": graph})
+    encoder = model.graphs["encoder"]
+
+    def telling(sizes: dict[str, int]) -> PredictModel:
+        told = spec({"frames": "batch L C"}, {"error": "batch N"}, sizes).outputs
+
+        def run(frames: np.ndarray) -> tuple[np.ndarray, ...]:
+            errors = np.abs(frames[:, -1, :1]) * np.arange(1, sizes["N"] + 1)
+            return *encoder({"frames": frames}).values(), errors
+
+        graph = FakeGraph(replace(encoder.spec, outputs=(*encoder.spec.outputs, *told)), run)
+        return PredictModel(model.manifest, {**model.graphs, "encoder": graph})
+
+    sure = telling(sizes)
+    np.testing.assert_array_equal(sure.predict(motion).values, model.predict(motion).values)
     expected = 100 * np.abs(motion.values[-1, 0]) * np.arange(1, HORIZON + 1)
     np.testing.assert_allclose(sure.expected_errors(motion), expected, rtol=1e-6)
     np.testing.assert_array_equal(sure.expected_errors([motion[:-1], motion])[1], sure.expected_errors(motion))
     assert sure.expected_errors([]).shape == (0, HORIZON)
-    wrong = spec({"frames": "batch L C"}, {"error": "batch N"}, {**sizes, "N": HORIZON + 1})
-    with pytest.raises(BundleError, match="4 errors of a horizon of 3"):
-        PredictModel(model.manifest, {**model.graphs, "error": FakeGraph(wrong, lambda frames: (frames,))})
+    with pytest.raises(BundleError, match="4 errors for a horizon of 3"):
+        telling({**sizes, "N": HORIZON + 1})
 
 
 def test_a_stream_of_another_figure_gives_what_the_whole_motion_gives(clips) -> None:

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.bundle.arrays import array_of
+from motet.bundle.fields import LARGEST
 from motet.bundle.graph import OnnxGraph
 from motet.bundle.manifest import FORMAT, MANIFEST, FileEntry, Manifest
 from motet.bundle.members import Archive, Folder, Members
@@ -92,14 +93,14 @@ class Bundle:
             return OnnxGraph(self.read(found.file), found.spec, options)
 
     def table(self, name: str) -> NDArray[Any]:
-        """A table's array, read-only; BundleError where it is not as declared, or holds a number that is not finite."""
+        """A table's array, read-only; BundleError where it is not as declared, or not finite."""
         found = self.manifest.tables[name]
         with self.named(f", table {name}"):
             array = array_of(self.read(found.file), found.file, [found.dtype])
             if array.shape != found.shape:
                 raise BundleError(f"it has the shape {list(array.shape)}, declared {list(found.shape)}")
-            if array.dtype.kind == "f" and not np.isfinite(array).all():
-                raise BundleError("it holds numbers that are not finite")
+            if array.dtype.kind == "f" and not (np.abs(array) <= np.float64(LARGEST)).all():
+                raise BundleError(f"it holds numbers that are not between -{LARGEST:g} and {LARGEST:g}")
             return array
 
     def check_files(self) -> list[str]:

@@ -1,32 +1,26 @@
 """One graph as a function of named arrays, and the contract that it keeps."""
 
-import math
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from motet.bundle.fields import LARGEST, Fields
+from motet.bundle.fields import Fields
 from motet.bundle.graph_safety import check_graph
 from motet.bundle.session import SessionOptions
 from motet.errors import BundleError
 
 Arrays = Mapping[str, NDArray[Any]]
 Floats = NDArray[np.float32]
-Ranges = Mapping[str, tuple[int, ArrayLike]]
-"""Name of an output -> its lowest and highest value."""
 
 DTYPES = {"float32": "tensor(float)", "int64": "tensor(int64)", "bool": "tensor(bool)"}
 """dtype in a manifest -> type in ONNX Runtime."""
 
 MAX_AXIS, MAX_ROW = 1 << 20, 1 << 22
 """Of a fixed axis, and of all the fixed axes of a tensor multiplied."""
-
-MAX_TABLE = 1 << 26
-"""Numbers of a graph that is a table."""
 
 _creation = threading.Lock()  # ONNX Runtime sessions are safe to share but not to create concurrently
 
@@ -192,22 +186,6 @@ class OnnxGraph:
             if array.dtype.kind == "f" and not np.isfinite(array).all():
                 raise BundleError(f"the graph's output {name!r} is not finite")
         return found
-
-
-def rows_of(graph: Graph, count: int, ranges: Ranges) -> dict[str, NDArray[Any]]:
-    """All ``count`` rows of a graph that is a table: row (N,) int64 -> outputs (N, ...).
-
-    Outputs without a range are between -LARGEST and LARGEST. BundleError where a value is outside, or the table is too
-    large.
-    """
-    if count * sum(math.prod(map(spec.size, range(1, len(spec.shape)))) for spec in graph.spec.outputs) > MAX_TABLE:
-        raise BundleError(f"a table of {count} rows has more than {MAX_TABLE} numbers")
-    found = graph({"row": np.arange(count, dtype=np.int64)})
-    for name, array in found.items():
-        low, high = map(np.asarray, ranges.get(name, (-LARGEST, LARGEST)))
-        if len(array) != count or not ((low <= array) & (array <= high)).all():
-            raise BundleError(f"the table's {name!r} is out of range, or has not {count} rows")
-    return found
 
 
 def _check(found: list[Any], declared: tuple[TensorSpec, ...], kind: str) -> None:

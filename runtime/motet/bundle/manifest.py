@@ -16,7 +16,7 @@ from motet.motion.skeleton import Skeleton
 from motet.representation import REPRESENTATIONS
 from motet.representation.contract import MotionContract
 
-FORMAT = 2
+FORMAT = 3
 """Version of the bundle format that this motet writes and reads."""
 
 MANIFEST = "manifest.json"
@@ -135,9 +135,10 @@ class Manifest:
         """Read the ``manifest.json`` of a bundle; BundleError for another format, and where it contradicts itself."""
         data = parse(text)
         version = data.get("format") if isinstance(data, dict) else None
-        if version == 1 and not isinstance(version, bool):
+        if version in (1, 2) and not isinstance(version, bool):
             raise BundleError(
-                "it has format 1, of an older motet: export its training run again with this one, or use the older one"
+                f"it has format {version}, of an older motet: export its training run again (motet export RUN), or use "
+                "the older one"
             )
         if version != FORMAT:
             raise BundleError(f"it has the format {version!r}; this motet reads format {FORMAT}")

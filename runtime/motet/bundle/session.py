@@ -1,6 +1,6 @@
 """How ONNX Runtime is to run a model: threads and execution providers."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,12 +23,15 @@ class SessionOptions:
     providers: execution providers of ONNX Runtime, the preferred first. ONNX Runtime gives the CPU what the others
         cannot run, all of it where one does not start: a model's ``providers`` are those that are really active.
     provider_options: options of each provider, in the same order; none by default.
+    configure: called with the ``onnxruntime.SessionOptions`` of each session before it is made, for all else: the level
+        of optimisation, profiling, spinning threads. A function of a module, if models are to be pickled.
     SettingError for a number of threads out of range, and for a provider that this build of ONNX Runtime does not have.
     """
 
     threads: int = 1
     providers: tuple[str, ...] = ("CPUExecutionProvider",)
     provider_options: tuple[Options, ...] = ()
+    configure: Callable[[Any], None] | None = None
 
     def __post_init__(self) -> None:
         checked_int("threads", self.threads, 1, MAX_THREADS)
@@ -48,6 +51,8 @@ class SessionOptions:
         options.inter_op_num_threads = 1
         options.enable_cpu_mem_arena = False  # memory goes back after a large batch, at the same speed
         options.log_severity_level = 4
+        if self.configure is not None:
+            self.configure(options)
         options.add_session_config_entry("session.load_model_format", "ONNX")  # the one that was checked
         given = [dict(one) for one in self.provider_options] or None
         return onnxruntime.InferenceSession(model, options, list(self.providers), given, enable_fallback=0)

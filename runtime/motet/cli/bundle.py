@@ -63,7 +63,7 @@ def info(name: str, as_json: bool) -> None:
         return
     click.echo(f"{manifest.name} {manifest.version}: {manifest.verb} by {manifest.model}, decoded by {manifest.loop}")
     click.echo(f"{len(manifest.motion.channels)} channels at {manifest.motion.fps:g} fps")
-    for key in ("control", "defaults", "licence", "training", "quality", "parity"):
+    for key in ("control", "defaults", "settings", "licence", "training", "quality", "parity"):
         if values := manifest.source.get(key):
             click.echo(f"\n{key}")
             _tree({k: v for k, v in values.items() if k not in LONG})

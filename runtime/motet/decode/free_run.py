@@ -21,9 +21,9 @@ class FreeRunSettings(Settings):
 def free_run(encoder: Graph, step: Graph, seed: Floats, count: int, horizon: int) -> Floats:
     """The ``count`` frames (B, count, C) float32 that follow the seed frames (B, L, C) float32.
 
-    What the encoder gives are the step's inputs, by name: those that are fed back begin there, others stay; a fed back
-    input that the encoder does not give begins as zeros. After every ``horizon`` frames the encoder is asked again,
-    about the L frames before.
+    Inputs of the step are taken from what the encoder gives, by name: those that are fed back begin there, others stay;
+    a fed back input that the encoder does not give begins as zeros. After every ``horizon`` frames the encoder is asked
+    again, about the L frames before.
     """
     given = seed.shape[1]
     frames = np.concatenate([seed, np.empty((len(seed), count, seed.shape[2]), dtype=np.float32)], axis=1)
@@ -34,7 +34,7 @@ def free_run(encoder: Graph, step: Graph, seed: Floats, count: int, horizon: int
                 **zero_state(step, len(seed), found),
                 **{k: v for k, v in found.items() if k in step.spec.feedback},
             }
-            constant = {name: value for name, value in found.items() if name not in state}
+            constant = {k: v for k, v in found.items() if k not in state and step.spec.takes(k)}
         outputs, state = advance(step, state, constant)
         frames[:, n + given] = outputs["frame"]
     return frames[:, given:]

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.bundle.graph import Graph, Ranges, rows_of
+from motet.bundle.graph import Floats
 from motet.decode.rollout import Ids
+from motet.errors import BundleError
 
 PAST = (1.0, 0.5, 0.25)
 """How much the last step counts, and those before it."""
@@ -43,21 +44,32 @@ class Memory:
     rows: dict[int, Ids]
 
     @staticmethod
-    def of(graph: Graph, count: int, actions: int, largest: Sequence[int]) -> "Memory":
-        """What a graph "memory" holds: row (M,) -> codes (M, P), numbers (M, L), action and age (M,).
+    def of(steps: NDArray[np.int16], moves: Floats, body: Floats, actions: int) -> "Memory":
+        """What the tables of a bundle hold: steps (M, P + 2), of each the codes, the action and the age.
 
-        actions: how many there are. largest: of each part the largest code (P,). BundleError as :func:`rows_of`.
+        moves: (E, 3) numbers of each move, body: (V, L) of each code of the body; the move E, an end, has none.
+        actions: how many there are. BundleError where a step has others.
         """
-        ranges: Ranges = {"action": (0, actions - 1), "age": (0, np.arange(count)), "codes": (0, largest)}
-        found = rows_of(graph, count, ranges)
-        ages, done, numbers = found["age"], found["action"], found["numbers"]
+        found = steps.astype(np.int64)
+        codes, done, ages, end = found[:, :-2], found[:, -2], found[:, -1], len(moves)
+        for name, values, most in (
+            ("move", codes[:, 0], end),
+            ("code", codes[:, 1:], len(body) - 1),
+            ("action", done, actions - 1),
+            ("age", ages, np.arange(len(ages))),
+        ):
+            if values.min() < 0 or (most < values.T).any():
+                raise BundleError(f"table memory: {name} is out of range")
+        real = (codes[:, :1] < end).astype(np.float32)
+        way = moves[np.minimum(codes[:, 0], end - 1)]
+        numbers = np.concatenate([way, body[codes[:, 1:]].reshape(len(codes), -1)], axis=1) * real
         # before the first step a figure is taken to have stood in it
-        before = [np.arange(count) - np.minimum(ages, back) for back in range(1, len(PAST) + 1)]
+        before = [np.arange(len(ages)) - np.minimum(ages, back) for back in range(1, len(PAST) + 1)]
         keys = np.concatenate([np.sqrt(w) * numbers[at] for w, at in zip(PAST, before, strict=True)], axis=1)
         order = np.argsort(done, kind="stable")
         names, starts = np.unique(done[order], return_index=True)
         rows = dict(zip(names.tolist(), np.split(order, starts[1:]), strict=True))
-        return Memory(found["codes"], keys.astype(np.float32), ages, _parts(ages), rows)
+        return Memory(codes, keys.astype(np.float32), ages, _parts(ages), rows)
 
     def next(self, action: int, recent: Sequence[NDArray[np.float32]], age: int, ends: bool, uniform: float) -> int:
         """The place (a row) at which an action goes on.

@@ -69,7 +69,10 @@ class BundleModel(ABC):
         if name not in self.tables:
             raise BundleError(f"manifest, tables: there is no table {name!r}")
         found = self.tables[name]
-        bind_tensor(TensorSpec(name, found.shape, str(found.dtype)), shape, dtype, self.sizes)
+        try:
+            bind_tensor(TensorSpec(name, found.shape, str(found.dtype)), shape, dtype, self.sizes)
+        except BundleError as error:
+            raise BundleError(f"manifest, tables: {error}") from error
         return found
 
     @classmethod

@@ -19,7 +19,7 @@ from motet.decode.planar import nearest_moves
 from motet.decode.rollout import Ids
 from motet.decode.sample import Sample
 from motet.decode.streaming_decoder import Sight, Unrolled
-from motet.errors import DecodingError, MotionError, TextError, TextWarning
+from motet.errors import BundleError, DecodingError, MotionError, TextError, TextWarning
 from motet.models.familiarity import FamiliaritySettings, Known, Understood
 from motet.models.generate import Generated, GenerateModel
 from motet.motion.motion import Motion
@@ -61,12 +61,12 @@ class CodesModel(GenerateModel):
 
     graphs: "encoder" (words, lengths -> context: log-probabilities of actions), "step" (codes, action, age, states ->
         known, numbers, next states), "part" (known, codes -> log_probabilities), "decoder" (codes -> frames, moves),
-        "tokens" (frames -> codes of the body) and "memory" (row -> codes, numbers, action, age), see docs/bundle.md.
+        "tokens" (frames -> codes of the body). tables: "memory", "moves" and "body", see docs/bundle.md.
     """
 
     SETTINGS = (FamiliaritySettings,)
     LOOPS = ("codes",)
-    ROLES = ("encoder", "part", "decoder", "tokens", "memory", "step")
+    ROLES = ("encoder", "part", "decoder", "tokens", "step")
 
     def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:
         super().__init__(manifest, graphs, tables)
@@ -78,10 +78,7 @@ class CodesModel(GenerateModel):
         back = sum(2 - one for one in ahead) + math.ceil(FINE / self.sizes["T"])
         self.sight = Sight(back, sum(ahead), self.sizes["T"])
         self._bind()
-        count = Fields(manifest.config, "config").whole("remembered", 1, 1 << 20)
-        largest = [self.moves, *[self.sizes["K"] - 1] * self.sizes["B"]]
-        memory = Memory.of(graphs["memory"], count, self.sizes["A"], largest)
-        self.source = Source(graphs["step"], graphs["part"], self.moves, self.sizes["A"], memory)
+        self.source = Source(graphs["step"], graphs["part"], self.moves, self.sizes["A"], self._memory())
         familiarity = self.settings(FamiliaritySettings)
         self.known = Known.read(Fields(manifest.source), self.sizes["A"], self.vocabulary.rules, familiarity)
 
@@ -92,8 +89,17 @@ class CodesModel(GenerateModel):
         self.bind("decoder", {"codes": "*batch steps P"}, {"frames": "batch steps T D", "moves": "batch steps 3"})
         self.sizes["B"] = self.sizes["P"] - 1
         self.bind("tokens", {"frames": "batch steps T D"}, {"codes": "*batch steps B"})
-        memory = {"codes": "*batch P", "numbers": "batch L", "action": "*batch", "age": "*batch"}
-        self.bind("memory", {"row": "*batch"}, memory)
+        if self.moves >= self.sizes["K"]:
+            most = self.sizes["K"] - 1
+            raise BundleError(f"manifest, config.codec.moves: must be at most {most}, as the graph part has it")
+
+    def _memory(self) -> Memory:
+        self.sizes |= {"S": self.sizes["P"] + 2, "M": self.moves}
+        steps, moves = self.table("memory", "R S", "int16"), self.table("moves", "M 3", "float32")
+        body = self.table("body", "Q N", "float32")
+        if 3 + self.sizes["B"] * self.sizes["N"] != self.sizes["L"]:
+            raise BundleError("manifest, tables.body: its numbers are not those of the graph step")
+        return Memory.of(steps, moves, body, self.sizes["A"])
 
     def contexts(self, sequences: Sequence[NDArray[Any]], role: str = "encoder") -> Floats:
         """See :meth:`motet.models.language.LanguageModel.contexts`; one by one: padding changes how sums round."""

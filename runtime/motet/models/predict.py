@@ -40,8 +40,8 @@ class PredictModel(BundleModel):
     """A model that continues motions; any number of sessions and threads share it.
 
     graphs: "encoder" (frames (B, L, C) -> what the step takes first) and "step" (-> frame (B, C), and what it takes
-        next). After ``horizon`` frames, its default, a prediction continues from its own last frames. Some have "error"
-        (frames (B, L, C) -> error (B, N) in metres), how far off the frames of a horizon are likely to be.
+        next). After ``horizon`` frames, its default, a prediction continues from its own last frames. Some encoders
+        also give "error" (B, N) in metres, how far off the frames of a horizon are likely to be.
     """
 
     VERB = "predict"
@@ -55,9 +55,9 @@ class PredictModel(BundleModel):
         bind("step", step, self.loop.inputs, self.loop.outputs, self.sizes, given=encoder.outputs)
         self.seed_frames = self.sizes["L"]
         if self.knows_errors:
-            self.bind("error", {"frames": "batch L D"}, {"error": "batch N"})
+            self.bind("encoder", {"frames": "batch L D"}, {"error": "batch N"})
             if self.sizes["N"] != self.horizon:
-                raise BundleError(f"graph error: it tells {self.sizes['N']} errors of a horizon of {self.horizon}")
+                raise BundleError(f"graph encoder: it gives {self.sizes['N']} errors for a horizon of {self.horizon}")
 
     @property
     def sure(self) -> int:
@@ -67,7 +67,7 @@ class PredictModel(BundleModel):
     @property
     def knows_errors(self) -> bool:
         """Whether :meth:`expected_errors` can tell anything."""
-        return "error" in self.graphs
+        return any(tensor.name == "error" for tensor in self.graphs["encoder"].spec.outputs)
 
     def count(self, seconds: float | None = None, frames: int | None = None) -> int:
         """How many frames a prediction has that lasts so long; DecodingError for both, or for a length out of range."""
@@ -239,13 +239,13 @@ class PredictModel(BundleModel):
         that does not know.
         """
         if not self.knows_errors:
-            raise DecodingError(f"{self!r} does not know its errors: it has no graph for them")
+            raise DecodingError(f"{self!r} does not know its errors: its encoder gives none")
         given = [motions] if isinstance(motions, Motion) else list(motions)
         seeds = np.zeros((len(given), self.seed_frames, len(self.contract.channels)), dtype=np.float32)
         for row, motion in zip(seeds, given, strict=True):
             row[:] = self._seed(motion)[2]
         rows = two_rows(np.arange(len(given)))
-        found = 100 * self.graphs["error"]({"frames": seeds[rows]})["error"][: len(given)]
+        found = 100 * self.graphs["encoder"]({"frames": seeds[rows]})["error"][: len(given)]
         return found[0] if isinstance(motions, Motion) else found
 
     def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:

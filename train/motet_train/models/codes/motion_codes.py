@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import torch
+from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
@@ -114,24 +115,25 @@ class MotionCodes(Net):
         hop, channels = self.config.codec.hop, self.config.codec.channels
         return frames.reshape(codes.shape[0], -1, hop, channels), self.codec.book[moves]
 
-    def remember(self, row: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """Remembered steps (B,) to codes (B, P), the numbers (B, L) they stand for, action (B,) and age (B,)."""
-        found = self.memory[row].long()
-        codes = found[:, : len(self.sizes)]
-        return codes, self._seen(codes[:, None])[1][:, 0], found[:, -2], found[:, -1]
+    def tables(self) -> dict[str, NDArray[Any]]:
+        """The memory, and the numbers that a move (M, 3) and a code of the body (V, L) stand for."""
+        codec = self.config.codec
+        every = torch.arange(codec.codes)[:, None].expand(-1, codec.groups)
+        moves, body = self.codec.book / self.codec.book_scale, self.codec.from_codes(every)[:, : len(codec.levels)]
+        return {"memory": self.memory.numpy(), "moves": moves.numpy(), "body": body.numpy()}
 
     def to_codes(self, frames: Tensor) -> Tensor:
         """Frames of steps (B, N, T / N, D) in the contract's units to the codes (B, N, P - 1) of the body."""
         return self.codec.to_codes(self.codec.encode(frames.flatten(1, 2)))
 
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
-        """The encoder of sentences, the step and its parts, the codec's two ways, and the memory."""
+        """The encoder of sentences, the step and its parts, and the codec's two ways."""
         return {"encoder": self.text.encoder(), **self._writing(), **self._moving()}
 
     def _writing(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
-        """The step, its parts, and the memory."""
+        """The step and its parts."""
         writer, parts = self.config.writer, len(self.sizes)
-        row, action, age = (TensorSpec(name, ("batch",), "int64") for name in ("row", "action", "age"))
+        action, age = (TensorSpec(name, ("batch",), "int64") for name in ("action", "age"))
         codes, known = TensorSpec("codes", ("batch", parts), "int64"), TensorSpec("known", ("batch", writer.width))
         numbers = TensorSpec("numbers", ("batch", self.writer.seen.in_features))
         layers, heads, size = writer.layers, writer.heads, 2 * writer.width // writer.heads
@@ -142,7 +144,6 @@ class MotionCodes(Net):
         return {
             "step": (Part(self, self.step), stepped),
             "part": (Part(self, self.part), GraphSpec((known, codes), (chances,))),
-            "memory": (Part(self, self.remember), GraphSpec((row,), (codes, numbers, action, age))),
         }
 
     def _moving(self) -> dict[str, tuple[nn.Module, GraphSpec]]:

@@ -175,35 +175,33 @@ class Predictor(Net):
         both = found.reshape(-1, 2, self.config.frames, self.config.channels)
         return both[:, 0], self.mirror(both[:, 1])
 
-    def expected(self, frames: Tensor) -> Tensor:
-        """Frames (B, L, C) to the error (B, N) in metres that is to be expected of what follows."""
+    def with_error(self, frames: Tensor) -> tuple[Tensor, Tensor]:
+        """Frames (B, L, C) to the next (B, N, C), and to the error (B, N) in metres that is to be expected of them."""
         assert self.doubt is not None
-        found: Tensor = self.doubt(self.judged_by(frames))
-        return found
+        one, other = self._both(frames)
+        return (one + other) / 2, self.doubt(self._signs(frames, one, other))
 
     def judged_by(self, frames: Tensor) -> Tensor:
         """Frames (B, L, C) to the signs (B, N, S) of :class:`motet_train.models.predict.error_head.Signs`."""
+        return self._signs(frames, *self._both(frames))
+
+    def _signs(self, frames: Tensor, one: Tensor, other: Tensor) -> Tensor:
         moved = self.kept[self.config.held :]
-        one, other = self._both(frames)
         one, other = ((found - frames[:, -1:])[..., moved] / self.scale[self.config.held :] for found in (one, other))
         return Signs(self._seen(frames)[..., self.config.held :], (one + other) / 2, other).logarithms()
 
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
-        """The encoder and the step, each with its contract; and where it knows its errors, what tells them."""
+        """The encoder, which gives its errors where it knows them, and the step, each with its contract."""
         channels = self.config.channels
         frames = TensorSpec("frames", ("batch", self.config.seed_frames, channels))
         coming, left = (
             TensorSpec(name, ("batch", self.config.frames, channels)) for name in ("trajectory", "next_trajectory")
         )
         step = GraphSpec((coming,), (TensorSpec("frame", ("batch", channels)), left), {coming.name: left.name})
-        found: dict[str, tuple[nn.Module, GraphSpec]] = {
-            "encoder": (self, GraphSpec((frames,), (coming,))),
-            "step": (Step(), step),
-        }
-        if self.doubt is not None:
-            error = TensorSpec("error", ("batch", self.config.frames))
-            found["error"] = Part(self, self.expected), GraphSpec((frames,), (error,))
-        return found
+        if self.doubt is None:
+            return {"encoder": (self, GraphSpec((frames,), (coming,))), "step": (Step(), step)}
+        error = TensorSpec("error", ("batch", self.config.frames))
+        return {"encoder": (Part(self, self.with_error), GraphSpec((frames,), (coming, error))), "step": (Step(), step)}
 
 
 class Step(nn.Module):
