@@ -58,7 +58,9 @@ def mutate(rng: Generator) -> Mutant:
     with zipfile.ZipFile(io.BytesIO(zips[name])) as archive:
         files = {member: archive.read(member) for member in archive.namelist()}
     manifest = json.loads(files.pop("manifest.json"))
-    change = _KINDS[kind] if manifest["graphs"] else _in_graph
+    change = _KINDS[kind]
+    if change in (_outside, _lie) and not manifest["graphs"]:
+        change = _in_graph  # a table of a bundle that has no graph
     said = change(rng, manifest, files)
     return f"{name}, {kind}: {said}", {"mutated.zip": _zipped(manifest, files)}
 
