@@ -187,8 +187,8 @@ def test_all_of_them_are_exported_and_run(outputs: list[Result], recordings: Pat
     models = {verb: motet.load(bundles / f"{verb}.zip") for verb in VERBS}
     assert all(model.manifest.licence["weights"] == "CC0-1.0" for model in models.values())
     motion = read_motion(recordings / "walk0.bvh")
-    assert models["describe"].describe(motion)[0].text
-    (made,) = models["generate"].generate("a person walks", seconds=2, strict=False)
+    assert all(one.log_probability < 0 for one in models["describe"].describe(motion))
+    (made,) = models["generate"].generate("a person walks", seconds=2)
     assert len(made.motion) == 60
     assert len(models["predict"].predict(motion, frames=10)) == 10
     assert len(models["fill"].fill(motion, gaps=[(1.0, 1.4)])) == len(motion)
