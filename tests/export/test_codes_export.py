@@ -111,7 +111,7 @@ def test_a_loaded_bundle_computes_what_the_net_computes(bundle: Path) -> None:
     assert isinstance(model, CodesModel)
     assert isinstance(net, MotionCodes)
     frames = walks(CONTRACT, np.random.default_rng(1), 1, 24)[0].astype(np.float64)
-    codes = model.codes_of(frames)
+    codes = model.codec.codes_of(frames)
     assert codes.shape == (6, PARTS)
     with torch.no_grad():
         body = net.codec.to_codes(net.codec.encode(torch.from_numpy(frames).float()[None]))[0]

@@ -14,7 +14,7 @@ MOVES, BODY, GROUPS, ACTIONS = 5, 4, 2, 3
 """Root moves, of which one more is the end, codes of each of the body's groups, and actions."""
 
 PARTS, KNOWN, NUMBERS = GROUPS + 1, 6, GROUPS + 1
-END, NOBODY = MOVES, ACTIONS
+END, NULL_ACTION = MOVES, ACTIONS
 NEVER = -1e4
 
 
@@ -79,4 +79,4 @@ def memory_tables(motions: list[tuple[int, Array]]) -> tuple[Array, Array, Array
 def source(sharpness: float = 1.0, ending: float = 0.0) -> Source:
     """What writers draw from."""
     memory = Memory.of(*memory_tables(remembered()))
-    return Source(step(), part(sharpness=sharpness, ending=ending), END, NOBODY, memory)
+    return Source(step(), part(sharpness=sharpness, ending=ending), END, NULL_ACTION, memory)

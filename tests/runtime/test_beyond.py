@@ -11,15 +11,20 @@ import pytest
 from command_line import run
 
 import motet
+from motet.bundle.manifest import Manifest
+from motet.decode.codec import Inertialization
+from motet.decode.continuation_settings import ContinuationSettings
 from motet.decode.continue_codes import Pace
 from motet.errors import DecodingError, MotionError
-from motet.models.continuation import AROUND, QUICKER, at_rate, joined, levelled, paced
+from motet.models.continuation import Continuation, at_rate, levelled, paced
 from motet.models.generate_codes import CodesModel
 from motet.models.predict import SURE, PredictModel
 from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
 from motet.representation.contract import MotionContract
+
+RULES = ContinuationSettings()
 
 
 @cache
@@ -124,9 +129,9 @@ def test_what_cannot_be_gone_on_with_is_refused(walk: Motion) -> None:
         predictor().predict(walk, beyond=writer(), frames=100_001)
     with pytest.raises(DecodingError, match="expected a seed"):
         predictor().futures(walk, beyond=writer(), seed=-1)
-    with pytest.raises(DecodingError, match=r"writes codes, as motet\.load\('generate'\)"):
+    with pytest.raises(DecodingError, match=r"writes codes, such as motet\.load\('generate'\)"):
         predictor().predict(walk, beyond=motet.load("cmu-generate"), frames=30)
-    with pytest.raises(MotionError, match="a motion of 7 frames is too short to go on with: 8 are needed"):
+    with pytest.raises(MotionError, match="a motion of 7 frames is too short to continue: 8 are needed"):
         predictor().futures(walk.resample(30.0)[:7], beyond=writer())
     with pytest.raises(MotionError, match="needs 10 frames"):
         predictor().predict(walk.resample(30.0)[:7], beyond=writer(), frames=30)
@@ -141,40 +146,67 @@ def curve(start: int, stop: int) -> Any:
 def test_what_is_not_quite_the_motion_is_joined_to_it() -> None:
     given, fps = curve(0, 20), 3000.0
     beside = np.array([0.2, 0.0, 0.1, 0.3, -0.2]) + 0.01 * np.arange(3000)[:, None] * [0, 0, 0, 1, 1]
-    found = joined(given, curve(0, 3000) + beside, fps)
-    seam, exact = np.concatenate([given, found]), curve(0, 3000)
+    shown = curve(0, 3000) + beside
+    join = Inertialization(given[-2:], shown[18:20], fps, 0.1)
+    pieces = [join(shown[start:stop]) for start, stop in ((20, 23), (23, 23), (23, 3000))]
+    seam, exact = np.concatenate([given, *pieces]), curve(0, 3000)
     for order, leap in ((0, 1e-3), (1, 1e-3)):  # neither a pose nor a velocity leaps
-        shown, wanted = np.diff(seam, order, axis=0)[18:22], np.diff(exact, order, axis=0)[18:22]
-        np.testing.assert_allclose(shown[:, 3:], wanted[:, 3:], atol=leap)
+        found, wanted = np.diff(seam, order, axis=0)[18:22], np.diff(exact, order, axis=0)[18:22]
+        np.testing.assert_allclose(found[:, 3:], wanted[:, 3:], atol=leap)
     np.testing.assert_allclose(seam[20, :3], exact[20, :3], atol=0.01)
-    np.testing.assert_allclose(found[-1], (exact + beside)[-1], atol=1e-3)
-    np.testing.assert_array_equal(joined(given, curve(0, 80), 30.0), curve(20, 80))
+    np.testing.assert_allclose(seam[-1], shown[-1], atol=1e-3)
+    same = Inertialization(given[-2:], given[-2:], 30.0, 0.1)
+    np.testing.assert_array_equal(same(curve(20, 80)), curve(20, 80))
 
 
-@pytest.mark.parametrize(("speed", "kept"), [(1.0, 1.1), (1.2, 1.1), (2.0, 2.0 / QUICKER), (0.5, 0.5 * QUICKER)])
+@pytest.mark.parametrize(
+    ("speed", "kept"), [(1.0, 1.1), (1.2, 1.1), (2.0, 2.0 / RULES.tempo), (0.5, 0.5 * RULES.tempo)]
+)
 def test_what_is_off_the_pace_is_played_quicker_or_slower(speed: float, kept: float) -> None:
     frames = np.zeros((301, 5))
     frames[:, 0], frames[:, 3] = speed, np.arange(301)
-    found = paced(frames, Pace(1.1, 0.0), 30.0)
+    found = paced(frames, Pace(1.1, 0.0), 30.0, RULES)
     assert found[60:200, 0] == pytest.approx(kept)
     np.testing.assert_allclose(np.diff(found[60:200, 3]), kept / speed)
     np.testing.assert_allclose(np.cumsum(found[:, 0]), speed * found[:, 3], rtol=0.01)  # as far as its frames went
-    np.testing.assert_array_equal(paced(frames, Pace(1.1, None), 30.0), frames[1:])
+    np.testing.assert_array_equal(paced(frames, Pace(1.1, None), 30.0, RULES), frames[1:])
 
 
 def test_feet_come_down_to_the_ground_that_was_given() -> None:
     contract = writer().contract
     frames = np.repeat(contract.mean[None], 200, axis=0)
     frames[:, 3] += np.where(np.arange(200) < 60, 0.0, np.minimum(0.001 * (np.arange(200) - 60), 0.05))
-    found = levelled(contract, frames, 30)
+    found = levelled(contract, frames, 30, RULES)
     np.testing.assert_array_equal(found[:, [0, 1, 2, *range(4, 136)]], frames[:, [0, 1, 2, *range(4, 136)]])
-    assert np.abs(found[:, 3] - contract.mean[3])[: 60 - round(2 * AROUND * 30)].max(initial=0) < 1e-9
+    assert np.abs(found[:, 3] - contract.mean[3])[: 60 - round(2 * RULES.ground_reach * 30)].max(initial=0) < 1e-9
     assert np.abs(found[-40:, 3] - contract.mean[3]).max() < 1e-6
     high = np.array(frames)
     high[100:, 3] += 2.0  # no floor: it stays as high as it is, but for what a floor may be off
-    assert (levelled(contract, high, 30)[150:, 3] > contract.mean[3] + 1.9).all()
+    assert (levelled(contract, high, 30, RULES)[150:, 3] > contract.mean[3] + 1.9).all()
     assert isinstance(contract, MotionContract)
     assert contract.skeleton == HUMANOID
+
+
+def test_a_shorter_continuation_is_the_beginning_of_a_longer_one(walk: Motion) -> None:
+    standing = replace(walk, values=np.repeat(walk.values[-1:], 240, axis=0))
+    for motion in (walk, standing, walk.scaled(0.3)):
+        long, short, one = (
+            predictor().futures(motion, frames=frames, beyond=writer(), seed=2)[0].values for frames in (220, 61, 1)
+        )
+        np.testing.assert_allclose(long[:61], short, atol=1e-9)
+        np.testing.assert_allclose(long[:1], one, atol=1e-9)
+    long, short = (predictor().predict(walk, frames=frames, beyond=writer()).values for frames in (150, 40))
+    np.testing.assert_allclose(long[:40], short, atol=1e-9)
+
+
+def test_a_bundle_has_settings_of_its_own(walk: Motion) -> None:
+    model = writer()
+    source = {**model.manifest.source, "settings": {"continuation": {"tempo": 1.0, "half_life": 0.3}}}
+    own = CodesModel(Manifest.from_json(source), model.graphs)
+    assert own.settings(ContinuationSettings) == replace(RULES, tempo=1.0, half_life=0.3)
+    assert own.decoder().half_life == 0.3
+    rules = Continuation(own, walk.resample(30.0)).rules
+    assert (rules.tempo, rules.rows) == (1.0, 12)
 
 
 def test_the_command_line_gives_what_python_gives(tmp_path: Path, clips: Path, walk: Motion) -> None:
@@ -222,7 +254,7 @@ def test_errors_are_told_of_the_predictors_own_frames(
         (2, ["--samples", "2", "--beyond", "cmu-generate"], "need one that is a CodesModel"),
         (2, ["--frames", "26", "--beyond", "control"], "is for 'control'"),
         (2, ["--frames", "26", "--beyond", "no-such"], "unknown bundle 'no-such'"),
-        (1, ["--samples", "1"], "short.npz: a motion of 7 frames is too short to go on with: 8 are needed (--beyond"),
+        (1, ["--samples", "1"], "short.npz: a motion of 7 frames is too short to continue: 8 are needed (--beyond"),
     ],
 )
 def test_refusals_of_the_command_line_write_nothing(

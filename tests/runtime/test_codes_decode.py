@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fake_codes import ACTIONS, END, KNOWN, NOBODY, PARTS, memory_tables, numbers_of, remembered, source
+from fake_codes import ACTIONS, END, KNOWN, NULL_ACTION, PARTS, memory_tables, numbers_of, remembered, source
 from numpy.typing import NDArray
 
 from motet.decode.codes import Drawing, Source, Writer, draw_codes, drawn_actions, drawn_steps, nucleus
@@ -158,10 +158,10 @@ def naive_row(
 ) -> list[list[int]]:
     """One motion, drawn number by number, without a memory: told and not told what it shows, each by itself."""
     rng, last, age, steps = np.random.default_rng(seed), [given.nothing, 0, 0], 0, list[list[int]]()
-    states = {who: np.zeros((1, KNOWN), np.float32) for who in (action, NOBODY)}
+    states = {who: np.zeros((1, KNOWN), np.float32) for who in (action, NULL_ACTION)}
     for length in range(longest):
         known = {}
-        for who in (action, NOBODY):
+        for who in (action, NULL_ACTION):
             feeds = {"codes": np.array([last]), "action": np.array([who]), "age": np.array([age])}
             out = given.step({**feeds, "state": states[who]})
             known[who], states[who] = out["known"], out["next_state"]
@@ -172,7 +172,7 @@ def naive_row(
                 given.part({"known": known[who], "codes": np.array([codes])})["log_probabilities"][0, part].astype(
                     float
                 )
-                for who in (action, NOBODY)
+                for who in (action, NULL_ACTION)
             )
             chances = untold + drawing.guidance * (told - untold)
             codes[part] = naive_nucleus(chances, float(uniform[part]), temperature, drawing.top_p)
@@ -225,8 +225,8 @@ def test_a_row_of_a_batch_gets_what_it_gets_alone(memory: float, exactly: bool) 
     for row, codes in enumerate(together):
         (alone,) = draw_codes(Writer(given, rngs(row), drawing), actions[row : row + 1], 20, exactly)
         np.testing.assert_array_equal(alone, codes)
-        one_by_one = drawn_steps(Writer(given, rngs(row), drawing), int(actions[row]), 20, exactly)
-        assert [step.tolist() for step in one_by_one] == codes.tolist()
+        one_by_one = drawn_steps(Writer(given, rngs(row), drawing), actions[row : row + 1], 20, exactly)
+        assert [step[0].tolist() for _, step in one_by_one] == codes.tolist()
     assert len({len(codes) for codes in together}) == 1 if exactly else len({len(codes) for codes in together}) > 1
 
 
@@ -268,18 +268,18 @@ def test_an_action_takes_over_where_the_last_one_ends(seed: int) -> None:
     """The end is not among what was before, and neither are the states that knew of it."""
     given = source(sharpness=0.6, ending=1.5)
     writer, first, ages = Writer(given, rngs(seed), PLAIN), list[Array](), [0]
-    for step in drawn_steps(writer, 0, 60):
-        first.append(step)
+    for _, step in drawn_steps(writer, np.array([0]), 60):
+        first.append(step[0])
         ages.append(int(writer.age[0]))
     assert 1 <= len(first) < 60
-    second = list(drawn_steps(writer, 2, 60))
+    second = [step[0].tolist() for _, step in drawn_steps(writer, np.array([2]), 60)]
     rng = np.random.default_rng(seed)
     for _ in range(len(first) + 1):  # of the end, too
         rng.random((PARTS + 2,), np.float32)
     other = Writer(given, [rng], PLAIN)
     other.state = _seen(given, first, ages)
     other.last = np.tile(first[-1], (2, 1))
-    assert [step.tolist() for step in drawn_steps(other, 2, 60)] == [step.tolist() for step in second]
+    assert [step[0].tolist() for _, step in drawn_steps(other, np.array([2]), 60)] == second
     assert second
 
 
@@ -287,7 +287,7 @@ def _seen(given: Source, steps: list[Array], ages: list[int]) -> dict[str, Array
     """States of a writer that drew some steps for action 0, before the last of them is seen."""
     last, state = np.array([[given.nothing, 0, 0]] * 2), np.zeros((2, KNOWN), np.float32)
     for age, following in zip(ages, steps, strict=False):
-        feeds = {"codes": last, "action": np.array([0, NOBODY]), "age": np.full(2, age), "state": state}
+        feeds = {"codes": last, "action": np.array([0, NULL_ACTION]), "age": np.full(2, age), "state": state}
         state, last = given.step(feeds)["next_state"], np.tile(following, (2, 1))
     return {"state": state}
 
@@ -298,12 +298,13 @@ def test_what_was_done_before_is_gone_on_with() -> None:
     early = math.ceil(EARLY * len(codes)) - 1
     writer.see(codes[:early])
     # the age says that the action has just begun, but the past decides where in its early part
-    assert [step.tolist() for step in drawn_steps(writer, action, 50)] == codes[early:-1].tolist()
+    found = [step[0].tolist() for _, step in drawn_steps(writer, np.array([action]), 50)]
+    assert found == codes[early:-1].tolist()
     fed = Writer(given, rngs(0), PLAIN)
     fed.see(codes[:2])
     state = np.zeros((2, KNOWN), np.float32)
     for before in ([given.nothing, 0, 0], codes[0]):
-        feeds = {"codes": np.tile(before, (2, 1)), "action": np.full(2, NOBODY), "age": np.zeros(2, np.int64)}
+        feeds = {"codes": np.tile(before, (2, 1)), "action": np.full(2, NULL_ACTION), "age": np.zeros(2, np.int64)}
         state = given.step({**feeds, "state": state})["next_state"]
     np.testing.assert_array_equal(fed.state["state"], state)
     assert fed.last.tolist() == [codes[1].tolist()] * 2

@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,7 +10,6 @@ from command_line import run
 
 import motet
 from motet.decode.codes import WINDOW, Drawing, Writer, drawn_steps
-from motet.decode.streaming_decoder import Unrolled
 from motet.errors import DecodingError, MotionError, TextError, TextWarning
 from motet.models.generate_codes import CodesModel
 from motet.motion.kinematics import positions
@@ -41,16 +41,40 @@ def test_a_motion_lasts_as_long_as_is_asked(model: CodesModel) -> None:
 
 def test_a_story_of_one_sentence_is_what_generate_gives(model: CodesModel) -> None:
     (alone,) = model.generate(WALK, seed=4)
-    story = model.story([WALK], seed=4)
+    story = model.story(WALK, seed=np.int64(4), hypotheses=1)
     np.testing.assert_array_equal(story.frames, alone.frames)
     assert [(one.text, one.start) for one in story.passages] == [(WALK, 0.0)]
 
 
-def test_a_stream_gives_the_motion_in_pieces_at_once(model: CodesModel) -> None:
-    whole = positions(model.story([WALK, JUMP], seconds=2, seed=1).playable(plant=False))
-    pieces = [positions(piece) for piece in model.stream([WALK, JUMP], seconds=2, seed=1)]
-    assert len(pieces) > 20
-    np.testing.assert_allclose(np.concatenate(pieces), whole, atol=1e-9)
+@pytest.mark.parametrize(
+    "asked",
+    [{"seconds": 2}, {"seconds": 0.41, "stand": "end"}, {"after": True, "seconds": [1, None]}, {"stand": "both"}],
+)
+def test_a_stream_is_the_story_to_the_bit(model: CodesModel, walk: Motion, asked: dict[str, Any]) -> None:
+    asked = {**asked, "after": walk} if "after" in asked else asked
+    whole = model.story([WALK, JUMP], seed=1, **asked).playable(plant=False)
+    pieces = list(model.stream([WALK, JUMP], seed=1, **asked))
+    assert len(pieces) > 10
+    np.testing.assert_array_equal(np.concatenate([piece.values for piece in pieces]), whole.values)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_every_passage_is_within_a_step_of_what_was_asked(model: CodesModel, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    asked = (
+        [[1.0] * 14, [0.41] * 12, [0.05] * 5][seed] if seed < 3 else rng.uniform(0.05, 1.5, rng.integers(1, 8)).tolist()
+    )
+    stand = ("start", "end", "both", None)[seed % 4]
+    story = model.story([WALK, JUMP][:1] * len(asked), seconds=asked, stand=stand, seed=seed)  # type: ignore[arg-type]
+    asked = [0.8] * (stand in ("start", "both")) + asked + [0.8] * (stand in ("end", "both"))
+    assert len(story.frames) == max(1, round(sum(asked) * model.fps))
+    assert len(story.passages) == len(asked)  # by their numbers, though the sentences are equal
+    starts, stops = ([getattr(one, edge) for one in story.passages] for edge in ("start", "stop"))
+    assert starts == [0.0, *stops[:-1]]
+    assert stops[-1] == len(story.frames) / model.fps
+    rounding = 0.5 / model.fps  # of the whole
+    assert np.abs(np.subtract(stops, starts) - asked).max() <= model.codec.seconds + rounding
+    assert np.abs(stops - np.cumsum(asked)).max() <= model.codec.seconds
 
 
 def test_a_writer_looks_back_at_a_window_of_steps(model: CodesModel) -> None:
@@ -58,9 +82,9 @@ def test_a_writer_looks_back_at_a_window_of_steps(model: CodesModel) -> None:
     assert model.manifest.training["recipe"]["window"] == WINDOW
     drawing, noise = Drawing(1.0, 1.0, 0.9, 1.5), [np.random.default_rng(3)]
     writer = Writer(model.source, noise, drawing)
-    past, last = np.zeros((2, 3, 6, 0, 64), np.float32), [[model.moves + 1, 0, 0, 0]] * 2
+    past, last = np.zeros((2, 3, 6, 0, 64), np.float32), [[model.codec.moves + 1, 0, 0, 0]] * 2
     for age in range(WINDOW + 20):
-        told = {"codes": np.array(last), "action": np.array([7, model.source.nobody]), "age": np.full(2, age)}
+        told = {"codes": np.array(last), "action": np.array([7, model.source.null_action]), "age": np.full(2, age)}
         past = model.graphs["step"]({**told, "past": past[:, :, :, -WINDOW:]})["next_past"]
         writer.age[:] = age
         last = [writer.draw(np.array([7]), ends=False)[0].tolist()] * 2
@@ -69,14 +93,18 @@ def test_a_writer_looks_back_at_a_window_of_steps(model: CodesModel) -> None:
 
 def test_a_stream_may_last(model: CodesModel) -> None:
     """It keeps no more after a while than at first."""
-    unrolled = Unrolled(model.graphs["decoder"], model.sight, model.fps)
-    steps = list(drawn_steps(model._writer([np.random.Generator(np.random.PCG64(1))], model.defaults), 7, 130, True))
-    pieces = []
-    for step in steps:
-        pieces.append(unrolled.push(step))
-        assert len(unrolled.codes) <= model.sight.back + model.sight.ahead + 1
-    pieces.append(unrolled.finish())
-    np.testing.assert_array_equal(np.concatenate(pieces), model.frames_of(np.array(steps)))
+    noise = [np.random.Generator(np.random.PCG64(1))]
+    decoder, writer = model.decoder(), model.writer(noise, model.defaults)
+    pieces, steps, kept = list[Any](), list[Any](), list[int]()
+    for _, step in drawn_steps(writer, np.array([7]), 160, True):
+        steps.append(step)
+        pieces.append(decoder.push(step))
+        state = [*writer.state.values(), *writer.recent, writer.last, *writer._before[1].values()]
+        kept.append(sum(array.nbytes for array in state) + sum(step.nbytes for step in decoder.codes))
+    assert max(kept[WINDOW:]) == kept[WINDOW + 2]
+    assert kept[-1] < 2**21
+    pieces.append(decoder.finish())
+    np.testing.assert_array_equal(np.concatenate(pieces), model.codec.frames_of(np.concatenate(steps)))
 
 
 def test_a_story_goes_on_without_a_leap_and_says_what_is_when(model: CodesModel) -> None:
@@ -94,7 +122,7 @@ def test_a_given_motion_is_gone_on_with(model: CodesModel, walk: Motion) -> None
     seam = np.linalg.norm(positions(story.playable(plant=False))[0] - positions(before)[-1], axis=-1)
     usual = np.linalg.norm(np.diff(positions(before), axis=0), axis=-1)
     assert seam.max() < 2 * usual.max()
-    with pytest.raises(MotionError, match="too short to go on with"):
+    with pytest.raises(MotionError, match="too short to continue"):
         model.story([WALK], after=walk[:10])
 
 
@@ -142,8 +170,14 @@ def test_settings_out_of_range_are_refused(model: CodesModel) -> None:
     for seconds in (-1.0, 0, 601.0, float("nan")):
         with pytest.raises(DecodingError):
             model.generate(WALK, seconds=seconds)
-    with pytest.raises(DecodingError, match="one for each of 2"):
-        model.story([WALK, JUMP], seconds=[1.0])
+    for seconds in ([1.0], np.ones(3), np.float32(-1), "12", [1.0, "x"], 601, float("nan"), np.array(1.0)):
+        with pytest.raises(DecodingError, match="one for each of 2"):
+            model.story([WALK, JUMP], seconds=seconds)  # type: ignore[arg-type]
+    for seed in (-1, 1.5, "x", [1, 2]):
+        with pytest.raises(DecodingError, match="expected a seed"):
+            model.story(WALK, seed=seed)  # type: ignore[arg-type]
+    with pytest.raises(DecodingError, match="hypotheses must be 1, not 3"):
+        model.story(WALK, hypotheses=3)
     with pytest.raises(DecodingError, match="no setting 'candidates'"):
         model.generate(WALK, candidates=3)
 
@@ -152,10 +186,10 @@ def test_what_cannot_be_told_is_refused(model: CodesModel) -> None:
     assert model.generate([]) == []
     with pytest.raises(TextError, match="needs a sentence"):
         model.story([])
-    with pytest.raises(DecodingError, match="not at 'middle'"):
-        model.story([WALK], stand="middle")
+    with pytest.raises(DecodingError, match="start, end, both, not 'middle'"):
+        model.story([WALK], stand="middle")  # type: ignore[arg-type]
     with pytest.raises(TextError, match="nearest: '"):
-        next(model.stream("a person repairs the violin of an astronaut", strict=True))
+        model.stream("a person repairs the violin of an astronaut", strict=True)
 
 
 def test_refusals_of_the_command_line_say_which_file_or_text(tmp_path: Path, walk: Motion) -> None:

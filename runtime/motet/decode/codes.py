@@ -5,7 +5,7 @@ by temperature, and from the likeliest that make up ``top_p`` together (nucleus 
 an action is followed can be raised by classifier-free guidance (Ho and Salimans 2022).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
 
@@ -36,19 +36,25 @@ class Drawing(NamedTuple):
     guidance: float
     memory: float = 0.0
 
+    @staticmethod
+    def of(settings: Mapping[str, Any]) -> "Drawing":
+        """From a loop's settings."""
+        names = ("temperature", "first_temperature", "top_p", "guidance", "memory")
+        return Drawing(*(settings[name] for name in names))
+
 
 @dataclass(frozen=True, eq=False)
 class Source:
     """What writers draw from: the graphs "step" and "part", and a memory.
 
     end: the move that ends a motion; the one after it, ``nothing``, stands for what comes before the first step.
-    nobody: the action that says nothing, for guidance.
+    null_action: the action that says nothing, for guidance.
     """
 
     step: Graph
     part: Graph
     end: int
-    nobody: int
+    null_action: int
     memory: Memory
 
     @property
@@ -85,7 +91,7 @@ class Writer:
     def see(self, codes: Ids) -> None:
         """Take steps (N, P) as what every row did before, whatever action it was."""
         for step in codes:
-            self._known(np.full(len(self.noise), self.source.nobody))
+            self._known(np.full(len(self.noise), self.source.null_action))
             self.last = np.tile(step, (len(self.last), 1))
 
     def draw(self, actions: Ids, ends: bool = True) -> Ids:
@@ -112,7 +118,7 @@ class Writer:
 
     def _known(self, actions: Ids) -> Floats:
         self._before = self.last, self.state, self.recent, self.age
-        told = np.concatenate([actions, np.full(len(actions), self.source.nobody)]).astype(np.int64)
+        told = np.concatenate([actions, np.full(len(actions), self.source.null_action)]).astype(np.int64)
         inputs = {"codes": self.last, "action": told, "age": np.tile(self.age, 2)}
         outputs, state = advance(self.source.step, self.state, inputs)
         self.state = {name: lately(array, self.source.step, name) for name, array in state.items()}
@@ -200,31 +206,30 @@ def draw_codes(writer: Writer, actions: Ids, longest: int, exactly: bool = False
 
     exactly: to ``longest`` steps; an action that ends before is done again.
     """
-    alive = np.arange(len(actions))
     steps: list[list[Ids]] = [[] for _ in actions]
-    writer.begin()
-    for length in range(longest):
-        codes = writer.draw(actions[alive], ends=not exactly and length > 0)
-        going = codes[:, 0] != writer.source.end
-        for row, step in zip(alive[going].tolist(), codes[going], strict=True):
+    for rows, codes in drawn_steps(writer, actions, longest, exactly):
+        for row, step in zip(rows.tolist(), codes, strict=True):
             steps[row].append(step)
-        alive = alive[going]
-        if not len(alive):
-            break
-        if not going.all():
-            writer.keep(np.flatnonzero(going))
     return [np.array(row, dtype=np.int64).reshape(-1, writer.source.parts) for row in steps]
 
 
-def drawn_steps(writer: Writer, action: int, longest: int, exactly: bool = False) -> Iterator[Ids]:
-    """Step by step (P,) what :func:`draw_codes` draws for a writer of one row; it can go on with another action."""
+def drawn_steps(writer: Writer, actions: Ids, longest: int, exactly: bool = False) -> Iterator[tuple[Ids, Ids]]:
+    """Step by step what :func:`draw_codes` gives: the rows (R,) that have not ended, and their codes (R, P).
+
+    A writer whose rows have all ended can draw other actions from there.
+    """
+    rows = np.arange(len(actions))
     writer.begin()
     for length in range(longest):
-        codes = writer.draw(np.array([action]), ends=not exactly and length > 0)
-        if codes[0, 0] == writer.source.end:
+        codes = writer.draw(actions[rows], ends=not exactly and length > 0)
+        going = codes[:, 0] != writer.source.end
+        if not going.any():
             writer.take_back()
             return
-        yield codes[0]
+        if not going.all():
+            writer.keep(np.flatnonzero(going))
+        rows = rows[going]
+        yield rows, codes[going]
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from motet.bundle.session import SessionOptions
 from motet.bundle.signature import Sizes, bind, bind_tensor
 from motet.decode.loops import LOOPS
 from motet.errors import BundleError
+from motet.motion.motion import Motion
 from motet.settings import Settings
 
 S = TypeVar("S", bound=Settings)
@@ -101,6 +102,10 @@ class BundleModel(ABC):
     def fps(self) -> float:
         """Frames per second that the model takes and gives."""
         return self.contract.fps
+
+    def at_own_rate(self, motion: Motion) -> Motion:
+        """A motion at the model's frame rate, its last frame kept."""
+        return motion if motion.fps == self.fps else motion.continuous().resample(self.fps, to_end=True)
 
     @property
     def providers(self) -> tuple[str, ...]:

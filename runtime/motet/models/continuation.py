@@ -2,137 +2,147 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from motet.decode.codes import Drawing
-from motet.decode.continue_codes import Ground, Pace, Shown, onward
+from motet.decode.continuation_settings import ContinuationSettings
+from motet.decode.continue_codes import Continuer, Pace
 from motet.errors import DecodingError, MotionError
 from motet.models.generate import SETTLED, GenerateModel
 from motet.models.generate_codes import CodesModel
 from motet.models.progress import Progress, silent
 from motet.motion.feet.contacts import GROUND_PERCENT, feet_of, ground_of
-from motet.motion.feet.hold import hold_feet, windows
+from motet.motion.feet.hold import BENT, hold_feet, windows
 from motet.motion.humanoid import HUMANOID, Figure
-from motet.motion.kinematics import positions
+from motet.motion.humanoid.bones import LEFT_RIGHT, ground_under, sided, sole_points
+from motet.motion.kinematics import global_transforms, positions
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
-from motet.motion.springs import damped, damping_of
 from motet.representation.contract import MotionContract
 from motet.representation.retargeting import from_model_figure
 from motet.representation.root_block import last_place
 from motet.representation.root_sixd import facing, in_world
 
-LOOKED_AT = 2.0
-"""Seconds of a motion's end whose pace is kept."""
-
-HALF_LIFE = 0.1
-"""Seconds after which half of what a motion's last frame is beside its codes is left."""
-
-QUICKER, LASTING = 1.15, 1.5
-"""What goes on is played so many times quicker or slower at most, by its speed in so many seconds before and after."""
-
-SEEN = 1.0
-"""Seconds of a motion's end that say where the ground is, beside what follows."""
-
-AROUND, OFF = 0.7, 0.1
-"""Seconds, more than a stride, and metres: see :func:`levelled`."""
-
 RATES = 3
-"""Channels that are rates: what they are off by is a speed already."""
+"""Channels that are rates of the root: they grow with the tempo."""
+
+STANCE = 0.7
+"""Seconds before a stance and after its anchor that know of it (:mod:`motet.motion.feet.hold`)."""
+
+LEGS = {sided(side, part) for side in LEFT_RIGHT for part in BENT}
+"""Joints that hold the feet."""
 
 
-@dataclass(frozen=True, eq=False)
-class Follower:
-    """Goes on with a motion, as often as is wanted.
+class Continuation:
+    """A motion that a model of codes continues, as often as is wanted; any number of threads share it.
 
-    writer: the model whose codes go on. own: the motion at the writer's frame rate; figure: the same on the writer's
-    figure. given, predicted: (T, D) frames of its last seconds and (P, D) of what was predicted of what follows, in the
-    writer's units, together whole steps of codes. pace: to be kept. pose: x, z and facing (3,) at the motion's end, the
-    facing as it is with what was predicted: it is smoothed over time, and alone it would lead another way.
+    model: any that writes codes. motion: of any human figure. predicted: seconds at its end that are not the motion's
+    own, but the beginning of what follows. MotionError for a motion that is too short, or of a figure that is no
+    human's.
     """
 
-    writer: CodesModel
-    own: Motion
-    figure: Motion
-    given: Array
-    predicted: Array
-    pace: Pace
-    pose: Array
-
-    @staticmethod
-    def of(writer: CodesModel, motion: Motion, predicted: float = 0.0) -> "Follower":
-        """MotionError for a motion that is too short, or of a figure that is no human's.
-
-        predicted: seconds at its end that are not the motion's own: part of what follows.
-        """
-        whole = motion if motion.fps == writer.fps else motion.continuous().resample(writer.fps, to_end=True)
-        figure = writer.contract.on_figure(whole)
-        frames = writer.last_frames(figure)
-        end = len(frames) - round(predicted * writer.fps)
-        if end < 2:
-            raise MotionError(f"a motion of {len(whole)} frames, so many of them predicted, is too short to go on with")
-        pace = Pace.of(frames[max(0, end - round(LOOKED_AT * writer.fps)) : end, :RATES], writer.fps)
-        own = len(whole) - len(frames) + end
-        place = last_place(figure[:own])
-        pose = np.array([place[0], place[2], facing(figure)[own - 1]])
-        return Follower(writer, whole[:own], figure[:own], frames[:end], frames[end:], pace, pose)
+    def __init__(self, model: CodesModel, motion: Motion, predicted: float = 0.0) -> None:
+        self.model, self.rules = model, model.settings(ContinuationSettings)
+        whole = model.at_own_rate(motion)
+        figure = model.contract.on_figure(whole)
+        self.context = model.context(figure)
+        self.given = len(self.context.frames) - round(predicted * model.fps)  # frames of the context, the own ones
+        if self.given < 2:
+            raise MotionError(f"only {len(whole)} frames, some of them predicted: too few to continue from")
+        own = len(whole) - len(self.context.frames) + self.given
+        # as it is with what was predicted: it is smoothed over time, and alone it would lead another way
+        faced, place = facing(figure)[own - 1], last_place(figure[:own])
+        self.own, self.figure, self.pose = whole[:own], figure[:own], np.array([place[0], place[2], faced])
+        looked_at = self.context.frames[max(0, self.given - round(self.rules.pace_seen * model.fps)) : self.given]
+        self.pace = Pace.of(looked_at[:, :RATES], model.fps, self.rules)
 
     def follow(self, count: int, seed: int) -> tuple[Motion, Motion]:
-        """So many frames that follow, the same for the same seed, and the motion before them: :func:`brought_back`."""
-        frames = np.concatenate([self.predicted, self.drawn(count - len(self.predicted), seed)])
-        following, _ = in_world(self.writer.contract.features(self.held(frames)), self.figure, self.pose)
-        return brought_back(following, self.own, self.figure)
+        """``count`` frames that follow, and the motion before them: :func:`brought_back`. Of one seed fewer frames are
+        the beginning of more."""
+        rules, contract = self.rules, self.model.contract
+        ahead = round((rules.anchor + STANCE + 2 * rules.ground_reach) * contract.fps)
+        before = self.context.frames[: self.given][-round(rules.ground_seen * contract.fps) :]
+        predicted = self.context.frames[self.given :]
+        frames = np.concatenate([before, predicted, self._drawn(count - len(predicted) + ahead, seed)])
+        if contract.skeleton == HUMANOID:
+            frames = self._on_ground(frames, len(before))
+        shown = contract.features(frames[len(before) : len(before) + count])
+        return brought_back(in_world(shown, self.figure, self.pose)[0], self.own, self.figure)
 
-    def drawn(self, count: int, seed: int) -> Array:
-        """Frames (count, D) after those predicted, in the writer's units, joined without a leap."""
-        writer, hop, frames = self.writer, self.writer.sight.hop, np.concatenate([self.given, self.predicted])
-        names = ("temperature", "first_temperature", "top_p", "guidance", "memory")
-        drawing = Drawing(*(writer.defaults[name] for name in names))
-        ground = Ground(writer.book(), hop / writer.fps)
-        shown = Shown(writer.codes_of(frames), self.pace, math.ceil(len(self.predicted) / hop))
-        # what is decoded last is decoded without what follows
-        steps = math.ceil(count * QUICKER / hop) + writer.sight.ahead
-        codes = onward(writer.source, drawing, ground, shown, steps, seed)
-        following = joined(frames, writer.frames_of(np.concatenate([shown.codes, codes])), writer.fps)
-        return paced(np.concatenate([frames[-1:], following]), self.pace, writer.fps)[:count]
+    def _drawn(self, count: int, seed: int) -> Array:
+        """Frames (count, D) after those of the context, at its pace and without a leap."""
+        model, rules, context = self.model, self.rules, self.context
+        continuer = Continuer(model.source, model.codec, Drawing.of(model.defaults), rules)
+        known = len(context.codes) - math.ceil((len(context.frames) - self.given) / model.codec.field.hop)
+        steps = continuer.steps(context.codes, max(1, known), self.pace, seed)
+        decoder, frames = model.decoder(context), context.frames[-1:]
+        while len(found := paced(frames, self.pace, model.fps, rules)) < count:
+            more = islice(steps, math.ceil((count - len(found)) / model.codec.field.hop))
+            frames = np.concatenate([frames, decoder.push(np.stack(list(more)))])
+        return found[: max(0, count)]
 
-    def held(self, frames: Array) -> Array:
-        """Frames (T, D) that follow, on the ground of the motion's end, and with feet that stay where they stand; at
+    def _on_ground(self, frames: Array, given: int) -> Array:
+        """Frames (T, D), the first of them given, on the ground of these and with feet that stay where they stand: at
         first as far as they did before."""
-        contract, before = self.writer.contract, self.given[-round(SEEN * self.writer.fps) :]
-        if contract.skeleton != HUMANOID:
-            return frames
-        level = levelled(contract, np.concatenate([before, frames]), len(before))
-        planted = contract.frames(hold_feet(contract.motion(level, plant=False), trembling=True))[len(before) :]
-        share = np.minimum(np.arange(len(frames)) / (SETTLED * self.writer.fps), 1.0)[:, None]
-        level = level[len(before) :]
-        found: Array = level + share * (planted - level)
-        return found
+        contract, rules = self.model.contract, self.rules
+        level = levelled(contract, frames, given, rules)
+        motion = contract.motion(level, plant=False)
+        ground = ground_under(sole_points(*global_transforms(motion[:given])))
+        held = contract.frames(hold_feet(motion, trembling=True, ground=ground, anchor=rules.anchor))
+        legs = [column for column, name in enumerate(contract.channels) if name.rpartition(".")[0] in LEGS]
+        share = np.clip((np.arange(len(frames)) - given) / (SETTLED * contract.fps), 0, 1)[:, None]
+        level[:, legs] += share * (held - level)[:, legs]
+        return level
 
 
-def levelled(contract: MotionContract, frames: Array, given: int) -> Array:
+def levelled(contract: MotionContract, frames: Array, given: int, rules: ContinuationSettings) -> Array:
     """Frames (T, D) whose feet come down to where they came down in the first ``given`` of them.
 
-    What is remembered was recorded on other floors, and on mounds and steps. Where the ground is, is seen over AROUND
-    seconds before and after; what is farther off than OFF is no other floor but a jump, or a figure on its hands.
+    What is remembered was recorded on other floors, and on mounds and steps.
     """
     soles = positions(contract.motion(frames, plant=False))[:, feet_of(HUMANOID), 1].min(axis=1)
-    reach = round(AROUND * contract.fps)
+    reach = round(rules.ground_reach * contract.fps)
     grounds = np.percentile(windows(soles, reach), GROUND_PERCENT, axis=1)
-    off = np.clip(grounds - ground_of(soles[:given, None]), -OFF, OFF)
-    bell = np.hanning(2 * reach + 3)[1:-1]
+    off = np.clip(grounds - ground_of(soles[:given, None]), -rules.ground_limit, rules.ground_limit)
     # at the seam there is no leap to another floor
     settled = (1 - np.cos(np.pi * np.clip((np.arange(len(frames)) - given) / reach, 0, 1))) / 2
     level = np.array(frames)
-    level[:, contract.channels.index("root.height")] -= settled * (windows(off, reach) @ (bell / bell.sum()))
+    level[:, contract.channels.index("root.height")] -= settled * averaged(off, reach)
     return level
 
 
+def averaged(values: Array, reach: int) -> Array:
+    """Values (T,) through a bell-shaped window of ``reach`` frames before and after each."""
+    bell = np.hanning(2 * reach + 3)[1:-1]
+    found: Array = (windows(values, reach) * (bell / bell.sum())).sum(axis=1)
+    return found
+
+
+def paced(frames: Array, pace: Pace, fps: float, rules: ContinuationSettings) -> Array:
+    """Frames after the first of (T, D), played quicker or slower where they are off a pace.
+
+    What stands goes on standing. The last frames are left out: their speed is not known yet.
+    """
+    reach, times = round(rules.tempo_reach * fps), np.arange(len(frames))
+    if pace.turn is None:
+        return frames[1:]
+    speed = averaged(np.linalg.norm(frames[:, : RATES - 1], axis=1), reach)
+    asked = np.clip(pace.speed / np.maximum(speed, 1e-3), 1 / rules.tempo, rules.tempo)
+    ratio = 1 + (asked[1:] - 1) * np.minimum(times[:-1] / (SETTLED * fps), 1.0)
+    shown = np.concatenate([[0.0], np.cumsum(1 / ratio)])
+    last = max(0, math.floor(shown[max(0, len(frames) - 1 - reach)]))
+    at = np.interp(np.arange(1, last + 1), shown, times)
+    found = np.column_stack([np.interp(at, times, column) for column in frames.T])
+    found[:, :RATES] *= np.interp(at, times[1:], ratio)[:, None] if len(at) else 1
+    return found
+
+
 def futures(
-    writer: GenerateModel,
+    model: GenerateModel,
     motion: Motion,
     count: int,
     seeds: Sequence[int],
@@ -141,17 +151,17 @@ def futures(
 ) -> list[tuple[Motion, Motion]]:
     """For each seed so many frames that follow a motion, at its frame rate, and the motion as it goes before them.
 
-    Both are in the motion's own channels, or where that is not possible on the writer's figure. progress: called with
-    the number of futures done and of all. predicted: as :meth:`Follower.of`. DecodingError where the writer does not
-    write codes, MotionError as :meth:`Follower.of`.
+    Both are in the motion's own channels, or where that is not possible on the model's figure. progress: called with
+    the number of futures done and of all. predicted and MotionError: as :class:`Continuation`. DecodingError where the
+    model does not write codes.
     """
-    if not isinstance(writer, CodesModel):
-        raise DecodingError(f"what goes on beyond the horizon writes codes, as motet.load('generate'), not {writer!r}")
-    follower, found = Follower.of(writer, motion, predicted), list[tuple[Motion, Motion]]()
+    if not isinstance(model, CodesModel):
+        raise DecodingError(f"beyond must be a model that writes codes, such as motet.load('generate'), not {model!r}")
+    continuation, found = Continuation(model, motion, predicted), list[tuple[Motion, Motion]]()
     own = motion[: len(motion) - round(predicted * motion.fps)]
     for seed in seeds:
-        following, before = follower.follow(math.ceil(count * writer.fps / motion.fps) + 1, seed)
-        whole = own if before is follower.own else writer.contract.on_figure(own)
+        following, before = continuation.follow(math.ceil(count * model.fps / motion.fps) + 1, seed)
+        whole = own if before is continuation.own else model.contract.on_figure(own)
         found.append((at_rate(before, following, motion.fps)[:count], whole))
         progress(len(found), len(seeds))
     return found
@@ -163,41 +173,6 @@ def at_rate(before: Motion, following: Motion, fps: float) -> Motion:
         return following
     last = before[-1:].select(following.channels, following.units)
     return replace(following, values=np.concatenate([last.values, following.values])).resample(fps)[1:]
-
-
-def joined(given: Array, found: Array, fps: float) -> Array:
-    """What follows given frames (T, D), from frames (T + N, D) that show them, too, but not exactly.
-
-    What the last given frame is beside what was found, and how fast that changes, goes by a critically damped spring
-    (inertialisation: Bollo 2016), so that neither poses nor velocities leap.
-    """
-    beside = given[-2:] - found[len(given) - 2 : len(given)]
-    off, speed = beside[1], (beside[1] - beside[0]) * fps
-    speed[:RATES] = 0
-    following = np.array(found[len(given) :])
-    for place in range(len(following)):
-        left, _ = damped(off, speed, damping_of(HALF_LIFE), (place + 1) / fps)
-        following[place] += left
-    return following
-
-
-def paced(frames: Array, pace: Pace, fps: float) -> Array:
-    """Frames after the first of (T, D), played up to QUICKER times quicker or slower where they are off a pace.
-
-    What stands goes on standing. The last frames may be missing, or be too many.
-    """
-    if pace.turn is None:
-        return frames[1:]
-    reach = round(LASTING * fps)
-    bell = np.hanning(2 * reach + 3)[1:-1]
-    speed = windows(np.linalg.norm(frames[:, : RATES - 1], axis=1), reach) @ (bell / bell.sum())
-    asked = np.clip(pace.speed / np.maximum(speed, 1e-3), 1 / QUICKER, QUICKER)
-    ratio = 1 + (asked[1:] - 1) * np.minimum(np.arange(len(frames) - 1) / (SETTLED * fps), 1.0)
-    shown = np.concatenate([[0.0], np.cumsum(1 / ratio)])
-    at = np.interp(np.arange(1, math.floor(shown[-1]) + 1), shown, np.arange(len(frames)))
-    found = np.column_stack([np.interp(at, np.arange(len(frames)), column) for column in frames.T])
-    found[:, :RATES] *= np.interp(at, np.arange(1, len(frames)), ratio)[:, None]
-    return found
 
 
 def carried_on(

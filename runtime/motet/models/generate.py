@@ -156,19 +156,25 @@ class GenerateModel(LanguageModel):
         if settings.get("seconds") == 0:
             raise DecodingError("seconds must be more than 0: leave them out, and a motion ends by itself")
         texts = [sentences] if isinstance(sentences, str) else list(sentences)
-        ids, seeds = [self.ids(text) for text in texts], seeds_of(seed, len(texts), DecodingError)
-        given = {"hypotheses": hypotheses, **cast(Mapping[str, float | None], settings)}
-        chosen = self.loop.settled(self.defaults, given)
-        noise = [np.random.Generator(np.random.PCG64(one)) for one in seeds]
-        contexts, found = self.contexts(ids), []
-        for text, context in zip(texts, contexts, strict=True):
-            self.note(text, context, strict)
+        own = {"hypotheses": hypotheses, **cast(Mapping[str, float | None], settings)}
+        contexts, noise, chosen = self.asked(texts, len(texts), seed, strict, own)
+        found: list[list[Sample]] = []
         for place in range(0, len(texts), self.loop.batch):
             batch = slice(place, place + self.loop.batch)
             found += self.decode(contexts[batch], noise[batch], chosen)
             progress(len(found), len(texts))
         rows = [[self._generated(s, text) for s in row] for text, row in zip(texts, found, strict=True)]
         return rows[0] if isinstance(sentences, str) else rows
+
+    def asked(
+        self, texts: Sequence[str], rows: int, seed: Seed, strict: bool, settings: Mapping[str, float | None]
+    ) -> tuple[Floats, list[np.random.Generator], dict[str, float]]:
+        """Contexts (N, C) of sentences, noise for so many rows, and all the loop's settings; see :meth:`generate`."""
+        ids, seeds = [self.ids(text) for text in texts], seeds_of(seed, rows, DecodingError)
+        chosen, contexts = self.loop.settled(self.defaults, settings), self.contexts(ids)
+        for text, context in zip(texts, contexts, strict=True):
+            self.note(text, context, strict)
+        return contexts, [np.random.Generator(np.random.PCG64(one)) for one in seeds], chosen
 
     def check(self, sentence: str) -> None:
         """TextError where a model knows only a part of a sentence, or nothing; see :meth:`note`."""

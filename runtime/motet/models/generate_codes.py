@@ -1,9 +1,11 @@
 """Motion as words: motions written code by code, as long as they take or as is asked, continued, told as a story."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from itertools import accumulate
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,26 +14,22 @@ from motet.arguments import warn
 from motet.bundle.fields import Fields
 from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
+from motet.decode.codec import Codec, Context, ReceptiveField, StreamingDecoder
 from motet.decode.codes import Drawing, Source, Writer, draw_codes, drawn_actions, drawn_steps
+from motet.decode.continuation_settings import ContinuationSettings
 from motet.decode.memory import Memory
 from motet.decode.noise import Noise, apart
-from motet.decode.planar import nearest_moves
-from motet.decode.rollout import Ids
 from motet.decode.sample import Sample
-from motet.decode.streaming_decoder import Sight, Unrolled
 from motet.errors import BundleError, DecodingError, MotionError, TextError, TextWarning
 from motet.models.familiarity import FamiliaritySettings, Known, Understood
 from motet.models.generate import Generated, GenerateModel
+from motet.models.seeds import Seed
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
-from motet.representation.root_block import way
 from motet.representation.root_sixd import in_world
 
 FINE = 4
 """Frames that the decoder's layers at the rate of frames look back."""
-
-CONTEXT = 4.0
-"""Seconds of a given motion that are looked at to go on with it."""
 
 STANDING = "a person stands still"
 """What is asked for where a motion is to start or to end in standing."""
@@ -39,10 +37,19 @@ STANDING = "a person stands still"
 STAND = 0.8
 """Seconds of that standing."""
 
+LONGEST = 600.0
+"""Seconds of a sentence at most."""
+
+Stand = Literal["start", "end", "both"]
+"""Where a figure stands for a moment."""
+
+Seconds = float | None | Sequence[float | None]
+"""How long sentences last: all alike, or each; None for one that ends by itself."""
+
 
 @dataclass(frozen=True)
 class Passage:
-    """A sentence of a story, and the seconds from and to which it is told."""
+    """A sentence of a story, and the seconds from and to which it is shown."""
 
     text: str
     start: float
@@ -56,6 +63,18 @@ class Story(Generated):
     passages: tuple[Passage, ...] = ()
 
 
+class Telling(NamedTuple):
+    """A story that is asked for: its sentences, the seconds of each or 0, contexts, noise of one row, all settings, and
+    the motion on the model's figure that it continues, if any."""
+
+    texts: list[str]
+    seconds: list[float]
+    contexts: Floats
+    noise: list[np.random.Generator]
+    settings: Mapping[str, Any]
+    after: Motion | None
+
+
 class CodesModel(GenerateModel):
     """A model that writes motions as codes.
 
@@ -64,22 +83,23 @@ class CodesModel(GenerateModel):
         "tokens" (frames -> codes of the body). tables: "memory", "moves" and "body", see docs/bundle.md.
     """
 
-    SETTINGS = (FamiliaritySettings,)
+    SETTINGS = (FamiliaritySettings, ContinuationSettings)
     LOOPS = ("codes",)
     ROLES = ("encoder", "part", "decoder", "tokens", "step")
 
     def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:
         super().__init__(manifest, graphs, tables)
         codec = Fields(manifest.config, "config").fields("codec")
-        self.moves, self.sizes["T"] = codec.whole("moves", 1, 1 << 15), codec.whole("hop", 1, 100)
+        moves, self.sizes["T"] = codec.whole("moves", 1, 1 << 15), codec.whole("hop", 2, 100)
         ahead = codec.items("ahead")
         if len(ahead) > 100 or any(one not in (0, 1) for one in ahead):
             raise codec.fault("0 or 1 for each of at most 100 layers", ahead, "ahead")
         back = sum(2 - one for one in ahead) + math.ceil(FINE / self.sizes["T"])
-        self.sight = Sight(back, sum(ahead), self.sizes["T"])
+        field = ReceptiveField(back, sum(ahead), self.sizes["T"])
+        self.codec = Codec(graphs["decoder"], graphs["tokens"], field, moves, self.fps)
         self._bind()
-        self.source = Source(graphs["step"], graphs["part"], self.moves, self.sizes["A"], self._memory())
-        familiarity = self.settings(FamiliaritySettings)
+        self.source = Source(graphs["step"], graphs["part"], moves, self.sizes["A"], self._memory())
+        self.continuation, familiarity = self.settings(ContinuationSettings), self.settings(FamiliaritySettings)
         self.known = Known.read(Fields(manifest.source), self.sizes["A"], self.vocabulary.rules, familiarity)
 
     def _bind(self) -> None:
@@ -89,12 +109,12 @@ class CodesModel(GenerateModel):
         self.bind("decoder", {"codes": "*batch steps P"}, {"frames": "batch steps T D", "moves": "batch steps 3"})
         self.sizes["B"] = self.sizes["P"] - 1
         self.bind("tokens", {"frames": "batch steps T D"}, {"codes": "*batch steps B"})
-        if self.moves >= self.sizes["K"]:
+        if self.codec.moves >= self.sizes["K"]:
             most = self.sizes["K"] - 1
             raise BundleError(f"manifest, config.codec.moves: must be at most {most}, as the graph part has it")
 
     def _memory(self) -> Memory:
-        self.sizes |= {"S": self.sizes["P"] + 2, "M": self.moves}
+        self.sizes |= {"S": self.sizes["P"] + 2, "M": self.codec.moves}
         steps, moves = self.table("memory", "R S", "int16"), self.table("moves", "M 3", "float32")
         body = self.table("body", "Q N", "float32")
         if 3 + self.sizes["B"] * self.sizes["N"] != self.sizes["L"]:
@@ -127,168 +147,144 @@ class CodesModel(GenerateModel):
         rows = np.repeat(np.arange(len(contexts)), count)
         each = [one for own in noise for one in apart(own, count)]
         actions = drawn_actions(self.source, contexts[rows], each, settings["certainty"])
-        longest = self.steps(settings["seconds"] or settings["max_seconds"])
-        found = draw_codes(self._writer(each, settings), actions, longest, exactly=settings["seconds"] > 0)
-        last = round(settings["seconds"] * self.fps) or None
-        samples = [Sample(self.frames_of(codes)[:last], None) for codes in found]
+        seconds = settings["seconds"]
+        longest = max(1, self.codec.steps(seconds or settings["max_seconds"]))
+        found = draw_codes(self.writer(each, settings), actions, longest, exactly=seconds > 0)
+        last = max(1, round(seconds * self.fps)) if seconds else None
+        samples = [Sample(self.codec.frames_of(codes)[:last], None) for codes in found]
         return [samples[start : start + count] for start in range(0, len(samples), count)]
 
     def story(
         self,
-        sentences: Sequence[str],
+        sentences: str | Sequence[str],
         *,
         after: Motion | None = None,
-        seconds: float | Sequence[float] | None = None,
-        stand: str | None = None,
-        seed: int = 0,
+        seconds: Seconds = None,
+        stand: Stand | None = None,
+        seed: Seed = 0,
         strict: bool = False,
         **settings: float | None,
     ) -> Story:
         """One continuous motion that shows one sentence after the other, each taking over where the last one ends.
 
-        after: a motion that is gone on with, of any human figure; its last seconds are looked at. seconds: how long
-        each sentence is shown, or all alike; by default until it ends by itself. stand: "start", "end" or "both": where
-        the figure is to stand for a moment. Others as :meth:`generate`; a story of one sentence is the motion that
-        :meth:`generate` gives for it.
+        after: a motion that is continued, of any human figure, from its last seconds. seconds: how long each sentence
+        is shown, or all alike, to within a step of codes; by default until it ends by itself. stand: where the figure
+        is to stand for a moment. Others as :meth:`generate`; a story of one sentence is the motion that it gives.
+        DecodingError for seconds, a seed or a setting out of range, and for several ``hypotheses``; MotionError for a
+        motion that is too short to continue, or of a figure that is no human's; TextError as :meth:`generate`.
         """
-        if stand not in (None, "start", "end", "both"):
-            raise DecodingError(f"a figure stands at the start, the end or both, not at {stand!r}")
-        figure = None if after is None else self._figure(after)
-        chosen = _each(self.defaults["seconds"] if seconds is None else seconds, len(sentences))
-        before, behind = ([STANDING] if stand in (end, "both") else [] for end in ("start", "end"))
-        sentences = [*before, *sentences, *behind]
-        seconds = [STAND] * len(before) + chosen + [STAND] * len(behind)
-        pieces = list(self._told(sentences, figure, seconds, seed, strict, settings))
+        told = self._telling(sentences, after, seconds, stand, seed, strict, settings)
+        pieces = list(self._pieces(told))
         frames = np.concatenate([found for _, found in pieces])
-        if all(one > 0 for one in seconds):
-            frames = frames[: round(sum(seconds) * self.fps)]
-        passages = self._passages([text for text, _ in pieces[:-1]], len(frames) / self.fps)
-        return Story(
-            self.contract,
-            frames,
-            None,
-            tuple(word for text in sentences for word in self.unknown(text)),
-            figure,
-            passages,
-        )
-
-    def _passages(self, texts: Sequence[str], end: float) -> tuple[Passage, ...]:
-        """The passages of a story from the sentence of each step of codes, and the second at which it ends."""
-        found, step = list[Passage](), self.sight.hop / self.fps
-        for number, text in enumerate(texts):
-            start = found.pop().start if found and found[-1].text is text else number * step
-            found.append(Passage(text, start, min((number + 1) * step, end)))
-        return tuple(found)
+        steps = Counter(number for number, _ in pieces[:-1])
+        shown = accumulate(steps[number] * self.codec.field.hop for number in range(len(told.texts)))
+        stops = [min(stop, len(frames)) / self.fps for stop in shown]
+        passages = tuple(map(Passage, told.texts, [0.0, *stops], stops))
+        unknown = tuple(word for text in told.texts for word in self.unknown(text))
+        return Story(self.contract, frames, None, unknown, told.after, passages)
 
     def stream(
         self,
         sentences: str | Sequence[str],
         *,
         after: Motion | None = None,
-        seconds: float | Sequence[float] | None = None,
-        seed: int = 0,
+        seconds: Seconds = None,
+        stand: Stand | None = None,
+        seed: Seed = 0,
         strict: bool = False,
         **settings: float | None,
     ) -> Iterator[Motion]:
         """The motion of :meth:`story` in pieces, as they are drawn: each can be played where the last one ends.
 
-        Feet are as drawn: what holds them still has to know how long they stand. Errors and warnings come with the
-        first piece.
+        Feet are as drawn: what holds them still has to know how long they stand. Memory and the time of a piece stay as
+        they are, however long the stream lasts. Errors as :meth:`story`.
         """
-        texts = [sentences] if isinstance(sentences, str) else list(sentences)
-        last, pose = None if after is None else self._figure(after), None
-        for _, frames in self._told(texts, last, seconds, seed, strict, settings):
+        return self._streamed(self._telling(sentences, after, seconds, stand, seed, strict, settings))
+
+    def _streamed(self, told: Telling) -> Iterator[Motion]:
+        last, pose = told.after, None
+        for _, frames in self._pieces(told):
             if len(frames):
                 last, pose = in_world(self.contract.features(frames), last, pose)
                 yield last
 
-    def _told(
+    def _telling(
         self,
-        sentences: Sequence[str],
-        figure: Motion | None,
-        seconds: float | Sequence[float] | None,
-        seed: int,
+        sentences: str | Sequence[str],
+        after: Motion | None,
+        seconds: Seconds,
+        stand: str | None,
+        seed: Seed,
         strict: bool,
         settings: Mapping[str, float | None],
-    ) -> Iterator[tuple[str, Array]]:
-        """For each step of codes its sentence, and frames (T, D) that are settled with it; then the frames left.
-
-        figure: a motion on the model's figure that is gone on with.
-        """
-        if not sentences:
+    ) -> Telling:
+        texts = [sentences] if isinstance(sentences, str) else list(sentences)
+        if not texts:
             raise TextError("a story needs a sentence")
-        chosen = self.loop.settled(self.defaults, settings)
-        lengths = _each(seconds if seconds is not None else chosen["seconds"], len(sentences))
-        contexts = self.contexts([self.ids(text) for text in sentences])
-        for text, context in zip(sentences, contexts, strict=True):
-            self.note(text, context, strict)
-        noise = [np.random.Generator(np.random.PCG64(seed))]
-        writer, unrolled = self._writer(noise, chosen), self._joined(figure)
-        if figure is not None:
-            writer.see(np.array(unrolled.codes))
-        for text, context, length in zip(sentences, contexts, lengths, strict=True):
-            (action,) = drawn_actions(self.source, context[None], noise, chosen["certainty"])
-            longest = self.steps(length or chosen["max_seconds"])
-            for step in drawn_steps(writer, int(action), longest, exactly=length > 0):
-                yield text, unrolled.push(step)
-        yield sentences[-1], unrolled.finish()
+        if stand not in (None, *get_args(Stand)):
+            raise DecodingError(f"stand is one of {', '.join(get_args(Stand))}, not {stand!r}")
+        if settings.get("hypotheses") not in (None, 1):
+            raise DecodingError(f"a story is one motion: hypotheses must be 1, not {settings['hypotheses']}")
+        each = _each(self.defaults["seconds"] if seconds is None else seconds, len(texts))
+        before, behind = ([STANDING] * (stand in (end, "both")) for end in ("start", "end"))
+        texts = [*before, *texts, *behind]
+        each = [STAND] * len(before) + each + [STAND] * len(behind)
+        contexts, noise, chosen = self.asked(texts, 1, seed, strict, settings)
+        return Telling(texts, each, contexts, noise, chosen, None if after is None else self.on_figure(after))
 
-    def _writer(self, noise: Sequence[Noise], settings: Mapping[str, Any]) -> Writer:
+    def _pieces(self, told: Telling) -> Iterator[tuple[int, Array]]:
+        """For each step of codes the number of its sentence, and frames (T, D) that are settled with it; then the
+        frames left."""
+        context = None if told.after is None else self.context(told.after)
+        writer, decoder = self.writer(told.noise, told.settings), self.decoder(context)
+        if context is not None:
+            writer.see(context.codes)
+        done, given, end, limit = 0, 0, 0.0, None
+        for number, (context_, seconds) in enumerate(zip(told.contexts, told.seconds, strict=True)):
+            action = drawn_actions(self.source, context_[None], told.noise, told.settings["certainty"])
+            end = (end or 0.0) + seconds
+            longest = self.codec.steps(end) - done if seconds else self.codec.steps(told.settings["max_seconds"])
+            limit = max(1, round(end * self.fps)) if seconds else None
+            for _, step in drawn_steps(writer, action, longest, exactly=seconds > 0):
+                done += 1
+                frames = decoder.push(step)[: None if limit is None else limit - given]
+                given += len(frames)
+                yield number, frames
+            end = end if seconds else done * self.codec.seconds
+        yield number, decoder.finish()[: None if limit is None else limit - given]
+
+    def writer(self, noise: Sequence[Noise], settings: Mapping[str, Any]) -> Writer:
         """A writer of codes for rows with the given noise."""
-        names = ("temperature", "first_temperature", "top_p", "guidance", "memory")
-        return Writer(self.source, noise, Drawing(*(settings[name] for name in names)))
+        return Writer(self.source, noise, Drawing.of(settings))
 
-    def steps(self, seconds: float) -> int:
-        """How many steps of codes last so long, at least one."""
-        return max(1, math.ceil(seconds * self.fps / self.sight.hop - 1e-9))
+    def decoder(self, context: Context | None = None) -> StreamingDecoder:
+        """What makes frames of codes, from the origin or after the end of a motion."""
+        return StreamingDecoder(self.codec, context, self.continuation.half_life)
 
-    def frames_of(self, codes: Ids) -> Array:
-        """Frames (T, D) in the contract's units of steps of codes (N, P), from the origin."""
-        return Unrolled(self.graphs["decoder"], self.sight, self.fps, codes[:0]).all(codes)
+    def on_figure(self, motion: Motion) -> Motion:
+        """A motion of any human figure on the model's, at its frame rate; the last frame is kept."""
+        return self.contract.on_figure(self.at_own_rate(motion))
 
-    def _joined(self, figure: Motion | None) -> Unrolled:
-        """What makes frames of codes, at the start or after a motion on the model's figure."""
-        if figure is None:
-            return Unrolled(self.graphs["decoder"], self.sight, self.fps)
-        frames = self.last_frames(figure)
-        return Unrolled(self.graphs["decoder"], self.sight, self.fps, self.codes_of(frames), frames[-1])
-
-    def last_frames(self, figure: Motion) -> Array:
-        """The last seconds (T, D), whole steps of codes, of a motion on the model's figure, in the contract's units.
-
-        MotionError where it is too short to go on with.
-        """
-        frames = self.contract.frames(figure)[-self.steps(CONTEXT) * self.sight.hop :]
-        if len(frames) < 2 * self.sight.hop:
-            raise MotionError(
-                f"a motion of {len(frames)} frames is too short to go on with: {2 * self.sight.hop} are needed"
-            )
-        return frames[len(frames) % self.sight.hop :]
-
-    def _figure(self, motion: Motion) -> Motion:
-        """A motion on the model's figure at the model's frame rate, its last frame kept."""
-        same = motion if motion.fps == self.fps else motion.continuous().resample(self.fps, to_end=True)
-        return self.contract.on_figure(same)
-
-    def codes_of(self, frames: Array) -> Ids:
-        """Steps of codes (N, P) int64 of frames (T, D) in the contract's units; T is a multiple of a step's frames."""
-        steps = frames.reshape(-1, self.sight.hop, frames.shape[1]).astype(np.float32)
-        body = self.graphs["tokens"]({"frames": np.stack([steps, steps])})["codes"][0]
-        facing, x, z = way(np.concatenate([frames[:, :3], frames[-1:, :3]]) / self.fps)
-        moves, _ = nearest_moves(np.stack([x, z, facing], axis=-1)[:: self.sight.hop], self.book())
-        return np.concatenate([moves[:, None], body], axis=1)
-
-    def book(self) -> Array:
-        """The moves (K, 3) that codes stand for."""
-        codes = np.zeros((2, self.moves, self.sizes["P"]), dtype=np.int64)
-        codes[..., 0] = np.arange(self.moves)
-        moves: Array = self.graphs["decoder"]({"codes": codes})["moves"][0].astype(np.float64)
-        return moves
+    def context(self, figure: Motion) -> Context:
+        """The last seconds, whole steps of codes, of a motion on the model's figure; MotionError where it is too short
+        to continue."""
+        hop = self.codec.field.hop
+        frames = self.contract.frames(figure)[-self.codec.steps(self.continuation.context) * hop :]
+        if len(frames) < 2 * hop:
+            raise MotionError(f"a motion of {len(frames)} frames is too short to continue: {2 * hop} are needed")
+        frames = frames[len(frames) % hop :]
+        return Context(frames, self.codec.codes_of(frames))
 
 
-def _each(seconds: float | Sequence[float], count: int) -> list[float]:
-    """The seconds of each of so many sentences; DecodingError where there are more or fewer."""
-    found = list(seconds) if isinstance(seconds, Sequence) else [seconds] * count
-    if len(found) != count or any(not 0 <= one <= 600 for one in found):
-        raise DecodingError(f"seconds are one number of 0 to 600, or one for each of {count} sentences, not {seconds}")
+def _each(seconds: float | Sequence[float | None], count: int) -> list[float]:
+    """The seconds of each of so many sentences, 0 where it ends by itself; DecodingError where they are none, or there
+    are more or fewer."""
+    try:
+        given = list(seconds) if isinstance(seconds, Iterable) else [seconds] * count
+        found = [0.0 if one is None else float(0.0 + one) for one in given]
+    except (TypeError, ValueError):
+        found = []
+    if len(found) != count or not all(0 <= one <= LONGEST for one in found):
+        asked = f"a number from 0 to {LONGEST:g}, or one for each of {count} sentences"
+        raise DecodingError(f"seconds must be {asked}, not {seconds}")
     return found

@@ -182,25 +182,22 @@ class PredictModel(BundleModel):
         """
         samples = checked_int("samples", samples, 1, MAX_SAMPLES, DecodingError)
         count, seeds = self.count(seconds, frames), seeds_of(seed, samples, DecodingError)
-        whole = self._at_rate(motion)
+        whole = self.at_own_rate(motion)
         found = futures(beyond, whole, count, seeds, progress)
         return [together(before, following) if append else following for following, before in found]
 
     def measured(self, motion: Motion) -> Figure | None:
         """The figure of a motion, measured for all predictions of it; None where it is the model's."""
-        return self.contract.measured(self._at_rate(motion))
+        return self.contract.measured(self.at_own_rate(motion))
 
     def following(self, motion: Motion, frames: int, measured: Figure | None) -> Motion:
         """As :meth:`predict`, of a figure that is measured already."""
         whole, figure, last = self._seed(motion, measured)
         return carried_on(self.contract, self.next_frames([last], frames)[0], whole, figure, measured)[0]
 
-    def _at_rate(self, motion: Motion) -> Motion:
-        return motion if motion.fps == self.fps else motion.continuous().resample(self.fps, to_end=True)
-
     def _seed(self, motion: Motion, measured: Figure | None = None) -> tuple[Motion, Motion, Array]:
         """The motion at the model's frame rate, the same on the model's figure, and its last frames (L, C)."""
-        whole = self._at_rate(motion)
+        whole = self.at_own_rate(motion)
         figure = self.contract.on_figure(whole, measured)
         frames = self.contract.frames(figure[max(0, len(whole) - self.seed_frames - 1) :])
         if len(frames) < self.seed_frames:

@@ -98,13 +98,13 @@ def euler_of(rotations: Array, joint: Joint) -> Array:
     return eulers_of(rotations[:, None], [joint])[:, 0]
 
 
-def eulers_of(rotations: Array, joints: Sequence[Joint]) -> Array:
-    """As :func:`euler_of` for several joints with their local rotations (T, J, 3, 3): (T, J, 3)."""
+def eulers_of(rotations: Array, joints: Sequence[Joint], leaps: bool = False) -> Array:
+    """As :func:`euler_of` for several joints with their local rotations (T, J, 3, 3): (T, J, 3). leaps: may leap."""
     angles = frames_last(rotations.shape[:-1])
     for order, alike in _by_order(enumerate(joints)).items():
         places = [place for place, _ in alike]
         plain = _about_axes(rotations[:, places], [joint for _, joint in alike], back=True)
-        angles[:, places] = rotmats_to_euler(plain, order)[..., [order.index(axis) for axis in AXES]]
+        angles[:, places] = rotmats_to_euler(plain, order, leaps)[..., [order.index(axis) for axis in AXES]]
     return angles
 
 
@@ -145,19 +145,21 @@ def continued(last: Motion, rotations: Mapping[str, Array], translations: Mappin
     """
     last = last[-1:]
     count = len(next(iter(rotations.values())))
-    after = posed(replace(last, values=np.repeat(last.values, count, axis=0)), rotations, translations)
+    after = posed(replace(last, values=np.repeat(last.values, count, axis=0)), rotations, translations, leaps=True)
     # the frame before the first one says which of two equal angles is the nearer one
     return replace(last, values=np.concatenate([last.values, after.values])).continuous()[1:]
 
 
-def posed(motion: Motion, rotations: Mapping[str, Array], translations: Mapping[str, Array]) -> Motion:
+def posed(
+    motion: Motion, rotations: Mapping[str, Array], translations: Mapping[str, Array], leaps: bool = False
+) -> Motion:
     """The motion in its channels with other local rotations (T, 3, 3) and translations (T, 3) of some joints, as
-    :func:`continued` takes them."""
+    :func:`continued` takes them. leaps: their angles may leap from frame to frame."""
     skeleton, values = skeleton_of(motion), np.array(motion.values)
     columns = motion.rotation_columns()
     turned = [name for name in columns if name in rotations]
     joints = [skeleton.joints[skeleton.index(name)] for name in turned]
-    angles = eulers_of(side_by_side([rotations[name] for name in turned], len(motion)), joints)
+    angles = eulers_of(side_by_side([rotations[name] for name in turned], len(motion)), joints, leaps)
     places = [place for place, name in enumerate(turned) for _ in columns[name]]
     taken = [column for name in turned for column in columns[name]]
     axes = [AXES.index(motion.channels[column][-1]) for column in taken]

@@ -121,8 +121,8 @@ def _without_leaps(angles: Array, turn: Array) -> Array:
     return without_turns(angles, turn)
 
 
-def rotmats_to_euler(matrices: Array, order: str) -> Array:
-    """Matrices (T, ..., 3, 3) to Euler angles (T, ..., 3) that do not leap from frame to frame.
+def rotmats_to_euler(matrices: Array, order: str, leaps: bool = False) -> Array:
+    """Matrices (T, ..., 3, 3) to Euler angles (T, ..., 3) that do not leap from frame to frame, unless ``leaps``.
 
     At a gimbal lock, where only the sum or difference of the first and the last angle counts, the last one is that of
     the last frame without one.
@@ -135,7 +135,7 @@ def rotmats_to_euler(matrices: Array, order: str) -> Array:
         last = np.take_along_axis(angles[..., 2], free, axis=0)
         angles[..., 0] -= np.where(locked, _handedness(order) * np.sign(angles[..., 1]) * (last - angles[..., 2]), 0)
         angles[..., 2] = np.where(locked, last, angles[..., 2])
-    return continuous_euler(angles)
+    return angles if leaps else continuous_euler(angles)
 
 
 def without_turns(angles: Array, turn: Array | float = 2 * np.pi) -> Array:

@@ -101,12 +101,13 @@ def way(steps: Array, start: ArrayLike = (0.0, 0.0, 0.0), facing: float = 0.0) -
     steps: forward and to the left in metres, turn in radians. start: the place (3,) of which x and z are those before
     the first step. facing: before it.
     """
-    origin, turns = np.asarray(start, dtype=np.float64), steps[:, 2]
-    now = facing + np.cumsum(turns)
-    sin, cos = np.sin(now - turns), np.cos(now - turns)
-    x = origin[0] + np.cumsum(steps[:, 0] * sin + steps[:, 1] * cos)
-    z = origin[2] + np.cumsum(steps[:, 0] * cos - steps[:, 1] * sin)
-    return now, x, z
+    origin = np.asarray(start, dtype=np.float64)
+    # summed from the start on: a way that is continued later is the same to the bit
+    now = np.cumsum(np.append(facing, steps[:, 2]))
+    sin, cos = np.sin(now[:-1]), np.cos(now[:-1])
+    x = np.cumsum(np.append(origin[0], steps[:, 0] * sin + steps[:, 1] * cos))
+    z = np.cumsum(np.append(origin[2], steps[:, 0] * cos - steps[:, 1] * sin))
+    return now[1:], x[1:], z[1:]
 
 
 def last_place(motion: Motion) -> Array:

@@ -8,7 +8,7 @@ and goes smoothly. Hip, knee and ankle follow by :mod:`motet.motion.two_bone`.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,8 @@ class HoldSettings:
     contact: when a point of the sole stands. lifted: a foot that does not touch the ground for less stays where it
     stands. blend: in which a shift comes and goes, most of it in half of that. farthest: a foot is shifted by less;
     what slides farther than twice that in a stance does slide. soft: before and after a foot is in the ground it is
-    being lifted out of it. tremble: what is shorter is no movement, and toes do not follow it.
+    being lifted out of it. tremble: what is shorter is no movement, and toes do not follow it. anchor: at the start of
+    a stance, says where the foot stands; None for all of it.
     """
 
     contact: ContactSettings = SOLES
@@ -38,6 +39,7 @@ class HoldSettings:
     farthest: float = 0.15
     soft: float = 0.05
     tremble: float = 0.015
+    anchor: float | None = None
 
 
 HOLD_RECORDED = HoldSettings()
@@ -47,7 +49,9 @@ HOLD_TREMBLING = HoldSettings(contact=ContactSettings(speeds=(0.7, 3.0), calm=0.
 BENT = ("UpperLeg", "LowerLeg", "Foot")
 
 
-def hold_feet(motion: Motion, trembling: bool = False) -> Motion:
+def hold_feet(
+    motion: Motion, trembling: bool = False, ground: float | None = None, anchor: float | None = None
+) -> Motion:
     """The motion of any human figure with feet that stay where they stand and are never deeper than the ground, by
     turning hips, knees and ankles; the root and all other joints are as they were, and the feet keep their directions
     in the world.
@@ -56,15 +60,18 @@ def hold_feet(motion: Motion, trembling: bool = False) -> Motion:
     A foot is shifted by 15 cm at most, and a leg that is nearly straight is hardly drawn longer: what is left slides
     on. Lengths are those of the figure at the humanoid's size.
 
-    trembling: whether the feet tremble and slide like those of a model that gives joint angles alone.
+    trembling: whether the feet tremble and slide like those of a model that gives joint angles alone. ground: its
+        height in metres, where it is known of a motion of the humanoid. anchor: seconds at the start of a stance that
+        say where the foot stands, by default all of it: what comes later then changes nothing.
     MotionError, with the reason, for a figure that is no human's, or one that does not stand along y.
     """
     if len(motion) < 2:
         return motion
     skeleton, (rotations, places) = skeleton_of(motion), global_transforms(motion)
-    known = _of_humanoid(rotations, places) if skeleton == HUMANOID else None
+    known = _of_humanoid(rotations, places, ground) if skeleton == HUMANOID else None
     legs, scale, soles = known or _measured(motion, rotations, places)
-    settings, places = HOLD_TREMBLING if trembling else HOLD_RECORDED, places * scale
+    settings = replace(HOLD_TREMBLING if trembling else HOLD_RECORDED, anchor=anchor)
+    places = places * scale
     turned = np.array(rotations)
     for (joints, hinge), points in zip(legs, np.split(soles, 2, axis=1), strict=True):
         hip, knee, ankle = (places[:, joint] for joint in joints)
@@ -80,10 +87,10 @@ Legs = list[tuple[list[int], Array]]
 """Of each side the joints of hip, knee and ankle, and the knee's axis (3,), to the left, in its joint's frame."""
 
 
-def _of_humanoid(rotations: Array, places: Array) -> tuple[Legs, float, Array]:
+def _of_humanoid(rotations: Array, places: Array, ground: float | None) -> tuple[Legs, float, Array]:
     """As :func:`_measured`, of the humanoid itself."""
     soles = sole_points(rotations, places)
-    soles[..., 1] -= ground_under(soles)
+    soles[..., 1] -= ground_under(soles) if ground is None else ground
     legs = [([HUMANOID.index(sided(side, part)) for part in BENT], np.array([1.0, 0.0, 0.0])) for side in LEFT_RIGHT]
     return legs, 1.0, soles
 
@@ -121,7 +128,7 @@ def _held(points: Array, fps: float, settings: HoldSettings) -> Array:
     times, values = [], []
     for start, stop in _stances(touch.max(axis=1) > 0, settings.lifted * fps):
         path = np.concatenate([np.zeros((1, 2)), np.cumsum(undone[start:stop], axis=0)])
-        path -= np.median(path, axis=0)
+        path -= np.median(path if settings.anchor is None else path[: round(settings.anchor * fps) + 1], axis=0)
         times.append(np.arange(start, stop + 1))
         values.append(path)
     shift = _between(times, values, len(points), settings.blend * fps)
