@@ -113,9 +113,9 @@ def test_commands_exist_with_their_options(page: str) -> None:
 
 
 def test_the_readmes_commands_run_in_their_order(clone: Path) -> None:
-    """What one command reads an earlier one has written, but for a character and for KIT's recordings."""
+    """What one command reads an earlier one has written, but for a character and for the reader's recordings."""
     lines = list(commands(PAGES["README.md"].read_text()))
-    runnable = [line for line in lines if "kit" not in line]
+    runnable = [line for line in lines if "runs" not in line]
     assert len(runnable) == len(lines) - 2
     for line in runnable:
         words = shlex.split(line)[1:]
