@@ -115,7 +115,7 @@ def test_commands_exist_with_their_options(page: str) -> None:
 def test_the_readmes_commands_run_in_their_order(clone: Path) -> None:
     """What one command reads an earlier one has written, but for a character and for the reader's recordings."""
     lines = list(commands(PAGES["README.md"].read_text()))
-    runnable = [line for line in lines if "runs" not in line]
+    runnable = [line for line in lines if not line.startswith(("motet train", "motet export"))]
     assert len(runnable) == len(lines) - 2
     for line in runnable:
         words = shlex.split(line)[1:]
