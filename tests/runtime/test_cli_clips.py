@@ -54,9 +54,9 @@ def test_a_file_of_one_motion_is_its_own_clip(many: Path, tmp_path: Path) -> Non
     out.mkdir()
     result = run("convert", many, tmp_path / "stroll.npz", "-o", out / "{clip}.npz")
     assert result.exit_code == 0
-    assert result.stderr == f"motet: {many}: of 6 clips the first is taken, 'Walk'; the next is many.glb#a/b: c?\n"
+    assert result.stderr == f"motet: {many}: reading the first of 6 clips, 'Walk'; the next is many.glb#a/b: c?\n"
     assert frames(out) == {"Walk.npz": 3, "stroll.npz": 9}
-    assert "its clips are 'Walk', 'a/b: c?', '歩く'" in run("-v", "view", many).stderr
+    assert "clips: 'Walk', 'a/b: c?', '歩く'" in run("-v", "view", many).stderr
 
 
 def test_what_cannot_be_read_is_said_once_and_the_rest_is_done(many: Path, tmp_path: Path) -> None:

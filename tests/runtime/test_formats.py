@@ -62,9 +62,9 @@ def test_an_amc_file_object_needs_its_skeleton(tmp_path: Path) -> None:
     write_motion(tmp_path / "a.amc", walker())
     content = io.BytesIO((tmp_path / "a.amc").read_bytes())
     assert len(read_motion(content, format="amc", asf=tmp_path / "a.asf")) == 40
-    with pytest.raises(FormatError, match="give it as asf"):
+    with pytest.raises(FormatError, match="pass it as asf"):
         read_motion(io.BytesIO(), format="amc")
-    with pytest.raises(FormatError, match="AMC is two files"):
+    with pytest.raises(FormatError, match="AMC consists of two files"):
         write_motion(io.BytesIO(), walker(), format="amc")
 
 
@@ -78,7 +78,7 @@ def test_a_unit_is_told_where_the_file_does_not_say_it(tmp_path: Path) -> None:
         assert read_motion(tmp_path / "b.npz", unit=unit).skeleton.metres_per_unit == 0.01
     write_motion(tmp_path / "c.csv", walker())
     for name, unit, said in (
-        ("c.csv", "m", "no skeleton, so it has no unit of length"),
+        ("c.csv", "m", "a file without a skeleton has no length unit"),
         ("a.bvh", "mile", r"a.bvh: expected a length unit \(m, cm"),
         ("a.bvh", 0, "number of metres, not 0"),
         ("a.bvh", float("nan"), "number of metres, not nan"),
@@ -112,9 +112,9 @@ def test_a_unit_counts_for_gltf_where_its_metre_is_no_better(
 def test_options_that_a_format_does_not_take_are_refused(tmp_path: Path) -> None:
     write_motion(tmp_path / "a.bvh", walker())
     for options, said in (
-        ({"fps": 30}, "'fps' is an option of .amc files only"),
-        ({"asf": "a.asf"}, "'asf' is an option of .amc files only"),
-        ({"format": "npz", "partial": True}, "'partial' is an option of .amc .bvh files only"),
+        ({"fps": 30}, "'fps' is an option for .amc files only"),
+        ({"asf": "a.asf"}, "'asf' is an option for .amc files only"),
+        ({"format": "npz", "partial": True}, "'partial' is an option for .amc .bvh files only"),
     ):
         with pytest.raises(FormatError, match=said):
             read_motion(tmp_path / "a.bvh", **options)
@@ -131,7 +131,7 @@ def test_places_that_are_no_files_are_named(tmp_path: Path) -> None:
         ("a" * 300 + ".bvh", "cannot be read"),
         ("a.bvh/b.bvh", "no such file"),
         ("a.txt", "cannot read files of type '.txt'; expected one of .amc .bvh .npz .csv .xml"),
-        ("a.c3d", r"cannot read files of type '.c3d', which hold markers and no skeleton: .* expected one of .amc"),
+        ("a.c3d", r"cannot read files of type '.c3d', which hold markers without a skeleton: .* expected one of .amc"),
     ):
         with pytest.raises(FormatError, match=said):
             read_motion(tmp_path / name)

@@ -55,7 +55,7 @@ def test_the_newer_names_of_arrays_are_known(tmp_path: Path) -> None:
 def test_other_files_are_refused(tmp_path: Path) -> None:
     vectors, trans = poses()
     cases = {
-        "no rate": ({"poses": vectors, "trans": trans}, "frame rate is missing"),
+        "no rate": ({"poses": vectors, "trans": trans}, "no frame rate"),
         "narrow": ({"poses": vectors[:, :60], "trans": trans, "mocap_framerate": 30.0}, "expected .frames, 66"),
         "path": ({"poses": vectors, "trans": trans[:3], "mocap_framerate": 30.0}, "trans must be"),
         "nan": ({"poses": vectors * np.nan, "trans": trans, "mocap_framerate": 30.0}, "finite"),

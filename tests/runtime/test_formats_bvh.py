@@ -196,7 +196,7 @@ def test_more_frames_than_declared_are_taken_and_said(read, caplog):
     motion = read(PLAIN.replace("Frames: 2", "Frames: 1"))
     np.testing.assert_array_equal(motion.values, read(PLAIN).values)
     assert [record.message.partition(": ")[2] for record in caplog.records] == [
-        "it declares 1 frames and holds 2: took them all"
+        "it declares 1 frames but holds 2: read them all"
     ]
 
 
@@ -207,14 +207,14 @@ def test_more_frames_than_declared_are_taken_and_said(read, caplog):
         ("31 41 51 61", "31 41 51 6x", 20, "'6x' is not a finite number"),
         ("31 41 51 61", "31 41 51 nan", 20, "'nan' is not a finite number"),
         ("OFFSET 0 5 0", "OFFSET 0 5", 8, "three numbers, not 2"),
-        ("CHANNELS 3 Z", "CHANNELS 4 Z", 9, "as many different channels"),
-        ("Xrotation Yrotation\n    End", "Xrotation Zrotation\n    End", 9, "as many different channels"),
+        ("CHANNELS 3 Z", "CHANNELS 4 Z", 9, "that many different channels"),
+        ("Xrotation Yrotation\n    End", "Xrotation Zrotation\n    End", 9, "that many different channels"),
         ("Xposition", "Xscale", 5, "'Xscale': expected one of"),
-        ("0.033333", "0", 18, "cannot take 0 seconds"),
+        ("0.033333", "0", 18, "frame time 0 s is out of range"),
         ("0.033333", "fast", 18, "'fast' is not a finite number"),
         ("Frames: 2", "Frames: two", 17, "'Frames: N'"),
-        ("0.033333", "1e-320", 18, "cannot have inf frames"),
-        ("0.033333", "1e9", 18, "cannot have 1e-09 frames"),
+        ("0.033333", "1e-320", 18, "frame rate inf is out of range"),
+        ("0.033333", "1e9", 18, "frame rate 1e-09 is out of range"),
         ("Frames: 2", "Frames: ²", 17, "'Frames: N'"),
         ("Frames: 2", "Frames: " + "9" * 5000, 17, "'Frames: 9999"),
         ("    OFFSET 0 5 0\n", "", 6, "joint 'Chest' has no OFFSET"),

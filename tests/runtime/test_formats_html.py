@@ -75,9 +75,9 @@ def test_captions_and_many(tmp_path):
         ("first", 40, 40),
         ("</script>", 20, 10),
     ]
-    with pytest.raises(MotionError, match="do not decrease"):
+    with pytest.raises(MotionError, match="must not decrease"):
         html.write(tmp_path / "bad.html", walker(), [(1.0, "b"), (0.0, "a")])
-    with pytest.raises(MotionError, match="do not decrease"):
+    with pytest.raises(MotionError, match="must not decrease"):
         html.write(tmp_path / "bad.html", walker(), [(float("nan"), "b")])
     with pytest.raises(MotionError, match="a name for each"):
         html.write_many(tmp_path / "bad.html", [walker()], [])

@@ -55,8 +55,8 @@ def test_without_a_clip_it_is_the_first_and_the_log_says_so(tmp_path: Path, capl
     with caplog.at_level(logging.INFO, "motet"):
         assert len(motet.read(path)) == 9
     assert [record.message for record in caplog.records] == [
-        f"{path}: of 2 clips the first is taken, 'Walk'; the next is a.glb#Run",
-        f"{path}: its clips are 'Walk', 'Run'",
+        f"{path}: reading the first of 2 clips, 'Walk'; the next is a.glb#Run",
+        f"{path}: clips: 'Walk', 'Run'",
     ]
     caplog.clear()
     motet.read(path, clip="Walk")
@@ -88,7 +88,7 @@ def test_a_clip_that_is_not_there_is_refused_with_those_that_are(clip: str | int
 def test_of_formats_without_clips_none_is_named_or_read(tmp_path: Path) -> None:
     motet.write(tmp_path / "a.bvh", swinging(3))
     assert motet.clips(tmp_path / "a.bvh") == ()
-    with pytest.raises(FormatError, match=r"'clip' is an option of \.glb \.gltf \.vrm \.vrma"):
+    with pytest.raises(FormatError, match=r"'clip' is an option for \.glb \.gltf \.vrm \.vrma"):
         motet.read(f"{tmp_path / 'a.bvh'}#Walk")
     with pytest.raises(FormatError, match=r"^\S*none\.glb: no such file"):
         motet.read(tmp_path / "none.glb#Walk")
@@ -182,7 +182,7 @@ def test_of_two_figures_the_one_is_read_that_the_clip_moves(
     if skin or not together:
         assert {*skeleton_of(first).names} == {*HUMANOID.names}
         assert {*skeleton_of(second).names} == {f"B_{name}" for name in HUMANOID.names}
-        assert "of 2 skeletons that of 'B_hips' is taken" in caplog.text
+        assert "of 2 skeletons, reading that of 'B_hips'" in caplog.text
     else:  # nothing tells that they are two
         assert len(skeleton_of(first).names) == 2 * count + 1
 

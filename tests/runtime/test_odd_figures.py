@@ -261,13 +261,13 @@ def test_the_first_frame_of_a_clip_can_be_the_rest_pose(tmp_path: Path) -> None:
 def test_a_rest_pose_is_taken_from_a_file_of_these_joints_alone(tmp_path: Path) -> None:
     motion = from_humanoid(dancing(5), skeleton_file("mixamo")).with_unit(0.01).scaled(1.0)
     path = write_clips(tmp_path / "a.glb", [("Dance", motion)])
-    with pytest.raises(FormatError, match="no joint of this figure's names"):
+    with pytest.raises(FormatError, match="shares no joint name with this figure"):
         read_motion(path, rest=write_clips(tmp_path / "b.glb", [("Dance", nameless(motion))]))
-    with pytest.raises(FormatError, match="a rest pose is taken from one of"):
+    with pytest.raises(FormatError, match="a rest pose must come from"):
         read_motion(path, rest=SKELETONS / "mixamo.bvh")
     with pytest.raises(FormatError, match="no such file"):
         read_motion(path, rest=tmp_path / "none.glb")
-    with pytest.raises(FormatError, match="'rest' is an option of"):
+    with pytest.raises(FormatError, match="'rest' is an option for"):
         read_motion(SKELETONS / "mixamo.bvh", rest=path)
 
 

@@ -181,11 +181,11 @@ def test_what_is_no_character_is_refused(tmp_path: Path) -> None:
     flat[0]["scale"] = [0, 0, 0]
     (tmp_path / "flat.glb").write_bytes(packed(document | {"nodes": flat}, Played(avatar).binary))
     for onto, place, error, said in (
-        (tmp_path / "apart.glb", out, FormatError, "apart.glb: parts of this character are other files"),
+        (tmp_path / "apart.glb", out, FormatError, "apart.glb: parts of this character are in other files"),
         (tmp_path / "flat.glb", out, FormatError, "flat.glb: .*scale 0"),
         (bvh, out, FormatError, "cannot write onto files of type '.bvh'; expected one of .glb .vrm"),
         (Character(motet.read(bvh)), out, MotionError, "no mesh"),
-        (avatar, tmp_path / "out.vrm", FormatError, "avatar.glb: it is no VRM avatar"),
+        (avatar, tmp_path / "out.vrm", FormatError, "avatar.glb: not a VRM avatar"),
         (avatar, tmp_path / "out.bvh", FormatError, "cannot write files of type '.bvh'; expected one of .glb .vrm"),
         (tmp_path / "none.glb", out, FormatError, "none.glb: no such file"),
     ):

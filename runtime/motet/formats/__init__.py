@@ -1,10 +1,9 @@
 """Files of motion: one record per format, chosen by the extension.
 
 A format's module has ``read(file, **options) -> Motion``, ``write(file, motion)`` or both, where a file is a path or a
-file object of bytes; both raise motet's errors and leave nothing half-written. One whose files hold several motions has
-``clips(file)``, which gives their names, and "clip" among the options of its ``read``. To add a format, write its
-module and add its record to :data:`FORMATS`: help texts, the table of docs/formats.md and the lists of corpora are made
-from it.
+binary file object; both raise motet's errors and leave nothing half-written. If its files hold several motions, it also
+has ``clips(file)``, which returns their names, and ``read`` takes "clip". To add a format, write its module and add its
+record to :data:`FORMATS`, which help texts, the table of docs/formats.md and the lists of corpora are built from.
 """
 
 import logging
@@ -34,13 +33,13 @@ log = logging.getLogger(__name__)
 class Format:
     """One format of motion files.
 
-    keeps: what of a motion a file holds, for the docs.
-    reader, writer: the modules in this package that have its ``read`` and ``write``, imported when they are used; empty
-        where it is not read or not written.
+    keeps: which parts of a motion a file holds, for the docs.
+    reader, writer: the modules in this package with its ``read`` and ``write``, imported on first use; empty if it is
+        not read or not written.
     options: the keyword arguments of its ``read``.
-    mocap: whether a file holds motion and skeleton, which the files of a corpus must.
-    loose: whether its unit of length is a convention that not all files keep to.
-    needs: the package that writing takes, out of the extra "plot".
+    mocap: whether a file holds motion and skeleton, as the files of a corpus must.
+    loose: whether its unit of length is a convention that some files ignore.
+    needs: the package required for writing, from the extra "plot".
     """
 
     extension: str
@@ -54,29 +53,29 @@ class Format:
     needs: str = ""
 
     def read(self) -> Callable[..., Motion]:
-        """The function that reads it."""
+        """The module's ``read``."""
         found: Callable[..., Motion] = import_module(f"motet.formats.{self.reader}").read
         return found
 
     def clips(self) -> Callable[[File], tuple[str, ...]]:
-        """The function that names the clips of a file."""
+        """The module's ``clips``."""
         found: Callable[[File], tuple[str, ...]] = import_module(f"motet.formats.{self.reader}").clips
         return found
 
     def write(self) -> Callable[[File, Motion], None]:
-        """The function that writes it."""
+        """The module's ``write``."""
         found: Callable[[File, Motion], None] = import_module(f"motet.formats.{self.writer}").write
         return found
 
 
-_AMC = "everything; AMC has no frame rate: 120 unless motet wrote another into a comment, or `fps=` says it"
-_GIF = "a picture that moves; needs Pillow: `pip install 'motet[plot]'`"
-_NPZ = "everything, to the last bit; of AMASS the body's joints"
+_AMC = "everything; AMC has no frame rate: 120 unless `fps=` or a comment written by motet gives another"
+_GIF = "an animated picture; needs Pillow: `pip install 'motet[plot]'`"
+_NPZ = "everything, bit for bit; from AMASS, the body joints"
 _GLB = "a skeleton and its animations, each a clip; written with a body, for viewers and engines"
-_CHARACTER = "a skeleton and its animations, each a clip, or the pose that it rests in"
+_CHARACTER = "a skeleton and its animations, each a clip, or its rest pose"
 _AVATAR = f"{_CHARACTER}; written by `--onto`, the avatar itself ([humanoid.md](humanoid.md#characters))"
 _FBX = "a skeleton and its takes, each a clip; needs ufbx: `pip install 'motet[fbx]'`"
-_VRMA = "the humanoid: a motion of another human figure is brought to it ([humanoid.md](humanoid.md))"
+_VRMA = "the humanoid: motions of other human figures are retargeted ([humanoid.md](humanoid.md))"
 
 FORMATS = (
     Format(".amc", "Acclaim, with its .asf", _AMC, "amc", "amc", options=("asf", "fps", "partial"), mocap=True),
@@ -94,12 +93,12 @@ FORMATS = (
 )
 
 CHARACTER_READERS = {"gltf": "gltf_character", "fbx": "fbx"}
-"""For readers of files whose nodes have axes of their own the modules that read these, by ``read_character``."""
+"""Reader -> the module whose ``read_character`` reads a skeleton with the axes of its nodes."""
 
 NO_MOTIONS = {
-    ".c3d": ", which hold markers and no skeleton: solve them for one first, with the program that recorded them",
+    ".c3d": ", which hold markers without a skeleton: first solve for one in the program that recorded them",
 }
-"""What is known of other types of motion files: it is said when they are refused."""
+"""Extensions of other motion files -> what to add when refusing them."""
 
 READABLE = tuple(kind.extension for kind in FORMATS if kind.reader)
 WRITABLE = tuple(kind.extension for kind in FORMATS if kind.writer)
@@ -110,11 +109,11 @@ WRITES = ", ".join(f"{kind.extension} ({kind.name})" for kind in FORMATS if kind
 """The formats as help texts list them."""
 
 ONTO = (".glb", ".vrm")
-"""What a character with its mesh and new animations is written as."""
+"""Extensions for a character written with its mesh and new animations."""
 
 
 HUMAN_HEIGHT = (0.5, 3.0)
-"""Metres from the sole to the top of the skull, or from hand to hand, that a figure of a human's size has."""
+"""Plausible sizes of a human figure in metres, sole to crown or hand to hand."""
 
 
 def read_motion(  # noqa: PLR0913  options, each of which has a default
@@ -128,18 +127,18 @@ def read_motion(  # noqa: PLR0913  options, each of which has a default
     rest: File | None = None,
     format: str | None = None,
 ) -> Motion:
-    """Read a motion file, or a file object of bytes; "file.glb#Walk" is the clip Walk of file.glb.
+    """Read a motion file or a binary file object; "file.glb#Walk" is the clip Walk of file.glb.
 
-    fps: the frame rate where the format has none, which is AMC.
+    fps: the frame rate, for AMC, which states none.
     asf: the skeleton of an AMC file; by default it is looked for beside it.
-    unit: the length unit where the file does not say its own: "m", "cm", "mm", "inch" or a number of metres. Of glTF,
-        whose metre is a convention, it is taken unless the figure is of a human's size in metres and not in that unit.
-    partial: take the complete frames of a truncated AMC or BVH file, which is refused otherwise.
-    clip: which motion of a file that holds several: a name as :func:`clips` has them, or a number from 1; by default
-        the first, with a word in the log where there are others.
-    rest: a glTF file of the same joints that rests in a T-pose, for glTF and FBX files that rest in their first frame;
-        as "file.glb#TPose" the first frame of that clip. Of FBX an FBX file, too.
-    format: the extension, such as "bvh", where it is not the path's; a file object needs it.
+    unit: the length unit if the file states none: "m", "cm", "mm", "inch" or a number of metres. For glTF, whose metre
+        is only a convention, it applies unless the figure is human-sized in metres and not in that unit.
+    partial: read the complete frames of a truncated AMC or BVH file instead of refusing it.
+    clip: a motion of a file with several: a name from :func:`clips` or a number from 1; default: the first.
+    rest: a glTF file with the same joints in a T-pose, for glTF and FBX files whose rest pose is their first frame;
+        "file.glb#TPose" means the first frame of that clip. For FBX, an FBX file works too.
+    format: the extension, such as "bvh", if it differs from the path's; required for a file object.
+
     FormatError for an unknown extension, a missing file, one that is not a motion, and an option that the format does
     not take or the file contradicts.
     """
@@ -149,7 +148,7 @@ def read_motion(  # noqa: PLR0913  options, each of which has a default
     given = {"fps": fps, "asf": asf, "partial": partial or None, "clip": clip, "rest": rest}
     options = _taken(path, kind, given)
     try:
-        with np.errstate(over="ignore", invalid="ignore"):  # what gets infinite is refused by Motion
+        with np.errstate(over="ignore", invalid="ignore"):  # Motion refuses infinite values
             motion = kind.read()(file, **options)
         log.debug("read %s: %r", path, motion)
         return motion if unit is None else _in_unit(path, motion, metres(unit), kind.loose)
@@ -160,41 +159,41 @@ def read_motion(  # noqa: PLR0913  options, each of which has a default
 
 
 def _taken(path: Path, kind: Format, given: Mapping[str, Any]) -> dict[str, Any]:
-    """The options that are given, all of which a format must take."""
+    """The options that were given; FormatError if the format does not take one of them."""
     options = {name: value for name, value in given.items() if value is not None}
     for name in options.keys() - set(kind.options):
         takers = " ".join(known.extension for known in FORMATS if name in known.options)
-        raise FormatError(path, f"{name!r} is an option of {takers} files only")
+        raise FormatError(path, f"{name!r} is an option for {takers} files only")
     return options
 
 
 def clips(file: File, *, format: str | None = None) -> tuple[str, ...]:
-    """The names of the motions that a file holds, each as ``clip`` of :func:`read_motion` takes it.
+    """The names of the motions in a file, for ``clip`` of :func:`read_motion`.
 
-    None of them twice; empty where the format has one motion to a file, or the file none. format: as of
-    :func:`read_motion`. FormatError for an unknown extension, or for a damaged file of a format that has clips.
+    They are unique; empty if the format holds one motion per file, or the file holds none. format: see
+    :func:`read_motion`. FormatError for an unknown extension, or for a damaged file of a format with clips.
     """
     kind = _format(file, format, READABLE, "read")
     return kind.clips()(file) if "clip" in kind.options else ()
 
 
 def names_motion(text: str) -> bool:
-    """Whether a text is the name of a motion file, by its extension; with a clip or without."""
+    """Whether a text names a motion file, judging by its extension; with or without a clip."""
     return place_of(split_clip(text, READABLE)[0]).suffix.lower() in READABLE
 
 
 def read_character(file: File) -> Character:
-    """Read a skeleton to put motions onto: of glTF, VRM and FBX as their nodes have it, of others that of the motion.
+    """Read a skeleton to put motions onto: from the nodes of glTF, VRM and FBX, otherwise the motion's skeleton.
 
-    The name of a rig of :data:`motet.motion.humanoid.rigs.RIGS`, such as "mixamo", gives that rig where there is no
-    such file. FormatError as :func:`read_motion`.
+    The name of a rig in :data:`motet.motion.humanoid.rigs.RIGS`, such as "mixamo", gives that rig unless a file of that
+    name exists. FormatError like :func:`read_motion`.
     """
     if isinstance(file, str | Path) and not Path(file).suffix and not Path(file).exists():
         return _character(_rig(Path(file)))
     reader = _format(file, None, READABLE, "read").reader
     if reader not in CHARACTER_READERS:
         return Character(read_motion(file))
-    with np.errstate(over="ignore", invalid="ignore"):  # what gets infinite is refused by Skeleton
+    with np.errstate(over="ignore", invalid="ignore"):  # Skeleton refuses infinite values
         found: Character = import_module(f"motet.formats.{CHARACTER_READERS[reader]}").read_character(file)
     return found
 
@@ -207,18 +206,19 @@ def write_motion(
     like: File | Character | Motion | Skeleton | None = None,
     onto: File | Character | None = None,
 ) -> None:
-    """Write a motion in the format of the path's extension, or in ``format``, which a file object needs.
+    """Write a motion in the format of the path's extension, or in ``format``, which a file object requires.
 
-    like: a character whose skeleton the motion is put onto: a file of it (.bvh, .glb, .vrm, ...), a motion of it,
-        its skeleton, or the name of a rig ("mixamo", "rigify", "unity", "unreal").
-    onto: the .glb or .vrm of a character, which is written with its mesh and materials and the motion, or several by
-        the names of their clips, as animations in it.
-    FormatError, MotionError or OutputError if that is not possible; nothing is written then.
+    like: the character whose skeleton takes the motion: its file (.bvh, .glb, .vrm, ...), a motion of it, its
+        skeleton, or the name of a rig ("mixamo", "rigify", "unity", "unreal").
+    onto: a character's .glb or .vrm; it is written with its mesh and materials and the motion, or several motions by
+        clip name, as animations.
+
+    FormatError, MotionError or OutputError if that is impossible; then nothing is written.
     """
     if onto is not None:
         write_onto(file, motion if isinstance(motion, Mapping) else {"motion": motion}, onto, format=format)
     elif isinstance(motion, Mapping):
-        raise MotionError("several motions are written into one file with onto= and a character's .glb or .vrm only")
+        raise MotionError("writing several motions into one file requires onto= and a character's .glb or .vrm")
     else:
         check_writable(file, format)
         character = None if like is None else _character(like)
@@ -226,10 +226,10 @@ def write_motion(
 
 
 def write_on(file: File, motion: Motion, character: Character | None, *, format: str | None = None) -> None:
-    """Write a motion as :func:`write_motion` does, which is on the character's skeleton already where one is given."""
+    """Write a motion like :func:`write_motion`; if a character is given, the motion is already on its skeleton."""
     check_writable(file, format)
     kind = _format(file, format, WRITABLE, "write")
-    with np.errstate(over="ignore", invalid="ignore"):  # writers refuse what is too large by themselves
+    with np.errstate(over="ignore", invalid="ignore"):  # writers refuse values that are too large
         if character and character.nodes and kind.writer == "glb":
             from motet.formats import gltf_onto
 
@@ -239,7 +239,7 @@ def write_on(file: File, motion: Motion, character: Character | None, *, format:
 
 
 def write_onto(file: File, motions: Mapping[str, Motion], onto: File | Character, *, format: str | None = None) -> None:
-    """Write a character with motions by their names, as :func:`write_motion` does."""
+    """Write a character with named motions, like :func:`write_motion`."""
     check_writable(file, format, ONTO)
     if not isinstance(onto, Character):
         _format(onto, None, ONTO, "write onto")
@@ -262,7 +262,7 @@ def _metres(motion: Motion) -> Motion:
 
 
 def check_writable(file: File, format: str | None = None, allowed: tuple[str, ...] = WRITABLE) -> None:
-    """Refuse a place that cannot be written to, or an extension that is not allowed, before long work starts."""
+    """Refuse an unwritable path or a disallowed extension before long work starts."""
     kind = _format(file, format, allowed, "write")
     if kind.needs and find_spec(kind.needs) is None:
         reason = (
@@ -298,14 +298,14 @@ def _rig(name: Path) -> Skeleton:
 
 
 def _in_unit(path: Path, motion: Motion, unit: float, loose: bool) -> Motion:
-    """The motion with the length unit that its file does not say. loose: or says by convention."""
+    """The motion with the length unit that its file leaves out or, if ``loose``, states only by convention."""
     if motion.skeleton is None:
-        raise FormatError(path, "it has no skeleton, so it has no unit of length")
+        raise FormatError(path, "a file without a skeleton has no length unit")
     said, height = motion.skeleton.metres_per_unit, motion.skeleton.height
     if said is None or (loose and (_human(height * unit) or not _human(height * said))):
         return motion.with_unit(unit)
     if not math.isclose(said, unit, rel_tol=1e-6):
-        log.info("%s: its length unit is %.6g m according to the file, not %.6g m as given", path, said, unit)
+        log.info("%s: the file states a length unit of %.6g m, so the given %.6g m is ignored", path, said, unit)
     return motion
 
 

@@ -1,8 +1,8 @@
 """AMASS and other files of SMPL bodies (.npz): rotations of 22 joints and the root's path.
 
 Arrays: ``trans`` (T, 3) in metres, and ``poses`` (T, 66 or more) or ``root_orient`` (T, 3) with ``pose_body`` (T, 63):
-rotation vectors of the joints in SMPL's order; fingers, jaw and eyes behind them are left out. z is up. The body's
-shape needs the body model, which is not read: the skeleton is a plain one of an adult's proportions.
+rotation vectors of the joints in SMPL's order; the fingers, jaw and eyes that follow are left out. z is up. The body
+shape would need the body model, which is not read: the skeleton is a plain one with an adult's proportions.
 """
 
 import io
@@ -44,7 +44,7 @@ AMASS_JOINTS = (
     ("left_wrist", 18, (0.25, 0.0, 0.0)),
     ("right_wrist", 19, (-0.25, 0.0, 0.0)),
 )
-"""SMPL's joints in its order, with parents and offsets in metres of a plain body in a T-pose that faces z, y up."""
+"""SMPL's joints in order, with parents and offsets in metres of a plain body in a T-pose, facing z, y up."""
 
 AMASS_SKELETON = Skeleton(
     tuple(Joint(name, parent, offset) for name, parent, offset in AMASS_JOINTS), metres_per_unit=1.0
@@ -57,11 +57,11 @@ RATE_NAMES = ("mocap_framerate", "mocap_frame_rate")
 
 
 def is_amass(content: bytes) -> bool:
-    """Whether a file's bytes hold SMPL's poses and a path; False for any other or broken file."""
+    """Whether a file's bytes hold SMPL poses and a path; False for any other or broken file."""
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             names = {name.removesuffix(".npy") for name in archive.namelist()}
-    # what opening raises: of damage, of a version that Python does not know, of names that are no UTF-8
+    # raised on opening: damage, an unknown zip version, names that are not UTF-8
     except (zipfile.BadZipFile, NotImplementedError, ValueError):
         return False
     return "trans" in names and bool(names & {"poses", "pose_body"})
@@ -89,7 +89,7 @@ def parse(path: Path, content: bytes) -> Motion:
     except Exception as error:
         raise FormatError(path, f"not an AMASS file: {str(error)[:200]}") from error
     if trans.shape != (len(vectors), 3) or not (np.isfinite(vectors).all() and np.isfinite(trans).all()):
-        raise FormatError(path, f"trans must be ({len(vectors)}, 3) finite numbers, here it is {trans.shape}")
+        raise FormatError(path, f"trans must be ({len(vectors)}, 3) finite numbers, not {trans.shape}")
     turned = rotvec_to_rotmat(vectors)
     turned[:, 0] = Z_TO_Y @ turned[:, 0]
     for i, joint in enumerate(AMASS_SKELETON.joints[1:], start=1):
@@ -113,5 +113,5 @@ def _vectors(path: Path, archive: zipfile.ZipFile) -> Array:
 def _rate(path: Path, archive: zipfile.ZipFile) -> float:
     names = [name for name in RATE_NAMES if f"{name}.npy" in archive.namelist()]
     if not names:
-        raise FormatError(path, f"the frame rate is missing: expected an array {' or '.join(RATE_NAMES)}")
+        raise FormatError(path, f"no frame rate: expected an array {' or '.join(RATE_NAMES)}")
     return frame_rate(float(_array(archive, names[0])), path)

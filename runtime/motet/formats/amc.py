@@ -23,7 +23,7 @@ log = logging.getLogger(__name__)
 
 FPS_COMMENT = "# fps "
 EACH_LINE = r".+\n?|\n"
-"""Finds one line after the other: a file need not be split as a whole for the sake of its first lines."""
+"""Finds lines one by one, so reading the first lines does not split the whole file."""
 
 Layout = list[tuple[str, int]]
 
@@ -33,15 +33,15 @@ def read(file: File, asf: str | Path | None = None, fps: float | None = None, pa
 
     asf: the skeleton; if not given, the file of the same stem, else of the same subject (``39.asf`` for
         ``39_14.amc``), else the only ASF file, looked for beside the motion and then in ``../asf``.
-    fps: AMC does not state it. If not given: that of the file's comment ``# fps 60`` (motet writes one), else 120,
-        the rate of nearly all of CMU. A comment that says something else is an error.
-    partial: take the complete frames of a file that breaks off within its last one, which is refused otherwise.
+    fps: AMC does not state it. Default: the file's comment ``# fps 60`` (motet writes one), else 120, the rate of
+        nearly all of CMU. A comment that contradicts it is an error.
+    partial: read the complete frames of a file whose last frame is truncated instead of refusing it.
     Channels come in the file's order of bones, units "length" for translations, "deg" or "rad" as in the file.
     FormatError names the file, and the line where it is cut or wrong.
     """
     path, text = place_of(file), read_text(file)
     if asf is None and not isinstance(file, str | Path):
-        raise FormatError(path, "a file object has no folder to find its skeleton in: give it as asf")
+        raise FormatError(path, "a file object has no folder to find the skeleton in: pass it as asf")
     skeleton = read_skeleton(asf if asf is not None else _find_asf(path))
     header, unit, said_fps = _header(path, text, skeleton)
     layout = _layout(path, _frame_lines(text, header), skeleton.dofs)
@@ -54,8 +54,8 @@ def read(file: File, asf: str | Path | None = None, fps: float | None = None, pa
 
 def _rate(path: Path, said: float | None, given: float | None) -> float:
     if said is not None and given is not None and abs(said - given) > 1e-6 * said:
-        raise FormatError(path, f"its frame rate is {said:g} according to the file, not {given:g} as given")
-    # CMU's files do not say: they have 120
+        raise FormatError(path, f"the file states {said:g} fps, but {given:g} was given")
+    # CMU's files state none: theirs is 120
     return frame_rate(120.0 if said is None and given is None else said or given or 0.0, path)
 
 
@@ -65,7 +65,7 @@ def _find_asf(path: Path) -> Path:
         try:
             found = sorted(folder.iterdir()) if folder.is_dir() else []
         except OSError as error:
-            raise FormatError(path, f"no skeleton can be looked for in {folder}: {error.strerror}") from error
+            raise FormatError(path, f"cannot look for a skeleton in {folder}: {error.strerror}") from error
         by_stem = {file.stem: file for file in found if file.suffix.lower() == ".asf"}
         for stem in stems:
             if stem in by_stem:
@@ -73,11 +73,11 @@ def _find_asf(path: Path) -> Path:
         if len(by_stem) == 1:
             return next(iter(by_stem.values()))
     names = " or ".join(f"{stem}.asf" for stem in stems)
-    raise FormatError(path, f"its skeleton is missing: no {names}, nor a single .asf, beside it or in ../asf")
+    raise FormatError(path, f"no skeleton found: expected {names}, or a single .asf, beside it or in ../asf")
 
 
 def _header(path: Path, text: str, asf: Asf) -> tuple[int, str, float | None]:
-    """The number of lines before the first frame, the unit of angles and the frame rate where a comment says it."""
+    """The number of lines before the first frame, the angle unit, and the frame rate if a comment states it."""
     unit, fps, line = asf.angle, None, -1
     for line, content in enumerate(re.finditer(EACH_LINE, text)):
         word = content[0].strip().lower()
@@ -91,7 +91,7 @@ def _header(path: Path, text: str, asf: Asf) -> tuple[int, str, float | None]:
 
 
 def _frame_lines(text: str, header: int) -> Iterator[tuple[int, list[str]]]:
-    """Every line with words after the header, and its number."""
+    """Every non-empty line after the header, and its number."""
     for line, content in enumerate(re.finditer(EACH_LINE, text), start=1):
         words = content[0].split("#")[0].split()
         if words and line > header:
@@ -104,7 +104,7 @@ def _layout(path: Path, lines: Iterator[tuple[int, list[str]]], dofs: Mapping[st
     if not words[0]:
         return [(bone, len(names)) for bone, names in dofs.items()]
     if not _is_frame_number(words):
-        reason = f"a frame starts with its number alone on a line, not {quoted(' '.join(words))}"
+        reason = f"expected a frame number alone on its line, not {quoted(' '.join(words))}"
         raise FormatError(path, reason, line)
     layout: dict[str, int] = {}
     for line, words in lines:
@@ -132,12 +132,12 @@ def _values(path: Path, text: str, header: int, layout: Layout, partial: bool) -
         frames = [match.start() for match in re.finditer(r"^\d+\s*$", text, re.MULTILINE)]
         if not (partial and frames):
             raise
-    log.info("%s: took the frames before its last one, which is truncated", path)
+    log.info("%s: the last frame is truncated and was left out", path)
     return _values_by_line(path, _frame_lines(text[: frames[-1]], header), layout)
 
 
 def _values_at_once(text: str, header: int, layout: Layout) -> Array | None:
-    """All values (T, D) of a file whose frames are all alike, else None: several times as fast as by line."""
+    """All values (T, D) if all frames have the same layout, else None: several times faster than line by line."""
     try:
         words = Words("".join(text.split("\n", header)[header:]))
     except UnicodeEncodeError:
@@ -169,7 +169,7 @@ def _values_by_line(path: Path, lines: Iterator[tuple[int, list[str]]], layout: 
             continue
         if not expected or words[0] != expected[-1][0]:
             wanted = f"bone {expected[-1][0]!r}" if expected else "a frame number"
-            raise FormatError(path, f"{quoted(words[0])} where the order of the first frame has {wanted}", line)
+            raise FormatError(path, f"expected {wanted}, as in the first frame, not {quoted(words[0])}", line)
         bone, count = expected.pop()
         if len(words) - 1 != count:
             raise FormatError(path, f"bone {bone!r} needs {count} values, not {len(words) - 1}", line)
@@ -180,27 +180,28 @@ def _values_by_line(path: Path, lines: Iterator[tuple[int, list[str]]], layout: 
 
 def _refuse_rest(path: Path, expected: Layout, line: int) -> None:
     if expected:
-        raise FormatError(path, f"truncated frame: it lacks bone {expected[-1][0]!r}", line)
+        raise FormatError(path, f"truncated frame: bone {expected[-1][0]!r} is missing", line)
 
 
 def write(file: File, motion: Motion) -> None:
-    """Write ``file``, a path, and beside it the ASF file of the same stem; both are replaced if there.
+    """Write ``file``, a path, and beside it the ASF file of the same stem; existing ones are replaced.
 
-    The frame rate goes into a comment that :func:`read` understands. The root becomes "root"; characters that the
-    format cannot hold become ``_``. Values are written without loss, translations in the skeleton's unit; a skeleton
-    that knows its unit is written in CMU's, the only one that the format can name.
-    FormatError for channels other than Euler angles and translations, and for a joint besides the root that really
-    moves within its parent's frame; MotionError for a motion without skeleton.
+    The frame rate goes into a comment that :func:`read` understands. The root becomes "root"; characters not allowed
+    in the format become ``_``. Values are lossless, translations in the skeleton's unit; a skeleton with a known unit
+    is written in CMU's, the only one the format can name.
+
+    FormatError for channels other than Euler angles and translations, and for a joint other than the root whose
+    translation varies; MotionError for a motion without skeleton.
     """
     if not isinstance(file, str | Path):
-        raise FormatError(place_of(file), "AMC is two files, which one file object cannot hold")
+        raise FormatError(place_of(file), "AMC consists of two files, so it cannot be written to one file object")
     path = check_place(file)
     motion, moving = with_still_offsets(path, motion)
     if moving:
         raise FormatError(path, f"only the root can move in an AMC file, not {', '.join(moving)}")
     if skeleton_of(motion).metres_per_unit not in (None, CMU_METRES):
         motion = motion.scaled(CMU_METRES)
-    # a bone's name holds no blanks and comments, and is neither a number nor a keyword
+    # a bone's name has no blanks or comments, and is neither a number nor a keyword
     names = plain_names([ASF_ROOT, *skeleton_of(motion).names[1:]], r"[\s#]|^(?=\d+$)|^(?=:)")
     motion = with_names(motion, names)
     joints = skeleton_of(motion).joints
@@ -211,7 +212,7 @@ def write(file: File, motion: Motion) -> None:
 
 
 def _dofs(motion: Motion, joint: Joint) -> tuple[str, ...]:
-    """The joint's channels in the motion's order if the rotation's order allows it: the first one turns first."""
+    """The joint's channels in the motion's order if the rotation order allows it: the first one turns first."""
     prefix = f"{joint.name}."
     dofs = tuple(name.removeprefix(prefix) for name in motion.channels if name.rpartition(".")[0] == joint.name)
     turns = [f"r{axis}" for axis in reversed(joint.order) if f"r{axis}" in dofs]

@@ -1,9 +1,9 @@
 """ASF, the skeleton file beside AMC motion (Acclaim).
 
-A bone turns about its beginning and carries its children at its end, so ``direction * length`` of a bone is the
-offset of the joints that follow it, and a last bone gets a joint ``NAME_end``. The words of ``dof`` and of the
-root's ``order`` name a bone's channels, the one applied first comes first: ``rx ry rz`` is R = Rz Ry Rx, and so
-is ``axis ... XYZ``. The root's ``orientation`` is read as its axis, its ``position`` as its offset.
+A bone turns about its start and carries its children at its end, so a bone's ``direction * length`` is the offset of
+its child joints, and a last bone gets a joint ``NAME_end``. The words of ``dof`` and of the root's ``order`` name a
+bone's channels, first applied first: ``rx ry rz`` is R = Rz Ry Rx, and so is ``axis ... XYZ``. The root's
+``orientation`` is read as its axis, its ``position`` as its offset.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -30,9 +30,9 @@ Lines = list[tuple[int, list[str]]]
 
 @dataclass(frozen=True)
 class Asf:
-    """A skeleton; for every joint with channels their names ("rx", "tx", ...); the unit of angles, deg or rad.
+    """A skeleton; the channel names ("rx", "tx", ...) of every joint that has any; the angle unit, deg or rad.
 
-    Files of the same skeleton share one: nothing of it is to be changed.
+    Shared between files of the same skeleton: do not modify.
     """
 
     skeleton: Skeleton
@@ -53,15 +53,15 @@ class _Bone:
 def read_skeleton(path: str | Path) -> Asf:
     """Read an ASF file, without limits and masses.
 
-    FormatError with file and line where it is not one, where a bone has no direction, length or axis, and where the
-    hierarchy leaves one out.
+    FormatError with file and line if it is not one, a bone has no direction, length or axis, or the hierarchy omits
+    one.
     """
     return _skeleton(Path(path), read_text(path))
 
 
 @lru_cache(maxsize=16)
 def _skeleton(path: Path, text: str) -> Asf:
-    """A folder's motions are mostly of a few people: each skeleton is parsed once."""
+    """A folder mostly holds motions of a few people: each skeleton is parsed once."""
     sections = _sections(path, text)
     units = {words[0].lower(): words[1] for _, words in sections.get("units", []) if len(words) > 1}
     angle = units.get("angle", "deg").lower()[:3]
@@ -73,13 +73,13 @@ def _skeleton(path: Path, text: str) -> Asf:
     for line, block in _blocks(path, sections.get("bonedata", [])):
         bone = _bone(path, line, block, factor)
         if not bone.name or bone.name in bones:
-            raise FormatError(path, f"a bone needs a name of its own, not {quoted(bone.name)}", line)
+            raise FormatError(path, f"bone names must be unique and not empty, not {quoted(bone.name)}", line)
         bones[bone.name] = bone
     _hang_children(path, sections.get("hierarchy", []), bones)
     metres = CMU_METRES if units.get("length") == str(CMU_LENGTH) else None
     joints = _joints(bones, position)
     if lost := bones.keys() - {joint.name for joint in joints}:
-        raise FormatError(path, f"the hierarchy does not lead to bone {quoted(min(lost))}")
+        raise FormatError(path, f"the hierarchy does not reach bone {quoted(min(lost))}")
     try:
         skeleton = Skeleton(tuple(joints), metres)
     except MotionError as error:
@@ -170,7 +170,7 @@ def _axis(path: Path, line: int, words: list[str], factor: float) -> Triple:
     """Angles in the order of the letters that follow them, as angles about x, y, z of ``Joint.axis``."""
     order = words[-1].lower() if words else ""
     if sorted(order) != ["x", "y", "z"]:
-        reason = f"an axis is three angles and their order such as XYZ, not {quoted(' '.join(words))}"
+        reason = f"expected an axis of three angles and their order, such as XYZ, not {quoted(' '.join(words))}"
         raise FormatError(path, reason, line)
     x, y, z = _triple(path, line, words[:-1])
     if order == "xyz":
@@ -184,7 +184,7 @@ def _dofs(path: Path, line: int, words: list[str], known: tuple[str, ...]) -> tu
     dofs = tuple(word.lower() for word in words)
     unknown = [word for word in dofs if word not in known]
     if unknown or len(set(dofs)) < len(dofs):
-        reason = f"degrees of freedom {quoted(' '.join(words))}: each of {' '.join(known)} at most once"
+        reason = f"degrees of freedom {quoted(' '.join(words))}: expected each of {' '.join(known)} at most once"
         raise FormatError(path, reason, line)
     return dofs
 
@@ -196,7 +196,7 @@ def _hang_children(path: Path, lines: Lines, bones: dict[str, _Bone]) -> None:
             continue
         for name in words:
             if name not in bones:
-                raise FormatError(path, f"the hierarchy has a bone {quoted(name)}, which :bonedata does not have", line)
+                raise FormatError(path, f"the hierarchy names bone {quoted(name)}, which is not in :bonedata", line)
         for child in words[1:]:
             if child in hung:
                 raise FormatError(path, f"bone {quoted(child)} has two parents", line)
@@ -205,7 +205,7 @@ def _hang_children(path: Path, lines: Lines, bones: dict[str, _Bone]) -> None:
 
 
 def _joints(bones: dict[str, _Bone], position: Triple) -> list[Joint]:
-    """The joints in the hierarchy's order, each branch to its end before the next."""
+    """The joints in the hierarchy's order, depth first."""
     joints: list[Joint] = []
     waiting = [(ASF_ROOT, -1, position)]
     while waiting:
@@ -223,8 +223,8 @@ def _joints(bones: dict[str, _Bone], position: Triple) -> list[Joint]:
 def write_skeleton(path: str | Path, asf: Asf) -> None:
     """Write an ASF file, angles in degrees; OutputError if it cannot be written.
 
-    The root must be called "root" and names must hold no blank. Where the children of a joint begin at different
-    places, each of them gets a bone ``NAME_base`` without channels that leads to it.
+    The root must be called "root" and names must have no blanks. If the children of a joint start at different places,
+    each gets a bone ``NAME_base`` without channels leading to it.
     """
     root, *bones = _bones(asf)
     length = CMU_LENGTH if asf.skeleton.metres_per_unit == CMU_METRES else 1.0
@@ -267,7 +267,7 @@ def _bones(asf: Asf) -> list[_Bone]:
 
 
 def _tips(asf: Asf) -> set[str]:
-    """The joints that need no bone, as the reader adds them to the last bones by itself."""
+    """The joints that need no bone, because the reader adds them to the last bones."""
     joints = asf.skeleton.joints
     return {
         joints[children[0]].name

@@ -1,9 +1,9 @@
 """BVH: skeleton and motion in one text file (Biovision). Angles are degrees; lengths have no stated unit.
 
-The reader takes what programs write: rotations in any order and before or after the position, one axis or none,
-six channels on any joint (the position then takes the place of OFFSET, as it does for the root), names with blanks
-or colons, equal names (the second "Hand" becomes "Hand_2"), braces anywhere, every line ending. An "End Site"
-becomes a joint ``PARENT_end``. The writer writes what every reader takes.
+The reader accepts the variants in use: rotations in any order and before or after the position, one axis or none, six
+channels on any joint (the position then replaces OFFSET, as for the root), names with blanks or colons, duplicate names
+(the second "Hand" becomes "Hand_2"), braces anywhere, every line ending. An "End Site" becomes a joint ``PARENT_end``.
+The writer sticks to what every reader accepts.
 """
 
 import logging
@@ -35,17 +35,17 @@ BVH_POSITION, BVH_ROTATION = "Xposition Yposition Zposition", "Zrotation Yrotati
 def read(file: File, partial: bool = False) -> Motion:
     """Read a BVH file: channels in the file's order, units "deg" and "length".
 
-    A frame time is read as a whole number of frames per second if that is the only one which its digits allow:
-    0.0083333 is 120 fps, and 0.03, which may stand for 29 to 40, is 33.33.
-    partial: take the complete frames of a file that is truncated or holds fewer than it declares, which is refused
-        otherwise. Of one that holds more all are taken, with a warning in the log.
+    A frame time is read as a whole number of frames per second if its digits allow only one: 0.0083333 is 120 fps,
+    but 0.03, which could mean 29 to 40, is 33.33.
+    partial: read the complete frames of a file that is truncated or holds fewer than it declares instead of refusing
+        it. If it holds more, all are read, with a warning in the log.
     FormatError names file and line.
     """
     path, lines = place_of(file), read_text(file).split("\n")
     nodes, motion_line = _hierarchy(path, lines)
     start, declared, fps = _motion_header(path, lines, motion_line)
     channels = [f"{node.name}.{kind}" for node in nodes for kind in node.channels]
-    # without channels nothing else bears the number out
+    # without channels nothing else confirms the number
     if not channels and declared > (10**7):
         raise FormatError(path, f"the file declares {declared} frames and has no channels", start)
     kept = _without_broken_end(lines, start, len(channels)) if partial else lines
@@ -54,9 +54,9 @@ def read(file: File, partial: bool = False) -> Motion:
         reason = f"the file declares {declared} frames but holds {len(values)}: correct the line 'Frames:'"
         raise FormatError(path, f"{reason}, or read it with partial=True (--partial)", start)
     if len(values) < declared:
-        log.info("%s: took %d frames of the %d that it declares", path, len(values), declared)
+        log.info("%s: read %d of the declared %d frames", path, len(values), declared)
     elif len(values) > declared:
-        log.warning("%s: it declares %d frames and holds %d: took them all", path, declared, len(values))
+        log.warning("%s: it declares %d frames but holds %d: read them all", path, declared, len(values))
     units = tuple("deg" if name[-2] == "r" else "length" for name in channels)
     return Motion(values, tuple(channels), units, fps, Skeleton(tuple(_joint(path, node) for node in nodes)))
 
@@ -82,7 +82,7 @@ def _hierarchy(path: Path, lines: list[str]) -> tuple[list[_Node], int]:
     nodes: list[_Node] = []
     open_nodes: list[int] = []
     names = Names()
-    declared = False  # a joint has been named and its brace must come now
+    declared = False  # a joint has been named and its brace must follow
     for line, statement in _statements(lines):
         keyword, _, rest = statement.replace("\t", " ").partition(" ")
         match keyword.lower():
@@ -108,7 +108,7 @@ def _hierarchy(path: Path, lines: list[str]) -> tuple[list[_Node], int]:
             case _:
                 raise FormatError(path, f"{quoted(statement)} does not belong here", line)
         declared = keyword.lower() in ("root", "joint", "end")
-    raise FormatError(path, "not a BVH file, or a truncated one: the line MOTION is missing")
+    raise FormatError(path, "not a BVH file, or truncated: the line MOTION is missing")
 
 
 def _statements(lines: list[str]) -> Iterator[tuple[int, str]]:
@@ -133,7 +133,7 @@ def _channels(path: Path, words: list[str], line: int) -> tuple[str, ...]:
         reason = f"channel {unknown}: expected one of Xposition ... Zposition, Xrotation ... Zrotation"
         raise FormatError(path, reason, line)
     if words[:1] != [str(len(channels))] or len(set(channels)) < len(channels):
-        reason = f"CHANNELS is a number and as many different channels, not {quoted(' '.join(words))}"
+        reason = f"CHANNELS needs a count and that many different channels, not {quoted(' '.join(words))}"
         raise FormatError(path, reason, line)
     return channels
 
@@ -148,7 +148,7 @@ def _motion_header(path: Path, lines: list[str], motion_line: int) -> tuple[int,
         elif found and found[1].lower() != "frames":
             time = _fps(path, found[2], line)
         elif text.strip():
-            reason = f"{quoted(text.strip())} where 'Frames: N' and 'Frame Time: SECONDS' should be"
+            reason = f"expected 'Frames: N' and 'Frame Time: SECONDS', not {quoted(text.strip())}"
             raise FormatError(path, reason, line)
         if frames is not None and time is not None:
             return line, frames, time
@@ -158,7 +158,7 @@ def _motion_header(path: Path, lines: list[str], motion_line: int) -> tuple[int,
 def _fps(path: Path, word: str, line: int) -> float:
     seconds = number(word, path, line)
     if not seconds > 0:
-        raise FormatError(path, f"a frame cannot take {word} seconds", line)
+        raise FormatError(path, f"frame time {word} s is out of range", line)
     fps = frame_rate(1 / seconds, path, line)
     precision = 0.51 * 10.0 ** int(Decimal(word).as_tuple().exponent)
     near = [rate for rate in (round(fps) - 1, round(fps), round(fps) + 1) if rate > 0]
@@ -167,14 +167,14 @@ def _fps(path: Path, word: str, line: int) -> float:
 
 
 def _without_broken_end(lines: list[str], start: int, width: int) -> list[str]:
-    """The lines without a last frame of which values are missing."""
+    """The lines without an incomplete last frame."""
     last = max((n for n in range(start, len(lines)) if lines[n].strip()), default=start)
     whole = last < len(lines) and len(lines[last].split()) == width
     return lines if whole else lines[:last]
 
 
 def _values(path: Path, lines: list[str], start: int, width: int) -> Array:
-    """The frames (T, width) behind the header, one to a line or not; FormatError where one is truncated."""
+    """The frames (T, width) after the header, one per line or not; FormatError if one is truncated."""
     text = "\n".join(lines[start:])
     with suppress(UnicodeEncodeError):
         words = Words(text)
@@ -202,13 +202,13 @@ def write(file: File, motion: Motion) -> None:
     """Write a BVH file that every reader accepts; OutputError if it cannot be written.
 
     The root's OFFSET is 0 and the root alone has six channels; all rotations are Z Y X in degrees; names are plain
-    and different; every last joint has an End Site. Angles in that order come through without loss, others to
-    1e-9 degrees. A joint that really moves within its parent's frame gets six channels too, rather than lose that.
-    A motion without translation of the root stays at the skeleton's origin.
+    and unique; every last joint has an End Site. Angles in that order are lossless, others accurate to 1e-9 degrees.
+    A joint whose translation varies gets six channels too. A motion without root translation stays at the skeleton's
+    origin.
     FormatError for channels other than Euler angles and translations; MotionError for a motion without skeleton.
     """
     motion, moving = with_still_offsets(place_of(file), motion)
-    # readers stumble over blanks and colons in names
+    # some readers fail on blanks and colons in names
     names = plain_names(skeleton_of(motion).names, r"[^\w.-]")
     translated = {names[0], *(names[skeleton_of(motion).index(name)] for name in moving)}
     motion = with_names(motion, names)
@@ -223,7 +223,7 @@ def write(file: File, motion: Motion) -> None:
 
 
 def _jointed(motion: Motion) -> list[int]:
-    """The joints that are written as such, in the file's order; the others are the End Sites."""
+    """The joints written as JOINT, in the file's order; the others are End Sites."""
     skeleton = skeleton_of(motion)
     moved = {channel.rpartition(".")[0] for channel in motion.channels}
     order, waiting = [], [0]
@@ -238,9 +238,9 @@ def _jointed(motion: Motion) -> list[int]:
 
 
 def _tree(skeleton: Skeleton, joints: list[int], translated: set[str]) -> Iterator[str]:
-    """The lines of the hierarchy; ``joints`` come each branch to its end before the next."""
+    """The lines of the hierarchy; ``joints`` are depth first."""
     written = set(joints)
-    # 40 tabs at most: a long chain of joints is not a long file
+    # 40 tabs at most, so that a long chain of joints does not make a huge file
     indents = ["\t" * min(depth, 40) for depth in range(len(joints))]
     open_joints: list[int] = []
     for i in joints:
@@ -279,7 +279,7 @@ def _rows(motion: Motion, joints: list[int], translated: set[str]) -> Array:
 
 
 def _zyx_degrees(motion: Motion) -> Array:
-    """Angles (T, J, 3) about z, y, x in degrees, as they are where they are of this kind already."""
+    """Angles (T, J, 3) about z, y, x in degrees; unchanged if they already are."""
     skeleton = skeleton_of(motion)
     converted = rotmats_to_euler(local_rotations(motion), BVH_ORDER)
     angles: Array = np.round(np.degrees(converted), 9).astype(np.float64)

@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Character:
-    """A character's skeleton as its file has it, to put motions onto.
+    """A character's skeleton from its file, to put motions onto.
 
-    rest: a motion of it, of a glTF file one frame: the pose that its nodes rest in, in metres, with every angle 0.
-    joint_map: its bones where the file names them, as VRM does, else None.
-    nodes: of a glTF file the nodes that the joints are, by which a motion is written for just these.
-    skin: joint -> points (P, 3) of the mesh that hang on it, from the joint, at rest; empty where there is no mesh.
+    rest: a motion of it; for a glTF file one frame, the rest pose of its nodes, in metres, with every angle 0.
+    joint_map: its bones if the file names them, as VRM does, else None.
+    nodes: for a glTF file, the nodes of the joints, used to write a motion for exactly these nodes.
+    skin: joint -> points (P, 3) of the mesh attached to it, relative to the joint, at rest; empty without a mesh.
     """
 
     rest: Motion
@@ -31,10 +31,10 @@ class Character:
 
 
 def put_onto(motion: Motion, character: Character) -> Motion:
-    """A motion of any human figure on a character's skeleton; as it is where it is on that skeleton already.
+    """A motion of any human figure on a character's skeleton; unchanged if it already is on that skeleton.
 
-    A character of a glTF file stands on the ground, and z becomes the way that it faces at rest. MotionError, with the
-    reason, where the motion's figure or the character is no human's.
+    A character from a glTF file stands on the ground, and z becomes its facing direction at rest. MotionError, with the
+    reason, if the motion's figure or the character is not human.
     """
     if motion.skeleton == character.rest.skeleton:
         return motion

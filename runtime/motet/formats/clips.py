@@ -14,32 +14,31 @@ Clip = str | int | None
 """One of a file's clips: its name, its number from 1, or None for the first."""
 
 MARK = "#"
-"""What stands between a file and its clip."""
+"""Separates a file from its clip."""
 
 
 def clip_names(given: Iterable[str]) -> tuple[str, ...]:
-    """Names for a file's clips, in their order, none twice: printable and on one line, "clip3" for an empty third."""
+    """Unique names for a file's clips, in order: printable and on one line, "clip3" for an empty third."""
     names = Names()
     return tuple(names.unique(_tidy(name) or f"clip{number}") for number, name in enumerate(given, start=1))
 
 
 def _tidy(name: str) -> str:
     printable = "".join(letter if letter.isprintable() else " " for letter in name)
-    # more characters are cut off
+    # characters beyond this are cut off
     return " ".join(printable.split())[:200]
 
 
 def chosen(path: Path, names: Sequence[str], clip: Clip) -> int:
-    """The index of a clip among a file's; of a number as text, a clip of that name goes before the one of that number.
+    """The index of a clip among a file's; for a number as text, a clip of that name precedes the clip of that number.
 
-    None is the first, with a word in the log if there are others. FormatError, with the names, for a clip that is not
-    there.
+    None is the first, with a note in the log if there are others. FormatError, with the names, for an unknown clip.
     """
     if clip is None:
         if len(names) > 1:
-            said = "%s: of %d clips the first is taken, %s; the next is %s%s%s"
+            said = "%s: reading the first of %d clips, %s; the next is %s%s%s"
             log.warning(said, path, len(names), quoted(names[0]), path.name, MARK, names[1])
-            log.info("%s: its clips are %s", path, ", ".join(map(quoted, names)))
+            log.info("%s: clips: %s", path, ", ".join(map(quoted, names)))
         return 0
     if isinstance(clip, str) and _tidy(clip) in names:
         return names.index(_tidy(clip))
@@ -51,9 +50,9 @@ def chosen(path: Path, names: Sequence[str], clip: Clip) -> int:
 
 
 def split_clip(file: File, extensions: Sequence[str]) -> tuple[File, str | None]:
-    """A file and the clip that is named behind :data:`MARK`, None where none is.
+    """A file and the clip named after :data:`MARK`, or None.
 
-    A file that really has the mark in its name comes first, then the shortest path before a mark that is a file, then
+    An existing file with the mark in its name takes precedence, then the shortest existing path before a mark, then
     the shortest one with one of ``extensions``.
     """
     if not isinstance(file, str | Path) or MARK not in str(file) or _is_file(Path(file)):
@@ -67,5 +66,5 @@ def split_clip(file: File, extensions: Sequence[str]) -> tuple[File, str | None]
 def _is_file(path: Path) -> bool:
     try:
         return path.is_file()
-    except OSError:  # a name that no file can have
+    except OSError:  # not a valid file name
         return False

@@ -1,7 +1,7 @@
 """CSV: a table of channels for spreadsheets and other programs. The skeleton is not kept.
 
-A comment ``# motet motion, fps 120.0``, a header ``time,root.tx [length],root.rx [deg],...`` and one row a frame, its
-time in seconds first. A table from elsewhere needs the header and, where it has no such comment, evenly spaced times.
+A comment ``# motet motion, fps 120.0``, a header ``time,root.tx [length],root.rx [deg],...`` and one row per frame, its
+time in seconds first. Other programs' tables need the header and, without such a comment, evenly spaced times.
 """
 
 import csv
@@ -21,7 +21,7 @@ COMMENT = "# motet motion, fps "
 
 
 def read(file: File) -> Motion:
-    """Read a table: values as they are written, no skeleton. FormatError names file and line of what is wrong."""
+    """Read a table: values unchanged, no skeleton. FormatError names the file and line at fault."""
     path, text = place_of(file), read_text(file)
     fps, header, rows = None, None, []
     reader = csv.reader(io.StringIO(text))
@@ -58,12 +58,12 @@ def _columns(path: Path, header: list[str]) -> tuple[tuple[str, ...], tuple[str,
 def _fps_of(path: Path, times: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> float:
     steps = np.diff(times)
     if not len(steps) or steps.min() <= 0 or np.ptp(steps) > 0.01 * steps.mean():
-        raise FormatError(path, f"without evenly spaced times the frame rate needs a comment line '{COMMENT}30'")
+        raise FormatError(path, f"times are not evenly spaced: add a comment line '{COMMENT}30'")
     return frame_rate(float(1 / steps.mean()), path)
 
 
 def write(file: File, motion: Motion) -> None:
-    """Write a table; values come back exactly, the skeleton does not. OutputError if it cannot be written."""
+    """Write a table; values are kept exactly, the skeleton is not. OutputError if it cannot be written."""
     text = io.StringIO()
     text.write(f"{COMMENT}{motion.fps!r}\n")
     writer = csv.writer(text, lineterminator="\n")

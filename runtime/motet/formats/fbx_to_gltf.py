@@ -1,13 +1,13 @@
-"""A program of its own: FBX on standard input, its skeleton and one of its takes as glTF on standard output.
+"""A separate program: FBX on standard input, its skeleton and one of its takes as glTF on standard output.
 
     python -P fbx_to_gltf.py NUMBER
 
-Takes are those that move a bone, counted from 0; where there is none of that number, the skeleton is at rest. All their
-names are in the glTF's ``extras``. It has nodes, skins and samples at every frame; y is up, lengths are metres. Exit
-status 1 comes with a reason on standard error.
+Only takes that move a bone count, from 0; without one of that number, the skeleton is at rest. All their names are in
+the glTF's ``extras``. It has nodes, skins and samples at every frame; y is up, lengths are metres. Exit status 1 comes
+with a reason on standard error.
 
-It runs apart from motet because of ufbx: that is C code, which strangers' files may break, and version 0.0.5 gives its
-Python objects away without counting the reference, so that each has to be kept until the process ends.
+It runs separately because of ufbx: it is C code, which untrusted files may crash, and version 0.0.5 returns Python
+objects without counting the reference, so each has to be kept until the process ends.
 """
 
 import base64
@@ -25,16 +25,16 @@ from typing import Any, TypeVar
 import ufbx
 
 MEMORY, MEMORY_PER_BYTE = 2**28, 32
-"""Bytes of memory that a file may take: these, and so many for each of its own."""
+"""Memory limit in bytes: a base, plus this many per byte of the file."""
 
 FBX_FREE_VALUES = 10**5
-"""Frames times nodes of a file of any size; one of more has four bytes for each, so that a small one stays cheap."""
+"""Frames times nodes allowed at any file size; beyond it four bytes of file for each, so small files stay cheap."""
 
 FBX_FPS, FBX_MAX_FPS = 30.0, 1000.0
-"""The frame rate of a file that says none, and the highest."""
+"""The frame rate of a file that states none, and the highest."""
 
 TRACK_TYPES = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3"}
-"""What glTF and ufbx both call the parts of a node's transform, and glTF's types of them."""
+"""The parts of a node's transform, as named by both glTF and ufbx, and their glTF types."""
 
 Vector = Sequence[float]
 Matrix = Sequence[Vector]
@@ -63,12 +63,12 @@ def product(a: Matrix, b: Matrix) -> Matrix:
 
 
 def inverse(matrix: Matrix) -> Matrix:
-    """What undoes it; ValueError for one that flattens."""
+    """The inverse; ValueError if singular."""
     x, y, z, origin = matrix
     rows = [_cross(y, z), _cross(z, x), _cross(x, y)]
     volume = sum(a * b for a, b in zip(x, rows[0], strict=True))
     if not volume:
-        raise ValueError("a bone hangs on one that is bound without volume")
+        raise ValueError("a bone's parent has a singular bind pose")
     axes = [[row[i] / volume for row in rows] for i in range(3)]
     return product([*axes, [0.0, 0.0, 0.0]], [*ufbx.identity_matrix[:3], [-number for number in origin]])
 
@@ -92,7 +92,7 @@ def matrix_of(transform: Any) -> Matrix:
 
 
 class Scene:
-    """A file's nodes without the root, each after its parent, and which of them are joints.
+    """A file's nodes without the root, parents first, and which of them are joints.
 
     at: indices in ``nodes`` by ufbx's numbers. bound: for bones of skins, where they are in the world when bound.
     skins: the bones of each skin, then those that no skin uses, skeleton by skeleton. near: the bones and what they
@@ -130,7 +130,7 @@ class Scene:
         return bones
 
     def _bare(self, skinned: set[int]) -> Iterator[set[int]]:
-        """The bones that no skin uses, together where they hang on the same one."""
+        """The bones that no skin uses, grouped by topmost bone."""
         tops: dict[int, int] = {}
         groups: dict[int, set[int]] = {}
         for i, node in enumerate(self.nodes):
@@ -147,7 +147,7 @@ class Scene:
         return found
 
     def rest(self) -> list[Matrix]:
-        """How each node rests in its parent: bones of skins as they are bound."""
+        """Each node's rest pose in its parent: for bones of skins, the bind pose."""
         world: list[Matrix] = []
         rest = []
         for i, node in enumerate(self.nodes):
@@ -167,7 +167,7 @@ class Take:
 
 
 def takes(scene: Scene) -> list[Take]:
-    """The takes that move a bone or what one hangs on; in a file without bones any node."""
+    """The takes that move a bone or its ancestor; in a file without bones any node."""
     found = (_take(scene, stack) for stack in each(scene.scene.anim_stacks))
     return [take for take in found if take.moved & scene.near]
 
@@ -187,12 +187,12 @@ def frame_times(scene: Scene, take: Take) -> list[float]:
     begin, end = span(take)
     fps = frame_rate(scene, take)
     if not (end - begin) * fps * len(scene.near) < FBX_FREE_VALUES + scene.size / 4:
-        raise ValueError(f"{end - begin:g} s at {fps:g} fps are too many frames")
+        raise ValueError(f"{end - begin:g} s at {fps:g} fps is too many frames")
     return [begin + i / fps for i in range(round((end - begin) * fps) + 1)]
 
 
 def span(take: Take) -> tuple[float, float]:
-    """When a take has keys, within the time that the file gives it if that has any length."""
+    """The times of a take's keys, within the take's time range if that is not empty."""
     first = min((curve.min_time for curve in take.curves), default=0.0)
     last = max((curve.max_time for curve in take.curves), default=0.0)
     begin, end = max(first, take.stack.time_begin), min(last, take.stack.time_end)
@@ -200,7 +200,7 @@ def span(take: Take) -> tuple[float, float]:
 
 
 def frame_rate(scene: Scene, take: Take) -> float:
-    """The file's, or that of the take's keys where they are denser."""
+    """The file's, or that of the take's keys if they are denser."""
     said = scene.scene.settings.frames_per_second
     keys = max((curve.keyframes for curve in take.curves), key=len, default=())
     times = [key.time for key in keys]
@@ -212,7 +212,7 @@ def frame_rate(scene: Scene, take: Take) -> float:
 
 
 def as_gltf(scene: Scene, take: Take | None) -> dict[str, Any]:
-    """The skeleton, and a take of it, as a glTF document that holds its buffer."""
+    """The skeleton and a take of it, as a glTF document with its buffer embedded."""
     rest = scene.rest()
     nodes: list[dict[str, Any]] = [{"name": node.name} for node in scene.nodes]
     for i, node in enumerate(scene.nodes):
@@ -258,12 +258,12 @@ def _animation(scene: Scene, take: Take, rest: list[Matrix]) -> dict[str, Any]:
 
 def _differ(a: Matrix, b: Matrix) -> bool:
     pairs = ((x, y) for left, right in zip(a, b, strict=True) for x, y in zip(left, right, strict=True))
-    # a node that no curve moves gets samples where it is further than this from its rest
+    # a node without curves gets samples if it is further than this from its rest
     return any(abs(x - y) > 1e-5 * max(1.0, abs(y)) for x, y in pairs)
 
 
 def limit_memory(size: int) -> None:
-    """Let this process use no more memory than a file of this size needs, where the system can."""
+    """Limit this process to the memory that a file of this size needs, if the system can."""
     with suppress(ImportError, ValueError, OSError):
         import resource
 
@@ -282,11 +282,11 @@ def main(number: int) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    gc.disable()  # it would count what ufbx did not
+    gc.disable()  # it would count references that ufbx did not
     status = 0
     try:
         sys.stdout.write(json.dumps(main(int(sys.argv[1])), allow_nan=False))
-    except Exception as error:  # whatever ufbx raises on a broken file
+    except Exception as error:  # ufbx raises anything on a broken file
         sys.stderr.write(str(error) or type(error).__name__)
         status = 1
     sys.stdout.flush()

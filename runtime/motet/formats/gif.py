@@ -1,7 +1,7 @@
-"""Write a motion as an animated GIF that loops: a figure on a ground, the camera beside it. Pillow draws and packs it.
+"""Write a motion as a looping animated GIF: a figure on a ground, the camera beside it. Pillow draws and packs it.
 
-Delays of a GIF are whole hundredths of a second, and viewers slow down those under 2. So the picture rate is the
-motion's where that gives a whole delay of at least 4, else 20 per second; real time is kept either way.
+GIF delays are whole hundredths of a second, and viewers slow down those under 2. So the picture rate is the motion's
+if that gives a whole delay of at least 4, else 20 per second; either way it plays in real time.
 """
 
 import io
@@ -17,7 +17,7 @@ from motet.motion.resample import resampled
 from motet.motion.rotations import Array
 
 YAW = np.radians(40.0)
-"""Camera yaw relative to where the figure faces."""
+"""Camera yaw relative to the figure's facing direction."""
 
 
 def write(file: File, motion: Motion, size: int = 320) -> None:
@@ -35,7 +35,7 @@ def write(file: File, motion: Motion, size: int = 320) -> None:
 
 
 def delay_of(fps: float) -> int:
-    """Hundredths of a second from picture to picture for a motion of that frame rate."""
+    """Hundredths of a second per picture for a motion of that frame rate."""
     whole = round(100 / fps)
     if whole >= 4 and abs(whole * fps - 100) < 1e-6:
         return whole
@@ -43,8 +43,8 @@ def delay_of(fps: float) -> int:
 
 
 def _targets(path: Array, fps: float) -> Array:
-    """Where the camera looks (T, 2): the root's path (T, 2) without its sway, or the middle if it hardly moves."""
-    # half a height: the camera stands still
+    """The camera's target (T, 2): the root's path (T, 2) without its sway, or the middle if it hardly moves."""
+    # within half a height the camera stands still
     if np.ptp(path, axis=0).max() < 0.5:
         return np.tile((path.min(axis=0) + path.max(axis=0)) / 2, (len(path), 1))
     half = round(fps / 2)

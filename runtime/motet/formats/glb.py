@@ -1,9 +1,9 @@
 """Write a motion as binary glTF 2.0: one node per joint, an animation, and a simple body skinned to the joints.
 
-Axes are glTF's and motet's own: y up, right-handed. Lengths are metres where the skeleton says how long its unit is,
-else its own unit. Times are seconds from 0. A joint is animated where it turns or moves, the root always. The rest
-pose of the file is the skeleton's (every angle 0). The body makes the file visible in any viewer and names the joints
-in a skin, by which viewers and Blender know them as bones.
+Axes are glTF's and motet's own: y up, right-handed. Lengths are metres if the skeleton states its unit, else its own
+unit. Times are seconds from 0. A joint is animated if it turns or moves, the root always. The rest pose of the file is
+the skeleton's (every angle 0). The body makes the file visible in any viewer and puts the joints in a skin, so that
+viewers and Blender recognize them as bones.
 """
 
 import json
@@ -23,19 +23,19 @@ from motet.motion.rotations import Array, rotmat_to_quat
 from motet.motion.skeleton import Skeleton
 
 FLOAT, UINT8, UINT16, UINT32 = 5126, 5121, 5123, 5125
-"""glTF's numbers for the types of components."""
+"""glTF's component types."""
 
 GLB_TYPES: dict[tuple[int, ...], str] = {(): "SCALAR", (3,): "VEC3", (4,): "VEC4", (4, 4): "MAT4"}
 
 VERTICES, INDICES = 34962, 34963
-"""glTF's numbers for what a buffer of a mesh holds."""
+"""glTF's buffer targets."""
 
 LIMB_CORNERS = 10
 """Corners around a bone of the body."""
 
 
 class Buffer:
-    """The binary part of a file: arrays put in, each as an accessor with its own view, after those of ``document``."""
+    """The binary part of a file: arrays, each an accessor with its own view, after those of ``document``."""
 
     def __init__(self, document: Mapping[str, Any] | None = None, content: bytes = b"") -> None:
         document = document or {}
@@ -48,7 +48,7 @@ class Buffer:
         types = {FLOAT: "<f4", UINT8: "<u1", UINT16: "<u2", UINT32: "<u4"}
         content = np.ascontiguousarray(values, dtype=types[kind])
         if not np.isfinite(content).all():
-            raise MotionError("values of this motion are too large for glTF's numbers of 32 bits")
+            raise MotionError("values of this motion exceed glTF's 32-bit numbers")
         view = {"buffer": 0, "byteOffset": len(self.content), "byteLength": content.nbytes}
         self.views.append(view | ({"target": target} if target else {}))
         self.content += content.tobytes() + bytes(-content.nbytes % 4)
@@ -58,13 +58,13 @@ class Buffer:
         return len(self.accessors) - 1
 
     def add_bounded(self, values: NDArray[Any], target: int = 0) -> int:
-        """The same for floats (N, ...) with their least and greatest values, which times and corners need."""
+        """The same for floats (N, ...) with their minimum and maximum, required for times and corners."""
         single = np.asarray(values, dtype="<f4").reshape(len(values), -1)
         least, greatest = single.min(axis=0).tolist(), single.max(axis=0).tolist()
         return self.add(values, FLOAT, target, min=least, max=greatest)
 
     def parts(self) -> dict[str, Any]:
-        """What a document says of its binary part."""
+        """The document's entries for its binary part."""
         return {
             "bufferViews": self.views,
             "accessors": self.accessors,
@@ -76,7 +76,7 @@ def write(file: File, motion: Motion) -> None:
     """Write a motion; MotionError for one without skeleton or frames, OutputError if the file cannot be written."""
     skeleton = skeleton_of(motion)
     if not len(motion):
-        raise MotionError("this motion has no frames: glTF cannot hold an animation without any")
+        raise MotionError("this motion has no frames, and glTF cannot hold an empty animation")
     if skeleton.metres_per_unit is not None:
         motion = motion.scaled(1.0)
         skeleton = skeleton_of(motion)
@@ -104,7 +104,7 @@ def drawn(buffer: Buffer, skeleton: Skeleton) -> dict[str, Any]:
 
 
 def facts(motion: Motion, skeleton: Skeleton) -> dict[str, Any]:
-    """What a file says of its motion beside what glTF has words for."""
+    """Properties of the motion that glTF has no field for."""
     return {"fps": motion.fps, "frames": len(motion), "length_unit": "m" if skeleton.metres_per_unit else "unknown"}
 
 
@@ -126,11 +126,11 @@ def joint_nodes(skeleton: Skeleton) -> list[dict[str, Any]]:
 
 
 Track = tuple[int, str, Array]
-"""A node's index, "rotation" or "translation", and quaternions (T, 4) or places (T, 3), T of 1 for what never moves."""
+"""A node's index, "rotation" or "translation", and quaternions (T, 4) or positions (T, 3); T = 1 if constant."""
 
 
 def joint_tracks(motion: Motion, skeleton: Skeleton) -> Iterator[Track]:
-    """The tracks of the joints' nodes, the first of all nodes: of those that turn or move, and of the root always."""
+    """The tracks of the joints' nodes, which come first: of those that turn or move, and always of the root."""
     turns, moves = rotmat_to_quat(local_rotations(motion)), local_translations(motion)
     for i, joint in enumerate(skeleton.joints):
         tracks = {"rotation": (turns[:, i], [0, 0, 0, 1]), "translation": (moves[:, i], joint.offset)}
@@ -138,7 +138,7 @@ def joint_tracks(motion: Motion, skeleton: Skeleton) -> Iterator[Track]:
 
 
 def animation(buffer: Buffer, name: str, motion: Motion, tracks: Iterable[Track]) -> dict[str, Any]:
-    """The animation of tracks from the motion's first frame on; its arrays go into the buffer."""
+    """The animation of tracks from the motion's first frame; its arrays go into the buffer."""
     times = {len(motion): buffer.add_bounded(np.arange(len(motion)) / motion.fps)}
     samplers: list[dict[str, Any]] = []
     channels: list[dict[str, Any]] = []
@@ -152,7 +152,7 @@ def animation(buffer: Buffer, name: str, motion: Motion, tracks: Iterable[Track]
 
 
 def _continuous(quats: Array) -> Array:
-    """The same rotations (T, ..., 4) with signs by which each quaternion is near the one before it."""
+    """The same rotations (T, ..., 4) with signs that keep each quaternion near its predecessor."""
     flips = np.sum(quats[1:] * quats[:-1], axis=-1, keepdims=True) < 0
     signs = np.cumprod(np.where(flips, -1.0, 1.0), axis=0)
     return np.concatenate([quats[:1], quats[1:] * signs])
@@ -165,13 +165,13 @@ def _skin(buffer: Buffer, skeleton: Skeleton) -> dict[str, Any]:
 
 
 def _rest(skeleton: Skeleton) -> Array:
-    """Positions of the joints (J, 3) in the file's rest pose: as the skeleton's, but with the root at its offset."""
+    """Positions of the joints (J, 3) in the file's rest pose: the skeleton's, with the root at its offset."""
     rest: Array = skeleton.rest_positions + skeleton.offsets[0]
     return rest
 
 
 def _body(buffer: Buffer, skeleton: Skeleton) -> dict[str, Any]:
-    """The primitive of the body: a tapered prism for each bone, whose ends move with the bone's carriers."""
+    """The primitive of the body: a tapered prism for each bone, its ends moving with the bone's carriers."""
     body = Body(skeleton)
     points = body.points(_rest(skeleton) / body.height)
     prisms = [_prism(bone, points[bone.start], points[bone.end]) for bone in body.bones]
@@ -191,7 +191,7 @@ def _body(buffer: Buffer, skeleton: Skeleton) -> dict[str, Any]:
 
 
 def _linear(colours: NDArray[Any]) -> Array:
-    """sRGB colours (N, 3) of 0 to 255 to the linear ones of glTF."""
+    """sRGB colours (N, 3) of 0 to 255 as glTF's linear ones."""
     linear: Array = (colours / 255) ** 2.2
     return linear
 

@@ -1,6 +1,6 @@
 """Reading glTF 2.0 (.gltf, .glb) and VRM (.vrm, .vrma): the skeleton, and its animations as clips.
 
-Scales of nodes count in lengths, and so does what nodes above the skeleton do.
+Lengths include the scales of nodes and the transforms of nodes above the skeleton.
 """
 
 from collections.abc import Iterator, Mapping
@@ -22,31 +22,31 @@ from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 
 GLTF_EXTENSIONS = (".glb", ".gltf", ".vrm", ".vrma")
-"""What these files are called."""
+"""The extensions of these files."""
 
 
 def read(file: File, clip: Clip = None, rest: File | None = None) -> Motion:
-    """Read a clip, the first by default, or the rest pose as one frame where there is none; lengths are metres.
+    """Read a clip, by default the first, or the rest pose as one frame if there is none; lengths are metres.
 
-    rest: a file of the same joints that rests in a T-pose, or "file#clip", whose first frame is one: that is the rest
-        pose then, where the nodes of an animation without a character rest in its first frame.
+    rest: a file with the same joints in a T-pose, or "file#clip" whose first frame is one, used as the rest pose. An
+        animation exported without its character needs it, because its nodes rest in its first frame.
 
     Bones of a VRM humanoid get VRM's names, other joints keep theirs. Channels: three angles in "deg" for each joint,
-    the translation of the root and of joints that move in "length". FormatError names what the file lacks.
+    the translation of the root and of moving joints in "length". FormatError names what the file lacks.
     """
     with broken(place_of(file)):
         return _read(_parsed(file), clip, {} if rest is None else _stance(rest))
 
 
 def clips(file: File) -> tuple[str, ...]:
-    """The names of the animations that move a figure, in the file's order; FormatError as :func:`read`."""
+    """The names of the animations that move a figure, in the file's order; FormatError like :func:`read`."""
     with broken(place_of(file)):
         return _parsed(file).names
 
 
 @contextmanager
 def broken(path: Path) -> Iterator[None]:
-    """What a file holds in the wrong place or type, as a FormatError."""
+    """Turn errors from misplaced or mistyped content into FormatError."""
     try:
         yield
     except MotionError as error:
@@ -57,7 +57,7 @@ def broken(path: Path) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class _Scene:
-    """A file with its figures, the nodes of each, and the animations that move one, with their names."""
+    """A file with its figures, their nodes, and the animations that move one, with their names."""
 
     gltf: Gltf
     figures: list[set[int]]
@@ -72,7 +72,7 @@ def _parsed(file: File) -> _Scene:
     near = above(gltf, set().union(*found))
     moving = [animation for animation in animations if moved(animation) & near]
     if animations and not moving:
-        raise FormatError(gltf.path, "its animations move no joint of its skeleton: export those of the armature")
+        raise FormatError(gltf.path, "its animations move no joint of its skeleton: export the armature's animations")
     return _Scene(gltf, found, moving, clip_names(str(animation.get("name", "")) for animation in moving))
 
 
@@ -87,12 +87,12 @@ class _Take:
 
 
 def _read(scene: _Scene, clip: Clip, turns: Mapping[str, Array]) -> Motion:
-    """turns: rotations (3, 3) in the world that joints are taken to rest in."""
+    """turns: rest rotations (3, 3) of joints in the world, to use instead of the file's."""
     named = scene.names or clip is not None
     take = _take(scene, chosen(scene.gltf.path, scene.names, clip) if named else None)
     names, parents = take.figure.names, take.figure.parents
     if turns and not turns.keys() & set(names):
-        raise FormatError(scene.gltf.path, "the file of the rest pose has no joint of this figure's names")
+        raise FormatError(scene.gltf.path, "the file of the rest pose shares no joint name with this figure")
     rest = rested(take.rest, names, parents, turns)
     return motion_of_nodes(
         scene.gltf.path, _named(scene.gltf, take.figure), parents, rest, take.poses, take.fps, metres=1.0
@@ -100,10 +100,10 @@ def _read(scene: _Scene, clip: Clip, turns: Mapping[str, Array]) -> Motion:
 
 
 def _stance(file: File) -> dict[str, Array]:
-    """How a file's joints are turned (3, 3) in the world, by name: at rest, or where a clip is named in its start."""
+    """The rotations (3, 3) of a file's joints in the world, by name: at rest, or at the start of a named clip."""
     file, clip = split_clip(file, GLTF_EXTENSIONS)
     if isinstance(file, str | Path) and Path(file).suffix.lower() not in GLTF_EXTENSIONS:
-        raise FormatError(place_of(file), f"a rest pose is taken from one of {' '.join(GLTF_EXTENSIONS)}")
+        raise FormatError(place_of(file), f"a rest pose must come from a file of {' '.join(GLTF_EXTENSIONS)}")
     with broken(place_of(file)):
         scene = _parsed(file)
         take = _take(scene, None if clip is None else chosen(scene.gltf.path, scene.names, clip))
@@ -123,7 +123,7 @@ def _take(scene: _Scene, index: int | None) -> _Take:
 
 
 def _named(gltf: Gltf, joints: Figure) -> list[str]:
-    """The joints' names, those of VRM for the bones of its humanoid; another joint of such a name gets another."""
+    """The joints' names, VRM's for the bones of its humanoid; other joints with such a name are renamed."""
     bones = {node: bone for bone, node in gltf.humanoid().items() if bone in BONES}
     given = Names(bones.values())
     return [bones.get(node) or given.unique(name) for node, name in zip(joints.nodes, joints.names, strict=True)]

@@ -1,7 +1,7 @@
-"""Characters of glTF and VRM files: their skeleton, and what a motion on it is for the file's own nodes.
+"""Characters of glTF and VRM files: their skeleton, and a motion on it as tracks of the file's own nodes.
 
-Nodes have rests, axes and scales of their own, and so may those that the skeleton hangs on: in every export of Mixamo
-the hips are below a node with scale .01. A track is in the frame of the node's parent, so these count in it.
+Nodes have their own rest poses, axes and scales, and so may the skeleton's ancestors: in every Mixamo export the hips
+are below a node with scale .01. A track is in the frame of the node's parent, so these all affect it.
 """
 
 from collections.abc import Iterator
@@ -26,12 +26,12 @@ from motet.motion.rotations import Array, product, quat_to_rotmat, rotmat_to_qua
 from motet.motion.skeleton import Skeleton
 
 STAYS_WITHIN = 1e-6
-"""A joint that stays this near to its rest, in radians and heights, has no track."""
+"""A joint that stays within this of its rest, in radians and heights, has no track."""
 
 
 @dataclass(frozen=True)
 class Nodes:
-    """The nodes of a character's file, and how they rest."""
+    """The nodes of a character's file, and their rest pose."""
 
     gltf: Gltf
     rest: Rest
@@ -39,8 +39,8 @@ class Nodes:
     def tracks(self, motion: Motion) -> Iterator[Track]:
         """The tracks of a motion on the character's skeleton, in metres, for the file's nodes.
 
-        The root has both tracks, other joints those by which they leave their rest. Exact where scales are uniform, or
-        mirror; of stretched parents the rotation is the nearest one.
+        The root has both tracks, other joints only those in which they leave their rest. Exact for uniform or mirroring
+        scales; under stretched parents the rotation is the nearest one.
         """
         skeleton, still = self.rest.skeleton, STAYS_WITHIN * self.rest.skeleton.height
         turns, moves = local_rotations(motion), local_translations(motion)
@@ -55,34 +55,34 @@ class Nodes:
                 yield node, "translation", from_parent @ np.linalg.inv(to_parent).T
 
     def above(self) -> tuple[int, ...]:
-        """The nodes that the skeleton hangs on, from the top."""
+        """The skeleton's ancestor nodes, from the top."""
         found = [self.rest.nodes[0]]
         while self.gltf.parents[found[0]] >= 0:
             found.insert(0, self.gltf.parents[found[0]])
         return tuple(found[:-1])
 
     def _above(self, node: int) -> tuple[Array, Array]:
-        """The linear map (3, 3) and the place (3) of a node's parent in the world."""
+        """The linear map (3, 3) and the position (3) of a node's parent in the world."""
         parent = self.gltf.parents[node]
         return (self.rest.linear[parent], self.rest.places[parent]) if parent >= 0 else (np.eye(3), np.zeros(3))
 
 
 def _orthogonal(linear: Array) -> Array:
-    """The rotation (3, 3), or rotation and mirror, that is nearest to a linear map."""
+    """The rotation (3, 3), or rotation with mirroring, nearest to a linear map."""
     left, _, right = np.linalg.svd(linear)
     nearest: Array = left @ right
     return nearest
 
 
 def read_character(file: File) -> Character:
-    """Read a character to put motions onto; FormatError as :func:`motet.formats.gltf.read`."""
+    """Read a character to put motions onto; FormatError like :func:`motet.formats.gltf.read`."""
     path = place_of(file)
     with broken(path):
         gltf = parse(file)
         rest = at_rest(gltf)
         scales = np.abs(np.linalg.det(rest.linear[list(rest.nodes)]))
         if not scales.min() > 0:
-            raise FormatError(path, "nodes of its skeleton have the scale 0: apply scales when exporting")
+            raise FormatError(path, "nodes of its skeleton have scale 0: apply scales when exporting")
         still = Motion(np.zeros((1, 0)), (), (), GLTF_FPS, rest.skeleton)
         return Character(still, _map(path, gltf, rest), Nodes(gltf, rest), skin_of(gltf, rest))
 

@@ -19,15 +19,15 @@ from motet.formats.lines import read_bytes
 from motet.motion.rotations import Array, frames_last, product, quat_to_rotmat, rotated, rotmat_to_quat
 
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-"""glTF's numbers for types of numbers."""
+"""glTF's component types."""
 
 TYPE_SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 MAX_NODES = 20_000
-"""Nodes of a file; a figure has some hundreds."""
+"""Nodes per file; a figure has a few hundred."""
 
 GLTF_MAX_BYTES = 2**29
-"""Bytes of all buffers of a file together."""
+"""Total bytes of a file's buffers."""
 
 
 @dataclass(frozen=True)
@@ -42,17 +42,17 @@ class Gltf:
 
     @property
     def size(self) -> int:
-        """Bytes of all buffers together, and of what was unpacked of them."""
+        """Total bytes of all buffers and of the parts unpacked from them."""
         return sum(map(len, (*self.buffers, *self._unpacked.values())))
 
     def objects(self, name: str) -> list[dict[str, Any]]:
-        """One of the file's lists of objects, empty where it has none."""
+        """One of the file's lists of objects, empty if absent."""
         found: list[dict[str, Any]] = self.document.get(name, [])
         return found
 
     @cached_property
     def parents(self) -> tuple[int, ...]:
-        """For each node its parent, -1 for a root; FormatError where nodes do not form trees."""
+        """The parent of each node, -1 for a root; FormatError if the nodes do not form trees."""
         nodes = self.objects("nodes")
         parents = [-1] * len(nodes)
         for index, node in enumerate(nodes):
@@ -64,32 +64,31 @@ class Gltf:
 
     @cached_property
     def order(self) -> tuple[int, ...]:
-        """All nodes, each after its parent, branch by branch."""
+        """All nodes, parents first, branch by branch."""
         order: list[int] = []
         waiting = [node for node, parent in enumerate(self.parents) if parent == -1][::-1]
         while waiting:
             order.append(waiting.pop())
             waiting.extend(reversed(self.objects("nodes")[order[-1]].get("children", [])))
         if len(order) < len(self.parents):
-            raise FormatError(self.path, "its nodes are not a tree: some of them form a ring")
+            raise FormatError(self.path, "its nodes are not a tree: some of them form a cycle")
         return tuple(order)
 
     @cached_property
     def places(self) -> dict[int, int]:
-        """For each node its place in :attr:`order`."""
+        """Each node's index in :attr:`order`."""
         return {node: place for place, node in enumerate(self.order)}
 
     @cached_property
     def roots(self) -> dict[int, int]:
-        """For each node the root of its tree."""
+        """The root of each node's tree."""
         roots: dict[int, int] = {}
         for node in self.order:
             roots[node] = roots.get(self.parents[node], node)
         return roots
 
     def branch(self, wanted: set[int]) -> tuple[int, ...]:
-        """Nodes of one tree and what lies between them, each after its parent; the first is the lowest that all
-        hang on."""
+        """Nodes of one tree and the nodes between them, parents first; the first is their lowest common ancestor."""
         below = [int(node in wanted) for node in range(len(self.parents))]
         for node in reversed(self.order):
             if self.parents[node] >= 0:
@@ -98,7 +97,7 @@ class Gltf:
         return (top, *(node for node in self.order if 0 < below[node] < len(wanted) or node in wanted))
 
     def humanoid(self) -> dict[str, int]:
-        """The bones that VRM 0, VRM 1 or VRM Animation names, with their nodes; empty where there are none."""
+        """The bones named by VRM 0, VRM 1 or VRM Animation, with their nodes; empty if none."""
         extensions = self.document.get("extensions", {})
         if "VRM" in extensions:
             old = extensions["VRM"].get("humanoid", {}).get("humanBones", [])
@@ -110,7 +109,7 @@ class Gltf:
         return {}
 
     def name(self, node: int) -> str:
-        """A node's name, made from its number where it has none; FormatError where it is not text."""
+        """A node's name, or one made from its number; FormatError if it is not text."""
         name = self.objects("nodes")[node].get("name") or f"node{node}"
         if not isinstance(name, str):
             raise FormatError(self.path, f"the name of node {node} is not text")
@@ -130,10 +129,10 @@ class Gltf:
     def world(
         self, nodes: Iterable[int] | None = None, tracks: Mapping[tuple[int, str], Array] | None = None
     ) -> tuple[Array, Array, Array]:
-        """Linear maps and rotations (T, N, 3, 3) and places (T, N, 3) of nodes in the world, at rest (T = 1) or moved
-        by tracks, values (T, ...) of a node's "translation", "rotation" or "scale".
+        """Linear maps and rotations (T, N, 3, 3) and positions (T, N, 3) of nodes in the world, at rest (T = 1) or
+        moved by tracks, values (T, ...) of a node's "translation", "rotation" or "scale".
 
-        nodes: of which each is there with all above it; all by default. Others are not filled.
+        nodes: the nodes to fill, including all their ancestors; all by default. Others are not filled.
         """
         tracks = tracks or {}
         count, wanted = len(next(iter(tracks.values()), [0])), self.order if nodes is None else set(nodes)
@@ -151,7 +150,7 @@ class Gltf:
         return linear, turns, places
 
     def array(self, index: int) -> Array:
-        """The numbers (N, ...) of an accessor, which are not to be changed; FormatError where it is not in the file."""
+        """The numbers (N, ...) of an accessor, not to be modified; FormatError if it is not in the file."""
         if index not in self._arrays:
             values = self._decoded(index)
             values.setflags(write=False)
@@ -175,7 +174,7 @@ class Gltf:
                 or stride < size
                 or (start + stride * (count - 1) + size > len(content) and count)
             ):
-                raise FormatError(self.path, f"accessor {index} reaches beyond its buffer: the file is truncated")
+                raise FormatError(self.path, f"accessor {index} extends beyond its buffer: the file is truncated")
             rows = np.lib.stride_tricks.as_strided(
                 np.frombuffer(content, np.uint8, offset=start), (count, size), (stride, 1), writeable=False
             )
@@ -191,7 +190,7 @@ class Gltf:
         return values
 
     def _view(self, index: int) -> tuple[bytes, int, int]:
-        """A buffer, where a view of it starts, and the bytes from one element to the next; 0 where they are dense."""
+        """A buffer, the start of a view of it, and the stride in bytes; 0 if dense."""
         view = self.objects("bufferViews")[index]
         packed = packing(view)
         if packed is None:
@@ -203,7 +202,7 @@ class Gltf:
 
 
 def parse(file: File) -> Gltf:
-    """Read a file's parts; FormatError for one that is not glTF 2.0, is truncated, or lacks its buffers."""
+    """Read a file's parts; FormatError if it is not glTF 2.0, is truncated, or lacks its buffers."""
     path, content = place_of(file), read_bytes(file)
     text, binary = _chunks(path, content) if content[:4] == b"glTF" else (content, b"")
     try:
@@ -212,7 +211,7 @@ def parse(file: File) -> Gltf:
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise FormatError(path, f"not a glTF file: {str(error)[:200]}") from error
     if not str(version).startswith("2."):
-        raise FormatError(path, f"glTF of version {str(version)[:20]}: expected 2.0")
+        raise FormatError(path, f"glTF version {str(version)[:20]}: expected 2.0")
     if len(document.get("nodes", [])) > MAX_NODES:
         raise FormatError(path, f"it has {len(document['nodes'])} nodes: expected at most {MAX_NODES}")
     beside = path.parent if isinstance(file, str | Path) and content[:4] != b"glTF" else None
@@ -235,10 +234,10 @@ def _chunks(path: Path, content: bytes) -> tuple[bytes, bytes]:
 
 
 def _buffers(path: Path, buffers: list[dict[str, Any]], binary: bytes, beside: Path | None) -> tuple[bytes, ...]:
-    """The content of each buffer, as much as it declares; that of files in the folder ``beside`` only where given."""
+    """The content of each buffer, up to its declared size; files in the folder ``beside`` only if given."""
     sizes = [buffer["byteLength"] for buffer in buffers]
     if not all(isinstance(size, int) and size >= 0 for size in sizes) or sum(sizes) > GLTF_MAX_BYTES:
-        raise FormatError(path, f"its buffers declare sizes that are none, or over {GLTF_MAX_BYTES} bytes together")
+        raise FormatError(path, f"its buffers declare invalid sizes, or over {GLTF_MAX_BYTES} bytes in total")
     return tuple(_buffer(path, buffer, binary, beside)[:size] for buffer, size in zip(buffers, sizes, strict=True))
 
 
@@ -249,7 +248,7 @@ def _buffer(path: Path, buffer: dict[str, Any], binary: bytes, beside: Path | No
     if uri.startswith("data:"):
         return base64.b64decode(uri.partition(",")[2])
     if beside is None:
-        raise FormatError(path, f"its buffer {quoted(uri)} is another file, which is read only for a .gltf at a path")
+        raise FormatError(path, f"its buffer {quoted(uri)} is a separate file, which requires a .gltf given by path")
     place = beside / unquote(uri)
     try:
         if not place.resolve().is_relative_to(beside.resolve()) or place.is_symlink() or not place.is_file():

@@ -1,7 +1,7 @@
 """The figures of a glTF file: which of its nodes are joints, and of which skeleton.
 
-Joints are those of the skins and those that a VRM file calls bones of its humanoid, with all nodes between them. A file
-that has neither, as animations alone are exported, has the nodes that its animations move, and what hangs on them.
+Joints are those of the skins and the humanoid bones of a VRM file, with all nodes between them. In a file with neither,
+such as an animation exported alone, they are the nodes that its animations move, and the descendants of these.
 """
 
 import logging
@@ -19,15 +19,15 @@ from motet.motion.skeleton import END_SUFFIX, Skeleton
 log = logging.getLogger(__name__)
 
 MAX_SKINS = 500
-"""Skins of a file; a figure has one for each of its meshes."""
+"""Skins per file; a figure has one for each of its meshes."""
 
 MAX_JOINTS = 3000
-"""Joints of a figure; one with a face of many bones has a thousand."""
+"""Joints per figure; one with a detailed facial rig has a thousand."""
 
 
 @dataclass(frozen=True)
 class Figure:
-    """The joints of one skeleton, each after its parent: their nodes in the file, parents (-1: none) and names."""
+    """The joints of one skeleton, parents first: their nodes in the file, parents (-1: none) and names."""
 
     nodes: tuple[int, ...]
     parents: tuple[int, ...]
@@ -35,10 +35,10 @@ class Figure:
 
 
 def figures(gltf: Gltf, moved: set[int]) -> list[set[int]]:
-    """The joints of each figure of a file, by their nodes, that of a VRM humanoid alone; FormatError for none.
+    """The joints of each figure of a file, by node; of a VRM file only the humanoid's; FormatError if none.
 
-    moved: the nodes that its animations move. Skins belong to one figure where one hangs below the other, or both below
-    a node that is moved.
+    moved: the nodes that its animations move. Skins belong to one figure if one is below the other, or both are below a
+    moved node.
     """
     parts = _parts(gltf) or _animated(gltf, moved)
     tops = [_top(gltf, part) for part in parts]
@@ -51,16 +51,16 @@ def figures(gltf: Gltf, moved: set[int]) -> list[set[int]]:
 
 
 def likeliest(gltf: Gltf, found: list[set[int]], moved: set[int]) -> set[int]:
-    """Of several figures the one of which most nodes move, those above it, too, or which has the most joints."""
+    """The figure with the most moving nodes, counting its ancestors, or else with the most joints."""
     best = max(found, key=lambda joints: (len(above(gltf, joints) & moved), len(joints)))
     if len(found) > 1:
         name = quoted(gltf.name(_top(gltf, best)))
-        log.warning("%s: of %d skeletons that of %s is taken, which moves the most", gltf.path, len(found), name)
+        log.warning("%s: of %d skeletons, reading that of %s, which moves the most", gltf.path, len(found), name)
     return best
 
 
 def figure_of(gltf: Gltf, joints: set[int]) -> Figure:
-    """The joints and what lies between them, with the ends that hang on them."""
+    """The joints and the nodes between them, with the ends attached to them."""
     inside = set(gltf.branch(joints))
     ends = {node for node in gltf.order if gltf.parents[node] in inside and _is_end(gltf, node)}
     kept = tuple(node for node in gltf.order if node in inside or node in ends)
@@ -72,7 +72,7 @@ def figure_of(gltf: Gltf, joints: set[int]) -> Figure:
 
 
 def above(gltf: Gltf, nodes: Iterable[int]) -> set[int]:
-    """The nodes and all that they hang on."""
+    """The nodes and all their ancestors."""
     found: set[int] = set()
     for node in nodes:
         at = node
@@ -83,23 +83,23 @@ def above(gltf: Gltf, nodes: Iterable[int]) -> set[int]:
 
 
 def _parts(gltf: Gltf) -> list[set[int]]:
-    """The joints of each skin and the bones of the humanoid, those in each tree of nodes apart."""
+    """The joints of each skin and the bones of the humanoid, separately for each tree of nodes."""
     skins = gltf.objects("skins")
     if len(skins) > MAX_SKINS:
         raise FormatError(gltf.path, f"it has {len(skins)} skins: expected at most {MAX_SKINS}")
     given = [set(gltf.humanoid().values()), *(set(skin.get("joints", [])) for skin in skins)]
     if strange := set().union(*given) - set(range(len(gltf.parents))):
-        raise FormatError(gltf.path, f"joints that are no nodes: {listed(sorted(map(str, strange)))}")
+        raise FormatError(gltf.path, f"joints that are not nodes: {listed(sorted(map(str, strange)))}")
     return [part for nodes in given for part in _by_tree(gltf, nodes)]
 
 
 def _animated(gltf: Gltf, moved: set[int]) -> list[set[int]]:
-    """In each tree the nodes that are moved and the bones that hang on them, if some hang on others."""
+    """In each tree the moved nodes and the bones below them, if some are below others."""
     bones = {node for node in moved if not _is_thing(gltf, node, ("camera",))}
     hanging: set[int] = set()
     for node in gltf.order:
         held = gltf.parents[node] in bones or gltf.parents[node] in hanging
-        # an extension, such as a light, makes a node a thing, too
+        # an extension, such as a light, makes a node an object too
         if held and (node in bones or not _is_thing(gltf, node, ("mesh", "camera"))):
             hanging.add(node)
     parts = [part for part in _by_tree(gltf, bones | hanging) if part & bones & hanging]
@@ -127,7 +127,7 @@ def _by_tree(gltf: Gltf, nodes: set[int]) -> Iterator[set[int]]:
 
 
 def _heads(gltf: Gltf, among: set[int]) -> dict[int, int]:
-    """For each node the highest one of ``among`` that it hangs on or is."""
+    """The highest of ``among`` that each node is or is below."""
     heads: dict[int, int] = {}
     for node in gltf.order:
         if gltf.parents[node] in heads:
@@ -138,7 +138,7 @@ def _heads(gltf: Gltf, among: set[int]) -> dict[int, int]:
 
 
 def _top(gltf: Gltf, part: set[int]) -> int:
-    """The lowest node that a part hangs on: what the first and the last of its nodes, branch by branch, share."""
+    """The lowest common ancestor of a part: that of its first and last node in branch order."""
     first, last = (pick(part, key=gltf.places.__getitem__) for pick in (min, max))
     line = above(gltf, [first])
     while last not in line:
@@ -147,17 +147,17 @@ def _top(gltf: Gltf, part: set[int]) -> int:
 
 
 def _is_end(gltf: Gltf, node: int) -> bool:
-    """Whether a node marks the tip of a bone, as motet and Blender name them."""
+    """Whether a node marks the tip of a bone, by motet's and Blender's naming."""
     found = gltf.objects("nodes")[node]
     return str(found.get("name", "")).endswith(END_SUFFIX) and not found.get("children")
 
 
 @dataclass(frozen=True)
 class Rest:
-    """The node of each joint, and the skeleton, which rests in the nodes' pose, in metres.
+    """The node of each joint, and the skeleton, whose rest pose is the nodes' pose, in metres.
 
-    linear: what all nodes of the file, joints or not, make of vectors in the world (N, 3, 3), with their scales; places
-    (N, 3): where they are.
+    linear: the linear maps (N, 3, 3), with scales, of all nodes of the file, joints or not, in the world; places
+    (N, 3): their positions.
     """
 
     nodes: tuple[int, ...]
@@ -167,7 +167,7 @@ class Rest:
 
 
 def at_rest(gltf: Gltf) -> Rest:
-    """The figure of a file that its animations move the most; FormatError where there is none."""
+    """The figure of a file that its animations move the most; FormatError if there is none."""
     all_moved = set().union(*map(moved, gltf.objects("animations")))
     figure = figure_of(gltf, likeliest(gltf, figures(gltf, all_moved), all_moved))
     linear, _, places = (found[0] for found in gltf.world())

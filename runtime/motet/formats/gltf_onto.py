@@ -1,6 +1,6 @@
-"""Write motions for a character's own nodes: into its file, beside mesh and materials, or as a clip without these.
+"""Write motions for a character's own nodes: into its file, with mesh and materials, or as a clip without them.
 
-The tracks are the nodes' own (:mod:`motet.formats.gltf_character`): a clip plays right by the nodes' names, too.
+The tracks are the nodes' own (:mod:`motet.formats.gltf_character`), so a clip also plays correctly by node names.
 """
 
 from collections.abc import Mapping
@@ -18,15 +18,15 @@ from motet.motion.motion import Motion
 
 
 def write_onto(file: File, clips: Mapping[str, Motion], nodes: Nodes) -> None:
-    """Write a character's file with an animation for each of the named motions, which are on its skeleton.
+    """Write a character's file with an animation for each named motion; the motions are on its skeleton.
 
-    All else in the file stays as it is; its own animations follow the new ones, but for those of the same names.
-    FormatError for a character in several files, or one that is no VRM avatar where a .vrm is written; MotionError for
-    a motion without frames, OutputError if the file cannot be written.
+    Everything else in the file is kept; its own animations follow the new ones, except those of the same names.
+    FormatError for a character in several files, or a .vrm of one that is not a VRM avatar; MotionError for a motion
+    without frames, OutputError if the file cannot be written.
     """
     gltf = nodes.gltf
     if place_of(file).suffix.lower() == ".vrm" and not gltf.humanoid():
-        raise FormatError(gltf.path, "it is no VRM avatar: write it to a .glb")
+        raise FormatError(gltf.path, "not a VRM avatar: write it to a .glb")
     with broken(gltf.path):
         buffer = Buffer(gltf.document, _binary(gltf))
         made = [_animation(buffer, name, motion, nodes) for name, motion in clips.items()]
@@ -41,18 +41,18 @@ def write_onto(file: File, clips: Mapping[str, Motion], nodes: Nodes) -> None:
 
 
 def _binary(gltf: Gltf) -> bytes:
-    """The binary part of a file that holds all of itself."""
+    """The binary part of a self-contained file."""
     buffers = gltf.objects("buffers")
     apart = [
         each["uri"] for each in (*buffers, *gltf.objects("images")) if not each.get("uri", "data:").startswith("data:")
     ]
     if apart or (buffers and "uri" in buffers[0]):
-        raise FormatError(gltf.path, "parts of this character are other files or texts: export it as one .glb or .vrm")
+        raise FormatError(gltf.path, "parts of this character are in other files or text: export one .glb or .vrm")
     return gltf.buffers[0] if buffers else b""
 
 
 def _turnable(gltf: Gltf, node: int) -> dict[str, Any]:
-    """A node as one that is animated has to be: with translation, rotation and scale in place of a matrix."""
+    """A node as animation requires it: with translation, rotation and scale instead of a matrix."""
     found = gltf.objects("nodes")[node]
     if "matrix" not in found:
         return found
@@ -62,14 +62,14 @@ def _turnable(gltf: Gltf, node: int) -> dict[str, Any]:
 
 def _animation(buffer: Buffer, name: str, motion: Motion, nodes: Nodes) -> dict[str, Any]:
     if not len(motion):
-        raise MotionError("this motion has no frames: glTF cannot hold an animation without any")
+        raise MotionError("this motion has no frames, and glTF cannot hold an empty animation")
     return animation(buffer, name, motion, nodes.tracks(motion))
 
 
 def write_clip(file: File, motion: Motion, nodes: Nodes) -> None:
-    """Write a motion on a character's skeleton with the nodes of this, and a simple body in place of its mesh.
+    """Write a motion on a character's skeleton with its nodes, and a simple body instead of its mesh.
 
-    MotionError and OutputError as :func:`write_onto`.
+    MotionError and OutputError like :func:`write_onto`.
     """
     gltf, rest, buffer = nodes.gltf, nodes.rest, Buffer()
     kept = (*nodes.above(), *rest.nodes)
@@ -79,7 +79,7 @@ def write_clip(file: File, motion: Motion, nodes: Nodes) -> None:
         channel["target"]["node"] = at[channel["target"]["node"]]
     bind = np.zeros((len(rest.nodes), 4, 4))
     bind[:, :3, :3], bind[:, :3, 3], bind[:, 3, 3] = rest.linear[list(rest.nodes)], rest.places[list(rest.nodes)], 1
-    # glTF keeps columns: what is written is the transpose
+    # glTF is column-major: the transpose is written
     skin = {
         "joints": [at[i] for i in rest.nodes],
         "inverseBindMatrices": buffer.add(np.linalg.inv(bind).swapaxes(1, 2)),
@@ -98,7 +98,7 @@ def write_clip(file: File, motion: Motion, nodes: Nodes) -> None:
 
 
 def _bare(gltf: Gltf, node: int, at: Mapping[int, int]) -> dict[str, Any]:
-    """A node by itself: its name, how it rests, and those of its children that are kept."""
+    """A single node: its name, its rest pose, and its kept children."""
     found = _turnable(gltf, node)
     bare: dict[str, Any] = {key: found[key] for key in ("translation", "rotation", "scale") if key in found}
     kept = [at[child] for child in found.get("children", []) if child in at]

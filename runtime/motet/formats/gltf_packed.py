@@ -1,4 +1,4 @@
-"""Parts of glTF buffers that meshoptimizer packed, by EXT_meshopt_compression or KHR_meshopt_compression."""
+"""Parts of glTF buffers packed by meshoptimizer: EXT_meshopt_compression or KHR_meshopt_compression."""
 
 from collections.abc import Mapping
 from importlib import import_module
@@ -11,17 +11,17 @@ from motet.errors import FormatError
 MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
 MAX_UNPACKED = 2**25
-"""Bytes that all parts together may hold: a key each frame for 12 minutes of a figure of 90 joints at 60 a second."""
+"""Total bytes of all unpacked parts: 12 minutes of a figure of 90 joints with 60 keys per second."""
 
 
 def packing(view: Mapping[str, Any]) -> Mapping[str, Any] | None:
-    """What an extension says of how a view of a buffer is packed; None where it is not."""
+    """The extension that describes how a buffer view is packed; None if it is not."""
     found = view.get("extensions", {})
     return next((found[name] for name in MESHOPT if name in found), None)
 
 
 def unpacked(path: Path, packed: Mapping[str, Any], buffers: tuple[bytes, ...], room: int) -> bytes:
-    """The bytes of a packed view, at most ``room``; FormatError where it is damaged, or the extra is not installed."""
+    """The bytes of a packed view, at most ``room``; FormatError if it is damaged, or the extra is not installed."""
     if find_spec("meshopt") is None:
         raise FormatError(
             path,
@@ -32,10 +32,10 @@ def unpacked(path: Path, packed: Mapping[str, Any], buffers: tuple[bytes, ...], 
     count, stride = packed["count"], packed["byteStride"]
     content = buffers[packed["buffer"]][start : start + length]
     if not 0 <= start <= start + length or len(content) < length:
-        raise FormatError(path, "a packed part reaches beyond its buffer: the file is truncated")
-    # bytes that one packed byte can stand for: a block of 256 equal bytes takes two bits
+        raise FormatError(path, "a packed part extends beyond its buffer: the file is truncated")
+    # bytes that one packed byte can expand to: a block of 256 equal bytes takes two bits
     if not (count > 0 and stride > 0 and count * stride <= min(room, 1024 * length)):
-        raise FormatError(path, f"a packed part of {length} bytes cannot hold {count} times {stride} of them")
+        raise FormatError(path, f"a packed part of {length} bytes cannot hold {count} elements of {stride} bytes")
     decode = import_module("meshopt").decode_gltf_buffer
     try:
         found: bytes = decode(content, count, stride, packed["mode"], packed.get("filter")).tobytes()

@@ -1,4 +1,4 @@
-"""What of a glTF file's meshes hangs on each joint: the points of the skin that stand out, as soles do."""
+"""The outermost points of a glTF file's meshes on each joint, such as soles."""
 
 import logging
 from collections.abc import Iterator
@@ -15,18 +15,18 @@ from motet.motion.rotations import Array, rotated
 log = logging.getLogger(__name__)
 
 SKIN_DIRECTIONS = 200
-"""Directions, all around, in each of which the outermost point is kept."""
+"""Directions, all around; the outermost point in each is kept."""
 
 
 def skin_of(gltf: Gltf, rest: Rest) -> dict[int, Array]:
-    """For each joint with a part of a mesh the points (P, 3) of its hull, from the joint, at rest, in metres.
+    """Hull points (P, 3) of the mesh on each joint that has some, relative to the joint, at rest, in metres.
 
-    A point belongs to the joint that moves it most. Empty, with a line in the log, where meshes cannot be read.
+    A point belongs to the joint that moves it most. Empty, with a line in the log, if meshes cannot be read.
     """
     try:
         parts = [part for node in gltf.order for part in _parts(gltf, rest, node)]
     except FormatError as error:
-        log.info("soles are taken from the joints, not from the mesh: %s", error)
+        log.info("estimating soles from the joints instead of the mesh: %s", error)
         return {}
     if not parts:
         return {}
@@ -46,7 +46,7 @@ def _directions() -> Array:
 
 
 def _parts(gltf: Gltf, rest: Rest, node: int) -> Iterator[tuple[Array, NDArray[np.intp]]]:
-    """Of a node's mesh the points (P, 3) in the world at rest, and the joint of each, -1 for none."""
+    """The points (P, 3) of a node's mesh in the world at rest, and the joint of each, -1 for none."""
     found = gltf.objects("nodes")[node]
     if "mesh" not in found:
         return
@@ -60,7 +60,7 @@ def _parts(gltf: Gltf, rest: Rest, node: int) -> Iterator[tuple[Array, NDArray[n
 
 
 def _carrier(gltf: Gltf, rest: Rest, node: int) -> int:
-    """The joint that a node hangs on, -1 for none."""
+    """The joint that a node is attached to, -1 for none."""
     while node >= 0 and node not in rest.nodes:
         node = gltf.parents[node]
     return rest.nodes.index(node) if node >= 0 else -1
@@ -80,7 +80,7 @@ def _skinned(
 
 
 def _bound(gltf: Gltf, rest: Rest, skin: dict[str, Any]) -> tuple[Array, Array]:
-    """What each joint of a skin at rest makes of the mesh's points: linear maps (J, 3, 3) and places (J, 3)."""
+    """The transform of mesh points by each joint of a skin at rest: linear maps (J, 3, 3) and positions (J, 3)."""
     nodes = list(skin["joints"])
     linear, places = rest.linear[nodes], rest.places[nodes]
     if "inverseBindMatrices" not in skin:

@@ -1,4 +1,4 @@
-"""The animations of a glTF file: what they are called, which nodes they move, and the nodes' values at every frame."""
+"""The animations of a glTF file: their names, the nodes they move, and the nodes' values at every frame."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -10,13 +10,13 @@ from motet.formats.gltf_data import Gltf
 from motet.motion.rotations import Array
 
 GLTF_FPS = 30.0
-"""The frame rate of a file that has no animation or keys too sparse to tell one."""
+"""The frame rate of a file without animation, or with keys too sparse to tell."""
 
 PATHS = {"rotation": 4, "translation": 3, "scale": 3}
-"""What of a node is animated here, with the numbers it has; weights of meshes are left out."""
+"""The animated properties of a node, and how many numbers each has; mesh weights are left out."""
 
 Tracks = Mapping[tuple[int, str], Array]
-"""For nodes and what is animated of them the values (T, 3 or 4)."""
+"""(Node, property) -> values (T, 3 or 4)."""
 
 
 def moved(animation: Mapping[str, Any]) -> set[int]:
@@ -26,7 +26,7 @@ def moved(animation: Mapping[str, Any]) -> set[int]:
 
 
 def tracks(gltf: Gltf, animation: Mapping[str, Any], name: str, nodes: set[int]) -> tuple[Tracks, float]:
-    """What an animation, called so, does to some nodes at every frame, and its frame rate."""
+    """The values of some nodes at every frame of the animation ``name``, and its frame rate."""
     samplers = animation.get("samplers", [])
     keys = {}
     for channel in animation.get("channels", []):
@@ -39,13 +39,13 @@ def tracks(gltf: Gltf, animation: Mapping[str, Any], name: str, nodes: set[int])
         raise FormatError(gltf.path, f"its animation {quoted(name)} has tracks without keys")
     start, end = min(times[0] for times, _, _ in keys.values()), max(times[-1] for times, _, _ in keys.values())
     steps = min((float(np.median(np.diff(times))) for times, _, _ in keys.values() if len(times) > 1), default=0.0)
-    # keys that are further apart do not tell a frame rate
+    # keys further apart do not tell a frame rate
     rate = 1 / steps if 0 < steps < 0.1 else GLTF_FPS
     fps = float(round(rate)) if abs(rate - round(rate)) < 0.01 * rate else rate
     count = (end - start) * fps + 1
-    # an hour at 30 frames a second of 90 nodes; of a small file a million, and one more for each byte
+    # an hour of 90 nodes at 30 fps; for a small file a million, plus one per byte
     if not count * len(gltf.objects("nodes")) < min((10**7), (10**6) + gltf.size):
-        raise FormatError(gltf.path, f"{end - start:g} s at {fps:g} fps are too many frames")
+        raise FormatError(gltf.path, f"{end - start:g} s at {fps:g} fps is too many frames")
     frames = start + np.arange(round(count)) / fps
     return {place: _sampled(*key, frames, place[1]) for place, key in keys.items()}, fps
 
@@ -74,7 +74,7 @@ def _sampled(times: Array, values: Array, kind: str, frames: Array, name: str) -
 
 
 def _between(low: Array, high: Array, part: Array) -> Array:
-    """Quaternions (T, 4) the shortest way between two, at constant speed."""
+    """Quaternions (T, 4) between two by the shortest way, at constant speed."""
     low, high = (quats / np.linalg.norm(quats, axis=-1, keepdims=True) for quats in (low, high))
     cosine = np.sum(low * high, axis=-1, keepdims=True)
     high, cosine = np.where(cosine < 0, -high, high), np.abs(cosine)

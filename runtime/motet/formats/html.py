@@ -1,8 +1,8 @@
-"""Write a motion as one HTML page that plays it: no network, no other file, any browser.
+"""Write a motion as one HTML page with a player: no network, no other file, any browser.
 
-The page is ``player.html`` with the figures put in as JSON. A figure holds the path of its root as float32 (T, 3) and
+The page is ``player.html`` with the figures inserted as JSON. A figure holds the path of its root as float32 (T, 3) and
 its points relative to the root as int16 (T, P, 3) in steps of ``step`` body heights, both base64 of little-endian
-bytes. A step is 0.0001 heights (0.2 mm of a person) unless a point is further than 3.2 heights from the root.
+bytes. A step is 0.0001 heights (0.2 mm for a person) unless a point is further than 3.2 heights from the root.
 """
 
 import math
@@ -19,11 +19,11 @@ from motet.files import File, place_of, write_whole
 from motet.motion.motion import Motion
 
 Captions = Sequence[tuple[float, str]]
-"""What is shown when: (start in seconds, text), each until the next one starts."""
+"""Timed captions: (start in seconds, text), each shown until the next starts."""
 
 
 def write(file: File, motion: Motion, captions: Captions | None = None, title: str | None = None) -> None:
-    """Write the page of one motion, with captions that change with time and a title (the file's name if None).
+    """Write the page of one motion, with timed captions and a title (the file's name if None).
 
     MotionError for a motion without skeleton or frames, OutputError if the file cannot be written.
     """
@@ -32,7 +32,7 @@ def write(file: File, motion: Motion, captions: Captions | None = None, title: s
 
 
 def write_many(file: File, motions: Sequence[Motion], names: Sequence[str], title: str | None = None) -> None:
-    """Write one page of several motions side by side on one clock, each with its name; errors as :func:`write`."""
+    """Write one page of several motions side by side on one clock, each with its name; errors like :func:`write`."""
     if not motions or len(motions) != len(names):
         raise MotionError(f"a page needs motions and a name for each, not {len(motions)} and {len(names)} names")
     title = place_of(file).stem if title is None else title
@@ -45,7 +45,7 @@ def page(figures: list[dict[str, Any]], title: str) -> str:
 
 
 def figure_data(motion: Motion, name: str, captions: Captions | None = None) -> dict[str, Any]:
-    """A motion as the player reads it, ready for JSON; see the head of this module."""
+    """A motion in the player's format, ready for JSON; see the module's docstring."""
     figure = figure_of(motion)
     root = figure.points[:, 0].astype("<f4")
     relative = figure.points - root[:, None]
@@ -66,5 +66,5 @@ def figure_data(motion: Motion, name: str, captions: Captions | None = None) -> 
 def _checked(captions: Captions) -> list[list[float | str]]:
     starts = [start for start, _ in captions]
     if not all(math.isfinite(start) for start in starts) or starts != sorted(starts):
-        raise MotionError(f"captions must start at times that do not decrease, not at {starts}")
+        raise MotionError(f"caption start times must not decrease: {starts}")
     return [[float(start), text] for start, text in captions]

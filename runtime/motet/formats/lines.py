@@ -1,4 +1,4 @@
-"""What the formats share: reading a file's bytes or text, its numbers, and names that a file can hold."""
+"""Shared by the formats: reading a file's bytes, text and numbers, and names that a file can hold."""
 
 import math
 import re
@@ -11,9 +11,9 @@ from motet.files import File, place_of
 
 
 def read_bytes(file: File, most: int | None = None) -> bytes:
-    """All bytes of a file or file object; FormatError if there is no such file or it cannot be read.
+    """All bytes of a file or file object; FormatError if it is missing or cannot be read.
 
-    most: FormatError for more bytes than this, before they are read.
+    most: FormatError for more bytes than this, before reading them.
     """
     path = place_of(file)
     try:
@@ -39,7 +39,7 @@ def _too_large(path: Path, most: int) -> FormatError:
 def read_text(file: File) -> str:
     """The text of a file in UTF-8, with or without byte order mark, else Latin-1; FormatError if it is not text.
 
-    Lines end with ``\\n`` whatever the file has: split them with ``split("\\n")`` to count as editors count.
+    Every line ending becomes ``\\n``: ``split("\\n")`` counts lines the way editors do.
     """
     content = read_bytes(file)
     if b"\0" in content:
@@ -57,7 +57,7 @@ def numbers(words: Iterable[str], path: Path, line: int | None) -> list[float]:
 
 
 def number(word: str, path: Path, line: int | None) -> float:
-    """One finite number; FormatError as :func:`numbers`."""
+    """One finite number; FormatError like :func:`numbers`."""
     try:
         # Python would read 1_000, which no other program does
         value = math.nan if "_" in word else float(word)
@@ -69,27 +69,27 @@ def number(word: str, path: Path, line: int | None) -> float:
 
 
 def frame_rate(fps: float, path: Path, line: int | None = None) -> float:
-    """A frame rate that a file states, if a motion can have it; else FormatError."""
+    """A file's frame rate; FormatError if a motion cannot have it."""
     if not 1e-3 <= fps <= 1e6:
-        raise FormatError(path, f"a motion cannot have {fps:g} frames a second", line)
+        raise FormatError(path, f"frame rate {fps:g} is out of range", line)
     return fps
 
 
 def complete_order(axes: str) -> str:
-    """The Euler order of all three axes that has ``axes`` in this order: a missing axis does not turn."""
+    """An Euler order of all three axes that contains ``axes`` in this order: a missing axis does not turn."""
     orders = ("".join(order) for order in permutations("zyx"))
     return next(order for order in orders if [axis for axis in order if axis in axes] == list(axes))
 
 
 class Names:
-    """Names given out once each: one that is taken gets _2, _3, ... behind it."""
+    """Hands out unique names: a name already taken gets the suffix _2, _3, ..."""
 
     def __init__(self, taken: Iterable[str] = ()) -> None:
         self._taken = set(taken)
         self._next: dict[str, int] = {}
 
     def unique(self, name: str) -> str:
-        """``name``, with a number behind it if it is taken; from now on that is taken, too."""
+        """``name``, with a numeric suffix if it is taken; the result is then taken too."""
         candidate = name
         while candidate in self._taken:
             number = self._next.get(name, 2)
@@ -99,6 +99,6 @@ class Names:
 
 
 def plain_names(names: Iterable[str], forbidden: str) -> list[str]:
-    """Different names, not empty, with ``_`` for every character that matches the regular expression ``forbidden``."""
+    """Unique non-empty names, with ``_`` for every character that matches the regular expression ``forbidden``."""
     given = Names()
     return [given.unique(re.sub(forbidden, "_", name) or "_") for name in names]

@@ -1,7 +1,7 @@
 """MMM motion (Master Motor Map), the XML files of the KIT Motion-Language data. The skeleton is not in the file.
 
-The first ``Motion`` is read: the angles of its ``JointOrder`` in radians, each channel called as the file calls the
-joint, and the root's pose. MMM has z up, millimetres, and figures that face y; here y is up, and they face z.
+The first ``Motion`` is read: the angles of its ``JointOrder`` in radians, each channel named like the joint in the
+file, and the root's pose. MMM has z up, millimetres, and figures facing y; here y is up, and they face z.
 """
 
 from collections.abc import Iterator
@@ -19,17 +19,17 @@ from motet.motion.rotations import Array
 
 MMM_ROOT = ("root.tx", "root.ty", "root.tz", "root.rx", "root.ry", "root.rz")
 XML_CHUNK = 2**20
-"""Bytes that the XML parser is given at once: it starts anew on a token that is longer, so few large ones are fast."""
+"""Bytes per call of the XML parser: it restarts on a longer token, so few large pieces are fast."""
 
 FRAME_PARTS = {"Timestep": 1, "RootPosition": 3, "RootRotation": 3}
-"""Element of a frame -> how many numbers it has; after these come the joints' angles."""
+"""Element of a frame -> how many numbers it has; the joints' angles follow."""
 
 
 def read(file: File) -> Motion:
     """Read the first motion of an MMM file, without skeleton.
 
     Channels: "root.tx" to "root.tz" in "m", "root.rx" to "root.rz" in "rad" with R = Ry Rz Rx, then one for each joint
-    in "rad". The frame rate comes from the time steps. FormatError names the file, and the line or frame that is wrong.
+    in "rad". The frame rate comes from the time steps. FormatError names the file and the line or frame at fault.
     """
     path = place_of(file)
     joints: list[str] = []
@@ -37,15 +37,15 @@ def read(file: File) -> Motion:
     for element in _elements(file):
         if element.tag == "JointOrder":
             if joints or frames:
-                raise FormatError(path, "a motion has one JointOrder, before its frames")
+                raise FormatError(path, "a motion must have one JointOrder, before its frames")
             joints = [joint.get("name", "") for joint in element.iter("Joint")]
         elif element.tag == "MotionFrame":
             frames.append(_frame(path, element, len(joints), len(frames)))
             element.clear()
     if len(set(joints)) != len(joints) or not all(joints):
-        raise FormatError(path, "each joint of the JointOrder needs a name of its own")
+        raise FormatError(path, "joint names in the JointOrder must be unique and not empty")
     if not joints or not frames:
-        raise FormatError(path, "not an MMM motion: it needs a Motion with JointOrder and MotionFrames")
+        raise FormatError(path, "not an MMM motion: expected a Motion with JointOrder and MotionFrames")
     rows = np.array(frames)
     values = np.column_stack([_root(rows[:, 1:4], rows[:, 4:7]), rows[:, 7:]])
     units = ("m",) * 3 + ("rad",) * (3 + len(joints))
@@ -53,12 +53,12 @@ def read(file: File) -> Motion:
 
 
 def motion_name(file: File) -> str:
-    """The name of the first motion, which in KIT's files tells who moved; empty if it has none."""
+    """The name of the first motion, in KIT's files the performer's; empty if it has none."""
     return next((element.get("name", "") for element in _elements(file, "start") if element.tag == "Motion"), "")
 
 
 def _elements(file: File, event: Literal["start", "end"] = "end") -> Iterator[ElementTree.Element]:
-    """The elements up to the end of the first motion, as they come; nothing after it is read."""
+    """The elements up to the end of the first motion, in order; nothing after it is read."""
     path, content = place_of(file), read_bytes(file)
     parser: ElementTree.XMLPullParser[Any] = ElementTree.XMLPullParser([event])
     try:
@@ -72,8 +72,8 @@ def _elements(file: File, event: Literal["start", "end"] = "end") -> Iterator[El
         parser.close()
     except ElementTree.ParseError as error:
         raise FormatError(path, f"not XML, or truncated: {error.msg.split(':')[0]}", error.position[0]) from error
-    except (LookupError, ValueError) as error:  # an encoding that Python or its XML parser does not have
-        raise FormatError(path, f"its encoding cannot be read: {error}", 1) from error
+    except (LookupError, ValueError) as error:  # an encoding unknown to Python or its XML parser
+        raise FormatError(path, f"unknown encoding: {error}", 1) from error
 
 
 def _frame(path: Path, element: ElementTree.Element, joints: int, number: int) -> Array:
@@ -100,7 +100,7 @@ def _root(positions: Array, rotations: Array) -> Array:
 def _fps(path: Path, times: Array) -> float:
     steps = np.diff(times)
     if not len(steps):
-        raise FormatError(path, "a single frame does not give the frame rate")
+        raise FormatError(path, "cannot tell the frame rate from a single frame")
     uneven = np.flatnonzero(np.abs(steps - steps.mean()) > 0.5 * abs(steps.mean()))
     if steps.mean() <= 0 or len(uneven):
         raise FormatError(path, f"frame {uneven[0] + 1 if len(uneven) else 1}: the time steps are uneven")

@@ -1,7 +1,7 @@
-"""From nodes in the world to a motion: what the readers of scene files (glTF, FBX) share.
+"""From nodes in the world to a motion, for the readers of scene files (glTF, FBX).
 
-A motion's skeleton rests in the pose that the file's nodes rest in, with all rotations taken out: every angle 0 is that
-pose, whatever the nodes' own axes.
+A motion's skeleton has the rest pose of the file's nodes, with all rotations removed: every angle 0 is that pose,
+whatever the nodes' own axes.
 """
 
 from collections.abc import Mapping, Sequence
@@ -32,10 +32,10 @@ class Poses:
 def motion_of_nodes(
     path: Path, names: list[str], parents: tuple[int, ...], rest: Poses, poses: Poses, fps: float, metres: float | None
 ) -> Motion:
-    """The motion of joints, each after its parent (-1 for the root, the first), from their poses (T) and at rest (1).
+    """The motion of joints, parents first (-1 for the root), from their poses (T) and their rest pose (1).
 
     metres: the length of the positions' unit. Channels: three angles in "deg" for each joint, the translation of the
-    root and of joints that move in "length". FormatError where the joints are no skeleton.
+    root and of moving joints in "length". FormatError if the joints do not form a skeleton.
     """
     at_rest = rest.places[0]
     offsets = [at_rest[i] - at_rest[parent] if parent >= 0 else at_rest[i] for i, parent in enumerate(parents)]
@@ -45,9 +45,9 @@ def motion_of_nodes(
 
 
 def rested(rest: Poses, names: Sequence[str], parents: Sequence[int], turns: Mapping[str, Array]) -> Poses:
-    """A rest pose with each bone turned as another figure's of its joints' names: rotations (3, 3) in the world.
+    """A rest pose with each bone turned like that of the same name in another figure: rotations (3, 3) in the world.
 
-    Bones keep their lengths, and joints that the other lacks their turn against the joint that they hang on.
+    Bones keep their lengths; joints missing from the other figure keep their rotation relative to their parent.
     """
     turned, places = rest.turns.copy(), rest.places.copy()
     for i, (name, parent) in enumerate(zip(names, parents, strict=True)):
@@ -62,7 +62,7 @@ def rested(rest: Poses, names: Sequence[str], parents: Sequence[int], turns: Map
 def skeleton_of_nodes(
     path: Path, names: list[str], parents: tuple[int, ...], offsets: list[Array], metres: float | None
 ) -> Skeleton:
-    """The skeleton of joints with offsets (3,) from their parents; FormatError where it is none."""
+    """The skeleton of joints with offsets (3,) from their parents; FormatError if they do not form one."""
     triples = [(float(x), float(y), float(z)) for x, y, z in offsets]
     made = [Joint(*joint) for joint in zip(names, parents, triples, strict=True)]
     try:
@@ -72,12 +72,12 @@ def skeleton_of_nodes(
 
 
 def _moved(skeleton: Skeleton, turned: Array, places: Array) -> dict[int, Array]:
-    """Translations (T, 3) in their parents' frames: of the root, and of joints that do not stay at their offset."""
+    """Translations (T, 3) in their parents' frames: of the root, and of joints that leave their offset."""
     moved = {0: places[:, 0]}
     for i, joint in enumerate(skeleton.joints[1:], start=1):
         from_parent = places[:, i] - places[:, joint.parent]
         local = rotated(inverse(turned[:, joint.parent]), from_parent)
-        # of the figure's height: a joint that is nowhere further from its offset stays there
+        # share of the figure's height: a joint that stays within this of its offset does not move
         if np.abs(local - joint.offset).max(initial=0.0) > 1e-4 * max(skeleton.height, 1e-9):
             moved[i] = local
     return moved

@@ -1,7 +1,7 @@
-"""NPZ: all of a motion, without loss, as numpy arrays. Nothing in it is pickled.
+"""NPZ: a complete motion, lossless, as numpy arrays. Nothing in it is pickled.
 
 Arrays: ``values`` (T, D) float64, ``channels`` (D,) and ``units`` (D,) text, ``fps`` float64, and ``skeleton``, the
-text of the JSON object of :meth:`motet.motion.skeleton.Skeleton.to_json`, empty for a motion without skeleton.
+JSON of :meth:`motet.motion.skeleton.Skeleton.to_json`, empty for a motion without skeleton.
 """
 
 import io
@@ -21,18 +21,18 @@ from motet.motion.skeleton import Skeleton
 
 OTHER_NPZ = {
     "posed_joints": "Kimodo's npz, which has no skeleton: convert it to BVH with its own kimodo_convert",
-    "body_pos_w": "a robot's motion as controllers are trained on, and no human's",
-    "dof_pos": "angles of a robot's motors, and no human's",
-    "joint_pos": "angles of a robot's motors, and no human's",
+    "body_pos_w": "a robot's motion for training controllers, not a human's",
+    "dof_pos": "the motor angles of a robot, not a human's motion",
+    "joint_pos": "the motor angles of a robot, not a human's motion",
 }
-"""An array -> what a file that has it is."""
+"""An array -> the kind of file it reveals."""
 
 NPZ_ARRAYS = {"values": "fiu", "channels": "U", "units": "U", "fps": "fiu", "skeleton": "U"}
-"""Array -> the kinds of dtype that it may have."""
+"""Array -> its allowed kinds of dtype."""
 
 
 def read(file: File) -> Motion:
-    """Read a motion that :func:`write` wrote, or one of AMASS (:mod:`motet.formats.amass`); FormatError for others."""
+    """Read a motion written by :func:`write` or a file of AMASS (:mod:`motet.formats.amass`); else FormatError."""
     path, content = place_of(file), read_bytes(file)
     if amass.is_amass(content):
         return amass.parse(path, content)
@@ -47,20 +47,20 @@ def read(file: File) -> Motion:
         raise
     # a damaged archive makes zipfile, its unpackers, numpy and json raise errors of a dozen types
     except Exception as error:
-        raise FormatError(path, f"not a motion that motet wrote as .npz: {str(error)[:200]}") from error
+        raise FormatError(path, f"not an .npz motion written by motet: {str(error)[:200]}") from error
 
 
 def _refuse_others(path: Path, arrays: set[str]) -> None:
-    """Say what a file is whose arrays are those of another program, not what motet's own files have."""
+    """FormatError that names the kind of file if the arrays are another program's."""
     for name, kind in OTHER_NPZ.items():
         if name in arrays and not arrays >= NPZ_ARRAYS.keys():
-            raise FormatError(path, f"this is {kind}; expected a motion of motet or of AMASS")
+            raise FormatError(path, f"this is {kind}; expected a motion from motet or AMASS")
 
 
 def write(file: File, motion: Motion) -> None:
-    """Write a motion; FormatError if it is too long to be read again, OutputError if it cannot be written."""
+    """Write a motion; FormatError if it is too long to read back, OutputError if it cannot be written."""
     if motion.values.nbytes >= NPY_MAX_BYTES:
-        raise FormatError(place_of(file), f"{motion.values.nbytes} bytes of values are too many for one file: cut it")
+        raise FormatError(place_of(file), f"{motion.values.nbytes} bytes of values are too many for one file: split it")
     content = io.BytesIO()
     skeleton = "" if motion.skeleton is None else json.dumps(motion.skeleton.to_json())
     np.savez_compressed(

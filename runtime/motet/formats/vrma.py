@@ -1,7 +1,7 @@
 """VRM Animation (.vrma): a GLB whose nodes are the humanoid in a VRM T-pose, with the extension VRMC_vrm_animation 1.0.
 
-Every bone has its rotation, the hips alone their translation; players turn both to their avatar's rest pose and scale
-the path by the height of its hips. The fingers are those of a relaxed hand.
+Every bone has a rotation, only the hips a translation; players adapt both to their avatar's rest pose and scale the
+path by its hip height. The fingers form a relaxed hand.
 """
 
 from collections.abc import Iterator
@@ -20,7 +20,7 @@ from motet.motion.skeleton import Joint, Skeleton
 EXTENSION = "VRMC_vrm_animation"
 
 THUMB, FINGER = ("Metacarpal", "Proximal", "Distal"), ("Proximal", "Intermediate", "Distal")
-"""What VRM calls the joints of the thumb, and of other fingers."""
+"""VRM's names for the joints of the thumb, and of other fingers."""
 
 FINGER_BONES = {
     "Thumb": ((0.025, -0.01, 0.025), (0.035, -0.005, 0.02), (0.025, -0.005, 0.015)),
@@ -29,7 +29,7 @@ FINGER_BONES = {
     "Ring": ((0.09, 0.0, -0.01), (0.04, 0.0, 0.0), (0.025, 0.0, 0.0)),
     "Little": ((0.09, 0.0, -0.03), (0.03, 0.0, 0.0), (0.02, 0.0, 0.0)),
 }
-"""Finger -> offsets of its joints from the ones before, in metres, in the left hand; the right one mirrors it."""
+"""Finger -> offsets of its joints from their parents, in metres, in the left hand; the right one mirrors it."""
 
 
 def _with_fingers() -> Skeleton:
@@ -44,16 +44,16 @@ def _with_fingers() -> Skeleton:
 
 
 VRMA_SKELETON = _with_fingers()
-"""The humanoid with the fingers of VRM's."""
+"""The humanoid with VRM's fingers."""
 
 
 def write(file: File, motion: Motion) -> None:
-    """Write a motion; one of another skeleton is brought to the humanoid first.
+    """Write a motion; one of another skeleton is retargeted to the humanoid first.
 
-    MotionError for a motion without frames or of a figure that is no human's, OutputError if it cannot be written.
+    MotionError for a motion without frames or of a figure that is not human, OutputError if it cannot be written.
     """
     if not len(motion):
-        raise MotionError("this motion has no frames: a VRM animation cannot be without any")
+        raise MotionError("this motion has no frames, and a VRM animation cannot be empty")
     motion = grounded(on_humanoid(motion))
     buffer = Buffer()
     document: dict[str, Any] = {
@@ -75,7 +75,7 @@ def _bones() -> dict[str, dict[str, int]]:
 
 
 def _fingers() -> Iterator[Track]:
-    """The tracks of a relaxed hand's fingers, each of one frame."""
+    """The tracks of a relaxed hand's fingers, one frame each."""
     still = np.broadcast_to(np.eye(3), (len(VRMA_SKELETON.names), 3, 3))
     turned = relaxed(VRMA_SKELETON, still, VRMA_SKELETON.places)
     for joint in range(len(HUMANOID.names), len(VRMA_SKELETON.names)):

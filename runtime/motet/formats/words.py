@@ -1,4 +1,4 @@
-"""The words of a long text, all at once: numbers are read as exactly as by ``float``, and in a third of the time."""
+"""All words of a long text at once: numbers are parsed as exactly as by ``float``, in a third of the time."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,22 +6,22 @@ from numpy.typing import NDArray
 from motet.motion.rotations import Array
 
 LONGEST_WORD = 32
-"""Characters of a word that is read as a number; no program writes longer ones."""
+"""Longest word parsed as a number, in characters; no program writes longer ones."""
 
 EXACT_DIGITS = 15
-"""Digits of a number that float64 holds as an integer. It and a power of ten up to this are exact, so their quotient is
-rounded once, which is right."""
+"""Digits of a number that float64 holds as an integer. It and powers of ten up to this are exact, so their quotient is
+rounded only once, correctly."""
 
 _POWERS = np.array([float(10**power) for power in range(EXACT_DIGITS + 1)])
 _BLANK = np.zeros(256, dtype=bool)
-_BLANK[[*b" \t\n\r\v\f\x1c\x1d\x1e\x1f"]] = True  # what str.split() takes for such
+_BLANK[[*b" \t\n\r\v\f\x1c\x1d\x1e\x1f"]] = True  # as in str.split()
 
 
 class Words:
-    """The words of an ASCII text, by their places; UnicodeEncodeError for another text."""
+    """The words of an ASCII text, by position; UnicodeEncodeError for another text."""
 
     def __init__(self, text: str) -> None:
-        # blanks at both ends, so that each word has an edge before and one behind it, and can be read past its end
+        # blanks at both ends, so that each word has an edge on both sides and can be read past its end
         content = np.frombuffer(b" " + text.encode("ascii") + b" " * (LONGEST_WORD + 1), dtype=np.uint8)
         blank = _BLANK[content]
         edges = np.flatnonzero(blank[1:] != blank[:-1]) + 1
@@ -38,7 +38,7 @@ class Words:
         return bool((found == np.frombuffer(word.encode(), np.uint8)).all())
 
     def are_digits(self, picked: slice) -> bool:
-        """Whether all of some words are nothing but digits."""
+        """Whether all of some words consist of digits only."""
         read = self._read(self.starts[picked], self.lengths[picked])
         return read is not None and bool((read[1] == self.lengths[picked]).all())
 
@@ -60,9 +60,9 @@ class Words:
         return values if np.isfinite(values).all() else None
 
     def _read(self, starts: NDArray[np.int64], lengths: NDArray[np.int64]) -> tuple[NDArray[np.int64], ...] | None:
-        """Of each word: its digits as one number, how many there are, how many behind the point, if it is plain.
+        """For each word: its digits as one number, their count, the count after the point, and whether it is plain.
 
-        A plain word has digits, at most one point, and perhaps a minus in front. None for words that are too long.
+        A plain word has digits, at most one point, and optionally a leading minus. None if words are too long.
         """
         if not len(starts) or lengths.max() > LONGEST_WORD:
             return None

@@ -1,4 +1,4 @@
-"""What a file of Euler angles can hold: checks before writing."""
+"""Checks before writing a file of Euler angles."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -14,9 +14,9 @@ ANGLE_KINDS, TRANSLATION_KINDS = ("rx", "ry", "rz"), ("tx", "ty", "tz")
 
 
 def with_still_offsets(path: str | Path, motion: Motion) -> tuple[Motion, tuple[str, ...]]:
-    """The motion with translations that never change as offsets of the skeleton, and the joints that really move.
+    """The motion with constant translations turned into offsets of the skeleton, and the joints that still translate.
 
-    The root's translation stays as it is and is not among those joints; all translations come in "length".
+    The root keeps its translation and is not among those joints; all translations are in "length".
     MotionError for a motion without skeleton; FormatError names channels that are neither an Euler angle nor a
     translation of one of its joints.
     """
@@ -39,7 +39,7 @@ def with_still_offsets(path: str | Path, motion: Motion) -> tuple[Motion, tuple[
 
 
 def with_names(motion: Motion, names: list[str]) -> Motion:
-    """The motion with other names for its skeleton's joints, one for each."""
+    """The motion with its skeleton's joints renamed, one name for each."""
     skeleton = skeleton_of(motion)
     new = dict(zip(skeleton.names, names, strict=True))
     joints = tuple(replace(joint, name=new[joint.name]) for joint in skeleton.joints)
@@ -61,4 +61,4 @@ def _check(path: str | Path, motion: Motion, skeleton: Skeleton) -> None:
         if joint not in skeleton.names or unit not in allowed:
             bad.append(f"{name} [{unit}]")
     if bad:
-        raise FormatError(path, f"holds Euler angles and translations of joints, so it cannot take {', '.join(bad)}")
+        raise FormatError(path, f"holds only Euler angles and translations of joints, not {', '.join(bad)}")
