@@ -162,7 +162,7 @@ def test_bench_describes_a_file_and_says_where_it_ran(clips: Path) -> None:
         (
             1,
             ["convert", "{clips}/39_14.amc", "{out}/a.bvh", "--from", "1", "--to", "1.001"],
-            "no frame from 1 to 1.001",
+            "no frame between 1 and 1.001",
         ),
         (1, ["convert", "{clips}/39_14.amc", "{out}/a.bvh", "--fps-in", "nan"], "frame rate nan is out of range"),
         (1, ["convert", "{clips}/39_14.amc", "{out}/a.bvh", "--asf", "none.asf"], "none.asf: no such file"),

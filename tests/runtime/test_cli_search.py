@@ -57,7 +57,7 @@ def test_the_unit_of_files_that_do_not_state_it(tmp_path: Path) -> None:
         write_motion(tmp_path / f"{seed}.bvh", moving(20, seed=seed))
     refused = run("search", "walks", tmp_path)
     assert refused.exit_code == 2
-    assert "unit of length is not known" in refused.stderr
+    assert "length unit of this skeleton is unknown" in refused.stderr
     assert "--unit-in" in refused.stderr
     rows = json.loads(run("search", tmp_path / "1.bvh", tmp_path, "--unit-in", "m", "--json").stdout)
     assert rows[0]["path"] == str(tmp_path / "1.bvh")

@@ -202,7 +202,7 @@ def test_a_motion_of_another_figure_and_rate_is_brought_to_the_first_and_that_is
     with caplog.at_level(logging.WARNING):
         found = model.join(mixamo, walk.resample(30.0), seconds=0.5)
     assert "resampled the second motion from 30 to 120 fps" in caplog.text
-    assert "the second motion is of another figure" in caplog.text
+    assert "retargeted the second motion" in caplog.text
     assert (found.channels, found.skeleton, found.fps) == (mixamo.channels, mixamo.skeleton, 120.0)
     assert len(found) == len(mixamo) + 60 + 397  # 100 frames at 30 fps
     # the same walk, as it is on the first figure

@@ -76,7 +76,7 @@ def test_several_files_are_filled_and_what_fails_is_named(tmp_path: Path, clips:
 def test_joining_another_figure_says_so(tmp_path: Path, clips: Path) -> None:
     result = run("join", clips / WALK, clips / RUN, "--seconds", 0.5, "-o", tmp_path / "out.bvh")
     assert result.exit_code == 0
-    assert "motet: the second motion is of another figure: put on that of the first" in result.stderr
+    assert "motet: retargeted the second motion to the figure of the first" in result.stderr
 
 
 @pytest.mark.parametrize("text", ["1.0", "1-2", "a:b", "1:2:3", "", "nan:1", "1:inf", ":"])

@@ -174,7 +174,12 @@ def test_hips_that_hang_on_a_root_at_rest_and_joints_of_one_angle():
 
 @pytest.mark.parametrize(
     ("frames", "shortest", "said"),
-    [(0, 0.7, "too short for a loop of 0.7 s"), (21, 0.7, "too short"), (60, 2.0, "too short"), (60, 0, "more than 0")],
+    [
+        (0, 0.7, "too short for a loop of 0.7 s"),
+        (21, 0.7, "too short"),
+        (60, 2.0, "too short"),
+        (60, 0, "longer than 0"),
+    ],
 )
 def test_what_is_too_short(frames, shortest, said):
     with pytest.raises(MotionError, match=said):

@@ -107,7 +107,7 @@ def test_what_cannot_be_mirrored_is_refused():
     odd = with_channels(motion, ("hips.vx",), np.zeros((3, 1)), ("m/s",))
     with pytest.raises(MotionError, match=r"not hips\.vx"):
         mirror(odd)
-    with pytest.raises(MotionError, match="no joints in pairs"):
+    with pytest.raises(MotionError, match="no left-right pairs of joints"):
         mirror(Motion(np.zeros((1, 1)), ("root.rx",), ("deg",), 30, line_of("root", "spine")))
     with pytest.raises(MotionError, match="not mirror images"):
         mirror(Motion(np.zeros((1, 1)), ("root.rx",), ("deg",), 30, line_of("root", "lleg", "rleg")))

@@ -60,8 +60,8 @@ def test_one_frame_and_frame_by_frame():
     ("values", "channels", "units", "fps", "words"),
     [
         (np.zeros((2, 2)), ("a",), ("deg",), 30, "do not fit 1 channels"),
-        (np.zeros((2, 2)), ("a", "a"), ("deg", "deg"), 30, "names must differ"),
-        (np.zeros((2, 1)), ("a",), ("degrees",), 30, "one unit for each channel"),
+        (np.zeros((2, 2)), ("a", "a"), ("deg", "deg"), 30, "names must be unique"),
+        (np.zeros((2, 1)), ("a",), ("degrees",), 30, "one unit per channel"),
         (np.zeros((2, 1)), ("a",), ("deg",), 0, "frame rate"),
         ([[0.0], [np.nan]], ("a",), ("deg",), 30, "frame 1, channel 'a' is nan"),
         ([["x"]], ("a",), ("deg",), 30, "must be numbers"),
@@ -104,7 +104,7 @@ def test_scaled_changes_the_unit_and_not_the_place():
     motion = walker(metres_per_unit=0.5)
     in_metres = motion.scaled(1.0)
     np.testing.assert_allclose(positions(in_metres), positions(motion) * 0.5, atol=1e-12)
-    with pytest.raises(MotionError, match="give metres_per_unit"):
+    with pytest.raises(MotionError, match="the length unit of this skeleton is unknown"):
         walker(metres_per_unit=None).scaled(1.0)
 
 

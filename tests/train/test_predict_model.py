@@ -96,7 +96,7 @@ def test_training_learns_and_repeats_itself(tmp_path: Path) -> None:
 def test_train_and_evaluate_from_the_command_line(tmp_path: Path) -> None:
     data, out = write_files(tmp_path / "data"), tmp_path / "run"
     split = run("train", "predict", "--data", data, "--out", out, "--split", "trial")
-    assert "has test files of its own" in split.stderr
+    assert "has its own test files" in split.stderr
     trained = run("train", "predict", "--data", data, "--out", out, "--steps", 3, "--seed", 1)
     assert trained.exit_code == 0, trained.output
     assert "lacks 42 files: train/basketball/basketball_1.txt" in trained.stderr

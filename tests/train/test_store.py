@@ -298,7 +298,7 @@ def test_when_most_motions_do_not_fit_the_first_it_is_named(tmp_path: Path) -> N
     (tmp_path / "said.tsv").write_text("clip\tsentence\n" + "".join(f"{name}\tA person runs.\n" for name in "abc"))
     result = CliRunner().invoke(main, ["prepare", str(tmp_path), "--figure", "own", "--out", str(tmp_path / "store")])
     assert (result.exit_code, "2 skipped" in result.stdout) == (0, True)
-    assert "channels and axes are those of the first, a" in result.stderr
+    assert "channels and axes are taken from the first, a" in result.stderr
 
 
 def test_how_a_corpus_is_prepared_for_a_verb() -> None:

@@ -1,4 +1,4 @@
-"""Geometry: motions, skeletons, rotations, and what is done to them without a model."""
+"""Geometry: motions, skeletons, rotations, and operations on them that need no model."""
 
 from motet.motion.feet.contacts import feet_of, ground_of, has_feet
 from motet.motion.feet.hold import hold_feet

@@ -1,4 +1,4 @@
-"""One motion after another: set down where the one before it leads, facing as it does."""
+"""One motion after another: placed where the first one leads, with the same facing."""
 
 import logging
 from dataclasses import replace
@@ -24,14 +24,14 @@ log = logging.getLogger(__name__)
 def to_figure_of(motion: Motion, like: Motion) -> Motion:
     """A motion at the frame rate, on the skeleton and in the channels of another.
 
-    It is resampled, and put on the other's figure by way of the humanoid, where it has to be; both are logged as
-    warnings. MotionError, with the reason, for figures that are no humans'.
+    If needed, it is resampled and retargeted to the other figure through the humanoid; both are logged as warnings.
+    MotionError, with the reason, for figures that are not human.
     """
     if motion.fps != like.fps:
         log.warning("resampled the second motion from %g to %g fps, the rate of the first", motion.fps, like.fps)
         motion = motion.continuous().resample(like.fps)
     if not same_figure(motion, like):
-        log.warning("the second motion is of another figure: put on that of the first")
+        log.warning("retargeted the second motion to the figure of the first")
         motion = from_humanoid(on_humanoid(motion), like)
     elif set(motion.channels) == set(like.channels):
         return replace(motion.select(like.channels, like.units), skeleton=like.skeleton)
@@ -41,7 +41,7 @@ def to_figure_of(motion: Motion, like: Motion) -> Motion:
 
 
 def same_figure(motion: Motion, other: Motion) -> bool:
-    """Whether the joints of two motions are called, connected and turned alike, and as far apart."""
+    """Whether the joints of two motions have the same names, connections, rotation conventions and distances."""
     one, two = skeleton_of(motion), skeleton_of(other)
     told = [[(joint.name, joint.parent, joint.order, joint.axis) for joint in each.joints] for each in (one, two)]
     if told[0] != told[1]:
@@ -51,11 +51,11 @@ def same_figure(motion: Motion, other: Motion) -> bool:
 
 
 def placed_after(motion: Motion, before: Motion, seconds: float, turn: float) -> Motion | None:
-    """A motion set down so that its first frame is ``seconds`` after the last one of another of the same figure.
+    """A motion placed so that its first frame is ``seconds`` after the last one of another of the same figure.
 
-    turn: radians about the vertical axis y that it is turned by. In between the hips go, over the ground, at the mean
-    of the velocities at the end of the one and, so turned, at the start of the other. None where the channels do not
-    say where the hips go and how they turn.
+    turn: its rotation about the vertical axis y, in radians. In between, the hips cross the ground at the mean of the
+    velocities at the end of the first and, after turning, at the start of the second. None if the channels lack the
+    position or rotation of the hips.
     """
     carrier = _carrier(motion)
     if carrier is None:
@@ -68,7 +68,7 @@ def placed_after(motion: Motion, before: Motion, seconds: float, turn: float) ->
 
 
 def _carrier(motion: Motion) -> int | None:
-    """The joint that carries the others about: the first with a place, if it has three angles too."""
+    """The joint that carries the others: the first with a translation, if it has three angles too."""
     for joint, name in enumerate(skeleton_of(motion).names):
         place, angles = ({f"{name}.{kind}{axis}" for axis in AXES} for kind in "tr")
         if place <= set(motion.channels):
@@ -77,7 +77,7 @@ def _carrier(motion: Motion) -> int | None:
 
 
 def _velocity(motion: Motion, carrier: int, to_end: bool = False) -> Array:
-    """Lengths a second (3,) at which a joint moves at the start of a motion, or at its end; 0 for a lone frame."""
+    """Velocity (3,) of a joint, lengths per second, at the start or end of a motion; 0 for a single frame."""
     # the mean over .2 s
     frames = max(1, round(0.2 * motion.fps)) + 1
     part = motion[-frames:] if to_end else motion[:frames]
@@ -89,7 +89,7 @@ def _velocity(motion: Motion, carrier: int, to_end: bool = False) -> Array:
 
 
 def _set_down(motion: Motion, carrier: int, about: Array, origin: Array, to: Array) -> Motion:
-    """The motion turned about a point, which comes to another."""
+    """The motion turned about a point and moved so that the point reaches another."""
     joint = skeleton_of(motion).joints[carrier]
     turned, places = global_transforms(motion)
     frames = len(motion)

@@ -14,10 +14,10 @@ def heading(motion: Motion) -> Array:
 
 
 def without_heading(motion: Motion) -> Motion:
-    """The motion turned to face z: a straight line is fitted to the heading and taken out of the root's rotation.
+    """The motion turned to face z: a straight line fitted to the heading is removed from the root's rotation.
 
-    The sway of the hips within a stride stays; walking another way, or turning at a constant rate, does not. A
-    motion without rotations of the root comes back as it is. The root's translation is not changed.
+    This keeps the sway of the hips within a stride and removes any constant heading or turning rate. A motion without
+    root rotation is returned unchanged. The root's translation is not changed.
     """
     joint = skeleton_of(motion).joints[0]
     names = tuple(f"{joint.name}.r{axis}" for axis in AXES)

@@ -19,7 +19,7 @@ K = TypeVar("K")
 def skeleton_of(motion: Motion) -> Skeleton:
     """The motion's skeleton; MotionError if it has none."""
     if motion.skeleton is None:
-        raise MotionError("this motion has no skeleton: positions and rotations of its joints are not defined")
+        raise MotionError("this motion has no skeleton, so its joints have no positions or rotations")
     return motion.skeleton
 
 
@@ -39,7 +39,7 @@ def local_rotations(motion: Motion, joints: Sequence[int] | None = None) -> Arra
 
 
 def _by_order(joints: Iterable[tuple[K, Joint]]) -> dict[str, list[tuple[K, Joint]]]:
-    """Joints, each with something of its own, by the order of their angles: those of one order are turned at once."""
+    """Joints with an item each, grouped by Euler order: joints of one order are processed together."""
     found: dict[str, list[tuple[K, Joint]]] = {}
     for own, joint in joints:
         found.setdefault(joint.order, []).append((own, joint))
@@ -47,7 +47,7 @@ def _by_order(joints: Iterable[tuple[K, Joint]]) -> dict[str, list[tuple[K, Join
 
 
 def _angles(motion: Motion, joints: Sequence[tuple[Joint, Sequence[int]]]) -> Array:
-    """Angles (T, J, 3) in radians, each joint's in its order, from the columns of each; 0 where there is no channel."""
+    """Angles (T, J, 3) in radians, each joint's in its order, from the columns of each; 0 without a channel."""
     angles = frames_last((len(motion), len(joints), 3))
     angles[:] = 0.0
     found = [(place, joint, column) for place, (joint, columns) in enumerate(joints) for column in columns]
@@ -58,7 +58,7 @@ def _angles(motion: Motion, joints: Sequence[tuple[Joint, Sequence[int]]]) -> Ar
 
 
 def local_translations(motion: Motion) -> Array:
-    """Translations (T, J, 3) of every joint in its parent's frame: the channel where there is one, else the offset."""
+    """Translations (T, J, 3) of every joint in its parent's frame: the channel if there is one, else the offset."""
     skeleton = skeleton_of(motion)
     translations = frames_last((len(motion), len(skeleton.joints), 3))
     translations[:] = skeleton.offsets
@@ -93,13 +93,13 @@ def positions(motion: Motion) -> Array:
 def euler_of(rotations: Array, joint: Joint) -> Array:
     """Local rotations (T, 3, 3) of one joint to its channels rx, ry, rz (T, 3) in radians: undoes C M C^T.
 
-    The angles do not leap from frame to frame; the first frame's middle angle is within a quarter turn.
+    The angles are continuous over time; the first frame's middle angle is within a quarter turn.
     """
     return eulers_of(rotations[:, None], [joint])[:, 0]
 
 
 def eulers_of(rotations: Array, joints: Sequence[Joint], leaps: bool = False) -> Array:
-    """As :func:`euler_of` for several joints with their local rotations (T, J, 3, 3): (T, J, 3). leaps: may leap."""
+    """Like :func:`euler_of` for several joints with their local rotations (T, J, 3, 3): (T, J, 3). leaps: may leap."""
     angles = frames_last(rotations.shape[:-1])
     for order, alike in _by_order(enumerate(joints)).items():
         places = [place for place, _ in alike]
@@ -126,7 +126,7 @@ def side_by_side(rotations: Sequence[Array], frames: int) -> Array:
 
 
 def with_channels(motion: Motion, names: tuple[str, ...], values: Array, units: tuple[str, ...]) -> Motion:
-    """The motion with channels (T, len(names)) replaced, or prepended where it has none of that name."""
+    """The motion with channels (T, len(names)) replaced, or prepended if it has none of that name."""
     new = tuple(name for name in names if name not in motion.channels)
     added = [names.index(name) for name in new]
     everything = np.concatenate([values[:, added], motion.values], axis=1)
@@ -138,15 +138,15 @@ def with_channels(motion: Motion, names: tuple[str, ...], values: Array, units: 
 
 
 def continued(last: Motion, rotations: Mapping[str, Array], translations: Mapping[str, Array]) -> Motion:
-    """What follows a motion's last frame, in its channels: local rotations (T, 3, 3) and translations (T, 3) of joints.
+    """The frames after a motion's last, in its channels: local rotations (T, 3, 3) and translations (T, 3) of joints.
 
-    Lengths are in the skeleton's unit. What the channels do not have is left out, and channels of other joints stay as
-    they are.
+    Lengths are in the skeleton's unit. Joints without channels are left out, and channels of other joints keep their
+    values.
     """
     last = last[-1:]
     count = len(next(iter(rotations.values())))
     after = posed(replace(last, values=np.repeat(last.values, count, axis=0)), rotations, translations, leaps=True)
-    # the frame before the first one says which of two equal angles is the nearer one
+    # the frame before the first one decides which of two equivalent angles is nearer
     return replace(last, values=np.concatenate([last.values, after.values])).continuous()[1:]
 
 
@@ -191,7 +191,7 @@ def local_of(skeleton: Skeleton, turned: Array) -> Array:
 
 def motion_of(skeleton: Skeleton, turned: Array, moved: dict[int, Array], fps: float) -> Motion:
     """The motion of rotations in the world (T, J, 3, 3) and of translations (T, 3) of some joints in their parents'
-    frames: all in "deg" and "length", with angles that do not leap."""
+    frames: all in "deg" and "length", with continuous angles."""
     kept = [i for i, j in enumerate(skeleton.joints) if skeleton.children[i] or not j.name.endswith(END_SUFFIX)]
     angles = np.degrees(eulers_of(local_of(skeleton, turned)[:, kept], [skeleton.joints[i] for i in kept]))
     columns = dict(zip(kept, np.moveaxis(angles, 1, 0), strict=True))

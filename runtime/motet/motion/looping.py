@@ -1,9 +1,8 @@
-"""Loops: the part of a motion that plays in a circle without a leap, as game engines want walks and runs.
+"""Loops: the part of a motion that repeats seamlessly, as game engines need for walks and runs.
 
-A loop begins and ends with the same pose, seen without place and heading, at the same velocity. All pairs of frames are
-compared, by the root mean square over the joints; where loops of several lengths are nearly as good, as one, two and
-three strides are, the longest is taken. What is left of the difference is spread over the loop: rotations by rotation
-vectors, all else by lines.
+A loop begins and ends with the same pose, ignoring position and heading, at the same velocity. All pairs of frames are
+compared by the root mean square over the joints; of loops nearly as good, such as one, two and three strides, the
+longest is taken. The remaining difference is spread over the loop: rotations by rotation vectors, all else linearly.
 """
 
 from dataclasses import replace
@@ -16,17 +15,17 @@ from motet.motion.motion import TURN, Motion
 from motet.motion.rotations import UP, Array, inverse, product, rotated, rotmat_to_rotvec, rotvec_to_rotmat, twist
 
 REPEATS_WITHIN = 0.04
-"""Of the figure's height: frames that differ by more do not show the same. Of 40 recorded walks, on the humanoid at 30
-frames a second, nine in ten repeat within 0.03, steady strides within 0.01 to 0.02; what is most alike in a bend, CMU's
-02_06, differs by 0.08, and half of the takes of running, which are short and turn or leap, repeat within 0.06 only."""
+"""Share of the figure's height: frames that differ by more do not match. Of 40 recorded walks, on the humanoid at 30
+fps, nine in ten repeat within 0.03, steady strides within 0.01 to 0.02; the best match in a bend, CMU's 02_06, differs
+by 0.08, and half of the running takes, which are short and turn or leap, repeat only within 0.06."""
 
 
 def looped(motion: Motion, shortest: float = 0.7) -> Motion:
     """The part of the motion that can be repeated: its last frame is one frame before its first pose in every joint.
 
-    The place on the ground and the heading go on as they did, by the same from each repetition to the next.
-    shortest: seconds that the loop takes at least. MotionError for a motion without a skeleton, one that is too short,
-    and one in which nothing repeats.
+    Position and heading advance by the same amount in each repetition.
+    shortest: minimum length of the loop in seconds. MotionError for a motion without a skeleton, one that is too short,
+    and one without a repetition.
     """
     start, stop = _repetition(motion, shortest)
     part = motion[start : stop + 1]
@@ -34,7 +33,7 @@ def looped(motion: Motion, shortest: float = 0.7) -> Motion:
     turned, local = global_transforms(part)[0], local_rotations(part)
     above = turned[:, skeleton.joints[carrier].parent] if carrier else np.broadcast_to(np.eye(3), turned[:, 0].shape)
     heading = twist(turned[:, carrier], UP)
-    # the heading stays: only what the hips tilt by comes back
+    # the heading stays: only the tilt of the hips is made to repeat
     own = product(heading, _closed(product(inverse(heading), turned[:, carrier])))
     rotations = {
         skeleton.names[i]: product(inverse(above), own) if i == carrier else _closed(local[:, i])
@@ -47,15 +46,15 @@ def looped(motion: Motion, shortest: float = 0.7) -> Motion:
 
 
 def _repetition(motion: Motion, shortest: float) -> tuple[int, int]:
-    """The first frame of the loop and the one that shows the same again."""
+    """The first frame of the loop and the one that repeats it."""
     least = max(1, int(np.ceil(shortest * motion.fps - 1e-9))) if 0 < shortest < np.inf else 0
     if not least:
-        raise MotionError(f"a loop takes more than 0 seconds, not {shortest}")
+        raise MotionError(f"a loop must be longer than 0 seconds, not {shortest}")
     if len(motion) <= least:
         raise MotionError(
-            f"this motion of {motion.duration:.2g} s is too short for a loop of {shortest:g} s: take a longer one"
+            f"a motion of {motion.duration:.2g} s is too short for a loop of {shortest:g} s: use a longer one"
         )
-    # 1,500 frames are compared, each with each: of longer motions every second or third, then those in between
+    # at most 1,500 frames are compared pairwise: in longer motions every second or third, then those in between
     seen, step = _seen(motion), -(-len(motion) // 1500)
     lengths = np.arange(-(-least // step), -(-len(motion) // step))
     apart = _apart(seen[::step], seen[::step])
@@ -66,18 +65,18 @@ def _repetition(motion: Motion, shortest: float) -> tuple[int, int]:
     if off > REPEATS_WITHIN:
         raise MotionError(
             f"no loop found: the closest pair, {start / motion.fps:.2f} s and {stop / motion.fps:.2f} s, differs by "
-            f"{off:.1%} of the figure's height, more than {REPEATS_WITHIN:.0%}; cut the motion to what repeats, or "
-            f"take a longer one, of two strides or more"
+            f"{off:.1%} of the figure's height, more than {REPEATS_WITHIN:.0%}; cut the motion to repeating parts, or "
+            f"use a longer one of two strides or more"
         )
     return start, stop
 
 
 def _longest_of_the_best(off: Array) -> int:
-    """The last of the minima that are nearly as low as the lowest; at either end nothing says that it is a minimum."""
+    """The last of the minima nearly as low as the lowest; the ends do not count as minima."""
     low = np.zeros(len(off), dtype=bool)
     low[1:-1] = (off[1:-1] <= off[:-2]) & (off[1:-1] <= off[2:])
     low[off.argmin()] = True
-    # nearly as good: 1.25 times the best difference, or .01 of the height, by which strides of a steady walk differ
+    # nearly as good: 1.25 times the best difference, or .01 of the height, the variation of a steady walk
     return int(np.flatnonzero(low & (off <= max(1.25 * off.min(), 0.01)))[-1])
 
 
@@ -97,13 +96,13 @@ def _apart(one: Array, other: Array) -> Array:
 
 
 def _seen(motion: Motion) -> Array:
-    """Where joints are and how they move (T, D), seen from the hips without their heading: the distance of two rows is
-    the root mean square over the joints, in parts of the figure's height."""
+    """Positions and velocities of joints (T, D), relative to the hips without their heading: the distance of two rows
+    is the root mean square over the joints, as a share of the figure's height."""
     skeleton, carrier, (turned, places) = skeleton_of(motion), _carrier(motion), global_transforms(motion)
     facing = inverse(twist(turned[:, carrier], UP))[:, None]
     ground = places[:, [carrier]] * (1 - UP)
     places = places[:, skeleton.subtree(skeleton.names[carrier])]
-    # velocities differ by how far they lead apart in .1 s
+    # velocities count by how far they diverge in .1 s
     moved = np.gradient(places, axis=0, edge_order=2 if len(motion) > 2 else 1) * motion.fps * 0.1
     points = np.concatenate([rotated(facing, places - ground), rotated(facing, moved)], axis=1)
     found: Array = points.reshape(len(motion), -1) / (np.sqrt(places.shape[1]) * skeleton.height)
@@ -111,7 +110,7 @@ def _seen(motion: Motion) -> Array:
 
 
 def _carrier(motion: Motion) -> int:
-    """The joint that carries the others about: the first that moves, as some figures' hips hang on a root at rest."""
+    """The joint that carries the others: the first that moves, since some figures' hips are below a static root."""
     moving = np.ptp(motion.values, axis=0) > 1e-9 if len(motion) else []
     names = {name.rpartition(".")[0] for name, moves in zip(motion.channels, moving, strict=False) if moves}
     return next((i for i, name in enumerate(skeleton_of(motion).names) if name in names), 0)
@@ -124,14 +123,14 @@ def _whole(motion: Motion) -> list[str]:
 
 
 def _closed(rotations: Array) -> Array:
-    """Rotations (T, 3, 3) of which the last is the first."""
+    """Rotations (T, 3, 3) adjusted so that the last equals the first."""
     off = rotmat_to_rotvec(product(rotations[:1], inverse(rotations[-1:])))
     return product(rotvec_to_rotmat(_share(len(rotations)) * off), rotations)
 
 
 def _closed_channels(motion: Motion, carrier: str) -> Motion:
-    """The motion with channels of which the last frame is the first, up to whole turns; those of joints with all three
-    angles, and the carrier's place and heading, stay."""
+    """The motion with channels whose last frame equals the first, up to whole turns; joints with all three angles, and
+    the carrier's position and heading, stay."""
     stay = {f"{name}.r{axis}" for name in _whole(motion) for axis in AXES}
     stay |= {f"{carrier}.{kind}" for kind in ("tx", "ty", "tz", "ry")}
     turns = np.array([TURN.get(unit, np.inf) for unit in motion.units])
@@ -142,11 +141,11 @@ def _closed_channels(motion: Motion, carrier: str) -> Motion:
 
 
 def _drift(values: Array) -> Array:
-    """What makes the last of values (T, N) differ from the first, as a line about its middle."""
+    """The difference between the last and the first of values (T, N), as a line about its middle."""
     drift: Array = _share(len(values)) * (values[-1] - values[0])
     return drift
 
 
 def _share(frames: int) -> Array:
-    """From -1/2 to 1/2 (T, 1): both ends of the loop are changed as much."""
+    """From -1/2 to 1/2 (T, 1), so both ends of the loop change equally."""
     return np.linspace(-0.5, 0.5, frames)[:, None]

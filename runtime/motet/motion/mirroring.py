@@ -3,7 +3,7 @@
 With S the reflection across the plane between the paired joints of the rest pose, the local rotation of a joint
 becomes S R S of its partner's, a translation S t. Where the partner's axes are the mirror image of the joint's own,
 as in CMU's skeletons and in BVH, this only swaps channels and changes signs, so mirroring twice gives back the motion
-bit by bit. Else the rotation is turned into the joint's own Euler angles.
+bit for bit. Otherwise the rotation is converted to the joint's own Euler angles.
 """
 
 import re
@@ -25,14 +25,14 @@ Channels = tuple[tuple[str, ...], Array, tuple[str, ...]]
 def lateral_axis(skeleton: Skeleton) -> int:
     """0, 1 or 2: the axis along which paired joints lie apart at rest.
 
-    MotionError where no joints are paired, or where their places do not mirror each other across a coordinate plane.
+    MotionError if no joints are paired, or their positions do not mirror each other across a coordinate plane.
     """
     partners = np.array(partners_of(skeleton.names))
     rest = skeleton.rest_positions
     apart = np.abs(rest - rest[partners])
     if not apart.any():
         raise MotionError(
-            "no joints in pairs: names such as LeftArm and RightArm, lfemur and rfemur show what is where"
+            "no left-right pairs of joints: expected names such as LeftArm and RightArm, lfemur and rfemur"
         )
     axis = int(np.argmax(apart.sum(axis=0)))
     gap = rest[partners] * _signs(axis) - rest
@@ -50,9 +50,9 @@ def _signs(axis: int) -> Array:
 def mirror(motion: Motion) -> Motion:
     """The motion with left and right swapped, on the same skeleton and with the same channels.
 
-    Channels are added, in front, only where a joint lacks one that its mirrored rotation or place needs. Twice
-    mirrored is the motion itself. MotionError for a motion without skeleton, for one whose joints are not in pairs,
-    and for channels other than Euler angles and translations of joints.
+    Channels are prepended only if a joint lacks one that its mirrored rotation or translation needs. Mirroring twice
+    gives the motion itself. MotionError for a motion without skeleton or without paired joints, and for channels other
+    than Euler angles and translations of joints.
     """
     skeleton = skeleton_of(motion)
     _refuse_other_channels(motion, skeleton)
@@ -115,7 +115,7 @@ def _mirrored_translation(motion: Motion, joint: Joint, partner: int, axis: int)
 
 
 def _needed(joint: Joint, own: dict[str, str], letter: str, values: Array, units: list[str]) -> Channels:
-    """The channels that the joint has already, and others that would not stay at rest."""
+    """The joint's existing channels, and others that would leave their rest value."""
     rest = (0.0, 0.0, 0.0) if letter == "r" else joint.offset
     moved = [bool((np.abs(values[:, n] - rest[n]) > 1e-9).any()) for n in range(3)]
     needed = [n for n, axis in enumerate(AXES) if moved[n] or f"{letter}{axis}" in own]

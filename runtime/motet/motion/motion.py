@@ -17,13 +17,13 @@ from motet.motion.skeleton import Skeleton
 log = logging.getLogger(__name__)
 
 UNITS = ("deg", "rad", "length", "m", "deg/s", "rad/s", "m/s", "1")
-"""Units a channel can have; "length" is the length unit of the skeleton, "1" a number without unit."""
+"""Units of channels; "length" is the skeleton's length unit, "1" a number without unit."""
 
 TURN = {"deg": 360.0, "rad": 2 * np.pi}
 """A whole turn in each unit of angle."""
 
 MAX_VALUES = 2**28
-"""Numbers that a motion is resampled to at most: 2 GiB, of a hundred channels six hours at 120 frames a second."""
+"""Maximum numbers in a resampled motion: 2 GiB, six hours of a hundred channels at 120 fps."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -31,11 +31,11 @@ class Motion:
     """A motion of T frames and D channels.
 
     values: (T, D) float64, read-only. Any array is accepted and copied; NaN and infinity are refused.
-    channels: D different names, "JOINT.rx" for an Euler angle about x, "JOINT.tx" for a translation along x.
-    units: D units out of :data:`UNITS`.
+    channels: D unique names, "JOINT.rx" for an Euler angle about x, "JOINT.tx" for a translation along x.
+    units: D units from :data:`UNITS`.
     fps: frames per second.
-    skeleton: what the channels move, or None.
-    Raises MotionError where these do not fit together.
+    skeleton: the skeleton that the channels move, or None.
+    MotionError if these do not match.
     """
 
     values: Array
@@ -52,9 +52,9 @@ class Motion:
         if self.values.ndim != 2 or self.values.shape[1] != len(self.channels):
             raise MotionError(f"values of shape {self.values.shape} do not fit {len(self.channels)} channels")
         if len(set(self.channels)) != len(self.channels):
-            raise MotionError("channel names must differ")
+            raise MotionError("channel names must be unique")
         if len(self.units) != len(self.channels) or set(self.units) - set(UNITS):
-            raise MotionError(f"a motion needs one unit for each channel, each one of {', '.join(UNITS)}")
+            raise MotionError(f"a motion needs one unit per channel, from {', '.join(UNITS)}")
         if not (np.isfinite(self.fps) and self.fps > 0):
             raise MotionError(f"the frame rate must be a positive number, not {self.fps}")
         self._refuse_not_finite()
@@ -72,14 +72,14 @@ class Motion:
 
     @property
     def duration(self) -> float:
-        """Seconds: the number of frames over fps."""
+        """Seconds: the number of frames divided by fps."""
         return len(self) / self.fps
 
     def __repr__(self) -> str:
         return f"Motion({len(self)} frames, {len(self.channels)} channels, {self.fps:g} fps, {self.duration:.1f} s)"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # arrays come back writeable from pickle and deepcopy: made anew, the motion is read-only again
+        # pickle and deepcopy return writeable arrays: rebuilding the motion makes it read-only again
         return Motion, (self.values, self.channels, self.units, self.fps, self.skeleton)
 
     def __getitem__(self, frames: slice | SupportsIndex) -> "Motion":
@@ -99,13 +99,13 @@ class Motion:
         return (self[index] for index in range(len(self)))
 
     def cut(self, start: float = 0.0, stop: float | None = None) -> "Motion":
-        """The part from ``start`` to ``stop``, in seconds; MotionError outside of the motion."""
+        """The part from ``start`` to ``stop``, in seconds; MotionError outside the motion."""
         stop = self.duration if stop is None else stop
         if not 0 <= start < stop <= self.duration + 0.5 / self.fps:
             raise MotionError(f"cannot cut {start:g} to {stop:g} s out of a motion of {self.duration:g} s")
         part = self[round(start * self.fps) : round(stop * self.fps)]
         if not len(part):
-            raise MotionError(f"there is no frame from {start:g} to {stop:g} s at {self.fps:g} fps")
+            raise MotionError(f"no frame between {start:g} and {stop:g} s at {self.fps:g} fps")
         return part
 
     def select(self, channels: tuple[str, ...], units: tuple[str, ...] | None = None) -> "Motion":
@@ -142,7 +142,7 @@ class Motion:
         return replace(self, values=self.values * factors, skeleton=self.skeleton.scaled(metres_per_unit))
 
     def with_unit(self, metres_per_unit: float) -> "Motion":
-        """The same motion, with the skeleton's unit of length set: for files that do not state it."""
+        """The same motion with the skeleton's length unit set, for files that do not state it."""
         if self.skeleton is None:
             raise MotionError("a motion without a skeleton has no length unit")
         return replace(self, skeleton=replace(self.skeleton, metres_per_unit=metres_per_unit))
@@ -150,8 +150,8 @@ class Motion:
     def resample(self, fps: float, to_end: bool = False) -> "Motion":
         """The motion at another frame rate, by the rule of :mod:`motet.motion.resample`.
 
-        It starts at the same frame, or ends at the same one (``to_end``). Where frames are not picked, leaps of angles
-        are taken out first (:meth:`continuous`).
+        The first frame is kept, or the last one (``to_end``). Unless frames are merely picked, jumps of angles are
+        removed first (:meth:`continuous`).
         """
         if not (np.isfinite(fps) and fps > 0):
             raise MotionError(f"the frame rate must be a positive number, not {fps}")
@@ -159,17 +159,17 @@ class Motion:
             return self
         ratio = self.fps / fps
         if self.values.size / ratio > MAX_VALUES:
-            raise MotionError(f"{self.duration:g} s at {fps:g} fps are too many frames")
+            raise MotionError(f"{self.duration:g} s at {fps:g} fps is too many frames")
         log.debug("resampling %r to %g fps", self, fps)
         picked = abs(ratio - round(ratio)) < 1e-9 and ratio > 0.5
         values = (self if picked else self.continuous()).values
         return replace(self, values=resampled(values, ratio, to_end), fps=fps)
 
     def continuous(self) -> "Motion":
-        """The same poses with angles that do not leap between frames.
+        """The same poses with angles that do not jump between frames.
 
-        Euler angles by whole turns and gimbal flips, from the first frame on; exponential maps ("JOINT.ex", "JOINT.ey",
-        "JOINT.ez") by whole turns, back from the last one.
+        Euler angles change by whole turns and gimbal flips, forward from the first frame; exponential maps ("JOINT.ex",
+        "JOINT.ey", "JOINT.ez") by whole turns, backward from the last one.
         """
         values = np.array(self.values)
         triples, singles = self._euler()
@@ -196,7 +196,7 @@ class Motion:
         return triples, singles
 
     def rotation_columns(self) -> Mapping[str, list[int]]:
-        """For each joint with Euler channels their columns, in the order x, y, z."""
+        """The columns of each joint with Euler channels, in the order x, y, z."""
         return rotation_columns(self.channels, self.units)
 
     def _order(self, joint: str) -> str | None:
@@ -207,7 +207,7 @@ class Motion:
 
 @lru_cache(maxsize=64)
 def rotation_columns(channels: tuple[str, ...], units: tuple[str, ...], letter: str = "r") -> Mapping[str, list[int]]:
-    """For each joint with channels "JOINT.rx", ... (or with another letter) in a unit of angle their columns."""
+    """The columns of each joint with channels "JOINT.rx", ... (or another letter) in a unit of angle."""
     found: dict[str, list[int]] = {}
     kinds = {f"{letter}{axis}" for axis in "xyz"}
     for column in sorted(range(len(channels)), key=lambda column: channels[column][-2:]):
@@ -219,7 +219,7 @@ def rotation_columns(channels: tuple[str, ...], units: tuple[str, ...], letter: 
 
 def _frozen(values: ArrayLike) -> Array:
     try:
-        array = np.array(values, dtype=np.float64, order="C")  # frames lie one after the other, whatever made them
+        array = np.array(values, dtype=np.float64, order="C")  # frames are contiguous, whatever the source
     except (TypeError, ValueError) as error:
         raise MotionError(f"the values of a motion must be numbers: {error}") from error
     array.flags.writeable = False

@@ -1,4 +1,4 @@
-"""The pose of characters at a moment, as an engine takes it: where they are, how they face, how their bones turn."""
+"""The pose of characters at one moment, for engines: positions, facings and bone rotations."""
 
 from dataclasses import dataclass, replace
 
@@ -12,17 +12,17 @@ from motet.motion.rotations import Array
 Floats = NDArray[np.float32]
 
 LEVELS = [[int(joint) for joint in level] for level in HUMANOID.levels]
-"""Joints of the humanoid but the root, those of one depth together."""
+"""Joints of the humanoid except the root, grouped by depth."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Pose:
-    """The pose of B characters on the humanoid; metres, y up. Places in the world are float64, all else float32.
+    """The pose of B characters on the humanoid; metres, y up. World positions are float64, all else float32.
 
     ground: (B, 3) x, z, and the facing in radians: 0 along z, positive to the left. rotations: (B, J, 4) quaternions
     (x, y, z, w) of the bones (:data:`motet.motion.BONES`) in their parents' frames; of the hips in the frame of the
-    facing. height: (B,) of the hips above the ground. contacts: (B, 2) from 0 to 1, how much the left and the right
-    foot stand.
+    facing. height: (B,) of the hips above the ground. contacts: (B, 2) from 0 to 1, ground contact of the left and the
+    right foot.
     """
 
     ground: Array
@@ -39,7 +39,7 @@ class Pose:
 
     @property
     def place(self) -> Array:
-        """Where the characters stand (B, 3): on the ground under the hips."""
+        """Positions of the characters (B, 3): on the ground under the hips."""
         return np.insert(self.ground[:, :2], 1, 0.0, axis=1)
 
     @property
@@ -50,11 +50,11 @@ class Pose:
         return np.stack([zero, np.sin(half), zero, np.cos(half)], axis=1)
 
     def positions(self) -> Array:
-        """Places (B, J', 3) of all joints of the humanoid in the world, in the order of ``HUMANOID.names``."""
+        """Positions (B, J', 3) of all joints of the humanoid in the world, in the order of ``HUMANOID.names``."""
         return self.global_transforms()[1]
 
     def global_transforms(self) -> tuple[Floats, Array]:
-        """Rotations (B, J', 4) and places (B, J', 3) of all joints of the humanoid in the world."""
+        """Rotations (B, J', 4) and positions (B, J', 3) of all joints of the humanoid in the world."""
         count = len(HUMANOID.names)
         turned = np.zeros((count, len(self), 4), dtype=np.float32)
         turned[..., 3] = 1
@@ -71,7 +71,7 @@ class Pose:
         return np.swapaxes(turned, 0, 1), np.swapaxes(places, 0, 1)
 
     def towards(self, other: "Pose", part: float) -> "Pose":
-        """The pose ``part`` of the way to another, which is near; for frame rates that are not the model's."""
+        """The pose ``part`` (0 to 1) of the way to another nearby pose, for frame rates other than the model's."""
         share = np.float32(part)
         step = other.ground - self.ground
         step[:, 2] = wrapped(step[:, 2])

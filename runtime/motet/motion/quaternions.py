@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 
 def quat_product(left: NDArray[Any], right: NDArray[Any]) -> NDArray[Any]:
-    """Products of quaternions (..., 4): first the right turn, then the left."""
+    """Products of quaternions (..., 4): the right rotation first, then the left."""
     a, b = left[..., :3], right[..., :3]
     found = np.empty(np.broadcast_shapes(left.shape, right.shape), dtype=left.dtype)
     found[..., :3] = left[..., 3:] * b + right[..., 3:] * a + cross(a, b)
@@ -16,7 +16,7 @@ def quat_product(left: NDArray[Any], right: NDArray[Any]) -> NDArray[Any]:
 
 
 def quat_rotated(quats: NDArray[Any], vectors: NDArray[Any]) -> NDArray[Any]:
-    """Vectors (..., 3) turned by unit quaternions (..., 4)."""
+    """Vectors (..., 3) rotated by unit quaternions (..., 4)."""
     axis = quats[..., :3]
     twice = 2 * cross(axis, vectors)
     found: NDArray[Any] = vectors + quats[..., 3:] * twice + cross(axis, twice)
@@ -33,7 +33,7 @@ def cross(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
 
 
 def conjugate(quats: NDArray[Any]) -> NDArray[Any]:
-    """The turns (..., 4) back."""
+    """The inverse rotations (..., 4)."""
     found: NDArray[Any] = quats * np.array([-1, -1, -1, 1], dtype=quats.dtype)
     return found
 

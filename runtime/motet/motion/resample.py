@@ -1,8 +1,8 @@
-"""Frames between frames: at which times, and by lines or splines.
+"""Resampling: the times of the new frames, and linear or spline interpolation.
 
-There is one rule. New frames lie within the old ones: nothing is extrapolated past the last frame, so T frames become
-``floor((T - 1) * new / old) + 1``. Where every n-th frame is wanted they are picked, at a lower rate frames lie on
-lines, and at a higher one on Catmull-Rom splines, which pass through every frame without a kink.
+One rule applies: nothing is extrapolated past the last frame, so T frames become ``floor((T - 1) * new / old) + 1``.
+Whole ratios pick every n-th frame; otherwise lower rates interpolate linearly, and higher ones by Catmull-Rom splines,
+which pass smoothly through every frame.
 """
 
 import numpy as np
@@ -11,9 +11,9 @@ from motet.motion.rotations import Array
 
 
 def resampled(values: Array, ratio: float, to_end: bool = False) -> Array:
-    """Values (T, ...) at every ``ratio``-th frame, which need not be whole: at the first frame and on.
+    """Values (T, ...) at every ``ratio``-th frame, from the first; the ratio need not be whole.
 
-    to_end: such that the last frame stays instead of the first; what is left over falls away at the start.
+    to_end: keep the last frame instead of the first; the remainder is dropped at the start.
     """
     frames = len(values)
     count = int((frames - 1) / ratio + 1e-9) + 1 if frames else 0
@@ -36,10 +36,10 @@ def lines(values: Array, times: Array) -> Array:
 
 
 def spline(values: Array, times: Array) -> Array:
-    """As :func:`lines`, on Catmull-Rom splines."""
+    """Like :func:`lines`, on Catmull-Rom splines."""
     if len(values) < 2:
         return np.repeat(values[:1], len(times), axis=0)
-    # beyond each end the parabola through the three nearest frames goes on, or the line through two
+    # beyond each end, continue the parabola through the three nearest frames, or the line through two
     near, far = (np.array([3.0, -3.0, 1.0]), 3) if len(values) > 2 else (np.array([2.0, -1.0]), 2)
     ends = [np.tensordot(near, part, 1)[None] for part in (values[:far], values[: -far - 1 : -1])]
     padded = np.concatenate([ends[0], values, ends[1]])
@@ -50,7 +50,7 @@ def spline(values: Array, times: Array) -> Array:
 
 
 def _between(values: Array, times: Array) -> tuple[np.ndarray[tuple[int], np.dtype[np.intp]], Array]:
-    """For each time the frame before it, and how far on the way to the next one it is (S, 1, ...)."""
-    # a time that is a frame but for rounding is that frame
+    """For each time the frame before it, and the fraction of the way to the next one (S, 1, ...)."""
+    # a time that equals a frame up to rounding is that frame
     start = np.minimum((times + 1e-9).astype(np.intp), len(values) - 2)
     return start, (times - start).reshape(-1, *[1] * (values.ndim - 1))

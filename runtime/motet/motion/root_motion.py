@@ -1,4 +1,4 @@
-"""The way over the ground: taken out, for figures that an engine's own code moves, or laid on a root at the floor."""
+"""The path over the ground: removed, for figures moved by an engine's code, or moved to a root at the floor."""
 
 import numpy as np
 
@@ -10,11 +10,11 @@ from motet.motion.rotations import UP, Array, inverse, rotated
 
 
 def in_place(motion: Motion) -> Motion:
-    """The motion with the root over the origin in every frame: its way over the ground goes, height and turns stay.
+    """The motion in place: the root stays over the origin; its height and rotation are kept.
 
-    Where another joint than the root carries legs and back, such as a pelvis below a root at the floor, it stays over
-    the origin, too. Up is y, or the axis along which a human figure stands. A motion without translations comes back
-    as it is. MotionError for one without skeleton.
+    If another joint than the root carries legs and back, such as a pelvis below a root at the floor, it too stays over
+    the origin. Up is y, or the axis along which a human figure stands. A motion without translations is returned
+    unchanged. MotionError for one without skeleton.
     """
     skeleton = skeleton_of(motion)
     carrier, up = _carrier(motion)
@@ -28,14 +28,14 @@ def in_place(motion: Motion) -> Motion:
 
 
 def travel_on_root(motion: Motion, joint_map: JointMap | None = None) -> Motion:
-    """The motion with its way over the ground on the root, where that rests at the floor and carries the hips.
+    """The motion with its path over the ground moved to the root, if that rests at the floor and carries the hips.
 
-    So Unreal and Godot take it for root motion; turns stay with the hips. Any other motion comes back as it is.
-    MotionError for what is no human figure.
+    Unreal and Godot then use it as root motion; rotation stays with the hips. Any other motion is returned unchanged.
+    MotionError for a figure that is not human.
     """
     skeleton = skeleton_of(motion)
     joint = (joint_map or map_of(motion)).carrier(skeleton)
-    # a root that far below what carries legs and back, in heights, rests at the floor
+    # a root this far below the joint that carries legs and back, in heights, rests at the floor
     if float(np.linalg.norm(skeleton.rest_positions[joint])) < 0.3 * skeleton.height:
         return motion
     moves = local_translations(motion)[:, [0, joint]]
@@ -48,7 +48,7 @@ def travel_on_root(motion: Motion, joint_map: JointMap | None = None) -> Motion:
 
 
 def _over_origin(motion: Motion, joint: int, up: Array) -> Motion:
-    """The motion with the translation of one joint that leaves only its height."""
+    """The motion with the translation of one joint reduced to its height."""
     skeleton = skeleton_of(motion)
     rotations, places = global_transforms(motion)
     moved = np.outer(places[:, joint] @ up, up)
@@ -59,7 +59,7 @@ def _over_origin(motion: Motion, joint: int, up: Array) -> Motion:
 
 
 def _carrier(motion: Motion) -> tuple[int, Array]:
-    """The joint that carries legs and back and where up is (3,); of what is no human figure the root, and y."""
+    """The joint that carries legs and back, and up (3,); for a figure that is not human, the root and y."""
     skeleton = skeleton_of(motion)
     try:
         figure = Figure.of(motion)

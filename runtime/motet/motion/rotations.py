@@ -1,13 +1,13 @@
 """Conversions between rotation representations; names say ``from_to``.
 
-Any number of leading dimensions comes before the last one (angles, vectors, quaternions) or the last two
-(matrices). Angles are radians, arrays float64. Matrices turn column vectors. An Euler ``order`` such as ``"zyx"``
-lists the factors of the product from left to right, R = Rz Ry Rx, and the angles come in the same order (what
-scipy writes as the intrinsic ``"ZYX"``). Quaternions are (x, y, z, w), unit length, the scalar last.
+Any number of leading dimensions may precede the last one (angles, vectors, quaternions) or the last two (matrices).
+Angles are radians, arrays float64. Matrices rotate column vectors. An Euler ``order`` such as ``"zyx"`` lists the
+factors of the product from left to right, R = Rz Ry Rx, and the angles come in the same order (scipy's intrinsic
+``"ZYX"``). Quaternions are (x, y, z, w), unit length, scalar last.
 
-Products are summed along the frames, some four times as fast as by ``@``, which takes the matrices one by one, where
-the frames lie together in memory (:func:`frames_last`). What is computed from such arrays or picked out of them is laid
-out like them; other arrays give the same products, more slowly.
+Products are summed along the frames, about four times as fast as by ``@``, which multiplies matrices one by one, if the
+frames are contiguous in memory (:func:`frames_last`). Results and slices of such arrays keep that layout; other arrays
+give the same products, more slowly.
 """
 
 import numpy as np
@@ -21,21 +21,21 @@ UP = np.array([0.0, 1.0, 0.0])
 """Where y points."""
 
 LOCKED = 1e-9
-"""A cosine of the middle Euler angle under which the other two turn about the same axis: a gimbal lock."""
+"""Gimbal lock: below this cosine of the middle Euler angle the other two turn about the same axis."""
 
 
 def frames_last(shape: tuple[int, ...]) -> Array:
-    """An array of the shape (T, ...), not filled yet, with the frames last in memory.
+    """An uninitialized array of the shape (T, ...) with the frames last in memory.
 
-    What is computed number by number for all frames, as rotations are, then runs along one piece of memory.
+    Elementwise computations over all frames, as for rotations, then run along contiguous memory.
     """
     return np.empty(shape[::-1]).T
 
 
 def angle_of(sine: Array, cosine: Array) -> Array:
-    """Angles (...) in radians of sines and cosines (...): ``np.arctan2``, rounded alike wherever these lie in memory.
+    """Angles (...) in radians from sines and cosines (...): ``np.arctan2``, rounded the same for any memory layout.
 
-    Old numpy takes a strided array that ends beside the result's memory for one with it, and rounds otherwise.
+    Old numpy mistakes a strided array that ends next to the result's memory for overlapping, and rounds differently.
     """
     found: Array = np.arctan2(np.array(sine, order="K"), np.array(cosine, order="K"))
     return found
@@ -56,7 +56,7 @@ def axis_to_rotmat(axis: str, angle: Array) -> Array:
 def euler_to_rotmat(angles: Array, order: str) -> Array:
     """Euler angles (..., 3) in ``order``, three different axes, to matrices (..., 3, 3): the product multiplied out."""
     i, j, k = (_AXES[axis] for axis in order)
-    # cosine and sine from the tangent of the half, which numpy has several times as fast as the two of them
+    # cosine and sine from the tangent of the half angle, several times as fast in numpy as both
     tangent = np.tan(angles * (0.5 * _handedness(order)))
     part = 1 / (1 + tangent**2)
     cos_a, cos_b, cos_c = np.moveaxis((1 - tangent**2) * part, -1, 0)
@@ -72,7 +72,7 @@ def euler_to_rotmat(angles: Array, order: str) -> Array:
 
 
 def rotmat_to_euler(matrix: Array, order: str) -> Array:
-    """Matrices (..., 3, 3) to Euler angles (..., 3): with the middle one within a quarter turn.
+    """Matrices (..., 3, 3) to Euler angles (..., 3), the middle one within a quarter turn.
 
     ``order`` must name three different axes. At a gimbal lock the last angle is 0.
     """
@@ -91,16 +91,16 @@ def rotmat_to_euler(matrix: Array, order: str) -> Array:
 
 
 def _handedness(order: str) -> float:
-    """1 for "xyz" and what is rotated out of it, -1 for "zyx" and those."""
+    """1 for cyclic permutations of "xyz", -1 for those of "zyx"."""
     return 1.0 if (_AXES[order[1]] - _AXES[order[0]]) % 3 == 1 else -1.0
 
 
 def continuous_euler(angles: Array, turn: Array | float = 2 * np.pi) -> Array:
-    """The same rotations with Euler angles (T, ..., 3) that do not leap from frame to frame.
+    """The same rotations with Euler angles (T, ..., 3) that do not jump from frame to frame.
 
     Of the two solutions (a, b, c) and (a + pi, pi - b, c + pi), each up to whole turns, every frame takes the one
     nearest to the frame before it; the first frame stays.
-    turn: a whole turn in the angles' unit, or in that of each.
+    turn: a whole turn in the angles' unit, or one for each angle.
     """
     turn = turn + np.zeros(angles.shape[1:])
     result = np.array(angles, dtype=np.float64)
@@ -145,20 +145,20 @@ def without_turns(angles: Array, turn: Array | float = 2 * np.pi) -> Array:
 
 
 def _distance(steps: Array, turn: Array) -> Array:
-    """Radians (T, ...) over all three of angles (T, ..., 3), whole turns left out."""
+    """Summed radians (T, ...) of angles (T, ..., 3), modulo whole turns."""
     turns = steps / turn
     distance: Array = 2 * np.pi * np.abs(turns - np.round(turns)).sum(axis=-1)
     return distance
 
 
 def continuous_rotvec(vectors: Array) -> Array:
-    """The same rotations as rotation vectors (T, J, 3) that do not leap from frame to frame; the last frame stays.
+    """The same rotations as rotation vectors (T, J, 3) that do not jump from frame to frame; the last frame stays.
 
-    A turn by a about an axis is one by a - 2 pi too: every frame takes the one nearest to the frame after it.
+    A rotation by a about an axis is also one by a - 2 pi: every frame takes the one nearest to the frame after it.
     """
     result = np.array(vectors, dtype=np.float64)
     frames, joints, _ = np.nonzero(_whole_turns(result[:-1], result[1:]))
-    if len(joints):  # what does not leap anywhere is the nearest as it is
+    if len(joints):  # without jumps they are the nearest already
         joints = np.unique(joints)
         part = result[:, joints]
         for t in range(int(frames.max()), -1, -1):
@@ -168,16 +168,16 @@ def continuous_rotvec(vectors: Array) -> Array:
 
 
 def _whole_turns(now: Array, after: Array) -> Array:
-    """What to add to rotation vectors (..., 3), whole turns, so that they are nearest to ``after`` (..., 3)."""
+    """Whole turns to add to rotation vectors (..., 3) to bring them nearest to ``after`` (..., 3)."""
     angle, other = (np.linalg.norm(vector, axis=-1, keepdims=True) for vector in (now, after))
-    # without an angle of its own, a rotation has the axis of the frame after it
+    # a rotation by no angle takes the axis of the frame after it
     axis = np.where(angle > 1e-3, now / np.maximum(angle, 1e-9), after / np.maximum(other, 1e-9))
     turns: Array = axis * (np.round(((after * axis).sum(-1, keepdims=True) - angle) / (2 * np.pi)) * 2 * np.pi)
     return turns
 
 
 def rotvec_to_rotmat(vector: Array) -> Array:
-    """Rotation vectors, also called exponential maps, (..., 3) to matrices (..., 3, 3) (Rodrigues' formula)."""
+    """Rotation vectors (exponential maps) (..., 3) to matrices (..., 3, 3) (Rodrigues' formula)."""
     angle = np.linalg.norm(vector, axis=-1)
     # sin(a)/a and (1 - cos a)/a^2, both exact at 0 by numpy's sinc(t) = sin(pi t)/(pi t)
     first, second = np.sinc(angle / np.pi), 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
@@ -185,7 +185,7 @@ def rotvec_to_rotmat(vector: Array) -> Array:
 
 
 def rodrigues(cosine: Array, sine: Array, versed: Array, along: Array) -> Array:
-    """Matrices (..., 3, 3) of turns by angles a about axes n, as c I + [s]x + v w^T.
+    """Matrices (..., 3, 3) of rotations by angles a about axes n, as c I + [s]x + v w^T.
 
     cosine: c = cos a (...); sine: s = n sin a (..., 3); versed, along: v and w, with v w^T = (1 - cos a) n n^T.
     """
@@ -217,8 +217,8 @@ def quat_to_rotmat(quat: Array) -> Array:
 def rotmat_to_quat(matrix: Array) -> Array:
     """Matrices (..., 3, 3) to unit quaternions (..., 4), scalar last and not negative.
 
-    The largest of the four components is found first and divides the others, which keeps every rotation exact
-    (Shepperd 1978).
+    The largest of the four components is found first and divides the others, so every rotation is exact (Shepperd
+    1978).
     """
     trace = np.trace(matrix, axis1=-2, axis2=-1)[..., None, None]
     transposed = np.swapaxes(matrix, -1, -2)
@@ -242,13 +242,13 @@ def product(left: Array, right: Array) -> Array:
 
 
 def rotated(rotations: Array, vectors: Array) -> Array:
-    """Vectors (..., 3) turned by rotations (..., 3, 3)."""
+    """Vectors (..., 3) rotated by rotations (..., 3, 3)."""
     result: Array = np.einsum("...ij,...j->...i", rotations, vectors)
     return result
 
 
 def inverse(rotations: Array) -> Array:
-    """The rotations (..., 3, 3) back."""
+    """The inverse rotations (..., 3, 3)."""
     return np.swapaxes(rotations, -1, -2)
 
 
@@ -260,11 +260,11 @@ def unit(vectors: Array) -> Array:
 
 
 def swing(start: Array, end: Array) -> Array:
-    """The shortest rotations (..., 3, 3) that turn directions (..., 3) into others; half a turn is about any axis."""
+    """The shortest rotations (..., 3, 3) from directions (..., 3) to others; half a turn is about any axis."""
     start, end = unit(start), unit(end)
     axis, cosine = np.cross(start, end), np.sum(start * end, axis=-1)
     versed = axis / np.maximum(1 + cosine, 1e-9)[..., None]
-    # 1 - (1 - cosine) and not the cosine itself: where a direction is 0, nothing is turned
+    # 1 - (1 - cosine) instead of the cosine: a direction of 0 gives the identity
     turn = rodrigues(1 - np.sum(versed * axis, axis=-1), axis, versed, axis)
     half = cosine < -1 + 1e-6
     if half.any():
@@ -274,7 +274,7 @@ def swing(start: Array, end: Array) -> Array:
 
 
 def twist(rotations: Array, axis: Array) -> Array:
-    """The part (T, 3, 3) of rotations (T, 3, 3) that is a turn about an axis (3): what is left of them is a swing."""
+    """The twist (T, 3, 3) of rotations (T, 3, 3) about an axis (3); the rest is the swing."""
     length = float(np.linalg.norm(axis))
     if length == 0.0:
         return np.broadcast_to(np.eye(3), rotations.shape)

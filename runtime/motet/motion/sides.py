@@ -1,4 +1,4 @@
-"""Left and right, told from names: which joints are each other's mirror image."""
+"""Left and right from names: which joints mirror each other."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -17,7 +17,7 @@ PATTERNS = (
 
 
 def partners_of(names: Sequence[str]) -> tuple[int, ...]:
-    """For each name the index of its partner on the other side, or its own where there is none."""
+    """For each name the index of its partner on the other side, or its own if there is none."""
     return tuple(partner for partner, _ in _found(names))
 
 
@@ -34,7 +34,7 @@ def _found(names: Sequence[str]) -> Iterator[tuple[int, str]]:
 
 
 def _other_names(name: str) -> Iterator[tuple[str, str]]:
-    """Names that the partner could have, each with the side that this name then stands for."""
+    """Possible names of the partner, each with the side that ``name`` is then on."""
     for pattern in PATTERNS:
         for match in re.finditer(pattern, name):
             side = LEFT if match[0][0] in "lL" else RIGHT

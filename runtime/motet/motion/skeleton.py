@@ -1,4 +1,4 @@
-"""The skeleton: a tree of joints with offsets, and how each joint turns its angles into a rotation."""
+"""The skeleton: a tree of joints with offsets, and each joint's rotation convention."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
@@ -41,10 +41,10 @@ class Joint:
 
 @dataclass(frozen=True, repr=False)
 class Skeleton:
-    """Joints in an order where each parent comes before its children; the first is the root.
+    """Joints, parents before children; the first is the root.
 
-    A joint with a name that ends in ``_end`` marks the tip of its parent's last bone and has no channels.
-    metres_per_unit: how long one unit of the offsets is, or None where a file does not state it.
+    A joint whose name ends in ``_end`` marks the tip of its parent's last bone and has no channels.
+    metres_per_unit: metres per unit of the offsets, or None if the file does not state it.
     """
 
     joints: tuple[Joint, ...]
@@ -54,11 +54,11 @@ class Skeleton:
         if not self.joints:
             raise MotionError("a skeleton needs at least one joint")
         if self.metres_per_unit is not None and not 0 < self.metres_per_unit < np.inf:
-            raise MotionError(f"a unit of length has a positive number of metres, not {self.metres_per_unit}")
+            raise MotionError(f"a length unit must be a positive number of metres, not {self.metres_per_unit}")
         names = [joint.name for joint in self.joints]
         double = sorted(name for name, count in Counter(names).items() if count > 1)
         if double:
-            raise MotionError(f"joint names must differ, twice in this skeleton: {', '.join(double)}")
+            raise MotionError(f"joint names must be unique; repeated: {', '.join(double)}")
         if not np.isfinite([[*joint.offset, *joint.axis] for joint in self.joints]).all():
             raise MotionError("offsets and axes of joints must be finite")
         for i, joint in enumerate(self.joints):
@@ -127,7 +127,7 @@ class Skeleton:
         return self.places[name]
 
     def subtree(self, name: str) -> tuple[int, ...]:
-        """Indices of a joint and of all that hang on it."""
+        """Indices of a joint and all its descendants."""
         found = [self.index(name)]
         for i in found:
             found.extend(self.children[i])
@@ -143,11 +143,9 @@ class Skeleton:
         return Skeleton(joints, metres_per_unit)
 
     def unit_factor(self, metres_per_unit: float) -> float:
-        """What a length in this skeleton's unit is multiplied by to be in the other unit."""
+        """The factor from this skeleton's unit to the other unit."""
         if self.metres_per_unit is None:
-            raise UnitError(
-                "this skeleton's unit of length is not known: give metres_per_unit, as motion.with_unit(0.01)"
-            )
+            raise UnitError("the length unit of this skeleton is unknown: set it, as in motion.with_unit(0.01)")
         return self.metres_per_unit / metres_per_unit
 
     def to_json(self) -> dict[str, Any]:
@@ -162,7 +160,7 @@ class Skeleton:
 
     @staticmethod
     def from_json(data: Mapping[str, Any]) -> "Skeleton":
-        """The inverse of :meth:`to_json`; MotionError where it is not a skeleton."""
+        """The inverse of :meth:`to_json`; MotionError if it is not a skeleton."""
         try:
             joints = tuple(
                 Joint(str(j["name"]), index(j["parent"]), _triple(j["offset"]), str(j["order"]), _triple(j["axis"]))

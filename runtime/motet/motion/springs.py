@@ -1,4 +1,4 @@
-"""Critically damped springs: what comes back to rest as fast as it can without going beyond it.
+"""Critically damped springs: the fastest return to rest without overshoot.
 
 The distance from rest after t seconds is (d + (v + d y) t) exp(-y t): d and v are its start and its rate there, y the
 damping.
@@ -14,12 +14,12 @@ Values = NDArray[Any]
 
 
 def damping_of(half_life: float) -> float:
-    """The damping, 1/s, of a spring that from rest is half way back after so many seconds, nearly."""
+    """The damping, 1/s, of a spring with approximately this half-life in seconds, starting at rate 0."""
     return 2 * math.log(2) / half_life
 
 
 def damped(off: Values, rate: Values, damping: float | Values, seconds: float) -> tuple[Values, Values]:
-    """A distance from rest and its rate, arrays of one shape, so many seconds later (exact).
+    """A distance from rest and its rate, arrays of one shape, ``seconds`` later (exact).
 
     damping: one for all, or an array that broadcasts.
     """
@@ -28,7 +28,7 @@ def damped(off: Values, rate: Values, damping: float | Values, seconds: float) -
 
 
 def damped_path(off: Values, rate: Values, damping: float, seconds: float) -> Values:
-    """The integral of the distance of :func:`damped` over so many seconds (exact)."""
+    """The integral of the distance of :func:`damped` over ``seconds`` (exact)."""
     rise, left = rate / damping + off, math.exp(-damping * seconds)
     found: Values = (rise + off - left * (rise + off + rise * damping * seconds)) / damping
     return found

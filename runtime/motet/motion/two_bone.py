@@ -1,4 +1,4 @@
-"""Inverse kinematics of two bones: a thigh and a shin turn so that the ankle comes to another place."""
+"""Two-bone inverse kinematics: thigh and shin turn to move the ankle to a target."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -8,20 +8,20 @@ import numpy as np
 from motet.motion.rotations import Array, product, rotated, rotvec_to_rotmat, swing, unit
 
 MOST_BENT = -0.95
-"""The cosine of the angle by which a knee bends at most, 162 degrees: what would bend it more is not reached."""
+"""The cosine of the largest bend of a knee, 162 degrees: targets beyond it are not reached."""
 
 EASED_SHARE = 0.5
-"""The share of what is left until a leg is straight that it is lengthened by at most."""
+"""The largest lengthening of a leg, as a share of the length left until it is straight."""
 
 GIVES = (0.012, 0.006)
-"""Of the length of a straight leg, 1 cm: how much it stays too long where it has to bend; and what it is short of
-straight, 5 mm or a knee bent by 12 degrees, where that is e times less."""
+"""Shares of the length of a straight leg: 1 cm, how much too long it stays when it has to bend; and 5 mm short of
+straight, or a knee bent by 12 degrees, where that is e times less."""
 
 
 @dataclass(frozen=True, eq=False)
 class Leg:
-    """A thigh and a shin: where hip, knee and ankle are, (T, 3), and the knee's axis (T, 3), about which the shin turns
-    back when the knee bends. Any unit of length."""
+    """A thigh and a shin: positions of hip, knee and ankle (T, 3), and the knee's axis (T, 3), about which the shin
+    turns back when the knee bends. Any unit of length."""
 
     hip: Array
     knee: Array
@@ -29,10 +29,10 @@ class Leg:
     hinge: Array
 
     def eased(self, target: Array) -> Array:
-        """The place (T, 3) nearby ``target`` (T, 3), on the line to the hip, that the ankle comes to without a snap.
+        """The position (T, 3) near ``target`` (T, 3), on the line to the hip, that the ankle reaches without a snap.
 
-        A straight knee bends, and a bent one becomes straight, infinitely fast for the length that the leg gains or
-        loses. So a leg lengthens the less the straighter it gets, and a straight one gives way but softly.
+        Near straight, a knee bends or straightens infinitely fast relative to the leg's length. So a leg lengthens less
+        the straighter it gets, and a straight one bends only softly.
         """
         away = target - self.hip
         now, wanted = _length(self.ankle - self.hip), _length(away)
@@ -45,8 +45,8 @@ class Leg:
         return found
 
     def turns(self, target: Array) -> tuple[Array, Array]:
-        """Turns (T, 3, 3) in the world of thigh and shin that bring the ankle to ``target`` (T, 3), or as near to it as
-        it can be brought.
+        """World rotations (T, 3, 3) of thigh and shin that bring the ankle to ``target`` (T, 3), or as near as
+        possible.
 
         The knee turns about its axis, as far as that is square to the thigh, until the leg is as long as it has to be,
         bent back, as knees are, even where it was bent forward;
@@ -76,14 +76,14 @@ class Leg:
 
     @cached_property
     def _bent(self) -> Array:
-        """By how much the knee bends, radians (T, 1): less than 0 where it bends forward."""
+        """The knee's bend in radians (T, 1), negative if forward."""
         along, down = self.knee - self.hip, self.ankle - self.knee
         found: Array = np.arctan2(_dot(np.cross(along, down), self._axis), _dot(along, down))
         return found
 
     @cached_property
     def _in_plane(self) -> Array:
-        """The part of the shin that is in the plane of the bend."""
+        """The part of the shin in the plane of the bend."""
         out = _dot(unit(self.ankle - self.knee), self._axis)
         return np.sqrt(np.maximum(1 - out**2, 1e-12))
 

@@ -107,7 +107,7 @@ def test_a_run_is_evaluated_on_what_it_was_trained_on(tmp_path: Path) -> None:
     assert found(f"motet train tdbn --data={tmp_path} --out x") == tmp_path
     assert found("motet train tdbn --out x") is None
     assert found("motet train tdbn --data gone --out x", tmp_path) == tmp_path
-    with pytest.raises(DataError, match=r"runs/x was trained on, gone, are missing: give --data"):
+    with pytest.raises(DataError, match=r"runs/x was trained on, gone, which is missing: give --data"):
         found("motet train tdbn --data gone")
     run = tmp_path / "run"
     run.mkdir()
@@ -118,7 +118,7 @@ def test_a_run_is_evaluated_on_what_it_was_trained_on(tmp_path: Path) -> None:
     (tmp_path / "run-store" / "store.json").touch()
     assert found("", run=run, suite=fill) == found("", tmp_path, run, fill) == tmp_path / "run-store"
     assert found("", tmp_path / "other", run, fill) == tmp_path / "other"
-    with pytest.raises(UsageError, match=r"need --data: .*\(runs/x was trained on gone, which is not here\)"):
+    with pytest.raises(UsageError, match=r"need --data: .*\(runs/x was trained on gone, which is missing\)"):
         found("motet train fill --data gone --out x", suite=fill)
 
 

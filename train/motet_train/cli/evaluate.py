@@ -31,24 +31,22 @@ from motet_train.settings import read_settings
 @click.option(
     "--data",
     type=Path,
-    help="Control: the clips. Predict: text files of the protocol, or the store. Others: the store. [default: what a "
-    "run was trained on] With --says: a store or a folder or zip of motion files with a table of sentences, for the "
+    help="Control: the clips. Predict: text files of the protocol, or the store. Others: the store. [default: the "
+    "run's training data] With --says: a store, or a folder or zip of motion files with a table of sentences, for the "
     "columns of real trials and of the look-up.",
 )
-@click.option(
-    "--says", is_flag=True, help="Generate: ask everyday prompts, and count the motions that do what they say."
-)
+@click.option("--says", is_flag=True, help="Generate: try everyday prompts, and count the motions that follow them.")
 @click.option(
     "--search",
     default="search",
     show_default=True,
-    help="With --says: the name or path of a search bundle, in whose space motions and prompts are compared.",
+    help="With --says: name or path of the search bundle whose space is used to compare motions and prompts.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one nested object with stable keys.")
 @click.option("--plots", type=Path, help="Folder for the figures of the papers.")
 @unit_in
 @session_options
-@click.option("--save", "keep", is_flag=True, help="Save the figures in each run, to be exported with it.")
+@click.option("--save", "keep", is_flag=True, help="Save the figures in each run, for export.")
 def evaluate(
     models: tuple[str, ...],
     data: Path | None,
@@ -62,19 +60,19 @@ def evaluate(
 ) -> None:
     """Measure MODELS: run folders, or names and paths of bundles, of one kind.
 
-    Control: the thesis' experiments. Figures that are steered: how well their feet stand, whether they go where they
-    are told, whether their poses stay whole whatever they are told, beside recordings. Describe and generate: BLEU,
-    floors, attributes, measures; with both, of the same split, also the chain from sentence to motion and back. Search:
-    what is found. Fill: how far joints are from where they were in gaps of trials, beside interpolation. Predict: the
-    protocol's Euler errors on its text files, beside floors and published rows, or distances in held out motion files,
-    by kinds of motions. With --says, generate: the share of motions that do what everyday prompts say, how good they
-    are, and how near they are to their prompts and to recorded motions in the space of a search model.
+    Control: the thesis' experiments. Steered figures: foot contact, path following and pose integrity under any
+    control, next to recordings. Describe and generate: BLEU, floors, attributes, measures; with both, on the same
+    split, also the chain from sentence to motion and back. Search: retrieval. Fill: joint distances from the originals
+    in gaps of trials, next to interpolation. Predict: the protocol's Euler errors on its text files, next to floors and
+    published rows, or distances in held-out motion files, by kind of motion. With --says, generate: the share of
+    motions that follow everyday prompts, their quality, and their distance to their prompts and to recorded motions in
+    the space of a search model.
     """
     torch.set_num_threads(1)
     runs, loaded = _loaded(models, session)
     suite = _says(loaded, keep) if says else suite_of(loaded)
     if keep and (bundles := [name for name in models if name not in runs]):
-        raise click.UsageError(f"--save keeps figures in training runs; {', '.join(bundles)} is a bundle")
+        raise click.UsageError(f"--save stores figures in training runs, but {', '.join(bundles)} is a bundle")
     found = dict.fromkeys(loaded, data) if says else data_of(loaded, suite, data)
     _check(suite, plots)
     results = suite.measure(loaded, Given(found, unit_in, load_as(SearchModel, search, session) if says else None))
@@ -95,9 +93,9 @@ def _loaded(names: tuple[str, ...], session: SessionOptions) -> tuple[dict[str, 
 
 
 def _check(suite: Suite, plots: Path | None) -> None:
-    """That pictures can be drawn and written, which is said before hours of measuring."""
+    """Check that pictures can be drawn and written before hours of measuring."""
     if plots is not None and not suite.draws:
-        raise click.UsageError(f"{suite.what} have no --plots")
+        raise click.UsageError(f"--plots is not available for {suite.what}")
     if plots is not None:
         make_folder(plots)
 
@@ -112,28 +110,28 @@ def _draw(results: Results, plots: Path | None) -> None:
 
 def _says(models: Mapping[str, BundleModel], keep: bool) -> Suite:
     if keep:
-        raise click.UsageError("--says prints figures, and draws them with --plots; it does not go with --save")
+        raise click.UsageError("--says only prints figures, or draws them with --plots: drop --save")
     if others := [name for name, model in models.items() if model.VERB != "generate"]:
-        raise click.UsageError(f"--says asks generate models; {', '.join(others)} is none")
+        raise click.UsageError(f"--says takes generate models, not {', '.join(others)}")
     return SAYS
 
 
 def data_of(models: Mapping[str, BundleModel], suite: Suite, data: Path | None) -> dict[str, Path | None]:
-    """What each model is measured on: the store that was prepared of the corpus that its training was given, where
-    that or nothing is given here; else what is given; else what its training was given, where it is still there."""
+    """The data to measure each model on: given its training corpus or nothing, the store prepared from that corpus;
+    else the given data; else its training data, if it still exists."""
     told = {name: _told(name, model) for name, model in models.items()}
     found = {name: _found(Path(name), told[name], data, not suite.data) for name in models}
     lost = next(((name, path) for name, path in told.items() if path is not None and found[name] is None), None)
     if suite.data and not any(found.values()):
-        was = "" if lost is None else f" ({lost[0]} was trained on {lost[1]}, which is not here)"
+        was = "" if lost is None else f" ({lost[0]} was trained on {lost[1]}, which is missing)"
         raise click.UsageError(f"{suite.what} need --data: {suite.data}{was}")
     if lost is not None and not suite.data:
-        raise DataError(f"the clips that {lost[0]} was trained on, {lost[1]}, are missing: give --data")
+        raise DataError(f"{lost[0]} was trained on {lost[1]}, which is missing: give --data")
     return {name: at and part(at, models[name].manifest.motion.representation) for name, at in found.items()}
 
 
 def _found(run: Path, told: Path | None, data: Path | None, bundled: bool) -> Path | None:
-    """The data of one model. bundled: whether what a bundle was trained on is looked for, too."""
+    """The data of one model. bundled: whether to look for a bundle's training data too."""
     asked = data is None or (told is not None and data.resolve() == told.resolve())
     if asked and (store_beside(run) / INDEX).is_file():
         return store_beside(run)
@@ -143,7 +141,7 @@ def _found(run: Path, told: Path | None, data: Path | None, bundled: bool) -> Pa
 
 
 def _told(name: str, model: BundleModel) -> Path | None:
-    """What training was given as --data: by the settings of a run, or the command of a bundle."""
+    """The --data of its training: from the settings of a run, or the command of a bundle."""
     if (Path(name) / SETTINGS).is_file():
         given = [str(value) for key, value in read_settings(Path(name) / SETTINGS)[0].items() if key == "data"]
     else:

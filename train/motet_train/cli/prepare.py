@@ -1,4 +1,4 @@
-"""``motet prepare``: a corpus into a store that models are trained on."""
+"""``motet prepare``: turns a corpus into a store for training."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -17,17 +17,19 @@ from motet_train.data.table import read_people
 from motet_train.progress import preparing
 
 SOURCE = (
-    click.option("--sentences", type=Path, help="Table of sentences. [default: the only .tsv in or beside the data]"),
-    click.option("--people", type=Path, help="Table of who moves in which clips. [default: by the clips' names]"),
-    click.option("--gaits", type=Path, help="Table of gaits (TOML), to steer by. [default: the column gait]"),
+    click.option("--sentences", type=Path, help="Table of sentences. [default: the only .tsv in or next to the data]"),
+    click.option("--people", type=Path, help="Table of performers by clip. [default: from the clips' names]"),
+    click.option("--gaits", type=Path, help="Table of gaits (TOML) for steering. [default: the column gait]"),
     unit_in,
 )
 
 CORPUS = (
     *SOURCE,
-    click.option("--figure", type=click.Choice(FIGURES), help="Whose joints. [default: humanoid; of KIT's data, own]"),
+    click.option(
+        "--figure", type=click.Choice(FIGURES), help="Skeleton of the store. [default: humanoid; for KIT's data, own]"
+    ),
 )
-"""What says how a corpus is to be understood."""
+"""Options for interpreting a corpus."""
 
 
 def corpus_of(
@@ -38,7 +40,7 @@ def corpus_of(
     unit_in: str | None,
     described: bool = True,
 ) -> Corpus:
-    """The corpus by the options of :data:`SOURCE`, see :func:`motet_train.data.corpus.read_corpus`."""
+    """The corpus read with the options of :data:`SOURCE`, see :func:`motet_train.data.corpus.read_corpus`."""
     who = () if people is None else read_people(people)
     return read_corpus(data, sentences, who, unit_in, described, () if gaits is None else read_gaits(gaits))
 
@@ -59,7 +61,7 @@ def corpus_options(function: Callable[..., None]) -> Callable[..., None]:
     type=click.Choice(["describe", "generate", "codes", "predict", "all"]),
     default="describe",
     show_default=True,
-    help="What is to be trained on it: describe, search; codes, fill, matching; predict; or all.",
+    help="Models to train on it: describe, search; codes, fill, matching; predict; or all.",
 )
 @click.option("--fps", type=click.FloatRange(1, 240), help="Frames per second. [default: 10; for codes, predict 30]")
 @corpus_options
@@ -77,14 +79,14 @@ def prepare(
     """Prepare the corpus DATA once: folders or zips of motions with sentences become a store to train on.
 
     DATA is the KIT Motion-Language data, or motion files .amc (with .asf) .bvh .npz .glb .vrma with a
-    tab-separated table of the columns clip and sentence, which predict does not need; a clip of a file of several is
-    called FILE#CLIP there. Of two files of one name that of the later DATA counts. Every human figure is brought to the
-    humanoid. A motion that cannot be used is named and skipped; longer than 30 s, it is cut into pieces, which share
-    its sentences.
+    tab-separated table with the columns clip and sentence, which predict does not need; a clip in a file with several
+    is named FILE#CLIP there. Of two files of one name, the one in the later DATA is used. Every human figure is
+    retargeted to the humanoid. Unusable motions are named and skipped; those over 30 s are cut into pieces that share
+    their sentences.
     """
     corpus = corpus_of(data, sentences, people, gaits, unit_in, verb != "predict")
     if verb == "all" and (figure or fps):
-        raise click.UsageError("--figure and --fps are for a store of one kind: give --for, too")
+        raise click.UsageError("--figure and --fps apply to a store of one kind: add --for")
     parts = ALL if verb == "all" else {".": preparation(verb, corpus.kit, figure, fps)}
     for one in parts.values():
         _check_unit(corpus, one)
@@ -104,15 +106,13 @@ def _summarise(place: Path) -> None:
     )
     if len(store.skipped) > len(store.records):
         first = store.records[0].name
-        click.echo(f"motet: most motions were skipped; channels and axes are those of the first, {first}", err=True)
+        click.echo(f"motet: most motions were skipped; channels and axes are taken from the first, {first}", err=True)
 
 
 def _check_unit(corpus: Corpus, preparation: Preparation) -> None:
-    """DataError where the first motion does not say its unit and nobody else does: the others will not, either."""
+    """DataError if neither the first motion nor an option states the unit: the others will not either."""
     if preparation.humanoid or not named(preparation.representation).required:
-        return  # the humanoid's unit is found by its height; joint angles alone have no lengths
+        return  # the humanoid's unit is inferred from its height; joint angles alone have no lengths
     first = next((item for item in corpus if isinstance(item, Record)), None)
     if first is not None and first.motion.skeleton is not None and first.motion.skeleton.metres_per_unit is None:
-        raise DataError(
-            f"{first.name} does not state its unit of length: give --unit-in for files that do not state it"
-        )
+        raise DataError(f"{first.name} does not state its length unit: give --unit-in for such files")

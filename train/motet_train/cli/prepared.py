@@ -1,4 +1,4 @@
-"""The store that a training command is given, or makes of the corpus that it is given."""
+"""The store given to a training command, or made from the corpus given to it."""
 
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from motet_train.trainer import CHECKPOINT
 
 
 def prepared(data: Path, job: Job, **corpus: Any) -> Store:
-    """The store at ``data``, or that of the corpus which is there, prepared beside the run; a resumed run has its own.
+    """The store at ``data``, or one prepared next to the run from the corpus there; a resumed run has its own.
 
     corpus: options of ``motet prepare``.
     """
@@ -32,5 +32,5 @@ def prepared(data: Path, job: Job, **corpus: Any) -> Store:
 
 
 def store_beside(run: Path) -> Path:
-    """Where the store of a run is that was given a corpus."""
+    """The path of the store of a run that was given a corpus."""
     return run.with_name(f"{run.name}-store")

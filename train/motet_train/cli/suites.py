@@ -1,4 +1,4 @@
-"""What ``motet evaluate`` measures: one record for each kind of model."""
+"""The measurements of ``motet evaluate``: one record for each kind of model."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -49,8 +49,8 @@ from motet_train.trainer import LOG
 
 @dataclass(frozen=True)
 class Given:
-    """What a command gives to measure with. data: where each model's is. unit: of files that do not state theirs.
-    search: the model in whose space motions and prompts are compared."""
+    """Inputs of a measurement. data: path of each model's data. unit: for files that do not state theirs. search: the
+    model whose space is used to compare motions and prompts."""
 
     data: Mapping[str, Path | None]
     unit: str | None = None
@@ -58,17 +58,17 @@ class Given:
 
     @property
     def first(self) -> Path:
-        """The first data that there is, on which all models are measured; of a suite that needs data."""
+        """The first existing data, on which all models are measured; for a suite that needs data."""
         return next(found for found in self.data.values() if found is not None)
 
     def store(self) -> Store:
-        """The store there; DataError where there is none."""
+        """The store there; DataError if there is none."""
         return Store.open(self.first)
 
 
 @dataclass(frozen=True)
 class Results:
-    """Figures of each model, ready for JSON; all of them as text; and pictures, by the folder that they go into."""
+    """Figures of each model, ready for JSON; all of them as text; and pictures, by their folder."""
 
     figures: dict[str, Any]
     text: str
@@ -76,13 +76,13 @@ class Results:
 
     @staticmethod
     def of(reports: Mapping[str, Report], goals: Goals) -> "Results":
-        """Those of reports, beside their goals."""
+        """Those of reports, next to their goals."""
         return Results(json_ready(reports), report_table(reports, goals))
 
 
 @dataclass(frozen=True)
 class Suite:
-    """What is measured of a kind of models, called ``what``; and the data that it takes, "" where it can do without."""
+    """The measurements of a kind of models, called ``what``; and the data required, "" if optional."""
 
     what: str
     measure: Callable[[Mapping[str, Any], Given], Results]
@@ -92,7 +92,7 @@ class Suite:
 
 @singledispatch
 def as_steered(_: BundleModel) -> SteerModel | None:
-    """What is measured as a figure that is steered: a model of them, or what stands for it; None for all others."""
+    """A steered figure to measure: a model of one, or its stand-in; None for all others."""
     return None
 
 
@@ -125,7 +125,7 @@ def _filled(models: Mapping[str, FillModel], given: Given) -> Results:
 
 
 def _language(models: Mapping[str, LanguageModel], given: Given) -> Results:
-    """Others are compared with the first describe model that had the same split."""
+    """Others are compared with the first describe model of the same split."""
     store = given.store()
     corpora = {name: split_as(model.manifest, store) for name, model in models.items()}
     reports = {name: _language_report(name, models, corpora) for name in models}
@@ -141,7 +141,7 @@ _REPORTS: Mapping[str, Callable[..., Report]] = {
     "generate": generate_report,
     "search": search_report,
 }
-"""What measures a model of a verb: with its corpus, and the describe model of the same split."""
+"""Measures a model of a verb, with its corpus and the describe model of the same split."""
 
 
 def _language_report(name: str, models: Mapping[str, LanguageModel], corpora: Mapping[str, SplitStore]) -> Report:
@@ -150,7 +150,7 @@ def _language_report(name: str, models: Mapping[str, LanguageModel], corpora: Ma
     partner = next((other for other in alike if other.VERB == "describe"), None)
     report = _REPORTS[model.VERB](model, corpus, partner)
     if model.VERB == "generate" and partner is None:
-        click.echo(f"{name}: tables 3 and 4 need a describe model of the same split; they are left out", err=True)
+        click.echo(f"{name}: omitting tables 3 and 4, which need a describe model of the same split", err=True)
     lacking = [f"asked.{key}" for key in ASKED if key not in report.get("asked", {})]
     if model.VERB == "generate" and lacking:
         said = "training motions of that kind, or a root block, are missing"
@@ -159,7 +159,7 @@ def _language_report(name: str, models: Mapping[str, LanguageModel], corpora: Ma
 
 
 def _by_subject(models: Mapping[str, LanguageModel], name: str) -> str | None:
-    """The model that shows how well this one would do with people never seen: the same verb, split by subject."""
+    """The model that shows how this one would do with unseen people: the same verb, split by subject."""
     by = {other: model.manifest.training["split"]["by"] for other, model in models.items()}
     alike = (other for other, model in models.items() if model.VERB == models[name].VERB)
     return next((other for other in alike if by[other] == "subject" and by[name] != "subject"), None)
@@ -173,7 +173,7 @@ def _language_drawings(models: Mapping[str, LanguageModel], corpora: Mapping[str
 
 
 def _predict(models: Mapping[str, PredictModel], given: Given) -> Results:
-    """By the protocol where its text files are given, else the joints' distances in trials that were held out."""
+    """By the protocol if its text files are given, else the joints' distances in held-out trials."""
     if not is_expmap(given.first):
         return _in_mocap(models, given.store())
     found = protocol_results(models, read_expmap_files(given.first))
@@ -208,7 +208,7 @@ def _says(models: Mapping[str, GenerateModel], given: Given) -> Results:
     data = next(iter(given.data.values()))
     trials = [] if data is None else list(read_trials(data, given.unit))
     if data is not None and not trials:
-        raise DataError(f"{data} has no motion that can be used")
+        raise DataError(f"{data} has no usable motion")
     reports = {}
     for name, model in models.items():
         training = trained_on(model.manifest, trials)
@@ -233,11 +233,11 @@ SUITES = {
     "predict": Suite("predictors", _predict, "text files of the protocol, or the store they were trained on"),
     "search": _LANGUAGE,
 }
-"""Verb -> what measures its models, but for figures that are steered."""
+"""Verb -> the suite of its models, except steered figures."""
 
 
 def suite_of(models: Mapping[str, BundleModel]) -> Suite:
-    """What measures all of some models; UsageError where several would."""
+    """The suite of all the models; UsageError if they need several."""
     first, *others = {SUITES[model.VERB] if as_steered(model) is None else STEERED for model in models.values()}
     if others:
         raise click.UsageError("evaluate control, fill, predict and language models separately: their data differ")

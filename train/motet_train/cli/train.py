@@ -10,7 +10,7 @@ from motet_train.cli.train_predict import predict
 
 @click.group()
 def train() -> None:
-    """Train models on your own recordings: all that ships, or one; runs are what evaluate and export take."""
+    """Train models on your own recordings: all shipped kinds, or one. Evaluate and export take the runs."""
 
 
 for command in (everything, generate, predict, tdbn, crbm, *train_store.COMMANDS, *train_systems.COMMANDS):

@@ -1,4 +1,4 @@
-"""``motet train all`` and ``motet train generate``: all that ships, or what generates, in one command."""
+"""``motet train all`` and ``motet train generate``: all shipped kinds, or the generator, in one command."""
 
 import shlex
 import sys
@@ -25,7 +25,7 @@ OPTIONS = (
     *SOURCE,
     SPLIT,
     *VECTORS,
-    click.option("--config", type=Path, help="TOML file of settings: [describe.training] changes that of describe."),
+    click.option("--config", type=Path, help="TOML file of settings: [describe.training] is for describe."),
     *WHERE,
 )
 
@@ -36,26 +36,26 @@ def _options(function: Callable[..., None]) -> Callable[..., None]:
     return function
 
 
-@click.command("all", short_help="Train all that ships on your own recordings: one command, resumable.")
+@click.command("all", short_help="Train all shipped kinds on your own recordings: one command, resumable.")
 @click.argument("data", type=Path, nargs=-1, required=True)
 @click.option("--only", "verbs", type=click.Choice(VERBS), multiple=True, help="Only these. [default: all]")
 @_options
 def everything(verbs: tuple[str, ...], **given: Any) -> None:
-    """Train all that ships on DATA: folders or zips of motion files with a table of sentences, or a store of these.
+    """Train all shipped kinds on DATA: folders or zips of motion files with a table of sentences, or their store.
 
-    Motions are prepared once, into OUT/store; then a run for each verb is trained, of the kinds that ship with motet.
-    What is trained already is passed over, what was interrupted resumes: the same command continues.
+    Motions are prepared once, into OUT/store; then one run per verb is trained, of the kind that ships with motet.
+    Repeat the command to continue: finished runs are skipped, interrupted ones resume.
     """
     _train(verbs or VERBS, **given)
 
 
-@click.command(short_help="Train the kind of generate that ships, in five stages.")
+@click.command(short_help="Train the shipped kind of generate, in five stages.")
 @click.option("--data", type=Path, multiple=True, required=True, help="A store, or a corpus: folder or zip.")
 @_options
 def generate(**given: Any) -> None:
-    """Train sentence to motion, of the kind that ships: codec, decoder (twice), actions, and the writer of codes.
+    """Train sentence to motion, the shipped kind: codec, decoder (twice), actions, and the writer of codes.
 
-    As `motet train all --only generate` does: the runs go into the folder OUT, the last is OUT/generate.
+    Like `motet train all --only generate`: the runs go into the folder OUT, the last is OUT/generate.
     """
     _train(("generate",), **given)
 

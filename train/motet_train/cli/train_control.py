@@ -1,4 +1,4 @@
-"""``motet train tdbn`` and ``motet train crbm``: models that are controlled live."""
+"""``motet train tdbn`` and ``motet train crbm``: models for live control."""
 
 from dataclasses import replace
 from pathlib import Path

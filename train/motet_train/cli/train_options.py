@@ -1,4 +1,4 @@
-"""What all commands ``motet train`` share: options, settings from a file, where the run goes, and how it ends."""
+"""Shared by all ``motet train`` commands: options, settings from a file, the output folder, and the final summary."""
 
 import logging
 import shlex
@@ -34,7 +34,7 @@ def _configure(context: click.Context, option: click.Parameter, path: Path | Non
 
 
 def _long(option: click.Parameter) -> str:
-    """How an option is called where it is written out, without its hyphens."""
+    """An option's full name, without its hyphens."""
     return max(option.opts, key=len).lstrip("-")
 
 
@@ -43,7 +43,7 @@ WHERE = (
     click.option("--device", type=click.Choice(["cpu", "cuda"]), default="cpu", show_default=True),
     click.option("--threads", type=click.IntRange(1), default=1, show_default=True),
     click.option("--licence", help="Licence of the weights. [default: not stated]"),
-    click.option("--data-licence", help="Licence of the data. [default: as the data states, or not stated]"),
+    click.option("--data-licence", help="Licence of the data. [default: the data's own, or not stated]"),
 )
 
 OPTIONS = (
@@ -55,10 +55,10 @@ OPTIONS = (
     click.option(
         "--precision",
         type=click.Choice(["float32", "bfloat16"]),
-        help="Precision of matrix products; float32 where the device has no bfloat16.",
+        help="Precision of matrix products; float32 if the device lacks bfloat16.",
     ),
-    click.option("--resume", is_flag=True, help="Continue the run in --out, by the same command."),
-    click.option("--tensorboard", is_flag=True, help="Write the log for TensorBoard, too."),
+    click.option("--resume", is_flag=True, help="Resume the run in --out with the same command."),
+    click.option("--tensorboard", is_flag=True, help="Also write a TensorBoard log."),
     click.option("--name", help="Bundle name. [default: the run's folder]"),
 )
 
@@ -75,9 +75,9 @@ def train_command(
     *options: Callable[..., Any],
     defaults: Mapping[str, Any] | None = None,
 ) -> Callable[[Callable[..., Run]], click.Command]:
-    """A command that trains by one of the recipes: the function is given the job and the command's own options.
+    """A command that trains one of the recipes: the function receives the job and the command's own options.
 
-    An option that is named like a field of the recipe changes it and is not given. defaults: of shared options.
+    An option named like a field of the recipe sets that field and is not passed on. defaults: of shared options.
     """
 
     def decorate(function: Callable[..., Run]) -> click.Command:
@@ -124,25 +124,25 @@ def _train(
 
 
 def show_lines() -> None:
-    """Show a line for each chunk without --verbose, too; none with --quiet."""
+    """Show a line for each chunk even without --verbose; none with --quiet."""
     log.setLevel(logging.INFO if logging.getLogger("motet").isEnabledFor(logging.WARNING) else logging.NOTSET)
 
 
 def _is_of(name: str, recipe: Recipe) -> bool:
-    """Whether an option changes the recipe; what is found in the data is not for options to say."""
+    """Whether an option changes the recipe; options cannot set values found in the data."""
     parts = (part for part in (recipe.training, recipe.config, recipe.visits) if part is not None)
     return name not in recipe.derived and any(hasattr(part, name) for part in parts)
 
 
 def _kept(context: click.Context, given: Mapping[str, Any]) -> dict[str, Any]:
-    """The options that repeat the run, by the names they have on the command line."""
+    """The options that repeat the run, by their command-line names."""
     names = {option.name: _long(option) for option in context.command.params}
     left_out = ("out", "resume", "tensorboard", "precision")  # the recipe has the last
     return {names[name]: value for name, value in given.items() if name not in left_out}
 
 
 def _next(out: Path, manifest: Mapping[str, Any]) -> str:
-    """What is done with a run."""
+    """The next command for a run."""
     parts = {"codec": "--codec {0} --actions RUN", "actions": "--codec RUN --actions {0}"}
     if manifest["verb"] in parts:
         return f"motet train codes {parts[manifest['verb']].format(out)}"

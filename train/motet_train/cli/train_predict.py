@@ -18,14 +18,14 @@ from motet_train.recipes.recipe import Job
 from motet_train.runs import Run
 
 AUGMENTATION = (
-    click.option("--warp", type=click.FloatRange(0), help="Windows are up to exp(this) times as fast or slow."),
-    click.option("--reverse", type=click.FloatRange(0, 1), help="Share of the windows that are played backwards."),
-    click.option("--mirror", type=click.FloatRange(0, 1), help="Share of the windows that are mirrored."),
+    click.option("--warp", type=click.FloatRange(0), help="Play windows up to exp(this) times faster or slower."),
+    click.option("--reverse", type=click.FloatRange(0, 1), help="Share of windows played backwards."),
+    click.option("--mirror", type=click.FloatRange(0, 1), help="Share of windows mirrored."),
     click.option(
-        "--average", type=click.FloatRange(0, 1, max_open=True), help="Of a running mean of weights; 0: none."
+        "--average", type=click.FloatRange(0, 1, max_open=True), help="Decay of a running mean of weights; 0: none."
     ),
 )
-"""How the windows vary and what is kept; each one's default is the preset's."""
+"""Augmentation of windows and averaging; the defaults are the preset's."""
 
 
 @train_command(
@@ -42,7 +42,7 @@ AUGMENTATION = (
         "--split",
         "by",
         type=click.Choice(["trial", "subject"]),
-        help="How motion files are held out: by chance, or all of a person. [default: subject]",
+        help="How to hold out motion files: at random, or by person. [default: subject]",
     ),
     click.option("--steps", type=click.IntRange(1), help="[default: the preset's]"),
     *AUGMENTATION,
@@ -50,8 +50,8 @@ AUGMENTATION = (
 def predict(job: Job, data: Path, by: str | None, **corpus: Any) -> Run:
     """Train a predictor: a net that continues a motion from its last frames.
 
-    From text files of the protocol it learns what `motet evaluate` measures; from motion files to continue files of any
-    human figure.
+    Text files of the protocol train it for the measures of `motet evaluate`; motion files train it to continue files of
+    any human figure.
     """
     return train_predict(_material(data, job, by, **corpus), job)
 
@@ -60,7 +60,7 @@ def _material(data: Path, job: Job, by: str | None, **corpus: Any) -> Material:
     if not is_expmap(data):
         return store_material(prepared(data, job, **corpus), data.name, by or "subject")
     if by is not None:
-        raise DataError(f"{data} has test files of its own: --split is for motion files")
+        raise DataError(f"{data} has its own test files: --split is for motion files")
     return expmap_material(read_expmap_files(data))
 
 

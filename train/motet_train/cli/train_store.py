@@ -1,4 +1,4 @@
-"""The commands ``motet train`` that train one net on a store: describe, search, codec, actions, codes, fill, ..."""
+"""The ``motet train`` commands that train one net on a store: describe, search, codec, actions, codes, fill, ..."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -23,7 +23,7 @@ DATA = (click.option("--data", type=Path, required=True, help="A prepared store,
 STEPS = (click.option("--steps", type=click.IntRange(1), help="[default: the preset's]"), SPLIT)
 EPOCHS = (
     click.option("--epochs", type=click.IntRange(1), help="[default: the preset's]"),
-    click.option("--batch", type=click.IntRange(1), help="Motions in a batch. [default: the preset's]"),
+    click.option("--batch", type=click.IntRange(1), help="Motions per batch. [default: the preset's]"),
     SPLIT,
     click.option("--mirror/--no-mirror", default=None, help="Mirror left and right at random. [default: the preset's]"),
 )
@@ -31,13 +31,15 @@ LOSS = click.option(
     "--loss", type=click.Choice(list(LOSSES)), help="Eq. 12, or the true likelihood. [default: the preset's]"
 )
 VECTORS = (
-    click.option("--word-vectors", type=Path, help="Vectors to start from: a word and its numbers in each line."),
-    click.option("--vectors-from", help="Whose vectors they are, and their licence, for the manifest."),
+    click.option("--word-vectors", type=Path, help="Initial word vectors: a word and its numbers per line."),
+    click.option("--vectors-from", help="Source and licence of the vectors, for the manifest."),
 )
 START = click.option("--start", type=Path, help="Run of a codec: train its decoder alone (--preset decoder, sharp).")
 PARTS = (
     click.option("--codec", type=Path, required=True, help="Run of a codec, trained on the same data and split."),
-    click.option("--actions", type=Path, required=True, help="Run of a net of actions, trained on the same."),
+    click.option(
+        "--actions", type=Path, required=True, help="Run of an action net, trained on the same data and split."
+    ),
 )
 
 RUNS = ("start", "codec", "actions")
@@ -47,7 +49,7 @@ RUNS = ("start", "codec", "actions")
 def _command(
     name: str, text: str, recipes: Mapping[str, Recipe], train: Callable[..., Run], *options: Callable[..., Any]
 ) -> click.Command:
-    """A command that calls a function of a recipe: with a store, the job, the store's name and its own options."""
+    """A command that calls a recipe's function with a store, the job, the store's name and its own options."""
 
     def run(job: Job, data: Path, **given: Any) -> Run:
         corpus = {key: given.pop(key) for key in ("sentences", "people", "gaits", "unit_in", "figure")}
@@ -64,14 +66,14 @@ def _actions(store: Store, job: Job, data: str, by: str, word_vectors: Path | No
 
 
 DESCRIBE = "Train motion to language: a net that describes a motion in words."
-SEARCH = "Train a joint embedding: motions and sentences in one space, to search by."
+SEARCH = "Train a joint embedding for search: motions and sentences in one space."
 MIXTURE = "Train language to motion, after Plappert et al. 2017: frame by frame from a mixture."
 CODEC = "Train a codec of motions: frames to codes and back."
-ACTIONS = "Train a net that tells which action a sentence asks for."
-CODES = "Train a writer of codes: a sentence to motion, code by code."
-FILL = "Train a net that fills gaps of motions, between what is before and after them."
-MATCHING = "Train a figure to be steered, by motion matching on recordings of gaits."
-STEERED = "Train a figure to be steered, by the thesis' nets on recordings of walking and running."
+ACTIONS = "Train a net that recognizes the action a sentence asks for."
+CODES = "Train a code writer: from a sentence to motion, code by code."
+FILL = "Train a net that fills gaps in motions from the frames before and after."
+MATCHING = "Train a steerable figure: motion matching on recordings of gaits."
+STEERED = "Train a steerable figure: the thesis' nets on recordings of walking and running."
 
 COMMANDS = (
     _command("describe", DESCRIBE, describe.RECIPES, train_language, *EPOCHS),

@@ -1,4 +1,4 @@
-"""``motet train convseq2seq`` and the commands of the other published systems that predict."""
+"""``motet train convseq2seq`` and the commands of the other published prediction systems."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -18,23 +18,25 @@ from motet_train.runs import Run
 OPTIONS = (
     click.option("--data", type=Path, required=True, help="Folder or zip of exponential-map text files."),
     click.option("--steps", type=click.IntRange(1), help="[default: the preset's]"),
-    click.option("--batch", type=click.IntRange(1), help="Windows in a batch. [default: the preset's]"),
+    click.option("--batch", type=click.IntRange(1), help="Windows per batch. [default: the preset's]"),
     click.option("--learning-rate", type=click.FloatRange(0, min_open=True), help="[default: the preset's]"),
     *AUGMENTATION,
-    click.option("--all-files", is_flag=True, help="Hold out no training file; validate on windows of all of them."),
+    click.option("--all-files", is_flag=True, help="Hold out no training files; validate on windows of all of them."),
 )
 
 SWITCHES = (
     click.option("--long-term", type=click.Choice(["convolutional", "recurrent", "none"]), help="Long-term encoder."),
     click.option("--kernel", type=click.IntRange(1), nargs=2, help="Frames and channels of the convolutions' kernels."),
     click.option("--padding", type=click.Choice(["valid", "same"]), help="Other kernels or windows need 'same'."),
-    click.option("--window", type=click.IntRange(1), help="Frames that the short-term encoder sees, C."),
-    click.option("--own", type=click.FloatRange(0, 1), help="Share of predicted frames in what training feeds back."),
+    click.option("--window", type=click.IntRange(1), help="Frames seen by the short-term encoder, C."),
+    click.option(
+        "--own", type=click.FloatRange(0, 1), help="Share of predicted frames among those fed back in training."
+    ),
     click.option("--loss", type=click.Choice(["square", "distance"]), help="Mean squared distance, or mean distance."),
     click.option("--l2", type=click.FloatRange(0), help="Weight of the squared weights in the loss."),
-    click.option("--adversary", type=click.FloatRange(0), help="Weight of the discriminator in the loss; 0 is none."),
+    click.option("--adversary", type=click.FloatRange(0), help="Weight of the discriminator in the loss; 0: none."),
 )
-"""Of the ablations; each one's default is the preset's."""
+"""Options of the ablations; the defaults are the preset's."""
 
 
 def _command(name: str, title: str, *switches: Callable[..., Any]) -> click.Command:
@@ -43,7 +45,7 @@ def _command(name: str, title: str, *switches: Callable[..., Any]) -> click.Comm
         kept_back = () if all_files else validation_files(corpus, PROTOCOL_WINDOW)
         return train_system(expmap_material(corpus, kept_back), job)
 
-    run.__doc__ = f"Train {title}, which `motet train predict` is compared with."
+    run.__doc__ = f"Train {title}, a baseline of `motet train predict`."
     return train_command(name, RECIPES[name], *OPTIONS, *switches)(run)
 
 

@@ -1,1 +1,1 @@
-"""Feet: which stand (`contacts`), where they are held or locked, and the path that they lay for the root."""
+"""Feet: which stand (`contacts`), holding and locking them, and the root path that follows from them."""

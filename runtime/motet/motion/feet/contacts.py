@@ -1,6 +1,6 @@
-"""Which feet stand: the one definition, for all that plants feet, holds them or measures how they slide.
+"""Which feet stand: the one definition used for planting and holding feet and for measuring foot sliding.
 
-A point of a foot stands where it is low and slow. Only the bounds differ, by what the points are and what moves them.
+A point of a foot stands if it is low and slow. Only the bounds depend on the points and the source of the motion.
 """
 
 from dataclasses import dataclass
@@ -14,12 +14,12 @@ from motet.motion.sides import partners_of
 from motet.motion.skeleton import Skeleton
 
 GROUND_PERCENT = 10
-"""Per cent of the frames whose lowest point of the feet is under the ground."""
+"""Percentage of frames whose lowest point of the feet is below ground."""
 
 
 @dataclass(frozen=True)
 class ContactSettings:
-    """Two bounds each: up to the first a point stands surely, from the second on not at all; equal ones are a
+    """Two bounds each: up to the first a point surely stands, from the second it does not at all; equal bounds are a
     threshold.
 
     heights: metres above the ground. speeds: metres a second over it. calm: seconds, the standard deviation of the
@@ -36,41 +36,41 @@ SOLES = ContactSettings()
 
 
 def contacts(heights: Array, speeds: Array | None, settings: ContactSettings) -> Array:
-    """How much points stand, from 0 to 1, by their heights in m and speeds in m/s, both of one shape.
+    """Ground contact of points, from 0 to 1, from their heights in m and speeds in m/s, both of one shape.
 
-    speeds: None where only the height counts.
+    speeds: None if only the height counts.
     """
     low = 1 - rise(heights, *settings.heights)
     return low if speeds is None else low * (1 - rise(speeds, *settings.speeds))
 
 
 def standing(heights: Array, speeds: Array | None, settings: ContactSettings) -> NDArray[np.bool_]:
-    """Which points surely stand, as :func:`contacts` has them."""
+    """Which points surely stand, as in :func:`contacts`."""
     found: NDArray[np.bool_] = contacts(heights, speeds, settings) == 1
     return found
 
 
 def contacts_of(points: Array, fps: float, settings: ContactSettings = SOLES) -> Array:
-    """How much points (T, K, 3) above a ground at 0 stand from each frame to the next, (T - 1, K) from 0 to 1."""
+    """Contact of points (T, K, 3), over ground at 0, from each frame to the next, (T - 1, K) from 0 to 1."""
     calm = smoothed(points, settings.calm, fps)
     return contacts((points[1:, :, 1] + points[:-1, :, 1]) / 2, ground_speeds(calm, fps), settings)
 
 
 def ground_speeds(points: Array, fps: float) -> Array:
-    """Speeds (..., T - 1, K) over the ground of points (..., T, K, 3), by frame."""
+    """Speeds (..., T - 1, K) over the ground of points (..., T, K, 3), per frame."""
     speeds: Array = np.linalg.norm(np.diff(points[..., [0, 2]], axis=-3), axis=-1) * fps
     return speeds
 
 
 def rise(values: Array, start: float, end: float) -> Array:
-    """From 0 at ``start`` to 1 at ``end`` without a kink (Perlin's "smootherstep", 2002)."""
+    """Smoothly from 0 at ``start`` to 1 at ``end`` (Perlin's "smootherstep", 2002)."""
     part = np.clip((values - start) / max(end - start, 1e-12), 0, 1)
     found: Array = part**3 * (10 - 15 * part + 6 * part**2)
     return found
 
 
 def smoothed(points: Array, calm: float, fps: float) -> Array:
-    """Points (T, ..., ...) through a Gaussian window in time, continued at both ends as they come in.
+    """Points (T, ..., ...) smoothed by a Gaussian window in time, extrapolated at both ends.
 
     calm: its standard deviation in seconds.
     """
@@ -84,22 +84,22 @@ def smoothed(points: Array, calm: float, fps: float) -> Array:
 
 
 def feet_of(skeleton: Skeleton) -> list[int]:
-    """Indices of the joints of both feet, those that lie low at rest; MotionError where no joints are in pairs."""
+    """Indices of the joints of both feet, the low ones at rest; MotionError if no joints are paired."""
     paired, height = _paired(skeleton), skeleton.rest_positions[:, 1]
     if not paired:
-        raise MotionError("no joints in pairs, left and right, to find the feet by: name the joints of the feet")
-    # joints of the feet lie within a tenth of the figure's height
+        raise MotionError("no left-right pairs of joints to find the feet among: name the joints of the feet")
+    # joints of the feet are within a tenth of the figure's height
     limit = height[paired].min() + 0.1 * skeleton.height
     return [i for i in paired if height[i] <= limit]
 
 
 def has_feet(skeleton: Skeleton) -> bool:
-    """Whether there are joints in pairs, left and right, to find the feet among."""
+    """Whether there are left-right pairs of joints to find the feet among."""
     return bool(_paired(skeleton))
 
 
 def ground_of(heights: Array) -> float:
-    """The height of the ground under feet that are at ``heights`` (T, K)."""
+    """The height of the ground under feet at ``heights`` (T, K)."""
     return float(np.percentile(heights.min(axis=1), GROUND_PERCENT))
 
 

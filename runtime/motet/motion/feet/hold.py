@@ -1,10 +1,10 @@
-"""Holding feet: what stands on the ground stays where it stands, whatever the root does meanwhile.
+"""Holding feet: a standing foot stays in place, whatever the root does meanwhile.
 
-A foot stands where heel, ball or tip of the toes is low and slow. How much each of them does, between 0 and 1, says
-whose movement over the ground is taken out of the foot: that of the heel after it has landed, that of all three while
-the sole is flat, that of the ball and the toes as the foot rolls off. What has been taken out adds up to a shift of the
-foot; over a stance its median is 0, so the foot stands where it stood on average. Before and after, the shift comes
-and goes smoothly. Hip, knee and ankle follow by :mod:`motet.motion.two_bone`.
+A foot stands while its heel, ball or toe tip is low and slow. The contact of each, between 0 and 1, decides whose
+movement over the ground is removed from the foot: the heel's after landing, that of all three while the sole is flat,
+the ball's and toes' as the foot rolls off. The removed movement adds up to a shift of the foot; over a stance its
+median is 0, so the foot stands where it stood on average. Before and after, the shift blends in and out smoothly. Hip,
+knee and ankle follow by :mod:`motet.motion.two_bone`.
 """
 
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ from motet.motion.two_bone import Leg
 
 @dataclass(frozen=True)
 class HoldSettings:
-    """Seconds, metres and metres a second.
+    """Seconds, metres and metres per second.
 
     contact: when a point of the sole stands. lifted: a foot that does not touch the ground for less stays where it
     stands. blend: in which a shift comes and goes, most of it in half of that. farthest: a foot is shifted by less;
@@ -44,7 +44,7 @@ class HoldSettings:
 
 HOLD_RECORDED = HoldSettings()
 HOLD_TREMBLING = HoldSettings(contact=ContactSettings(speeds=(0.7, 3.0), calm=0.06))
-"""For feet that tremble and slide: where they stand is seen over longer, and what slides faster stands, too."""
+"""For feet that tremble and slide: contact is measured over a longer time, and may slide faster."""
 
 BENT = ("UpperLeg", "LowerLeg", "Foot")
 
@@ -52,18 +52,17 @@ BENT = ("UpperLeg", "LowerLeg", "Foot")
 def hold_feet(
     motion: Motion, trembling: bool = False, ground: float | None = None, anchor: float | None = None
 ) -> Motion:
-    """The motion of any human figure with feet that stay where they stand and are never deeper than the ground, by
-    turning hips, knees and ankles; the root and all other joints are as they were, and the feet keep their directions
-    in the world.
+    """The motion of any human figure with its standing feet held in place and never below ground, by turning hips,
+    knees and ankles; the root and all other joints are unchanged, and the feet keep their directions in the world.
 
     The ground is level, and where :func:`motet.motion.to_humanoid` lays it: the soles are deeper in 5 % of the frames.
     A foot is shifted by 15 cm at most, and a leg that is nearly straight is hardly drawn longer: what is left slides
     on. Lengths are those of the figure at the humanoid's size.
 
-    trembling: whether the feet tremble and slide like those of a model that gives joint angles alone. ground: its
+    trembling: whether the feet tremble and slide like those of a model that outputs only joint angles. ground: its
         height in metres, where it is known of a motion of the humanoid. anchor: seconds at the start of a stance that
         say where the foot stands, by default all of it: what comes later then changes nothing.
-    MotionError, with the reason, for a figure that is no human's, or one that does not stand along y.
+    MotionError, with the reason, for a figure that is not human or does not stand along y.
     """
     if len(motion) < 2:
         return motion
@@ -84,11 +83,11 @@ def hold_feet(
 
 
 Legs = list[tuple[list[int], Array]]
-"""Of each side the joints of hip, knee and ankle, and the knee's axis (3,), to the left, in its joint's frame."""
+"""For each side the joints of hip, knee and ankle, and the knee's axis (3,), to the left, in its joint's frame."""
 
 
 def _of_humanoid(rotations: Array, places: Array, ground: float | None) -> tuple[Legs, float, Array]:
-    """As :func:`_measured`, of the humanoid itself."""
+    """Like :func:`_measured`, for the humanoid itself."""
     soles = sole_points(rotations, places)
     soles[..., 1] -= ground_under(soles) if ground is None else ground
     legs = [([HUMANOID.index(sided(side, part)) for part in BENT], np.array([1.0, 0.0, 0.0])) for side in LEFT_RIGHT]
@@ -101,7 +100,7 @@ def _measured(motion: Motion, rotations: Array, places: Array) -> tuple[Legs, fl
     figure = Figure.of(motion)
     fitted, joints_of = figure.fitted, figure.fitted.joint_map.joints
     if not np.array_equal(figure.turn, np.eye(3)):
-        raise MotionError("this figure does not stand along y: turn it upright by to_humanoid")
+        raise MotionError("this figure does not stand along y: turn it upright with to_humanoid")
     scale = leg_length() / fitted.leg
     soles = fitted.soles(fitted.bones(rotations), places) * scale
     # how thick the soles of another figure are is not known: each of their points is on the ground where it is lowest
@@ -111,7 +110,7 @@ def _measured(motion: Motion, rotations: Array, places: Array) -> tuple[Legs, fl
 
 
 def _target(leg: Leg, points: Array, fps: float, settings: HoldSettings) -> Array:
-    """Where the ankle comes to (T, 3), from points (T, K, 3) of the sole above a ground at 0."""
+    """The ankle's target (T, 3), from points (T, K, 3) of the sole over ground at 0."""
     over_ground = _held(points, fps, settings)
     target = leg.eased(leg.ankle + np.insert(over_ground, 1, 0.0, axis=1))
     lowest = points[..., 1].min(axis=1) + target[:, 1] - leg.ankle[:, 1]

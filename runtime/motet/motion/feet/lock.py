@@ -1,10 +1,9 @@
-"""A foot lock for live figures: what stands stays where it stands, without looking ahead.
+"""A foot lock for live figures: standing feet stay in place, without look-ahead.
 
-What stands is in the table that is played, by :func:`motet.motion.feet.contacts.contacts_of` of the recordings.
-
-While a foot stands, what its lowest point moves over the ground is taken out of the foot, tick by tick; when it leaves,
-what has been taken out fades. Hip, knee and ankle follow (:mod:`motet.motion.two_bone`). The offline twin, which knows
-how long a foot is going to stand, is :mod:`motet.motion.feet.hold`.
+Contacts come from the table being played, by :func:`motet.motion.feet.contacts.contacts_of` of the recordings. While a
+foot stands, the movement of its lowest point over the ground is removed, tick by tick; when it lifts off, the
+correction fades. Hip, knee and ankle follow (:mod:`motet.motion.two_bone`). The offline twin, which knows how long a
+foot will stand, is :mod:`motet.motion.feet.hold`.
 """
 
 from dataclasses import dataclass, replace
@@ -63,7 +62,7 @@ class FootLock:
     soles: Array | None = None
 
     def held(self, pose: Pose) -> Pose:
-        """The next pose with feet that stay where they stand, and not under the ground; a tick after the last."""
+        """The next pose, one tick later, with standing feet held in place and above ground."""
         hips, turned, places = _legs(pose)
         soles = places[:, :, CARRIERS] + quat_rotated(turned[:, :, CARRIERS], POINTS)
         shift = self._shift(soles, pose.contacts)
@@ -74,7 +73,7 @@ class FootLock:
         return replace(pose, rotations=_reached(pose.rotations, hips, turned, places, target))
 
     def _shift(self, soles: Array, contacts: Floats) -> Array:
-        """By how much each foot is moved now (B, 2, 2), from the points of the soles (B, 2, 3, 3)."""
+        """The current shift of each foot (B, 2, 2), from the points of the soles (B, 2, 3, 3)."""
         how = self.settings
         if self.soles is None or self.shift is None or self.drift is None:
             self.shift = self.drift = np.zeros((*soles.shape[:2], 2))

@@ -1,11 +1,10 @@
-"""Where a figure goes: a root translation from joint angles alone, found by what the feet do on the ground.
+"""The root translation from joint angles alone, inferred from the feet's contact with the ground.
 
-A foot that carries weight stays where it is, so the root moves against it. Which foot that is has to be found at the
-same time as the velocity. Every point of the feet votes for a velocity, and a vote counts the more, the nearer its
-point is to the ground and the better it agrees with the others around it in time: robust regression by iteratively
-reweighted least squares (Beaton and Tukey 1974). Votes that are too slow count less, as the joints of a foot that
-rolls from heel to toe do move forward. Between steps of a run nothing agrees, and the velocity of the last and the
-next step carries through.
+A foot that carries weight stays in place, so the root moves against it. Which foot that is has to be found together
+with the velocity. Every point of the feet votes for a velocity; a vote counts more the nearer its point is to the
+ground and the better it agrees with others around it in time: robust regression by iteratively reweighted least squares
+(Beaton and Tukey 1974). Votes that are too slow count less, because the joints of a foot rolling from heel to toe do
+move forward. Between steps of a run nothing agrees, and the velocity of the last and the next step carries through.
 
 The ground pushes but does not pull: where the root falls faster than gravity while the lowest point of the feet is
 held at the ground, the figure has jumped. It then flies along a parabola until its feet reach the ground again.
@@ -27,9 +26,9 @@ from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 
 GRAVITY = 9.81  # m/s^2
-ADULT_HEIGHT = 1.7  # m: taken for a figure whose skeleton does not know its unit of length
-VOTES = ContactSettings(heights=(0.0, 0.07))  # a vote counts the less, the higher its point is
-TREMBLE = 0.015  # s: what is shorter is no movement but noise
+ADULT_HEIGHT = 1.7  # m: assumed if the skeleton's length unit is unknown
+VOTES = ContactSettings(heights=(0.0, 0.07))  # a vote counts less the higher its point is
+TREMBLE = 0.015  # s: anything shorter is noise
 
 
 def lay_root_path(
@@ -42,14 +41,14 @@ def lay_root_path(
 
     The path begins at x = z = 0; y is such that the lowest joint of the feet touches the ground, y = 0, within
     millimetres, but in flight. A translation that the motion has already is replaced.
-    feet: the names of the joints of each foot, toes included; if not given, the lowest joints that are paired left
-        and right. MotionError for a motion without skeleton or one without such joints.
+    feet: the names of the joints of each foot, toes included; by default the lowest left-right pairs of joints.
+        MotionError for a motion without skeleton or without such joints.
     tremble: seconds over which the feet are smoothed; recorded motions need little, generated ones 0.06 s, and 0
         smooths nothing.
-    keep_height: leave y as it is, as of a motion in place whose height is right.
+    keep_height: keep y, for a motion in place whose height is right.
     """
     if not 0 <= tremble < np.inf:
-        raise MotionError(f"feet are smoothed over 0 or more seconds, not {tremble}")
+        raise MotionError(f"the smoothing time of feet must be 0 or more seconds, not {tremble}")
     skeleton = skeleton_of(motion)
     joints = feet_of(skeleton) if feet is None else [skeleton.index(name) for name in (*feet[0], *feet[1])]
     metres = skeleton.metres_per_unit or ADULT_HEIGHT / skeleton.height
@@ -75,13 +74,13 @@ def led_along(motion: Motion, velocity: Array, height: Array, metres: float) -> 
 def _height(points: Array, fps: float) -> Array:
     """Heights (T,) of the root above the ground from those of the feet's points (T, K) above the root, in metres."""
     standing = -points.min(axis=1)
-    # what jumps up forward in time falls down backward: only what both agree on is flight
+    # a jump up forward in time is a fall backward: only frames on which both agree are flight
     flight = np.minimum(_with_flight(standing, fps), _with_flight(standing[::-1], fps)[::-1])
     return smoothed(flight[:, None, None], TREMBLE, fps)[:, 0, 0]
 
 
 def _with_flight(standing: Array, fps: float) -> Array:
-    # the velocity upwards is measured over .05 s
+    # the upward velocity is measured over .05 s
     heights, speed, span = standing.tolist(), 0.0, max(1, round(0.05 * fps))
     for t in range(1, len(heights)):
         falling = heights[t - 1] + speed / fps - 0.5 * GRAVITY / fps**2
