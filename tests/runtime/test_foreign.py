@@ -155,7 +155,7 @@ def test_a_figure_whose_z_is_up_goes_on_on_the_models_own(
     with caplog.at_level(logging.INFO, "motet"):
         found = predictor.predict(lying, frames=5)
     assert found.skeleton == predictor.contract.skeleton
-    assert "the new frames stay on the model's figure" in caplog.text
+    assert "the new frames use the model's figure" in caplog.text
     assert len(predictor.predict(lying, frames=5, append=True)) > 5
 
 

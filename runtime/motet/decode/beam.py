@@ -89,7 +89,7 @@ def _merge(scores: Scores, alive: Ids, best: Ids, gains: Floats, end: int) -> tu
     rows, beams = scores.shape
     width = best.shape[1]
     pool = np.full((rows * beams, width), -np.inf)
-    pool[:, 0] = scores.ravel()  # what has ended goes on as it is
+    pool[:, 0] = scores.ravel()  # ended hypotheses are kept unchanged
     pool[alive] = scores.ravel()[alive, None] + gains
     words = np.full((rows * beams, width), end, dtype=np.int64)
     words[alive] = best

@@ -1,4 +1,4 @@
-"""The loop of predictors: a step graph whose frames go on from seed frames."""
+"""The loop of predictors: a step graph that continues seed frames."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -13,7 +13,7 @@ from motet.settings import Range, Settings
 
 @dataclass(frozen=True)
 class FreeRunSettings(Settings):
-    """horizon: frames after which the encoder is asked again."""
+    """horizon: frames between runs of the encoder."""
 
     horizon: Annotated[int, Range(1, 10_000)]
 

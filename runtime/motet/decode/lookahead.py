@@ -1,4 +1,4 @@
-"""Frames that do not tremble, and do not come late: the net runs a few frames ahead of those that are shown.
+"""Smooth frames without delay: the net runs a few frames ahead of those shown.
 
 What is shown is the mean of the frames before it, itself and those to come, through a Gaussian window; the net's own
 history is not touched. Where the control changes, the frames ahead are run again from the last one shown. The

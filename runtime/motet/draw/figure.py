@@ -41,9 +41,7 @@ def figure_of(motion: Motion) -> Figure:
     body = Body(skeleton)
     points = places / body.height
     if not np.abs(points).max() < LARGEST_COORDINATE:
-        raise MotionError(
-            f"joints are further than {LARGEST_COORDINATE:g} body heights from the origin: too far to be shown"
-        )
+        raise MotionError(f"joints are over {LARGEST_COORDINATE:g} body heights from the origin: too far to show")
     points[:, :, 1] -= _ground(points, moves=f"{skeleton.names[0]}.ty" in motion.channels)
     return Figure(body.points(points), body.bones, _heading(points[0], body.sides), motion.fps)
 

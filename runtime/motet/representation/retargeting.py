@@ -126,7 +126,7 @@ def from_model_figure(found: Motion, own: Motion, ends: Motion, figure: Figure |
     motion's own world is another than the model's.
     """
     if own.skeleton is None:
-        log.info("the new frames stay on the model's figure: the file has no skeleton")
+        log.info("the new frames use the model's figure: the file has no skeleton")
         return None
     skeleton, at = own.skeleton, [0, -1][: len(ends)]
     back = found if found.skeleton == skeleton else from_humanoid(on_humanoid(found), figure or own)
@@ -135,7 +135,7 @@ def from_model_figure(found: Motion, own: Motion, ends: Motion, figure: Figure |
     carrier = next(name.rpartition(".")[0] for name in back.channels if name.endswith(".tx"))
     channels = {f"{carrier}.t{axis}" for axis in AXES} <= set(own.channels)
     if not channels or not all(_same_world(turn, skeleton, carrier) for turn in turns):
-        log.info("the new frames stay on the model's figure: the file's own turns or moves its hips in another way")
+        log.info("the new frames use the model's figure: the file's own turns or moves its hips in another way")
         return None
     part = np.linspace(0, 1, len(found))[:, None]
     between = rotmat_to_rotvec(product(inverse(turns[:1]), turns[-1:])) * part[..., None]
