@@ -106,7 +106,7 @@ def test_bundle_commands(tmp_path: Path) -> None:
     rows = json.loads(run("bundle", "list", "--json").stdout)
     assert {("cmu-control", "control"), ("predict", "predict")} <= {(row["name"], row["verb"]) for row in rows}
     assert "cmu-control" in run("bundle", "list").stdout
-    assert json.loads(run("bundle", "info", "cmu-control", "--json").stdout)["format"] == 2
+    assert json.loads(run("bundle", "info", "cmu-control", "--json").stdout)["format"] == 3
     assert "NSF EIA-0196217" in run("bundle", "info", "cmu-control").stdout
     verified = run("bundle", "verify", "cmu-control", "--threads", 2, "--provider", "cpu").stdout
     assert "3 files match the manifest\nthe model runs on CPUExecutionProvider\n" in verified
@@ -170,7 +170,7 @@ def test_bench_describes_a_file_and_says_where_it_ran(clips: Path) -> None:
         (2, ["control", "walk 1s", "--start", "{bad}/text.bvh", "-o", "{out}/a.bvh"], "text.bvh, line 1"),
         (2, ["predict", "{clips}/39_14.amc", "-o", "{out}/a.bvh", "--frames", "1000000000"], "range 1<=x<=100000"),
         (1, ["convert", "{bad}/broken.bvh", "{out}/a.npz"], "broken.bvh, line "),
-        (1, ["convert", "{bad}/alone.amc", "{out}/a.npz"], "skeleton is missing"),
+        (1, ["convert", "{bad}/alone.amc", "{out}/a.npz"], "no skeleton found"),
         (1, ["view", "{bad}/text.bvh"], "text.bvh, line 1: "),
         (2, ["bundle", "verify", "{bad}"], "no manifest.json"),
         (2, ["bundle", "pack", "cmu-control", "-o", "{out}/b.tar"], "is a .zip"),

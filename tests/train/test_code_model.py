@@ -130,16 +130,15 @@ def test_hidden_steps_tell_nothing() -> None:
     assert not torch.equal(known_of(model, before, action, age), known_of(model, others, action, age))
 
 
-def test_what_is_remembered_comes_back() -> None:
+def test_tables_hold_the_memory_and_the_numbers_of_its_codes() -> None:
     model = net()
     rows = np.random.default_rng(0).integers(6, size=(20, 5))
-    rows[3, 0] = END
     model.memory.copy_(torch.from_numpy(rows))
-    codes, numbers, action, age = model.remember(torch.tensor([3, 7, 7]))
-    assert codes.tolist() == rows[[3, 7, 7], :3].tolist()
-    assert (action.tolist(), age.tolist()) == (rows[[3, 7, 7], 3].tolist(), rows[[3, 7, 7], 4].tolist())
-    assert not numbers[0].any()
-    torch.testing.assert_close(numbers[1:, 3:], model.codec.from_codes(codes[1:, 1:]))
+    tables, (move, *codes) = model.tables(), rows[7, :3]
+    np.testing.assert_array_equal(tables["memory"], rows)
+    torch.testing.assert_close(torch.from_numpy(tables["moves"][move]), model.codec.book[move] / model.codec.book_scale)
+    body = torch.from_numpy(tables["body"][codes].ravel())
+    torch.testing.assert_close(body, model.codec.from_codes(torch.tensor([codes]))[0])
 
 
 def test_a_model_comes_back_from_its_configuration() -> None:

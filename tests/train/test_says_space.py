@@ -11,6 +11,7 @@ from test_says_table import CMU, LEFT, LYING, STILL, ZOMBIE, Half, gliding, only
 import motet
 from motet.errors import MotionError
 from motet.formats import read_motion
+from motet.models.search import IndexSettings
 from motet.motion.motion import Motion
 from motet_train.evaluate.text_adherence import table
 from motet_train.evaluate.text_adherence.prompts import prompts
@@ -32,6 +33,9 @@ class Known:
     """A space of three directions: whoever lies, whoever stands, and anything else that is asked for."""
 
     sizes = {"E": 3}  # noqa: RUF012
+
+    def settings(self, kind: type[IndexSettings]) -> IndexSettings:
+        return kind()
 
     def windows(self, motion: Motion, longest: float) -> list[tuple[float, Motion]]:
         return [(0.0, motion)]

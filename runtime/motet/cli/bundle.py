@@ -28,7 +28,7 @@ def bundle() -> None:
 @bundle.command("list")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def list_(as_json: bool) -> None:
-    """List the installed bundles: motet's own, and those of other packages."""
+    """List the installed bundles."""
     rows = [_row(Bundle.open(path)) for path in list_bundles().values()]
     if as_json:
         click.echo(json.dumps(rows))

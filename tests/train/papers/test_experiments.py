@@ -96,11 +96,12 @@ def test_figures_that_the_clips_allow_are_drawn(clips: Clips, tmp_path: Path) ->
 
 def test_a_run_is_evaluated_on_what_it_was_trained_on(tmp_path: Path) -> None:
     control, fill = SUITES["control"], SUITES["fill"]
+    own = SimpleNamespace(representation="root_sixd")
 
     def found(
         command: str, data: Path | None = None, run: Path = Path("runs/x"), suite: Suite = control
     ) -> Path | None:
-        model: Any = SimpleNamespace(manifest=SimpleNamespace(training={"command": command}))
+        model: Any = SimpleNamespace(manifest=SimpleNamespace(training={"command": command}, motion=own))
         return data_of({str(run): model}, suite, data)[str(run)]
 
     assert found(f"motet train tdbn --data {tmp_path} --out x") == tmp_path
