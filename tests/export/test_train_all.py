@@ -184,7 +184,7 @@ def test_settings_of_unknown_stages_are_refused(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_bundles_are_exported_and_run(outputs: list[Result], recordings: Path) -> None:
     bundles, chosen = recordings.parent / "bundles", recordings.parent / "chosen"
-    # how far off a predictor is was fitted to a single motion held out here, which amplifies rounding too much
+    # after two steps a predictor differs from its mirrored self by little but rounding, which its expected error shows
     shutil.copytree(recordings.parent / "runs", chosen, ignore=shutil.ignore_patterns("predict", "store"))
     exported = command("export", chosen, "-o", bundles)
     assert exported.exit_code == 0, exported.output
