@@ -138,7 +138,7 @@ def test_what_cannot_be_written_onto_is_said_before_work(tmp_path: Path) -> None
         (("--onto", avatar, "--like", avatar, "-o", out / "a.glb"), "give one of the two"),
         (("--onto", tmp_path / "none.glb", "-o", out / "a.glb"), "none.glb: no such file"),
         (("--onto", avatar, "-o", out / "a.vrm"), "avatar.glb: not a VRM avatar: write it to a .glb"),
-        (("--onto", avatar, "-o", avatar), "avatar.glb is read, so it is not written over: name another file"),
+        (("--onto", avatar, "-o", avatar), "avatar.glb is an input and would be overwritten: name another file"),
     ):
         check_refused(run("control", "walk .5s", *options), said, out)
 

@@ -182,5 +182,5 @@ def test_no_result_is_written_over_what_is_read(tmp_path: Path, clips: Path, mon
     ):
         result = run(*command)
         assert result.exit_code == 2
-        assert ".npz is read, so it is not written over: name another file for the result" in result.stderr
+        assert ".npz is an input and would be overwritten: name another file for the result" in result.stderr
     assert Path("a.npz").read_bytes() == content

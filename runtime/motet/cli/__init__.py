@@ -1,4 +1,4 @@
-"""The command line: each command is imported when it is used, and says which extra it needs where one is missing."""
+"""The command line: each command is imported on use, and names the extra it needs if one is missing."""
 
 import importlib
 import importlib.util
@@ -46,7 +46,7 @@ NEEDS = {
 
 
 class Commands(click.Group):
-    """A group that imports a command only when it is called, and says which of them need an extra."""
+    """A group that imports a command only when it is called, and shows which need an extra."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """The commands whose extra is installed."""
@@ -65,7 +65,7 @@ class Commands(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """The command that is called; one that is nearly spelt like another is refused with its name."""
+        """The called command; a misspelt one is refused with the nearest name."""
         near = get_close_matches(args[0], COMMANDS, 1)
         if near and args[0] not in COMMANDS and not ctx.resilient_parsing:
             ctx.fail(f"No such command {args[0]!r}. Did you mean {near[0]!r}?")
@@ -95,7 +95,7 @@ class Commands(click.Group):
             sys.exit(130)
 
     def main(self, *args: Any, **kwargs: Any) -> Any:
-        """Run as a program; results that cannot be printed, as on a full disk, are one message and exit code 1."""
+        """Run as a program; if results cannot be printed, as on a full disk, one message and exit code 1."""
         try:
             return super().main(*args, **kwargs)
         except OSError as error:
@@ -113,7 +113,7 @@ def missing(extra: str) -> list[str]:
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.option("-q", "--quiet", is_flag=True, help="Print only errors on stderr.")
-@click.option("-v", "--verbose", is_flag=True, help="Print on stderr what is done, such as resampling.")
+@click.option("-v", "--verbose", is_flag=True, help="Print details on stderr, such as resampling.")
 @click.version_option(package_name="motet")
 def main(quiet: bool, verbose: bool) -> None:
     """Models of human motion that describe, generate, predict and control."""

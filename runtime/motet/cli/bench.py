@@ -17,7 +17,7 @@ from motet.models.load import load
 @click.command()
 @click.option("--bundle", default="control", show_default=True, help="Name or path of a bundle.")
 @click.option("--motion", type=Path, help="Motion file to describe.  [default: a generated one of 2.8 s]")
-@click.option("--seconds", default=1.0, show_default=True, help="How long to measure each figure.")
+@click.option("--seconds", default=1.0, show_default=True, help="How long to measure each row.")
 @click.option("--torch/--no-torch", default=True, help="Measure torch too, if it is installed.  [default: --torch]")
 @session_options
 @click.option("--json", "as_json", is_flag=True, help="Print a list of rows.")

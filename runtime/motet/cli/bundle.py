@@ -12,7 +12,7 @@ from motet.cli.options import session_options
 from motet.models.verify import verify as verify_bundle
 
 NOT_STATED = "not stated"
-"""What is said of a licence that is null."""
+"""Shown for a licence that is null."""
 
 LONG = ("starts", "kinds")
 """Parts of a manifest that are shown with --json alone."""

@@ -24,7 +24,7 @@ from motet.motion.motion import Motion
 
 HEAD = ("figure", "sure", "tall m", "seconds", "fps", "facing", "ground m", "travel m", "notes")
 COLUMNS = "{:<26}{:>6}{:>8}{:>9}{:>7}{:>11}{:>10}{:>10}{:>7}"
-"""Of the table of several files, behind their names."""
+"""Columns of the table, after the name."""
 
 KINDS = tuple(dict.fromkeys((*MOCAP, *CLIPPED)))
 """Types of files that are looked at in a folder."""

@@ -23,26 +23,24 @@ from motet.models.load import load_as
 @out_option
 @click.option("--bundle", default="control", show_default=True, help="Name or path of a bundle.")
 @click.option("--start", help="Where to start: a gait or label, or a motion file to continue.")
-@click.option("--seed", type=click.IntRange(0), help="Seed of the noise, of models that have such.  [default: 0]")
+@click.option("--seed", type=click.IntRange(0), help="Seed, for models with noise.  [default: 0]")
 @click.option(
     "--variety",
     type=click.FloatRange(0, 1),
-    help="0: always alike; 1: fully sampled, of models that draw.  [default: 0]",
+    help="For models that sample: 0 is always the same, 1 fully sampled.  [default: 0]",
 )
 @click.option(
     "--temperature",
     type=click.FloatRange(0.01, 100),
-    help="Sampling temperature of models that draw; lower is more deterministic.  [default: the bundle's]",
+    help="Sampling temperature of models that sample; lower is more deterministic.  [default: the bundle's]",
 )
-@click.option(
-    "--loose-feet", "hold_feet", flag_value=False, default=None, help="Do not hold feet to the ground as they stand."
-)
+@click.option("--loose-feet", "hold_feet", flag_value=False, default=None, help="Do not hold standing feet.")
 @click.option(
     "--no-smooth",
     "smooth",
     flag_value=False,
     default=None,
-    help="Show the frames of a net that trembles as they are.",
+    help="Show a trembling net's frames as they are.",
 )
 @write_options
 @session_options

@@ -37,13 +37,13 @@ log = logging.getLogger(__name__)
 @click.option("--to", "stop", type=click.FloatRange(0, min_open=True), help="Cut: seconds to stop at.")
 @click.option("--mirror", is_flag=True, help="Swap left and right.")
 @click.option("--unit", type=click.Choice(list(METRES)), help="Length unit to write.")
-@click.option("--humanoid", is_flag=True, help="Bring the motions to the humanoid (docs/humanoid.md).")
+@click.option("--humanoid", is_flag=True, help="Retarget the motions to the humanoid (docs/humanoid.md).")
 @click.option(
     "--map", "map_file", type=Path, metavar="FILE", help="Which joint of IN is which bone, as JSON; implies --humanoid."
 )
-@click.option("--travel", is_flag=True, help="Lay the way over the ground that the feet tell, of a clip in place.")
+@click.option("--travel", is_flag=True, help="Give an in-place clip the path that its feet imply.")
 @click.option("--hold-feet", is_flag=True, help="Keep feet that stand from sliding; implies --humanoid.")
-@click.option("--loop", is_flag=True, help="Cut to what plays in a circle without a leap, as strides of a walk.")
+@click.option("--loop", is_flag=True, help="Cut to a seamless loop, such as strides of a walk.")
 @write_options
 @read_options
 def convert(

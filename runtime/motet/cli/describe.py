@@ -33,7 +33,7 @@ from motet.models.load import load_as
     help="Samples for consensus (MBR) decoding; 0: beam search. [default: the bundle's; of describe: beam search]",
 )
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the samples.")
-@click.option("--timeline", is_flag=True, help="Say what happens when: a sentence for each part of a motion.")
+@click.option("--timeline", is_flag=True, help="One sentence for each part of a motion, with its times.")
 @session_options
 @read_options
 @click.option("--json", "as_json", is_flag=True, help="Print a list: each window or part with its input and seconds.")

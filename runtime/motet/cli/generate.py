@@ -34,19 +34,21 @@ from motet.motion.looping import looped
     help="Draws per hypothesis; 1: independent samples. [default: the bundle's]",
 )
 @click.option("--temperature", type=click.FloatRange(0.01, 100), help="Sampling temperature. [default: the bundle's]")
-@click.option("--top-p", type=click.FloatRange(0.01, 1), help="Draw codes from the likeliest of this share.")
-@click.option("--seconds", type=click.FloatRange(0, 600), help="Length of each text; 0: it ends by itself.")
+@click.option(
+    "--top-p", type=click.FloatRange(0.01, 1), help="Nucleus sampling: draw from the likeliest codes up to this mass."
+)
+@click.option("--seconds", type=click.FloatRange(0, 600), help="Length for each text; 0: it ends by itself.")
 @click.option("--max-seconds", type=click.FloatRange(0, 600), help="Maximum length in seconds. [default: the bundle's]")
 @click.option(
     "--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed; later texts use seed + 1, ..."
 )
 @click.option("--no-plant", is_flag=True, help="Skip foot planting: the figure moves as drawn.")
 @click.option("--all", "every", is_flag=True, help="Write all hypotheses, not only the best.")
-@click.option("--story", is_flag=True, help="One motion for all texts, one after the other.")
-@click.option("--after", type=Path, metavar="MOTION", help="Go on from the end of this motion file.")
+@click.option("--story", is_flag=True, help="One motion for all texts, in order.")
+@click.option("--after", type=Path, metavar="MOTION", help="Continue from the end of this motion file.")
 @click.option("--stand", type=click.Choice(["start", "end", "both"]), help="Start or end in standing.")
-@click.option("--loop", is_flag=True, help="Write the part that plays in a circle without a leap.")
-@click.option("--strict", is_flag=True, help="Refuse a text of which the model knows only a part.")
+@click.option("--loop", is_flag=True, help="Write only a seamless loop.")
+@click.option("--strict", is_flag=True, help="Fail on a text that the model knows only in part.")
 @write_options
 @session_options
 @click.option("--json", "as_json", is_flag=True, help="Print a list with input and hypotheses of each text.")

@@ -1,4 +1,4 @@
-"""``motet live``: a figure that is steered, as a page, by a server, or as messages for an avatar."""
+"""``motet live``: a steered figure, as a page, by a server, or as messages for an avatar."""
 
 from pathlib import Path
 
@@ -16,13 +16,15 @@ from motet.models.steer import SteerModel
 @click.command()
 @click.option("-o", "--out", type=click.Path(path_type=Path), help="Write a page that steers a figure in a browser.")
 @click.option("--port", type=click.IntRange(0, 65535), help="Serve poses on this port (WebSocket, JSON); 0: any.")
-@click.option("--osc", metavar="HOST:PORT", help="Send poses to there (VMC protocol, OSC over UDP).")
-@click.option("--script", help="What --osc shows without a server, again and again, such as 'walk 3s, run 4s'.")
-@click.option("--host", default="127.0.0.1", show_default=True, help="Address to serve on; other machines see 0.0.0.0.")
+@click.option("--osc", metavar="HOST:PORT", help="Send poses there (VMC protocol, OSC over UDP).")
+@click.option("--script", help="Script for --osc without a server, repeated, such as 'walk 3s, run 4s'.")
 @click.option(
-    "--origin", "origins", multiple=True, help="Origin of a web page that may connect; several times for more."
+    "--host", default="127.0.0.1", show_default=True, help="Address to serve on; 0.0.0.0 serves other machines."
 )
-@click.option("--characters", type=click.IntRange(1), default=1, show_default=True, help="Figures at first.")
+@click.option(
+    "--origin", "origins", multiple=True, help="Origin of a web page that may connect; may be given several times."
+)
+@click.option("--characters", type=click.IntRange(1), default=1, show_default=True, help="Initial number of figures.")
 @click.option("--bundle", default="control", show_default=True, help="Name or path of a bundle.")
 @session_options
 def live(

@@ -1,4 +1,4 @@
-"""What commands say on stderr beside their results: the log of ``motet``, and its warnings."""
+"""What commands print on stderr: the log of ``motet``, and its warnings."""
 
 import logging
 import warnings

@@ -19,7 +19,7 @@ from motet.models.predict import MAX_SAMPLES, PredictModel
 from motet.motion.motion import Motion
 
 NOBODY = "none"
-"""What ``--beyond`` says where the predictor goes on by itself."""
+"""Value of ``--beyond`` for the predictor alone."""
 
 
 @click.command()
@@ -29,7 +29,9 @@ NOBODY = "none"
 @click.option("--frames", type=click.IntRange(1, 100_000), help="Frames to predict. [default: the bundle's horizon]")
 @click.option("--seconds", type=click.FloatRange(0, min_open=True), help="The same in seconds.")
 @click.option("--append", is_flag=True, help="Write the motion too, then the prediction.")
-@click.option("--samples", type=click.IntRange(1, MAX_SAMPLES), help="Write so many different futures of each motion.")
+@click.option(
+    "--samples", type=click.IntRange(1, MAX_SAMPLES), help="Number of different futures to write for each motion."
+)
 @click.option(
     "--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed; later samples use seed + 1, ..."
 )
@@ -38,7 +40,7 @@ NOBODY = "none"
     default="generate",
     show_default=True,
     metavar="BUNDLE",
-    help=f"What goes on after the horizon, and gives samples; {NOBODY}: the predictor itself, until it dies away.",
+    help=f"Model that continues beyond the horizon and gives samples; {NOBODY}: the predictor alone, which dies away.",
 )
 @write_options
 @session_options
@@ -117,7 +119,7 @@ class Asked:
         try:
             return self._beyond(motion, writer)
         except MotionError as error:
-            raise MotionError(f"{error} (--beyond {NOBODY} goes on with the predictor alone)") from error
+            raise MotionError(f"{error} (--beyond {NOBODY} continues with the predictor alone)") from error
 
     def _beyond(self, motion: Motion, writer: CodesModel) -> list[Motion]:
         frames, append, seed = self.frames, self.append, self.seed

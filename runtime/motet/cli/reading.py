@@ -101,7 +101,7 @@ class Read:
     def _only(self, given: Path) -> Source:
         first, *others = self._of(given, every=False)
         if others:
-            raise click.UsageError(f"one motion is wanted here, and {given} holds {len(others) + 1} clips: name one")
+            raise click.UsageError(f"expected one motion, but {given} holds {len(others) + 1} clips: name one")
         return first
 
 
@@ -119,10 +119,8 @@ def read_options(command: Callable[..., None]) -> Callable[..., None]:
 
     @unit_option
     @click.option("--fps-in", type=FPS, help=f"Frame rate of files that have none ({_takers('fps')}).")
-    @click.option(
-        "--asf", type=Path, help=f"Skeleton of the files ({_takers('asf')}). [default: looked for beside them]"
-    )
-    @click.option("--clip", metavar="NAME|N|all", help=f"Clip of files of several ({_takers('clip')}).")
+    @click.option("--asf", type=Path, help=f"Skeleton of the files ({_takers('asf')}). [default: found beside them]")
+    @click.option("--clip", metavar="NAME|N|all", help=f"Clip of files with several ({_takers('clip')}).")
     @click.option(
         "--partial", is_flag=True, help=f"Take the complete frames of truncated files ({_takers('partial')})."
     )
@@ -130,7 +128,7 @@ def read_options(command: Callable[..., None]) -> Callable[..., None]:
         "--rest",
         type=Path,
         metavar="FILE",
-        help=f"File that rests in a T-pose, of the same joints ({_takers('rest')}).",
+        help=f"File with the same joints in a T-pose ({_takers('rest')}).",
     )
     @functools.wraps(command)
     def with_read(

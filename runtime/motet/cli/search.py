@@ -24,7 +24,7 @@ from motet.models.search import SearchModel
 @click.argument("folder", type=Path)
 @click.option("--count", type=click.IntRange(1, 1000), help="Motions to print. [default: the bundle's]")
 @click.option("--bundle", default="search", show_default=True, help="Name or path of a bundle.")
-@click.option("--index", "file", type=Path, help=f"File to keep the vectors in. [default: {NAME} in FOLDER]")
+@click.option("--index", "file", type=Path, help=f"File for the vectors. [default: {NAME} in FOLDER]")
 @unit_option
 @session_options
 @click.option("--json", "as_json", is_flag=True, help="Print a list with path, clip, start, stop and score of each.")

@@ -81,11 +81,11 @@ def write_options(command: Callable[..., None]) -> Callable[..., None]:
         help=f"Write this character ({' '.join(ONTO)}) with mesh and materials, and the results as clips in it.",
     )
     @click.option("--fps", type=FPS, help="Frame rate to write, such as 24, 25, 30 or 60. [default: the result's own]")
-    @click.option("--in-place", is_flag=True, help="Take out the way over the ground; height and turns stay.")
+    @click.option("--in-place", is_flag=True, help="Remove horizontal travel; height and turns stay.")
     @functools.wraps(command)
     def with_output(like: Path | None, onto: Path | None, fps: float | None, in_place: bool, **options: Any) -> None:
         if like and onto:
-            raise click.UsageError("--like writes motions alone, --onto the character with them: give one of the two")
+            raise click.UsageError("--like writes only motions, --onto the character with them: give one of the two")
         if onto and onto.suffix.lower() not in ONTO:
             raise click.UsageError(f"--onto takes a character with its mesh ({' '.join(ONTO)}), which {onto} is not")
         given = onto or like
@@ -98,7 +98,7 @@ def write_options(command: Callable[..., None]) -> Callable[..., None]:
 def spare(place: Path, *sources: Path) -> None:
     """Refuse a result that would take the place of a file that it is made from."""
     if place.resolve() in {source.resolve() for source in sources}:
-        raise click.UsageError(f"{place} is read, so it is not written over: name another file for the result")
+        raise click.UsageError(f"{place} is an input and would be overwritten: name another file for the result")
 
 
 def size(frames: int, fps: float) -> str:
