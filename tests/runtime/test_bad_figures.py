@@ -59,7 +59,7 @@ def lacking(*names: str) -> Callable[[], Motion]:
 
 
 FIGURES: dict[str, tuple[Callable[[], Motion], str]] = {
-    "two hips": (two_hips, "has two hips, 'A:Hips' and 'B:Hips': give a file with one figure"),
+    "two hips": (two_hips, "has two hips, 'A:Hips' and 'B:Hips': put each figure in a file of its own"),
     "no legs": (lacking("LeftUpLeg", "RightUpLeg"), "has no legs: a human needs hips with two legs, a spine"),
     "one arm": (lacking("RightForeArm"), "one side only: rightLowerArm, rightHand (the other side has leftLowerArm,"),
     "one hand": (lacking("LeftHand"), "one side only: leftHand (the other side has rightHand); export them, too, or"),
@@ -79,8 +79,8 @@ NO_CHARACTER = {name: case for name, case in FIGURES.items() if name not in ("kn
 MAPS = {
     '{"hips": "Hipz"}': "map.json: hips: the skeleton has no joint 'Hipz'; it has mixamorig:Hips, mixamorig:Spine,",
     '{"tail": "mixamorig:Hips"}': "map.json: 'tail' is not a bone of the humanoid: expected hips, spine, head,",
-    '{"hips": "mixamorig:Hips", "spine": ["mixamorig:Hips"]}': "twice in this map: mixamorig:Hips; name it once",
-    '{"hips": "mixamorig:Hips", "hips": "mixamorig:Spine"}': "this is not a map of joints in JSON: hips stands twice",
+    '{"hips": "mixamorig:Hips", "spine": ["mixamorig:Hips"]}': "named twice: mixamorig:Hips",
+    '{"hips": "mixamorig:Hips", "hips": "mixamorig:Spine"}': "not a joint map in JSON: hips appears twice",
     '{"hips": "mixamorig:Hips"}': "map.json: this skeleton has no legs",
 }
 """A map of Mixamo's joints, and what is said of it."""

@@ -191,7 +191,7 @@ def test_control_goes_on_from_another_figure(mixamo: Motion, walk: Motion) -> No
 
 def test_a_figure_that_is_no_humans_is_refused_with_both_reasons(describer: DescribeModel) -> None:
     with pytest.raises(
-        MotionError, match=r"no joint was found for .*; and it cannot be taken as it is: the model's figure"
+        MotionError, match=r"no joint was found for .*; and it cannot be used as it is: this motion lacks"
     ):
         describer.describe(walker(80))
 

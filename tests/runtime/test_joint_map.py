@@ -47,9 +47,9 @@ def test_maps_that_cannot_be_followed_are_refused(tmp_path: Path) -> None:
     cases: list[tuple[dict[str, object], str]] = [
         ({"leftTail": "bone3"}, "'leftTail' is not a bone of the humanoid"),
         ({"hips": "nothing"}, "no joint 'nothing'"),
-        ({"hips": entries["head"]}, "one bone only, twice in this map"),
+        ({"hips": entries["head"]}, "only one bone; named twice"),
         ({"hips": ["bone0", "bone1"], "spine": ["bone2"]}, "only spine and neck take a list"),
-        ({"hips": 3}, "the name of a joint is expected"),
+        ({"hips": 3}, "expected the name of a joint"),
         ({"leftUpperArm": entries["leftLowerArm"], "leftLowerArm": entries["leftUpperArm"]}, "out of order"),
     ]
     for change, reason in cases:
@@ -59,10 +59,10 @@ def test_maps_that_cannot_be_followed_are_refused(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match="one side only: rightUpperLeg"):
         read_map(write_map(tmp_path, without), skeleton)
     (tmp_path / "map.json").write_text('{"hips": "bone0", "hips": "bone1"}')
-    with pytest.raises(FormatError, match="hips stands twice"):
+    with pytest.raises(FormatError, match="hips appears twice"):
         read_map(tmp_path / "map.json", skeleton)
     (tmp_path / "map.json").write_text("[1, 2]")
-    with pytest.raises(FormatError, match="map of joints"):
+    with pytest.raises(FormatError, match="joint map"):
         read_map(tmp_path / "map.json", skeleton)
 
 

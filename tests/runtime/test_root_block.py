@@ -85,7 +85,7 @@ def test_what_the_block_needs_is_named() -> None:
     motion = walker(10)
     with pytest.raises(MotionError, match=r"lacks hips\.tx, hips\.ty, hips\.tz"):
         to_root_block(motion.select(motion.channels[3:]))
-    with pytest.raises(MotionError, match="metres_per_unit"):
+    with pytest.raises(MotionError, match="length unit of this skeleton is unknown"):
         to_root_block(walker(10, metres_per_unit=None))
     with pytest.raises(MotionError, match="no skeleton"):
         to_root_block(replace(motion, skeleton=None))

@@ -56,7 +56,7 @@ def infinite() -> NDArray[Any]:
     [
         (array_bytes(ROWS.astype(np.float32)), "'rows.npy' is not a plain array: expected float16"),
         (array_bytes(ROWS.astype(">f2")), "expected float16"),
-        (array_bytes(ROWS.T), r"it has the shape \[3, 4\], declared \[4, 3\]"),
+        (array_bytes(ROWS.T), r"its shape is \[3, 4\], declared as \[4, 3\]"),
         (array_bytes(ROWS)[:-1], "and nothing after it"),
         (array_bytes(ROWS) + b"x", "and nothing after it"),
         (array_bytes(infinite()), "not between -1e.09 and 1e.09"),

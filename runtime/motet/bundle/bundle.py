@@ -98,9 +98,9 @@ class Bundle:
         with self.named(f", table {name}"):
             array = array_of(self.read(found.file), found.file, [found.dtype])
             if array.shape != found.shape:
-                raise BundleError(f"it has the shape {list(array.shape)}, declared {list(found.shape)}")
+                raise BundleError(f"its shape is {list(array.shape)}, declared as {list(found.shape)}")
             if array.dtype.kind == "f" and not (np.abs(array) <= np.float64(LARGEST)).all():
-                raise BundleError(f"it holds numbers that are not between -{LARGEST:g} and {LARGEST:g}")
+                raise BundleError(f"some numbers are not between -{LARGEST:g} and {LARGEST:g}")
             return array
 
     def check_files(self) -> list[str]:

@@ -62,7 +62,7 @@ def replay(model: Replayable, data: bytes, golden: Golden) -> dict[str, float]:
     found["run"] = difference(run, _part(arrays, "run.out."))
     for name, off in found.items():
         if not off <= golden.tolerance:
-            raise BundleError(f"golden vectors, {name}: it differs by {off:.2e}, the tolerance is {golden.tolerance:g}")
+            raise BundleError(f"golden vectors, {name}: off by {off:.2e}, the tolerance is {golden.tolerance:g}")
     return found
 
 
@@ -74,9 +74,9 @@ def difference(found: Arrays, expected: Arrays) -> float:
     largest = 0.0
     for name, array in expected.items():
         if name not in found or found[name].shape != array.shape or found[name].dtype != array.dtype:
-            raise BundleError(f"the output {name!r} has another shape or dtype than expected")
+            raise BundleError(f"output {name!r} does not have the expected shape or dtype")
         if not np.isfinite(found[name]).all() or not np.isfinite(array).all():
-            raise BundleError(f"the output {name!r} has values that are not finite")
+            raise BundleError(f"output {name!r} is not finite")
         if array.dtype.kind in "bi":
             largest = largest if np.array_equal(found[name], array) else math.inf
         elif array.size:

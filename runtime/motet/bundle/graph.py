@@ -52,7 +52,7 @@ class TensorSpec:
         """The size of a fixed axis; BundleError if the axis is dynamic."""
         size = self.shape[axis]
         if isinstance(size, str):
-            raise BundleError(f"axis {axis} of {self.name!r} must have a fixed size, it is {size!r}")
+            raise BundleError(f"axis {axis} of {self.name!r} must have a fixed size, not {size!r}")
         return size
 
     def example(self, rng: np.random.Generator, batch: int) -> NDArray[Any]:
@@ -163,7 +163,7 @@ class OnnxGraph:
             with _creation:
                 self._session = (options or SessionOptions()).session(model)
         except Exception as error:  # ONNX Runtime's errors share no base class of their own
-            raise BundleError(f"ONNX Runtime refuses the graph: {str(error).partition(chr(10))[0]}") from error
+            raise BundleError(f"ONNX Runtime rejected the graph: {str(error).partition(chr(10))[0]}") from error
         _check(self._session.get_inputs(), spec.inputs, "input")
         _check(self._session.get_outputs(), spec.outputs, "output")
         self._outputs = [tensor.name for tensor in spec.outputs]

@@ -79,7 +79,7 @@ class Archive:
             _check_entry(info)
         self._infos: Mapping[str, zipfile.ZipInfo] = {info.filename: info for info in infos}
         if len(self._infos) != len(infos):
-            raise BundleError("a file is in the zip twice")
+            raise BundleError("the zip contains a file twice")
         self.names = frozenset(self._infos)
 
     def read(self, name: str, limit: int) -> bytes:
@@ -106,7 +106,7 @@ def _check_entry(info: zipfile.ZipInfo) -> None:
     if stat.S_IFMT(info.external_attr >> 16) not in {0, stat.S_IFREG}:
         raise BundleError(f"{info.filename!r} is not a plain file")
     if info.compress_type not in {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED} or info.flag_bits & 1:
-        raise BundleError(f"{info.filename!r} is encrypted, or packed by another method than deflate")
+        raise BundleError(f"{info.filename!r} is encrypted, or not compressed with deflate")
     if info.file_size > max(FREE, MAX_RATIO * info.compress_size):
         raise BundleError(f"{info.filename!r} unpacks to more than {MAX_RATIO} times its size")
 
@@ -118,4 +118,4 @@ def _check(sizes: Mapping[str, int]) -> None:
         if not NAME.fullmatch(name):
             raise BundleError(f"{name[:80]!r} is not a plain file name")
     if sum(sizes.values()) > MAX_SIZE:
-        raise BundleError(f"its files are larger than {MAX_SIZE} bytes together")
+        raise BundleError(f"its files total more than {MAX_SIZE} bytes")

@@ -21,7 +21,7 @@ def fields(message: memoryview) -> Iterator[tuple[int, Value]]:
         tag, place = _varint(message, place)
         number, wire = tag >> 3, tag & 7
         if tag >> 32 or not number:
-            raise BundleError("the graph is not valid ONNX: a field has an impossible number")
+            raise BundleError("the graph is not valid ONNX: a field has an invalid number")
         if wire == _VARINT:
             value, place = _varint(message, place)
             yield number, value
@@ -45,4 +45,4 @@ def _varint(message: memoryview, place: int) -> tuple[int, int]:
         value |= (byte & 127) << 7 * shift
         if byte < 128:
             return value, place + shift + 1
-    raise BundleError("the graph is not valid ONNX: a number does not end")
+    raise BundleError("the graph is not valid ONNX: a number is unterminated")

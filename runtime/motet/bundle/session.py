@@ -40,7 +40,7 @@ class SessionOptions:
         available = onnxruntime.get_available_providers()
         for provider in self.providers:
             if provider not in available:
-                raise SettingError(f"ONNX Runtime has no provider {provider!r} here; it has {', '.join(available)}")
+                raise SettingError(f"ONNX Runtime has no provider {provider!r} here; available: {', '.join(available)}")
         if not self.providers or len(self.provider_options) not in {0, len(self.providers)}:
             raise SettingError("give at least one provider, and options for each provider or for none")
 

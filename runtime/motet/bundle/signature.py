@@ -34,7 +34,7 @@ def bind(
         if tensor in given or tensor.name in inputs:
             continue
         if tensor.name not in spec.feedback:
-            raise BundleError(f"manifest, graphs.{role}: nothing gives the input {tensor.name!r}")
+            raise BundleError(f"manifest, graphs.{role}: input {tensor.name!r} is neither supplied nor fed back")
         spec.start_shape(tensor.name)
 
 

@@ -102,6 +102,6 @@ class Recorded:
     def _next(self, kind: str, size: tuple[int, ...], dtype: type[np.float32]) -> Floats:
         found = next(self._left[kind], None)
         if found is None or found.shape != size:
-            raise BundleError(f"the golden vectors lack {kind} numbers of the shape {size}")
+            raise BundleError(f"the golden vectors lack {kind} numbers of shape {size}")
         numbers: Floats = found.astype(dtype)
         return numbers

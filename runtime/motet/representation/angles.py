@@ -50,5 +50,5 @@ class Angles:
         mirrored = mirror(probe)
         found = np.abs(mirrored.values[0])
         if mirrored.channels != probe.channels or not np.array_equal(np.sort(found), probe.values[0]):
-            raise MotionError("joints of the two sides turn about other axes: frames are not mirrored by their columns")
+            raise MotionError("left and right joints turn about different axes: frames cannot be mirrored by columns")
         return FrameMirror(found.astype(np.intp) - 1, np.sign(mirrored.values[0]).astype(np.float32))

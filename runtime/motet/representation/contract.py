@@ -94,7 +94,7 @@ class MotionContract:
         if reason is None:
             return in_known_unit(motion, self.skeleton)
         if named(self.representation).required and not any(channel.endswith(".tx") for channel in motion.channels):
-            raise MotionError("this motion lacks the root's tx, ty and tz: it does not say where the figure goes")
+            raise MotionError("this motion lacks the root's tx, ty and tz, the path of the figure")
         slower = motion.continuous().resample(self.fps) if motion.fps > self.fps else motion
         return to_model_figure(slower, self._average, reason, figure)
 

@@ -32,7 +32,7 @@ def foreign(motion: Motion, skeleton: Skeleton, joints: Iterable[str]) -> str | 
     own = motion.skeleton
     lacking = [name for name in joints if name not in own.places]
     if lacking:
-        return f"the model's figure has joints that this motion lacks: {listed(lacking)}"
+        return f"this motion lacks joints of the model's figure: {listed(lacking)}"
     return _other_bones(own, skeleton)
 
 
@@ -60,8 +60,8 @@ def _other_bone(own: Skeleton, other: Skeleton, name: str) -> str | None:
     if apart <= 45:  # degrees; the bones of 16 of CMU's subjects, measured one by one, lie up to 24 apart
         return None
     return (
-        f"the bone to {name!r} points {apart:.0f} degrees away from where it does in the model's figure at rest: "
-        "the same angles mean other poses"
+        f"the bone to {name!r} points {apart:.0f} degrees away from its direction in the model's rest pose: "
+        "the same angles mean different poses"
     )
 
 
@@ -103,7 +103,7 @@ def to_model_figure(motion: Motion, pose: Motion, reason: str, figure: Figure | 
         found = from_humanoid(found, skeleton)
         said = map_of(pose).names(skeleton).values()
     except MotionError as error:
-        raise MotionError(f"{error}; and it cannot be taken as it is: {reason}") from error
+        raise MotionError(f"{error}; and it cannot be used as it is: {reason}") from error
     for name in frozenset(found.rotation_columns()).difference(skeleton.names[:1], *said):
         if np.abs(found.values[:, found.rotation_columns()[name]]).max(initial=0) > 1e-6:  # degrees, of rounding
             continue

@@ -47,7 +47,7 @@ def to_root_block(motion: Motion) -> Motion:
     names = _root_channels(motion)
     missing = [name for name in names if name not in motion.channels]
     if missing:
-        raise MotionError(f"the root's path and rotation are needed, and this motion lacks {', '.join(missing)}")
+        raise MotionError(f"the root's path and rotation are needed, but this motion lacks {', '.join(missing)}")
     angles = rotmats_to_euler(local_rotations(motion, [0])[:, 0], BLOCK_ORDER)
     places = motion.select(names[:3], ("m",) * 3).values
     velocities = ground_velocities(places, angles[:, 0], motion.fps)

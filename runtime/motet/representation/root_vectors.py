@@ -84,7 +84,7 @@ def to_joint_vectors(motion: Motion, joints: Sequence[str] | None = None) -> Mot
         joints = tuple(name for name in skeleton.names[1:] if not name.endswith(END_SUFFIX))
     lacking = [name for name in joints if name not in skeleton.places]
     if lacking:
-        raise MotionError(f"the model's figure has joints that this motion lacks: {listed(lacking)}")
+        raise MotionError(f"this motion lacks joints of the model's figure: {listed(lacking)}")
     block = to_root_block(motion).select(ROOT_BLOCK, ROOT_VECTOR_UNITS)
     vectors = rotmat_to_rotvec(local_rotations(motion, [skeleton.places[name] for name in joints]))
     channels = (*ROOT_BLOCK, *(f"{name}.{kind}" for name in joints for kind in VECTOR_KINDS))

@@ -137,11 +137,11 @@ def read_map(path: str | Path, skeleton: Skeleton) -> JointMap:
     used = [joint for joints in places.values() for joint in joints]
     twice = sorted({skeleton.names[joint] for joint in used if used.count(joint) > 1})
     if twice:
-        raise FormatError(path, f"a joint can be one bone only, twice in this map: {', '.join(twice)}; name it once")
+        raise FormatError(path, f"a joint can be only one bone; named twice: {', '.join(twice)}")
     chains = {chain: places.pop(chain, ()) for chain in ("spine", "neck")}
     longer = [bone for bone, joints in places.items() if len(joints) != 1]
     if longer:
-        raise FormatError(path, f"{longer[0]}: one joint is expected, only spine and neck take a list")
+        raise FormatError(path, f"{longer[0]}: expected one joint; only spine and neck take a list")
     joints = {bone: joint for bone, (joint,) in places.items()}
     try:
         return check_map(skeleton, JointMap(joints, chains["spine"], chains["neck"], path.name, 1.0))
@@ -155,13 +155,13 @@ def _entries(path: Path) -> dict[str, list[str]]:
     except OSError as error:
         raise FormatError(path, f"cannot be read: {error.strerror}") from error
     except ValueError as error:
-        raise FormatError(path, f"this is not a map of joints in JSON: {error}") from error
+        raise FormatError(path, f"not a joint map in JSON: {error}") from error
     if not isinstance(content, dict):
-        raise FormatError(path, "this is not a map of joints: expected an object of bones and joints")
+        raise FormatError(path, "not a joint map: expected an object of bones and joints")
     entries = {bone: [names] if isinstance(names, str) else names for bone, names in content.items()}
     for bone, names in entries.items():
         if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-            raise FormatError(path, f"{bone}: the name of a joint is expected, or a list of names")
+            raise FormatError(path, f"{bone}: expected the name of a joint or a list of names")
     return entries
 
 
@@ -169,7 +169,7 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     keys = [key for key, _ in pairs]
     twice = sorted({key for key in keys if keys.count(key) > 1})
     if twice:
-        raise ValueError(f"{', '.join(twice)} stands twice")
+        raise ValueError(f"{', '.join(twice)} appears twice")
     return dict(pairs)
 
 

@@ -182,4 +182,4 @@ def _refuse_two_hips(skeleton: Skeleton, names: list[str], hips: tuple[str, ...]
     found = [i for i, name in enumerate(names) if name == hips[0] and len(skeleton.children[i]) >= 3]
     if len(found) > 1:
         both = " and ".join(repr(skeleton.names[i]) for i in found)
-        raise MotionError(f"this file has two hips, {both}: give a file with one figure, each in one of its own")
+        raise MotionError(f"this file has two hips, {both}: put each figure in a file of its own")

@@ -116,7 +116,7 @@ def _check_straight(skeleton: Skeleton, frames: Array, joints: dict[str, int]) -
         # joints that take a bone's twist lie in line with it; limbs of beasts have more bones, and bend at them
         if np.median(pieces) > 1.1 * np.median(np.linalg.norm(frames[:, upper] - frames[:, lower], axis=-1)):
             bent = f"this one is bent between {skeleton.names[upper]!r} and {skeleton.names[lower]!r}"
-            raise MotionError(f"a human's bones are straight, {bent}: where it is a human all the same, give a map")
+            raise MotionError(f"a human's bones are straight, {bent}: if it is human all the same, give a map")
 
 
 def _translations(motion: Motion, skeleton: Skeleton) -> Array:
@@ -250,5 +250,5 @@ def _left_first(skeleton: Skeleton, frames: Array, to_left: Array, pair: list[in
     across = np.mean(np.sum((frames[:, pair[0]] - frames[:, pair[1]]) * to_left, axis=-1))
     if not across:
         names = " and ".join(repr(skeleton.names[joint]) for joint in pair)
-        raise MotionError(f"left and right of {names} cannot be told: neither names nor feet say; give a map")
+        raise MotionError(f"left and right of {names} cannot be told apart by names or feet; give a map")
     return bool(across > 0), False

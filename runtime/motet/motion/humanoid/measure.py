@@ -131,7 +131,7 @@ def _fit(skeleton: Skeleton, joint_map: JointMap, rotations: Array, places: Arra
         note = "the rest pose is not a standing body: the first frame's pose was used in its place"
         return Fitted(joint_map, aims, aligned, leg, heights, None, True, 0.95, (note,))
     if len(places) < 2 and not known:
-        raise MotionError("the rest pose is not a standing body: give a motion of this skeleton, whose frames show how")
+        raise MotionError("the rest pose is not a standing body: give a motion of this skeleton instead")
     if not known:
         check_stance(places, joint_map)
         check_frames(places, joint_map, aims, dict.fromkeys(LEFT_RIGHT, unit(to_left(places, joint_map, "UpperLeg"))))

@@ -153,7 +153,7 @@ def to_humanoid(motion: Motion, joint_map: JointMap | None = None) -> Humanoid:
     motion = with_figure(motion) if is_mmm(motion) else motion
     skeleton = skeleton_of(motion)
     if not len(motion):
-        raise MotionError("this motion has no frames: there is nothing to bring to the humanoid")
+        raise MotionError("this motion has no frames to put on the humanoid")
     joint_map = joint_map or map_of(motion)
     rotations, places = global_transforms(motion)
     fitted = fit(skeleton, joint_map, rotations, places)
@@ -242,7 +242,7 @@ def from_humanoid(
     MotionError for a motion that is not the humanoid's, or a skeleton that is no human's.
     """
     if motion.skeleton != HUMANOID:
-        raise MotionError("this motion is not on the humanoid: bring it there by to_humanoid first")
+        raise MotionError("this motion is not on the humanoid: convert it with to_humanoid first")
     figure = like if isinstance(like, Figure) else Figure.of(like, joint_map)
     fitted, (skeleton, still) = figure.fitted, figure.posture
     source, places = global_transforms(motion)
