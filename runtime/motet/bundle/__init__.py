@@ -1,1 +1,1 @@
-"""What is on disk: graphs and the manifest that says everything needed to run them."""
+"""Bundles on disk: graphs, and a manifest with everything needed to run them."""

@@ -1,4 +1,4 @@
-"""The bundle: a folder or zip with graphs and a manifest that says everything needed to run them.
+"""The bundle: a folder or zip with graphs and a manifest of everything needed to run them.
 
 ``manifest.json`` lists every other file with size and sha256; a file is checked whenever it is read, and a graph before
 ONNX Runtime gets it (:mod:`motet.bundle.graph_safety`). Nothing in a bundle is pickled or executed. docs/bundle.md
@@ -39,10 +39,10 @@ MAX_MANIFEST = 4 << 20
 
 
 class Bundle:
-    """What lies on disk, read and checked.
+    """A bundle on disk, read and checked.
 
     path: the folder or zip, absolute.
-    manifest: what its ``manifest.json`` says.
+    manifest: the contents of its ``manifest.json``.
     """
 
     def __init__(self, path: Path, members: Members) -> None:
@@ -58,7 +58,7 @@ class Bundle:
 
     @staticmethod
     def open(name_or_path: str | Path) -> "Bundle":
-        """Open a default bundle by name, or a folder or zip by path; BundleError if there is none, or it is damaged."""
+        """Open a default bundle by name, or a folder or zip by path; BundleError if missing or damaged."""
         path = find_bundle(name_or_path)
         try:
             return Bundle(path, Folder(path) if path.is_dir() else Archive(path))
@@ -74,7 +74,7 @@ class Bundle:
         return self.manifest.name
 
     def read(self, name: str) -> bytes:
-        """One file's bytes, after size and sha256 were found to be those of the manifest."""
+        """One file's bytes, checked against the manifest's size and sha256."""
         with self.named():
             declared = self.manifest.files.get(name)
             if declared is None:
@@ -93,7 +93,7 @@ class Bundle:
             return OnnxGraph(self.read(found.file), found.spec, options)
 
     def table(self, name: str) -> NDArray[Any]:
-        """A table's array, read-only; BundleError where it is not as declared, or not finite."""
+        """A table's array, read-only; BundleError if it differs from its declaration or is not finite."""
         found = self.manifest.tables[name]
         with self.named(f", table {name}"):
             array = array_of(self.read(found.file), found.file, [found.dtype])
@@ -104,7 +104,7 @@ class Bundle:
             return array
 
     def check_files(self) -> list[str]:
-        """Read every file that the manifest lists; returns their names. BundleError at the first fault."""
+        """Read every file listed in the manifest and return their names; BundleError at the first fault."""
         for name in self.manifest.files:
             self.read(name)
         return sorted(self.manifest.files)
@@ -116,7 +116,7 @@ class Bundle:
 
     @contextmanager
     def named(self, where: str = "") -> Iterator[None]:
-        """Faults within say which bundle they are of."""
+        """Name the bundle in every error raised within."""
         try:
             yield
         except BundleError as error:
@@ -160,14 +160,14 @@ def _zips(folder: Path) -> dict[str, Path]:
 
 
 def entry(data: bytes) -> FileEntry:
-    """What a manifest says of a file."""
+    """A file's entry in a manifest."""
     return FileEntry(len(data), hashlib.sha256(data).hexdigest())
 
 
 def write_bundle(path: str | Path, manifest: Mapping[str, Any], files: Mapping[str, bytes]) -> None:
     """Write a bundle as one zip (a path that ends in .zip) or as a new folder, with sizes and sha256 filled in.
 
-    BundleError for a manifest that could not be read again.
+    BundleError for a manifest that could not be read back.
     """
     path = Path(path)
     entries = {name: vars(entry(data)) for name, data in sorted(files.items())}

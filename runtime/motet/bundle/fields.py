@@ -16,7 +16,7 @@ LARGEST = 1e9
 
 
 def parse(text: bytes) -> Any:
-    """A JSON document; BundleError where it is not one, with NaN and Infinity, and nested too deeply."""
+    """A JSON document; BundleError if it is invalid, nested too deeply, or contains NaN or Infinity."""
     try:
         return json.loads(text, parse_constant=_no_constant)
     except (ValueError, RecursionError) as error:
@@ -28,7 +28,7 @@ def _no_constant(name: str) -> None:
 
 
 class Fields:
-    """A JSON object that is read key by key.
+    """A JSON object read key by key.
 
     data: what stands at ``path`` ("" for the whole document); BundleError where it is not an object.
     """
@@ -64,7 +64,7 @@ class Fields:
         return found
 
     def one_of(self, key: str, allowed: Collection[str]) -> str:
-        """A string out of some."""
+        """One of the allowed strings."""
         found = self.text(key)
         if found not in allowed:
             raise self.fault(f"one of {', '.join(allowed)}", found, key)
@@ -92,7 +92,7 @@ class Fields:
         return found
 
     def texts(self, key: str) -> tuple[str, ...]:
-        """A list of strings, each there once."""
+        """A list of distinct strings."""
         found = self.items(key)
         if not all(isinstance(item, str) for item in found):
             raise self.fault("a list of strings", found, key)

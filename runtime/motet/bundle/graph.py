@@ -39,7 +39,7 @@ class TensorSpec:
 
     @staticmethod
     def read(data: Fields) -> "TensorSpec":
-        """Read what :meth:`to_json` wrote; BundleError where it is no tensor."""
+        """The inverse of :meth:`to_json`; BundleError for anything else."""
         shape = data.items("shape")
         fixed = [axis for axis in shape if not isinstance(axis, str)]
         if any(isinstance(axis, bool) or not isinstance(axis, int) or not 1 <= axis <= MAX_AXIS for axis in fixed):
@@ -63,7 +63,7 @@ class TensorSpec:
 
 @dataclass(frozen=True)
 class GraphSpec:
-    """What a graph takes and gives, and which outputs are fed back into which inputs at the next step.
+    """A graph's inputs and outputs, and which outputs are fed back into which inputs at the next step.
 
     start: for a fed back input with dynamic axes besides the batch, the sizes that all its axes but the batch have
         before the first step: (heads, 0, width) for a cache that grows by one along its second axis.
@@ -102,7 +102,7 @@ class GraphSpec:
 
     @staticmethod
     def read(data: Fields) -> "GraphSpec":
-        """Read what :meth:`to_json` wrote; BundleError where it contradicts itself."""
+        """The inverse of :meth:`to_json`; BundleError if it contradicts itself."""
         inputs, outputs = (tuple(map(TensorSpec.read, data.list_of_fields(key))) for key in ("inputs", "outputs"))
         fed = data.fields("feedback") if "feedback" in data else Fields({})
         feedback = {name: fed.text(name) for name in fed.data}
@@ -189,7 +189,7 @@ class OnnxGraph:
 
 
 def _check(found: list[Any], declared: tuple[TensorSpec, ...], kind: str) -> None:
-    """Refuse a graph whose tensors are not those that the manifest declares; dynamic axes may have other names."""
+    """Refuse a graph whose tensors differ from the manifest's; dynamic axes may have other names."""
     actual = {node.name: (node.type, _sizes(node.shape)) for node in found}
     wanted = {spec.name: (DTYPES[spec.dtype], _sizes(spec.shape)) for spec in declared}
     for name in actual.keys() | wanted.keys():

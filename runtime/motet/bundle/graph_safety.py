@@ -1,4 +1,4 @@
-"""Graphs that could reach outside of their own bytes are refused before ONNX Runtime sees them.
+"""Graphs that could reach outside their own bytes are refused before ONNX Runtime sees them.
 
 ONNX Runtime opens the files that a tensor's ``external_data`` names, also where it is given a model as bytes: some
 versions only below the working directory, older ones anywhere. So this walks the whole protocol buffer, with every
@@ -55,7 +55,7 @@ _OPERATOR = 4  # of a node
 
 
 def check_graph(model: bytes) -> None:
-    """BundleError where an ONNX model is damaged or could reach outside of its bytes: what was found, and where."""
+    """BundleError where an ONNX model is damaged or could reach outside its bytes: what was found, and where."""
     if model[4:8] == b"ORTM":
         raise BundleError("the graph is in ONNX Runtime's own format, which cannot be checked")
     waiting, count = [("model", memoryview(model), "the graph", 0)], 0

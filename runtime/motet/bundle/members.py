@@ -1,4 +1,4 @@
-"""The files of a folder or zip, read within limits: nothing is unpacked that was not announced."""
+"""The files of a folder or zip, read within limits: nothing unannounced is unpacked."""
 
 import io
 import re
@@ -52,7 +52,7 @@ class Folder:
         self.names = frozenset(found)
 
     def read(self, name: str, limit: int) -> bytes:
-        """As :meth:`Members.read`."""
+        """See :meth:`Members.read`."""
         try:
             with (self._path / name).open("rb") as file:
                 return file.read(limit + 1)
@@ -61,7 +61,7 @@ class Folder:
 
 
 class Archive:
-    """The files of a zip, given by its path or as bytes; BundleError where it is damaged, or holds what it must not."""
+    """The files of a zip, given by its path or as bytes; BundleError if it is damaged or unsafe."""
 
     def __init__(self, source: Path | bytes) -> None:
         self._source = source
@@ -83,7 +83,7 @@ class Archive:
         self.names = frozenset(self._infos)
 
     def read(self, name: str, limit: int) -> bytes:
-        """As :meth:`Members.read`: by reading, whatever size the zip announces."""
+        """See :meth:`Members.read`; the limit holds whatever size the zip announces."""
         try:
             with self._file() as source, zipfile.ZipFile(source) as archive, archive.open(self._infos[name]) as file:
                 return file.read(limit + 1)

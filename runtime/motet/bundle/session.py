@@ -1,4 +1,4 @@
-"""How ONNX Runtime is to run a model: threads and execution providers."""
+"""How ONNX Runtime runs a model: threads and execution providers."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What a model asks of a graph: tensors with shapes such as "batch time D", as docs/bundle.md writes them."""
+"""The tensors a model expects of a graph, with shapes such as "batch time D", as docs/bundle.md writes them."""
 
 from collections.abc import Collection, Mapping
 
@@ -17,7 +17,7 @@ def bind(
     sizes: Sizes,
     given: Collection[TensorSpec] = (),
 ) -> None:
-    """Check a graph's tensors, and note the sizes of axes that were not known before.
+    """Check a graph's tensors, and note the sizes of axes not known before.
 
     inputs, outputs: shapes by name. A small word is a dynamic axis; a capital letter is a size, the same wherever it
         stands; "*" in front is int64. The graph may have more outputs, and more inputs where something gives them.

@@ -1,4 +1,4 @@
-"""Sentences drawn word by word from what a model holds possible (ancestral sampling), spread evenly over it."""
+"""Sentences drawn word by word from a model's distribution (ancestral sampling), spread evenly over it."""
 
 from typing import NamedTuple
 

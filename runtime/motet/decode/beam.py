@@ -14,14 +14,14 @@ from motet.settings import Range, Settings
 
 @dataclass(frozen=True)
 class BeamSettings(Settings):
-    """max_words: how many words a sentence has at most. beams: hypotheses that are kept, and given."""
+    """max_words: the longest sentence, in words. beams: hypotheses kept, and returned."""
 
     max_words: Annotated[int, Range(1, 1000)]
     beams: Annotated[int, Range(1, 100)] = 5
 
 
 class Limits(NamedTuple):
-    """Ids of start and end, how many words a sequence has at most, and ids that never come."""
+    """Ids of start and end, the most words in a sequence, and ids never chosen."""
 
     start: int
     end: int

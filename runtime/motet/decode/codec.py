@@ -19,7 +19,7 @@ PATH = 3
 
 
 class ReceptiveField(NamedTuple):
-    """How many steps of codes the decoder looks back and ahead, and how many frames a step has."""
+    """Steps of codes the decoder looks back and ahead, and frames in a step."""
 
     back: int
     ahead: int
@@ -27,7 +27,7 @@ class ReceptiveField(NamedTuple):
 
 
 class Context(NamedTuple):
-    """The end of a motion that is continued: frames (G, D) in the contract's units, and their steps of codes (N, P)."""
+    """The end of the motion to continue: frames (G, D) in the contract's units, and their steps of codes (N, P)."""
 
     frames: Array
     codes: Ids
@@ -57,7 +57,7 @@ class Codec:
         return moves
 
     def steps(self, seconds: float) -> int:
-        """How many steps last so long; what is over a step by rounding alone is none."""
+        """The number of steps that cover a duration, ignoring rounding errors."""
         return math.ceil(seconds * self.fps / self.field.hop - 1e-9)
 
     def codes_of(self, frames: Array) -> Ids:
@@ -122,7 +122,7 @@ class StreamingDecoder:
         return found
 
     def finish(self) -> Array:
-        """The frames that are left, nothing following."""
+        """The remaining frames, with nothing to follow."""
         return self._settled(len(self.codes))
 
     def _settled(self, until: int) -> Array:

@@ -113,7 +113,7 @@ class Writer:
         self.age = np.zeros_like(self.age)
 
     def take_back(self) -> None:
-        """Forget the last draw, such as that of an end, and go on before it."""
+        """Undo the last draw, such as that of an end, and continue from before it."""
         self.last, self.state, self.recent, self.age = self._before
 
     def _known(self, actions: Ids) -> Floats:

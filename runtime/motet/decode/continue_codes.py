@@ -91,7 +91,7 @@ class Continuer(NamedTuple):
         return np.array(order, dtype=np.int64), memory.ages[places], -off[places] / self.settings.action_scale
 
     def paces_off(self, pace: Pace) -> Array:
-        """How much (M,) the distance of remembered places grows since they go on faster or slower for a moment."""
+        """How much (M,) the distance of remembered places grows because they continue faster or slower for a moment."""
         memory, book, seconds = self.source.memory, self.codec.book, self.codec.seconds
         count, steps = len(memory.codes), max(1, round(self.settings.moment / seconds))
         going = memory.codes[:, 0] < len(book)  # an end is no move

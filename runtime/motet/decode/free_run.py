@@ -1,4 +1,4 @@
-"""The loop of predictors: a step graph that continues seed frames."""
+"""The loop of predictors: a step graph continues seed frames."""
 
 from dataclasses import dataclass
 from typing import Annotated

@@ -12,7 +12,7 @@ Frames = Annotated[int, Range(1, 1000, "frames")]
 
 @dataclass(frozen=True)
 class BetweenSettings(Settings):
-    """context: the most frames that are seen before and after a gap; least: the fewest; longest: of the gap itself."""
+    """context: the most frames seen before and after a gap; least: the fewest; longest: the longest gap."""
 
     context: Frames
     least: Frames

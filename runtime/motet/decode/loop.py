@@ -16,7 +16,7 @@ class Loop:
         :class:`motet.models.describe.DescribeModel`, GenerateModel and PredictModel. Settings are given by name.
     inputs, outputs: what the step graph takes beside its states, and gives beside them: :mod:`motet.bundle.signature`.
     settings: what a bundle has defaults of, and a user may choose anew for each call.
-    batch: how many rows it decodes at once; more bring no speed and take memory.
+    batch: rows decoded at once; more cost memory without gaining speed.
     """
 
     run: Callable[..., Any]
@@ -31,9 +31,9 @@ class Loop:
         return dict(vars(self.settings.read(own, "defaults")))
 
     def settled(self, defaults: Mapping[str, float], given: Mapping[str, float | None]) -> dict[str, float]:
-        """All settings: those that a user gives, and the defaults in place of None.
+        """All settings: the user's, and the defaults in place of None.
 
-        DecodingError for one out of range, or that the loop does not have.
+        DecodingError for one that is unknown or out of range.
         """
         try:
             chosen = {name: self.settings.check(name, value) for name, value in given.items() if value is not None}

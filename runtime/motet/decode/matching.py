@@ -23,7 +23,7 @@ from motet.motion.rotations import Array
 from motet.motion.springs import damped, damped_path, damping_of
 
 HORIZONS = 3
-"""Times ahead at which is compared where rows go: thirds of the settings' horizon."""
+"""Number of times ahead at which trajectories are compared: thirds of the settings' horizon."""
 
 TRAJECTORY = 4 * HORIZONS + 1
 """The features that say where a row goes: places (left, forward) at each of the horizons, facings (sin, cos), and the

@@ -1,4 +1,4 @@
-"""Steps of codes remembered from training motions, to go on as people did where the last steps were alike.
+"""Steps of codes remembered from training motions, to continue as people did after similar steps.
 
 What a nearest-neighbour language model does for words (Khandelwal et al. 2020): the distribution of the next step is
 that of a net, mixed with the next steps of remembered places whose past resembles the present.
@@ -15,7 +15,7 @@ from motet.decode.rollout import Ids
 from motet.errors import BundleError
 
 PAST = (1.0, 0.5, 0.25)
-"""How much the last step counts, and those before it."""
+"""Weights of the last step and those before it."""
 
 NEAR = 0.5
 """Places are chosen by exp(-distance / NEAR), the distance that of the squared numbers of their last steps."""
@@ -72,7 +72,7 @@ class Memory:
         return Memory(codes, keys.astype(np.float32), ages, _parts(ages), rows)
 
     def next(self, action: int, recent: Sequence[NDArray[np.float32]], age: int, ends: bool, uniform: float) -> int:
-        """The place (a row) at which an action goes on.
+        """The place (a row) at which an action continues.
 
         recent: numbers (L,) of the last steps, the latest first, no more than K. None yet: any start of a motion.
         ends: whether it is to end where remembered motions do; else it may come back to what was done before.

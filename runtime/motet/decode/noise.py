@@ -60,7 +60,7 @@ class RowsOfNoise:
         self._rows = rows.astype(np.float32)
 
     def at(self, tick: int) -> Floats:
-        """As :meth:`RowNoise.at`."""
+        """See :meth:`RowNoise.at`."""
         if tick >= len(self._rows):
             raise BundleError(f"the golden vectors have noise for {len(self._rows)} ticks only")
         row: Floats = self._rows[tick : tick + 1]

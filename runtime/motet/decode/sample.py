@@ -1,4 +1,4 @@
-"""What loops of generate give: a sequence of frames and how likely it is."""
+"""The result of generate's loops: a sequence of frames and its likelihood."""
 
 from typing import Any, NamedTuple
 

@@ -1,4 +1,4 @@
-"""How probable known sequences are: a step that is fed what is known in place of what it would draw."""
+"""How probable known sequences are: the step is fed known values instead of its own draws."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""The loop of control: one frame a tick, from what the figure did and what it is told."""
+"""The loop of control: one frame a tick, from the figure's history and its control."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

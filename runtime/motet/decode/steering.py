@@ -1,4 +1,4 @@
-"""The loop of a figure that is steered: recorded frames played one after the other, and matched with what is asked.
+"""The loop of a steered figure: recorded frames are played in turn and matched with the target.
 
 What is asked, a velocity and a facing, is approached by critically damped springs. Recordings are played a little
 slower or faster, with shorter or longer strides, and turned a little, to go as fast and where the springs are. The

@@ -1,4 +1,4 @@
-"""The numbers of steering: how what is asked is approached, what is searched, and how far playback is corrected."""
+"""The numbers of steering: how the target is approached, what is searched, and how far playback is corrected."""
 
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
@@ -15,7 +15,7 @@ Rows = Annotated[int, Range(0, 10_000, "rows")]
 
 @dataclass(frozen=True)
 class SteeringSettings(Settings):
-    """Of a figure that is steered by motion matching.
+    """Settings of a figure steered by motion matching.
 
     The desired trajectory:
         velocity, facing: half-lives of the springs by which target velocity and facing are approached.

@@ -1,1 +1,1 @@
-"""What people look at: a body on a skeleton, and pages and pictures of it."""
+"""Drawing: a body on a skeleton, and pages and pictures of it."""

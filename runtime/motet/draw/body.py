@@ -1,4 +1,4 @@
-"""The body that pictures put on a skeleton: round bones with a thickness and a side, and a head.
+"""The body drawn on a skeleton: round bones with a thickness and a side, and a head.
 
 Lengths are in body heights (:attr:`Body.height`), so bodies of every skeleton are of one size. Nothing here knows a
 naming scheme: thickness follows from how much body hangs on a joint, sides from mirrored names.

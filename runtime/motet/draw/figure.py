@@ -1,4 +1,4 @@
-"""The figure that pictures of a motion show: the points of its body in every frame, standing on the ground."""
+"""The figure in pictures of a motion: the points of its body in every frame, standing on the ground."""
 
 from dataclasses import dataclass, replace
 

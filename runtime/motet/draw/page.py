@@ -1,4 +1,4 @@
-"""Pages that need no other file: a template with what all pages share, and data that its script reads."""
+"""Self-contained pages: a template with the parts that all pages share, and the data for its script."""
 
 import json
 import re

@@ -17,7 +17,7 @@ LIGHT = np.array([0.35, 1.0, 0.45])
 """Where the light comes from."""
 
 DRAWN_LARGER = 3
-"""A picture is drawn so many times as large, and made smaller: edges come out smooth."""
+"""Pictures are drawn larger by this factor and scaled down, for smooth edges."""
 
 CIRCLE = np.stack([np.cos(np.arange(12) * np.pi / 6), 0 * np.arange(12), np.sin(np.arange(12) * np.pi / 6)], axis=1)
 

@@ -1,4 +1,4 @@
-"""Motions of other figures: put onto a model's figure by way of the humanoid, and what follows them back."""
+"""Motions of other figures: retargeted to a model's figure by way of the humanoid, and their continuations back."""
 
 import logging
 from collections.abc import Iterable

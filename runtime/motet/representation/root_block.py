@@ -38,7 +38,7 @@ BLOCK_ORDER = "yxz"
 
 
 def to_root_block(motion: Motion) -> Motion:
-    """The motion with the root block in front, instead of the root's translation and rotation.
+    """The motion with the root block first, instead of the root's translation and rotation.
 
     Frame 0 has no previous frame and repeats the velocities of frame 1; those of a lone frame are 0. Pitch and roll
     are continuous in time. Other channels are untouched. MotionError where the root's translation or rotation is

@@ -45,7 +45,7 @@ class RootVectors:
         return motion.select(like.channels, like.units).continuous()
 
     def planted(self, features: Motion) -> Motion:
-        """The features themselves: a prediction's path goes on from a recorded one, and is better than one laid."""
+        """The features themselves: a prediction's path continues a recorded one, which is better than laying one."""
         return features
 
     def motion(self, features: Motion, after: Motion | None = None) -> Motion:

@@ -1,4 +1,4 @@
-"""Any human figure to the humanoid and back: which joint is which bone, how a figure stands, retargeting.
+"""Any human figure to the humanoid and back: joint maps, rest poses, retargeting.
 
 Two doors: :func:`to_humanoid` and :func:`from_humanoid`, with a :class:`Figure` measured once for more than one motion.
 """

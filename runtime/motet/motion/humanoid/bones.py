@@ -1,4 +1,4 @@
-"""The humanoid: the one figure that motions of every skeleton are brought to, and that they leave from.
+"""The humanoid: the one figure through which motions of every skeleton are retargeted.
 
 Its bones have the names of the VRM 1.0 humanoid. At rest (every angle 0) it stands in a T-pose: y up, facing +z, the
 left at +x, palms down, soles at y = 0 where the root is at its offset; lengths are metres. Every joint's frame is that
@@ -77,7 +77,7 @@ REQUIRED = tuple(
     for name in BONES
     if name in ("hips", "spine", "head") or name.removeprefix("left").removeprefix("right") in (*LEG[:3], *ARM[1:])
 )
-"""The bones that VRM requires; the others stay at rest where a figure lacks them."""
+"""The bones required by VRM; the others stay at rest if a figure lacks them."""
 
 PARENTS = {name: HUMANOID.names[max(0, HUMANOID.joints[HUMANOID.index(name)].parent)] for name in BONES[1:]}
 """For each bone but the hips its parent."""

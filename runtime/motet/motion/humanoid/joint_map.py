@@ -1,4 +1,4 @@
-"""Which joint of a skeleton is which bone of the humanoid, and a file in which a user says so."""
+"""Which joint of a skeleton is which bone of the humanoid, and the user's file that says so."""
 
 import json
 from collections.abc import Mapping
@@ -37,7 +37,7 @@ class JointMap:
     joints: bone -> index of its joint, for the hips, the head and the limbs.
     spine, neck: the joints between the hips and the arms, and between the arms and the head, upwards; any number.
     convention: the name of the convention, "by the tree" or the name of the user's file.
-    confidence: from 0 to 1, how sure it is that each joint is what it is taken for.
+    confidence: from 0 to 1, how certain the assignment of joints is.
     rest: where the convention is known to rest in a pose of its own: bone -> the rotation vector in degrees by which
         the humanoid's bone is turned in that pose; a bone that is not named is not turned.
     points: bone -> where it points in that pose (3), left, up and forward: a skeleton that rests otherwise is another.
@@ -69,7 +69,7 @@ class JointMap:
 
 
 def missing_bones(found: Mapping[str, object], spine: tuple[int, ...]) -> list[str]:
-    """The needed bones that are not there, and those that are there on the other side only."""
+    """The required bones that are missing, and those present on the other side only."""
     there = {*found, *(["spine"] if spine else [])}
     missing = [bone for bone in NEEDED if bone not in there]
     return missing + [bone for bone in _one_sided(there) if bone not in missing]
@@ -96,7 +96,7 @@ def check_map(skeleton: Skeleton, joint_map: JointMap) -> JointMap:
 
 
 def missing_reason(missing: list[str], found: Mapping[str, object]) -> str:
-    """A sentence that says which bones a skeleton lacks."""
+    """A sentence naming the bones a skeleton lacks."""
     legs = [sided(side, part) for side in LEFT_RIGHT for part in LEG[:3]]
     remedy = "export them, too, or name them in a map"
     if all(bone in missing for bone in legs):
@@ -108,7 +108,7 @@ def missing_reason(missing: list[str], found: Mapping[str, object]) -> str:
 
 
 def one_sided(missing: list[str], found: Mapping[str, object]) -> bool:
-    """Whether there are bones missing, all of which are there on the other side."""
+    """Whether bones are missing, all of them present on the other side."""
     return bool(missing) and all(PARTNERS.get(bone) in found for bone in missing)
 
 
@@ -118,11 +118,11 @@ def _one_sided(there: set[str]) -> list[str]:
 
 
 def read_map(path: str | Path, skeleton: Skeleton) -> JointMap:
-    """Read a user's map: a JSON object of bones of the humanoid and the names of the skeleton's joints.
+    """Read a user's map: a JSON object from bones of the humanoid to names of the skeleton's joints.
 
     Keys are the bones' VRM names, values names of joints; "spine" and "neck" take a list, upwards:
     ``{"hips": "Root", "spine": ["Back1", "Back2"], "leftUpperLeg": "LThigh", ...}``. FormatError names the file and
-    what is wrong: an unknown bone or joint, a joint that stands twice, a needed bone that is not there.
+    the fault: an unknown bone or joint, a joint named twice, a required bone that is missing.
     """
     path = Path(path)
     places: dict[str, tuple[int, ...]] = {}

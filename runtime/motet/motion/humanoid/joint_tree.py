@@ -52,7 +52,7 @@ class _Tree:
 
 @dataclass(frozen=True)
 class _Fork:
-    """A joint and two limbs alike that hang on it, by their first joints."""
+    """A joint and the two similar limbs below it, by their first joints."""
 
     joint: int
     limbs: tuple[int, int]
@@ -60,7 +60,7 @@ class _Fork:
 
 
 def map_of(motion: Motion) -> JointMap:
-    """Which joint of the motion's skeleton is which bone: by names, else by the tree; MotionError if it is no human.
+    """Which joint of the motion's skeleton is which bone: by names, else by the tree; MotionError if it is not human.
 
     Where names fit in part, and the tree does not tell either, the error says which bones the names lack.
     """

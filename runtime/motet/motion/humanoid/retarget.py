@@ -106,7 +106,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Humanoid:
-    """A motion brought to the humanoid, and what was found on the way.
+    """A motion on the humanoid, and what was found on the way.
 
     motion: on :data:`motet.motion.HUMANOID`, at the file's frame rate, root translation in metres.
     joints: bone -> the names of the joints that it was taken from.
@@ -131,7 +131,7 @@ class Humanoid:
 
     @property
     def summary(self) -> str:
-        """What was found in one line: convention, confidence and notes."""
+        """The findings in one line: convention, confidence and notes."""
         found = "found by the tree" if self.convention == BY_THE_TREE else f"of {self.convention}"
         return "; ".join((f"joints {found}, confidence {self.confidence:.2f}", *self.notes))
 
@@ -143,7 +143,7 @@ class Humanoid:
 
 
 def to_humanoid(motion: Motion, joint_map: JointMap | None = None) -> Humanoid:
-    """Bring a motion of any human skeleton to the humanoid.
+    """Retarget a motion of any human skeleton to the humanoid.
 
     joint_map: which joint is which bone, as :func:`motet.motion.read_map` reads it; found where not given.
     The path is scaled by the ratio of the legs' lengths, and the soles' lowest points are laid on y = 0 at their 5th
@@ -229,7 +229,7 @@ def from_humanoid(
     skin: Mapping[int, Array] | None = None,
     ahead: bool = False,
 ) -> Motion:
-    """Put a motion of the humanoid onto another human skeleton, with its names, rest pose and proportions.
+    """Retarget a motion of the humanoid to another human skeleton, with its names, rest pose and proportions.
 
     like: the skeleton; where its rest pose is not a standing body, a motion of it, whose frames then tell how its
         joints stand; or it as it was measured already (:attr:`Humanoid.figure`).
