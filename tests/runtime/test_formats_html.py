@@ -89,7 +89,7 @@ def test_captions_and_many(tmp_path):
     [
         (replace(walker(), skeleton=None), "no skeleton"),
         (walker()[:0], "no frames"),
-        (replace(walker(), values=walker().values + 1e200), "further than"),
+        (replace(walker(), values=walker().values + 1e200), "too far to show"),
     ],
 )
 def test_what_cannot_be_shown_is_refused(tmp_path, motion, reason):

@@ -134,7 +134,7 @@ def test_what_does_not_fit_is_refused(model: SteerModel, store: Store, folder: P
     with pytest.raises(DataError, match="has no 'run'"):
         steer_report(other, recorded)
     result = CliRunner().invoke(main, ["evaluate", str(folder / "run"), "--plots", str(folder / "p")])
-    assert (result.exit_code, "no --plots" in result.output) == (2, True)
+    assert (result.exit_code, "--plots is not available" in result.output) == (2, True)
 
 
 def test_the_command_prints_and_saves(folder: Path, monkeypatch: pytest.MonkeyPatch, report: Any) -> None:

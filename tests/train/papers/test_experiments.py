@@ -108,7 +108,7 @@ def test_a_run_is_evaluated_on_what_it_was_trained_on(tmp_path: Path) -> None:
     assert found(f"motet train tdbn --data={tmp_path} --out x") == tmp_path
     assert found("motet train tdbn --out x") is None
     assert found("motet train tdbn --data gone --out x", tmp_path) == tmp_path
-    with pytest.raises(DataError, match=r"runs/x was trained on, gone, which is missing: give --data"):
+    with pytest.raises(DataError, match=r"runs/x was trained on gone, which is missing: give --data"):
         found("motet train tdbn --data gone")
     run = tmp_path / "run"
     run.mkdir()
