@@ -129,7 +129,7 @@ def test_what_cannot_be_gone_on_with_is_refused(walk: Motion) -> None:
         predictor().predict(walk, beyond=writer(), frames=100_001)
     with pytest.raises(DecodingError, match="expected a seed"):
         predictor().futures(walk, beyond=writer(), seed=-1)
-    with pytest.raises(DecodingError, match=r"writes codes, such as motet\.load\('generate'\)"):
+    with pytest.raises(DecodingError, match=r"motion-code model such as motet\.load\('generate'\)"):
         predictor().predict(walk, beyond=motet.load("cmu-generate"), frames=30)
     with pytest.raises(MotionError, match="a motion of 7 frames is too short to continue: 8 are needed"):
         predictor().futures(walk.resample(30.0)[:7], beyond=writer())

@@ -184,7 +184,7 @@ NAN, HUGE = float("nan"), 10**400
             {"noise": "next_codes", "history": "frame"},
             "'frame' does not fit the input 'history'",
         ),
-        ("graphs.step.feedback", {}, "graphs.step.feedback: nothing gives the next history"),
+        ("graphs.step.feedback", {}, "graphs.step.feedback: no output is fed back"),
         ("graphs.step.start", {"history": [3]}, "graphs.step.start: .* does not fit the state 'history'"),
         ("graphs.step.file", "manifest.json", "graphs.step.file: 'manifest.json' is not among its files"),
         ("golden", None, "graphs or tables, and golden vectors"),

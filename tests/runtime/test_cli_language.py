@@ -203,7 +203,7 @@ def test_embed(tmp_path: Path, files: list[Path]) -> None:
             ["describe", "{bad}/lacking.npz"],
             "lacking.npz: the motion lacks 2 of 3 channels: hips.ty",
         ),
-        (1, ["describe", "{bad}/frame.npz"], "frame.npz: the model needs two frames at 10 fps, and the motion has 1"),
+        (1, ["describe", "{bad}/frame.npz"], "frame.npz: the model needs two frames at 10 fps, but the motion has 1"),
         (1, ["embed", "{bad}/long.npz", "-o", "{out}/a.npy"], "long.npz: the motion lasts 31.0 s"),
         (1, ["describe", "{bad}/nan.csv"], "nan.csv"),
         (2, ["describe", "{bad}/good.npz", "--beams", "0"], "range 1<=x<=100"),

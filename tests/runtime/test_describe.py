@@ -77,10 +77,10 @@ def test_a_motion_that_does_not_fit(model: DescribeModel) -> None:
     lacking = motion.select(("knee.ry", "knee.rz"))
     for bad, reason in (
         (lacking, r"lacks 2 of 3 channels: hips.ty, knee.rx"),
-        (motion[:1], "needs two frames at 10 fps, and the motion has 1"),
+        (motion[:1], "needs two frames at 10 fps, but the motion has 1"),
         (motion[:0], "has 0"),
         (replace(motion, fps=200.0), "two frames at 10 fps"),
-        (moving(301), r"lasts 30.1 s, and the model takes at most 30 s"),
+        (moving(301), r"lasts 30.1 s, but the model takes at most 30 s"),
         (replace(motion, units=("m", "deg", "m", "rad")), "does not convert"),
     ):
         with pytest.raises(MotionError, match=reason):

@@ -107,20 +107,20 @@ def test_several_gaps_are_as_one_after_the_other(model: FillModel, walk: Motion)
     ("gaps", "said"),
     [
         ([], "no gap to fill"),
-        ([(1.0, 1.0)], "is empty: it has to start before it stops"),
-        ([(2.0, 1.0)], "is empty: it has to start before it stops"),
+        ([(1.0, 1.0)], "is empty: it must start before it stops"),
+        ([(2.0, 1.0)], "is empty: it must start before it stops"),
         ([(float("nan"), 1.0)], "is empty"),
         ([1.0, 1.5], r"a gap is two numbers in seconds, such as \(1.0, 2.0\), not 1.0"),
         ([(1.0, "end")], r"a gap is two numbers in seconds, .*, not \(1.0, 'end'\)"),
         ([(1.0, 1.001)], "has no frame at 30 fps: make it longer"),
-        ([(0.0, 1.0)], "at the very start of the motion of 3 s: there is nothing before it"),
-        ([(2.0, 3.0)], r"at the very end of the motion of 3 s: there is nothing after it.*motet predict"),
+        ([(0.0, 1.0)], "at the very start of the motion of 3 s: a gap needs frames before it"),
+        ([(2.0, 3.0)], r"at the very end of the motion of 3 s: a gap needs frames after it.*motet predict"),
         ([(0.1, 1.0)], r"at least 0.13 s of motion \(4 frames at 30 fps\) before it, and there are 0.1 s"),
         ([(2.0, 2.9)], r"at least 0.13 s of motion \(4 frames at 30 fps\) after it, and there are 0.1 s"),
         ([(-1.0, 1.0)], "not within the motion of 3 s"),
         ([(1.0, 4.0)], "not within the motion of 3 s"),
-        ([(1.0, 1.6), (1.5, 2.0)], "1:1.6 and 1.5:2 overlap or touch: give them as one"),
-        ([(1.5, 2.0), (1.0, 1.5)], "1:1.5 and 1.5:2 overlap or touch: give them as one"),
+        ([(1.0, 1.6), (1.5, 2.0)], "1:1.6 and 1.5:2 overlap or touch: merge them"),
+        ([(1.5, 2.0), (1.0, 1.5)], "1:1.5 and 1.5:2 overlap or touch: merge them"),
         ([(1.0, 1.5), (1.6, 2.0)], "at least 0.13 s of motion .* after it, and there are 0.1 s"),
         ([(0.4, 2.6)], "too long: at most 2 s can be filled"),
     ],
@@ -149,7 +149,7 @@ def test_a_figure_in_another_world_comes_on_the_humanoid(
     np.testing.assert_allclose(positions(standing), positions(mixamo) @ up.T, atol=1e-6)
     with caplog.at_level(logging.WARNING):
         found = model.fill(standing, [(1.0, 2.0)])
-    assert "comes on the model's figure" in caplog.text
+    assert "uses the model's skeleton" in caplog.text
     assert (found.skeleton, found.fps) == (CONTRACT.skeleton, 30.0)
     joined = model.join(standing, mixamo, seconds=0.5)
     assert (joined.skeleton, joined.fps, len(joined)) == (CONTRACT.skeleton, 30.0, 100 + 15 + 100)
@@ -163,7 +163,7 @@ def test_a_file_without_a_skeleton_of_its_own_comes_on_the_humanoid(
     stands = replace(motion, values=np.repeat(motion.values[:1], 200, axis=0))
     with caplog.at_level(logging.WARNING):
         found = [model.fill(stands, [(0.5, 1.0)]), model.looped(stands), model.join(stands, stands)]
-    assert "comes on the model's figure" in caplog.text
+    assert "uses the model's skeleton" in caplog.text
     assert [(each.skeleton, each.fps, len(each)) for each in found] == [
         (CONTRACT.skeleton, 30.0, count) for count in (60, 75, 150)
     ]

@@ -198,7 +198,7 @@ def test_a_length_in_seconds_is_one_in_frames() -> None:
 def test_what_does_not_fit_is_refused() -> None:
     whole = circle()
     model = model_of(to_joint_vectors(whole))
-    with pytest.raises(MotionError, match=r"needs 4 frames at 30 fps, and the motion has 3 \(9 at 90 fps\)"):
+    with pytest.raises(MotionError, match=r"needs 4 frames at 30 fps, but the motion has 3 \(9 at 90 fps\)"):
         model.predict(circle(9, fps=90.0))
     with pytest.raises(MotionError, match="the motion has 0"):
         model.predict(whole[:0])
@@ -243,7 +243,7 @@ def test_what_knows_its_errors_tells_them_in_centimetres() -> None:
     motion = circle()
     model = model_of(motion)
     assert not model.knows_errors
-    with pytest.raises(DecodingError, match="does not know its errors"):
+    with pytest.raises(DecodingError, match="does not estimate its errors"):
         model.expected_errors(motion)
     sizes = {"L": SEED, "N": HORIZON, "C": len(motion.channels)}
     encoder = model.graphs["encoder"]

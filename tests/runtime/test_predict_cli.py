@@ -81,7 +81,7 @@ def test_bench_says_how_long_a_frame_takes() -> None:
         (
             1,
             ["{bad}/short.npz", "-o", "{out}/a.bvh"],
-            "needs 10 frames at 30 fps, and the motion has 9 (36 at 120 fps)",
+            "needs 10 frames at 30 fps, but the motion has 9 (36 at 120 fps)",
         ),
         (1, ["{bad}/still.npz", "-o", "{out}/a.bvh"], "lacks the root's tx, ty and tz"),
         (1, ["{bad}/nan.bvh", "-o", "{out}/a.bvh"], "nan.bvh, line "),

@@ -124,7 +124,7 @@ def test_a_part_over_thirty_seconds_is_described_by_its_middle(monkeypatch: pyte
 
 def test_what_has_no_timeline() -> None:
     model = describe_model()
-    with pytest.raises(MotionError, match="needs two frames at 10 fps, and the motion has 1"):
+    with pytest.raises(MotionError, match="needs two frames at 10 fps, but the motion has 1"):
         model.timeline(constant(1, *ONE))
 
 

@@ -1,4 +1,4 @@
-"""What follows a motion for as long as is wanted, by a model that writes codes: alive, at its pace, its feet held."""
+"""Continue a motion for any length with a motion-code model: lively, at its pace, feet held."""
 
 import math
 from collections.abc import Sequence
@@ -28,21 +28,20 @@ from motet.representation.root_block import last_place
 from motet.representation.root_sixd import facing, in_world
 
 RATES = 3
-"""Channels that are rates of the root: they grow with the tempo."""
+"""Number of root-rate channels; they scale with the tempo."""
 
 STANCE = 0.7
-"""Seconds before a stance and after its anchor that know of it (:mod:`motet.motion.feet.hold`)."""
+"""Seconds before a stance and after its anchor that it affects (:mod:`motet.motion.feet.hold`)."""
 
 LEGS = {sided(side, part) for side in LEFT_RIGHT for part in BENT}
-"""Joints that hold the feet."""
+"""Joints of the legs."""
 
 
 class Continuation:
-    """A motion that a model of codes continues, as often as is wanted; any number of threads share it.
+    """A motion to be continued by a motion-code model, any number of times; threads can share it.
 
-    model: any that writes codes. motion: of any human figure. predicted: seconds at its end that are not the motion's
-    own, but the beginning of what follows. MotionError for a motion that is too short, or of a figure that is no
-    human's.
+    model: any motion-code model. motion: of any human figure. predicted: seconds at its end that were predicted, not
+    recorded: they begin what follows. MotionError for a motion that is too short or not of a human figure.
     """
 
     def __init__(self, model: CodesModel, motion: Motion, predicted: float = 0.0) -> None:
@@ -61,8 +60,8 @@ class Continuation:
         self.pace = Pace.of(looked_at[:, :RATES], model.fps, self.rules)
 
     def follow(self, count: int, seed: int) -> tuple[Motion, Motion]:
-        """``count`` frames that follow, and the motion before them: :func:`brought_back`. Of one seed fewer frames are
-        the beginning of more."""
+        """The next ``count`` frames, and the motion before them: :func:`brought_back`. With the same seed, a shorter
+        continuation is the beginning of a longer one."""
         rules, contract = self.rules, self.model.contract
         ahead = round((rules.anchor + STANCE + 2 * rules.ground_reach) * contract.fps)
         before = self.context.frames[: self.given][-round(rules.ground_seen * contract.fps) :]
@@ -74,7 +73,7 @@ class Continuation:
         return brought_back(in_world(shown, self.figure, self.pose)[0], self.own, self.figure)
 
     def _drawn(self, count: int, seed: int) -> Array:
-        """Frames (count, D) after those of the context, at its pace and without a leap."""
+        """Frames (count, D) after those of the context, at its pace and without a jump."""
         model, rules, context = self.model, self.rules, self.context
         continuer = Continuer(model.source, model.codec, Drawing.of(model.defaults), rules)
         known = len(context.codes) - math.ceil((len(context.frames) - self.given) / model.codec.field.hop)
@@ -86,8 +85,8 @@ class Continuation:
         return found[: max(0, count)]
 
     def _on_ground(self, frames: Array, given: int) -> Array:
-        """Frames (T, D), the first of them given, on the ground of these and with feet that stay where they stand: at
-        first as far as they did before."""
+        """Frames (T, D), the first ``given`` of them known, on their ground and with planted feet; the planting blends
+        in after the given frames."""
         contract, rules = self.model.contract, self.rules
         level = levelled(contract, frames, given, rules)
         motion = contract.motion(level, plant=False)
@@ -100,9 +99,9 @@ class Continuation:
 
 
 def levelled(contract: MotionContract, frames: Array, given: int, rules: ContinuationSettings) -> Array:
-    """Frames (T, D) whose feet come down to where they came down in the first ``given`` of them.
+    """Frames (T, D) shifted so that the feet touch the same ground as in the first ``given`` frames.
 
-    What is remembered was recorded on other floors, and on mounds and steps.
+    The recordings in memory were made on other floors, and on mounds and steps.
     """
     soles = positions(contract.motion(frames, plant=False))[:, feet_of(HUMANOID), 1].min(axis=1)
     reach = round(rules.ground_reach * contract.fps)
@@ -116,16 +115,16 @@ def levelled(contract: MotionContract, frames: Array, given: int, rules: Continu
 
 
 def averaged(values: Array, reach: int) -> Array:
-    """Values (T,) through a bell-shaped window of ``reach`` frames before and after each."""
+    """Values (T,) smoothed by a Hann window of ``reach`` frames on either side."""
     bell = np.hanning(2 * reach + 3)[1:-1]
     found: Array = (windows(values, reach) * (bell / bell.sum())).sum(axis=1)
     return found
 
 
 def paced(frames: Array, pace: Pace, fps: float, rules: ContinuationSettings) -> Array:
-    """Frames after the first of (T, D), played quicker or slower where they are off a pace.
+    """Frames after the first of (T, D), played faster or slower where they deviate from a pace.
 
-    What stands goes on standing. The last frames are left out: their speed is not known yet.
+    A standing figure keeps standing. The last frames are left out: their speed is not known yet.
     """
     reach, times = round(rules.tempo_reach * fps), np.arange(len(frames))
     if pace.turn is None:
@@ -149,14 +148,14 @@ def futures(
     progress: Progress = silent,
     predicted: float = 0.0,
 ) -> list[tuple[Motion, Motion]]:
-    """For each seed so many frames that follow a motion, at its frame rate, and the motion as it goes before them.
+    """For each seed, ``count`` frames that follow a motion, at its frame rate, and the motion before them.
 
-    Both are in the motion's own channels, or where that is not possible on the model's figure. progress: called with
-    the number of futures done and of all. predicted and MotionError: as :class:`Continuation`. DecodingError where the
-    model does not write codes.
+    Both are in the motion's own channels or, where that is impossible, on the model's figure. progress: called with the
+    number of futures done and in total. predicted and MotionError: like :class:`Continuation`. DecodingError unless the
+    model is a motion-code model.
     """
     if not isinstance(model, CodesModel):
-        raise DecodingError(f"beyond must be a model that writes codes, such as motet.load('generate'), not {model!r}")
+        raise DecodingError(f"beyond must be a motion-code model such as motet.load('generate'), not {model!r}")
     continuation, found = Continuation(model, motion, predicted), list[tuple[Motion, Motion]]()
     own = motion[: len(motion) - round(predicted * motion.fps)]
     for seed in seeds:

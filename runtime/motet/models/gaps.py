@@ -1,4 +1,4 @@
-"""Gaps of a motion: which frames they are, and what fills them at the motion's own frame rate."""
+"""Gaps of a motion: their frames, and resampling what fills them to the motion's own frame rate."""
 
 import logging
 from collections.abc import Sequence
@@ -14,10 +14,10 @@ from motet.motion.rotations import Array
 log = logging.getLogger(__name__)
 
 Gap = tuple[float, float]
-"""Seconds of a motion: of the first frame that is missing, and of the first that is there again."""
+"""Times in seconds of the first missing frame and of the first frame after the gap."""
 
 Span = tuple[int, int]
-"""The same as numbers of frames."""
+"""The same as frame numbers."""
 
 
 def spans_of(motion: Motion, gaps: Sequence[Gap], longest: float) -> list[Span]:
@@ -33,7 +33,7 @@ def spans_of(motion: Motion, gaps: Sequence[Gap], longest: float) -> list[Span]:
     for (start, stop), (then, end) in pairwise(ordered):
         if round(then * motion.fps) <= round(stop * motion.fps):
             both = f"{_text(start, stop)} and {_text(then, end)}"
-            raise MotionError(f"the gaps {both} overlap or touch: give them as one, or leave motion between them")
+            raise MotionError(f"the gaps {both} overlap or touch: merge them, or leave motion between them")
     return [(round(start * motion.fps), round(stop * motion.fps)) for start, stop in ordered]
 
 
@@ -44,19 +44,19 @@ def _check(motion: Motion, gap: Gap, longest: float) -> None:
         raise MotionError(f"a gap is two numbers in seconds, such as (1.0, 2.0), not {gap!r}") from error
     text, whole = f"the gap {_text(start, stop)} s", f"the motion of {motion.duration:g} s"
     if not (np.isfinite([start, stop]).all() and start < stop):
-        raise MotionError(f"{text} is empty: it has to start before it stops")
+        raise MotionError(f"{text} is empty: it must start before it stops")
     if start < 0 or stop > motion.duration + 0.5 / motion.fps:
         raise MotionError(f"{text} is not within {whole}")
     if round(start * motion.fps) == round(stop * motion.fps):
         raise MotionError(f"{text} has no frame at {motion.fps:g} fps: make it longer")
     if round(start * motion.fps) == 0:
-        raise MotionError(f"{text} is at the very start of {whole}: there is nothing before it to go on from")
+        raise MotionError(f"{text} is at the very start of {whole}: a gap needs frames before it")
     if round(stop * motion.fps) >= len(motion):
         raise MotionError(
-            f"{text} is at the very end of {whole}: there is nothing after it to lead to (motet predict continues)"
+            f"{text} is at the very end of {whole}: a gap needs frames after it (motet predict continues)"
         )
     if stop - start > longest + 1e-9:
-        raise MotionError(f"{text} is too long: at most {longest:g} s can be filled, leave more of the motion")
+        raise MotionError(f"{text} is too long: at most {longest:g} s can be filled")
 
 
 def _text(start: float, stop: float) -> str:
@@ -72,8 +72,8 @@ def at_own_rate(past: Array, filled: Array, after: Array, count: int) -> Array:
 
 
 def log_elsewhere() -> None:
-    """Say that a motion does not stay on its own figure."""
+    """Log that a motion does not keep its own skeleton."""
     log.warning(
-        "the motion comes on the model's figure and at its rate: the file has no skeleton, its world is another, or "
-        "its channels do not say where the hips go and how they turn"
+        "the result uses the model's skeleton and frame rate: the file has no skeleton, a different world, or no "
+        "channels for the position and rotation of the hips"
     )

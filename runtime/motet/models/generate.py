@@ -1,4 +1,4 @@
-"""Generate: motions for a sentence; what all models that do so have in common."""
+"""Generate: motions for a sentence; the base of all such models."""
 
 import warnings
 from abc import abstractmethod
@@ -25,14 +25,14 @@ from motet.motion.skeleton import Skeleton
 from motet.representation.contract import MotionContract
 
 SETTLED = 0.3
-"""Seconds after which feet are planted that were not before."""
+"""Blend-in time of foot planting, in seconds."""
 
 PLAYED = 30.0
-"""Frames per second of what is generated, whatever the model's own rate is."""
+"""Default frame rate of generated motions, whatever the model's own rate."""
 
 
 class GenerateSettings(TypedDict, total=False):
-    """What may be chosen for each call where its loop has it: :meth:`GenerateModel.generate`. None: the bundle's."""
+    """Settings of a call, as far as the model's loop has them: :meth:`GenerateModel.generate`. None: the bundle's."""
 
     candidates: int | None
     certainty: float | None
@@ -49,10 +49,10 @@ class GenerateSettings(TypedDict, total=False):
 class Generated:
     """A generated motion, its log-likelihood given the sentence, and the words that were unknown.
 
-    contract: what the frames mean. frames: (T, D) as they were drawn, in its channels.
-    log_likelihood: of the normalised frames as drawn and of where they end, as :meth:`GenerateModel.score` gives it;
+    contract: the meaning of the frames. frames: (T, D) as drawn, in its channels.
+    log_likelihood: of the normalised frames as drawn and of their end, like :meth:`GenerateModel.score`;
         None where the model's loop has no likelihoods.
-    after: the motion that it goes on from; else it starts at the origin.
+    after: the motion that it continues; without one it starts at the origin.
     """
 
     contract: MotionContract
@@ -63,9 +63,9 @@ class Generated:
 
     @cached_property
     def features(self) -> Motion:
-        """The motion in the contract's channels and at its frame rate, its feet planted: to be measured.
+        """The motion in the contract's channels and at its frame rate, its feet planted: for measuring.
 
-        What goes on from a motion whose feet are not planted is planted little by little.
+        The continuation of a motion whose feet are not planted is planted gradually.
         """
         planted = self.contract.features(self.frames, plant=True)
         if self.after is None:
@@ -75,11 +75,11 @@ class Generated:
 
     @cached_property
     def motion(self) -> Motion:
-        """The motion at 30 frames a second, going where its feet take it: to be played and written."""
+        """The motion at 30 frames per second, its path following its planted feet: for playing and writing."""
         return self.playable()
 
     def playable(self, fps: float = PLAYED, plant: bool = True) -> Motion:
-        """The motion at another frame rate, or without its feet planted: moving as it was drawn, with sliding feet."""
+        """The motion at another frame rate, or as drawn: feet not planted, and possibly sliding."""
         frames = self.features.values if plant else self.frames
         return self.contract.motion(frames, after=self.after, plant=False).resample(fps)
 
@@ -92,7 +92,7 @@ class Generated:
         like: File | Character | Motion | Skeleton | None = None,
         onto: File | Character | None = None,
     ) -> None:
-        """Write :meth:`playable` as :func:`motet.write` does, perhaps put onto a character, or into its file."""
+        """Write :meth:`playable` like :func:`motet.write`, optionally retargeted onto a character, or into its file."""
         write_motion(path, self.playable(fps, plant), like=like, onto=onto)
 
     def __repr__(self) -> str:
@@ -102,8 +102,8 @@ class Generated:
 
 
 class GenerateModel(LanguageModel):
-    """A model that puts words into motion: :class:`motet.models.generate_mixture.MixtureModel` or
-    :class:`motet.models.generate_codes.CodesModel`, as the bundle's loop says."""
+    """A text-to-motion model: :class:`motet.models.generate_mixture.MixtureModel` or
+    :class:`motet.models.generate_codes.CodesModel`, depending on the bundle's loop."""
 
     VERB = "generate"
 
@@ -139,22 +139,23 @@ class GenerateModel(LanguageModel):
         progress: Progress = silent,
         **settings: Unpack[GenerateSettings],
     ) -> list[Generated] | list[list[Generated]]:
-        """``hypotheses`` motions for a sentence; for several sentences a list for each.
+        """``hypotheses`` motions for a sentence; for several sentences, a list for each.
 
-        A mixture ranks them, the likeliest per frame first. Of codes they are independent, the first what it is alone.
-        seed: sentence i has seed + i (or seed[i]), and the motions it would have alone with that seed.
-        progress: called with the number of sentences done and of all.
-        strict: refuse a sentence of which the model knows only a part, instead of warning.
-        settings: those of the model's loop (:mod:`motet.decode.loops`); None, as by default, for the bundle's.
-            temperature: of the draws: about the centres of a mixture's components, or of codes. max_seconds: a motion
-            that has not ended by then ends there. Of a mixture also candidates: frames that each hypothesis draws in a
-            step; 1 gives independent samples. Of codes also seconds: how long the motion lasts, an action that ends
-            before is done again; and top_p: codes are drawn from the likeliest that make up this share.
-        TextError for a sentence that is empty, too long or wholly unknown; DecodingError for a setting out of range, or
-        that the loop does not have. Unknown words are named by a TextWarning and in the result.
+        A mixture model ranks them, the likeliest per frame first. Those of a motion-code model are independent, and the
+        first does not depend on their number.
+        seed: sentence i uses seed + i (or seed[i]), and gets the same motions as alone with that seed.
+        progress: called with the number of sentences done and in total.
+        strict: fail on unknown words instead of warning.
+        settings: those of the model's loop (:mod:`motet.decode.loops`); None (the default) for the bundle's.
+            temperature: of sampling: about the centres of a mixture's components, or of codes. max_seconds: a motion
+            that has not ended by then is cut. Mixture models also take candidates: frames drawn by each hypothesis in a
+            step; 1 gives independent samples. Motion-code models also take seconds: the length of the motion, where an
+            action that ends early is repeated; and top_p: nucleus sampling, the most likely codes up to this mass.
+        TextError for a sentence that is empty, too long or wholly unknown; DecodingError for a setting that is out of
+        range or unknown to the loop. Unknown words are named by a TextWarning and in the result.
         """
         if settings.get("seconds") == 0:
-            raise DecodingError("seconds must be more than 0: leave them out, and a motion ends by itself")
+            raise DecodingError("seconds must be more than 0; omit them to let a motion end by itself")
         texts = [sentences] if isinstance(sentences, str) else list(sentences)
         own = {"hypotheses": hypotheses, **cast(Mapping[str, float | None], settings)}
         contexts, noise, chosen = self.asked(texts, len(texts), seed, strict, own)
@@ -169,7 +170,7 @@ class GenerateModel(LanguageModel):
     def asked(
         self, texts: Sequence[str], rows: int, seed: Seed, strict: bool, settings: Mapping[str, float | None]
     ) -> tuple[Floats, list[np.random.Generator], dict[str, float]]:
-        """Contexts (N, C) of sentences, noise for so many rows, and all the loop's settings; see :meth:`generate`."""
+        """Contexts (N, C) of sentences, noise of ``rows`` rows, and all settings of the loop; see :meth:`generate`."""
         ids, seeds = [self.ids(text) for text in texts], seeds_of(seed, rows, DecodingError)
         chosen, contexts = self.loop.settled(self.defaults, settings), self.contexts(ids)
         for text, context in zip(texts, contexts, strict=True):
@@ -177,35 +178,34 @@ class GenerateModel(LanguageModel):
         return contexts, [np.random.Generator(np.random.PCG64(one)) for one in seeds], chosen
 
     def check(self, sentence: str) -> None:
-        """TextError where a model knows only a part of a sentence, or nothing; see :meth:`note`."""
+        """TextError where the model does not know all of a sentence; see :meth:`note`."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", TextWarning)
             self.note(sentence, self.embed(sentence), strict=True)
 
     def note(self, sentence: str, context: Floats, strict: bool) -> None:
-        """Say that a model knows only a part of a sentence with this context (C,), beside the unknown words.
+        """Warn where the model knows a sentence with this context (C,) only in part, beyond its unknown words.
 
-        strict: TextError instead.
+        strict: raise TextError instead.
         """
         if strict and (unknown := self.unknown(sentence)):
             raise TextError(f"the model does not know {', '.join(unknown)} (in {sentence!r})")
 
     @abstractmethod
     def decode(self, contexts: Floats, noise: Sequence[Noise], settings: Mapping[str, Any]) -> list[list[Sample]]:
-        """Samples for each context (B, C), from the noise of each and all the loop's settings; frames in the contract's
-        units."""
+        """Samples for each context (B, C) from its noise and the loop's settings; frames in the contract's units."""
 
     def embed(self, sentences: str | Sequence[str]) -> Floats:
-        """The context vector (C,) float32 of a sentence, or vectors (N, C) of several; errors as :meth:`ids`."""
+        """The context vector (C,) float32 of a sentence, or vectors (N, C) of several; errors like :meth:`ids`."""
         if isinstance(sentences, str):
             context: Floats = self.contexts([self.ids(sentences)])[0]
             return context
         return self.contexts([self.ids(text) for text in sentences])
 
     def score(self, sentence: str, motion: Motion) -> float:
-        """Log-likelihood of a motion, and of its end, given a sentence; a TextWarning names words that count as UNK.
+        """Log-likelihood of a motion, and of its end, given a sentence; a TextWarning names the words taken as UNK.
 
-        DecodingError for a model whose loop knows no likelihoods.
+        DecodingError for a model whose loop has no likelihoods.
         """
         raise DecodingError(f"models of the loop {self.manifest.loop!r} cannot score motions")
 

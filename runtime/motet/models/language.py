@@ -55,25 +55,25 @@ class LanguageModel(BundleModel):
     def frames(self, motion: Motion) -> Array:
         """The frames (T, D) float64 of a motion in the contract's channels and units, resampled to its frame rate.
 
-        A motion of any other human figure is brought onto the model's (docs/humanoid.md). MotionError names the
-        channels that the motion lacks, and refuses less than two frames and more than 30 s.
+        A motion of any other human figure is retargeted onto the model's (docs/humanoid.md). MotionError where the
+        motion lacks channels (it names them), or has less than two frames or more than 30 s.
         """
         if motion.duration > MAX_SECONDS:
             limit = f"the model takes at most {MAX_SECONDS:g} s: cut it, or describe its windows"
-            raise MotionError(f"the motion lasts {motion.duration:.1f} s, and {limit}")
+            raise MotionError(f"the motion lasts {motion.duration:.1f} s, but {limit}")
         frames = self.contract.frames(motion)
         if len(frames) < 2:
-            raise MotionError(f"the model needs two frames at {self.fps:g} fps, and the motion has {len(frames)}")
+            raise MotionError(f"the model needs two frames at {self.fps:g} fps, but the motion has {len(frames)}")
         return frames
 
     def prepared(self, motion: Motion) -> Motion:
-        """What the model sees of a motion, to be prepared once and asked about often; MotionError as :meth:`frames`."""
+        """A motion as the model sees it, to be prepared once and reused; MotionError like :meth:`frames`."""
         return self.contract.features(self.frames(motion))
 
     def windows(self, motion: Motion, longest: float = MAX_SECONDS) -> list[tuple[float, Motion]]:
-        """A motion of any length in as few equal parts as are no longer, each with the second at which it starts.
+        """A motion of any length in the fewest equal parts of at most ``longest`` seconds, each with its start time.
 
-        One of another human figure is brought onto the model's first, as :meth:`frames` does it, as a whole.
+        One of another human figure is first retargeted as a whole onto the model's, like in :meth:`frames`.
         """
         motion = self.contract.on_figure(motion)
         most = max(1, math.floor(longest * motion.fps + 1e-9))  # parts are of whole frames
@@ -94,7 +94,7 @@ class LanguageModel(BundleModel):
 
 
 def batches(lengths: Sequence[int], size: int) -> Iterator[list[int]]:
-    """Indices in batches of at most ``size``, sequences of like length together."""
+    """Indices in batches of at most ``size``, sequences of similar length together."""
     order = sorted(range(len(lengths)), key=lambda i: lengths[i])
     return (order[start : start + size] for start in range(0, len(order), size))
 

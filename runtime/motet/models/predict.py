@@ -26,14 +26,14 @@ from motet.motion.rotations import Array
 from motet.settings import is_number
 
 MAX_FRAMES, MAX_GOLDEN = 100_000, 1000
-"""Of one prediction, which is in memory as a whole; and of one among the golden vectors."""
+"""Most frames of a prediction, which is held in memory as a whole, and of one in golden vectors."""
 
 SURE = 0.5
-"""Seconds that are the predictor's where a writer goes on beyond the horizon: later it is sure of too little, and what
-it predicts begins to die away."""
+"""Seconds taken from the predictor where a code model continues beyond the horizon; later predictions regress to the
+mean."""
 
 MAX_SAMPLES = 100
-"""Futures that are drawn at once."""
+"""Most futures of one call."""
 
 
 class PredictModel(BundleModel):
@@ -57,20 +57,20 @@ class PredictModel(BundleModel):
         if self.knows_errors:
             self.bind("encoder", {"frames": "batch L D"}, {"error": "batch N"})
             if self.sizes["N"] != self.horizon:
-                raise BundleError(f"graph encoder: it gives {self.sizes['N']} errors for a horizon of {self.horizon}")
+                raise BundleError(f"graph encoder: outputs {self.sizes['N']} errors for a horizon of {self.horizon}")
 
     @property
     def sure(self) -> int:
-        """How many frames are the predictor's where a writer goes on beyond the horizon."""
+        """Number of frames taken from the predictor where a code model continues beyond the horizon."""
         return min(self.horizon, round(SURE * self.fps))
 
     @property
     def knows_errors(self) -> bool:
-        """Whether :meth:`expected_errors` can tell anything."""
+        """Whether the model can give :meth:`expected_errors`."""
         return any(tensor.name == "error" for tensor in self.graphs["encoder"].spec.outputs)
 
     def count(self, seconds: float | None = None, frames: int | None = None) -> int:
-        """How many frames a prediction has that lasts so long; DecodingError for both, or for a length out of range."""
+        """Number of frames of a prediction; DecodingError for both, or for a length out of range."""
         if seconds is None:
             return checked_int("frames", self.horizon if frames is None else frames, 1, MAX_FRAMES, DecodingError)
         longest = MAX_FRAMES / self.fps
@@ -116,19 +116,19 @@ class PredictModel(BundleModel):
     ) -> Motion | list[Motion]:
         """The ``seconds`` or ``frames`` (the horizon by default) that follow a motion, at the model's frame rate.
 
-        A motion is continued in its own channels, units and skeleton, from where its root is. One of another human
-        figure is brought onto the model's, and what follows back, or given on the model's where that is not possible
+        A motion is continued in its own channels, units and skeleton, from its own place. One of another human figure
+        is retargeted onto the model's, and the prediction back, or returned on the model's where that is impossible
         (docs/humanoid.md). The model sees the last :attr:`seed_frames` at its frame rate; of another figure, all frames
-        tell how its joints stand and where its ground is. A motion is resampled so that its last frame is kept.
-        append: give the motion, resampled, and what follows it.
-        progress: called with the number of motions done and of all.
-        beyond: a model that writes codes, such as ``motet.load("generate")``. It continues a prediction longer than the
-            horizon, at the motion's pace (docs/alive.md), after SURE seconds of the predictor's. Without it the
-            predictor continues from its own last frames, and its motion dies away.
-        seed: of what ``beyond`` draws; motion i has seed + i (or seed[i]).
-        Several motions are carried on in one batch, each as it would be alone. MotionError for a motion that is too
-        short, lacks channels of the model, or is of a figure that is no human's; DecodingError for a length out of
-        range, and where ``beyond`` does not write codes.
+        are used to measure its joints and its ground. Resampling a motion keeps its last frame.
+        append: return the resampled motion followed by the prediction.
+        progress: called with the number of motions done and in total.
+        beyond: a motion-code model such as ``motet.load("generate")``. It continues a prediction longer than the
+            horizon, at the motion's pace (docs/alive.md), after SURE seconds by the predictor. Without it the
+            predictor continues from its own last frames, and its motion fades out.
+        seed: of sampling by ``beyond``; motion i uses seed + i (or seed[i]).
+        Several motions are continued in one batch, each as it would be alone. MotionError for a motion that is too
+        short, lacks channels of the model, or is not of a human figure; DecodingError for a length out of range, or
+        where ``beyond`` is not a motion-code model.
         """
         count = self.count(seconds, frames)
         if beyond is not None and count > self.horizon:
@@ -152,7 +152,7 @@ class PredictModel(BundleModel):
         writer: GenerateModel,
         seed: Seed,
     ) -> Motion | list[Motion]:
-        """See :meth:`predict`: more frames than the horizon, all but the first by a writer."""
+        """See :meth:`predict`: more frames than the horizon, all but the first by a code model."""
         given, found = [motions] if isinstance(motions, Motion) else list(motions), list[Motion]()
         for motion, own in zip(given, seeds_of(seed, len(given), DecodingError), strict=True):
             start = self.predict(motion, frames=self.sure, append=True)
@@ -173,12 +173,12 @@ class PredictModel(BundleModel):
         seed: Seed = 0,
         progress: Progress = silent,
     ) -> list[Motion]:
-        """So many different futures of a motion, each of ``seconds`` or ``frames`` (the horizon by default).
+        """``samples`` different futures of a motion, each of ``seconds`` or ``frames`` (the horizon by default).
 
-        beyond: a model that writes codes, as ``motet.load("generate")``. From the first frame on they are what it draws
-        (docs/alive.md): they differ as far as the future is open, where :meth:`predict` begins with what is likeliest
-        on average. Sample i is what seed + i gives alone. append, channels and errors: as :meth:`predict`; progress:
-        called with the number of samples done and of all. DecodingError for other than 1 to MAX_SAMPLES samples.
+        beyond: a motion-code model such as ``motet.load("generate")``. It draws all frames from the first on
+        (docs/alive.md): they differ as far as the future is open, whereas :meth:`predict` begins with the average
+        future. Sample i is the one drawn alone with seed + i. append, channels and errors: like :meth:`predict`;
+        progress: called with the number of samples done and in total. DecodingError unless samples is 1 to MAX_SAMPLES.
         """
         samples = checked_int("samples", samples, 1, MAX_SAMPLES, DecodingError)
         count, seeds = self.count(seconds, frames), seeds_of(seed, samples, DecodingError)
@@ -187,11 +187,11 @@ class PredictModel(BundleModel):
         return [together(before, following) if append else following for following, before in found]
 
     def measured(self, motion: Motion) -> Figure | None:
-        """The figure of a motion, measured for all predictions of it; None where it is the model's."""
+        """The figure of a motion, measured once for all its predictions; None where it is the model's."""
         return self.contract.measured(self.at_own_rate(motion))
 
     def following(self, motion: Motion, frames: int, measured: Figure | None) -> Motion:
-        """As :meth:`predict`, of a figure that is measured already."""
+        """Like :meth:`predict`, for a figure already measured."""
         whole, figure, last = self._seed(motion, measured)
         return carried_on(self.contract, self.next_frames([last], frames)[0], whole, figure, measured)[0]
 
@@ -202,7 +202,7 @@ class PredictModel(BundleModel):
         frames = self.contract.frames(figure[max(0, len(whole) - self.seed_frames - 1) :])
         if len(frames) < self.seed_frames:
             limit = f"the model needs {self.seed_frames} frames at {self.fps:g} fps"
-            raise MotionError(f"{limit}, and the motion has {len(frames)} ({len(motion)} at {motion.fps:g} fps)")
+            raise MotionError(f"{limit}, but the motion has {len(frames)} ({len(motion)} at {motion.fps:g} fps)")
         return whole, figure, frames[-self.seed_frames :]
 
     def _carried_on(self, whole: Motion, figure: Motion, frames: Floats, append: bool) -> Motion:
@@ -212,7 +212,7 @@ class PredictModel(BundleModel):
     def next_frames(self, seeds: ArrayLike, frames: int | None = None) -> Floats:
         """Seed frames (B, L, C) in the contract's channels, to the next frames (B, frames, C) float32.
 
-        Each row gives what it gives alone, to the bit with one thread.
+        Each row is the same as alone, bit for bit with one thread.
         DecodingError for a number of frames out of range, MotionError for seeds of another shape.
         """
         given = np.asarray(seeds, dtype=np.float32)
@@ -229,14 +229,14 @@ class PredictModel(BundleModel):
         return found[: len(given)]
 
     def expected_errors(self, motions: Motion | Sequence[Motion]) -> Floats:
-        """How far from where they will be the joints of each predicted frame are expected to be, in centimetres.
+        """Expected joint position error of each predicted frame, in centimetres.
 
         (horizon,) for a motion, (B, horizon) for several: the mean over the joints of the model's figure, in the world,
-        as it is for people that the model was not trained on. Errors as :meth:`predict`, and DecodingError for a model
-        that does not know.
+        for people not in the training data. Errors like :meth:`predict`, and DecodingError for a model that does not
+        estimate its errors.
         """
         if not self.knows_errors:
-            raise DecodingError(f"{self!r} does not know its errors: its encoder gives none")
+            raise DecodingError(f"{self!r} does not estimate its errors: its encoder has no 'error' output")
         given = [motions] if isinstance(motions, Motion) else list(motions)
         seeds = np.zeros((len(given), self.seed_frames, len(self.contract.channels)), dtype=np.float32)
         for row, motion in zip(seeds, given, strict=True):
@@ -253,7 +253,7 @@ class PredictModel(BundleModel):
         return {"frames": self.next_frames(given["frames"][None], count)[0]}
 
     def stream(self, start: Motion | None = None) -> "PredictSession":
-        """A session that frames are pushed into as they come.
+        """A session to push frames into as they arrive.
 
         start: the motion so far; its channels, units, frame rate and skeleton are those of the frames to come. By
             default there is none, and frames come in the channels and at the frame rate of :attr:`contract`.
@@ -266,8 +266,8 @@ class PredictModel(BundleModel):
 class PredictSession:
     """A growing motion: push new frames, predict the next. Keeps only the frames that the model uses.
 
-    Another figure than the model's is measured once, at the first prediction: by the motion that the session starts
-    with or, where that is too short, by the frames that are kept. So is where its ground is.
+    A figure other than the model's is measured once, with its ground, at the first prediction: from the motion that the
+    session starts with or, where that is too short, from the frames kept.
     """
 
     def __init__(self, model: PredictModel, start: Motion) -> None:
@@ -276,7 +276,7 @@ class PredictSession:
         self._start, self._motion = start, start[-self._kept :]
 
     def push(self, frames: ArrayLike) -> None:
-        """The next frame (D,), or several (T, D); MotionError where they do not fit, and then nothing has changed."""
+        """The next frame (D,), or several (T, D); MotionError where they do not fit; nothing is changed then."""
         try:
             new = np.atleast_2d(np.asarray(frames, dtype=np.float64))
         except (TypeError, ValueError) as error:

@@ -51,7 +51,7 @@ class TdbnModel(ControlModel):
         turns = np.array([TURN.get(unit, np.inf) for unit in self.contract.units], dtype=np.float32)
         self.lookahead = Lookahead(self.settings(LookaheadSettings), self.fps, turns)
         if "history" not in self.stepper.spec.feedback:
-            raise BundleError("manifest, graphs.step.feedback: nothing gives the next history")
+            raise BundleError("manifest, graphs.step.feedback: no output is fed back to 'history'")
         for label, frames in self.starts.items():
             if len(frames) != self.taps:
                 raise BundleError(f"manifest, control.starts.{label}: must hold {self.taps} frames, not {len(frames)}")
