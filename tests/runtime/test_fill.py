@@ -115,13 +115,13 @@ def test_several_gaps_are_as_one_after_the_other(model: FillModel, walk: Motion)
         ([(1.0, 1.001)], "has no frame at 30 fps: make it longer"),
         ([(0.0, 1.0)], "at the very start of the motion of 3 s: a gap needs frames before it"),
         ([(2.0, 3.0)], r"at the very end of the motion of 3 s: a gap needs frames after it.*motet predict"),
-        ([(0.1, 1.0)], r"at least 0.13 s of motion \(4 frames at 30 fps\) before it, and there are 0.1 s"),
-        ([(2.0, 2.9)], r"at least 0.13 s of motion \(4 frames at 30 fps\) after it, and there are 0.1 s"),
+        ([(0.1, 1.0)], r"at least 0.13 s of motion \(4 frames at 30 fps\) before it, but there are 0.1 s"),
+        ([(2.0, 2.9)], r"at least 0.13 s of motion \(4 frames at 30 fps\) after it, but there are 0.1 s"),
         ([(-1.0, 1.0)], "not within the motion of 3 s"),
         ([(1.0, 4.0)], "not within the motion of 3 s"),
         ([(1.0, 1.6), (1.5, 2.0)], "1:1.6 and 1.5:2 overlap or touch: merge them"),
         ([(1.5, 2.0), (1.0, 1.5)], "1:1.5 and 1.5:2 overlap or touch: merge them"),
-        ([(1.0, 1.5), (1.6, 2.0)], "at least 0.13 s of motion .* after it, and there are 0.1 s"),
+        ([(1.0, 1.5), (1.6, 2.0)], "at least 0.13 s of motion .* after it, but there are 0.1 s"),
         ([(0.4, 2.6)], "too long: at most 2 s can be filled"),
     ],
 )
@@ -221,9 +221,9 @@ def test_transitions_that_are_none(model: FillModel, seconds: float) -> None:
 
 
 def test_motions_too_short_to_be_joined(model: FillModel) -> None:
-    with pytest.raises(MotionError, match=r"before it, and there are 0\.1 s"):
+    with pytest.raises(MotionError, match=r"before it, but there are 0\.1 s"):
         model.join(glider(3), glider())
-    with pytest.raises(MotionError, match=r"after it, and there are 0\.1 s"):
+    with pytest.raises(MotionError, match=r"after it, but there are 0\.1 s"):
         model.join(glider(), glider(3))
 
 

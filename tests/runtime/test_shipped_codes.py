@@ -146,7 +146,7 @@ def test_it_says_what_it_does_not_know(model: CodesModel) -> None:
     assert not found.confident
     assert len(found.nearest) == 3
     for call in (model.generate, model.story):
-        with pytest.warns(TextWarning, match="outside of what the model knows") as caught:
+        with pytest.warns(TextWarning, match="outside the training data") as caught:
             call([strange], seconds=1)
         assert {warning.filename for warning in caught} == {__file__}
     with pytest.raises(TextError, match="nearest: '"):
@@ -162,7 +162,7 @@ def test_a_text_without_a_known_word_is_refused(model: CodesModel, text: str) ->
 
 
 def test_a_text_in_another_language_is_said_to_be_outside(model: CodesModel) -> None:
-    with pytest.warns(TextWarning, match="outside of what the model knows"):
+    with pytest.warns(TextWarning, match="outside the training data"):
         model.generate("ein Mann in einem Haus", seconds=1)
 
 

@@ -36,7 +36,7 @@ def test_orders_say_what_to_do_in_any_order_of_their_words() -> None:
         ("walk speed fast", 11, "expected metres a second, such as"),
         ("turn 90", 5, "expected left or right"),
         ("turn left", 5, "expected degrees after this"),
-        ("walk 3s 4s", 8, "says its seconds twice"),
+        ("walk 3s 4s", 8, "gives its seconds twice"),
         ("walk 9999s", 0, "at most 3600 s"),
         ("walk -3s", 5, "expected seconds"),
         ("walk>run 3s", 0, "unknown order 'walk>run'"),

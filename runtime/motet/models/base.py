@@ -1,4 +1,4 @@
-"""What the models of all verbs share: a manifest, a motion contract, graphs, and the bundle that they came from."""
+"""The base of all models: a manifest, a motion contract, graphs, and the bundle they were loaded from."""
 
 import logging
 from abc import ABC, abstractmethod
@@ -24,11 +24,11 @@ log = logging.getLogger(__name__)
 
 
 class BundleModel(ABC):
-    """A model that runs graphs; without state, so that requests and threads can share it.
+    """A model that runs graphs; stateless, so requests and threads can share it.
 
     manifest: of a bundle of the model's verb, or of a training run.
     graphs: by role. tables: plain arrays by name.
-    BundleError where graphs or tables are not those of the verb, or do not fit the manifest.
+    BundleError where graphs or tables do not fit the verb or the manifest.
     """
 
     VERB: ClassVar[str]
@@ -36,7 +36,7 @@ class BundleModel(ABC):
     """The decoding loops of its bundles, by their names in :mod:`motet.decode.loops`."""
     ROLES: ClassVar[tuple[str, ...]] = ("encoder", "step")
     SETTINGS: ClassVar[tuple[type[Settings], ...]] = ()
-    """Of the features whose numbers a bundle may hold."""
+    """Settings classes whose values a bundle may hold."""
 
     _source: tuple[Path, SessionOptions] | None = None
 
@@ -58,15 +58,15 @@ class BundleModel(ABC):
         self.sizes: Sizes = {"D": len(self.contract.channels)}
 
     def bind(self, role: str, inputs: Mapping[str, str], outputs: Mapping[str, str]) -> None:
-        """Check the graph of a role against :attr:`sizes`, and note the sizes it adds; BundleError as :func:`bind`."""
+        """Check the graph of a role against :attr:`sizes`, and record its new sizes; BundleError like :func:`bind`."""
         bind(role, self.graphs[role].spec, inputs, outputs, self.sizes)
 
     def settings(self, kind: type[S]) -> S:
-        """The settings of a feature, one of :attr:`SETTINGS`: the bundle's, and defaults for what it does not say."""
+        """The settings of a feature, one of :attr:`SETTINGS`: the bundle's values, defaults for the others."""
         return cast(S, self._tuned[kind])
 
     def table(self, name: str, shape: str, dtype: str) -> NDArray[Any]:
-        """The table of a name, its shape checked like :meth:`bind`; BundleError where it is missing, or another."""
+        """A table by name, its shape checked like in :meth:`bind`; BundleError where it is missing or does not fit."""
         if name not in self.tables:
             raise BundleError(f"manifest, tables: there is no table {name!r}")
         found = self.tables[name]
@@ -100,7 +100,7 @@ class BundleModel(ABC):
 
     @property
     def fps(self) -> float:
-        """Frames per second that the model takes and gives."""
+        """The model's frames per second."""
         return self.contract.fps
 
     def at_own_rate(self, motion: Motion) -> Motion:
@@ -109,12 +109,12 @@ class BundleModel(ABC):
 
     @property
     def providers(self) -> tuple[str, ...]:
-        """The execution providers of ONNX Runtime that are active, the preferred first; none without its graphs."""
+        """The active execution providers of ONNX Runtime, the preferred first; empty without its graphs."""
         return tuple(getattr(self.graphs[self.ROLES[-1]], "providers", ())) if self.ROLES else ()
 
     @abstractmethod
     def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
-        """The whole run of the golden vectors (docs/bundle.md): what follows from its inputs and settings."""
+        """The complete run of the golden vectors (docs/bundle.md): outputs from its inputs and settings."""
 
 
 def _read_settings(

@@ -1,4 +1,4 @@
-"""Control: figures that move tick by tick as they are told; what both kinds of models have in common."""
+"""Control: figures that move tick by tick under control; the base of both kinds of models."""
 
 from abc import abstractmethod
 from typing import Any
@@ -8,16 +8,16 @@ from motet.motion.motion import Motion
 
 
 class ControlModel(BundleModel):
-    """A model of figures that are controlled: :class:`motet.models.steer.SteerModel` or
-    :class:`motet.models.tdbn_control.TdbnModel`, by the bundle's loop. Both take scripts, each in its own words."""
+    """A model of controllable figures: :class:`motet.models.steer.SteerModel` or
+    :class:`motet.models.tdbn_control.TdbnModel`, depending on the bundle's loop. Each has its own script syntax."""
 
     VERB = "control"
 
     @abstractmethod
     def run(self, script: str, *args: Any, **settings: Any) -> Motion:
-        """The motion of one figure that runs a script, with the settings of the kind; ScriptError where it does not
+        """The motion of one figure that runs a script, with the settings of the subclass; ScriptError where it does not
         parse."""
 
     @abstractmethod
     def captions(self, script: str) -> list[tuple[float, str]]:
-        """When each part of a script begins, in seconds, and how a viewer calls it; ScriptError as :meth:`run`."""
+        """The start of each part of a script, in seconds, and its caption; ScriptError like :meth:`run`."""

@@ -29,7 +29,7 @@ Decoding = Literal["beam", "consensus"]
 
 @dataclass(frozen=True)
 class ConfidenceSettings(Settings):
-    """log_probability: from which on a description is believed. Training finds it (docs/language.md)."""
+    """log_probability: least of a confident description. Training finds it (docs/language.md)."""
 
     FEATURE: ClassVar[str] = "confidence"
     log_probability: Annotated[float, Range(-1000, 0, "nats")] = -5.5
@@ -39,8 +39,8 @@ class ConfidenceSettings(Settings):
 class Description:
     """A sentence, normalised, and the natural logarithm of its probability given the motion.
 
-    score: what the sentences of a motion are ranked by: the log-probability, or how well a sentence drawn agrees with
-        all that were drawn, from 0 to 1. confident: whether it is as probable as right descriptions are.
+    score: by which the sentences of a motion are ranked: the log-probability, or the agreement of a sampled sentence
+        with all samples, from 0 to 1. confident: whether it is as probable as correct descriptions are.
     """
 
     text: str
@@ -49,7 +49,7 @@ class Description:
     confident: bool
 
     def to_json(self) -> dict[str, Any]:
-        """A JSON object of all that it says."""
+        """All fields as a JSON object."""
         return asdict(self)
 
 
@@ -62,11 +62,11 @@ class Part(Description):
 
 
 class DescribeModel(LanguageModel):
-    """A model that puts motions into words.
+    """A motion captioning model.
 
     graphs: "encoder" (frames, lengths -> context) and "step" (word, context, states -> log_probabilities, next states).
-    Its loops (:mod:`motet.decode.loops`) take the step, contexts (B, C), limits and their settings by name, and give up
-    to ``beams`` hypotheses for each row, best first.
+    Its loops (:mod:`motet.decode.loops`) take the step, contexts (B, C), limits and their settings by name, and return
+    up to ``beams`` hypotheses for each row, best first.
     """
 
     VERB = "describe"
@@ -110,17 +110,17 @@ class DescribeModel(LanguageModel):
         seed: SupportsIndex = 0,
         progress: Progress = silent,
     ) -> list[Description] | list[list[Description]]:
-        """Up to ``beams`` descriptions of a motion, the best first; of several motions a list for each.
+        """Up to ``beams`` descriptions of a motion, the best first; for several motions, a list for each.
 
-        decoding: "beam" for beam search, whose best is the most probable sentence; "consensus" for ``draws`` sentences
-            drawn, of which the best has most in common with all (:mod:`motet.decode.consensus`), and need not be
-            probable itself. By default consensus where ``draws`` is given, and otherwise the bundle's loop.
-        seed: of the draws; each motion gets those that it gets alone.
-        progress: called with the number of motions done and of all.
+        decoding: "beam" for beam search, whose best is the most probable sentence; "consensus" for sampling ``draws``
+            sentences, the best being the one that agrees most with all (:mod:`motet.decode.consensus`), not necessarily
+            a probable one. By default consensus where ``draws`` is given, and otherwise the bundle's loop.
+        seed: of sampling; each motion gets the same samples as alone.
+        progress: called with the number of motions done and in total.
 
-        A motion at another frame rate is resampled. MotionError as :meth:`frames`: longer motions go in
+        A motion at another frame rate is resampled. MotionError like :meth:`frames`; cut longer motions with
         :meth:`windows`. DecodingError where ``beams`` (the bundle's by default) is not between 1 and 100, ``draws`` not
-        between 1 and 1,000 or given for beam search, and for a negative seed.
+        between 1 and 1,000 or given for beam search, or the seed negative.
         """
         if decoding not in (None, *self.LOOPS):
             raise DecodingError(f"decoding must be one of {', '.join(self.LOOPS)}, not {decoding!r}")
@@ -140,14 +140,14 @@ class DescribeModel(LanguageModel):
         return Description(self.vocabulary.decode(found.ids), found.log_probability, found.score, sure)
 
     def timeline(self, motion: Motion, *, progress: Progress = silent) -> list[Part]:
-        """What happens in a motion of any length: parts that follow each other, each with its best description.
+        """What happens in a motion of any length: consecutive parts, each with its best description.
 
-        Short windows are described, each sentence is scored for all windows near it, and the motion is cut where
-        another sentence is worth a change (:mod:`motet.models.timeline`). Each part is then described as
-        :meth:`describe` does it, one of more than 30 s by its middle; neighbours of which the same is said are one.
+        Short windows are described, each sentence is scored for all nearby windows, and the motion is cut where
+        switching to another sentence pays (:mod:`motet.models.timeline`). Each part is then described like in
+        :meth:`describe`, one of more than 30 s by its middle; neighbours with the same description are merged.
 
-        progress: called with the number of windows done and of all.
-        MotionError as :meth:`frames`, but for long motions.
+        progress: called with the number of windows done and in total.
+        MotionError like :meth:`frames`, except for long motions.
         """
         motion = self.contract.on_figure(motion).resample(self.fps)
         settings = self.settings(TimelineSettings)
@@ -164,7 +164,7 @@ class DescribeModel(LanguageModel):
         return [(start, *best.ids, end) for best, *_ in found]
 
     def _parts(self, motion: Motion, cuts: list[int]) -> list[Part]:
-        """Parts of a motion between frames; those are left out on whose two sides the same is said."""
+        """Parts of a motion between cuts; a cut between two equal descriptions is dropped."""
         found = [row[0] for row in self.describe([_middle(motion[a:b]) for a, b in pairwise(cuts)])]
         inner = [cut for cut, (one, two) in zip(cuts[1:-1], pairwise(found), strict=True) if one.text != two.text]
         if len(inner) < len(cuts) - 2:
@@ -175,7 +175,7 @@ class DescribeModel(LanguageModel):
     def _hypotheses(
         self, loop: Loop, contexts: Floats, settings: Mapping[str, Any], progress: Progress = silent
     ) -> list[list[Hypothesis]]:
-        """The hypotheses of many contexts, as many at a time as the loop decodes at once."""
+        """The hypotheses of many contexts, decoded in batches of the loop's size."""
         found: list[list[Hypothesis]] = []
         for place in range(0, len(contexts), loop.batch):
             found += self._decoded(loop, contexts[place : place + loop.batch], settings)
@@ -188,7 +188,7 @@ class DescribeModel(LanguageModel):
         return found
 
     def embed(self, motions: Motion | Sequence[Motion]) -> Floats:
-        """The context vector (C,) float32 of a motion, or vectors (N, C) of several; MotionError as :meth:`frames`."""
+        """The context vector (C,) float32 of a motion, or (N, C) of several; MotionError like :meth:`frames`."""
         if isinstance(motions, Motion):
             context: Floats = self.contexts([self.frames(motions)])[0]
             return context
@@ -201,7 +201,7 @@ class DescribeModel(LanguageModel):
         return float(score_words(self.graphs["step"], self.embed([motion]), np.zeros(1, np.int64), words)[0])
 
     def limits(self, settings: Mapping[str, Any]) -> Limits:
-        """What bounds a sentence in ids of the vocabulary, with "max_words" of the settings."""
+        """The limits of a sentence, in ids of the vocabulary, with "max_words" of the settings."""
         start, end, *banned = (self.vocabulary.ids[word] for word in (SOS, EOS, PAD, UNK))
         return Limits(start, end, int(settings["max_words"]), [start, *banned])
 
@@ -217,7 +217,7 @@ class DescribeModel(LanguageModel):
 
 
 def _middle(motion: Motion) -> Motion:
-    """The middle of a motion that is longer than a model takes."""
+    """The middle of a motion too long for the model."""
     most = int(MAX_SECONDS * motion.fps + 1e-9)
     start = max(0, len(motion) - most) // 2
     return motion[start : start + most]

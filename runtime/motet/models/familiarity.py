@@ -1,4 +1,4 @@
-"""What a model knows: the actions that it was trained on, and how well a sentence fits any of them."""
+"""What a model knows: the actions in its training data, and how well a sentence fits them."""
 
 import math
 from collections import Counter
@@ -14,18 +14,17 @@ from motet.models.text import TextRules
 from motet.settings import Range, Settings
 
 ROUNDING = 0.01
-"""By which a log-probability may be above 0."""
+"""Most by which a log-probability may exceed 0."""
 
 NEAREST = 3
-"""Known sentences that are named."""
+"""Number of known sentences named."""
 
 
 @dataclass(frozen=True)
 class FamiliaritySettings(Settings):
-    """confident: the least confidence of a sentence that the model knows (docs/generate.md).
+    """confident: least confidence of a known sentence (docs/generate.md).
 
-    doubt: the power by which the probability of the likeliest action counts: sentences share actions, so it is often
-        low.
+    doubt: exponent of the probability of the likeliest action, which is often low because sentences share actions.
     """
 
     FEATURE: ClassVar[str] = "familiarity"
@@ -35,11 +34,10 @@ class FamiliaritySettings(Settings):
 
 @dataclass(frozen=True)
 class Understood:
-    """confidence: from 0 to 1: how much of what a sentence says is in known words, rare words counting more, times how
-    sure it is which action is meant.
+    """confidence: from 0 to 1: the share of known words in a sentence, rare words counting more, times the certainty
+    about the action meant.
 
-    nearest: sentences of the likeliest of these actions, the likeliest first. confident: whether the model knows what
-    the sentence says.
+    nearest: sentences of the likeliest actions, the likeliest first. confident: whether the model knows the sentence.
     """
 
     confidence: float
@@ -49,8 +47,8 @@ class Understood:
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """A actions. sentences: one of each. rare: how much a word says: the logarithm of how many actions there are for
-    each of which it is said."""
+    """A actions. sentences: one of each. rare: the weight of a word: the logarithm of the number of actions divided by
+    the number that it describes."""
 
     sentences: tuple[str, ...]
     rare: dict[str, float]
@@ -59,7 +57,7 @@ class Known:
 
     @staticmethod
     def read(manifest: Fields, count: int, rules: TextRules, settings: FamiliaritySettings) -> "Known":
-        """The key "actions" of a manifest; BundleError where it is not one entry for each of ``count`` actions."""
+        """The key "actions" of a manifest; BundleError unless it has one entry for each of ``count`` actions."""
         entries = manifest.list_of_fields("actions")
         if len(entries) != count:
             raise BundleError(f"manifest, actions: {len(entries)} entries, expected {count}")
@@ -68,7 +66,7 @@ class Known:
         return Known(tuple(entry.text("sentence") for entry in entries), rare, rules, settings)
 
     def understood(self, sentence: str, context: Floats) -> Understood:
-        """What a sentence is taken for, by the log-probabilities (A,) of actions; BundleError where they are none."""
+        """How a sentence is understood, by the log-probabilities (A,) of actions; BundleError for other numbers."""
         asked, unheard = set(self.rules.words(sentence)), math.log(1 + len(self.sentences))
         heard = sum(self.rare.get(word, 0.0) for word in asked)
         share = heard / (sum(self.rare.get(word, unheard) for word in asked) or 1.0)

@@ -1,4 +1,4 @@
-"""Fill: what happens in a gap of a motion, between two motions, or from the end of one to its start."""
+"""Fill: the missing frames in a gap of a motion, between two motions, or from the end of one to its start."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -23,16 +23,16 @@ from motet.representation.retargeting import from_model_figure
 from motet.representation.root_sixd import facing
 
 SEEN = 5.0
-"""Seconds before and after a gap by which a figure is brought to the humanoid: where its ground is, how it stands."""
+"""Seconds before and after a gap from which a figure is retargeted onto the humanoid: its ground, its stance."""
 
 JOIN_SECONDS, LOOP_SECONDS = 1.0, 0.5
-"""How long transitions take by default: between two motions, and from the end of one to its start."""
+"""Default seconds of a transition between two motions, and from the end of one to its start."""
 
 
 @dataclass(frozen=True)
 class Sides:
-    """What is known about a gap, at the model's frame rate. own: both sides, as the figure has them; figure: the same
-    on the humanoid. past: (P, E) placed frames before the gap, the last of them right before it. after: (A, E)."""
+    """What is known about a gap, at the model's frame rate. own: both sides, on their own figure; figure: the same on
+    the humanoid. past: (P, E) placed frames before the gap, the last of them right before it. after: (A, E)."""
 
     own: Motion
     figure: Motion
@@ -41,11 +41,11 @@ class Sides:
 
 
 class FillModel(BundleModel):
-    """A model that fills gaps of motions; any number of threads share it.
+    """A model that fills gaps in motions; threads can share it.
 
     graphs: "filler" (past, plain, after -> filled), of placed frames (:mod:`motet.representation.placed`) of the
-        humanoid. Its loop gives "context", the frames it sees before and after a gap, "least", how many it needs, and
-        "longest", the frames of the longest gap, all at the model's frame rate.
+        humanoid. Its loop's defaults are "context", the frames it sees before and after a gap, "least", the frames
+        it needs there, and "longest", the frames of the longest gap, all at the model's frame rate.
     """
 
     VERB = "fill"
@@ -63,7 +63,7 @@ class FillModel(BundleModel):
 
     @property
     def seconds(self) -> float:
-        """How long a gap may be."""
+        """The longest gap, in seconds."""
         return self.longest / self.fps
 
     @overload
@@ -79,16 +79,16 @@ class FillModel(BundleModel):
         *,
         progress: Progress = silent,
     ) -> Motion | list[Motion]:
-        """A motion with what may have happened in its gaps; what is there in their frames is not looked at.
+        """A motion with its gaps filled plausibly; the present content of their frames is ignored.
 
-        gaps: of several motions a list for each. A gap is (start, stop) in seconds: frames from ``start`` on, up to and
-            without that at ``stop``, are replaced. All others stay as they are, to the bit, and so do channels, units,
-            figure and frame rate. A motion of a figure whose own world or channels do not allow that comes on the
-            humanoid at the model's rate, which is logged.
-        progress: called with the number of motions done and of all.
-        MotionError, with what would be right, for gaps that are empty, longer than :attr:`seconds`, not within the
-        motion, that overlap, or with fewer than :attr:`least` frames at the model's rate before or after them; and for
-        a figure that is no human's.
+        gaps: for several motions, a list for each. A gap is (start, stop) in seconds: the frames from ``start`` up to,
+            but not including, ``stop`` are replaced. All others are unchanged, bit for bit, and so are channels, units,
+            figure and frame rate. Where a figure's world or channels make that impossible, the result is on the
+            humanoid at the model's frame rate, which is logged.
+        progress: called with the number of motions done and in total.
+        MotionError, with the remedy, for gaps that are empty, longer than :attr:`seconds`, outside the motion or
+        overlapping, or with fewer than :attr:`least` frames at the model's rate before or after them; and for a figure
+        that is not human.
         """
         if isinstance(motions, Motion):
             return self._filled(motions, cast(Sequence[Gap], gaps))
@@ -115,21 +115,21 @@ class FillModel(BundleModel):
         return result
 
     def join(self, first: Motion, second: Motion, *, seconds: float = JOIN_SECONDS) -> Motion:
-        """One motion, a transition of so many seconds, and another motion, which is set down where the first leads.
+        """One motion, a transition of ``seconds``, and another motion, placed where the first leads.
 
-        The second is turned to face as the first does at its end, and begins ahead of it by the mean of both their
-        velocities. It is brought to the first's frame rate and figure where it has others, which is logged. The frames
-        of the first stay as they are, to the bit; for figures where that is not possible see :meth:`fill`.
-        MotionError for seconds that are not positive or more than :attr:`seconds`, and as :meth:`fill`.
+        The second is turned to face the way the first does at its end, and begins ahead of it by the mean of both
+        velocities. If it has another frame rate or figure, it is converted to the first's, which is logged. The frames
+        of the first are unchanged, bit for bit; for figures where that is impossible see :meth:`fill`.
+        MotionError unless 0 < seconds <= :attr:`seconds`, and like :meth:`fill`.
         """
         before, new, after = self._joined(first, second, seconds)
         return replace(before, values=np.concatenate([before.values, new.values, after.values]))
 
     def looped(self, motion: Motion, *, seconds: float = LOOP_SECONDS) -> Motion:
-        """The motion and a transition of so many seconds to its own start: its last frame is one before its first pose.
+        """The motion and a transition of ``seconds`` back to its start: the last frame is one before the first pose.
 
-        The place on the ground and the heading go on, by the same from each repetition to the next. Errors as
-        :meth:`join`. Where a part of the motion repeats as it is, :func:`motet.motion.looped` finds it.
+        Position on the ground and heading carry over, by the same amount at each repetition. Errors like
+        :meth:`join`. To find a part of the motion that already repeats, use :func:`motet.motion.looped`.
         """
         before, new, _ = self._joined(motion, motion, seconds)
         return replace(before, values=np.concatenate([before.values, new.values]))
@@ -138,7 +138,7 @@ class FillModel(BundleModel):
         """Placed frames (P, E) and (A, E) to the ``frames`` (frames, E) float64 between them, all in one world.
 
         pace: frames at the model's rate from one of them to the next, about 1. Only the nearest :attr:`context` frames
-        are looked at. MotionError for too few frames, another number of channels, or more than twice
+        are used. MotionError for too few frames, another number of channels, or more than twice
         :attr:`longest` frames to fill.
         """
         known = [np.asarray(part, dtype=np.float64) for part in (past, after)]
@@ -166,7 +166,7 @@ class FillModel(BundleModel):
         return {"filled": self.frames_between(given["past"], given["after"], count)}
 
     def _joined(self, first: Motion, second: Motion, seconds: float) -> tuple[Motion, Motion, Motion]:
-        """The first motion, what is between, and the second set down; all in the channels of the first."""
+        """The first motion, the transition, and the second placed after it; all in the channels of the first."""
         if not 0 < seconds <= self.seconds:
             raise MotionError(f"a transition takes more than 0 and at most {self.seconds:g} seconds, not {seconds:g}")
         if None in (first.skeleton, second.skeleton) or not self._in_its_world(first):
@@ -183,19 +183,19 @@ class FillModel(BundleModel):
         return first, new, after
 
     def _in_its_world(self, motion: Motion) -> bool:
-        """Whether a motion's figure stands in its own world as in the model's, and can be set down there."""
+        """Whether a motion's figure stands in its own world like in the model's, and can be placed there."""
         part = motion[-round(SEEN * motion.fps) :].continuous().resample(self.fps, to_end=True)
         ends = replace(part, values=part.values[[0, -1]] if len(part) else part.values)
         return from_model_figure(on_humanoid(part), part, ends) is not None
 
     def _elsewhere(self, first: Motion, second: Motion, seconds: float) -> tuple[Motion, Motion, Motion]:
-        """As :meth:`_joined`, on the humanoid."""
+        """Like :meth:`_joined`, on the humanoid."""
         log_elsewhere()
         return self._joined(self._on_humanoid(first), self._on_humanoid(second), seconds)
 
     def _between(self, before: Motion, after: Motion, count: int) -> Motion | None:
-        """What is between two parts of a motion, so many frames at its own rate, in its channels; None where it cannot
-        be put onto its figure."""
+        """``count`` frames between two parts of a motion, at its own rate, in its channels; None where they cannot be
+        retargeted onto its figure."""
         known = self._sides(before, after)
         span = (count + 1) * self.fps / before.fps
         knots = max(0, round(span) - 1)
@@ -206,7 +206,7 @@ class FillModel(BundleModel):
         return from_model_figure(unplaced(frames, like), known.own, ends)
 
     def _sides(self, before: Motion, after: Motion) -> Sides:
-        """What is known about a gap; MotionError where it is too little."""
+        """What is known about a gap; MotionError for too few frames."""
         seen = round(SEEN * before.fps)
         parts = (
             before[-seen:].continuous().resample(self.fps, to_end=True),
@@ -215,7 +215,7 @@ class FillModel(BundleModel):
         for part, given, name in zip(parts, (before, after), ("before", "after"), strict=True):
             if len(part) < self.least:
                 need = f"at least {self.least / self.fps:.2g} s of motion ({self.least} frames at {self.fps:g} fps)"
-                raise MotionError(f"a gap needs {need} {name} it, and there are {given.duration:.2g} s")
+                raise MotionError(f"a gap needs {need} {name} it, but there are {given.duration:.2g} s")
         own = replace(parts[0], values=np.concatenate([part.values for part in parts]))
         figure = on_humanoid(own)
         return Sides(own, figure, *np.split(placed(figure), [len(parts[0])]))

@@ -1,4 +1,4 @@
-"""Motion as words: motions written code by code, as long as they take or as is asked, continued, told as a story."""
+"""Generate motions code by code, of natural or given length, continue them, and show several sentences as a story."""
 
 import math
 from collections import Counter
@@ -29,27 +29,27 @@ from motet.motion.rotations import Array
 from motet.representation.root_sixd import in_world
 
 FINE = 4
-"""Frames that the decoder's layers at the rate of frames look back."""
+"""Frames that the decoder's frame-rate layers look back."""
 
 STANDING = "a person stands still"
-"""What is asked for where a motion is to start or to end in standing."""
+"""Sentence for a motion that is to start or end standing."""
 
 STAND = 0.8
-"""Seconds of that standing."""
+"""Seconds of standing."""
 
 LONGEST = 600.0
-"""Seconds of a sentence at most."""
+"""Most seconds of a sentence."""
 
 Stand = Literal["start", "end", "both"]
-"""Where a figure stands for a moment."""
+"""Where a figure stands briefly."""
 
 Seconds = float | None | Sequence[float | None]
-"""How long sentences last: all alike, or each; None for one that ends by itself."""
+"""Lengths of sentences: one for all, or for each; None for one that ends by itself."""
 
 
 @dataclass(frozen=True)
 class Passage:
-    """A sentence of a story, and the seconds from and to which it is shown."""
+    """A sentence of a story, shown from ``start`` to ``stop`` in seconds."""
 
     text: str
     start: float
@@ -58,13 +58,13 @@ class Passage:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Story(Generated):
-    """One motion for several sentences, and which of them is shown when."""
+    """One motion for several sentences, and when each is shown."""
 
     passages: tuple[Passage, ...] = ()
 
 
 class Telling(NamedTuple):
-    """A story that is asked for: its sentences, the seconds of each or 0, contexts, noise of one row, all settings, and
+    """A requested story: its sentences, the seconds of each or 0, contexts, noise of one row, all settings, and
     the motion on the model's figure that it continues, if any."""
 
     texts: list[str]
@@ -76,7 +76,7 @@ class Telling(NamedTuple):
 
 
 class CodesModel(GenerateModel):
-    """A model that writes motions as codes.
+    """A model that generates motion codes.
 
     graphs: "encoder" (words, lengths -> context: log-probabilities of actions), "step" (codes, action, age, states ->
         known, numbers, next states), "part" (known, codes -> log_probabilities), "decoder" (codes -> frames, moves),
@@ -111,14 +111,14 @@ class CodesModel(GenerateModel):
         self.bind("tokens", {"frames": "batch steps T D"}, {"codes": "*batch steps B"})
         if self.codec.moves >= self.sizes["K"]:
             most = self.sizes["K"] - 1
-            raise BundleError(f"manifest, config.codec.moves: must be at most {most}, as the graph part has it")
+            raise BundleError(f"manifest, config.codec.moves: must be at most {most}, to fit the graph part")
 
     def _memory(self) -> Memory:
         self.sizes |= {"S": self.sizes["P"] + 2, "M": self.codec.moves}
         steps, moves = self.table("memory", "R S", "int16"), self.table("moves", "M 3", "float32")
         body = self.table("body", "Q N", "float32")
         if 3 + self.sizes["B"] * self.sizes["N"] != self.sizes["L"]:
-            raise BundleError("manifest, tables.body: its numbers are not those of the graph step")
+            raise BundleError("manifest, tables.body: does not fit the graph step")
         return Memory.of(steps, moves, body, self.sizes["A"])
 
     def contexts(self, sequences: Sequence[NDArray[Any]], role: str = "encoder") -> Floats:
@@ -127,7 +127,7 @@ class CodesModel(GenerateModel):
         return np.concatenate([np.empty((0, self.sizes["A"]), dtype=np.float32), *alone])
 
     def understood(self, sentence: str) -> Understood:
-        """How well a sentence is known, and the known sentences nearest to it; errors as :meth:`ids`."""
+        """How well a sentence is known, and the nearest known sentences; errors like :meth:`ids`."""
         return self.known.understood(sentence, self.embed(sentence))
 
     def note(self, sentence: str, context: Floats, strict: bool) -> None:
@@ -136,7 +136,7 @@ class CodesModel(GenerateModel):
         if found.confident:
             return
         near = ", ".join(f"'{one}'" for one in found.nearest)
-        said = f"{sentence!r} is outside of what the model knows (confidence {found.confidence:.2f}); nearest: {near}"
+        said = f"{sentence!r} is outside the training data (confidence {found.confidence:.2f}); nearest: {near}"
         if strict:
             raise TextError(said)
         warn(said, TextWarning)
@@ -165,13 +165,13 @@ class CodesModel(GenerateModel):
         strict: bool = False,
         **settings: float | None,
     ) -> Story:
-        """One continuous motion that shows one sentence after the other, each taking over where the last one ends.
+        """One continuous motion for several sentences, each starting where the last one ends.
 
-        after: a motion that is continued, of any human figure, from its last seconds. seconds: how long each sentence
-        is shown, or all alike, to within a step of codes; by default until it ends by itself. stand: where the figure
-        is to stand for a moment. Others as :meth:`generate`; a story of one sentence is the motion that it gives.
+        after: a motion to continue, of any human figure, from its last seconds. seconds: of each sentence, or one value
+        for all, to within one code; by default each ends by itself. stand: where the figure is to stand briefly. Others
+        like :meth:`generate`; a story of one sentence is the motion that it returns.
         DecodingError for seconds, a seed or a setting out of range, and for several ``hypotheses``; MotionError for a
-        motion that is too short to continue, or of a figure that is no human's; TextError as :meth:`generate`.
+        motion that is too short to continue or not of a human figure; TextError like :meth:`generate`.
         """
         told = self._telling(sentences, after, seconds, stand, seed, strict, settings)
         pieces = list(self._pieces(told))
@@ -194,10 +194,10 @@ class CodesModel(GenerateModel):
         strict: bool = False,
         **settings: float | None,
     ) -> Iterator[Motion]:
-        """The motion of :meth:`story` in pieces, as they are drawn: each can be played where the last one ends.
+        """The motion of :meth:`story` in pieces, as they are drawn: each continues the last one.
 
-        Feet are as drawn: what holds them still has to know how long they stand. Memory and the time of a piece stay as
-        they are, however long the stream lasts. Errors as :meth:`story`.
+        Feet are as drawn, since planting them requires knowing how long they stand. Memory and the time of a piece stay
+        constant, however long the stream lasts. Errors like :meth:`story`.
         """
         return self._streamed(self._telling(sentences, after, seconds, stand, seed, strict, settings))
 
@@ -233,8 +233,8 @@ class CodesModel(GenerateModel):
         return Telling(texts, each, contexts, noise, chosen, None if after is None else self.on_figure(after))
 
     def _pieces(self, told: Telling) -> Iterator[tuple[int, Array]]:
-        """For each step of codes the number of its sentence, and frames (T, D) that are settled with it; then the
-        frames left."""
+        """For each step of codes, the number of its sentence and the frames (T, D) that become final with it; then the
+        remaining frames."""
         context = None if told.after is None else self.context(told.after)
         writer, decoder = self.writer(told.noise, told.settings), self.decoder(context)
         if context is not None:
@@ -258,7 +258,7 @@ class CodesModel(GenerateModel):
         return Writer(self.source, noise, Drawing.of(settings))
 
     def decoder(self, context: Context | None = None) -> StreamingDecoder:
-        """What makes frames of codes, from the origin or after the end of a motion."""
+        """A decoder of codes to frames, from the origin or after the end of a motion."""
         return StreamingDecoder(self.codec, context, self.continuation.half_life)
 
     def on_figure(self, motion: Motion) -> Motion:
@@ -277,8 +277,8 @@ class CodesModel(GenerateModel):
 
 
 def _each(seconds: float | Sequence[float | None], count: int) -> list[float]:
-    """The seconds of each of so many sentences, 0 where it ends by itself; DecodingError where they are none, or there
-    are more or fewer."""
+    """The seconds of each of ``count`` sentences, 0 where it ends by itself; DecodingError for anything but numbers,
+    or another number of them."""
     try:
         given = list(seconds) if isinstance(seconds, Iterable) else [seconds] * count
         found = [0.0 if one is None else float(0.0 + one) for one in given]

@@ -15,12 +15,12 @@ from motet.motion.motion import Motion
 
 
 class MixtureModel(GenerateModel):
-    """A model whose step gives a mixture, or frames.
+    """A model whose step outputs a mixture, or frames.
 
     graphs: "encoder" (words, lengths -> context), "step" (frame, context, states -> log_weights, means, stds,
         active, next states), with frames normalised and the active flag last.
-    Its loops (:mod:`motet.decode.loops`) take the step, contexts (B, C), a generator of noise for each row, the longest
-    number of frames and their settings by name, and give samples for each row, best first.
+    Its loops (:mod:`motet.decode.loops`) take the step, contexts (B, C), a generator of noise for each row, the largest
+    number of frames and their settings by name, and return samples for each row, best first.
     """
 
     LOOPS = ("mixture",)

@@ -1,8 +1,8 @@
-"""The motions of a folder as vectors, kept in one file, so that a question about them is answered at once.
+"""The motions of a folder as vectors, kept in one file so that searches are instant.
 
 The file is an .npz of two arrays: ``vectors`` (N, E) float32, a unit vector for each window of each motion, and
-``index``, the bytes of a JSON object that says which model made them and, for each motion file, its size and time of
-change, its windows in seconds, or why it could not be used.
+``index``, the bytes of a JSON object with the model that made them and, for each motion file, its size and
+modification time, and its windows in seconds or why it could not be used.
 """
 
 import io
@@ -30,20 +30,20 @@ from motet.motion.units import metres
 log = logging.getLogger(__name__)
 
 Query = str | Motion
-"""What is asked for: a sentence, or a motion to which others are alike."""
+"""A sentence, or a motion to find similar ones."""
 
 NAME = ".motet-search.npz"
-"""The file of a folder's index, in the folder."""
+"""Name of the index file in its folder."""
 
 VERSION = 2
-"""Of what is in the file."""
+"""Version of the file's format."""
 
 
 @dataclass(frozen=True)
 class Hit:
-    """A motion file, the seconds in which it shows what was asked for, and how near that is: 1 is the same.
+    """A motion file, the seconds in which it matches the query, and how well: 1 is identical.
 
-    clip: which motion of a file that holds several; else empty.
+    clip: its name in a file that holds several; else empty.
     """
 
     path: Path
@@ -54,7 +54,7 @@ class Hit:
 
     @property
     def place(self) -> str:
-        """The path, with the clip if there is one, as :func:`motet.read` takes it."""
+        """The path, with the clip if there is one, as taken by :func:`motet.read`."""
         return f"{self.path}{MARK}{self.clip}" if self.clip else str(self.path)
 
 
@@ -79,10 +79,10 @@ class Member:
 
 
 class Index:
-    """The motions of a folder, to be asked about; :meth:`open` makes one.
+    """The searchable motions of a folder; :meth:`open` makes one.
 
-    folder: where the paths of the hits begin. vectors: (N, E) float32, of all windows of all members. vanished: the
-    files that were there before, and are not any more. unit: what :func:`motet.read` was told to read them.
+    folder: root of the paths of hits. vectors: (N, E) float32, of all windows of all members. vanished: files that no
+    longer exist. unit: length unit with which :func:`motet.read` read them.
     """
 
     def __init__(
@@ -107,16 +107,16 @@ class Index:
         unit: str | float | None = None,
         progress: Progress = silent,
     ) -> "Index":
-        """The index of a folder's motion files, and those of the folders in it; or of the folder of an index file.
+        """The index of all motion files in a folder and its subfolders; or of the folder of an index file.
 
-        What a file already knows is taken from there; new and changed motion files are read and embedded, and the file
-        is written anew, whole. Motion files that cannot be read or used are named in :attr:`failed`, vanished ones in
+        An existing index is reused; new and changed motion files are read and embedded, and the index file is rewritten
+        as a whole. Motion files that cannot be read or used are listed in :attr:`failed`, vanished ones in
         :attr:`vanished`.
-        file: where the index is kept, by default ".motet-search.npz" in the folder, if that can be written to.
-        unit: the length unit of files that do not state theirs, as in :func:`motet.read`; an index that was made with
-        another one is made anew.
-        progress: called with the number of motion files done and of all.
-        FormatError where there is no folder, no motion file in it, or where the index is damaged or another model's;
+        file: the index file, by default ".motet-search.npz" in the folder, if that is writable.
+        unit: the length unit of files that do not state theirs, like in :func:`motet.read`; an index made with another
+        unit is rebuilt.
+        progress: called with the number of motion files done and in total.
+        FormatError for a missing folder, one without motion files, or an index that is damaged or of another model;
         MotionError where no motion can be used, or for an unknown unit.
         """
         if unit is not None:
@@ -137,7 +137,7 @@ class Index:
 
     @property
     def failed(self) -> dict[Path, str]:
-        """The motion files that cannot be found by any question, and why."""
+        """The motion files that could not be indexed, and why."""
         return {self.folder / member.name: member.fault for member in self.members if member.fault}
 
     @overload
@@ -148,7 +148,7 @@ class Index:
     def search(self, queries: Sequence[Query], count: int | None = None) -> list[list[Hit]]: ...
     def search(self, queries: Query | Sequence[Query], count: int | None = None) -> list[Hit] | list[list[Hit]]:
         """The ``count`` files or clips nearest to a sentence or a motion, best first, each with its best window; for
-        several queries a list for each.
+        several queries, a list for each.
 
         count: the bundle's by default. TextError for a sentence without a known word, MotionError for a motion that
         the model cannot take, DecodingError for a count that is not between 1 and 1,000.
@@ -171,7 +171,7 @@ class Index:
         return list(found.values())
 
     def _told(self) -> tuple[Path, str | float | None, tuple[Member, ...]]:
-        """What the file says, but for the vectors and the model."""
+        """Contents of the file, except the vectors and the model."""
         return self.folder.absolute(), self.unit, self.members
 
     def _vector(self, query: Query) -> Floats:
@@ -190,11 +190,11 @@ def direction(model: SearchModel, motion: Motion) -> Floats:
 def _renewed(
     folder: Path, model: SearchModel, before: Index | None, unit: str | float | None, progress: Progress
 ) -> Index:
-    """The index of a folder as it is now, with what is known already of files that did not change."""
+    """The current index of a folder, reusing the entries of unchanged files."""
     known = {} if before is None else _by_file(before)
     usable = known if before is not None and before.unit == unit else {}
     if not folder.is_dir():
-        raise FormatError(folder, "it is neither a folder of motion files nor the index of one")
+        raise FormatError(folder, "neither a folder of motion files nor an index of one")
     paths = files_in(folder, MOCAP)
     if not paths:
         raise FormatError(folder, f"no motion files ({' '.join(MOCAP)}) are in it")
@@ -212,7 +212,7 @@ def _renewed(
 
 
 def _by_file(index: Index) -> dict[tuple[str, int, int], list[tuple[Member, Floats]]]:
-    """For each motion file, with its size and time of change, its members and their vectors."""
+    """For each motion file, with its size and modification time, its members and their vectors."""
     found: dict[tuple[str, int, int], list[tuple[Member, Floats]]] = {}
     stop = 0
     for member in index.members:
@@ -235,7 +235,7 @@ def _embedded_clips(
 
 
 def _embedded(path: Path, member: Member, model: SearchModel, unit: str | float | None) -> tuple[Member, Floats]:
-    """A member with its windows, and their vectors; or with the reason why it has none."""
+    """A member with its windows and their vectors, or with the reason for having none."""
     size = model.sizes["E"]
     try:
         motion = read_motion(path, unit=unit, clip=member.clip or None)
@@ -250,7 +250,7 @@ def _embedded(path: Path, member: Member, model: SearchModel, unit: str | float 
 
 
 def _keep(index: Index, file: Path, needed: bool) -> None:
-    """Write the file; one that nobody named is left out where it cannot be written."""
+    """Write the file; if not ``needed``, only warn where that fails."""
     text = {
         "version": VERSION,
         "model": index.model.identity,
@@ -269,7 +269,7 @@ def _keep(index: Index, file: Path, needed: bool) -> None:
 
 
 def _read(file: Path, model: SearchModel) -> Index:
-    """What :func:`_keep` wrote; FormatError where it is something else, or another model's."""
+    """Read what :func:`_keep` wrote; FormatError for anything else, or another model's index."""
     try:
         with zipfile.ZipFile(file) as archive:
             vectors, text = array(archive, "vectors", "f"), array(archive, "index", "u")

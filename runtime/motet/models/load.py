@@ -29,8 +29,8 @@ KINDS: tuple[type[BundleModel], ...] = (
     SteerModel,
     TdbnModel,
 )
-"""All kinds of models: each says for which verb it is, by which loops it is decoded and how its golden run is replayed.
-What measures or compares models has a function for each kind, registered where it is written."""
+"""All kinds of models, each with its verb, its decoding loops and the replay of its golden run. Benchmarks and
+comparisons register a function for each kind."""
 
 Kind = TypeVar("Kind", bound=BundleModel)
 
@@ -57,7 +57,7 @@ def load(name_or_path: str | Path, options: SessionOptions | None = None) -> Bun
     """The model of a bundle: a name (``motet bundle list``), or the path of a folder or zip.
 
     options: threads and execution providers; by default one thread of the CPU. BundleError if there is no such bundle,
-    or if it is damaged.
+    or it is damaged.
     """
     bundle = Bundle.open(name_or_path)
     with bundle.named():
@@ -65,9 +65,9 @@ def load(name_or_path: str | Path, options: SessionOptions | None = None) -> Bun
 
 
 def load_as(kind: Callable[..., Kind], name_or_path: str | Path, options: SessionOptions | None = None) -> Kind:
-    """Like :func:`load`, for one class of models, perhaps an abstract one: BundleError where the bundle is for another.
+    """Like :func:`load`, for one class of models, possibly abstract: BundleError where the bundle is for another.
 
-    kind: the class; typed as a callable, since checkers take no abstract class for a ``type``.
+    kind: the class; typed as a callable, since type checkers reject an abstract class for ``type``.
     """
     wanted, model = cast(type[BundleModel], kind), load(name_or_path, options)
     if not isinstance(model, wanted):
@@ -84,7 +84,7 @@ def build(manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None
 
 
 def kind_of(manifest: Manifest) -> type[BundleModel]:
-    """The class of a manifest's verb and loop; BundleError for a verb that is unknown, or that its loop does not do."""
+    """The class of a manifest's verb and loop; BundleError for an unknown verb, or a loop of another verb."""
     if manifest.verb not in (verbs := sorted({kind.VERB for kind in KINDS})):
         raise BundleError(f"manifest, verb: {manifest.verb!r} is unknown; expected one of {', '.join(verbs)}")
     by_loop = {loop: kind for kind in KINDS if manifest.verb == kind.VERB for loop in kind.LOOPS}

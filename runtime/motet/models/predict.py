@@ -37,11 +37,11 @@ MAX_SAMPLES = 100
 
 
 class PredictModel(BundleModel):
-    """A model that continues motions; any number of sessions and threads share it.
+    """A model that continues motions; sessions and threads can share it.
 
-    graphs: "encoder" (frames (B, L, C) -> what the step takes first) and "step" (-> frame (B, C), and what it takes
-        next). After ``horizon`` frames, its default, a prediction continues from its own last frames. Some encoders
-        also give "error" (B, N) in metres, how far off the frames of a horizon are likely to be.
+    graphs: "encoder" (frames (B, L, C) -> first inputs of the step) and "step" (-> frame (B, C), and its next
+        inputs). After ``horizon`` frames, its default, a prediction continues from its own last frames. Some encoders
+        also output "error" (B, N) in metres, the expected error of each frame of a horizon.
     """
 
     VERB = "predict"
@@ -256,7 +256,7 @@ class PredictModel(BundleModel):
         """A session to push frames into as they arrive.
 
         start: the motion so far; its channels, units, frame rate and skeleton are those of the frames to come. By
-            default there is none, and frames come in the channels and at the frame rate of :attr:`contract`.
+            default it is empty, with the channels and frame rate of :attr:`contract`.
         """
         if start is None:
             start = self.contract.features(np.empty((0, len(self.contract.channels))))
@@ -290,7 +290,7 @@ class PredictSession:
         return f"PredictSession({self._motion!r} kept, {self.model!r})"
 
     def predict(self, frames: int | None = None, *, seconds: float | None = None) -> Motion:
-        """As :meth:`PredictModel.predict`, after all that was pushed so far."""
+        """Like :meth:`PredictModel.predict`, after all frames pushed so far."""
         return self.model.following(self._motion, self.model.count(seconds, frames), self._figure)
 
     @cached_property

@@ -1,9 +1,9 @@
-"""How long work reports its progress."""
+"""How long-running work reports its progress."""
 
 from collections.abc import Callable
 
 Progress = Callable[[int, int], object]
-"""Called with how many are done, and how many there are."""
+"""Called with the number done and the total."""
 
 
 def silent(done: int, total: int) -> None:

@@ -1,4 +1,4 @@
-"""Search: motions and sentences as unit vectors of one space, in which what belongs together is near."""
+"""Search: motions and sentences as unit vectors of one space, in which matching ones are near."""
 
 import hashlib
 import json
@@ -16,17 +16,17 @@ from motet.settings import Range, Settings
 
 @dataclass(frozen=True)
 class IndexSettings(Settings):
-    """window: the longest motion that is one vector; longer ones are cut, so that a hit says when it is."""
+    """window: longest motion for one vector; longer ones are cut, so that a hit has a time."""
 
     FEATURE: ClassVar[str] = "index"
     window: Annotated[float, Range(0.5, MAX_SECONDS, "s")] = 10.0
 
 
 class SearchModel(LanguageModel):
-    """A model that puts motions and sentences into one space; how near two are is the product of their vectors.
+    """A model that embeds motions and sentences in one space; their similarity is the product of their vectors.
 
     graphs: "motion" (frames, lengths -> vector) and "text" (words, lengths -> vector).
-    Its loop takes scores (Q, N) and the count of the best that are wanted, and gives their columns.
+    Its loop takes scores (Q, N) and the number of best ones wanted, and returns their columns.
     """
 
     VERB = "search"
@@ -41,14 +41,14 @@ class SearchModel(LanguageModel):
         self.bind("text", {"words": "*batch words", "lengths": "*batch"}, vector)
 
     def embed(self, motions: Motion | Sequence[Motion]) -> Floats:
-        """The unit vector (E,) float32 of a motion, or vectors (N, E) of several; MotionError as :meth:`frames`."""
+        """The unit vector (E,) float32 of a motion, or vectors (N, E) of several; MotionError like :meth:`frames`."""
         if isinstance(motions, Motion):
             vector: Floats = self.embed([motions])[0]
             return vector
         return self.contexts([self.frames(motion) for motion in motions], "motion")
 
     def embed_text(self, sentences: str | Sequence[str]) -> Floats:
-        """The unit vector (E,) float32 of a sentence, or vectors (N, E) of several; errors as :meth:`ids`."""
+        """The unit vector (E,) float32 of a sentence, or vectors (N, E) of several; errors like :meth:`ids`."""
         if isinstance(sentences, str):
             vector: Floats = self.embed_text([sentences])[0]
             return vector
@@ -56,7 +56,7 @@ class SearchModel(LanguageModel):
 
     @cached_property
     def identity(self) -> str:
-        """What tells this model from any other: its name, its version and a hash of its manifest."""
+        """A unique identity of this model: its name, its version and a hash of its manifest."""
         text = json.dumps(self.manifest.source, sort_keys=True).encode()
         return f"{self.manifest.name} {self.manifest.version} {hashlib.sha256(text).hexdigest()[:16]}"
 

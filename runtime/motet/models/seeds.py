@@ -1,4 +1,4 @@
-"""Seeds: one for each row of a batch, so that it gets what it would get alone."""
+"""Seeds: one for each row of a batch, so that each result is the same as alone."""
 
 import operator
 from collections.abc import Iterable, Sequence
@@ -7,7 +7,7 @@ from typing import SupportsIndex
 from motet.errors import MotetError
 
 Seed = SupportsIndex | Sequence[SupportsIndex]
-"""An integer, Python's or numpy's, from which on the rows count; or one for each row."""
+"""The first row's seed, counted up for the others; or one for each row. Integers of Python or numpy."""
 
 
 def seeds_of(seed: Seed, count: int, error: type[MotetError]) -> list[int]:

@@ -1,4 +1,4 @@
-"""Steer: figures that go where they are told, live, on the ground."""
+"""Steer: figures that follow live controls over the ground."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -31,14 +31,14 @@ CHANNELS = (*ROOT_SIXD, *(f"{bone}.{kind}" for bone in BONES for kind in SIXD_KI
 """In the order of a pose's numbers."""
 
 FEATURE_STEPS = 16
-"""Steps of a feature in a table: they are kept in 8 bits, in sixteenths of their scaled unit."""
+"""Quantisation steps of a feature per scaled unit: tables hold them in 8 bits."""
 
 
 class SteerModel(ControlModel):
-    """A figure to be steered; any number of sessions and threads share it.
+    """A model of a steerable figure; sessions and threads can share it.
 
-    tables: of N rows "codes" (N, K), "moves" (N, 6), "features" (N, F), "shows" (N, G) and "left" (N,), what
-        :class:`motet.decode.matching.Table` is made of; "feature_mean" and "feature_scale" (F,); "pose_mean" (P,) and
+    tables: of N rows "codes" (N, K), "moves" (N, 6), "features" (N, F), "shows" (N, G) and "left" (N,), the
+        parts of a :class:`motet.decode.matching.Table`; "feature_mean" and "feature_scale" (F,); "pose_mean" (P,) and
         "pose_basis" (K, P), see :class:`motet.decode.pose_codes.PoseCodes`.
     """
 
@@ -98,12 +98,12 @@ class SteerModel(ControlModel):
         hold_feet: bool = True,
         strict: bool = False,
     ) -> SteerSession:
-        """A session of ``characters`` figures that stand still, or go on from a motion's last pose.
+        """A session of ``characters`` figures that stand still, or continue from a motion's last pose.
 
         start: a gait, by default the first; or a motion of any human figure. places: (characters, 3) x and z in metres
             and facing in degrees; by default all are at the origin and face z.
-        hold_feet: keep feet where they stand, by turning hips and knees. strict: refuse a speed that a gait does not
-            have, which is brought into its range otherwise.
+        hold_feet: keep planted feet in place, by turning hips and knees. strict: refuse a speed outside a gait's range,
+            instead of clamping it.
         ControlError for values out of range, MotionError for a motion that does not fit.
         """
         characters = checked_int("characters", characters, 1, MAX_CHARACTERS, ControlError)
@@ -129,7 +129,7 @@ class SteerModel(ControlModel):
     def run(self, script: str, start: Motion | str | None = None, *, hold_feet: bool = True) -> Motion:
         """The motion of one figure that is steered by a script (:mod:`motet.models.steer_script`).
 
-        start, hold_feet: as :meth:`start`; by default the script's first gait.
+        start, hold_feet: like :meth:`start`; by default the script's first gait.
         """
         orders = parse_orders(script, self.gaits)
         return self.start(orders[0].gait if start is None else start, hold_feet=hold_feet).run(script)[0]

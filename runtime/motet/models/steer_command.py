@@ -1,4 +1,4 @@
-"""What steered figures are told, and what their gaits can do of it."""
+"""Commands to steered figures, and what their gaits allow of them."""
 
 from dataclasses import dataclass, replace
 
@@ -15,8 +15,8 @@ from motet.motion.rotations import Array
 
 @dataclass(frozen=True, eq=False)
 class Gaits:
-    """G ways of moving. speeds: (G, 5) m/s, the slowest, the usual one, and the fastest forward, sideways and
-    backwards; 0 where a gait does not go that way."""
+    """G gaits. speeds: (G, 5) m/s, the slowest, the usual one, and the fastest forward, sideways and
+    backwards; 0 where a gait cannot move that way."""
 
     names: tuple[str, ...]
     speeds: Array
@@ -24,26 +24,26 @@ class Gaits:
 
     @staticmethod
     def read(config: Fields, settings: SteeringSettings) -> "Gaits":
-        """Those of a manifest's configuration; BundleError with the key that is wrong."""
+        """Those of a manifest's configuration; BundleError naming the wrong key."""
         names, speeds = config.texts("gaits"), config.table("speeds", 5)
         if not names or len(speeds) != len(names) or not ((speeds >= 0) & (speeds <= 100)).all():
             raise BundleError("manifest, config.speeds: must hold a row of 5 speeds, 0 to 100 m/s, for each gait")
         return Gaits(names, speeds, settings)
 
     def number(self, name: str) -> int:
-        """The number of a gait; ControlError for one that there is not."""
+        """The number of a gait; ControlError for an unknown one."""
         if name not in self.names:
             raise ControlError(f"unknown gait {name!r}; expected one of {', '.join(self.names)}")
         return self.names.index(name)
 
     def facing(self, direction: Array, facing: Array, gait: Rows) -> Array:
-        """Facings (B,) from which gaits can go in a direction, in radians: not all go sideways and backwards."""
+        """Facings (B,) in radians in which gaits can move in a direction: not all go sideways and backwards."""
         farthest = np.where(self.speeds[gait, 3:].min(axis=1) > 0, np.pi, self.settings.ahead)
         found: Array = direction - np.clip(wrapped(direction - facing), -farthest, farthest)
         return found
 
     def range(self, aside: Array, gait: Rows) -> tuple[Array, Array]:
-        """The lowest and the highest speed (B,) of gaits at angles from the facing."""
+        """The lowest and highest speed (B,) of gaits at angles from the facing."""
         sector = np.digitize(np.abs(wrapped(aside)), (self.settings.aside, self.settings.back))
         high = self.speeds[gait, 2 + sector]
         return np.minimum(self.speeds[gait, 0], high), high
@@ -51,10 +51,10 @@ class Gaits:
 
 @dataclass(frozen=True, eq=False)
 class Command:
-    """What B figures were told last; its arrays are never written into.
+    """The last command to B figures; its arrays are never modified.
 
     gait: (B,) numbers. speed: (B,) m/s. direction: of travel, and facing: (B,) radians. faces_way: (B,) whether they
-    are to face where they go as soon as they go.
+    are to face the way they move.
     """
 
     gait: Rows
@@ -76,7 +76,7 @@ class Command:
         direction: Array | None = None,
         facing: Array | None = None,
     ) -> "Command":
-        """With what is told anew. Where it is the direction and not the facing, they face it once they go."""
+        """With new values. Given a direction but no facing, they face it once they move."""
         faces_way = self.faces_way if facing is None else np.zeros_like(self.faces_way)
         if direction is not None and facing is None:
             faces_way = np.ones_like(faces_way)
@@ -87,7 +87,7 @@ class Command:
         return Command(self.gait if gait is None else gait, speed, direction, facing, faces_way)
 
     def steered(self, velocity: Array, gait: Rows | None = None, facing: Array | None = None) -> "Command":
-        """With speed and direction of velocities (B, 2) along x and z; one of no length stops, and keeps all else."""
+        """With speed and direction of velocities (B, 2) along x and z; zero stops, and keeps all else."""
         speed = np.hypot(*velocity.T)
         goes = speed > 0
         direction = np.where(goes, np.arctan2(*velocity.T), self.direction)
@@ -97,18 +97,18 @@ class Command:
         return replace(found, faces_way=np.where(goes, True, self.faces_way))
 
     def put(self, facing: Array) -> "Command":
-        """Of figures that are set down elsewhere with another facing: those that stand go there next."""
+        """Of figures placed elsewhere with another facing: standing ones move that way next."""
         direction = np.where(self.speed > 0, self.direction, facing)
         return replace(self, direction=direction, facing=facing, faces_way=np.zeros_like(self.faces_way))
 
     @property
     def heading(self) -> Array:
-        """Where they face (B,) once they go."""
+        """Their facing (B,) once they move."""
         return np.where(self.faces_way, self.direction, self.facing)
 
     def target(self, gaits: Gaits) -> tuple[Array, list[tuple[str, str]]]:
-        """The velocity along x and z, m/s, and the facing, radians, (B, 3), within what the gaits can do; and what they
-        cannot: gait and message."""
+        """The velocity along x and z, m/s, and the facing, radians, (B, 3), within the gaits' limits; and what exceeds
+        them: gait and message."""
         facing = np.where(self.speed > 0, gaits.facing(self.direction, self.facing, self.gait), self.facing)
         low, high = gaits.range(self.direction - facing, self.gait)
         speed = np.where(self.speed > 0, np.clip(self.speed, low, high), 0.0)

@@ -1,9 +1,9 @@
-"""Scripts for figures that are steered: what one is to do, in words, one order after the other.
+"""Scripts for steered figures: their orders, in words, one after the other.
 
-``walk 3s speed 1.4, turn left 90, run 4s, walk backwards 2s, stop``. An order is a gait, ``turn`` or ``stop``, and what
-follows in any order: for how long (``3s``; else SECONDS), how fast (``speed 1.4`` in m/s; else as the gait mostly is),
-which way (``backwards``, ``left``, ``right``: seen from where it faces, which it goes on to face), and by how many
-degrees to turn (``turn left 90``, or ``walk 3s turn right 45``). A turn alone keeps gait, speed and way.
+``walk 3s speed 1.4, turn left 90, run 4s, walk backwards 2s, stop``. An order is a gait, ``turn`` or ``stop``,
+followed in any order by a duration (``3s``; else SECONDS), a speed (``speed 1.4`` in m/s; else the gait's usual one),
+a way (``backwards``, ``left``, ``right``, relative to the facing, which does not change), and an angle in degrees
+to turn (``turn left 90``, or ``walk 3s turn right 45``). A turn alone keeps gait, speed and way.
 """
 
 import re
@@ -14,7 +14,7 @@ from motet.errors import ScriptError
 from motet.models.tdbn_script import MAX_SECONDS
 
 SECONDS = {"turn": 1.5, "stop": 1.5}
-"""How long an order takes that does not say it; a gait takes 2."""
+"""Default seconds of an order; a gait takes 2."""
 
 WAYS = {"forward": 0.0, "left": 90.0, "backwards": 180.0, "right": -90.0}
 """Degrees from the facing, positive to the left."""
@@ -26,10 +26,9 @@ _NUMBER = re.compile(r"\d+\.?\d*|\.\d+")
 
 @dataclass(frozen=True)
 class Order:
-    """gait: None for that of the order before. speed: m/s, None for what the gait mostly has, -1 for that of before.
+    """gait: None for the previous one. speed: m/s, None for the gait's usual one, -1 for the previous one.
 
-    way: degrees from the facing in which it travels, None as before. turn: degrees by which it turns to the left.
-    caption: as it was said.
+    way: of travel, in degrees from the facing, None for the previous one. turn: degrees to the left. caption: in words.
     """
 
     gait: str | None
@@ -54,7 +53,7 @@ def parse_orders(script: str, gaits: Sequence[str]) -> list[Order]:
 
 
 def captions(orders: Sequence[Order]) -> list[tuple[float, str]]:
-    """When each order begins, in seconds, and how it was said."""
+    """The start of each order, in seconds, and its words."""
     found, at = [], 0.0
     for order in orders:
         found.append((at, order.caption))
@@ -133,5 +132,5 @@ class _Order:
 
     def _put(self, name: str, value: float) -> None:
         if name in self.found:
-            raise self.fail(f"this order says its {name} twice")
+            raise self.fail(f"this order gives its {name} twice")
         self.found[name] = value

@@ -1,4 +1,4 @@
-"""A session of figures that are steered: told where to go, they give a pose a tick."""
+"""A session of steered figures: commands in, a pose per tick out."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -24,12 +24,12 @@ if TYPE_CHECKING:
     from motet.models.steer import SteerModel
 
 LARGEST = 1e6
-"""Of numbers that a session is told: metres, m/s, degrees."""
+"""Largest number of a command: metres, m/s, degrees."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SteerSnapshot:
-    """All that changes in a session."""
+    """The whole state of a session."""
 
     playback: Playback
     command: Command
@@ -42,7 +42,7 @@ class SteerSnapshot:
 
 
 class SteerSession:
-    """Characters that move in one batch, each steered by itself; holds their whole state.
+    """Characters that move in one batch, each steered separately; holds their whole state.
 
     A tick is 1 / ``model.fps`` seconds. Angles are degrees about the vertical: 0 along z, positive to the left.
     """
@@ -72,14 +72,14 @@ class SteerSession:
         facing: ArrayLike | None = None,
         velocity: ArrayLike | None = None,
     ) -> None:
-        """Tell the characters where to go from now on, each a number for all or one for each; what is not named stays.
+        """Set where the characters go from now on, a number for all or one for each; values not given stay.
 
-        gait: one of ``model.gaits``. speed: m/s. direction: of travel, in degrees. facing: in degrees; where only the
-        direction is given, they face it. velocity: (2,) or (characters, 2) along x and z in m/s, such as a stick of a
-        gamepad gives, instead of speed and direction; (0, 0) stops, facing as before.
-        A speed that the gait does not have is brought into its range and said once (ControlWarning), or refused where
-        the session is strict; a gait that only goes forward faces where it goes. ControlError for what is no number or
-        does not fit; the control is then as it was.
+        gait: one of ``model.gaits``. speed: m/s. direction: of travel, in degrees. facing: in degrees; if only the
+        direction is given, they face it. velocity: (2,) or (characters, 2) along x and z in m/s, for example from a
+        gamepad's stick, instead of speed and direction; (0, 0) stops, facing as before.
+        A speed outside the gait's range is clamped with one warning (ControlWarning), or refused if the session is
+        strict; a gait that only goes forward faces the way it goes. ControlError for values that are not numbers or do
+        not fit; the control is unchanged then.
         """
         given = {"speed": speed, "direction": direction, "facing": facing}
         numbers = {name: self._numbers(name, values) for name, values in given.items() if values is not None}
@@ -89,13 +89,13 @@ class SteerSession:
             self._tell(self._command.told(kinds, **numbers))
             return
         if speed is not None or direction is not None:
-            raise ControlError("a velocity stands for speed and direction: give it or them")
+            raise ControlError("give a velocity, or speed and direction, not both")
         self._tell(self._command.steered(self._rows("a velocity needs x and z", velocity, 2), kinds, **numbers))
 
     @property
     def target(self) -> Array:
-        """What the characters were told (characters, 3), within what their gaits can do: velocity along x and z, m/s,
-        and facing, radians."""
+        """The characters' targets (characters, 3), within their gaits' limits: velocity along x and z, m/s, and facing,
+        radians."""
         return self._target.copy()
 
     def _tell(self, command: Command) -> None:
@@ -146,9 +146,9 @@ class SteerSession:
         return pose if self._lock is None else self._lock.held(pose)
 
     def advance(self, seconds: float) -> Pose:
-        """The pose ``seconds`` later, for a display of any frame rate: between two ticks, of which the later is known.
+        """The pose ``seconds`` later, for a display of any frame rate: interpolated between two ticks.
 
-        What is told shows within a tick. ControlError for a time that is not between 0 and 1 s.
+        A command shows within a tick. ControlError unless 0 <= seconds <= 1.
         """
         if not 0 <= seconds <= 1:
             raise ControlError(f"a session advances by 0 to 1 s, not {seconds}")
@@ -162,13 +162,13 @@ class SteerSession:
         return self._poses[0].towards(self._poses[1], self._ahead)
 
     def push(self, velocity: ArrayLike) -> None:
-        """Push the characters by a velocity (2,) or (characters, 2) along x and z, m/s, which they catch."""
+        """Push the characters by a velocity (2,) or (characters, 2) along x and z, m/s, from which they recover."""
         pushed = self._rows("a velocity needs x and z", velocity, 2)
         self._playback.spring[:, :2] += pushed
         self._playback.ticks_to_search[:] = 0
 
     def put(self, places: ArrayLike) -> None:
-        """Set the characters down elsewhere: (3,) or (characters, 3) x and z in metres, facing in degrees."""
+        """Place the characters elsewhere: (3,) or (characters, 3) x and z in metres, facing in degrees."""
         wanted = self._rows("places need x, z and facing", places, 3)
         wanted[:, 2] = wrapped(np.radians(wanted[:, 2]))
         self._playback.root = wanted
@@ -180,14 +180,14 @@ class SteerSession:
             self._lock = self._new_lock()
 
     def take(self, pose: Pose) -> None:
-        """Let the characters go on from a changed pose: its rotations and height, one for all or one for each.
+        """Continue from a changed pose: its rotations and height, one for all characters or one for each.
 
-        Where they are and how fast they go stays. ControlError for a pose that does not fit.
+        Their positions and velocities stay. ControlError for a pose that does not fit.
         """
         if len(pose) not in (1, self.characters) or pose.rotations.shape[1:] != (len(BONES), 4):
             raise ControlError(f"a pose of {pose.rotations.shape} does not fit {self.characters} characters")
         if not (np.isfinite(pose.rotations).all() and np.isfinite(pose.height).all()):
-            raise ControlError("a pose must be of finite numbers")
+            raise ControlError("a pose must be finite numbers")
         codes = self.model.pose_codes.encode(pose.rotations, pose.height)
         self.model.matcher.pose(self._playback, np.broadcast_to(codes, (self.characters, codes.shape[1])))
 
@@ -218,7 +218,7 @@ class SteerSession:
         self.control(gait=order.gait, speed=speed, direction=degrees + np.degrees(aside), facing=degrees)
 
     def frames_of(self, poses: Sequence[Pose]) -> Array:
-        """Frames (characters, T, D) in the contract's units of poses that follow each other."""
+        """Frames (characters, T, D) in the contract's units of consecutive poses."""
         ground = np.stack([pose.ground for pose in poses], axis=1)
         steps = np.diff(ground, axis=1, prepend=ground[:, :1])
         facing = ground[..., 2] - wrapped(steps[..., 2])
@@ -232,13 +232,13 @@ class SteerSession:
         return found
 
     def snapshot(self) -> SteerSnapshot:
-        """All that changes, to come back to."""
+        """The whole state, to be restored later."""
         lock = None if self._lock is None else replace(self._lock)  # its arrays are replaced, never written into
         return SteerSnapshot(self._playback.copy(), self._command, lock, self._poses, self._ahead)
 
     def restore(self, snapshot: SteerSnapshot) -> None:
-        """Go back to a snapshot, of this session or of one like it: of the same model, with as many characters, and
-        with a foot lock or without; ControlError for another."""
+        """Go back to a snapshot of this session or of one like it: the same model, as many characters, and the same
+        ``hold_feet``; ControlError for another."""
         command = snapshot.command
         if len(command.gait) != self.characters:
             raise ControlError(f"a snapshot of {len(command.gait)} characters does not fit {self.characters}")
@@ -251,6 +251,6 @@ class SteerSession:
 
 
 def _check_size(name: str, values: Array) -> None:
-    """ControlError where numbers are not finite, or too large."""
+    """ControlError for numbers that are not finite or too large."""
     if not (np.abs(values) <= LARGEST).all():
-        raise ControlError(f"{name} must be of finite numbers, no larger than {LARGEST:g}")
+        raise ControlError(f"{name} must be finite numbers, no larger than {LARGEST:g}")

@@ -1,4 +1,4 @@
-"""Control: one figure, or thousands, moved tick by tick by control values."""
+"""Control: one figure or thousands, moved tick by tick by control values."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -22,11 +22,11 @@ from motet.motion.heading import without_heading
 from motet.motion.motion import TURN, Motion
 
 MAX_CHARACTERS = 100_000
-"""Of one session, whose state is in memory."""
+"""Most of one session, whose state is in memory."""
 
 
 class TdbnModel(ControlModel):
-    """A model of labelled motions that runs live; any number of sessions and threads share it.
+    """A model of labelled motions that runs live; sessions and threads can share it.
 
     manifest: of a control bundle, or of a training run with the same keys.
     graphs: "encoder" (frames -> codes) and "step" (history, control, noise, variety, temperature -> codes, frame,
@@ -77,12 +77,12 @@ class TdbnModel(ControlModel):
         start: a label of the model, or a motion to continue from its last frames; by default the first label. A
             label is also the first control; after a motion, set one before the first step.
         seed: of the noise. Character i has seed + i (or seed[i]) and moves as it would alone with that seed.
-        variety: 0 runs on probabilities, always the same; 1 draws binary codes; between, a blend.
+        variety: 0 runs on probabilities, always the same; 1 draws binary codes; values between blend the two.
         temperature: of the sigmoid, the bundle's by default; lower is more deterministic.
         iterations: Gibbs iterations for each frame, by default as many as the bundle's; more than 1 only in models
             with free hidden units.
-        smooth: show frames that do not tremble more than recorded ones (:mod:`motet.decode.lookahead`); else those
-            of the net as they are. What the net does is the same.
+        smooth: show frames that do not tremble more than recorded ones (:mod:`motet.decode.lookahead`), not those of
+            the net itself. The net runs the same.
         Raises ControlError for values out of range, MotionError for a motion that does not fit.
         """
         characters = checked_int("characters", characters, 1, MAX_CHARACTERS, ControlError)
@@ -109,7 +109,7 @@ class TdbnModel(ControlModel):
         in_place: bool = False,
         smooth: bool = True,
     ) -> Motion:
-        """The motion of one figure that runs a control script, from the script's first label unless ``start`` says.
+        """The motion of one figure that runs a control script, starting from its first label unless ``start`` is given.
 
         The parameters are those of :meth:`start` and :meth:`TdbnSession.run`.
         """
@@ -125,7 +125,7 @@ class TdbnModel(ControlModel):
     def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
         """From the start of the first label, at variety 1: a track (T, labels) and noise (T, N) to frames (T, D).
 
-        With several iterations a tick (of the settings), there are so many rows of noise for each.
+        With several iterations a tick (of the settings), each tick has that many rows of noise.
         """
         session = self.start(variety=1.0, iterations=settings.get("iterations"), smooth=False)
         session.noise = RowsOfNoise(given["noise"])
@@ -165,7 +165,7 @@ class _Settings:
 @dataclass(frozen=True, eq=False, repr=False)
 class TdbnSnapshot:
     """All that changes in a session, for n characters: the frames (K, n, D) that it began from, history (n, K, H),
-    control (n, labels), the tick, and of a smooth session what it has run ahead."""
+    control (n, labels), the tick, and the look-ahead of a smooth session."""
 
     first: Floats
     history: Floats
@@ -183,7 +183,7 @@ class TdbnSession:
     def __init__(
         self, model: TdbnModel, first: Floats, seeds: Sequence[int], settings: _Settings, smooth: bool
     ) -> None:
-        """first: the frames (K, D) that all characters go on from, one for each seed."""
+        """first: the frames (K, D) that all characters continue from, one character for each seed."""
         self.model, self.settings, self.smooth, self.characters = model, settings, smooth, len(seeds)
         self._first = np.repeat(first[:, None], self.characters, axis=1)
         self._history = np.repeat(model.encode(first)[None], self.characters, axis=0)
@@ -206,8 +206,8 @@ class TdbnSession:
     def control(self, **values: ArrayLike) -> None:
         """Set the control from now on: labels to numbers, or arrays (characters,), between 0 and 1.
 
-        Labels that are not named become 0. ControlError for an unknown label or a value out of range; the control
-        is then as it was.
+        Labels not named become 0. ControlError for an unknown label or a value out of range; the control is unchanged
+        then.
         """
         self.set_control(self._control_of(values))
 
@@ -253,7 +253,7 @@ class TdbnSession:
         return frame
 
     def _run(self, history: Floats, later: int) -> tuple[Floats, Floats]:
-        """The net's frame (characters, D) after a history, and the next history, so many ticks from now."""
+        """The net's frame (characters, D) after a history, and the next history, ``later`` ticks from now."""
         calls = count((self._tick + later) * self.settings.iterations)
 
         def inputs() -> Arrays:
@@ -266,7 +266,7 @@ class TdbnSession:
     def run(self, script: str, in_place: bool = False) -> list[Motion]:
         """Run a control script (:mod:`motet.models.tdbn_script`) for all characters; one motion for each.
 
-        The root's path is laid by what the feet do on the ground; ``in_place`` leaves it out.
+        The root's path follows from the feet on the ground; ``in_place`` leaves it out.
         """
         segments = parse_script(script, self.model.labels)
         frames = self.frames(control_track(segments, self.model.labels, self.model.fps))
@@ -283,14 +283,14 @@ class TdbnSession:
         return np.stack(result, axis=1)
 
     def snapshot(self) -> TdbnSnapshot:
-        """Frames, control and tick, without the noise: the session that goes on from it goes on with its own seeds."""
+        """Frames, control and tick, without the noise: a session that continues from it uses its own seeds."""
         control = self._inputs["control"].copy()
         return TdbnSnapshot(self._first, self._history.copy(), control, self._tick, self._ahead)
 
     def restore(self, snapshot: TdbnSnapshot) -> None:
-        """Go back to a snapshot, of this session or of one with as many characters of the same model.
+        """Go back to a snapshot of this session or of one with as many characters of the same model.
 
-        The same frames follow as then, but for what is drawn in a session of other seeds.
+        The same frames follow, except for random draws in a session of other seeds.
         """
         if snapshot.history.shape != self._history.shape:
             raise ControlError(f"a snapshot of history {snapshot.history.shape} does not fit {self._history.shape}")

@@ -1,7 +1,7 @@
-"""Control scripts: what a figure is to do, and for how long.
+"""Control scripts: what a figure does, and for how long.
 
 A script is a list of segments separated by commas. ``walk 3s`` holds a label, ``walk>run 5s`` goes from one to
-the other in a straight line, ``walk*.3+run*.7 2s`` mixes labels (a weight is between 0 and 1; labels that are not
+the other linearly, ``walk*.3+run*.7 2s`` mixes labels (a weight is between 0 and 1; labels that are not
 named have 0).
 """
 

@@ -18,13 +18,13 @@ PAD, SOS, EOS, UNK = SPECIALS = ("PAD", "SOS", "EOS", "UNK")
 """Padding, start and end of a sentence, unknown word: ids 0 to 3. Upper case, so that no normal word is one."""
 
 MAX_WORDS = 40
-"""Words of the longest sentence that a model takes."""
+"""Most words of a sentence."""
 
 MAX_LETTERS = 2000
-"""Letters of the longest sentence that is looked at."""
+"""Most letters of a sentence."""
 
 RULES_VERSION = 1
-"""Of what :class:`TextRules` does with its tables."""
+"""Version of how :class:`TextRules` uses its tables."""
 
 MAX_RULES = 2000
 """Entries of its tables."""
@@ -84,11 +84,11 @@ _TOKENS = re.compile(r"\d|[^\W\d]+")
 
 @dataclass(frozen=True)
 class TextRules:
-    """How a sentence becomes words; a bundle has its own, so that its words stay what they were in training.
+    """How a sentence becomes words; a bundle has its own rules, so that words stay the same as in training.
 
-    dropped: characters that vanish, so that "isn't" is one word. spelling: what replaces a word, or several.
+    dropped: characters removed, so that "isn't" is one word. spelling: replacements of a word, or several.
     numbers: number words and their values, 0 to 99. hundred, conjunction, point: the words in "a hundred and five" and
-    for the point in 1.5. spelled: whole numbers up to this are words again in a sentence that a model gives.
+    for the point in 1.5. spelled: whole numbers up to this are spelled out in a model's sentences.
     """
 
     dropped: str = "'`\u2018\u2019\u00b4"
@@ -136,7 +136,7 @@ class TextRules:
         return _TOKENS.findall(self.normalise(sentence))
 
     def sentence(self, words: Iterable[str]) -> str:
-        """The sentence of words: digits that follow each other become one number, and small numbers words.
+        """The sentence of words: consecutive digits become one number, and small numbers words.
 
         A word "" stands between its neighbours, and vanishes.
         """
@@ -162,7 +162,7 @@ class TextRules:
         return result
 
     def _number(self, tokens: list[str]) -> tuple[int, int]:
-        """The number that ``tokens`` start with, and how many of them it takes: 0 where they start with none."""
+        """The number at the start of ``tokens``, and how many of them it takes: 0 for none."""
         value, used = self._below_hundred(tokens)
         if tokens[used : used + 1] != [self.hundred]:
             return value, used
@@ -179,14 +179,14 @@ class TextRules:
 
 
 RULES = TextRules()
-"""Those that new models are trained with."""
+"""The rules for training new models."""
 
 
 @dataclass(frozen=True)
 class Vocabulary:
     """The words a model knows; a word's place is its id.
 
-    words: all of them, PAD, SOS, EOS and UNK first. TextError where they are not, or a word is there twice.
+    words: all of them, PAD, SOS, EOS and UNK first. TextError otherwise, or for a duplicate word.
     rules: how sentences become words.
     """
 
@@ -216,7 +216,7 @@ class Vocabulary:
         return {word: i for i, word in enumerate(self.words)}
 
     def encode(self, sentence: str) -> tuple[NDArray[np.int64], list[str]]:
-        """Ids (words,) int64 of a sentence, without SOS and EOS, and its words that are not known: their id is UNK's.
+        """Ids (words,) int64 of a sentence, without SOS and EOS, and its unknown words, whose id is UNK's.
 
         TextError for a sentence without words, one without a known word, and one of more than :data:`MAX_WORDS` words
         or :data:`MAX_LETTERS` letters.

@@ -1,4 +1,4 @@
-"""Where a long motion changes: short windows, what might be said of each, and the best way from one to the next.
+"""Where a long motion changes: short windows, candidate sentences for each, and the best path through them.
 
 The path of a hidden Markov model (Viterbi 1967) whose states are sentences and whose changes all cost the same.
 """
@@ -18,7 +18,7 @@ from motet.models.progress import Progress, silent
 from motet.settings import Range, Settings
 
 ROWS = 512
-"""Pairs that are scored at once."""
+"""Pairs scored at once."""
 
 Span = tuple[int, int]
 
@@ -27,11 +27,11 @@ Span = tuple[int, int]
 class TimelineSettings(Settings):
     """How a motion is cut into parts.
 
-    window, hop: how long a window is, and the time from one to the next. Longer windows miss short actions: of the
-        joins of validation people's motions 1.5 s find four fifths, 3 s half.
+    window, hop: the length of a window, and the time from one to the next. Longer windows miss short actions: of the
+        joins between motions of validation subjects, 1.5 s finds four fifths, 3 s half.
     change: the cost of a change of sentence. Three windows cover each moment, so with 12 nats a new sentence pays where
         it is e^4 times as probable for the length of a window.
-    near: the distance within which a window is scored for the sentences of others.
+    near: the distance within which a window is scored for other windows' sentences.
     """
 
     FEATURE: ClassVar[str] = "timeline"
@@ -47,7 +47,7 @@ class TimelineSettings(Settings):
 
 
 def windows(frames: int, fps: float, settings: TimelineSettings) -> list[Span]:
-    """Frames (start, stop) of overlapping windows, evenly spread, as long as the settings say or as the motion is."""
+    """Frames (start, stop) of overlapping windows, evenly spread, of the settings' length or the motion's."""
     length, hop = max(2, round(settings.window * fps)), max(1, round(settings.hop * fps))
     count = max(1, 1 + -(-(frames - length) // hop))
     starts = np.linspace(0, max(0, frames - length), count).round().astype(int).tolist()
@@ -59,8 +59,8 @@ def near_scores(
 ) -> Scores:
     """Log-probabilities (W, S) of the sentences of W windows, sorted by their ids, given each window.
 
-    said: of each window the ids of a sentence, from the start to the end. near: how many windows before and after a
-    window are asked about its sentence; minus infinity stands for what is not asked. progress: counts windows.
+    said: the ids of a sentence for each window, from the start to the end. near: how many windows before and after a
+    window are scored for its sentence; the others get minus infinity. progress: counts windows.
     """
     sentences = sorted(set(said))
     words = padded([np.array(ids) for ids in sentences], "int64")[0]
@@ -74,7 +74,7 @@ def near_scores(
 
 
 def _chunks(own: Ids, near: int) -> Iterator[tuple[Ids, Ids]]:
-    """Windows and sentences to be paired, both (N,), of as many windows at a time as give some :data:`ROWS` pairs."""
+    """Windows and sentences to be paired, both (N,), in chunks of about :data:`ROWS` pairs."""
     rows: list[int] = []
     columns: list[int] = []
     for row in range(len(own)):
@@ -101,7 +101,7 @@ def best_path(scores: Scores, change: float) -> list[int]:
 
 
 def edges(spans: Sequence[Span], path: Sequence[int]) -> list[int]:
-    """The frames between which parts lie: the first, the last, and the middle between two windows that differ."""
+    """The boundaries of parts in frames: the first, the last, and the middle between two windows that differ."""
     middles = [(start + stop) / 2 for start, stop in spans]
     steps = zip(pairwise(middles), pairwise(path), strict=True)
     return [spans[0][0], *(round(sum(two) / 2) for two, (a, b) in steps if a != b), spans[-1][1]]

@@ -12,7 +12,7 @@ from motet.models.load import kind_of
 
 @dataclass(frozen=True)
 class Verified:
-    """The files, the active providers, and how far each graph and the run are from the golden vectors."""
+    """The files, the active providers, and the errors of each graph and of the run against the golden vectors."""
 
     files: tuple[str, ...]
     providers: tuple[str, ...]
