@@ -157,7 +157,7 @@ def test_clients_do_not_touch_each_other(steer_model: SteerModel) -> None:
         ('{"type": "control", "speed": [1, 2]}', "speed needs a number or one for each of 1 characters"),
         ('{"type": "control", "velocity": [1, [2]]}', "a velocity needs x and z"),
         ('{"type": "control", "velocity": [[[1, 2]]]}', "control, velocity: expected numbers"),
-        ('{"type": "control", "velocity": [1, 0], "speed": 1}', "give it or them"),
+        ('{"type": "control", "velocity": [1, 0], "speed": 1}', "not both"),
         ('{"type": "control", "gait": "swim"}', "unknown gait 'swim'; expected one of walk, run"),
         ('{"type": "control", "gait": 3}', "expected the name of a gait"),
         ('{"type": "control", "sped": 3}', "'sped' is unknown; expected one of gait, speed"),
