@@ -30,7 +30,7 @@ Examples = Callable[[np.random.Generator, int], Arrays]
 def examples(manifest: Manifest, torch: Mapping[str, Graph]) -> dict[str, Examples]:
     """What draws the inputs of each graph, by role: :func:`example`, with frames as likely as the training data's.
 
-    A history of codes is what the encoder makes of such frames in torch; and a predictor's step gets all that its
+    A history of codes is what the encoder makes of such frames in torch; and a predictor's other graphs get what its
     encoder gives: from numbers far from any frames a net that feeds its frames back can make much of a rounding.
     """
     contract = manifest.motion
@@ -51,13 +51,15 @@ def examples(manifest: Manifest, torch: Mapping[str, Graph]) -> dict[str, Exampl
 
     draws: dict[str, Examples] = {role: partial(draw, graph.spec) for role, graph in torch.items()}
     if manifest.verb == "predict":
-        draws["step"] = partial(_first_states, torch["encoder"], torch["step"].spec, draws["encoder"])
+        for role in draws.keys() - {"encoder"}:
+            draws[role] = partial(_from_encoder, torch["encoder"], torch[role].spec, draws["encoder"])
     return draws
 
 
-def _first_states(encoder: Graph, step: GraphSpec, draw: Examples, rng: np.random.Generator, rows: int) -> Arrays:
-    """What an encoder gives to the step."""
-    return {name: value for name, value in encoder(draw(rng, rows)).items() if step.takes(name)}
+def _from_encoder(encoder: Graph, spec: GraphSpec, draw: Examples, rng: np.random.Generator, rows: int) -> Arrays:
+    """What a graph takes of the encoder's inputs and outputs."""
+    given = draw(rng, rows)
+    return {name: value for name, value in {**given, **encoder(given)}.items() if spec.takes(name)}
 
 
 def example(

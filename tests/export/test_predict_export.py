@@ -65,5 +65,6 @@ def test_the_bundle_predicts_what_torch_predicts(run: Run, tmp_path: Path) -> No
 def net_errors(run: Run, seeds: NDArray[np.float64]) -> NDArray[np.float32]:
     """What torch expects, in metres."""
     assert isinstance(run.model, Predictor)
-    found: NDArray[np.float32] = run.model.with_error(torch.from_numpy(seeds.astype(np.float32)))[1].numpy()
+    frames = torch.from_numpy(seeds.astype(np.float32))
+    found: NDArray[np.float32] = run.model.expected_error(frames, *run.model.with_disagreement(frames)).numpy()
     return found

@@ -40,8 +40,9 @@ class PredictModel(BundleModel):
     """A model that continues motions; sessions and threads can share it.
 
     graphs: "encoder" (frames (B, L, C) -> first inputs of the step) and "step" (-> frame (B, C), and its next
-        inputs). After ``horizon`` frames, its default, a prediction continues from its own last frames. Some encoders
-        also output "error" (B, N) in metres, the expected error of each frame of a horizon.
+        inputs). After ``horizon`` frames, its default, a prediction continues from its own last frames. A third one,
+        "error", is optional: from the frames and the encoder's outputs to the expected error of each frame of a
+        horizon, "error" (B, N) in metres.
     """
 
     VERB = "predict"
@@ -55,9 +56,16 @@ class PredictModel(BundleModel):
         bind("step", step, self.loop.inputs, self.loop.outputs, self.sizes, given=encoder.outputs)
         self.seed_frames = self.sizes["L"]
         if self.knows_errors:
-            self.bind("encoder", {"frames": "batch L D"}, {"error": "batch N"})
+            bind(
+                "error",
+                graphs["error"].spec,
+                {},
+                {"error": "batch N"},
+                self.sizes,
+                given=(*encoder.inputs, *encoder.outputs),
+            )
             if self.sizes["N"] != self.horizon:
-                raise BundleError(f"graph encoder: outputs {self.sizes['N']} errors for a horizon of {self.horizon}")
+                raise BundleError(f"graph error: outputs {self.sizes['N']} errors for a horizon of {self.horizon}")
 
     @property
     def sure(self) -> int:
@@ -67,7 +75,7 @@ class PredictModel(BundleModel):
     @property
     def knows_errors(self) -> bool:
         """Whether the model can give :meth:`expected_errors`."""
-        return any(tensor.name == "error" for tensor in self.graphs["encoder"].spec.outputs)
+        return "error" in self.graphs
 
     def count(self, seconds: float | None = None, frames: int | None = None) -> int:
         """Number of frames of a prediction; DecodingError for both, or for a length out of range."""
@@ -236,13 +244,15 @@ class PredictModel(BundleModel):
         estimate its errors.
         """
         if not self.knows_errors:
-            raise DecodingError(f"{self!r} does not estimate its errors: its encoder has no 'error' output")
+            raise DecodingError(f"{self!r} does not estimate its errors: it has no graph 'error'")
         given = [motions] if isinstance(motions, Motion) else list(motions)
         seeds = np.zeros((len(given), self.seed_frames, len(self.contract.channels)), dtype=np.float32)
         for row, motion in zip(seeds, given, strict=True):
             row[:] = self._seed(motion)[2]
-        rows = two_rows(np.arange(len(given)))
-        found = 100 * self.graphs["encoder"]({"frames": seeds[rows]})["error"][: len(given)]
+        known = {"frames": seeds[two_rows(np.arange(len(given)))]}
+        known |= self.graphs["encoder"](known)
+        error = self.graphs["error"]
+        found = 100 * error({t.name: known[t.name] for t in error.spec.inputs})["error"][: len(given)]
         return found[0] if isinstance(motions, Motion) else found
 
     def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:

@@ -134,9 +134,10 @@ def _error_head_fitted(net: Predictor, places: VectorPlaces, held: Tensor) -> di
     net.eval()
     held = torch.cat([held, net.mirror(held)])
     seed, truth = held[:, : net.config.seed_frames], held[:, net.config.seed_frames :]
-    off = (places(net(seed)) - places(truth)).norm(dim=-1).mean(-1)
+    predicted, disagreement = net.with_disagreement(seed)
+    off = (places(predicted) - places(truth)).norm(dim=-1).mean(-1)
     assert net.doubt is not None
-    net.doubt.fit(net.judged_by(seed), off)
+    net.doubt.fit(net.error_signs(seed, predicted, disagreement), off)
     return {"validation": round(100 * float(off.mean()), 4)}
 
 

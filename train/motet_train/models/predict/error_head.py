@@ -7,8 +7,6 @@ moves, how far the net takes it, and how much the net's answer differs from that
 Letters in shapes: B rows, L seed frames, D channels, M of them that are predicted, N predicted frames, S signs.
 """
 
-from typing import NamedTuple
-
 import torch
 from torch import Tensor, nn
 
@@ -21,28 +19,20 @@ RIDGE = 1e-2
 SIGNS = 6
 
 
-class Signs(NamedTuple):
-    """What an error is judged by, all in units of the channels' scales.
+def signs(seed: Tensor, steps: Tensor, disagreement: Tensor) -> Tensor:
+    """What an error is judged by (B, N, S), all in units of the channels' scales.
 
-    seed: (B, L, M) frames. steps: (B, N, M) predicted, from the last frame. other: (B, N, M) the same steps, as
-    predicted for the mirrored seed and mirrored back.
+    seed: (B, L, M) frames. steps: (B, N, M) predicted, from the last frame. disagreement: (B, N), how far the steps are
+    from those predicted for the mirrored seed and mirrored back.
     """
-
-    seed: Tensor
-    steps: Tensor
-    other: Tensor
-
-    def logarithms(self) -> Tensor:
-        """(B, N, S)."""
-        velocity = self.seed.diff(dim=1)
-        shared = [_size(velocity[:, -1]), _size(velocity).mean(1), _size(velocity.diff(dim=1)[:, -2:]).mean(1)]
-        apart = _size(self.steps - self.other)
-        own = [_size(self.steps), apart, _size(self.steps.diff(dim=1, prepend=torch.zeros_like(self.steps[:, :1])))]
-        alike = [sign[:, None].expand(apart.shape) for sign in shared]
-        return torch.log(torch.stack([*alike, *own], dim=-1) + LEAST)
+    velocity = seed.diff(dim=1)
+    shared = [size(velocity[:, -1]), size(velocity).mean(1), size(velocity.diff(dim=1)[:, -2:]).mean(1)]
+    own = [size(steps), disagreement, size(steps.diff(dim=1, prepend=torch.zeros_like(steps[:, :1])))]
+    alike = [sign[:, None].expand(disagreement.shape) for sign in shared]
+    return torch.log(torch.stack([*alike, *own], dim=-1) + LEAST)
 
 
-def _size(values: Tensor) -> Tensor:
+def size(values: Tensor) -> Tensor:
     """The root mean square (...) over the channels of (..., M)."""
     return (values.square().mean(-1) + 1e-12).sqrt()
 

@@ -20,7 +20,7 @@ from torch.nn.functional import gelu
 from motet.bundle.graph import GraphSpec, TensorSpec
 from motet_train.models.net import Net, Part, tuples
 from motet_train.models.normalised import normalised
-from motet_train.models.predict.error_head import ErrorHead, Signs
+from motet_train.models.predict.error_head import ErrorHead, signs, size
 
 GAIN = 3.0
 """Differences of normalised frames are multiplied by it, so that they vary about as much as poses do."""
@@ -175,33 +175,43 @@ class Predictor(Net):
         both = found.reshape(-1, 2, self.config.frames, self.config.channels)
         return both[:, 0], self.mirror(both[:, 1])
 
-    def with_error(self, frames: Tensor) -> tuple[Tensor, Tensor]:
-        """Frames (B, L, C) to the next (B, N, C), and to the error (B, N) in metres that is to be expected of them."""
-        assert self.doubt is not None
+    def with_disagreement(self, frames: Tensor) -> tuple[Tensor, Tensor]:
+        """Frames (B, L, C) to the next (B, N, C), and how far (B, N) their mirror image disagrees about them."""
         one, other = self._both(frames)
-        return (one + other) / 2, self.doubt(self._signs(frames, one, other))
+        return (one + other) / 2, size(self._moved(one - other) / 2)
 
-    def judged_by(self, frames: Tensor) -> Tensor:
-        """Frames (B, L, C) to the signs (B, N, S) of :class:`motet_train.models.predict.error_head.Signs`."""
-        return self._signs(frames, *self._both(frames))
+    def error_signs(self, frames: Tensor, trajectory: Tensor, disagreement: Tensor) -> Tensor:
+        """The signs (B, N, S) of an error, from frames (B, L, C) and what :meth:`with_disagreement` gives for them."""
+        seed = self._seen(frames)[..., self.config.held :]
+        return signs(seed, self._moved(trajectory - frames[:, -1:]), disagreement)
 
-    def _signs(self, frames: Tensor, one: Tensor, other: Tensor) -> Tensor:
-        moved = self.kept[self.config.held :]
-        one, other = ((found - frames[:, -1:])[..., moved] / self.scale[self.config.held :] for found in (one, other))
-        return Signs(self._seen(frames)[..., self.config.held :], (one + other) / 2, other).logarithms()
+    def expected_error(self, frames: Tensor, trajectory: Tensor, disagreement: Tensor) -> Tensor:
+        """What :meth:`error_signs` takes to the expected error (B, N) in metres."""
+        assert self.doubt is not None
+        expected: Tensor = self.doubt(self.error_signs(frames, trajectory, disagreement))
+        return expected
+
+    def _moved(self, differences: Tensor) -> Tensor:
+        """(B, N, C) to the channels that move (B, N, M), in units of their scales."""
+        return differences[..., self.kept[self.config.held :]] / self.scale[self.config.held :]
 
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
-        """The encoder, which gives its errors where it knows them, and the step, each with its contract."""
-        channels = self.config.channels
-        frames = TensorSpec("frames", ("batch", self.config.seed_frames, channels))
+        """The encoder, the step and, where the net knows its errors, those: each with its contract."""
+        frames = TensorSpec("frames", ("batch", self.config.seed_frames, self.config.channels))
         coming, left = (
-            TensorSpec(name, ("batch", self.config.frames, channels)) for name in ("trajectory", "next_trajectory")
+            TensorSpec(name, ("batch", self.config.frames, self.config.channels))
+            for name in ("trajectory", "next_trajectory")
         )
-        step = GraphSpec((coming,), (TensorSpec("frame", ("batch", channels)), left), {coming.name: left.name})
+        frame = TensorSpec("frame", ("batch", self.config.channels))
+        step = (Step(), GraphSpec((coming,), (frame, left), {coming.name: left.name}))
         if self.doubt is None:
-            return {"encoder": (self, GraphSpec((frames,), (coming,))), "step": (Step(), step)}
-        error = TensorSpec("error", ("batch", self.config.frames))
-        return {"encoder": (Part(self, self.with_error), GraphSpec((frames,), (coming, error))), "step": (Step(), step)}
+            return {"encoder": (self, GraphSpec((frames,), (coming,))), "step": step}
+        apart, error = (TensorSpec(name, ("batch", self.config.frames)) for name in ("disagreement", "error"))
+        return {
+            "encoder": (Part(self, self.with_disagreement), GraphSpec((frames,), (coming, apart))),
+            "step": step,
+            "error": (Part(self, self.expected_error), GraphSpec((frames, coming, apart), (error,))),
+        }
 
 
 class Step(nn.Module):
