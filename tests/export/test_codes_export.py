@@ -21,11 +21,10 @@ from motet.representation.contract import MotionContract
 from motet.representation.root_sixd import ROOT_SIXD, ROOT_SIXD_UNITS, SIXD_KINDS
 from motet_export.bundles import export_run, parity_of
 from motet_export.examples import example, walks
-from motet_train.models.codes.actions import ActionsConfig, stems_of
-from motet_train.models.codes.code_model import CodeModelConfig
-from motet_train.models.codes.codec import CodecConfig
-from motet_train.models.codes.motion_codes import MotionCodes, MotionCodesConfig
-from motet_train.models.codes.sixd_places import tree_of
+from motet_train.models.action_net import ActionsConfig, stems_of
+from motet_train.models.codec import CodecConfig
+from motet_train.models.kinematics import tree_of
+from motet_train.models.motion_codes import CodeModelConfig, MotionCodes, MotionCodesConfig
 from motet_train.recipes.codes import DRAWING
 from motet_train.runs import Run
 

@@ -23,8 +23,8 @@ from motet_export.exporter import ExportError
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.locomotion import Recording
 from motet_train.data.matching_rows import rows_of
-from motet_train.models.codes.sixd_places import tree_of
-from motet_train.models.control.matching import Matching, MatchingConfig
+from motet_train.models.kinematics import tree_of
+from motet_train.models.matching import Matching, MatchingConfig
 from motet_train.recipes.matching_table import take
 from motet_train.runs import Run
 

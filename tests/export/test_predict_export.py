@@ -12,7 +12,7 @@ from motet.bundle.manifest import Manifest
 from motet.models.load import load
 from motet.models.predict import PredictModel
 from motet_export.bundles import export_run
-from motet_train.models.predict.predictor import Predictor, PredictorConfig
+from motet_train.models.predictor import Predictor, PredictorConfig
 from motet_train.runs import Run
 
 pytestmark = pytest.mark.slow  # torch's exporter

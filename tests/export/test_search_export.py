@@ -17,8 +17,8 @@ from motet.representation.contract import MotionContract
 from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS
 from motet_export.bundles import export_run, parity_of
 from motet_export.examples import example, walks
-from motet_train.models.language.joint_embedding import JointEmbedding, JointEmbeddingConfig
-from motet_train.models.language.places import figure_of
+from motet_train.models.joint_embedding import JointEmbedding, JointEmbeddingConfig
+from motet_train.models.kinematics import figure_of
 from motet_train.runs import Run
 
 pytestmark = pytest.mark.slow  # torch's exporter

@@ -17,7 +17,7 @@ from motet_train.data.errors import DataError
 from motet_train.data.mirror_text import mirror_text
 from motet_train.data.store import Store
 from motet_train.data.word_vectors import principal, read_word_vectors
-from motet_train.models.codes.actions import BESIDE, UNK, ActionNet, ActionsConfig, stem, stems_of
+from motet_train.models.action_net import ActionNet, ActionsConfig, stem, stems_of
 from motet_train.recipes.actions import Said
 from motet_train.recipes.language import divided
 
@@ -51,7 +51,7 @@ def test_a_sentence_of_a_padded_batch_gets_what_it_gets_alone() -> None:
 @torch.no_grad()
 def test_words_are_dropped_in_training_alone() -> None:
     model = ActionNet(ActionsConfig(9, 4, tuple(range(9)), dropout=0.0, word_dropout=1.0))
-    words, unknown = torch.tensor([[4, 5, 6]]), torch.full((1, 3), UNK)
+    words, unknown = torch.tensor([[4, 5, 6]]), torch.full((1, 3), 3)
     assert torch.equal(model.train()(words, torch.tensor([3])), model(unknown, torch.tensor([3])))
     assert not torch.equal(model.eval()(words, torch.tensor([3])), model(unknown, torch.tensor([3])))
 
@@ -148,7 +148,7 @@ def test_a_net_starts_from_vectors() -> None:
     net.start_from(vectors, known)
     assert torch.equal(net.words.weight[known], vectors[known])
     assert torch.equal(net.words.weight[~known], plain.words.weight[~known])
-    torch.testing.assert_close(net.roots.weight, BESIDE * plain.roots.weight)
+    torch.testing.assert_close(net.roots.weight, 0.3 * plain.roots.weight)
     assert torch.equal(net.outward.weight, plain.outward.weight)
 
 

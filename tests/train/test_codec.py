@@ -24,9 +24,9 @@ from motet.representation.root_sixd import ROOT_SIXD, ROOT_SIXD_UNITS, SIXD_KIND
 from motet_train.data.errors import DataError
 from motet_train.data.sixd_windows import SixdWindows, poses_of, window_of, with_way
 from motet_train.data.store import Store
-from motet_train.models.codes.codec import CodecConfig, MotionCodec, places_in_world
-from motet_train.models.codes.root_book import fit_book
-from motet_train.models.codes.sixd_places import SixdPlaces, tree_of
+from motet_train.models.codec import CodecConfig, MotionCodec, places_in_world
+from motet_train.models.kinematics import SixdPlaces, tree_of
+from motet_train.recipes.codec import fit_book
 from motet_train.runs import MODELS
 
 BONES = [name for name in HUMANOID.names if not name.endswith(END_SUFFIX)]

@@ -29,8 +29,8 @@ from motet_train.data.split import split
 from motet_train.data.store import Store, prepare
 from motet_train.evaluate.fill.report import FILL_GOALS, fill_report
 from motet_train.evaluate.tables import reached
-from motet_train.models.codes.sixd_places import tree_of
-from motet_train.models.fill.filler import Filler, FillerConfig
+from motet_train.models.filler import Filler, FillerConfig
+from motet_train.models.kinematics import tree_of
 from motet_train.runs import Run
 
 SETTINGS = """

@@ -6,9 +6,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from motet_train.models.language.dropout import WordEmbedding, mask
-from motet_train.models.language.gru import GRU
-from motet_train.models.language.sequence import Decoder, Encoder
+from motet_train.models.recurrent import GRU, Decoder, Encoder, WordEmbedding, mask
 from motet_train.papers.plappert2017.layer_norm_gru import LayerNormGRU
 
 Array = NDArray[np.float64]

@@ -20,9 +20,15 @@ from motet_train.data.alike import alike
 from motet_train.data.preparation import Preparation
 from motet_train.data.store import Store, prepare
 from motet_train.data.views import Pairs, views
-from motet_train.models.language.joint_embedding import JointEmbedding, JointEmbeddingConfig, contrast
-from motet_train.models.language.places import Figure, Places, figure_of
-from motet_train.models.language.statistics import PARTS, SMALLEST, of_frames, of_speeds
+from motet_train.models.joint_embedding import (
+    SMALLEST,
+    JointEmbedding,
+    JointEmbeddingConfig,
+    contrast,
+    of_frames,
+    of_speeds,
+)
+from motet_train.models.kinematics import EulerPlaces, Figure, figure_of
 from motet_train.recipes.language import divided
 from motet_train.runs import MODELS, Run
 
@@ -52,7 +58,7 @@ def test_places_are_those_of_the_motion_that_plays() -> None:
     values[:, :3] = 0  # it stays and faces z
     world = positions(CONTRACT.motion(values, plant=False))
     kept = [HUMANOID.names.index(name) for name in JOINTS]
-    found = Places(figure_of(CONTRACT))(torch.tensor(values, dtype=torch.float32)[None])
+    found = EulerPlaces(figure_of(CONTRACT))(torch.tensor(values, dtype=torch.float32)[None])
     np.testing.assert_allclose(found[0].reshape(7, -1, 3), world[:, kept] - world[:, :1], atol=1e-5)
 
 
@@ -67,7 +73,7 @@ def test_statistics_are_those_of_numpy() -> None:
     found, speeds = of_frames(x, lengths), of_speeds(x, lengths)
     for row, length in enumerate(lengths.tolist()):
         frames = x[row, :length].numpy()
-        of = [frames[[t for t in range(length) if PARTS * t // length == part]] for part in range(PARTS)]
+        of = [frames[[t for t in range(length) if 3 * t // length == part]] for part in range(3)]
         means = [one.mean(axis=0) if len(one) else frames.mean(axis=0) for one in of]
         wanted = [frames.mean(axis=0), frames.std(axis=0), frames.min(axis=0), frames.max(axis=0), *means]
         np.testing.assert_allclose(found[row], np.concatenate(wanted), atol=1e-5)

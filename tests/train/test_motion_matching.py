@@ -26,8 +26,8 @@ from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.gaits import Gait, read_gaits
 from motet_train.data.locomotion import Recording
 from motet_train.data.matching_rows import MatchingRows, mirrored_poses, rows_of
-from motet_train.models.codes.sixd_places import tree_of
-from motet_train.models.control.matching import DTYPES, Matching, MatchingConfig, from_config
+from motet_train.models.kinematics import tree_of
+from motet_train.models.matching import DTYPES, Matching, MatchingConfig
 from motet_train.recipes.matching_table import take
 
 CLIPS = CMU_FOLDER
@@ -178,7 +178,7 @@ def test_a_net_is_built_from_its_manifest(net: Matching) -> None:
     import json
     from dataclasses import asdict
 
-    again = from_config(json.loads(json.dumps(asdict(net.config))))
+    again = Matching.from_config(json.loads(json.dumps(asdict(net.config))))
     assert again.config == net.config
     again.load_state_dict(net.state_dict())
 

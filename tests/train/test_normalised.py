@@ -5,9 +5,9 @@ import pytest
 import torch
 
 from motet.representation.contract import Z_LIMIT, MotionContract
-from motet_train.models.language.motion_to_language import MotionToLanguage, MotionToLanguageConfig
-from motet_train.models.normalised import normalised
-from motet_train.models.predict.predictor import Predictor, PredictorConfig
+from motet_train.models.motion_to_language import MotionToLanguage, MotionToLanguageConfig
+from motet_train.models.net import normalised
+from motet_train.models.predictor import Predictor, PredictorConfig
 
 MEAN, STD = np.array([1.0, -20.0, 7.1]), np.array([0.5, 12.0, 0.0])
 CONTRACT = MotionContract("angles", ("a.rx", "b.rx", "lfingers.rx"), ("deg",) * 3, 10.0, MEAN, STD, None)

@@ -26,7 +26,7 @@ from motet_train.data.records import Record
 from motet_train.data.split import split
 from motet_train.data.store import Store, prepare
 from motet_train.data.windows import Windows
-from motet_train.models.predict.places import VectorPlaces
+from motet_train.models.kinematics import VectorPlaces
 from motet_train.papers.li2018.expmap_files import (
     CMU_LAYOUT,
     H36M_LAYOUT,

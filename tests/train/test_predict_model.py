@@ -17,8 +17,7 @@ from motet.models.predict import PredictModel
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.evaluate.predict.floors import ZERO
 from motet_train.manifest import About
-from motet_train.models.predict.error_head import LEAST, SIGNS, ErrorHead, signs
-from motet_train.models.predict.predictor import Predictor, PredictorConfig
+from motet_train.models.predictor import LEAST, ErrorHead, Predictor, PredictorConfig, error_signs
 from motet_train.papers.li2018.expmap_files import CMU_ACTIONS, read_expmap
 from motet_train.papers.li2018.material import expmap_material
 from motet_train.papers.li2018.published import CONV
@@ -193,7 +192,7 @@ def test_bad_input_is_refused(tmp_path: Path, arguments: list[str], said: str) -
 
 def test_doubt_finds_the_law_that_errors_follow() -> None:
     torch.manual_seed(0)
-    logarithms = torch.randn(4000, 3, SIGNS) * torch.tensor([1.0, 0.5, 2.0, 1.0, 0.1, 1.0]) - 2
+    logarithms = torch.randn(4000, 3, 6) * torch.tensor([1.0, 0.5, 2.0, 1.0, 0.1, 1.0]) - 2
     weight, bias = torch.tensor([0.5, 0, -0.2, 0.3, 0, 0.1]), torch.tensor([-3.0, -2.5, -2.0])
     mean = torch.exp((logarithms * weight).sum(-1) + bias)
     doubt = ErrorHead(3)
@@ -206,7 +205,11 @@ def test_doubt_finds_the_law_that_errors_follow() -> None:
 def test_signs_grow_with_what_they_are_signs_of() -> None:
     seed, steps = torch.randn(5, 10, 4), torch.randn(5, 3, 4)
     agreed = torch.zeros(5, 3)
-    alike, faster, apart = signs(seed, steps, agreed), signs(2 * seed, steps, agreed), signs(seed, steps, agreed + 1.0)
+    alike, faster, apart = (
+        error_signs(seed, steps, agreed),
+        error_signs(2 * seed, steps, agreed),
+        error_signs(seed, steps, agreed + 1),
+    )
     assert (faster > alike).sum(dim=(0, 1)).tolist() == [15, 15, 15, 0, 0, 0]
     assert (apart > alike).sum(dim=(0, 1)).tolist() == [0, 0, 0, 0, 15, 0]
     torch.testing.assert_close(apart[..., 4], torch.full((5, 3), float(np.log(1 + LEAST))))

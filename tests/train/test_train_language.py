@@ -17,7 +17,7 @@ from motet.formats import write_motion
 from motet_train.data.store import Store
 from motet_train.descent import Training
 from motet_train.manifest import About
-from motet_train.models.language.motion_to_language import MotionToLanguageConfig
+from motet_train.models.motion_to_language import MotionToLanguageConfig
 from motet_train.papers.plappert2017 import recipe as generate
 from motet_train.papers.plappert2017.language_to_motion import LanguageToMotionConfig
 from motet_train.progress import Shown

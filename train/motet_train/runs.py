@@ -16,12 +16,15 @@ from torch import nn
 from motet.bundle.graph import Graph, GraphSpec
 from motet.errors import MotetError
 from motet.files import write_whole
-from motet_train.models.codes import actions, codec, motion_codes
-from motet_train.models.control import matching
-from motet_train.models.fill import filler
-from motet_train.models.language import joint_embedding, motion_to_language
+from motet_train.models.action_net import ActionNet
+from motet_train.models.codec import MotionCodec
+from motet_train.models.filler import Filler
+from motet_train.models.joint_embedding import JointEmbedding
+from motet_train.models.matching import Matching
+from motet_train.models.motion_codes import MotionCodes
+from motet_train.models.motion_to_language import MotionToLanguage
 from motet_train.models.net import Net
-from motet_train.models.predict import predictor
+from motet_train.models.predictor import Predictor
 from motet_train.papers.li2018 import systems
 from motet_train.papers.plappert2017 import language_to_motion
 from motet_train.papers.tdbn import angle_crbm, tdbn
@@ -31,16 +34,16 @@ MANIFEST, WEIGHTS = "run.json", "weights.pt"
 
 MODELS: Mapping[str, Callable[[Mapping[str, Any]], Net]] = {
     "tdbn": tdbn.from_config,
-    "motion-to-language": motion_to_language.from_config,
+    "motion-to-language": MotionToLanguage.from_config,
     "language-to-motion": language_to_motion.from_config,
-    "joint-embedding": joint_embedding.from_config,
-    "motion-actions": actions.from_config,
-    "motion-codec": codec.from_config,
-    "motion-codes": motion_codes.from_config,
+    "joint-embedding": JointEmbedding.from_config,
+    "motion-actions": ActionNet.from_config,
+    "motion-codec": MotionCodec.from_config,
+    "motion-codes": MotionCodes.from_config,
     "angle-crbm": angle_crbm.from_config,
-    "motion-matching": matching.from_config,
-    "gap-filler": filler.from_config,
-    "trajectory": predictor.from_config,
+    "motion-matching": Matching.from_config,
+    "gap-filler": Filler.from_config,
+    "trajectory": Predictor.from_config,
     **{name: partial(systems.stepwise, name) for name in systems.SYSTEMS},
 }
 """Name of a model -> how it is built from the configuration in its manifest."""

@@ -34,8 +34,3 @@ class Batch:
         """The same batch on a device."""
         ended = None if self.ended is None else self.ended.to(device)
         return Batch(self.frames.to(device), self.lengths.to(device), self.words.to(device), ended)
-
-
-def before(lengths: Tensor, steps: int) -> Tensor:
-    """Which of the first ``steps`` steps lie before the end of each row: lengths (B,) to bool (B, steps)."""
-    return torch.arange(steps, device=lengths.device) < lengths[:, None]

@@ -1,8 +1,9 @@
-"""What every model must have: its normalisation, and the graphs that are exported."""
+"""What all nets share: their normalisation, the graphs that are exported, and their configuration."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from typing import Any
+from dataclasses import is_dataclass
+from typing import Any, ClassVar, Self, get_type_hints
 
 import torch
 from numpy.typing import NDArray
@@ -10,10 +11,14 @@ from torch import Tensor, nn
 
 from motet.bundle.graph import GraphSpec
 from motet.motion.rotations import Array
+from motet.representation.contract import Z_LIMIT
 
 
 class Net(nn.Module, ABC):
-    """A model of any kind. mean, scale: of the channels that it takes, set before training."""
+    """A model of any kind. mean, scale: of the channels it takes, set before training."""
+
+    CONFIG: ClassVar[type]
+    """The dataclass of its configuration."""
 
     mean: Tensor
     scale: Tensor
@@ -22,6 +27,11 @@ class Net(nn.Module, ABC):
         super().__init__()
         self.register_buffer("mean", torch.zeros(channels))
         self.register_buffer("scale", torch.ones(channels))
+
+    @classmethod
+    def from_config(cls, config: Mapping[str, Any]) -> Self:
+        """An untrained net of a configuration from a manifest."""
+        return cls(configured(cls.CONFIG, config))
 
     def measure_by(self, mean: Array, scale: Array) -> None:
         """Set mean and scale (D,)."""
@@ -34,7 +44,7 @@ class Net(nn.Module, ABC):
 
     @abstractmethod
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
-        """For each role the module to export and the contract that its forward keeps."""
+        """For each role the module to export and the contract of its forward."""
 
     def tables(self) -> dict[str, NDArray[Any]]:
         """The plain arrays that a bundle holds beside the graphs, by name."""
@@ -50,7 +60,30 @@ class Part(nn.Module):
 
 
 def tuples(value: Any) -> Any:
-    """A configuration from JSON, whose lists were tuples before."""
+    """A value from JSON with its lists as tuples."""
     if isinstance(value, Mapping):
         return {key: tuples(item) for key, item in value.items()}
     return tuple(map(tuples, value)) if isinstance(value, list) else value
+
+
+def configured(kind: Any, data: Mapping[str, Any]) -> Any:
+    """The dataclass ``kind``, and the dataclasses in its fields, from JSON."""
+    hints = get_type_hints(kind)
+    parts = {name: hints[name] for name in data if is_dataclass(hints.get(name))}
+    return kind(
+        **{key: configured(parts[key], value) if key in parts else tuples(value) for key, value in data.items()}
+    )
+
+
+def normalised(frames: Tensor, mean: Tensor, scale: Tensor, limit: float = Z_LIMIT) -> Tensor:
+    """Frames (..., D) as z = (frames - mean) / scale within +-limit, and 0 where the scale (D,) is 0.
+
+    Like :meth:`motet.representation.contract.MotionContract.normalised`, but part of the exported graphs.
+    """
+    divisor = torch.where(scale > 0, scale, torch.inf)
+    return ((frames - mean) / divisor).clamp(-limit, limit)
+
+
+def before(lengths: Tensor, steps: int) -> Tensor:
+    """Which of the first ``steps`` steps lie before the end of each row: lengths (B,) to bool (B, steps)."""
+    return torch.arange(steps, device=lengths.device) < lengths[:, None]

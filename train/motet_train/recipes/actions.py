@@ -17,7 +17,7 @@ from motet_train.data.errors import DataError
 from motet_train.data.store import Store
 from motet_train.data.word_vectors import principal, read_word_vectors
 from motet_train.descent import GradientLearner, Term, Terms, Training
-from motet_train.models.codes.actions import ActionNet, ActionsConfig, stems_of
+from motet_train.models.action_net import ActionNet, ActionsConfig, stems_of
 from motet_train.recipes.language import divided, manifest
 from motet_train.recipes.recipe import Job, Recipe
 from motet_train.runs import Run

@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
+from motet.decode.planar import REACH, seen_from
 from motet.motion.humanoid import LEFT_RIGHT, sided
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
@@ -18,9 +19,8 @@ from motet_train.data.sixd_windows import SixdWindows, Window
 from motet_train.data.split import split
 from motet_train.data.store import Store
 from motet_train.descent import GradientLearner, Term, Terms, Training
-from motet_train.models.codes.codec import CodecConfig, MotionCodec, places_in_world
-from motet_train.models.codes.root_book import fit_book
-from motet_train.models.codes.sixd_places import tree_of
+from motet_train.models.codec import CodecConfig, MotionCodec, places_in_world
+from motet_train.models.kinematics import tree_of
 from motet_train.recipes.recipe import Job, Recipe
 from motet_train.runs import Run
 
@@ -125,6 +125,19 @@ def _untrained(config: CodecConfig, contract: MotionContract, windows: SixdWindo
     net.book.copy_(torch.from_numpy(book))
     net.book_scale.copy_(torch.from_numpy(book.std(axis=0)))
     return net
+
+
+def fit_book(poses: list[Array], hop: int, size: int, seed: int) -> Array:
+    """A book (size, 3) of the moves over ``hop`` frames of poses (T, 3): x, z, facing. Standing still is entry 0.
+
+    What a move leaves out is not lost: the next one is chosen from where the moves so far have really led.
+    """
+    from sklearn.cluster import MiniBatchKMeans  # for this alone, so that other trainings do not load it
+
+    moves = np.concatenate([seen_from(way[:-hop], way[hop:]) for way in poses if len(way) > hop])
+    scaled = moves * (1, 1, REACH)
+    found = MiniBatchKMeans(size - 1, random_state=seed, n_init=3, batch_size=4096).fit(scaled).cluster_centers_
+    return np.concatenate([np.zeros((1, 3)), found / (1, 1, REACH)])
 
 
 def _weights(contract: MotionContract, ends: float) -> Tensor:

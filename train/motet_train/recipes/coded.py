@@ -9,7 +9,7 @@ from motet_train.data.actions import Actions
 from motet_train.data.code_windows import CodedMotion, Codes
 from motet_train.data.sixd_windows import poses_of, with_way
 from motet_train.data.store import Store
-from motet_train.models.codes.codec import MotionCodec
+from motet_train.models.codec import MotionCodec
 
 MIRRORED = (False, True)
 

@@ -14,10 +14,9 @@ from motet_train.data.code_windows import CodeBatch, CodeWindows, memory_of
 from motet_train.data.errors import DataError
 from motet_train.data.store import Store
 from motet_train.descent import GradientLearner, Term, Terms, Training
-from motet_train.models.codes.actions import ActionNet
-from motet_train.models.codes.code_model import CodeModelConfig
-from motet_train.models.codes.codec import MotionCodec
-from motet_train.models.codes.motion_codes import MotionCodes, MotionCodesConfig
+from motet_train.models.action_net import ActionNet
+from motet_train.models.codec import MotionCodec
+from motet_train.models.motion_codes import CodeModelConfig, MotionCodes, MotionCodesConfig
 from motet_train.recipes.actions import described, spoken
 from motet_train.recipes.coded import coded
 from motet_train.recipes.language import divided, manifest

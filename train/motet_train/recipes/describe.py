@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from motet_train.descent import Training
-from motet_train.models.language.motion_to_language import MotionToLanguageConfig
+from motet_train.models.motion_to_language import MotionToLanguageConfig
 from motet_train.recipes.language import SIZES, LanguageVisits
 from motet_train.recipes.recipe import Recipe
 

@@ -19,8 +19,8 @@ from motet_train.data.gap_windows import GapWindow, GapWindows
 from motet_train.data.split import split
 from motet_train.data.store import Store
 from motet_train.descent import GradientLearner, Term, Terms, Training
-from motet_train.models.codes.sixd_places import tree_of
-from motet_train.models.fill.filler import Filler, FillerConfig
+from motet_train.models.filler import Filler, FillerConfig
+from motet_train.models.kinematics import tree_of
 from motet_train.recipes.recipe import Job, Recipe
 from motet_train.runs import Run
 

@@ -24,7 +24,7 @@ from motet_train.data.store import Store
 from motet_train.descent import GradientLearner, Term, Terms
 from motet_train.evaluate.language.confidence import calibrated, judged
 from motet_train.evaluate.language.split_store import SplitStore
-from motet_train.models.language.net import LanguageNet
+from motet_train.models.motion_to_language import LanguageNet
 from motet_train.recipes.recipe import Job
 from motet_train.runs import MODELS, Run
 
@@ -146,7 +146,7 @@ def validation_loss(net: LanguageNet, examples: Examples, batch: int, longest: i
     """The mean loss of a step, over every sentence of every motion, of which the ``longest`` first frames count."""
     total, count, device = 0.0, 0, net.mean.device
     for rows in examples.everything(batch, longest):
-        losses = net.losses(rows.to(device))
+        losses, _ = net.terms(rows.to(device))
         total, count = total + float(losses.double().sum()), count + len(losses)
     return total / count
 

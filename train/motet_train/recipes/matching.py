@@ -18,8 +18,8 @@ from motet_train.data.locomotion import gaits_of, recordings
 from motet_train.data.matching_rows import MatchingRows, rows_of
 from motet_train.data.store import Store
 from motet_train.descent import GradientLearner, Term, Terms, Training
-from motet_train.models.codes.sixd_places import tree_of
-from motet_train.models.control.matching import Matching, MatchingConfig, Speeds
+from motet_train.models.kinematics import tree_of
+from motet_train.models.matching import Matching, MatchingConfig, Speeds
 from motet_train.recipes.matching_table import take
 from motet_train.recipes.recipe import Job, Recipe
 from motet_train.runs import Run

@@ -6,8 +6,8 @@ import torch
 from motet.models.steer import FEATURE_STEPS
 from motet.motion.rotations import Array
 from motet_train.data.matching_rows import MatchingRows, mirrored_poses, scaling
-from motet_train.models.codes.sixd_places import Tree
-from motet_train.models.control.matching import Matching
+from motet_train.models.kinematics import Tree
+from motet_train.models.matching import Matching
 
 SHORTEST = 0.05
 """Metres: how far a bone that carries nothing counts as reaching."""

@@ -11,8 +11,8 @@ from motet_train.data.errors import DataError
 from motet_train.data.predict_data import Material
 from motet_train.data.windows import Windows
 from motet_train.descent import GradientLearner, Term, Terms, Training
-from motet_train.models.predict.places import VectorPlaces
-from motet_train.models.predict.predictor import Predictor, PredictorConfig
+from motet_train.models.kinematics import VectorPlaces
+from motet_train.models.predictor import Predictor, PredictorConfig
 from motet_train.recipes.recipe import AUGMENTED, Job, Recipe, Visits
 from motet_train.runs import Run
 

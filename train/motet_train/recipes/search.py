@@ -13,8 +13,8 @@ from motet_train.data.batches import usable
 from motet_train.data.store import Store
 from motet_train.data.views import Pairs, views
 from motet_train.descent import GradientLearner, Term, Training
-from motet_train.models.language.joint_embedding import JointEmbedding, JointEmbeddingConfig, from_config
-from motet_train.models.language.places import figure_of
+from motet_train.models.joint_embedding import JointEmbedding, JointEmbeddingConfig
+from motet_train.models.kinematics import figure_of
 from motet_train.recipes.language import Divided, divided, manifest
 from motet_train.recipes.recipe import Job, Recipe
 from motet_train.runs import Run
@@ -67,7 +67,7 @@ def train_search(store: Store, job: Job, data: str = "", by: str = "trial") -> R
     sizes = {"channels": len(found.contract.channels), "words": len(found.vocabulary)}
     config = asdict(recipe.sized(**sizes, figure=figure_of(found.contract)))
     torch.manual_seed(job.about.seed)
-    net = from_config(config)
+    net = JointEmbedding.from_config(config)
     net.measure_by(found.contract.mean, found.contract.std)
     return job.run(net, _learner(net, found, job), manifest(job, found, config, data, by))
 

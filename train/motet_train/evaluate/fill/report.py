@@ -17,7 +17,7 @@ from motet_train.data.errors import DataError
 from motet_train.data.split import split
 from motet_train.data.store import Store
 from motet_train.evaluate.tables import Goals, Report, gathered
-from motet_train.models.codes.sixd_places import SixdPlaces, tree_of
+from motet_train.models.kinematics import SixdPlaces, tree_of
 
 GAP_SECONDS = (0.5, 1.0, 2.0)
 """Of the gaps."""

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
-from motet_train.models.language.gru import recur
+from motet_train.models.recurrent import recur
 from motet_train.papers.li2018.reused_activations import Reused, one_gradient
 from motet_train.papers.li2018.stepwise import State, System
 

@@ -11,8 +11,7 @@ import torch
 from torch import Tensor, nn
 
 from motet.bundle.graph import GraphSpec, TensorSpec
-from motet_train.models.net import Net, Part
-from motet_train.models.normalised import normalised
+from motet_train.models.net import Net, Part, normalised
 
 State = dict[str, Tensor]
 """What a system knows, by name; each (B, ...)."""

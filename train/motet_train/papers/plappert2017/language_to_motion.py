@@ -14,13 +14,10 @@ from torch.nn import functional
 
 from motet.bundle.graph import GraphSpec, TensorSpec
 from motet.representation.contract import Z_LIMIT
-from motet_train.data.batch import Batch, before
-from motet_train.models.language.dropout import WordEmbedding
-from motet_train.models.language.net import LanguageNet
-from motet_train.models.language.sequence import Decoder, Encoder
-from motet_train.models.language.summary import SummaryHead
-from motet_train.models.net import Part, tuples
-from motet_train.models.normalised import normalised
+from motet_train.data.batch import Batch
+from motet_train.models.motion_to_language import LanguageNet, SummaryHead
+from motet_train.models.net import Part, before, normalised, tuples
+from motet_train.models.recurrent import Decoder, Encoder, WordEmbedding
 from motet_train.papers.plappert2017.layer_norm_gru import LayerNormGRU
 from motet_train.papers.plappert2017.mixture_head import Mixture, MixtureHead
 
@@ -50,7 +47,7 @@ class LanguageToMotionConfig:
     """Mean share of the frames that are fed back as zeros in training, from none to twice as many in a sequence: what
     the frame before does not tell, the context must."""
     summary: float = 0.0
-    """Weight of the training-only loss of :mod:`motet_train.models.language.summary`; 0 leaves its head out."""
+    """Weight of the training-only loss of :mod:`motet_train.models.motion_to_language`; 0 leaves its head out."""
 
 
 class LanguageToMotion(LanguageNet):

@@ -4,7 +4,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import layer_norm
 
-from motet_train.models.language.gru import GATES, GRU
+from motet_train.models.recurrent import GATES, GRU
 
 
 class LayerNormGRU(GRU):

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from motet_train.models.language.dropout import mask
+from motet_train.models.recurrent import mask
 
 DENSITY_FLOOR = 1e-8
 """Added to each channel's density inside the logarithm of the surrogate, as in the authors' code."""

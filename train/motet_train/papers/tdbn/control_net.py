@@ -12,8 +12,7 @@ from torch import Tensor, nn
 
 from motet.bundle.graph import GraphSpec, TensorSpec
 from motet.representation.contract import Z_LIMIT
-from motet_train.models.net import Net, Part
-from motet_train.models.normalised import normalised
+from motet_train.models.net import Net, Part, normalised
 from motet_train.papers.tdbn.contrastive import Stage
 from motet_train.papers.tdbn.crbm import CRBM, CRBMLayer, Past, transitions
 

@@ -10,9 +10,7 @@ Letters in shapes: B rows, P frames before, N in the gap, A after it, T = P + N 
 width, H heads.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -20,15 +18,8 @@ from torch.nn import functional
 
 from motet.bundle.graph import GraphSpec, TensorSpec
 from motet.representation.placed import ROOT_PLACE, mirror
-from motet_train.models.codes.sixd_places import SixdPlaces, Tree
-from motet_train.models.net import Net, tuples
-from motet_train.models.normalised import normalised
-
-REACH = 100.0
-"""Frames: the longest wave by which the distance from the ends of the gap is told; the shortest is 4."""
-
-SIZE = 0.3
-"""Metres by which joints' places are divided."""
+from motet_train.models.kinematics import SixdPlaces, Tree
+from motet_train.models.net import Net, normalised
 
 
 @dataclass(frozen=True)
@@ -75,6 +66,7 @@ class Block(nn.Module):
 class Filler(Net):
     """Placed frames before, plainly through and after a gap to those that fill it. mean, scale: (E,) of such frames."""
 
+    CONFIG = FillerConfig
     frequencies: Tensor
     mirrored: Tensor
     signs: Tensor
@@ -94,7 +86,7 @@ class Filler(Net):
         sides = mirror()
         self.register_buffer("mirrored", torch.from_numpy(sides.columns), persistent=False)
         self.register_buffer("signs", torch.from_numpy(sides.signs), persistent=False)
-        waves = torch.logspace(0, 1, config.waves, base=REACH / 4) * 4
+        waves = torch.logspace(0, 1, config.waves, base=100.0 / 4) * 4  # of 4 to 100 frames
         self.register_buffer("frequencies", 2 * torch.pi / waves, persistent=False)
 
     def forward(self, past: Tensor, plain: Tensor, after: Tensor) -> Tensor:
@@ -114,12 +106,17 @@ class Filler(Net):
         """As forward, without the mirror image: what is trained."""
         given = torch.cat([past, plain, after], dim=1)
         before, count = past.shape[1], plain.shape[1]
+        # frames since the last one before the gap, and until the first one after it
         place = torch.arange(given.shape[1], device=given.device) - before + 1
         left = count + 1 - place
-        seen = [normalised(given, self.mean, self.scale), self.places(given[..., ROOT_PLACE:]).flatten(2) / SIZE]
-        x = self.inward(_around(torch.cat(seen, dim=-1)))
+        places = self.places(given[..., ROOT_PLACE:]).flatten(2) / 0.3
+        seen = torch.cat([normalised(given, self.mean, self.scale), places], dim=-1)
+        steps = functional.pad(4 * (seen[:, 1:] - seen[:, :-1]), (0, 0, 1, 1))
+        x = self.inward(torch.cat([seen, steps[:, :-1], steps[:, 1:]], dim=-1))
         ends = self.ends(torch.cat([x[:, before - 1], x[:, before + count]], dim=-1))
-        x = x + ends[:, None] + self.told(self._told(place, left))
+        angles = torch.stack([place, left], dim=-1)[..., None] * self.frequencies
+        inside = ((place > 0) & (left > 0)).float()[:, None]
+        x = x + ends[:, None] + self.told(torch.cat([angles.sin().flatten(1), angles.cos().flatten(1), inside], dim=-1))
         apart = (place[:, None] - place).abs().float()
         for block in self.blocks:
             x = block(x, apart)
@@ -128,12 +125,6 @@ class Filler(Net):
         found: Tensor = plain + (near / (near + self.config.soft)).prod(dim=0) * added
         return found
 
-    def _told(self, place: Tensor, left: Tensor) -> Tensor:
-        """Where tokens are (T, 4 W + 1), by the frames since the last one before the gap and until the first after."""
-        angles = torch.stack([place, left], dim=-1)[..., None] * self.frequencies
-        inside = ((place > 0) & (left > 0)).float()[:, None]
-        return torch.cat([angles.sin().flatten(1), angles.cos().flatten(1), inside], dim=-1)
-
     def joints(self, frames: Tensor) -> Tensor:
         """Joints (..., J, 3) in metres of placed frames (..., E)."""
         found: Tensor = self.places(frames[..., ROOT_PLACE:]) + frames[..., None, :ROOT_PLACE]
@@ -141,21 +132,6 @@ class Filler(Net):
 
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """The one graph."""
-        past, plain, after = (
-            TensorSpec(name, ("batch", axis, self.config.channels))
-            for name, axis in (("past", "before"), ("plain", "gap"), ("after", "behind"))
-        )
-        filled = TensorSpec("filled", plain.shape)
-        return {"filler": (self, GraphSpec((past, plain, after), (filled,)))}
-
-
-def _around(x: Tensor) -> Tensor:
-    """Each frame, how it differs from the one before and how the next one from it: (B, T, 3 E) of (B, T, E)."""
-    steps = functional.pad(4 * (x[:, 1:] - x[:, :-1]), (0, 0, 1, 1))
-    return torch.cat([x, steps[:, :-1], steps[:, 1:]], dim=-1)
-
-
-def from_config(config: Mapping[str, Any]) -> Filler:
-    """An untrained net of a configuration as it stands in a manifest."""
-    found = dict(tuples(config))
-    return Filler(FillerConfig(**{**found, "tree": Tree(**found["tree"])}))
+        axes = {"past": "before", "plain": "gap", "after": "behind", "filled": "gap"}
+        *given, filled = (TensorSpec(name, ("batch", axis, self.config.channels)) for name, axis in axes.items())
+        return {"filler": (self, GraphSpec(tuple(given), (filled,)))}

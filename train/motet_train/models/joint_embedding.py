@@ -9,33 +9,23 @@ of words.
 Letters in shapes: B rows, T frames, D channels, W words, S statistics, E numbers of a vector.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
 from motet.bundle.graph import GraphSpec, TensorSpec
-from motet_train.data.batch import before
 from motet_train.data.views import Pairs
-from motet_train.models.language.dropout import WordEmbedding
-from motet_train.models.language.places import Figure, Places
-from motet_train.models.language.statistics import of_frames, of_speeds
-from motet_train.models.net import Net, Part, tuples
-from motet_train.models.normalised import normalised
-
-PAD = 0
+from motet_train.models.kinematics import EulerPlaces, Figure
+from motet_train.models.net import Net, Part, before, normalised
+from motet_train.models.recurrent import WordEmbedding
 
 LIMIT = 5.0
 """Standard deviations: wilder channels and statistics would outweigh all else."""
 
-NEAR = 0.2
-"""Metres by which places are divided."""
-
-STILL = 0.03
-"""The least standard deviation of a statistic by which it is divided."""
+SMALLEST = 1e-3
+"""Added to deviations and speeds: the root of less would make much of rounding."""
 
 
 @dataclass(frozen=True)
@@ -62,13 +52,14 @@ class JointEmbeddingConfig:
 class JointEmbedding(Net):
     """Both encoders with the motions' normalisation. seen_mean, seen_scale: of the statistics."""
 
+    CONFIG = JointEmbeddingConfig
     seen_mean: Tensor
     seen_scale: Tensor
 
     def __init__(self, config: JointEmbeddingConfig) -> None:
         super().__init__(config.channels)
         self.config = config
-        self.places = Places(config.figure) if config.figure.parents else None
+        self.places = EulerPlaces(config.figure) if config.figure.parents else None
         joints = max(0, len(config.figure.parents) - 1)
         seen = 3 * joints + len(config.figure.root) if joints else config.channels
         statistics = of_frames(torch.zeros(1, 1, seen), torch.ones(1)).shape[1] + 2 * joints + 1
@@ -95,14 +86,14 @@ class JointEmbedding(Net):
         """Set mean and scale of statistics from examples (..., S)."""
         rows = seen.flatten(0, -2)
         self.seen_mean.copy_(rows.mean(dim=0))
-        self.seen_scale.copy_(rows.std(dim=0).clamp(min=STILL))
+        self.seen_scale.copy_(rows.std(dim=0).clamp(min=0.03))
 
     def statistics(self, frames: Tensor, lengths: Tensor) -> Tensor:
         """Frames (B, T, D) of lengths (B,) to what is seen of the whole motion (B, S)."""
         normal, length = normalised(frames, self.mean, self.scale, LIMIT), lengths[:, None].log()
         if self.places is None:
             return torch.cat([of_frames(normal, lengths), length], dim=1)
-        places = self.places(frames) / NEAR
+        places = self.places(frames) / 0.2  # metres
         seen = torch.cat([places, normal[..., list(self.config.figure.root)]], dim=-1)
         return torch.cat([of_frames(seen, lengths), of_speeds(places, lengths), length], dim=1)
 
@@ -116,13 +107,11 @@ class JointEmbedding(Net):
 
     def losses(self, pairs: Pairs) -> Tensor:
         """For each row how hard its motion and its sentence, and its sentences, find each other among all (B,)."""
-        motions, texts, others = self.embed_statistics(pairs.seen), self._texts(pairs.words), self._texts(pairs.others)
+        motions = self.embed_statistics(pairs.seen)
+        texts, others = (self.embed_text(words, (words != 0).sum(dim=1)) for words in (pairs.words, pairs.others))
         found = contrast(motions @ texts.T / self.config.temperature, pairs.groups)
         between = contrast(texts @ others.T / self.config.temperature, pairs.groups)
         return found + self.config.wordings * between
-
-    def _texts(self, words: Tensor) -> Tensor:
-        return self.embed_text(words, (words != PAD).sum(dim=1))
 
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """Both encoders, each with its contract."""
@@ -148,7 +137,28 @@ def contrast(scores: Tensor, groups: Tensor) -> Tensor:
     return (rows + columns) / 2
 
 
-def from_config(config: Mapping[str, Any]) -> JointEmbedding:
-    """An untrained net of a configuration as it stands in a manifest."""
-    found = dict(tuples(config))
-    return JointEmbedding(JointEmbeddingConfig(**{**found, "figure": Figure(**found["figure"])}))
+def of_frames(x: Tensor, lengths: Tensor) -> Tensor:
+    """Frames (B, T, C) of lengths (B,) to mean, deviation, least and greatest, and the means of parts: (B, 7 C)."""
+    active, count = before(lengths, x.shape[1])[..., None], lengths[:, None]
+    mean = torch.where(active, x, 0.0).sum(dim=1) / count
+    square = torch.where(active, (x - mean[:, None]).square(), 0.0).sum(dim=1) / count
+    least, most = torch.where(active, x, torch.inf).amin(dim=1), torch.where(active, x, -torch.inf).amax(dim=1)
+    part = 3 * torch.arange(x.shape[1], device=x.device) // count
+    parts = [_mean_where(x, mean, part == number) for number in range(3)]  # sitting down is not standing up
+    return torch.cat([mean, (square + SMALLEST**2).sqrt(), least, most, *parts], dim=1)
+
+
+def of_speeds(places: Tensor, lengths: Tensor) -> Tensor:
+    """Places (B, T, 3 J) of joints to roots of their mean and greatest speeds (B, 2 J), per frame."""
+    steps = torch.diff(places, dim=1, prepend=places[:, :1]).reshape(*places.shape[:2], -1, 3)
+    speed = torch.where(
+        before(lengths, places.shape[1])[..., None], (steps.square().sum(dim=-1) + SMALLEST**2).sqrt(), 0.0
+    )
+    return torch.cat([speed.sum(dim=1) / lengths[:, None], speed.amax(dim=1)], dim=1).sqrt()
+
+
+def _mean_where(x: Tensor, otherwise: Tensor, chosen: Tensor) -> Tensor:
+    """The mean (B, C) of the chosen (B, T) of x (B, T, C); where there are none, the other mean (B, C)."""
+    count = chosen.sum(dim=1)[:, None]
+    total = torch.where(chosen[..., None], x, 0.0).sum(dim=1)
+    return torch.where(count > 0, total / count.clamp(min=1), otherwise)

@@ -1,9 +1,10 @@
 """A sentence for a motion: bidirectional GRU encoder, GRU decoder over words (Plappert et al. 2017, section 4.2).
 
-Letters in shapes: B rows, T frames, D channels, W words, V words of the vocabulary, C units of the context.
+Letters in shapes: B rows, T frames, D channels, W words, V words of the vocabulary, C units of the context, S units of
+the decoder.
 """
 
-from collections.abc import Mapping
+from abc import abstractmethod
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,20 +13,61 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from motet.bundle.graph import GraphSpec, TensorSpec
-from motet_train.data.batch import Batch, before
-from motet_train.models.language.dropout import WordEmbedding
-from motet_train.models.language.gru import GRU
-from motet_train.models.language.net import LanguageNet
-from motet_train.models.language.sequence import Decoder, Encoder
-from motet_train.models.language.summary import SummaryHead
-from motet_train.models.net import Part, tuples
-from motet_train.models.normalised import normalised
-
-SPAN = 10.0
-"""Frames that sums are divided by: a second's at the usual rate, so that they are about as large as the frames."""
+from motet_train.data.batch import Batch
+from motet_train.models.net import Net, Part, before, normalised
+from motet_train.models.recurrent import GRU, Decoder, Encoder, WordEmbedding
 
 PAD, SOS, EOS = 0, 1, 2
 """Ids of the special words."""
+
+
+class SummaryHead(nn.Module):
+    """From contexts (B, C) to mean and deviation of D channels and the logarithm of the length, (B, 2 D + 1).
+
+    Its loss exists in training only. A decoder that sees every frame before the next one learns to follow the frames
+    and to ignore the sentence, whose context then holds no action. This head asks the context itself, so that the
+    encoder of a sentence has to tell walking from running, and left from right, and the encoder of a motion has to keep
+    what is only seen over the whole of it, such as a slow turn.
+    """
+
+    def __init__(self, context: int, channels: int) -> None:
+        super().__init__()
+        self.layers = nn.Sequential(nn.Linear(context, context), nn.Tanh(), nn.Linear(context, 2 * channels + 1))
+
+    def loss(self, context: Tensor, normal: Tensor, lengths: Tensor) -> Tensor:
+        """Mean squared error for contexts (B, C) of normalised frames (B, T, D) of the given lengths (B,)."""
+        found: Tensor = self.layers(context)
+        return (found - summary(normal, lengths)).square().mean()
+
+
+def summary(normal: Tensor, lengths: Tensor) -> Tensor:
+    """Mean, deviation and log-length (B, 2 D + 1) of normalised frames (B, T, D) of the given lengths (B,)."""
+    real = before(lengths, normal.shape[1])[..., None]
+    # within 5 deviations: a few wild frames would else outweigh the motion
+    frames, count = torch.where(real, normal.clamp(-5.0, 5.0), 0.0), lengths[:, None]
+    mean = frames.sum(dim=1) / count
+    square = torch.where(real, (frames - mean[:, None]).square(), 0.0).sum(dim=1) / count
+    return torch.cat([mean, square.sqrt(), count.log()], dim=1)
+
+
+class LanguageNet(Net):
+    """A net between motion and language. summary: its head, if any, whose loss weighs ``config.summary``."""
+
+    config: Any
+    summary: SummaryHead | None
+
+    @abstractmethod
+    def terms(self, batch: Batch) -> tuple[Tensor, Tensor | None]:
+        """The losses of all active steps (N,), and in training the weighted loss of the summary head, if there is one:
+        a mean over the B rows."""
+
+    def summary_loss(self, batch: Batch, context: Tensor) -> Tensor | None:
+        """The second of the :meth:`terms`, from contexts (B, C)."""
+        if self.summary is None or not self.training:
+            return None
+        normal = normalised(batch.frames, self.mean, self.scale)
+        weighed: Tensor = self.config.summary * self.summary.loss(context, normal, batch.lengths)
+        return weighed
 
 
 @dataclass(frozen=True)
@@ -42,13 +84,15 @@ class MotionToLanguageConfig:
     frame_noise: float = 0.0
     """Standard deviation of what training adds to the frames, in normalised units."""
     travelled: int = 0
-    """Of how many channels, the first ones, the encoder also sees the sum so far: way and turn since the start."""
+    """Number of first channels whose sum so far the encoder also sees: way and turn since the start."""
     summary: float = 0.0
-    """Weight of the training-only loss of :mod:`motet_train.models.language.summary`; 0 leaves its head out."""
+    """Weight of the loss of :class:`SummaryHead`; 0 leaves the head out."""
 
 
 class MotionToLanguage(LanguageNet):
     """The net with its normalisation."""
+
+    CONFIG = MotionToLanguageConfig
 
     def __init__(self, config: MotionToLanguageConfig) -> None:
         super().__init__(config.channels)
@@ -65,7 +109,7 @@ class MotionToLanguage(LanguageNet):
     def encode(self, frames: Tensor, lengths: Tensor) -> Tensor:
         """Frames (B, T, D) in the contract's units, of lengths (B,), to contexts (B, C)."""
         normal = normalised(frames, self.mean, self.scale)
-        sums = normal[..., : self.config.travelled].cumsum(dim=1) / SPAN
+        sums = normal[..., : self.config.travelled].cumsum(dim=1) / 10  # a second's frames at the usual rate
         if self.training and self.config.frame_noise:
             normal = normal + self.config.frame_noise * torch.randn_like(normal)
         context: Tensor = self.encoder(torch.cat([normal, sums, torch.ones_like(normal[..., :1])], dim=-1), lengths)
@@ -108,8 +152,3 @@ class MotionToLanguage(LanguageNet):
         step = GraphSpec((word, context, state), (scores, following), {"state": "next_state"})
         encoder = GraphSpec((frames, lengths), (context,))
         return {"encoder": (Part(self, self.encode), encoder), "step": (Part(self, self.step), step)}
-
-
-def from_config(config: Mapping[str, Any]) -> MotionToLanguage:
-    """An untrained net of a configuration as it stands in a manifest."""
-    return MotionToLanguage(MotionToLanguageConfig(**tuples(config)))

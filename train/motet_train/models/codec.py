@@ -1,15 +1,15 @@
 """The codec of motions: frames to a few codes, and codes to smooth frames.
 
-``hop`` frames are one step of codes: one entry of the book of root moves (:mod:`motet_train.models.codes.root_book`)
-and ``groups`` codes of the body. A body code is finite scalar quantisation (Mentzer et al. 2023): a few numbers, each
-rounded to one of ``levels``. The decoder gives the root relative to where the moves have led, so that the way never
-drifts from them, and looks only a few codes ahead, so that frames can be given as codes come.
+``hop`` frames are one step of codes: one entry of the book of root moves and ``groups`` codes of the body. A move is
+(forward, left) in metres and a turn in radians, seen from where the figure was. A body code is finite scalar
+quantisation (Mentzer et al. 2023): a few numbers, each rounded to one of ``levels``. The decoder gives the root
+relative to where the moves have led, so that the way never drifts from them, and looks only a few codes ahead, so that
+frames can be given as codes come.
 
 Letters in shapes: B rows, T frames, N steps of codes (T = hop N), D channels, G groups, L numbers of a group.
 """
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Self
 
@@ -19,12 +19,11 @@ from torch.nn import functional
 
 from motet.representation.root_sixd import ROOT_SIXD
 from motet_train.data.errors import DataError
-from motet_train.models.codes.sixd_places import SixdPlaces, Tree
-from motet_train.models.net import Net, tuples
-from motet_train.models.normalised import normalised
+from motet_train.models.kinematics import SixdPlaces, Tree
+from motet_train.models.net import Net, normalised
 
 PATH = 3
-"""Of the decoder's channels the first: the root's forward, left and turn relative to the way of the moves."""
+"""Number of the decoder's first channels: the root's forward, left and turn relative to the way of the moves."""
 
 
 @dataclass(frozen=True)
@@ -115,9 +114,10 @@ class CodecDecoder(nn.Module):
 class MotionCodec(Net):
     """Both halves. mean, scale: of the contract. book, book_scale: root moves (K, 3) and the deviation of each number.
 
-    path_scale: of the root relative to the way.
+    path_scale: of the root relative to the way. steps: levels of each number on either side of 0.
     """
 
+    CONFIG = CodecConfig
     book: Tensor
     book_scale: Tensor
     path_scale: Tensor
@@ -133,11 +133,10 @@ class MotionCodec(Net):
         self.register_buffer("book", torch.zeros(config.moves, 3))
         self.register_buffer("book_scale", torch.ones(3))
         self.register_buffer("path_scale", torch.tensor([0.05, 0.05, 0.1]), persistent=False)
-        half = torch.tensor(config.levels * config.groups) // 2
-        self.register_buffer("steps", half.float(), persistent=False)
+        self.register_buffer("steps", (torch.tensor(config.levels * config.groups) // 2).float(), persistent=False)
 
     def train(self, mode: bool = True) -> Self:
-        """As torch has it, but an encoder that is not trained goes on as it is."""
+        """As in torch, except that an encoder that is not trained stays in evaluation mode."""
         super().train(mode)
         if not next(self.encoder.parameters()).requires_grad:
             self.encoder.eval()
@@ -191,14 +190,3 @@ def places_in_world(codec: MotionCodec, frames: Tensor, way: Tensor) -> Tensor:
     across, up, along = places.unbind(-1)
     turned = torch.stack([across * cos + along * sin, up, along * cos - across * sin], dim=-1)
     return turned + root[..., None, :]
-
-
-def from_config(config: Mapping[str, Any]) -> MotionCodec:
-    """An untrained codec of a configuration as it stands in a manifest."""
-    return MotionCodec(codec_config(config))
-
-
-def codec_config(config: Mapping[str, Any]) -> CodecConfig:
-    """A configuration as it stands in a manifest."""
-    found = dict(tuples(config))
-    return CodecConfig(**{**found, "tree": Tree(**found["tree"])})

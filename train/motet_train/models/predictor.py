@@ -6,24 +6,23 @@ no velocity), sets the first frames; an MLP on the pose and on the past of all c
 functions of time, sets the later ones. The answer is the mean of that for the seed and of that for its mirror image.
 
 Letters in shapes: B rows, L seed frames, C channels of the contract, D of them that vary, M of these that are
-predicted, K output polynomials, P functions of the past, N predicted frames, H hidden units.
+predicted, K output polynomials, P functions of the past, N predicted frames, H hidden units, S signs of errors.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import torch
 from torch import Tensor, nn
 from torch.nn.functional import gelu
 
 from motet.bundle.graph import GraphSpec, TensorSpec
-from motet_train.models.net import Net, Part, tuples
-from motet_train.models.normalised import normalised
-from motet_train.models.predict.error_head import ErrorHead, signs, size
+from motet_train.models.net import Net, Part, normalised
 
 GAIN = 3.0
 """Differences of normalised frames are multiplied by it, so that they vary about as much as poses do."""
+
+LEAST = 1e-3
+"""Added to a sign of an error before its logarithm, in units of the channels' scales."""
 
 
 @dataclass(frozen=True)
@@ -32,8 +31,7 @@ class PredictorConfig:
 
     channels: C. kept: the channels that vary, the root's first. held: how many of these are seen, relative to the last
     frame, but not predicted. mirrored, signs: channel c of a mirrored frame is channel ``mirrored[c]`` times
-    ``signs[c]``; empty where left and right are not known. doubts: whether it knows its errors
-    (:class:`motet_train.models.predict.error_head.ErrorHead`).
+    ``signs[c]``; empty where left and right are not known. doubts: whether it has an :class:`ErrorHead`.
     """
 
     channels: int
@@ -49,17 +47,6 @@ class PredictorConfig:
     blocks: int = 2
     dropout: float = 0.3
     doubts: bool = False
-
-
-def from_config(data: Mapping[str, Any]) -> "Predictor":
-    """The net of a configuration as it stands in a manifest."""
-    return Predictor(PredictorConfig(**tuples(data)))
-
-
-def _polynomials(points: Tensor, count: int) -> Tensor:
-    """Orthonormal polynomials (T, count) at ``points`` (T), all 0 at 0."""
-    basis: Tensor = torch.linalg.qr(points[:, None] ** torch.arange(1, count + 1))[0]
-    return basis
 
 
 class Block(nn.Module):
@@ -86,9 +73,14 @@ class Trajectory(nn.Module):
         super().__init__()
         self.config, steps, seen = config, config.seed_frames - 1, len(config.kept)
         moved, k = seen - config.held, config.polynomials
-        self.past = nn.Parameter(2 * _polynomials(torch.arange(steps, 0, -1.0) / steps, config.past))
-        future = GAIN * _polynomials(torch.arange(1.0, config.frames + 1) / config.frames, k)
-        self.register_buffer("future", future)
+
+        def polynomials(points: Tensor, count: int) -> Tensor:
+            """Orthonormal ones (T, count) at points (T), all 0 at 0."""
+            basis: Tensor = torch.linalg.qr(points[:, None] ** torch.arange(1, count + 1))[0]
+            return basis
+
+        self.past = nn.Parameter(2 * polynomials(torch.arange(steps, 0, -1.0) / steps, config.past))
+        self.register_buffer("future", GAIN * polynomials(torch.arange(1.0, config.frames + 1) / config.frames, k))
         self.dropout = nn.Dropout(config.dropout)
         self.inward = nn.Linear(seen * (config.past + 1), config.hidden)
         self.blocks = nn.Sequential(*(Block(config.hidden, config.dropout) for _ in range(config.blocks)))
@@ -101,38 +93,95 @@ class Trajectory(nn.Module):
 
     def forward(self, seed: Tensor) -> Tensor:
         """Seed (B, L, D) to steps (B, N, M)."""
-        coefficients = self._together(seed) + self._alone(seed[..., self.config.held :])
-        return torch.einsum("tk,bkc->btc", self.future, coefficients)
-
-    def _together(self, seed: Tensor) -> Tensor:
-        """Coefficients (B, K, M) from all channels (B, L, D)."""
         past = torch.einsum("blc,lk->bkc", GAIN * (seed - seed[:, -1:])[:, :-1], self.past)
         hidden = self.blocks(self.inward(self.dropout(torch.cat([past.flatten(1), seed[:, -1]], 1))))
-        out: Tensor = self.outward(gelu(hidden))
-        return out.view(-1, self.config.polynomials, len(self.limit))
-
-    def _alone(self, seed: Tensor) -> Tensor:
-        """Coefficients (B, K, M) from each channel's own steps in (B, L, M)."""
-        step = GAIN * (seed[:, 1:] - seed[:, :-1])
+        together = self.outward(gelu(hidden)).view(-1, self.config.polynomials, len(self.limit))
+        moved = seed[..., self.config.held :]
+        step = GAIN * (moved[:, 1:] - moved[:, :-1])
         usual = self.limit * torch.tanh(step / self.limit)
         ordinary = torch.einsum("blc,clk->bkc", usual, self.ordinary)
-        return ordinary + torch.einsum("blc,clk->bkc", step - usual, self.outlying)
+        alone = ordinary + torch.einsum("blc,clk->bkc", step - usual, self.outlying)
+        return torch.einsum("tk,bkc->btc", self.future, together + alone)
+
+
+def error_signs(seed: Tensor, steps: Tensor, disagreement: Tensor) -> Tensor:
+    """Logarithms (B, N, S) of what an error is judged by: how fast and how unevenly the figure moves, how far the net
+    takes it, and how much the net's answer differs from that to the mirrored question.
+
+    All in units of the channels' scales. seed: (B, L, M) frames. steps: (B, N, M) predicted, from the last frame.
+    disagreement: (B, N), how far the steps are from those predicted for the mirrored seed and mirrored back.
+    """
+    velocity = seed.diff(dim=1)
+    shared = [size(velocity[:, -1]), size(velocity).mean(1), size(velocity.diff(dim=1)[:, -2:]).mean(1)]
+    own = [size(steps), disagreement, size(steps.diff(dim=1, prepend=torch.zeros_like(steps[:, :1])))]
+    alike = [sign[:, None].expand(disagreement.shape) for sign in shared]
+    return torch.log(torch.stack([*alike, *own], dim=-1) + LEAST)
+
+
+def size(values: Tensor) -> Tensor:
+    """The root mean square (...) over the channels of (..., M)."""
+    return (values.square().mean(-1) + 1e-12).sqrt()
+
+
+class ErrorHead(nn.Module):
+    """Signs to the expected error in metres, the mean over the joints: for each predicted frame a log-linear law.
+
+    A net's errors where it was trained say little of its errors elsewhere, so the law has few numbers, and is fitted to
+    the errors that a trained net makes on motions that were held out.
+    """
+
+    weight: Tensor
+    bias: Tensor
+
+    def __init__(self, frames: int) -> None:
+        super().__init__()
+        self.register_buffer("weight", torch.zeros(frames, 6))
+        self.register_buffer("bias", torch.zeros(frames))
+
+    def forward(self, logarithms: Tensor) -> Tensor:
+        """(B, N, S) to metres (B, N)."""
+        return torch.exp((logarithms * self.weight).sum(-1) + self.bias)
+
+    @torch.no_grad()
+    def fit(self, logarithms: Tensor, errors: Tensor) -> None:
+        """Set the law by measured errors (B, N) in metres, so that its mean is theirs.
+
+        It is the likeliest one if errors are distributed exponentially, so their largest values do not lead it.
+        """
+        middle, spread = logarithms.mean(0), logarithms.std(0).clamp_min(1e-3)
+        signs = ((logarithms - middle) / spread).double()
+        law = torch.zeros(len(self.bias), self.weight.shape[1] + 1, dtype=torch.float64, requires_grad=True)
+        law.data[:, -1] = errors.double().mean(0).log()
+        descent = torch.optim.LBFGS([law], max_iter=200, line_search_fn="strong_wolfe")
+
+        def loss() -> Tensor:
+            descent.zero_grad()
+            log = (signs * law[:, :-1]).sum(-1) + law[:, -1]
+            lost = (log + errors * torch.exp(-log)).mean() + 1e-2 * law[:, :-1].square().mean()
+            lost.backward()  # type: ignore[no-untyped-call]
+            return lost
+
+        with torch.enable_grad():
+            descent.step(loss)  # type: ignore[no-untyped-call]
+        found = law.detach()
+        self.weight.copy_(found[:, :-1] / spread)
+        self.bias.copy_(found[:, -1] - (found[:, :-1] * middle / spread).sum(-1))
 
 
 class Predictor(Net):
     """Seed frames (B, L, C) to the next frames (B, N, C), both in the contract's units.
 
-    mean, scale: (D,) of the kept channels; a held channel is seen as its difference to the last
-    frame over its scale. Channels that are held or do not vary stay as they are in the last frame.
+    mean, scale: (D,) of the kept channels; a held channel is seen as its difference to the last frame over its scale.
+    Channels that are held or do not vary stay as they are in the last frame. doubt: the error head.
     """
 
+    CONFIG = PredictorConfig
     kept: Tensor
     relative: Tensor
     placing: Tensor
     mirrored: Tensor
     signs: Tensor
     doubt: ErrorHead | None
-    """The error head, by the name that it has in the weights of runs."""
 
     def __init__(self, config: PredictorConfig) -> None:
         super().__init__(len(config.kept))
@@ -183,7 +232,7 @@ class Predictor(Net):
     def error_signs(self, frames: Tensor, trajectory: Tensor, disagreement: Tensor) -> Tensor:
         """The signs (B, N, S) of an error, from frames (B, L, C) and what :meth:`with_disagreement` gives for them."""
         seed = self._seen(frames)[..., self.config.held :]
-        return signs(seed, self._moved(trajectory - frames[:, -1:]), disagreement)
+        return error_signs(seed, self._moved(trajectory - frames[:, -1:]), disagreement)
 
     def expected_error(self, frames: Tensor, trajectory: Tensor, disagreement: Tensor) -> Tensor:
         """What :meth:`error_signs` takes to the expected error (B, N) in metres."""
@@ -197,16 +246,14 @@ class Predictor(Net):
 
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """The encoder, the step and, where the net knows its errors, those: each with its contract."""
-        frames = TensorSpec("frames", ("batch", self.config.seed_frames, self.config.channels))
-        coming, left = (
-            TensorSpec(name, ("batch", self.config.frames, self.config.channels))
-            for name in ("trajectory", "next_trajectory")
-        )
-        frame = TensorSpec("frame", ("batch", self.config.channels))
+        channels, count = self.config.channels, self.config.frames
+        frames = TensorSpec("frames", ("batch", self.config.seed_frames, channels))
+        coming, left = (TensorSpec(name, ("batch", count, channels)) for name in ("trajectory", "next_trajectory"))
+        frame = TensorSpec("frame", ("batch", channels))
         step = (Step(), GraphSpec((coming,), (frame, left), {coming.name: left.name}))
         if self.doubt is None:
             return {"encoder": (self, GraphSpec((frames,), (coming,))), "step": step}
-        apart, error = (TensorSpec(name, ("batch", self.config.frames)) for name in ("disagreement", "error"))
+        apart, error = (TensorSpec(name, ("batch", count)) for name in ("disagreement", "error"))
         return {
             "encoder": (Part(self, self.with_disagreement), GraphSpec((frames,), (coming, apart))),
             "step": step,

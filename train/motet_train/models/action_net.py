@@ -3,7 +3,7 @@
 Letters in shapes: B rows, W words, A actions, E numbers of a word's vector.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,16 +12,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from motet.bundle.graph import GraphSpec, TensorSpec
-from motet_train.models.net import Net, tuples
-
-UNK = 3
-"""The id of a word that is not known, :data:`motet.models.text.SPECIALS`."""
-
-ENDINGS = ("ingly", "edly", "ing", "ers", "ed", "es", "er", "ly", "s", "e")
-"""What a word may end in besides its stem, the longest first; what is left has at least three letters."""
-
-BESIDE = 0.3
-"""The standard deviation of the numbers of stems before training, where those of words are given: theirs is 1."""
+from motet_train.models.net import Net, before
 
 
 @dataclass(frozen=True)
@@ -40,6 +31,7 @@ class ActionsConfig:
 class ActionNet(Net):
     """Words to the probabilities of actions: vectors of words and stems, convolved over three words, mean and most."""
 
+    CONFIG = ActionsConfig
     stems: Tensor
 
     def __init__(self, config: ActionsConfig) -> None:
@@ -54,15 +46,15 @@ class ActionNet(Net):
 
     @torch.no_grad()
     def start_from(self, vectors: Tensor, known: Tensor) -> None:
-        """Take up vectors of words (words, E), of those that are known (words,) bool; stems say little beside them."""
+        """Start from vectors (words, E) of deviation 1 where ``known`` (words,); stems say little beside them."""
         self.words.weight[known] = vectors[known]
-        self.roots.weight.mul_(BESIDE)
+        self.roots.weight.mul_(0.3)
 
     def forward(self, words: Tensor, lengths: Tensor) -> Tensor:
         """Ids (B, W) int64 of sentences of lengths (B,) int64 to log-probabilities (B, A)."""
-        known = (torch.arange(words.shape[1], device=words.device) < lengths[:, None]).to(torch.float32)
-        if self.training:
-            words = words.masked_fill(torch.rand(words.shape, device=words.device) < self.config.word_dropout, UNK)
+        known = before(lengths, words.shape[1]).to(torch.float32)
+        if self.training:  # 3 is the id of unknown words
+            words = words.masked_fill(torch.rand(words.shape, device=words.device) < self.config.word_dropout, 3)
         vectors = self.words(words) + self.roots(self.stems[words])
         vectors = self.dropout(vectors) * known[..., None]
         around = functional.gelu(self.around(vectors.transpose(1, 2))) * known[:, None]
@@ -81,14 +73,9 @@ class ActionNet(Net):
         return {}
 
 
-def from_config(config: Mapping[str, Any]) -> ActionNet:
-    """An untrained net of a configuration as it stands in a manifest."""
-    return ActionNet(ActionsConfig(**tuples(config)))
-
-
 def stem(word: str) -> str:
     """A word without its ending, and one of two equal letters left at the end: "running" and "runs" are "run"."""
-    for ending in ENDINGS:
+    for ending in ("ingly", "edly", "ing", "ers", "ed", "es", "er", "ly", "s", "e"):
         if word.endswith(ending) and len(word) - len(ending) >= 3:
             word = word[: -len(ending)]
             break

@@ -3,7 +3,6 @@
 See :mod:`motet.decode.matching`, whose letters are used here; P = 4 J + 1 are the numbers of a pose.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,8 +13,8 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from motet.bundle.graph import GraphSpec
-from motet_train.models.codes.sixd_places import SixdPlaces, Tree
-from motet_train.models.net import Net, tuples
+from motet_train.models.kinematics import SixdPlaces, Tree
+from motet_train.models.net import Net
 
 Speeds = tuple[float, float, float, float, float]
 """Of a gait in m/s: the slowest, the usual one, and the fastest forward, sideways and backwards; 0 where it does not go
@@ -53,6 +52,7 @@ class MatchingConfig:
 class Matching(Net):
     """Codes (N, K) and the poses that they stand for, which are trained, and the rest of the table."""
 
+    CONFIG = MatchingConfig
     pose_mean: Tensor
 
     def __init__(self, config: MatchingConfig) -> None:
@@ -98,10 +98,3 @@ def quat_to_sixd(quats: Tensor) -> Tensor:
     axis_x = [1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)]
     axis_y = [2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)]
     return torch.stack(axis_x + axis_y, dim=-1)
-
-
-def from_config(config: Mapping[str, Any]) -> Matching:
-    """An untrained net of a configuration as it stands in a manifest."""
-    found = {name: tuples(value) for name, value in config.items() if name != "tree"}
-    tree = Tree(**{name: tuples(value) for name, value in config["tree"].items()})
-    return Matching(MatchingConfig(**found, tree=tree))

@@ -1,1 +1,0 @@
-"""Motion as words: a codec of motions, and the model that writes its codes."""

@@ -1,1 +1,0 @@
-"""Nets for live control."""

@@ -1,1 +1,0 @@
-"""Nets between motion and language."""

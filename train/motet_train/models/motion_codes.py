@@ -1,0 +1,259 @@
+"""Motion as words: which action a sentence asks for, codes written for the action, and the codec that makes them move.
+
+The writer is a causal transformer told which action is shown. A step of codes is one entry of the book of root moves,
+or the end, and ``groups`` codes of the body; they are written one after the other, each knowing those before it in its
+step. The action modulates every layer (adaptive layer norm: Perez et al. 2018, Peebles and Xie 2023), since a net told
+it once can ignore it: past codes say more about the next ones. Attention falls with the distance in time (ALiBi: Press
+et al. 2022), so that it works beyond the lengths seen in training.
+
+Letters in shapes: B rows, A actions, N steps of codes, P parts of a step (the move first), V codes of the largest part,
+C width, H heads, L numbers that a step's codes stand for, T frames, D channels.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+from torch.nn import functional
+
+from motet.bundle.graph import GraphSpec, TensorSpec
+from motet_train.models.action_net import ActionNet, ActionsConfig
+from motet_train.models.codec import CodecConfig, MotionCodec
+from motet_train.models.net import Net, Part
+
+
+@dataclass(frozen=True)
+class CodeModelConfig:
+    """Sizes, and what training adds.
+
+    actions: how many there are; a further one says nothing. hidden: the share of past steps that are hidden in
+    training; unsaid: of sequences whose action is not told. ages: the steps since the action began that are told apart.
+    """
+
+    actions: int
+    width: int = 192
+    layers: int = 3
+    heads: int = 6
+    action: int = 96
+    ages: int = 256
+    hidden: float = 0.3
+    unsaid: float = 0.1
+
+
+class Block(nn.Module):
+    """Attention to the past and a gated feed-forward layer, both modulated by the action."""
+
+    slopes: Tensor
+
+    def __init__(self, width: int, heads: int, told: int) -> None:
+        super().__init__()
+        self.heads = heads
+        self.told = nn.Linear(told, 6 * width)
+        nn.init.zeros_(self.told.weight)
+        nn.init.zeros_(self.told.bias)
+        self.asked = nn.Linear(width, 3 * width, bias=False)
+        self.mixed = nn.Linear(width, width, bias=False)
+        self.inward, self.outward = nn.Linear(width, 4 * width), nn.Linear(4 * width, width)
+        slopes = 2.0 ** -torch.linspace(1, 8, heads)
+        self.register_buffer("slopes", slopes[:, None, None], persistent=False)
+
+    def forward(self, x: Tensor, told: Tensor, past: Tensor) -> tuple[Tensor, Tensor]:
+        """(B, N, C) to the same; past: keys and values (B, H, M, 2 C / H) of the steps before, given back with new."""
+        shift, scale, gate, shift_2, scale_2, gate_2 = self.told(told).chunk(6, dim=-1)
+        found, past = self._attend(functional.layer_norm(x, x.shape[-1:]) * (1 + scale) + shift, past)
+        x = x + (1 + gate) * self.mixed(found)
+        inner = functional.gelu(self.inward(functional.layer_norm(x, x.shape[-1:]) * (1 + scale_2) + shift_2))
+        return x + (1 + gate_2) * self.outward(inner), past
+
+    def _attend(self, x: Tensor, past: Tensor) -> tuple[Tensor, Tensor]:
+        asked, keys, values = self.asked(x).unflatten(-1, (3, self.heads, -1)).permute(2, 0, 3, 1, 4)
+        past = torch.cat([past, torch.cat([keys, values], dim=-1)], dim=2)
+        keys, values = past.chunk(2, dim=-1)
+        now = torch.arange(x.shape[1], device=x.device) + past.shape[2] - x.shape[1]
+        ago = now[:, None] - torch.arange(past.shape[2], device=x.device)
+        bias = torch.where(ago >= 0, -self.slopes * ago, -torch.inf)
+        scores = asked @ keys.transpose(-1, -2) * keys.shape[-1] ** -0.5 + bias
+        return (scores.softmax(dim=-1) @ values).transpose(1, 2).flatten(2), past
+
+
+class CodeModel(nn.Module):
+    """The transformer and, for each part of a step, a small net that says how probable its codes are."""
+
+    def __init__(self, config: CodeModelConfig, sizes: tuple[int, ...], numbers: int) -> None:
+        """sizes: how many codes each part has, the end being the last move. numbers: that a step's codes stand for."""
+        super().__init__()
+        self.config, self.sizes, width = config, sizes, config.width
+        self.actions = nn.Embedding(config.actions + 1, config.action)
+        self.ages = nn.Embedding(config.ages, config.action)
+        self.seen = nn.Linear(numbers, width)
+        self.moves = nn.Embedding(sizes[0] + 1, width)  # one more: nothing yet
+        self.masked = nn.Parameter(torch.zeros(width))
+        self.blocks = nn.ModuleList(Block(width, config.heads, config.action) for _ in range(config.layers))
+        self.before = nn.ModuleList(nn.Embedding(size, width) for size in sizes[:-1])
+        self.heads = nn.ModuleList(
+            nn.Sequential(nn.LayerNorm(width), nn.Linear(width, width), nn.GELU(), nn.Linear(width, size))
+            for size in sizes
+        )
+
+    def start(self, rows: int) -> Tensor:
+        """What attention knows before the first step: (B, K, H, 0, 2 C / H) of K layers."""
+        config = self.config
+        return self.masked.new_zeros(rows, config.layers, config.heads, 0, 2 * config.width // config.heads)
+
+    def forward(
+        self, moves: Tensor, numbers: Tensor, action: Tensor, age: Tensor, past: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """What is known of the steps to come (B, N, C), and the past with these steps.
+
+        moves: (B, N) int64 entries of the steps before, ``sizes[0]`` where there was none. numbers: (B, N, L) for
+        which their codes stand. action: (B, N) int64. age: (B, N) int64 steps since the action began. past: of
+        :meth:`start`.
+        """
+        told = self.actions(action) + self.ages(age.clamp_max(self.config.ages - 1))
+        x = self.moves(moves) + self.seen(numbers)
+        if self.training:
+            hidden = torch.rand(moves.shape, device=x.device) < self.config.hidden
+            x = torch.where(hidden[..., None], self.masked, x)
+        pasts = []
+        for block, old in zip(self.blocks, past.unbind(1), strict=True):
+            x, new = block(x, told, old)
+            pasts.append(new)
+        return x, torch.stack(pasts, dim=1)
+
+    def logits(self, known: Tensor, codes: Tensor) -> list[Tensor]:
+        """For each part the logits (..., size) of its codes, from what is known (..., C) and the codes (..., P) of the
+        step, of which each part sees those before it."""
+        found = []
+        for part, head in enumerate(self.heads):
+            found.append(head(known))
+            if part < len(self.before):
+                known = known + self.before[part](codes[..., part])
+        return found
+
+
+@dataclass(frozen=True)
+class MotionCodesConfig:
+    """The configurations of its three parts. remembered: M steps of training motions that it keeps."""
+
+    codec: CodecConfig
+    text: ActionsConfig
+    writer: CodeModelConfig
+    remembered: int = 1
+
+
+class MotionCodes(Net):
+    """The three nets, and a memory. The writer alone is trained here.
+
+    memory: (M, P + 2) int16 steps of training motions one after the other, each with its action and its age.
+    """
+
+    CONFIG = MotionCodesConfig
+    memory: Tensor
+
+    def __init__(self, config: MotionCodesConfig) -> None:
+        super().__init__(config.codec.channels)
+        self.config = config
+        self.codec = MotionCodec(config.codec).requires_grad_(False)
+        self.text = ActionNet(config.text).requires_grad_(False)
+        codec = config.codec
+        self.sizes = (codec.moves + 1, *[codec.codes] * codec.groups)
+        self.writer = CodeModel(config.writer, self.sizes, 3 + codec.groups * len(codec.levels))
+        self.register_buffer("memory", torch.zeros(config.remembered, len(self.sizes) + 2, dtype=torch.int16))
+
+    def matrices(self) -> list[Tensor]:
+        """Those of the writer's blocks; layers with many classes learn better otherwise."""
+        return [module.weight for module in self.writer.blocks.modules() if isinstance(module, nn.Linear)]
+
+    @property
+    def end(self) -> int:
+        """The move that ends a motion; one more stands for what comes before the first step."""
+        return self.config.codec.moves
+
+    def take(self, codec: MotionCodec, text: ActionNet) -> None:
+        """Take up a trained codec, with its normalisation, and a trained net of actions."""
+        self.codec.load_state_dict(codec.state_dict())
+        self.text.load_state_dict(text.state_dict())
+        self.mean.copy_(codec.mean)
+        self.scale.copy_(codec.scale)
+
+    def losses(self, codes: Tensor, before: Tensor, action: Tensor, age: Tensor) -> Tensor:
+        """How surprising each part of each step is (B, N, P); of parts after an end, 0.
+
+        codes, before: (B, N, P) int64 of the steps and of the steps before them. action, age: as the writer takes them.
+        """
+        known, _ = self.writer(*self._seen(before), action, age, self.writer.start(len(codes)))
+        found = []
+        for part, logits in enumerate(self.writer.logits(known, codes)):
+            target = codes[..., part].flatten()
+            found.append(functional.cross_entropy(logits.float().flatten(0, 1), target, reduction="none"))
+        losses = torch.stack(found, dim=-1).reshape(codes.shape)
+        real = torch.ones_like(losses)
+        real[..., 1:] = (codes[..., :1] != self.end).float()
+        return losses * real
+
+    def _seen(self, codes: Tensor) -> tuple[Tensor, Tensor]:
+        """Moves (B, N) and numbers (B, N, L) of codes (B, N, P), numbers 0 where nothing was."""
+        moves = codes[..., 0]
+        codec, there = self.codec, (moves < self.end)[..., None].float()
+        way = codec.book[moves.clamp_max(self.end - 1)] / codec.book_scale
+        return moves, torch.cat([way, codec.from_codes(codes[..., 1:])], dim=-1) * there
+
+    def step(self, codes: Tensor, action: Tensor, age: Tensor, past: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """What is known of the next step (B, C), and the numbers (B, L) for which the step before stands.
+
+        codes: (B, P) of the step before. action: (B,). age: (B,) steps since it began.
+        """
+        moves, numbers = self._seen(codes[:, None])
+        known, new = self.writer(moves, numbers, action[:, None], age[:, None], past)
+        return known[:, 0], numbers[:, 0], new
+
+    def part(self, known: Tensor, codes: Tensor) -> Tensor:
+        """Log-probabilities (B, P, V) of the codes of each part, given those (B, P) of the parts before it."""
+        found = []
+        for logits in self.writer.logits(known, codes):
+            missing = max(self.sizes) - logits.shape[-1]  # codes that this part lacks
+            found.append(functional.pad(functional.log_softmax(logits, dim=-1), (0, missing), value=-1e4))
+        return torch.stack(found, dim=1)
+
+    def decode(self, codes: Tensor) -> tuple[Tensor, Tensor]:
+        """Codes (B, N, P) to the frames of each step (B, N, T / N, D), as :meth:`MotionCodec.decode`, and moves
+        (B, N, 3)."""
+        moves = codes[..., 0]
+        frames = self.codec.decode(moves, self.codec.from_codes(codes[..., 1:]))
+        hop, channels = self.config.codec.hop, self.config.codec.channels
+        return frames.reshape(codes.shape[0], -1, hop, channels), self.codec.book[moves]
+
+    def tables(self) -> dict[str, NDArray[Any]]:
+        """The memory, and the numbers that a move (M, 3) and a code of the body (V, L) stand for."""
+        codec = self.config.codec
+        every = torch.arange(codec.codes)[:, None].expand(-1, codec.groups)
+        moves, body = self.codec.book / self.codec.book_scale, self.codec.from_codes(every)[:, : len(codec.levels)]
+        return {"memory": self.memory.numpy(), "moves": moves.numpy(), "body": body.numpy()}
+
+    def to_codes(self, frames: Tensor) -> Tensor:
+        """Frames of steps (B, N, T / N, D) in the contract's units to the codes (B, N, P - 1) of the body."""
+        return self.codec.to_codes(self.codec.encode(frames.flatten(1, 2)))
+
+    def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
+        """The encoder of sentences, the step and its parts, and the codec's two ways."""
+        writer, codec, parts = self.config.writer, self.config.codec, len(self.sizes)
+        action, age = (TensorSpec(name, ("batch",), "int64") for name in ("action", "age"))
+        codes, known = TensorSpec("codes", ("batch", parts), "int64"), TensorSpec("known", ("batch", writer.width))
+        numbers = TensorSpec("numbers", ("batch", self.writer.seen.in_features))
+        layers, heads, size = writer.layers, writer.heads, 2 * writer.width // writer.heads
+        past, longer = (TensorSpec(name, ("batch", layers, heads, "past", size)) for name in ("past", "next_past"))
+        start = {"past": (layers, heads, 0, size)}
+        stepped = GraphSpec((codes, action, age, past), (known, numbers, longer), {"past": "next_past"}, start)
+        chances = TensorSpec("log_probabilities", ("batch", parts, max(self.sizes)))
+        frames = TensorSpec("frames", ("batch", "steps", codec.hop, codec.channels))
+        written, body = (TensorSpec("codes", ("batch", "steps", count), "int64") for count in (parts, parts - 1))
+        moves = TensorSpec("moves", ("batch", "steps", 3))
+        return {
+            "encoder": self.text.encoder(),
+            "step": (Part(self, self.step), stepped),
+            "part": (Part(self, self.part), GraphSpec((known, codes), (chances,))),
+            "decoder": (Part(self, self.decode), GraphSpec((written,), (frames, moves))),
+            "tokens": (Part(self, self.to_codes), GraphSpec((frames,), (body,))),
+        }
