@@ -145,7 +145,7 @@ def find_bundle(name_or_path: str | Path) -> Path:
         fault = "neither a folder nor a file" if path.exists() else "no such path"
     except (OSError, TypeError, ValueError) as error:
         fault = str(error)
-    more = "" if entry_points(group=PLUGINS) else "; the package motet-papers has more"
+    more = "" if entry_points(group=PLUGINS) else "; more with pip install ./papers, from a clone of motet"
     raise BundleError(f"unknown bundle {name!r}: {fault}; expected one of {', '.join(known)}{more}")
 
 
