@@ -272,7 +272,9 @@ def test_packages_bring_bundles_by_an_entry_point(tmp_path: Path, monkeypatch: p
     assert load("describe").manifest.name == "describe"  # motet's own come first
     assert list(list_bundles()) == sorted([*{kind.VERB for kind in KINDS}, "bends"])
     monkeypatch.setattr("motet.bundle.bundle.entry_points", lambda group: ())
-    with pytest.raises(BundleError, match=r"expected one of control, describe.*more with pip install ./papers, from a clone"):
+    with pytest.raises(
+        BundleError, match=r"expected one of control, describe.*more with pip install ./papers, from a clone"
+    ):
         load("bends")
 
 
