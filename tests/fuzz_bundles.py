@@ -27,7 +27,7 @@ from motet.bundle.bundle import Bundle, list_bundles
 from motet.bundle.protobuf import Value, fields
 from motet.bundle.session import SessionOptions
 from motet.models.generate_codes import CodesModel
-from motet.models.verify import verify
+from motet.models.load import verify
 from motet.motion.motion import Motion
 
 CLIP = Path(__file__).parents[1] / "train" / "motet_train" / "data" / "cmu" / "39_14.amc"

@@ -30,8 +30,7 @@ from motet.formats import clips
 from motet.formats import read_motion as read
 from motet.formats import write_motion as write
 from motet.live.page import live_page, write_live_page
-from motet.models.base import BundleModel
-from motet.models.control import ControlModel
+from motet.models.base import BundleModel, ControlModel
 from motet.models.describe import DescribeModel, Description, Part
 from motet.models.familiarity import Understood
 from motet.models.fill import FillModel
@@ -51,64 +50,16 @@ from motet.motion.pose import Pose
 
 __version__ = version("motet")
 
+# fmt: off
 __all__ = [
-    "Bundle",
-    "BundleError",
-    "BundleModel",
-    "Checked",
-    "CodesModel",
-    "ControlError",
-    "ControlModel",
-    "ControlWarning",
-    "DecodingError",
-    "DescribeModel",
-    "Description",
-    "FillModel",
-    "FormatError",
-    "GenerateModel",
-    "GenerateSettings",
-    "Generated",
-    "Hit",
-    "Humanoid",
-    "Index",
-    "MixtureModel",
-    "MotetError",
-    "Motion",
-    "MotionError",
-    "OutputError",
-    "Part",
-    "Passage",
-    "Pose",
-    "PredictModel",
-    "PredictSession",
-    "ScriptError",
-    "SearchModel",
-    "SessionOptions",
-    "SettingError",
-    "SteerModel",
-    "SteerSession",
-    "SteerSnapshot",
-    "Story",
-    "TdbnModel",
-    "TdbnSession",
-    "TdbnSnapshot",
-    "TextError",
-    "TextWarning",
-    "Understood",
-    "UnitError",
-    "check",
-    "clips",
-    "from_humanoid",
-    "list_bundles",
-    "live_page",
-    "load",
-    "load_as",
-    "motion",
-    "read",
-    "read_map",
-    "to_humanoid",
-    "write",
-    "write_live_page",
+    "Bundle", "BundleError", "BundleModel", "Checked", "CodesModel", "ControlError", "ControlModel", "ControlWarning",
+    "DecodingError", "DescribeModel", "Description", "FillModel", "FormatError", "GenerateModel", "GenerateSettings",
+    "Generated", "Hit", "Humanoid", "Index", "MixtureModel", "MotetError", "Motion", "MotionError", "OutputError",
+    "Part", "Passage", "Pose", "PredictModel", "PredictSession", "ScriptError", "SearchModel", "SessionOptions",
+    "SettingError", "SteerModel", "SteerSession", "SteerSnapshot", "Story", "TdbnModel", "TdbnSession", "TdbnSnapshot",
+    "TextError", "TextWarning", "Understood", "UnitError", "check", "clips", "from_humanoid", "list_bundles",
+    "live_page", "load", "load_as", "motion", "read", "read_map", "to_humanoid", "write", "write_live_page",
 ]
+# fmt: on
 
 logging.getLogger("motet").addHandler(logging.NullHandler())

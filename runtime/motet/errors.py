@@ -1,24 +1,27 @@
-"""motet's own errors: each is also a builtin, and says what is wrong, where, and what was expected."""
+"""motet's own errors: each is also a builtin, and says what is wrong, where, and what was expected. And warnings."""
 
+import sys
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
-SHOWN = 60
-"""Characters of a faulty word that an error repeats."""
 
-LISTED = 6
-"""Names that an error lists."""
-
-
-def quoted(text: str) -> str:
-    """What was given or a file says, for an error: not more of it than fits on a line."""
-    return repr(text if len(text) <= SHOWN else text[:SHOWN] + "...")
+def quoted(text: str, most: int = 60) -> str:
+    """What was given or a file says, for an error: at most so many of its characters."""
+    return repr(text if len(text) <= most else text[:most] + "...")
 
 
-def listed(names: Sequence[str]) -> str:
+def listed(names: Sequence[str], most: int = 6) -> str:
     """Names with commas, for an error: the first of them and how many more there are."""
-    more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
-    return ", ".join(names[:LISTED]) + more
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+
+
+def warn(said: str, category: type[Warning]) -> None:
+    """Warn at the nearest line outside of this package: that of the caller, who can do something about it."""
+    level, frame = 1, sys._getframe(0)
+    while frame.f_back is not None and Path(frame.f_code.co_filename).is_relative_to(Path(__file__).parent):
+        level, frame = level + 1, frame.f_back
+    warnings.warn(said, category, stacklevel=level)
 
 
 class MotetError(Exception):

@@ -7,17 +7,25 @@ Those of a feature are a frozen dataclass, with defaults beside the code that us
         FEATURE: ClassVar = "foot_lock"
         reach: Annotated[float, Range(0, 1, "m")] = 0.2
 
-A bundle holds values of its own under ``settings.foot_lock`` of its manifest.
+A bundle holds values of its own under ``settings.foot_lock`` of its manifest. Here is also what the arguments of all
+verbs have in common: whole numbers that are checked, seeds, and reports of progress.
 """
 
 import math
-from collections.abc import Mapping
+import operator
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields
-from typing import Annotated, Any, ClassVar, NamedTuple, Self, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, ClassVar, NamedTuple, Self, SupportsIndex, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from motet.errors import BundleError, SettingError
+from motet.errors import BundleError, MotetError, SettingError
+
+Progress = Callable[[int, int], object]
+"""How long-running work reports its progress: called with the number done and the total."""
+
+Seed = SupportsIndex | Sequence[SupportsIndex]
+"""The first row's seed, counted up for the others; or one for each row. Integers of Python or numpy."""
 
 
 class Range(NamedTuple):
@@ -40,10 +48,9 @@ class Settings:
     """Of each setting by name: whether it is a whole number, and its range."""
 
     def __init_subclass__(cls) -> None:
-        hints = {
-            name: hint for name, hint in get_type_hints(cls, None, None, True).items() if get_origin(hint) is Annotated
-        }
-        cls.RANGES = {name: (get_args(hint)[0] is int, get_args(hint)[1]) for name, hint in hints.items()}
+        hints = get_type_hints(cls, include_extras=True).items()
+        ranges = {name: get_args(hint) for name, hint in hints if get_origin(hint) is Annotated}
+        cls.RANGES = {name: (kind is int, limits) for name, (kind, limits) in ranges.items()}
 
     def __post_init__(self) -> None:
         for name in self.RANGES:
@@ -82,6 +89,31 @@ class Settings:
 
 def is_number(value: object) -> bool:
     """Whether a value is a finite number, and not true or false."""
-    return (isinstance(value, int) and not isinstance(value, bool)) or (
-        isinstance(value, float) and math.isfinite(value)
-    )
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < math.inf
+
+
+def checked_int(name: str, value: Any, low: int, high: int, error: type[MotetError] = SettingError) -> int:
+    """A whole number of Python's or numpy's from ``low`` to ``high``; ``error`` for anything else, True and 2.0 too."""
+    try:
+        found = low - 1 if isinstance(value, bool) else operator.index(value)
+    except TypeError:
+        found = low - 1
+    if not low <= found <= high:
+        raise error(f"{name} must be a whole number from {low} to {high}, not {value!r}")
+    return found
+
+
+def seeds_of(seed: Seed, count: int, error: type[MotetError]) -> list[int]:
+    """A seed for each of ``count`` rows; ``error`` for a negative one, another number of them, or another type."""
+    try:  # arrays look like integers, too: iterables are asked for first
+        given = seed if isinstance(seed, Iterable) else range(operator.index(seed), operator.index(seed) + count)
+        found = list(map(operator.index, given))
+    except TypeError:
+        found = []
+    if len(found) != count or min(found, default=0) < 0:
+        raise error(f"expected a seed of 0 or more, or one for each of {count}, not {seed}")
+    return found
+
+
+def silent(done: int, total: int) -> None:
+    """Report no progress."""

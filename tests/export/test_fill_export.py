@@ -9,8 +9,7 @@ import torch
 
 from motet.bundle.bundle import Bundle
 from motet.models.fill import FillModel
-from motet.models.load import load
-from motet.models.verify import verify
+from motet.models.load import load, verify
 from motet.motion.humanoid.bones import BONES, HUMANOID
 from motet.representation.contract import MotionContract
 from motet.representation.placed import PLACED_CHANNELS

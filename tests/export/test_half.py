@@ -11,9 +11,8 @@ from torch import nn
 from motet.bundle.bundle import Bundle, list_bundles
 from motet.bundle.graph import GraphSpec, OnnxGraph, TensorSpec
 from motet.cli import main
-from motet.models.load import load_as
+from motet.models.load import load_as, verify
 from motet.models.tdbn_control import TdbnModel
-from motet.models.verify import verify
 from motet_export.exporter import export_graph
 from motet_export.half import halved, round_weights
 

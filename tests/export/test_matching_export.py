@@ -12,9 +12,8 @@ from motet import to_humanoid
 from motet.bundle.bundle import Bundle
 from motet.decode.steering_settings import SteeringSettings
 from motet.formats import read_motion
-from motet.models.load import load, load_as
+from motet.models.load import load, load_as, verify
 from motet.models.steer import SteerModel
-from motet.models.verify import verify
 from motet.motion.humanoid import HUMANOID
 from motet.representation import named
 from motet.representation.contract import MotionContract

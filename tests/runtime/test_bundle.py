@@ -21,8 +21,7 @@ from motet.bundle.session import SessionOptions
 from motet.cli import main
 from motet.decode.loops import LOOPS
 from motet.errors import BundleError, OutputError, SettingError
-from motet.models.load import KINDS, kind_of, load
-from motet.models.verify import verify
+from motet.models.load import KINDS, kind_of, load, verify
 
 SHIPPED = list_bundles()["cmu-control"]
 

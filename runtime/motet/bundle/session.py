@@ -6,8 +6,8 @@ from typing import Any
 
 import onnxruntime
 
-from motet.arguments import checked_int
 from motet.errors import SettingError
+from motet.settings import checked_int
 
 MAX_THREADS = 256
 

@@ -9,7 +9,7 @@ import click
 from motet.bundle.bundle import Bundle, list_bundles
 from motet.bundle.session import SessionOptions
 from motet.cli.options import session_options
-from motet.models.verify import verify as verify_bundle
+from motet.models.load import verify as verify_bundle
 
 NOT_STATED = "not stated"
 """Shown for a licence that is null."""

@@ -14,7 +14,7 @@ from motet.cli.writing import Output, size, write_options
 from motet.errors import ControlError
 from motet.formats import names_motion
 from motet.formats.html import write as write_html
-from motet.models.control import ControlModel
+from motet.models.base import ControlModel
 from motet.models.load import load_as
 
 

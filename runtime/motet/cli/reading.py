@@ -19,9 +19,9 @@ from motet.formats import FORMATS, READABLE, WRITABLE, check_writable, clips, re
 from motet.formats.clips import MARK, chosen, split_clip
 from motet.formats.lines import plain_names
 from motet.models.language import LanguageModel
-from motet.models.progress import Progress, silent
 from motet.motion.motion import Motion
 from motet.motion.units import METRES
+from motet.settings import Progress, silent
 
 log = logging.getLogger(__name__)
 

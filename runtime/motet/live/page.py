@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.arguments import checked_int
 from motet.decode.matching import mirrored_features
 from motet.decode.steering_settings import SteeringSettings
 from motet.draw.body import Body
@@ -23,6 +22,7 @@ from motet.models.steer import FEATURE_STEPS, SteerModel
 from motet.motion import two_bone
 from motet.motion.feet import lock as foot_lock
 from motet.motion.humanoid import BONES, HUMANOID
+from motet.settings import checked_int
 
 MOST = 8
 """Characters of a page at most."""

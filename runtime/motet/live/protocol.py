@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.arguments import checked_int
 from motet.errors import ControlError, ControlWarning, MotetError, quoted
 from motet.models.steer import SteerModel
 from motet.models.steer_session import LARGEST
 from motet.motion.humanoid import BONES, HUMANOID
 from motet.motion.pose import Pose
+from motet.settings import checked_int
 
 MOST = 16
 """Characters of a client at most."""

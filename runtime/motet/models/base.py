@@ -2,7 +2,8 @@
 
 import logging
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, Self, TypeVar, cast
 
@@ -54,7 +55,13 @@ class BundleModel(ABC):
         self.graphs, self.tables = graphs, tables or {}
         self.loop = LOOPS[manifest.loop]
         self.defaults = self.loop.defaults(manifest.defaults)
-        self._tuned = _read_settings(self.SETTINGS, manifest.settings)
+        known = {kind.FEATURE: kind for kind in self.SETTINGS}
+        if unknown := sorted(manifest.settings.keys() - known.keys()):
+            expected = ", ".join(known) or "none"
+            raise BundleError(f"manifest, settings.{unknown[0]}: is unknown; expected {expected}")
+        self._tuned = {
+            kind: kind.read(manifest.settings.get(name, {}), f"settings.{name}") for name, kind in known.items()
+        }
         self.sizes: Sizes = {"D": len(self.contract.channels)}
 
     def bind(self, role: str, inputs: Mapping[str, str], outputs: Mapping[str, str]) -> None:
@@ -92,13 +99,16 @@ class BundleModel(ABC):
         # sessions of ONNX Runtime do not pickle: another process loads the bundle again
         if self._source is None:
             raise TypeError("only a model loaded from a bundle can be pickled")
-        return _reload, (type(self), *self._source)
+        return self._reload, self._source
+
+    @classmethod
+    def _reload(cls, path: Path, options: SessionOptions) -> Self:
+        return cls.load(Bundle.open(path), options)
 
     def __repr__(self) -> str:
-        size = f"{len(self.contract.channels)} channels, {self.fps:g} fps"
-        return f"{type(self).__name__}({self.manifest.name!r}, {size})"
+        return f"{type(self).__name__}({self.manifest.name!r}, {self.sizes['D']} channels, {self.fps:g} fps)"
 
-    @property
+    @cached_property
     def fps(self) -> float:
         """The model's frames per second."""
         return self.contract.fps
@@ -117,14 +127,17 @@ class BundleModel(ABC):
         """The complete run of the golden vectors (docs/bundle.md): outputs from its inputs and settings."""
 
 
-def _read_settings(
-    kinds: Sequence[type[Settings]], given: Mapping[str, Mapping[str, Any]]
-) -> dict[type[Settings], Settings]:
-    known = {kind.FEATURE: kind for kind in kinds}
-    if unknown := sorted(given.keys() - known.keys()):
-        raise BundleError(f"manifest, settings.{unknown[0]}: is unknown; expected {', '.join(known) or 'none'}")
-    return {kind: kind.read(given.get(name, {}), f"settings.{name}") for name, kind in known.items()}
+class ControlModel(BundleModel):
+    """A model of controllable figures: :class:`motet.models.steer.SteerModel` or
+    :class:`motet.models.tdbn_control.TdbnModel`, depending on the bundle's loop. Each has its own script syntax."""
 
+    VERB = "control"
 
-def _reload(kind: type[BundleModel], path: Path, options: SessionOptions) -> BundleModel:
-    return kind.load(Bundle.open(path), options)
+    @abstractmethod
+    def run(self, script: str, *args: Any, **settings: Any) -> Motion:
+        """The motion of one figure that runs a script, with the settings of the subclass; ScriptError where it does not
+        parse."""
+
+    @abstractmethod
+    def captions(self, script: str) -> list[tuple[float, str]]:
+        """The start of each part of a script, in seconds, and its caption; ScriptError like :meth:`run`."""

@@ -14,7 +14,6 @@ from motet.decode.continue_codes import Continuer, Pace
 from motet.errors import DecodingError, MotionError
 from motet.models.generate import SETTLED, GenerateModel
 from motet.models.generate_codes import CodesModel
-from motet.models.progress import Progress, silent
 from motet.motion.feet.contacts import GROUND_PERCENT, feet_of, ground_of
 from motet.motion.feet.hold import BENT, hold_feet, windows
 from motet.motion.humanoid import HUMANOID, Figure
@@ -26,6 +25,7 @@ from motet.representation.contract import MotionContract
 from motet.representation.retargeting import from_model_figure
 from motet.representation.root_block import last_place
 from motet.representation.root_sixd import facing, in_world
+from motet.settings import Progress, silent
 
 RATES = 3
 """Number of root-rate channels; they scale with the tempo."""

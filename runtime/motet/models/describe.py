@@ -16,12 +16,10 @@ from motet.decode.loops import LOOPS
 from motet.decode.score import score_words
 from motet.errors import DecodingError
 from motet.models.language import MAX_SECONDS, LanguageModel
-from motet.models.progress import Progress, silent
-from motet.models.seeds import seeds_of
 from motet.models.text import EOS, PAD, SOS, UNK
 from motet.models.timeline import TimelineSettings, best_path, edges, near_scores, windows
 from motet.motion.motion import Motion
-from motet.settings import Range, Settings
+from motet.settings import Progress, Range, Settings, seeds_of, silent
 
 Decoding = Literal["beam", "consensus"]
 """How descriptions are found."""

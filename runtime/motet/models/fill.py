@@ -7,13 +7,11 @@ from typing import Any, cast, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from motet.arguments import checked_int
 from motet.bundle.graph import Arrays, Graph
 from motet.bundle.manifest import Manifest
 from motet.errors import BundleError, MotionError
 from motet.models.base import BundleModel
 from motet.models.gaps import Gap, at_own_rate, log_elsewhere, spans_of
-from motet.models.progress import Progress, silent
 from motet.motion.follow import placed_after, to_figure_of
 from motet.motion.humanoid import HUMANOID, on_humanoid
 from motet.motion.motion import Motion
@@ -21,6 +19,7 @@ from motet.motion.rotations import Array
 from motet.representation.placed import PLACED_CHANNELS, bridge, placed, pose_of, put_at, seen_from, unplaced
 from motet.representation.retargeting import from_model_figure
 from motet.representation.root_sixd import facing
+from motet.settings import Progress, checked_int, silent
 
 SEEN = 5.0
 """Seconds before and after a gap from which a figure is retargeted onto the humanoid: its ground, its stance."""

@@ -17,12 +17,11 @@ from motet.files import File
 from motet.formats import write_motion
 from motet.formats.character import Character
 from motet.models.language import LanguageModel
-from motet.models.progress import Progress, silent
-from motet.models.seeds import Seed, seeds_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
 from motet.representation.contract import MotionContract
+from motet.settings import Progress, Seed, seeds_of, silent
 
 SETTLED = 0.3
 """Blend-in time of foot planting, in seconds."""

@@ -10,7 +10,6 @@ from typing import Any, Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.arguments import warn
 from motet.bundle.fields import Fields
 from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
@@ -20,13 +19,13 @@ from motet.decode.continuation_settings import ContinuationSettings
 from motet.decode.memory import Memory
 from motet.decode.noise import Noise, apart
 from motet.decode.sample import Sample
-from motet.errors import BundleError, DecodingError, MotionError, TextError, TextWarning
+from motet.errors import BundleError, DecodingError, MotionError, TextError, TextWarning, warn
 from motet.models.familiarity import FamiliaritySettings, Known, Understood
 from motet.models.generate import Generated, GenerateModel
-from motet.models.seeds import Seed
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.representation.root_sixd import in_world
+from motet.settings import Seed
 
 FINE = 4
 """Frames that the decoder's frame-rate layers look back."""

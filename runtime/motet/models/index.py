@@ -22,10 +22,10 @@ from motet.files import files_in, write_whole
 from motet.formats import MOCAP, clips, read_motion
 from motet.formats.clips import MARK
 from motet.formats.npy import array
-from motet.models.progress import Progress, silent
 from motet.models.search import IndexSettings, SearchModel
 from motet.motion.motion import Motion
 from motet.motion.units import metres
+from motet.settings import Progress, silent
 
 log = logging.getLogger(__name__)
 

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.arguments import warn
 from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
 from motet.decode.rollout import two_rows
-from motet.errors import BundleError, MotionError, TextError, TextWarning
+from motet.errors import BundleError, MotionError, TextError, TextWarning, warn
 from motet.models.base import BundleModel
 from motet.models.text import TextRules, Vocabulary
 from motet.motion.motion import Motion

@@ -1,10 +1,12 @@
-"""Loading a model: from a bundle's name or path to the model of its verb."""
+"""From a bundle's name or path to the model of its verb; and whether the bundle is whole and works here."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, TypeVar, cast, overload
 
 from motet.bundle.bundle import Bundle
+from motet.bundle.golden import replay
 from motet.bundle.graph import Arrays, Graph
 from motet.bundle.manifest import Manifest
 from motet.bundle.session import SessionOptions
@@ -85,10 +87,32 @@ def build(manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None
 
 def kind_of(manifest: Manifest) -> type[BundleModel]:
     """The class of a manifest's verb and loop; BundleError for an unknown verb, or a loop of another verb."""
-    if manifest.verb not in (verbs := sorted({kind.VERB for kind in KINDS})):
-        raise BundleError(f"manifest, verb: {manifest.verb!r} is unknown; expected one of {', '.join(verbs)}")
     by_loop = {loop: kind for kind in KINDS if manifest.verb == kind.VERB for loop in kind.LOOPS}
+    if not by_loop:
+        verbs = ", ".join(sorted({kind.VERB for kind in KINDS}))
+        raise BundleError(f"manifest, verb: {manifest.verb!r} is unknown; expected one of {verbs}")
     if manifest.loop not in by_loop:
         loops = ", ".join(by_loop)
         raise BundleError(f"manifest, loop: {manifest.loop!r} does not {manifest.verb}; expected one of {loops}")
     return by_loop[manifest.loop]
+
+
+@dataclass(frozen=True)
+class Verified:
+    """The files, the active providers, and the errors of each graph and of the run against the golden vectors."""
+
+    files: tuple[str, ...]
+    providers: tuple[str, ...]
+    errors: Mapping[str, float]
+    tolerance: float
+
+
+def verify(bundle: Bundle, options: SessionOptions | None = None) -> Verified:
+    """Read all files of a bundle, load its model, and replay its golden vectors; BundleError at the first fault."""
+    files, golden = bundle.check_files(), bundle.manifest.golden
+    with bundle.named():
+        model = kind_of(bundle.manifest).load(bundle, options)
+        if golden is None:
+            raise BundleError("it has no golden vectors")
+        errors = replay(model, bundle.read(golden.file), golden)
+    return Verified(tuple(files), model.providers, errors, golden.tolerance)

@@ -9,7 +9,6 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from motet.arguments import checked_int
 from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
 from motet.bundle.signature import bind
@@ -18,12 +17,10 @@ from motet.errors import BundleError, DecodingError, MotionError
 from motet.models.base import BundleModel
 from motet.models.continuation import carried_on, futures, together
 from motet.models.generate import GenerateModel
-from motet.models.progress import Progress, silent
-from motet.models.seeds import Seed, seeds_of
 from motet.motion.humanoid import Figure
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
-from motet.settings import is_number
+from motet.settings import Progress, Seed, checked_int, is_number, seeds_of, silent
 
 MAX_FRAMES, MAX_GOLDEN = 100_000, 1000
 """Most frames of a prediction, which is held in memory as a whole, and of one in golden vectors."""

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from motet.arguments import checked_int
 from motet.bundle.fields import LARGEST, Fields
 from motet.bundle.graph import Arrays, Graph
 from motet.bundle.manifest import Manifest
@@ -15,7 +14,7 @@ from motet.decode.playback import Playback
 from motet.decode.pose_codes import PoseCodes
 from motet.decode.steering_settings import SteeringSettings
 from motet.errors import BundleError, ControlError
-from motet.models.control import ControlModel
+from motet.models.base import ControlModel
 from motet.models.steer_command import Gaits
 from motet.models.steer_script import captions, parse_orders
 from motet.models.steer_session import SteerSession
@@ -26,6 +25,7 @@ from motet.motion.motion import Motion
 from motet.motion.pose import Pose
 from motet.motion.rotations import rotmat_to_quat
 from motet.representation.root_sixd import ROOT_SIXD, SIXD_KINDS, joint_rotations
+from motet.settings import checked_int
 
 CHANNELS = (*ROOT_SIXD, *(f"{bone}.{kind}" for bone in BONES for kind in SIXD_KINDS))
 """In the order of a pose's numbers."""

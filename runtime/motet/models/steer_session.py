@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from motet.arguments import warn
 from motet.decode.playback import Playback, Rows
 from motet.decode.steering import tick
-from motet.errors import ControlError, ControlWarning
+from motet.errors import ControlError, ControlWarning, warn
 from motet.models.steer_command import Command
 from motet.models.steer_script import Order, parse_orders
 from motet.motion.feet.lock import FootLock, FootLockSettings

@@ -8,18 +8,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from motet.arguments import checked_int
 from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
 from motet.decode.lookahead import Ahead, Lookahead, LookaheadSettings
 from motet.decode.noise import RowNoise, RowsOfNoise
 from motet.decode.session import tick
 from motet.errors import BundleError, ControlError, DecodingError, MotionError
-from motet.models.control import ControlModel
-from motet.models.seeds import Seed, seeds_of
+from motet.models.base import ControlModel
 from motet.models.tdbn_script import control_track, parse_script, starts_of
 from motet.motion.heading import without_heading
 from motet.motion.motion import TURN, Motion
+from motet.settings import Seed, checked_int, seeds_of
 
 MAX_CHARACTERS = 100_000
 """Most of one session, whose state is in memory."""

@@ -14,8 +14,7 @@ from motet.bundle.graph import Floats, Graph
 from motet.decode.rollout import Ids, Scores
 from motet.decode.score import score_words
 from motet.models.language import padded
-from motet.models.progress import Progress, silent
-from motet.settings import Range, Settings
+from motet.settings import Progress, Range, Settings, silent
 
 ROWS = 512
 """Pairs scored at once."""
