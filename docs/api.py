@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, is_typeddict
 
 import motet
 import motet.motion
@@ -42,7 +42,9 @@ def entry(name: str, found: Any) -> str:
 
 
 def fields(kind: type) -> Iterator[str]:
-    """The public fields of a dataclass or of a typed dictionary, as they are written."""
+    """The public fields of a dataclass or of a typed dictionary, as they are written; those of its base, too."""
+    for base in map(ast.unparse, tree(kind).bases if is_typeddict(kind) else ()):
+        yield from fields(vars(inspect.getmodule(kind))[base]) if base != "TypedDict" else ()
     for node in tree(kind).body:
         text = ast.unparse(node)
         if isinstance(node, ast.AnnAssign) and not text.startswith("_") and "ClassVar" not in text:

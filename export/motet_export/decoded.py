@@ -13,12 +13,11 @@ from motet.models.base import BundleModel
 from motet.models.describe import DescribeModel
 from motet.models.fill import FillModel
 from motet.models.generate import GenerateModel
-from motet.models.language import LanguageModel
+from motet.models.language import MAX_WORDS, SPECIALS, LanguageModel
 from motet.models.predict import PredictModel
 from motet.models.search import SearchModel
 from motet.models.steer import SteerModel
 from motet.models.tdbn_control import TdbnModel
-from motet.models.text import MAX_WORDS, SPECIALS
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet_export.examples import sides, walks

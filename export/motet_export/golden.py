@@ -14,12 +14,11 @@ from motet.models.base import BundleModel
 from motet.models.describe import DescribeModel
 from motet.models.fill import FillModel
 from motet.models.generate import GenerateModel
-from motet.models.language import LanguageModel
+from motet.models.language import SPECIALS, LanguageModel
 from motet.models.predict import PredictModel
 from motet.models.search import SearchModel
 from motet.models.steer import SteerModel
 from motet.models.tdbn_control import TdbnModel
-from motet.models.text import SPECIALS
 from motet_export.examples import Examples, sides, walks
 
 FILE = "golden.npz"

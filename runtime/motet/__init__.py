@@ -32,11 +32,9 @@ from motet.formats import write_motion as write
 from motet.live.page import live_page, write_live_page
 from motet.models.base import BundleModel, ControlModel
 from motet.models.describe import DescribeModel, Description, Part
-from motet.models.familiarity import Understood
 from motet.models.fill import FillModel
-from motet.models.generate import Generated, GenerateModel, GenerateSettings
-from motet.models.generate_codes import CodesModel, Passage, Story
-from motet.models.generate_mixture import MixtureModel
+from motet.models.generate import Generated, GenerateModel, GenerateSettings, MixtureModel
+from motet.models.generate_codes import CodesModel, Passage, Story, StorySettings, Understood
 from motet.models.index import Hit, Index
 from motet.models.load import load, load_as
 from motet.models.predict import PredictModel, PredictSession
@@ -56,9 +54,10 @@ __all__ = [
     "DecodingError", "DescribeModel", "Description", "FillModel", "FormatError", "GenerateModel", "GenerateSettings",
     "Generated", "Hit", "Humanoid", "Index", "MixtureModel", "MotetError", "Motion", "MotionError", "OutputError",
     "Part", "Passage", "Pose", "PredictModel", "PredictSession", "ScriptError", "SearchModel", "SessionOptions",
-    "SettingError", "SteerModel", "SteerSession", "SteerSnapshot", "Story", "TdbnModel", "TdbnSession", "TdbnSnapshot",
-    "TextError", "TextWarning", "Understood", "UnitError", "check", "clips", "from_humanoid", "list_bundles",
-    "live_page", "load", "load_as", "motion", "read", "read_map", "to_humanoid", "write", "write_live_page",
+    "SettingError", "SteerModel", "SteerSession", "SteerSnapshot", "Story", "StorySettings", "TdbnModel", "TdbnSession",
+    "TdbnSnapshot", "TextError", "TextWarning", "Understood", "UnitError", "check", "clips", "from_humanoid",
+    "list_bundles", "live_page", "load", "load_as", "motion", "read", "read_map", "to_humanoid", "write",
+    "write_live_page",
 ]
 # fmt: on
 

@@ -18,15 +18,14 @@ from motet.formats import read_motion, write_motion
 from motet.models.base import BundleModel
 from motet.models.describe import DescribeModel
 from motet.models.fill import FillModel
+from motet.models.generate import MixtureModel
 from motet.models.generate_codes import CodesModel
-from motet.models.generate_mixture import MixtureModel
-from motet.models.language import LanguageModel
+from motet.models.language import EOS, SPECIALS, LanguageModel
 from motet.models.predict import PredictModel
 from motet.models.search import SearchModel
 from motet.models.steer import SteerModel
 from motet.models.steer_session import SteerSession
 from motet.models.tdbn_control import TdbnModel
-from motet.models.text import EOS, SPECIALS
 from motet.representation.placed import placed
 
 BATCHES = (64, 256, 512, 1024, 2048, 4096)

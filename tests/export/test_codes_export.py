@@ -12,8 +12,8 @@ from torch import nn
 import motet
 from motet.bundle.bundle import Bundle
 from motet.models.generate_codes import CodesModel
+from motet.models.language import RULES, SPECIALS
 from motet.models.load import verify
-from motet.models.text import RULES, SPECIALS
 from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.kinematics import positions
 from motet.motion.skeleton import END_SUFFIX

@@ -12,8 +12,8 @@ import torch
 from motet.bundle.bundle import Bundle
 from motet.models.describe import DescribeModel
 from motet.models.generate import GenerateModel
+from motet.models.language import RULES, SPECIALS
 from motet.models.load import load, verify
-from motet.models.text import RULES, SPECIALS
 from motet.representation.contract import Z_LIMIT
 from motet_export.bundles import export_run, parity_of
 from motet_export.examples import example

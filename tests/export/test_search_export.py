@@ -8,9 +8,9 @@ import pytest
 import torch
 
 from motet.bundle.bundle import Bundle
+from motet.models.language import RULES, SPECIALS
 from motet.models.load import load, verify
 from motet.models.search import SearchModel
-from motet.models.text import RULES, SPECIALS
 from motet.motion.humanoid.bones import HUMANOID
 from motet.representation.contract import MotionContract
 from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from motet.bundle.graph import Arrays, GraphSpec, TensorSpec
 from motet.bundle.manifest import Manifest
 from motet.models.describe import DescribeModel
-from motet.models.generate_mixture import MixtureModel
+from motet.models.generate import MixtureModel
+from motet.models.language import SPECIALS, Vocabulary
 from motet.models.search import SearchModel
-from motet.models.text import SPECIALS, Vocabulary
 from motet.motion.motion import Motion
 from motet.motion.skeleton import Joint, Skeleton
 from motet.representation.contract import MotionContract

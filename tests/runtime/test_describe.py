@@ -10,7 +10,7 @@ from motet.bench import WORDS, describe_figures, figures
 from motet.errors import BundleError, DecodingError, MotionError, TextError, TextWarning
 from motet.formats import write_motion
 from motet.models.describe import DescribeModel, Description
-from motet.models.language import batches, padded
+from motet.models.language import padded
 
 
 @pytest.fixture(scope="module")
@@ -234,8 +234,7 @@ def test_one_step_call_serves_the_batch(model: DescribeModel) -> None:
     assert step.calls <= 7
 
 
-def test_batches_and_padding() -> None:
-    assert list(batches([3, 1, 2, 1, 5], 2)) == [[1, 3], [2, 0], [4]]
+def test_padding() -> None:
     values, lengths = padded([np.ones((2, 3)), np.ones((1, 3))], "float32")
     assert (values.shape, values.dtype, lengths.tolist()) == ((2, 2, 3), np.float32, [2, 1])
     assert (values[1, 1] == 0).all()

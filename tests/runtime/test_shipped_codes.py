@@ -94,7 +94,7 @@ def test_a_writer_looks_back_at_a_window_of_steps(model: CodesModel) -> None:
 def test_a_stream_may_last(model: CodesModel) -> None:
     """It keeps no more after a while than at first."""
     noise = [np.random.Generator(np.random.PCG64(1))]
-    decoder, writer = model.decoder(), model.writer(noise, model.defaults)
+    decoder, writer = model.decoder(), Writer(model.source, noise, Drawing.of(model.defaults))
     pieces, steps, kept = list[Any](), list[Any](), list[int]()
     for _, step in drawn_steps(writer, np.array([7]), 160, True):
         steps.append(step)
@@ -170,12 +170,23 @@ def test_settings_out_of_range_are_refused(model: CodesModel) -> None:
     for seconds in (-1.0, 0, 601.0, float("nan")):
         with pytest.raises(DecodingError):
             model.generate(WALK, seconds=seconds)
-    for seconds in ([1.0], np.ones(3), np.float32(-1), "12", [1.0, "x"], 601, float("nan"), np.array(1.0)):
-        with pytest.raises(DecodingError, match="one for each of 2"):
-            model.story([WALK, JUMP], seconds=seconds)  # type: ignore[arg-type]
+    for seconds in (
+        [1.0],
+        np.ones(3),
+        np.float32(-1),
+        "12",
+        [1.0, "x"],
+        [1.0, 0.0],
+        0,
+        601,
+        float("nan"),
+        np.array(1.0),
+    ):
+        with pytest.raises(DecodingError, match="seconds must be"):
+            model.story([WALK, JUMP], seconds=seconds)  # type: ignore[typeddict-item]
     for seed in (-1, 1.5, "x", [1, 2]):
         with pytest.raises(DecodingError, match="expected a seed"):
-            model.story(WALK, seed=seed)  # type: ignore[arg-type]
+            model.story(WALK, seed=seed)  # type: ignore[typeddict-item]
     with pytest.raises(DecodingError, match="hypotheses must be 1, not 3"):
         model.story(WALK, hypotheses=3)
     with pytest.raises(DecodingError, match="no setting 'candidates'"):

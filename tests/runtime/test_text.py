@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from motet.errors import BundleError, TextError
-from motet.models.text import (
+from motet.models.language import (
     EOS,
     MAX_WORDS,
     PAD,

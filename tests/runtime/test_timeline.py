@@ -12,8 +12,8 @@ from motet.bundle.manifest import Manifest
 from motet.errors import MotionError
 from motet.formats import read_motion
 from motet.models.describe import DescribeModel, Description
+from motet.models.language import EOS, SOS
 from motet.models.load import load_as
-from motet.models.text import EOS, SOS
 from motet.models.timeline import TimelineSettings, best_path, edges, near_scores, windows
 from motet.motion.motion import Motion
 

@@ -5,7 +5,7 @@ import pytest
 import torch
 from language_data import small_store, walker
 
-from motet.models.text import RULES
+from motet.models.language import RULES
 from motet.motion.mirroring import mirror
 from motet.representation.root_block import to_root_block
 from motet_train.data.batch import Batch

@@ -25,7 +25,7 @@ from language_models import (
 )
 
 from motet.cli import main
-from motet.models.text import RULES, Vocabulary
+from motet.models.language import RULES, Vocabulary
 from motet.motion.motion import Motion
 from motet_train.data.store import FRAMES as FRAMES_FILE
 from motet_train.data.store import INDEX, Store

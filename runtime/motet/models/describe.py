@@ -15,8 +15,7 @@ from motet.decode.loop import Loop
 from motet.decode.loops import LOOPS
 from motet.decode.score import score_words
 from motet.errors import DecodingError
-from motet.models.language import MAX_SECONDS, LanguageModel
-from motet.models.text import EOS, PAD, SOS, UNK
+from motet.models.language import EOS, MAX_SECONDS, PAD, SOS, UNK, LanguageModel
 from motet.models.timeline import TimelineSettings, best_path, edges, near_scores, windows
 from motet.motion.motion import Motion
 from motet.settings import Progress, Range, Settings, seeds_of, silent

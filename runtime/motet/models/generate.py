@@ -1,4 +1,5 @@
-"""Generate: motions for a sentence; the base of all such models."""
+"""Generate: motions for a sentence. What all such models share, and those that draw frame by frame from mixtures of
+Gaussians (section 4.3 of Plappert et al. 2017)."""
 
 import warnings
 from abc import abstractmethod
@@ -9,9 +10,11 @@ from typing import Any, TypedDict, Unpack, cast, overload
 
 import numpy as np
 
-from motet.bundle.graph import Arrays, Floats
+from motet.bundle.graph import Arrays, Floats, Graph
+from motet.bundle.manifest import Manifest
 from motet.decode.noise import Noise, Recorded
 from motet.decode.sample import Sample
+from motet.decode.score import score_frames
 from motet.errors import DecodingError, TextError, TextWarning
 from motet.files import File
 from motet.formats import write_motion
@@ -30,7 +33,7 @@ PLAYED = 30.0
 """Default frame rate of generated motions, whatever the model's own rate."""
 
 
-class GenerateSettings(TypedDict, total=False):
+class LoopSettings(TypedDict, total=False):
     """Settings of a call, as far as the model's loop has them: :meth:`GenerateModel.generate`. None: the bundle's."""
 
     candidates: int | None
@@ -39,9 +42,22 @@ class GenerateSettings(TypedDict, total=False):
     guidance: float | None
     max_seconds: float | None
     memory: float | None
-    seconds: float | None
     temperature: float | None
     top_p: float | None
+
+
+class GenerateSettings(LoopSettings, total=False):
+    """Settings of a call of :meth:`GenerateModel.generate`; None: the bundle's."""
+
+    seconds: float | None
+
+
+class _Options(GenerateSettings, total=False):
+    """All that a call of :meth:`GenerateModel.generate` takes by name."""
+
+    seed: Seed
+    strict: bool
+    progress: Progress
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -101,32 +117,18 @@ class Generated:
 
 
 class GenerateModel(LanguageModel):
-    """A text-to-motion model: :class:`motet.models.generate_mixture.MixtureModel` or
+    """A text-to-motion model: :class:`MixtureModel` or
     :class:`motet.models.generate_codes.CodesModel`, depending on the bundle's loop."""
 
     VERB = "generate"
 
     @overload
     def generate(  # type: ignore[overload-overlap]  # a string is a sequence of strings, too
-        self,
-        sentences: str,
-        hypotheses: int | None = None,
-        *,
-        seed: Seed = 0,
-        strict: bool = False,
-        progress: Progress = silent,
-        **settings: Unpack[GenerateSettings],
+        self, sentences: str, hypotheses: int | None = None, **options: Unpack[_Options]
     ) -> list[Generated]: ...
     @overload
     def generate(
-        self,
-        sentences: Sequence[str],
-        hypotheses: int | None = None,
-        *,
-        seed: Seed = 0,
-        strict: bool = False,
-        progress: Progress = silent,
-        **settings: Unpack[GenerateSettings],
+        self, sentences: Sequence[str], hypotheses: int | None = None, **options: Unpack[_Options]
     ) -> list[list[Generated]]: ...
     def generate(
         self,
@@ -153,28 +155,33 @@ class GenerateModel(LanguageModel):
         TextError for a sentence that is empty, too long or wholly unknown; DecodingError for a setting that is out of
         range or unknown to the loop. Unknown words are named by a TextWarning and in the result.
         """
-        if settings.get("seconds") == 0:
-            raise DecodingError("seconds must be more than 0; omit them to let a motion end by itself")
         texts = [sentences] if isinstance(sentences, str) else list(sentences)
         own = {"hypotheses": hypotheses, **cast(Mapping[str, float | None], settings)}
         contexts, noise, chosen = self.asked(texts, len(texts), seed, strict, own)
-        found: list[list[Sample]] = []
-        for place in range(0, len(texts), self.loop.batch):
-            batch = slice(place, place + self.loop.batch)
-            found += self.decode(contexts[batch], noise[batch], chosen)
+        found: list[list[Generated]] = []
+        for start in range(0, len(texts), self.loop.batch):
+            batch = slice(start, start + self.loop.batch)
+            for text, row in zip(texts[batch], self.decode(contexts[batch], noise[batch], chosen), strict=True):
+                unknown = tuple(self.unknown(text))
+                found.append([Generated(self.contract, one.frames, one.log_likelihood, unknown) for one in row])
             progress(len(found), len(texts))
-        rows = [[self._generated(s, text) for s in row] for text, row in zip(texts, found, strict=True)]
-        return rows[0] if isinstance(sentences, str) else rows
+        return found[0] if isinstance(sentences, str) else found
 
     def asked(
         self, texts: Sequence[str], rows: int, seed: Seed, strict: bool, settings: Mapping[str, float | None]
     ) -> tuple[Floats, list[np.random.Generator], dict[str, float]]:
         """Contexts (N, C) of sentences, noise of ``rows`` rows, and all settings of the loop; see :meth:`generate`."""
-        ids, seeds = [self.ids(text) for text in texts], seeds_of(seed, rows, DecodingError)
-        chosen, contexts = self.loop.settled(self.defaults, settings), self.contexts(ids)
+        chosen, contexts = self._settled(settings), self.embed(texts)
+        noise = [np.random.Generator(np.random.PCG64(one)) for one in seeds_of(seed, rows, DecodingError)]
         for text, context in zip(texts, contexts, strict=True):
             self.note(text, context, strict)
-        return contexts, [np.random.Generator(np.random.PCG64(one)) for one in seeds], chosen
+        return contexts, noise, chosen
+
+    def _settled(self, settings: Mapping[str, float | None]) -> dict[str, float]:
+        """All settings of the loop, the bundle's in place of None; DecodingError like :meth:`generate`."""
+        if settings.get("seconds") == 0:
+            raise DecodingError("seconds must be more than 0; omit them to let a motion end by itself")
+        return self.loop.settled(self.defaults, settings)
 
     def check(self, sentence: str) -> None:
         """TextError where the model does not know all of a sentence; see :meth:`note`."""
@@ -196,10 +203,8 @@ class GenerateModel(LanguageModel):
 
     def embed(self, sentences: str | Sequence[str]) -> Floats:
         """The context vector (C,) float32 of a sentence, or vectors (N, C) of several; errors like :meth:`ids`."""
-        if isinstance(sentences, str):
-            context: Floats = self.contexts([self.ids(sentences)])[0]
-            return context
-        return self.contexts([self.ids(text) for text in sentences])
+        found = self.contexts([self.ids(text) for text in ([sentences] if isinstance(sentences, str) else sentences)])
+        return found[0] if isinstance(sentences, str) else found
 
     def score(self, sentence: str, motion: Motion) -> float:
         """Log-likelihood of a motion, and of its end, given a sentence; a TextWarning names the words taken as UNK.
@@ -218,5 +223,32 @@ class GenerateModel(LanguageModel):
         (row,) = self.decode(self.contexts([ids]), [Recorded(given)], chosen)
         return {"ids": ids, "frames": self.contract.normalised(row[0].frames).astype(np.float32)}
 
-    def _generated(self, sample: Sample, text: str) -> Generated:
-        return Generated(self.contract, sample.frames, sample.log_likelihood, tuple(self.unknown(text)))
+
+class MixtureModel(GenerateModel):
+    """A model whose step outputs a mixture, or frames.
+
+    graphs: "encoder" (words, lengths -> context), "step" (frame, context, states -> log_weights, means, stds,
+        active, next states), with frames normalised and the active flag last.
+    Its loops (:mod:`motet.decode.loops`) take the step, contexts (B, C), a generator of noise for each row, the largest
+    number of frames and their settings by name, and return samples for each row, best first.
+    """
+
+    LOOPS = ("mixture",)
+
+    def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:
+        super().__init__(manifest, graphs, tables)
+        self.sizes["F"] = self.sizes["D"] + 1  # with the active flag
+        self.bind("encoder", {"words": "*batch words", "lengths": "*batch"}, {"context": "batch C"})
+        self.bind("step", self.loop.inputs, self.loop.outputs)
+
+    def decode(self, contexts: Floats, noise: Sequence[Noise], settings: Mapping[str, Any]) -> list[list[Sample]]:
+        """See :meth:`GenerateModel.decode`."""
+        rest = {name: value for name, value in settings.items() if name != "max_seconds"}
+        frames = max(1, round(settings["max_seconds"] * self.fps))
+        found: list[list[Sample]] = self.loop.run(self.graphs["step"], contexts, noise, frames, **rest)
+        return [[one._replace(frames=self.contract.denormalised(one.frames)) for one in row] for row in found]
+
+    def score(self, sentence: str, motion: Motion) -> float:
+        """See :meth:`GenerateModel.score`."""
+        normal = self.contract.normalised(self.frames(motion)).astype(np.float32)
+        return score_frames(self.graphs["step"], self.embed(sentence), normal)

@@ -2,10 +2,10 @@
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Annotated, Any, ClassVar, Literal, Unpack, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,30 +20,25 @@ from motet.decode.memory import Memory
 from motet.decode.noise import Noise, apart
 from motet.decode.sample import Sample
 from motet.errors import BundleError, DecodingError, MotionError, TextError, TextWarning, warn
-from motet.models.familiarity import FamiliaritySettings, Known, Understood
-from motet.models.generate import Generated, GenerateModel
+from motet.models.generate import Generated, GenerateModel, LoopSettings
+from motet.models.language import TextRules
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.representation.root_sixd import in_world
-from motet.settings import Seed
-
-FINE = 4
-"""Frames that the decoder's frame-rate layers look back."""
-
-STANDING = "a person stands still"
-"""Sentence for a motion that is to start or end standing."""
-
-STAND = 0.8
-"""Seconds of standing."""
-
-LONGEST = 600.0
-"""Most seconds of a sentence."""
+from motet.settings import Range, Seed, Settings
 
 Stand = Literal["start", "end", "both"]
 """Where a figure stands briefly."""
 
-Seconds = float | None | Sequence[float | None]
-"""Lengths of sentences: one for all, or for each; None for one that ends by itself."""
+
+class StorySettings(LoopSettings, total=False):
+    """Settings of a call of :meth:`CodesModel.story`; seconds may be a list, of one value for each sentence."""
+
+    after: Motion | None
+    seconds: float | Sequence[float | None] | None
+    stand: Stand | None
+    seed: Seed
+    strict: bool
 
 
 @dataclass(frozen=True)
@@ -62,16 +57,59 @@ class Story(Generated):
     passages: tuple[Passage, ...] = ()
 
 
-class Telling(NamedTuple):
-    """A requested story: its sentences, the seconds of each or 0, contexts, noise of one row, all settings, and
-    the motion on the model's figure that it continues, if any."""
+@dataclass(frozen=True)
+class FamiliaritySettings(Settings):
+    """confident: least confidence of a known sentence (docs/generate.md).
 
-    texts: list[str]
-    seconds: list[float]
-    contexts: Floats
-    noise: list[np.random.Generator]
-    settings: Mapping[str, Any]
-    after: Motion | None
+    doubt: exponent of the probability of the likeliest action, which is often low because sentences share actions.
+    """
+
+    FEATURE: ClassVar[str] = "familiarity"
+    confident: Annotated[float, Range(0, 1)] = 0.4
+    doubt: Annotated[float, Range(0, 10)] = 0.25
+
+
+@dataclass(frozen=True)
+class Understood:
+    """confidence: from 0 to 1: the share of known words in a sentence, rare words counting more, times the certainty
+    about the action meant.
+
+    nearest: sentences of the likeliest actions, the likeliest first. confident: whether the model knows the sentence.
+    """
+
+    confidence: float
+    nearest: tuple[str, ...]
+    confident: bool
+
+
+class Known:
+    """The actions that a model knows: the key "actions" of its manifest; BundleError unless it has ``count`` entries.
+
+    sentences: one of each. rare: the weight of a word: the logarithm of the number of actions divided by the number
+    that it describes.
+    """
+
+    def __init__(self, manifest: Fields, count: int, rules: TextRules, settings: FamiliaritySettings) -> None:
+        entries = manifest.list_of_fields("actions")
+        if len(entries) != count:
+            raise BundleError(f"manifest, actions: {len(entries)} entries, expected {count}")
+        said = Counter(word for entry in entries for word in set(entry.texts("words")))
+        self.sentences = [entry.text("sentence") for entry in entries]
+        self.rare = {word: math.log((1 + count) / times) for word, times in said.items()}
+        self.rules, self.settings = rules, settings
+
+    def understood(self, sentence: str, context: Floats) -> Understood:
+        """How a sentence is understood, by the log-probabilities (A,) of actions; BundleError for other numbers."""
+        asked, unheard = set(self.rules.words(sentence)), math.log(1 + len(self.sentences))
+        heard = sum(self.rare.get(word, 0.0) for word in asked)
+        share = heard / (sum(self.rare.get(word, unheard) for word in asked) or 1.0)
+        order = np.argsort(-context, kind="stable")
+        nearest = dict.fromkeys(self.sentences[action] for action in order)
+        likeliest = float(context[order[0]])
+        if likeliest > 0.01:  # more than rounding
+            raise BundleError(f"graph encoder: its context holds {likeliest:g}, which is no log-probability")
+        confidence = share * math.exp(likeliest) ** self.settings.doubt
+        return Understood(confidence, tuple(nearest)[:3], confidence >= self.settings.confident)
 
 
 class CodesModel(GenerateModel):
@@ -89,31 +127,28 @@ class CodesModel(GenerateModel):
     def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:
         super().__init__(manifest, graphs, tables)
         codec = Fields(manifest.config, "config").fields("codec")
-        moves, self.sizes["T"] = codec.whole("moves", 1, 1 << 15), codec.whole("hop", 2, 100)
-        ahead = codec.items("ahead")
+        moves, hop, ahead = codec.whole("moves", 1, 1 << 15), codec.whole("hop", 2, 100), codec.items("ahead")
         if len(ahead) > 100 or any(one not in (0, 1) for one in ahead):
             raise codec.fault("0 or 1 for each of at most 100 layers", ahead, "ahead")
-        back = sum(2 - one for one in ahead) + math.ceil(FINE / self.sizes["T"])
-        field = ReceptiveField(back, sum(ahead), self.sizes["T"])
-        self.codec = Codec(graphs["decoder"], graphs["tokens"], field, moves, self.fps)
-        self._bind()
-        self.source = Source(graphs["step"], graphs["part"], moves, self.sizes["A"], self._memory())
+        back = sum(2 - one for one in ahead) + math.ceil(4 / hop)  # the layers at the frame rate look back 4 frames
+        self.codec = Codec(graphs["decoder"], graphs["tokens"], ReceptiveField(back, sum(ahead), hop), moves, self.fps)
+        self.sizes |= {"T": hop, "M": moves}
+        memory = self._bound()
+        self.source = Source(graphs["step"], graphs["part"], moves, self.sizes["A"], memory)
         self.continuation, familiarity = self.settings(ContinuationSettings), self.settings(FamiliaritySettings)
-        self.known = Known.read(Fields(manifest.source), self.sizes["A"], self.vocabulary.rules, familiarity)
+        self.known = Known(Fields(manifest.source), self.sizes["A"], self.vocabulary.rules, familiarity)
 
-    def _bind(self) -> None:
+    def _bound(self) -> Memory:
+        """The memory, once graphs and tables are found to fit each other."""
         self.bind("encoder", {"words": "*batch words", "lengths": "*batch"}, {"context": "batch A"})
         self.bind("step", self.loop.inputs, self.loop.outputs)
         self.bind("part", {"known": "batch H", "codes": "*batch P"}, {"log_probabilities": "batch P K"})
         self.bind("decoder", {"codes": "*batch steps P"}, {"frames": "batch steps T D", "moves": "batch steps 3"})
-        self.sizes["B"] = self.sizes["P"] - 1
+        self.sizes |= {"B": self.sizes["P"] - 1, "S": self.sizes["P"] + 2}
         self.bind("tokens", {"frames": "batch steps T D"}, {"codes": "*batch steps B"})
         if self.codec.moves >= self.sizes["K"]:
             most = self.sizes["K"] - 1
             raise BundleError(f"manifest, config.codec.moves: must be at most {most}, to fit the graph part")
-
-    def _memory(self) -> Memory:
-        self.sizes |= {"S": self.sizes["P"] + 2, "M": self.codec.moves}
         steps, moves = self.table("memory", "R S", "int16"), self.table("moves", "M 3", "float32")
         body = self.table("body", "Q N", "float32")
         if 3 + self.sizes["B"] * self.sizes["N"] != self.sizes["L"]:
@@ -142,28 +177,17 @@ class CodesModel(GenerateModel):
 
     def decode(self, contexts: Floats, noise: Sequence[Noise], settings: Mapping[str, Any]) -> list[list[Sample]]:
         """See :meth:`GenerateModel.decode`."""
-        count = settings["hypotheses"]
-        rows = np.repeat(np.arange(len(contexts)), count)
+        count, seconds = settings["hypotheses"], settings["seconds"]
         each = [one for own in noise for one in apart(own, count)]
-        actions = drawn_actions(self.source, contexts[rows], each, settings["certainty"])
-        seconds = settings["seconds"]
+        actions = drawn_actions(self.source, np.repeat(contexts, count, axis=0), each, settings["certainty"])
         longest = max(1, self.codec.steps(seconds or settings["max_seconds"]))
-        found = draw_codes(self.writer(each, settings), actions, longest, exactly=seconds > 0)
+        writer = Writer(self.source, each, Drawing.of(settings))
+        found = draw_codes(writer, actions, longest, exactly=seconds > 0)
         last = max(1, round(seconds * self.fps)) if seconds else None
         samples = [Sample(self.codec.frames_of(codes)[:last], None) for codes in found]
         return [samples[start : start + count] for start in range(0, len(samples), count)]
 
-    def story(
-        self,
-        sentences: str | Sequence[str],
-        *,
-        after: Motion | None = None,
-        seconds: Seconds = None,
-        stand: Stand | None = None,
-        seed: Seed = 0,
-        strict: bool = False,
-        **settings: float | None,
-    ) -> Story:
+    def story(self, sentences: str | Sequence[str], **settings: Unpack[StorySettings]) -> Story:
         """One continuous motion for several sentences, each starting where the last one ends.
 
         after: a motion to continue, of any human figure, from its last seconds. seconds: of each sentence, or one value
@@ -172,97 +196,97 @@ class CodesModel(GenerateModel):
         DecodingError for seconds, a seed or a setting out of range, and for several ``hypotheses``; MotionError for a
         motion that is too short to continue or not of a human figure; TextError like :meth:`generate`.
         """
-        told = self._telling(sentences, after, seconds, stand, seed, strict, settings)
-        pieces = list(self._pieces(told))
+        texts, after, drawn = self._told(sentences, **settings)
+        pieces = list(drawn)
         frames = np.concatenate([found for _, found in pieces])
         steps = Counter(number for number, _ in pieces[:-1])
-        shown = accumulate(steps[number] * self.codec.field.hop for number in range(len(told.texts)))
+        shown = accumulate(steps[number] * self.codec.field.hop for number in range(len(texts)))
         stops = [min(stop, len(frames)) / self.fps for stop in shown]
-        passages = tuple(map(Passage, told.texts, [0.0, *stops], stops))
-        unknown = tuple(word for text in told.texts for word in self.unknown(text))
-        return Story(self.contract, frames, None, unknown, told.after, passages)
+        passages = tuple(map(Passage, texts, [0.0, *stops], stops))
+        unknown = tuple(word for text in texts for word in self.unknown(text))
+        return Story(self.contract, frames, None, unknown, after, passages)
 
-    def stream(
-        self,
-        sentences: str | Sequence[str],
-        *,
-        after: Motion | None = None,
-        seconds: Seconds = None,
-        stand: Stand | None = None,
-        seed: Seed = 0,
-        strict: bool = False,
-        **settings: float | None,
-    ) -> Iterator[Motion]:
+    def stream(self, sentences: str | Sequence[str], **settings: Unpack[StorySettings]) -> Iterator[Motion]:
         """The motion of :meth:`story` in pieces, as they are drawn: each continues the last one.
 
         Feet are as drawn, since planting them requires knowing how long they stand. Memory and the time of a piece stay
         constant, however long the stream lasts. Errors like :meth:`story`.
         """
-        return self._streamed(self._telling(sentences, after, seconds, stand, seed, strict, settings))
+        _, after, drawn = self._told(sentences, **settings)  # what cannot be told is refused before the first piece
 
-    def _streamed(self, told: Telling) -> Iterator[Motion]:
-        last, pose = told.after, None
-        for _, frames in self._pieces(told):
-            if len(frames):
-                last, pose = in_world(self.contract.features(frames), last, pose)
-                yield last
+        def pieces() -> Iterator[Motion]:
+            last, pose = after, None
+            for _, frames in drawn:
+                if len(frames):
+                    last, pose = in_world(self.contract.features(frames), last, pose)
+                    yield last
 
-    def _telling(
+        return pieces()
+
+    def _told(
         self,
         sentences: str | Sequence[str],
-        after: Motion | None,
-        seconds: Seconds,
-        stand: str | None,
-        seed: Seed,
-        strict: bool,
-        settings: Mapping[str, float | None],
-    ) -> Telling:
+        *,
+        after: Motion | None = None,
+        seconds: float | Sequence[float | None] | None = None,
+        stand: Stand | None = None,
+        seed: Seed = 0,
+        strict: bool = False,
+        **settings: Unpack[LoopSettings],
+    ) -> tuple[list[str], Motion | None, Iterator[tuple[int, Array]]]:
+        """The sentences of a story with those of standing, the motion on the model's figure that it continues, and its
+        pieces as they are drawn."""
         texts = [sentences] if isinstance(sentences, str) else list(sentences)
+        own = cast(Mapping[str, float | None], settings)
         if not texts:
             raise TextError("a story needs a sentence")
         if stand not in (None, *get_args(Stand)):
             raise DecodingError(f"stand is one of {', '.join(get_args(Stand))}, not {stand!r}")
-        if settings.get("hypotheses") not in (None, 1):
-            raise DecodingError(f"a story is one motion: hypotheses must be 1, not {settings['hypotheses']}")
-        each = _each(self.defaults["seconds"] if seconds is None else seconds, len(texts))
-        before, behind = ([STANDING] * (stand in (end, "both")) for end in ("start", "end"))
-        texts = [*before, *texts, *behind]
-        each = [STAND] * len(before) + each + [STAND] * len(behind)
-        contexts, noise, chosen = self.asked(texts, 1, seed, strict, settings)
-        return Telling(texts, each, contexts, noise, chosen, None if after is None else self.on_figure(after))
+        if own.get("hypotheses") not in (None, 1):
+            raise DecodingError(f"a story is one motion: hypotheses must be 1, not {own['hypotheses']}")
+        given: list[Any] = [seconds] * len(texts) if np.ndim(cast(Any, seconds)) == 0 else list(cast(Any, seconds))
+        if len(given) != len(texts):
+            raise DecodingError(f"seconds must be a number, or one for each of {len(texts)} sentences, not {seconds}")
+        each = [self._settled({"seconds": one})["seconds"] for one in given]
+        for end, place in (("start", 0), ("end", len(texts) + 1)):
+            if stand in (end, "both"):
+                texts.insert(place, "a person stands still")
+                each.insert(place, 0.8)
+        contexts, noise, chosen = self.asked(texts, 1, seed, strict, own)
+        figure = None if after is None else self.contract.on_figure(self.at_own_rate(after))
+        return texts, figure, self._pieces(figure, contexts, each, noise, chosen)
 
-    def _pieces(self, told: Telling) -> Iterator[tuple[int, Array]]:
+    def _pieces(
+        self,
+        after: Motion | None,
+        contexts: Floats,
+        seconds: Sequence[float],
+        noise: Sequence[Noise],
+        settings: Mapping[str, Any],
+    ) -> Iterator[tuple[int, Array]]:
         """For each step of codes, the number of its sentence and the frames (T, D) that become final with it; then the
-        remaining frames."""
-        context = None if told.after is None else self.context(told.after)
-        writer, decoder = self.writer(told.noise, told.settings), self.decoder(context)
+        remaining frames. seconds: of each sentence, 0 where it ends by itself."""
+        context = None if after is None else self.context(after)
+        writer, decoder = Writer(self.source, noise, Drawing.of(settings)), self.decoder(context)
         if context is not None:
             writer.see(context.codes)
         done, given, end, limit = 0, 0, 0.0, None
-        for number, (context_, seconds) in enumerate(zip(told.contexts, told.seconds, strict=True)):
-            action = drawn_actions(self.source, context_[None], told.noise, told.settings["certainty"])
-            end = (end or 0.0) + seconds
-            longest = self.codec.steps(end) - done if seconds else self.codec.steps(told.settings["max_seconds"])
-            limit = max(1, round(end * self.fps)) if seconds else None
-            for _, step in drawn_steps(writer, action, longest, exactly=seconds > 0):
+        for number, (told, length) in enumerate(zip(contexts, seconds, strict=True)):
+            action = drawn_actions(self.source, told[None], noise, settings["certainty"])
+            end += length
+            longest = self.codec.steps(end) - done if length else self.codec.steps(settings["max_seconds"])
+            limit = max(1, round(end * self.fps)) if length else None
+            for _, step in drawn_steps(writer, action, longest, exactly=length > 0):
                 done += 1
                 frames = decoder.push(step)[: None if limit is None else limit - given]
                 given += len(frames)
                 yield number, frames
-            end = end if seconds else done * self.codec.seconds
+            end = end if length else done * self.codec.seconds
         yield number, decoder.finish()[: None if limit is None else limit - given]
-
-    def writer(self, noise: Sequence[Noise], settings: Mapping[str, Any]) -> Writer:
-        """A writer of codes for rows with the given noise."""
-        return Writer(self.source, noise, Drawing.of(settings))
 
     def decoder(self, context: Context | None = None) -> StreamingDecoder:
         """A decoder of codes to frames, from the origin or after the end of a motion."""
         return StreamingDecoder(self.codec, context, self.continuation.half_life)
-
-    def on_figure(self, motion: Motion) -> Motion:
-        """A motion of any human figure on the model's, at its frame rate; the last frame is kept."""
-        return self.contract.on_figure(self.at_own_rate(motion))
 
     def context(self, figure: Motion) -> Context:
         """The last seconds, whole steps of codes, of a motion on the model's figure; MotionError where it is too short
@@ -273,17 +297,3 @@ class CodesModel(GenerateModel):
             raise MotionError(f"a motion of {len(frames)} frames is too short to continue: {2 * hop} are needed")
         frames = frames[len(frames) % hop :]
         return Context(frames, self.codec.codes_of(frames))
-
-
-def _each(seconds: float | Sequence[float | None], count: int) -> list[float]:
-    """The seconds of each of ``count`` sentences, 0 where it ends by itself; DecodingError for anything but numbers,
-    or another number of them."""
-    try:
-        given = list(seconds) if isinstance(seconds, Iterable) else [seconds] * count
-        found = [0.0 if one is None else float(0.0 + one) for one in given]
-    except (TypeError, ValueError):
-        found = []
-    if len(found) != count or not all(0 <= one <= LONGEST for one in found):
-        asked = f"a number from 0 to {LONGEST:g}, or one for each of {count} sentences"
-        raise DecodingError(f"seconds must be {asked}, not {seconds}")
-    return found

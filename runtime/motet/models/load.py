@@ -14,8 +14,8 @@ from motet.errors import BundleError
 from motet.models.base import BundleModel
 from motet.models.describe import DescribeModel
 from motet.models.fill import FillModel
+from motet.models.generate import MixtureModel
 from motet.models.generate_codes import CodesModel
-from motet.models.generate_mixture import MixtureModel
 from motet.models.predict import PredictModel
 from motet.models.search import SearchModel
 from motet.models.steer import SteerModel

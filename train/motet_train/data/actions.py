@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from motet.models.text import RULES
+from motet.models.language import RULES
 from motet_train.data.batches import usable
 from motet_train.data.mirror_text import mirror_text
 from motet_train.data.sixd_windows import action_of

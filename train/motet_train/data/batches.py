@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from motet.bundle.graph import Floats
 from motet.errors import MotionError
-from motet.models.language import padded
-from motet.models.text import MAX_WORDS, RULES, Vocabulary
+from motet.models.language import MAX_WORDS, RULES, Vocabulary, padded
 from motet.representation.base import FrameMirror
 from motet.representation.contract import MotionContract
 from motet_train.data.batch import Batch

@@ -2,7 +2,7 @@
 
 import re
 
-from motet.models.text import RULES
+from motet.models.language import RULES
 
 PAIRS = {
     "left": "right",

@@ -10,8 +10,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from motet.models.language import padded
-from motet.models.text import RULES, Vocabulary
+from motet.models.language import RULES, Vocabulary, padded
 from motet_train.data.actions import Actions, actions_of
 from motet_train.data.errors import DataError
 from motet_train.data.store import Store

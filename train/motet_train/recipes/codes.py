@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from motet.models.text import Vocabulary
+from motet.models.language import Vocabulary
 from motet_train.data.actions import Actions
 from motet_train.data.batches import frame_mirror
 from motet_train.data.code_windows import CodeBatch, CodeWindows, memory_of

@@ -11,8 +11,7 @@ import torch
 
 from motet.bundle.manifest import Manifest
 from motet.models.describe import ConfidenceSettings, DescribeModel
-from motet.models.language import MAX_SECONDS
-from motet.models.text import RULES, Vocabulary
+from motet.models.language import MAX_SECONDS, RULES, Vocabulary
 from motet.representation import named
 from motet.representation.base import FrameMirror
 from motet.representation.contract import MotionContract

@@ -6,8 +6,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from motet.models.language import padded
-from motet.models.text import RULES
+from motet.models.language import RULES, padded
 from motet_train.data.alike import alike
 from motet_train.data.batches import usable
 from motet_train.data.store import Store

@@ -6,7 +6,7 @@ from itertools import zip_longest
 import numpy as np
 from sacrebleu.metrics.bleu import BLEU
 
-from motet.models.text import EOS, SOS
+from motet.models.language import EOS, SOS
 from motet_train.evaluate.language.split_store import plain
 
 RANKS = 5

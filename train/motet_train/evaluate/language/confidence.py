@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.models.describe import ConfidenceSettings, DescribeModel, Description
-from motet.models.text import RULES
+from motet.models.language import RULES
 from motet_train.evaluate.language.attributes import action_right
 from motet_train.evaluate.language.split_store import SplitStore
 

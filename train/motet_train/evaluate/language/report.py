@@ -9,7 +9,7 @@ from motet.bundle.manifest import Manifest
 from motet.errors import TextError
 from motet.models.describe import DescribeModel
 from motet.models.generate import GenerateModel
-from motet.models.text import RULES
+from motet.models.language import RULES
 from motet_train.evaluate.language.attributes import Score, sides_right, turns_right, verbs_right
 from motet_train.evaluate.language.bleu import RANKS, References, agreement, bleu, ranks
 from motet_train.evaluate.language.chain import Answers, answers, best_descriptions, bounds_chained, chained, likelihood

@@ -10,8 +10,8 @@ from scipy.spatial.distance import cdist
 
 from motet.models.describe import DescribeModel
 from motet.models.index import Index, Member
+from motet.models.language import RULES
 from motet.models.search import IndexSettings, SearchModel
-from motet.models.text import RULES
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet_train.data.alike import alike

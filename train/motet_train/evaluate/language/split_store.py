@@ -10,7 +10,7 @@ import numpy as np
 
 from motet.bundle.manifest import Manifest
 from motet.errors import TextWarning
-from motet.models.text import RULES
+from motet.models.language import RULES
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from motet.bundle.manifest import Manifest
 from motet.errors import MotionError
-from motet.models.text import RULES
+from motet.models.language import RULES
 from motet.motion.motion import Motion
 from motet.representation import named
 from motet_train.data.corpus import read_corpus
