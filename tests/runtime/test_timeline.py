@@ -11,10 +11,9 @@ from fake_models import CHANNELS, CONTRACT, FPS, SKELETON, VOCABULARY, describe_
 from motet.bundle.manifest import Manifest
 from motet.errors import MotionError
 from motet.formats import read_motion
-from motet.models.describe import DescribeModel, Description
+from motet.models.describe import DescribeModel, Description, TimelineSettings, best_path, edges, near_scores, windows
 from motet.models.language import EOS, SOS
 from motet.models.load import load_as
-from motet.models.timeline import TimelineSettings, best_path, edges, near_scores, windows
 from motet.motion.motion import Motion
 
 ONE, OTHER = (1.0, 4.0, -2.0), (3.0, 2.0, -4.0)
@@ -55,15 +54,14 @@ def test_parts_meet_in_the_middle_between_windows() -> None:
 
 
 @pytest.mark.parametrize("rows", [1, 4, 512])
-def test_sentences_are_scored_for_windows_near_theirs(rows: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("motet.models.timeline.ROWS", rows)
+def test_sentences_are_scored_for_windows_near_theirs(rows: int) -> None:
     model, motions = describe_model(), [constant(9, level, -level, 1.0) for level in (0.5, 1.0, 2.0, 3.0, 4.0)]
     texts = ["a person walks", "walks", "a person walks", "left", "walks left"]
     start, end = (VOCABULARY.ids[word] for word in (SOS, EOS))
     said = [(start, *VOCABULARY.encode(text)[0].tolist(), end) for text in texts]
     told: list[tuple[int, int]] = []
     found = near_scores(
-        model.graphs["step"], model.embed(motions), said, 1, lambda done, total: told.append((done, total))
+        model.graphs["step"], model.embed(motions), said, 1, lambda done, total: told.append((done, total)), rows
     )
     assert told[-1] == (5, 5)
     by_ids = dict(zip(said, texts, strict=True))

@@ -10,8 +10,7 @@ from motet.cli.options import session_options
 from motet.cli.reading import Read, Tries, naming, out_option, places, read_options
 from motet.cli.writing import Output, size, spare, write_options
 from motet.errors import quoted
-from motet.models.fill import JOIN_SECONDS, LOOP_SECONDS, FillModel
-from motet.models.gaps import Gap
+from motet.models.fill import JOIN_SECONDS, LOOP_SECONDS, FillModel, Gap
 from motet.models.load import load_as
 
 bundle_option = click.option("--bundle", default="fill", show_default=True, help="Name or path of a bundle.")

@@ -1,9 +1,13 @@
-"""Describe: ranked sentences for a motion. Section 4.2 of Plappert et al. 2017."""
+"""Describe: ranked sentences for a motion (section 4.2 of Plappert et al. 2017), and for each part of a long one.
+
+Where a long motion changes is the best path of a hidden Markov model (Viterbi 1967) over short windows, whose states
+are sentences and whose changes all cost the same.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import pairwise
-from typing import Annotated, Any, ClassVar, Literal, SupportsIndex, overload
+from typing import Annotated, Any, ClassVar, Literal, SupportsIndex, TypedDict, Unpack, overload
 
 import numpy as np
 
@@ -13,10 +17,10 @@ from motet.decode.ancestral import noise_of
 from motet.decode.beam import Hypothesis, Limits
 from motet.decode.loop import Loop
 from motet.decode.loops import LOOPS
+from motet.decode.rollout import Scores
 from motet.decode.score import score_words
 from motet.errors import DecodingError
-from motet.models.language import EOS, MAX_SECONDS, PAD, SOS, UNK, LanguageModel
-from motet.models.timeline import TimelineSettings, best_path, edges, near_scores, windows
+from motet.models.language import EOS, MAX_SECONDS, PAD, SOS, UNK, LanguageModel, padded
 from motet.motion.motion import Motion
 from motet.settings import Progress, Range, Settings, seeds_of, silent
 
@@ -30,6 +34,24 @@ class ConfidenceSettings(Settings):
 
     FEATURE: ClassVar[str] = "confidence"
     log_probability: Annotated[float, Range(-1000, 0, "nats")] = -5.5
+
+
+@dataclass(frozen=True)
+class TimelineSettings(Settings):
+    """How a motion is cut into parts.
+
+    window, hop: the length of a window, and the time from one to the next. Longer windows miss short actions: of the
+        joins between motions of validation subjects, 1.5 s finds four fifths, 3 s half.
+    change: the cost of a change of sentence. Three windows cover each moment, so with 12 nats a new sentence pays where
+        it is e^4 times as probable for the length of a window.
+    near: the distance within which a window is scored for other windows' sentences.
+    """
+
+    FEATURE: ClassVar[str] = "timeline"
+    window: Annotated[float, Range(0.1, 30, "s")] = 1.5
+    hop: Annotated[float, Range(0.1, 30, "s")] = 0.5
+    change: Annotated[float, Range(0, 1000, "nats")] = 12.0
+    near: Annotated[float, Range(0, 600, "s")] = 15.0
 
 
 @dataclass(frozen=True)
@@ -58,6 +80,14 @@ class Part(Description):
     stop: float
 
 
+class _Options(TypedDict, total=False):
+    """What a call of :meth:`DescribeModel.describe` takes by name only."""
+
+    decoding: Decoding | None
+    seed: SupportsIndex
+    progress: Progress
+
+
 class DescribeModel(LanguageModel):
     """A motion captioning model.
 
@@ -77,25 +107,11 @@ class DescribeModel(LanguageModel):
 
     @overload
     def describe(
-        self,
-        motions: Motion,
-        beams: int | None = None,
-        draws: int | None = None,
-        *,
-        decoding: Decoding | None = None,
-        seed: SupportsIndex = 0,
-        progress: Progress = ...,
+        self, motions: Motion, beams: int | None = None, draws: int | None = None, **options: Unpack[_Options]
     ) -> list[Description]: ...
     @overload
     def describe(
-        self,
-        motions: Sequence[Motion],
-        beams: int | None = None,
-        draws: int | None = None,
-        *,
-        decoding: Decoding | None = None,
-        seed: SupportsIndex = 0,
-        progress: Progress = ...,
+        self, motions: Sequence[Motion], beams: int | None = None, draws: int | None = None, **options: Unpack[_Options]
     ) -> list[list[Description]]: ...
     def describe(
         self,
@@ -128,41 +144,39 @@ class DescribeModel(LanguageModel):
         if "draws" in settings:
             settings["noise"] = noise_of(self.limits(settings), settings["draws"], first)
         contexts = self.embed([motions] if isinstance(motions, Motion) else motions)
-        found = self._hypotheses(loop, contexts, settings, progress)
-        rows = [[self._description(hypothesis) for hypothesis in row] for row in found]
+        least, decode = self.settings(ConfidenceSettings).log_probability, self.vocabulary.decode
+        rows = [
+            [Description(decode(one.ids), one.log_probability, one.score, one.log_probability >= least) for one in row]
+            for row in self._hypotheses(loop, contexts, settings, progress)
+        ]
         return rows[0] if isinstance(motions, Motion) else rows
-
-    def _description(self, found: Hypothesis) -> Description:
-        sure = found.log_probability >= self.settings(ConfidenceSettings).log_probability
-        return Description(self.vocabulary.decode(found.ids), found.log_probability, found.score, sure)
 
     def timeline(self, motion: Motion, *, progress: Progress = silent) -> list[Part]:
         """What happens in a motion of any length: consecutive parts, each with its best description.
 
         Short windows are described, each sentence is scored for all nearby windows, and the motion is cut where
-        switching to another sentence pays (:mod:`motet.models.timeline`). Each part is then described like in
-        :meth:`describe`, one of more than 30 s by its middle; neighbours with the same description are merged.
+        switching to another sentence pays. Each part is then described like in :meth:`describe`, one of more than 30 s
+        by its middle; neighbours with the same description are merged.
 
         progress: called with the number of windows done and in total.
         MotionError like :meth:`frames`, except for long motions.
         """
         motion = self.contract.on_figure(motion).resample(self.fps)
-        settings = self.settings(TimelineSettings)
+        settings, beam = self.settings(TimelineSettings), LOOPS["beam"]
         spans = windows(len(motion), motion.fps, settings)
         contexts = self.embed([motion[start:stop] for start, stop in spans])
-        scores = near_scores(self.graphs["step"], contexts, self._likeliest(contexts), settings.reach, progress)
-        return self._parts(motion, edges(spans, best_path(scores, settings.change)))
-
-    def _likeliest(self, contexts: Floats) -> list[tuple[int, ...]]:
-        """The most probable sentence of each context, as ids from the start to the end."""
+        likeliest = self._hypotheses(beam, contexts, beam.defaults(self.manifest.defaults))
         start, end = (self.vocabulary.ids[word] for word in (SOS, EOS))
-        beam = LOOPS["beam"]
-        found = self._hypotheses(beam, contexts, beam.defaults(self.manifest.defaults))
-        return [(start, *best.ids, end) for best, *_ in found]
+        said = [(start, *best.ids, end) for best, *_ in likeliest]
+        scores = near_scores(self.graphs["step"], contexts, said, round(settings.near / settings.hop), progress)
+        return self._parts(motion, edges(spans, best_path(scores, settings.change)))
 
     def _parts(self, motion: Motion, cuts: list[int]) -> list[Part]:
         """Parts of a motion between cuts; a cut between two equal descriptions is dropped."""
-        found = [row[0] for row in self.describe([_middle(motion[a:b]) for a, b in pairwise(cuts)])]
+        most = int(MAX_SECONDS * motion.fps + 1e-9)
+        skipped = [max(0, b - a - most) // 2 for a, b in pairwise(cuts)]  # at the start of a part that is too long
+        middles = [motion[a + off : b][:most] for (a, b), off in zip(pairwise(cuts), skipped, strict=True)]
+        found = [row[0] for row in self.describe(middles)]
         inner = [cut for cut, (one, two) in zip(cuts[1:-1], pairwise(found), strict=True) if one.text != two.text]
         if len(inner) < len(cuts) - 2:
             return self._parts(motion, [cuts[0], *inner, cuts[-1]])
@@ -173,23 +187,20 @@ class DescribeModel(LanguageModel):
         self, loop: Loop, contexts: Floats, settings: Mapping[str, Any], progress: Progress = silent
     ) -> list[list[Hypothesis]]:
         """The hypotheses of many contexts, decoded in batches of the loop's size."""
-        found: list[list[Hypothesis]] = []
-        for place in range(0, len(contexts), loop.batch):
-            found += self._decoded(loop, contexts[place : place + loop.batch], settings)
-            progress(len(found), len(contexts))
-        return found
-
-    def _decoded(self, loop: Loop, contexts: Floats, settings: Mapping[str, Any]) -> list[list[Hypothesis]]:
         rest = {name: value for name, value in settings.items() if name != "max_words"}
-        found: list[list[Hypothesis]] = loop.run(self.graphs["step"], contexts, self.limits(settings), **rest)
+        found: list[list[Hypothesis]] = []
+        for start in range(0, len(contexts), loop.batch):
+            batch = contexts[start : start + loop.batch]
+            found += loop.run(self.graphs["step"], batch, self.limits(settings), **rest)
+            progress(len(found), len(contexts))
         return found
 
     def embed(self, motions: Motion | Sequence[Motion]) -> Floats:
         """The context vector (C,) float32 of a motion, or (N, C) of several; MotionError like :meth:`frames`."""
-        if isinstance(motions, Motion):
-            context: Floats = self.contexts([self.frames(motions)])[0]
-            return context
-        return self.contexts([self.frames(motion) for motion in motions])
+        found = self.contexts(
+            [self.frames(motion) for motion in ([motions] if isinstance(motions, Motion) else motions)]
+        )
+        return found[0] if isinstance(motions, Motion) else found
 
     def score(self, motion: Motion, sentence: str) -> float:
         """Log-probability of a sentence given a motion; unknown words count as UNK, and a TextWarning names them."""
@@ -206,15 +217,63 @@ class DescribeModel(LanguageModel):
         """Frames (T, D), and noise where the loop draws, to ids (W, words) int64 and log-probabilities (W,)."""
         extra = {"noise": given["noise"]} if "noise" in given else {}
         chosen = self.loop.settled(self.defaults, settings)
-        (row,) = self._decoded(self.loop, self.contexts([given["frames"]]), {**chosen, **extra})
+        (row,) = self._hypotheses(self.loop, self.contexts([given["frames"]]), {**chosen, **extra})
         ids = np.zeros((len(row), max(len(found.ids) for found in row)), dtype=np.int64)
         for place, found in zip(ids, row, strict=True):
             place[: len(found.ids)] = found.ids
         return {"ids": ids, "log_probabilities": np.array([found.log_probability for found in row])}
 
 
-def _middle(motion: Motion) -> Motion:
-    """The middle of a motion too long for the model."""
-    most = int(MAX_SECONDS * motion.fps + 1e-9)
-    start = max(0, len(motion) - most) // 2
-    return motion[start : start + most]
+def windows(frames: int, fps: float, settings: TimelineSettings) -> list[tuple[int, int]]:
+    """Frames (start, stop) of overlapping windows, evenly spread, of the settings' length or the motion's."""
+    length, hop = max(2, round(settings.window * fps)), max(1, round(settings.hop * fps))
+    count = max(1, 1 + -(-(frames - length) // hop))
+    starts = np.linspace(0, max(0, frames - length), count).round().astype(int).tolist()
+    return [(start, min(start + length, frames)) for start in starts]
+
+
+def near_scores(
+    step: Graph,
+    contexts: Floats,
+    said: Sequence[tuple[int, ...]],
+    near: int,
+    progress: Progress = silent,
+    at_once: int = 512,
+) -> Scores:
+    """Log-probabilities (W, S) of the sentences of W windows, sorted by their ids, given each window.
+
+    said: the ids of a sentence for each window, from the start to the end. near: how many windows before and after a
+    window are scored for its sentence; the others get minus infinity. progress: counts windows. at_once: pairs scored
+    in one batch.
+    """
+    places = {ids: place for place, ids in enumerate(sorted(set(said)))}
+    words, own = padded([np.array(ids) for ids in places], "int64")[0], np.array([places[ids] for ids in said])
+    nearby = [np.unique(own[max(0, row - near) : row + near + 1]) for row in range(len(own))]
+    rows, columns = np.repeat(np.arange(len(own)), list(map(len, nearby))), np.concatenate(nearby)
+    found = np.full((len(said), len(places)), -np.inf)
+    for start in range(0, len(rows), at_once):
+        row, column = rows[start : start + at_once], columns[start : start + at_once]
+        found[row, column] = score_words(step, contexts, row, words[column])
+        progress(int(row[-1]) + 1, len(said))
+    return found
+
+
+def best_path(scores: Scores, change: float) -> list[int]:
+    """For each window the column of (W, S) such that the sum, less ``change`` for each change of column, is largest."""
+    best, back = scores[0], []
+    for row in scores[1:]:
+        leader = int(best.argmax())
+        stays = best >= best[leader] - change
+        back.append(np.where(stays, np.arange(len(best)), leader))
+        best = np.where(stays, best, best[leader] - change) + row
+    path = [int(best.argmax())]
+    for before in reversed(back):
+        path.append(int(before[path[-1]]))
+    return path[::-1]
+
+
+def edges(spans: Sequence[tuple[int, int]], path: Sequence[int]) -> list[int]:
+    """The boundaries of parts in frames: the first, the last, and the middle between two windows that differ."""
+    middles = [(start + stop) / 2 for start, stop in spans]
+    steps = zip(pairwise(middles), pairwise(path), strict=True)
+    return [spans[0][0], *(round(sum(two) / 2) for two, (a, b) in steps if a != b), spans[-1][1]]

@@ -1,7 +1,9 @@
 """Fill: the missing frames in a gap of a motion, between two motions, or from the end of one to its start."""
 
+import logging
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from itertools import pairwise
 from typing import Any, cast, overload
 
 import numpy as np
@@ -11,32 +13,26 @@ from motet.bundle.graph import Arrays, Graph
 from motet.bundle.manifest import Manifest
 from motet.errors import BundleError, MotionError
 from motet.models.base import BundleModel
-from motet.models.gaps import Gap, at_own_rate, log_elsewhere, spans_of
 from motet.motion.follow import placed_after, to_figure_of
 from motet.motion.humanoid import HUMANOID, on_humanoid
 from motet.motion.motion import Motion
+from motet.motion.resample import spline
 from motet.motion.rotations import Array
 from motet.representation.placed import PLACED_CHANNELS, bridge, placed, pose_of, put_at, seen_from, unplaced
 from motet.representation.retargeting import from_model_figure
 from motet.representation.root_sixd import facing
 from motet.settings import Progress, checked_int, silent
 
+log = logging.getLogger(__name__)
+
+Gap = tuple[float, float]
+"""Times in seconds of the first missing frame and of the first frame after the gap."""
+
 SEEN = 5.0
 """Seconds before and after a gap from which a figure is retargeted onto the humanoid: its ground, its stance."""
 
 JOIN_SECONDS, LOOP_SECONDS = 1.0, 0.5
 """Default seconds of a transition between two motions, and from the end of one to its start."""
-
-
-@dataclass(frozen=True)
-class Sides:
-    """What is known about a gap, at the model's frame rate. own: both sides, on their own figure; figure: the same on
-    the humanoid. past: (P, E) placed frames before the gap, the last of them right before it. after: (A, E)."""
-
-    own: Motion
-    figure: Motion
-    past: Array
-    after: Array
 
 
 class FillModel(BundleModel):
@@ -100,18 +96,52 @@ class FillModel(BundleModel):
         return found
 
     def _filled(self, motion: Motion, gaps: Sequence[Gap]) -> Motion:
-        spans = spans_of(motion, gaps, self.seconds)
+        spans = self._spans(motion, gaps)
         result = motion
-        for number, (start, stop) in enumerate(spans):
-            end = spans[number + 1][0] if number + 1 < len(spans) else len(motion)
+        for (start, stop), (end, _) in zip(spans, [*spans[1:], (len(motion), 0)], strict=True):
             new = self._between(result[:start], result[stop:end], stop - start)
             if new is None:
-                log_elsewhere()
-                return self._filled(self._on_humanoid(motion), gaps)
+                return self._filled(*self._elsewhere(motion), gaps)
             values = np.array(result.values)
             values[start:stop] = new.values
             result = replace(result, values=values)
         return result
+
+    def _spans(self, motion: Motion, gaps: Sequence[Gap]) -> list[tuple[int, int]]:
+        """The frames of gaps, in the order of time; MotionError as :meth:`fill`."""
+        if not isinstance(gaps, Sequence):
+            raise MotionError(f"gaps are a list of (start, stop) in seconds, not {gaps!r}")
+        if not gaps:
+            raise MotionError("there is no gap to fill: give one, in seconds, such as (1.0, 2.0)")
+        spans = sorted((self._span(motion, gap), gap) for gap in gaps)
+        for ((_, last), (start, stop)), ((first, _), (then, end)) in pairwise(spans):
+            if first <= last:
+                both = f"{start:g}:{stop:g} and {then:g}:{end:g}"
+                raise MotionError(f"the gaps {both} overlap or touch: merge them, or leave motion between them")
+        return [span for span, _ in spans]
+
+    def _span(self, motion: Motion, gap: Gap) -> tuple[int, int]:
+        """The frames of a gap."""
+        try:
+            start, stop = map(float, gap)
+        except (TypeError, ValueError) as error:
+            raise MotionError(f"a gap is two numbers in seconds, such as (1.0, 2.0), not {gap!r}") from error
+        text, whole = f"the gap {start:g}:{stop:g} s", f"the motion of {motion.duration:g} s"
+        if not (np.isfinite([start, stop]).all() and start < stop):
+            raise MotionError(f"{text} is empty: it must start before it stops")
+        if start < 0 or stop > motion.duration + 0.5 / motion.fps:
+            raise MotionError(f"{text} is not within {whole}")
+        first, last = round(start * motion.fps), round(stop * motion.fps)
+        if first == last:
+            raise MotionError(f"{text} has no frame at {motion.fps:g} fps: make it longer")
+        if first == 0:
+            raise MotionError(f"{text} is at the very start of {whole}: a gap needs frames before it")
+        if last >= len(motion):
+            then = "a gap needs frames after it (motet predict continues)"
+            raise MotionError(f"{text} is at the very end of {whole}: {then}")
+        if stop - start > self.seconds + 1e-9:
+            raise MotionError(f"{text} is too long: at most {self.seconds:g} s can be filled")
+        return first, last
 
     def join(self, first: Motion, second: Motion, *, seconds: float = JOIN_SECONDS) -> Motion:
         """One motion, a transition of ``seconds``, and another motion, placed where the first leads.
@@ -168,18 +198,16 @@ class FillModel(BundleModel):
         """The first motion, the transition, and the second placed after it; all in the channels of the first."""
         if not 0 < seconds <= self.seconds:
             raise MotionError(f"a transition takes more than 0 and at most {self.seconds:g} seconds, not {seconds:g}")
-        if None in (first.skeleton, second.skeleton) or not self._in_its_world(first):
-            return self._elsewhere(first, second, seconds)
-        count = max(1, round(seconds * first.fps))
-        other = second if second is first else to_figure_of(second, first)
-        known = self._sides(first, other)
-        ends = len(known.past)
-        turn = float(facing(known.figure[:ends])[-1] - facing(known.figure[ends:])[0])
-        after = placed_after(other, first, (count + 1) / first.fps, turn)
-        new = None if after is None else self._between(first, after, count)
-        if after is None or new is None:
-            return self._elsewhere(first, second, seconds)
-        return first, new, after
+        if None not in (first.skeleton, second.skeleton) and self._in_its_world(first):
+            count = max(1, round(seconds * first.fps))
+            other = second if second is first else to_figure_of(second, first)
+            _, figure, past, _ = self._sides(first, other)
+            turn = float(facing(figure[: len(past)])[-1] - facing(figure[len(past) :])[0])
+            after = placed_after(other, first, (count + 1) / first.fps, turn)
+            new = None if after is None else self._between(first, after, count)
+            if after is not None and new is not None:
+                return first, new, after
+        return self._joined(*self._elsewhere(first, second), seconds)
 
     def _in_its_world(self, motion: Motion) -> bool:
         """Whether a motion's figure stands in its own world like in the model's, and can be placed there."""
@@ -187,38 +215,38 @@ class FillModel(BundleModel):
         ends = replace(part, values=part.values[[0, -1]] if len(part) else part.values)
         return from_model_figure(on_humanoid(part), part, ends) is not None
 
-    def _elsewhere(self, first: Motion, second: Motion, seconds: float) -> tuple[Motion, Motion, Motion]:
-        """Like :meth:`_joined`, on the humanoid."""
-        log_elsewhere()
-        return self._joined(self._on_humanoid(first), self._on_humanoid(second), seconds)
+    def _elsewhere(self, *motions: Motion) -> list[Motion]:
+        """Motions on the humanoid, at the model's rate, which is logged."""
+        log.warning(
+            "the result uses the model's skeleton and frame rate: the file has no skeleton, a different world, or no "
+            "channels for the position and rotation of the hips"
+        )
+        return [on_humanoid(motion.continuous().resample(self.fps)) for motion in motions]
 
     def _between(self, before: Motion, after: Motion, count: int) -> Motion | None:
         """``count`` frames between two parts of a motion, at its own rate, in its channels; None where they cannot be
         retargeted onto its figure."""
-        known = self._sides(before, after)
+        own, figure, past, behind = self._sides(before, after)
         span = (count + 1) * self.fps / before.fps
-        knots = max(0, round(span) - 1)
-        new = self.frames_between(known.past, known.after, knots, span / (knots + 1))
-        frames = at_own_rate(known.past, new, known.after, count)
+        filled = max(0, round(span) - 1)
+        new = self.frames_between(past, behind, filled, span / (filled + 1))
+        # from the last frame before the gap to the first after it, on splines through the model's frames
+        times = len(past[-2:]) - 1 + np.arange(count + 2) / (count + 1) * (filled + 1)
+        frames = spline(np.concatenate([past[-2:], new, behind[:2]]), times)
         ends = replace(before, values=np.concatenate([before.values[-1:], after.values[:1]]))
-        like = replace(known.figure[:1], fps=before.fps)
-        return from_model_figure(unplaced(frames, like), known.own, ends)
+        return from_model_figure(unplaced(frames, replace(figure[:1], fps=before.fps)), own, ends)
 
-    def _sides(self, before: Motion, after: Motion) -> Sides:
-        """What is known about a gap; MotionError for too few frames."""
+    def _sides(self, before: Motion, after: Motion) -> tuple[Motion, Motion, Array, Array]:
+        """What is known about a gap, at the model's rate: both sides on their own figure, the same on the humanoid, and
+        placed frames (P, E) before the gap and (A, E) after it. MotionError for too few frames."""
         seen = round(SEEN * before.fps)
-        parts = (
-            before[-seen:].continuous().resample(self.fps, to_end=True),
-            after[:seen].continuous().resample(self.fps),
-        )
-        for part, given, name in zip(parts, (before, after), ("before", "after"), strict=True):
+        past = before[-seen:].continuous().resample(self.fps, to_end=True)
+        behind = after[:seen].continuous().resample(self.fps)
+        for part, given, name in ((past, before, "before"), (behind, after, "after")):
             if len(part) < self.least:
                 need = f"at least {self.least / self.fps:.2g} s of motion ({self.least} frames at {self.fps:g} fps)"
                 raise MotionError(f"a gap needs {need} {name} it, but there are {given.duration:.2g} s")
-        own = replace(parts[0], values=np.concatenate([part.values for part in parts]))
+        own = replace(past, values=np.concatenate([past.values, behind.values]))
         figure = on_humanoid(own)
-        return Sides(own, figure, *np.split(placed(figure), [len(parts[0])]))
-
-    def _on_humanoid(self, motion: Motion) -> Motion:
-        """A motion on the humanoid, at the model's rate."""
-        return on_humanoid(motion.continuous().resample(self.fps))
+        frames = placed(figure)
+        return own, figure, frames[: len(past)], frames[len(past) :]
