@@ -35,10 +35,9 @@ from motet.models.describe import DescribeModel, Description, Part
 from motet.models.fill import FillModel
 from motet.models.generate import Generated, GenerateModel, GenerateSettings, MixtureModel
 from motet.models.generate_codes import CodesModel, Passage, Story, StorySettings, Understood
-from motet.models.index import Hit, Index
 from motet.models.load import load, load_as
 from motet.models.predict import PredictModel, PredictSession
-from motet.models.search import SearchModel
+from motet.models.search import Hit, Index, SearchModel
 from motet.models.steer import SteerModel
 from motet.models.steer_session import SteerSession, SteerSnapshot
 from motet.models.tdbn_control import TdbnModel, TdbnSession, TdbnSnapshot

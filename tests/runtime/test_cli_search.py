@@ -9,7 +9,7 @@ from command_line import check_refused, run
 from fake_models import moving, search_model
 
 from motet.formats import read_motion, write_motion
-from motet.models.index import NAME, Index
+from motet.models.search import NAME, Index
 
 
 @pytest.fixture(autouse=True)

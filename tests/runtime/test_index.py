@@ -11,9 +11,8 @@ from fake_models import moving, search_model
 
 from motet.errors import DecodingError, FormatError, MotionError, OutputError, TextError
 from motet.formats import read_motion, write_motion
-from motet.models import index as indexing
-from motet.models.index import NAME, Hit, Index
-from motet.models.search import SearchModel
+from motet.models import search as searching
+from motet.models.search import NAME, Hit, Index, SearchModel
 
 FILES = ("a.npz", "b.npz", "inner/c.npz", "d.npz")
 
@@ -42,7 +41,7 @@ def reads(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         found.append(path.name)
         return read_motion(path, unit=unit, clip=clip)
 
-    monkeypatch.setattr(indexing, "read_motion", noted)
+    monkeypatch.setattr(searching, "read_motion", noted)
     return found
 
 
@@ -160,7 +159,7 @@ def test_a_folder_that_cannot_be_written_to_is_searched_all_the_same(
     def refuse(path: Path, content: bytes) -> None:
         raise OutputError(f"cannot write {path}: Read-only file system")
 
-    monkeypatch.setattr(indexing, "write_whole", refuse)
+    monkeypatch.setattr(searching, "write_whole", refuse)
     with caplog.at_level(logging.WARNING, "motet"):
         assert len(Index.open(folder, model).search("walks", 9)) == 4
     assert caplog.messages == [f"the index is not kept: cannot write {folder / NAME}: Read-only file system"]

@@ -14,9 +14,8 @@ from motet.cli.options import session_options
 from motet.cli.reading import bar, unit_option
 from motet.errors import TextWarning
 from motet.formats import names_motion, read_motion
-from motet.models.index import NAME, Hit, Index
 from motet.models.load import load_as
-from motet.models.search import SearchModel
+from motet.models.search import NAME, Hit, Index, SearchModel
 
 
 @click.command()

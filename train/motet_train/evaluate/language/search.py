@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
 from motet.models.describe import DescribeModel
-from motet.models.index import Index, Member
 from motet.models.language import RULES
-from motet.models.search import IndexSettings, SearchModel
+from motet.models.search import Index, IndexSettings, Member, SearchModel
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet_train.data.alike import alike

@@ -10,8 +10,7 @@ import numpy as np
 from scipy.stats import hypergeom
 
 from motet.bundle.graph import Floats
-from motet.models.index import direction
-from motet.models.search import SearchModel
+from motet.models.search import SearchModel, direction
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet_train.evaluate.language.split_store import unknown_words_allowed
