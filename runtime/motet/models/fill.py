@@ -101,7 +101,7 @@ class FillModel(BundleModel):
         for (start, stop), (end, _) in zip(spans, [*spans[1:], (len(motion), 0)], strict=True):
             new = self._between(result[:start], result[stop:end], stop - start)
             if new is None:
-                return self._filled(*self._elsewhere(motion), gaps)
+                return self._filled(self._elsewhere(motion)[0], gaps)
             values = np.array(result.values)
             values[start:stop] = new.values
             result = replace(result, values=values)
@@ -207,7 +207,8 @@ class FillModel(BundleModel):
             new = None if after is None else self._between(first, after, count)
             if after is not None and new is not None:
                 return first, new, after
-        return self._joined(*self._elsewhere(first, second), seconds)
+        first, second = self._elsewhere(first, second)
+        return self._joined(first, second, seconds)
 
     def _in_its_world(self, motion: Motion) -> bool:
         """Whether a motion's figure stands in its own world like in the model's, and can be placed there."""

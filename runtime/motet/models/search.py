@@ -239,10 +239,10 @@ def _renewed(
 ) -> Index:
     """The current index of a folder, reusing the entries of unchanged files."""
     known: dict[tuple[str, int, int], list[tuple[Member, Floats]]] = {}  # by path, size and modification time
-    left = np.zeros(0) if before is None else before.vectors
-    for member in () if before is None else before.members:
-        rows, left = np.split(left, [len(member.windows)])
-        known.setdefault((member.path, member.size, member.changed), []).append((member, rows))
+    if before is not None:
+        stops = np.cumsum([len(member.windows) for member in before.members])
+        for member, rows in zip(before.members, np.split(before.vectors, stops)[:-1], strict=True):
+            known.setdefault((member.path, member.size, member.changed), []).append((member, rows))
     if not folder.is_dir():
         raise FormatError(folder, "neither a folder of motion files nor an index of one")
     paths = files_in(folder, MOCAP)
