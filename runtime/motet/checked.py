@@ -11,7 +11,6 @@ from motet.errors import MotionError
 from motet.files import place_of
 from motet.formats import READABLE, clips, read_motion
 from motet.formats.clips import Clip, chosen, split_clip
-from motet.motion.heading import heading
 from motet.motion.humanoid import (
     HUMANOID,
     SURE_OF_JOINTS,
@@ -22,7 +21,7 @@ from motet.motion.humanoid import (
     to_humanoid,
     with_figure,
 )
-from motet.motion.kinematics import global_transforms, positions
+from motet.motion.kinematics import global_transforms, heading, positions
 from motet.motion.motion import Motion
 
 STAYS = 0.3

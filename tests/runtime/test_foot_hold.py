@@ -6,16 +6,15 @@ import pytest
 from motet.errors import MotionError
 from motet.formats import read_motion
 from motet.motion import HUMANOID, global_transforms, hold_feet, positions, to_humanoid
-from motet.motion.feet.hold import BENT, HOLD_RECORDED
-from motet.motion.humanoid.bones import LEFT_RIGHT, ground_under, sole_points
+from motet.motion.feet.hold import HoldSettings, Leg
+from motet.motion.humanoid.bones import LEFT_RIGHT, LEG, ground_under, sole_points
 from motet.motion.motion import Motion
 from motet.motion.rotations import euler_to_rotmat
 from motet.motion.skeleton import Joint, Skeleton
-from motet.motion.two_bone import Leg
 
 BALLS = [HUMANOID.index(side + "Toes") for side in LEFT_RIGHT]
-LEGS = [[HUMANOID.index(side + part) for part in BENT] for side in LEFT_RIGHT]
-TURNED = {f"{side}{part}.r{axis}" for side in LEFT_RIGHT for part in BENT for axis in "xyz"}
+LEGS = [[HUMANOID.index(side + part) for part in LEG[:3]] for side in LEFT_RIGHT]
+TURNED = {f"{side}{part}.r{axis}" for side in LEFT_RIGHT for part in LEG[:3] for axis in "xyz"}
 WALK, RUN = "39_14", "09_07"
 
 
@@ -166,7 +165,8 @@ def test_who_stands_still_stays_as_it_is():
 def test_what_slides_on_is_moved_no_farther_than_a_leg_reaches():
     motion = standing(30, seconds=10, knee=40, z=lambda t: 0.1 * t)
     shift = soles_of(hold_feet(motion)) - soles_of(motion)
-    assert HOLD_RECORDED.farthest * 0.9 < np.linalg.norm(shift, axis=-1).max() < HOLD_RECORDED.farthest + 0.01
+    farthest = HoldSettings().farthest
+    assert farthest * 0.9 < np.linalg.norm(shift, axis=-1).max() < farthest + 0.01
 
 
 def test_a_foot_that_sinks_is_lifted_softly():

@@ -17,7 +17,7 @@ from PIL import Image
 
 from motet.draw.stage import DRAWN_LARGER, Stage
 from motet.formats import gif
-from motet.motion.resample import resampled
+from motet.motion.motion import resampled
 
 
 def frames_of(content):

@@ -7,8 +7,7 @@ from motet.decode.matching import FEATURES, TRAJECTORY, Matcher, Table, horizons
 from motet.decode.playback import Playback
 from motet.decode.pose_codes import PoseCodes
 from motet.decode.steering_settings import SteeringSettings
-from motet.motion.quaternions import conjugate, quat_product, quat_rotated, wrapped
-from motet.motion.rotations import quat_to_rotmat
+from motet.motion.rotations import conjugate, quat_product, quat_rotated, quat_to_rotmat, wrapped
 
 SETTINGS = SteeringSettings()
 ROWS, CODES = 300, 4

@@ -9,8 +9,7 @@ from motet.motion import mirroring
 from motet.motion.kinematics import positions, with_channels
 from motet.motion.mirroring import lateral_axis, mirror
 from motet.motion.motion import Motion
-from motet.motion.sides import partners_of
-from motet.motion.skeleton import Joint, Skeleton
+from motet.motion.skeleton import Joint, Skeleton, partners_of
 
 
 def line_of(*names):

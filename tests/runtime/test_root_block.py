@@ -9,10 +9,8 @@ from motet.bundle.fields import Fields
 from motet.bundle.manifest import read_contract
 from motet.errors import MotionError
 from motet.formats import read_motion
-from motet.motion.heading import heading
-from motet.motion.kinematics import positions
-from motet.motion.motion import Motion
-from motet.motion.resample import lines
+from motet.motion.kinematics import heading, positions
+from motet.motion.motion import Motion, lines
 from motet.representation.contract import MotionContract
 from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS, from_root_block, to_root_block
 

@@ -1,6 +1,6 @@
 import pytest
 
-from motet.motion.sides import partners_of, sides_of
+from motet.motion.skeleton import partners_of, sides_of
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from motet.motion.kinematics import skeleton_of
 from motet.motion.looping import looped
 from motet.motion.mirroring import mirror as mirrored
 from motet.motion.motion import Motion
-from motet.motion.units import METRES
+from motet.motion.skeleton import METRES
 
 log = logging.getLogger(__name__)
 

@@ -20,7 +20,7 @@ from motet.formats.clips import MARK, chosen, split_clip
 from motet.formats.lines import plain_names
 from motet.models.language import LanguageModel
 from motet.motion.motion import Motion
-from motet.motion.units import METRES
+from motet.motion.skeleton import METRES
 from motet.settings import Progress, silent
 
 log = logging.getLogger(__name__)

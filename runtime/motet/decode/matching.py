@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from motet.bundle.graph import Floats
 from motet.decode.playback import Playback, Rows
 from motet.decode.steering_settings import SteeringSettings
-from motet.motion.quaternions import wrapped
-from motet.motion.rotations import Array
+from motet.motion.rotations import Array, wrapped
 from motet.motion.springs import damped, damped_path, damping_of
 
 HORIZONS = 3

@@ -14,8 +14,7 @@ from motet.decode.playback import Playback, Rows
 from motet.decode.pose_codes import PoseCodes
 from motet.decode.steering_settings import SteeringSettings
 from motet.motion.pose import Pose
-from motet.motion.quaternions import wrapped
-from motet.motion.rotations import Array
+from motet.motion.rotations import Array, wrapped
 from motet.motion.springs import damped, damping_of
 
 

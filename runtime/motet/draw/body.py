@@ -11,8 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from motet.motion.rotations import Array
-from motet.motion.sides import LEFT, MIDDLE, RIGHT, sides_of
-from motet.motion.skeleton import Skeleton
+from motet.motion.skeleton import LEFT, MIDDLE, RIGHT, Skeleton, sides_of
 
 COLOURS = {LEFT: (236, 122, 52), RIGHT: (58, 124, 226), MIDDLE: (176, 182, 196)}
 """sRGB of 0 to 255; ``player.html`` has the same."""

@@ -9,8 +9,7 @@ from motet.errors import MotionError
 from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
-from motet.motion.sides import LEFT, RIGHT
-from motet.motion.skeleton import Skeleton
+from motet.motion.skeleton import LEFT, RIGHT, Skeleton
 
 LARGEST_COORDINATE = 1e6
 """Positions further than this from the origin are refused: such a motion is broken and cannot be drawn."""

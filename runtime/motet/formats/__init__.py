@@ -23,8 +23,7 @@ from motet.formats.character import Character, put_onto
 from motet.formats.clips import Clip, split_clip
 from motet.motion.humanoid import rig
 from motet.motion.motion import Motion
-from motet.motion.skeleton import Skeleton
-from motet.motion.units import metres
+from motet.motion.skeleton import Skeleton, metres
 
 log = logging.getLogger(__name__)
 

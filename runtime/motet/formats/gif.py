@@ -12,8 +12,7 @@ from PIL import Image
 from motet.draw.figure import figure_of
 from motet.draw.stage import Stage
 from motet.files import File, write_whole
-from motet.motion.motion import Motion
-from motet.motion.resample import resampled
+from motet.motion.motion import Motion, resampled
 from motet.motion.rotations import Array
 
 YAW = np.radians(40.0)

@@ -19,8 +19,8 @@ from motet.draw.page import bone_data, filled, source
 from motet.errors import BundleError, ControlError
 from motet.files import File, place_of, write_whole
 from motet.models.steer import FEATURE_STEPS, SteerModel
-from motet.motion import two_bone
 from motet.motion.feet import lock as foot_lock
+from motet.motion.feet.hold import Leg
 from motet.motion.humanoid import BONES, HUMANOID
 from motet.settings import checked_int
 
@@ -82,7 +82,7 @@ def figure_data(model: SteerModel) -> dict[str, Any]:
         "bones": [HUMANOID.index(bone) for bone in BONES],
         "legs": [{"joints": joints, "bones": bones} for joints, bones in legs],
         "soles": list(zip(foot_lock.CARRIERS, foot_lock.POINTS.tolist(), strict=True)),
-        "knee": {"shortest": two_bone.MOST_BENT, "share": two_bone.EASED_SHARE, "gives": list(two_bone.GIVES)},
+        "knee": {"shortest": Leg.SHORTEST, "share": Leg.EASED_SHARE, "gives": list(Leg.GIVES)},
         "lock": asdict(model.settings(foot_lock.FootLockSettings)),
     }
 

@@ -15,9 +15,9 @@ from motet.errors import DecodingError, MotionError
 from motet.models.generate import SETTLED, GenerateModel
 from motet.models.generate_codes import CodesModel
 from motet.motion.feet.contacts import GROUND_PERCENT, feet_of, ground_of
-from motet.motion.feet.hold import BENT, hold_feet, windows
+from motet.motion.feet.hold import hold_feet, windows
 from motet.motion.humanoid import HUMANOID, Figure
-from motet.motion.humanoid.bones import LEFT_RIGHT, ground_under, sided, sole_points
+from motet.motion.humanoid.bones import LEFT_RIGHT, LEG, ground_under, sided, sole_points
 from motet.motion.kinematics import global_transforms, positions
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
@@ -33,7 +33,7 @@ RATES = 3
 STANCE = 0.7
 """Seconds before a stance and after its anchor that it affects (:mod:`motet.motion.feet.hold`)."""
 
-LEGS = {sided(side, part) for side in LEFT_RIGHT for part in BENT}
+LEGS = {sided(side, part) for side in LEFT_RIGHT for part in LEG[:3]}
 """Joints of the legs."""
 
 

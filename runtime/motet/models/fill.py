@@ -13,10 +13,9 @@ from motet.bundle.graph import Arrays, Graph
 from motet.bundle.manifest import Manifest
 from motet.errors import BundleError, MotionError
 from motet.models.base import BundleModel
-from motet.motion.follow import placed_after, to_figure_of
 from motet.motion.humanoid import HUMANOID, on_humanoid
-from motet.motion.motion import Motion
-from motet.motion.resample import spline
+from motet.motion.motion import Motion, spline
+from motet.motion.root_motion import placed_after, to_figure_of
 from motet.motion.rotations import Array
 from motet.representation.placed import PLACED_CHANNELS, bridge, placed, pose_of, put_at, seen_from, unplaced
 from motet.representation.retargeting import from_model_figure

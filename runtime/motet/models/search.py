@@ -27,7 +27,7 @@ from motet.formats.clips import MARK
 from motet.formats.npy import array
 from motet.models.language import MAX_SECONDS, LanguageModel
 from motet.motion.motion import Motion
-from motet.motion.units import metres
+from motet.motion.skeleton import metres
 from motet.settings import Progress, Range, Settings, silent
 
 log = logging.getLogger(__name__)

@@ -9,8 +9,7 @@ from motet.bundle.fields import Fields
 from motet.decode.playback import Rows
 from motet.decode.steering_settings import SteeringSettings
 from motet.errors import BundleError, ControlError
-from motet.motion.quaternions import wrapped
-from motet.motion.rotations import Array
+from motet.motion.rotations import Array, wrapped
 
 
 @dataclass(frozen=True, eq=False)

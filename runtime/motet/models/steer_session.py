@@ -16,8 +16,7 @@ from motet.motion.feet.lock import FootLock, FootLockSettings
 from motet.motion.humanoid import BONES
 from motet.motion.motion import Motion
 from motet.motion.pose import Pose
-from motet.motion.quaternions import wrapped
-from motet.motion.rotations import Array, quat_to_rotmat
+from motet.motion.rotations import Array, quat_to_rotmat, wrapped
 
 if TYPE_CHECKING:
     from motet.models.steer import SteerModel

@@ -16,7 +16,7 @@ from motet.decode.session import tick
 from motet.errors import BundleError, ControlError, DecodingError, MotionError
 from motet.models.base import ControlModel
 from motet.models.tdbn_script import control_track, parse_script, starts_of
-from motet.motion.heading import without_heading
+from motet.motion.kinematics import without_heading
 from motet.motion.motion import TURN, Motion
 from motet.settings import Seed, checked_int, seeds_of
 

@@ -3,15 +3,20 @@
 from motet.motion.feet.contacts import feet_of, ground_of, has_feet
 from motet.motion.feet.hold import hold_feet
 from motet.motion.feet.root_path import lay_root_path
-from motet.motion.heading import heading, without_heading
 from motet.motion.humanoid import HUMANOID, MIXAMO, Humanoid, JointMap, from_humanoid, read_map, rig, to_humanoid
-from motet.motion.kinematics import global_transforms, local_rotations, local_translations, positions
+from motet.motion.kinematics import (
+    global_transforms,
+    heading,
+    local_rotations,
+    local_translations,
+    positions,
+    without_heading,
+)
 from motet.motion.looping import looped
 from motet.motion.mirroring import lateral_axis, mirror
 from motet.motion.motion import UNITS, Motion
 from motet.motion.root_motion import in_place
-from motet.motion.sides import partners_of, sides_of
-from motet.motion.skeleton import Joint, Skeleton
+from motet.motion.skeleton import Joint, Skeleton, partners_of, sides_of
 
 __all__ = [
     "HUMANOID",

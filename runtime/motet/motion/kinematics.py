@@ -1,19 +1,26 @@
-"""Forward kinematics: from the channels of a motion to rotations and positions of its joints."""
+"""Forward kinematics: from the channels of a motion to rotations and positions of its joints, and back."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
-from typing import TypeVar
 
 import numpy as np
 
 from motet.errors import MotionError
 from motet.motion.motion import TURN, Motion
-from motet.motion.rotations import Array, euler_to_rotmat, frames_last, inverse, product, rotated, rotmats_to_euler
+from motet.motion.rotations import (
+    Array,
+    angle_of,
+    axis_to_rotmat,
+    euler_to_rotmat,
+    frames_last,
+    inverse,
+    product,
+    rotated,
+    rotmats_to_euler,
+)
 from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
 
 AXES = ("x", "y", "z")
-
-K = TypeVar("K")
 
 
 def skeleton_of(motion: Motion) -> Skeleton:
@@ -25,36 +32,30 @@ def skeleton_of(motion: Motion) -> Skeleton:
 
 def local_rotations(motion: Motion, joints: Sequence[int] | None = None) -> Array:
     """Rotations (T, J, 3, 3) relative to the parent of every joint, or of the joints with the given indices."""
-    skeleton = skeleton_of(motion)
+    skeleton, columns = skeleton_of(motion), motion.rotation_columns()
     wanted = range(len(skeleton.joints)) if joints is None else joints
-    columns = motion.rotation_columns()
     rotations = frames_last((len(motion), len(wanted), 3, 3))
     rotations[:] = np.eye(3)
-    named = [(place, skeleton.joints[index]) for place, index in enumerate(wanted)]
-    for order, alike in _by_order((place, joint) for place, joint in named if joint.name in columns).items():
-        places = [place for place, _ in alike]
-        turns = euler_to_rotmat(_angles(motion, [(joint, columns[joint.name]) for _, joint in alike]), order)
-        rotations[:, places] = _about_axes(turns, [joint for _, joint in alike])
+    for order, places in _by_order([skeleton.joints[i] for i in wanted], columns).items():
+        turning = [skeleton.joints[wanted[place]] for place in places]
+        # each joint's angles in its order, 0 without a channel
+        angles = frames_last((len(motion), len(places), 3))
+        angles[:] = 0.0
+        found = [(place, column) for place, joint in enumerate(turning) for column in columns[joint.name]]
+        of, taken = (list(part) for part in zip(*found, strict=True))
+        axes = [order.index(motion.channels[column][-1]) for column in taken]
+        angles[:, of, axes] = motion.values[:, taken] * [2 * np.pi / TURN[motion.units[column]] for column in taken]
+        rotations[:, places] = _about_axes(euler_to_rotmat(angles, order), turning)
     return rotations
 
 
-def _by_order(joints: Iterable[tuple[K, Joint]]) -> dict[str, list[tuple[K, Joint]]]:
-    """Joints with an item each, grouped by Euler order: joints of one order are processed together."""
-    found: dict[str, list[tuple[K, Joint]]] = {}
-    for own, joint in joints:
-        found.setdefault(joint.order, []).append((own, joint))
+def _by_order(joints: Sequence[Joint], names: Container[str] | None = None) -> dict[str, list[int]]:
+    """The places in a list of joints, of these names, by Euler order: joints of one order are processed together."""
+    found: dict[str, list[int]] = {}
+    for place, joint in enumerate(joints):
+        if names is None or joint.name in names:
+            found.setdefault(joint.order, []).append(place)
     return found
-
-
-def _angles(motion: Motion, joints: Sequence[tuple[Joint, Sequence[int]]]) -> Array:
-    """Angles (T, J, 3) in radians, each joint's in its order, from the columns of each; 0 without a channel."""
-    angles = frames_last((len(motion), len(joints), 3))
-    angles[:] = 0.0
-    found = [(place, joint, column) for place, (joint, columns) in enumerate(joints) for column in columns]
-    places, _, taken = (list(part) for part in zip(*found, strict=True))
-    axes = [joint.order.index(motion.channels[column][-1]) for _, joint, column in found]
-    angles[:, places, axes] = motion.values[:, taken] * [2 * np.pi / TURN[motion.units[column]] for column in taken]
-    return angles
 
 
 def local_translations(motion: Motion) -> Array:
@@ -101,9 +102,8 @@ def euler_of(rotations: Array, joint: Joint) -> Array:
 def eulers_of(rotations: Array, joints: Sequence[Joint], leaps: bool = False) -> Array:
     """Like :func:`euler_of` for several joints with their local rotations (T, J, 3, 3): (T, J, 3). leaps: may leap."""
     angles = frames_last(rotations.shape[:-1])
-    for order, alike in _by_order(enumerate(joints)).items():
-        places = [place for place, _ in alike]
-        plain = _about_axes(rotations[:, places], [joint for _, joint in alike], back=True)
+    for order, places in _by_order(joints).items():
+        plain = _about_axes(rotations[:, places], [joints[place] for place in places], back=True)
         angles[:, places] = rotmats_to_euler(plain, order, leaps)[..., [order.index(axis) for axis in AXES]]
     return angles
 
@@ -182,18 +182,13 @@ def places_of(skeleton: Skeleton, turned: Array) -> Array:
     return places
 
 
-def local_of(skeleton: Skeleton, turned: Array) -> Array:
-    """Rotations (T, J, 3, 3) of joints in their parents' frames, from those in the world."""
-    local = turned.copy(order="K")
-    local[:, 1:] = product(inverse(turned[:, skeleton.parents[1:]]), turned[:, 1:])
-    return local
-
-
 def motion_of(skeleton: Skeleton, turned: Array, moved: dict[int, Array], fps: float) -> Motion:
     """The motion of rotations in the world (T, J, 3, 3) and of translations (T, 3) of some joints in their parents'
     frames: all in "deg" and "length", with continuous angles."""
     kept = [i for i, j in enumerate(skeleton.joints) if skeleton.children[i] or not j.name.endswith(END_SUFFIX)]
-    angles = np.degrees(eulers_of(local_of(skeleton, turned)[:, kept], [skeleton.joints[i] for i in kept]))
+    local = turned.copy(order="K")
+    local[:, 1:] = product(inverse(turned[:, skeleton.parents[1:]]), turned[:, 1:])
+    angles = np.degrees(eulers_of(local[:, kept], [skeleton.joints[i] for i in kept]))
     columns = dict(zip(kept, np.moveaxis(angles, 1, 0), strict=True))
     names: list[str] = []
     values: list[Array] = []
@@ -206,3 +201,28 @@ def motion_of(skeleton: Skeleton, turned: Array, moved: dict[int, Array], fps: f
             values.append(columns[i])
     units = tuple("deg" if name[-2] == "r" else "length" for name in names)
     return Motion(np.concatenate(values, axis=1), tuple(names), units, fps, skeleton)
+
+
+def heading(motion: Motion) -> Array:
+    """Angle (T,) in radians about the vertical y axis that the root faces, unwrapped over time; 0 is along z."""
+    forward = local_rotations(motion, [0])[:, 0, :, 2]
+    return np.unwrap(angle_of(forward[:, 0], forward[:, 2]))
+
+
+def without_heading(motion: Motion) -> Motion:
+    """The motion turned to face z: a straight line fitted to the heading is removed from the root's rotation.
+
+    This keeps the sway of the hips within a stride and removes any constant heading or turning rate. A motion without
+    root rotation is returned unchanged. The root's translation is not changed.
+    """
+    joint = skeleton_of(motion).joints[0]
+    names = tuple(f"{joint.name}.r{axis}" for axis in AXES)
+    if not set(names) <= set(motion.channels) or not len(motion):
+        return motion
+    time, angle = np.arange(len(motion)), heading(motion)
+    line: Array = np.polyval(np.polyfit(time, angle, min(1, len(motion) - 1)), time).astype(np.float64)
+    levelled = axis_to_rotmat("y", -line) @ local_rotations(motion, [0])[:, 0]
+    units = tuple(motion.units[motion.channels.index(name)] for name in names)
+    turns = np.array([TURN[unit] for unit in units])
+    angles = euler_of(levelled, joint) * turns / (2 * np.pi)
+    return with_channels(motion, names, angles, units).continuous()

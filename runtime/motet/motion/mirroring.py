@@ -15,8 +15,7 @@ from motet.errors import MotionError
 from motet.motion.kinematics import AXES, euler_of, local_rotations, local_translations, skeleton_of, with_channels
 from motet.motion.motion import TURN, Motion
 from motet.motion.rotations import Array
-from motet.motion.sides import partners_of
-from motet.motion.skeleton import Joint, Skeleton
+from motet.motion.skeleton import Joint, Skeleton, partners_of
 
 Channels = tuple[tuple[str, ...], Array, tuple[str, ...]]
 """Names, values (T, D) and units."""

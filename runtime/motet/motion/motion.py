@@ -7,10 +7,9 @@ from functools import lru_cache
 from typing import Any, SupportsIndex
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import NDArray
 
 from motet.errors import MotionError, listed
-from motet.motion.resample import resampled
 from motet.motion.rotations import Array, continuous_euler, continuous_rotvec, without_turns
 from motet.motion.skeleton import Skeleton
 
@@ -21,9 +20,6 @@ UNITS = ("deg", "rad", "length", "m", "deg/s", "rad/s", "m/s", "1")
 
 TURN = {"deg": 360.0, "rad": 2 * np.pi}
 """A whole turn in each unit of angle."""
-
-MAX_VALUES = 2**28
-"""Maximum numbers in a resampled motion: 2 GiB, six hours of a hundred channels at 120 fps."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -45,26 +41,31 @@ class Motion:
     skeleton: Skeleton | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "values", _frozen(self.values))
-        object.__setattr__(self, "channels", tuple(self.channels))
-        object.__setattr__(self, "units", tuple(self.units))
-        object.__setattr__(self, "fps", float(self.fps))
-        if self.values.ndim != 2 or self.values.shape[1] != len(self.channels):
-            raise MotionError(f"values of shape {self.values.shape} do not fit {len(self.channels)} channels")
+        try:
+            values = np.array(self.values, dtype=np.float64, order="C")  # frames are contiguous, whatever the source
+        except (TypeError, ValueError) as error:
+            raise MotionError(f"the values of a motion must be numbers: {error}") from error
+        values.flags.writeable = False
+        for name, value in (
+            ("values", values),
+            ("channels", tuple(self.channels)),
+            ("units", tuple(self.units)),
+            ("fps", float(self.fps)),
+        ):
+            object.__setattr__(self, name, value)
+        if values.ndim != 2 or values.shape[1] != len(self.channels):
+            raise MotionError(f"values of shape {values.shape} do not fit {len(self.channels)} channels")
         if len(set(self.channels)) != len(self.channels):
             raise MotionError("channel names must be unique")
         if len(self.units) != len(self.channels) or set(self.units) - set(UNITS):
             raise MotionError(f"a motion needs one unit per channel, from {', '.join(UNITS)}")
         if not (np.isfinite(self.fps) and self.fps > 0):
             raise MotionError(f"the frame rate must be a positive number, not {self.fps}")
-        self._refuse_not_finite()
-
-    def _refuse_not_finite(self) -> None:
-        finite = np.isfinite(self.values)
+        finite = np.isfinite(values)
         if not finite.all():
             bad = np.argwhere(~finite)
             frame, channel = bad[0]
-            place = f"frame {frame}, channel {self.channels[channel]!r} is {self.values[frame, channel]}"
+            place = f"frame {frame}, channel {self.channels[channel]!r} is {values[frame, channel]}"
             raise MotionError(f"{place}: {len(bad)} values are not finite")
 
     def __len__(self) -> int:
@@ -148,7 +149,7 @@ class Motion:
         return replace(self, skeleton=replace(self.skeleton, metres_per_unit=metres_per_unit))
 
     def resample(self, fps: float, to_end: bool = False) -> "Motion":
-        """The motion at another frame rate, by the rule of :mod:`motet.motion.resample`.
+        """The motion at another frame rate, by the rule of :func:`resampled`.
 
         The first frame is kept, or the last one (``to_end``). Unless frames are merely picked, jumps of angles are
         removed first (:meth:`continuous`).
@@ -158,7 +159,7 @@ class Motion:
         if fps == self.fps:
             return self
         ratio = self.fps / fps
-        if self.values.size / ratio > MAX_VALUES:
+        if self.values.size / ratio > 2**28:  # 2 GiB, six hours of a hundred channels at 120 fps
             raise MotionError(f"{self.duration:g} s at {fps:g} fps is too many frames")
         log.debug("resampling %r to %g fps", self, fps)
         picked = abs(ratio - round(ratio)) < 1e-9 and ratio > 0.5
@@ -171,56 +172,83 @@ class Motion:
         Euler angles change by whole turns and gimbal flips, forward from the first frame; exponential maps ("JOINT.ex",
         "JOINT.ey", "JOINT.ez") by whole turns, backward from the last one.
         """
-        values = np.array(self.values)
-        triples, singles = self._euler()
-        turns = np.array([TURN.get(unit, np.inf) for unit in self.units])
-        if len(triples):
+        values, turns = np.array(self.values), np.array([TURN.get(unit, np.inf) for unit in self.units])
+        places = {} if self.skeleton is None else self.skeleton.places
+        triples, singles = [], []
+        for name, columns in self.rotation_columns().items():
+            if self.skeleton is not None and len(columns) == 3 and name in places:
+                order = self.skeleton.joints[places[name]].order
+                triples.append([columns["xyz".index(axis)] for axis in order])
+            else:
+                singles += columns
+        if triples:
             values[:, triples] = continuous_euler(values[:, triples], turns[triples])
-        if len(singles):
+        if singles:
             values[:, singles] = without_turns(values[:, singles], turns[singles])
-        maps = [columns for columns in rotation_columns(self.channels, self.units, "e").values() if len(columns) == 3]
+        maps = [columns for columns in self.rotation_columns("e").values() if len(columns) == 3]
         if maps:
             radians = 2 * np.pi / turns[maps]
             values[:, maps] = continuous_rotvec(values[:, maps] * radians) / radians
         return replace(self, values=values)
 
-    def _euler(self) -> tuple[list[list[int]], list[int]]:
-        """Columns of joints with all three Euler angles, in the order of each; and columns of all other angles."""
-        triples, singles = [], []
-        for joint, columns in self.rotation_columns().items():
-            order = self._order(joint)
-            if len(columns) == 3 and order is not None:
-                triples.append([columns["xyz".index(axis)] for axis in order])
-            else:
-                singles.extend(columns)
-        return triples, singles
-
-    def rotation_columns(self) -> Mapping[str, list[int]]:
-        """The columns of each joint with Euler channels, in the order x, y, z."""
-        return rotation_columns(self.channels, self.units)
-
-    def _order(self, joint: str) -> str | None:
-        if self.skeleton is None or joint not in self.skeleton.places:
-            return None
-        return self.skeleton.joints[self.skeleton.places[joint]].order
+    def rotation_columns(self, letter: str = "r") -> Mapping[str, list[int]]:
+        """The columns, in the order x, y, z, of each joint with Euler angles ("r") or an exponential map ("e")."""
+        return _rotation_columns(self.channels, self.units, letter)
 
 
 @lru_cache(maxsize=64)
-def rotation_columns(channels: tuple[str, ...], units: tuple[str, ...], letter: str = "r") -> Mapping[str, list[int]]:
-    """The columns of each joint with channels "JOINT.rx", ... (or another letter) in a unit of angle."""
+def _rotation_columns(channels: tuple[str, ...], units: tuple[str, ...], letter: str) -> Mapping[str, list[int]]:
     found: dict[str, list[int]] = {}
-    kinds = {f"{letter}{axis}" for axis in "xyz"}
     for column in sorted(range(len(channels)), key=lambda column: channels[column][-2:]):
         joint, _, kind = channels[column].rpartition(".")
-        if kind in kinds and units[column] in TURN:
+        if kind in (f"{letter}x", f"{letter}y", f"{letter}z") and units[column] in TURN:
             found.setdefault(joint, []).append(column)
     return found
 
 
-def _frozen(values: ArrayLike) -> Array:
-    try:
-        array = np.array(values, dtype=np.float64, order="C")  # frames are contiguous, whatever the source
-    except (TypeError, ValueError) as error:
-        raise MotionError(f"the values of a motion must be numbers: {error}") from error
-    array.flags.writeable = False
-    return array
+def resampled(values: Array, ratio: float, to_end: bool = False) -> Array:
+    """Values (T, ...) at every ``ratio``-th frame, from the first; the ratio need not be whole.
+
+    Nothing is extrapolated past the last frame: floor((T - 1) / ratio) + 1 frames. Whole ratios pick every n-th frame;
+    otherwise lower rates interpolate linearly, and higher ones by Catmull-Rom splines, smoothly through every frame.
+    to_end: keep the last frame instead of the first; the remainder is dropped at the start.
+    """
+    frames = len(values)
+    if abs(ratio - round(ratio)) < 1e-9 and ratio > 0.5:
+        step = round(ratio)
+        return values[(frames - 1) % step if to_end and frames else 0 :: step]
+    count = int((frames - 1) / ratio + 1e-9) + 1 if frames else 0
+    times: Array = np.arange(count, dtype=np.float64) * ratio
+    if to_end and frames:
+        times = frames - 1 - times[::-1]
+    return spline(values, times) if ratio < 1 else lines(values, times)
+
+
+def lines(values: Array, times: Array) -> Array:
+    """Values (S, ...) on the lines between the frames of ``values`` (T, ...), at times (S,) counted in frames."""
+    if len(values) < 2:
+        return np.repeat(values[:1], len(times), axis=0)
+    start, part = _between(values, times)
+    found: Array = values[start] + part * (values[start + 1] - values[start])
+    return found
+
+
+def spline(values: Array, times: Array) -> Array:
+    """Like :func:`lines`, on Catmull-Rom splines."""
+    if len(values) < 2:
+        return np.repeat(values[:1], len(times), axis=0)
+    # beyond each end, continue the parabola through the three nearest frames, or the line through two
+    near = np.array([3.0, -3.0, 1.0] if len(values) > 2 else [2.0, -1.0])
+    ends = [np.tensordot(near, part, 1)[None] for part in (values[: len(near)], values[: -len(near) - 1 : -1])]
+    padded = np.concatenate([ends[0], values, ends[1]])
+    start, s = _between(values, times)
+    a, b, c, d = (padded[start + n] for n in range(4))
+    found: Array = b + 0.5 * s * (c - a + s * (2 * a - 5 * b + 4 * c - d + s * (3 * (b - c) + d - a)))
+    return found
+
+
+def _between(values: Array, times: Array) -> tuple[NDArray[np.intp], Array]:
+    """For each time the frame before it, and the fraction of the way to the next one (S, 1, ...)."""
+    # a time that equals a frame up to rounding is that frame
+    start = np.minimum((times + 1e-9).astype(np.intp), len(values) - 2)
+    return start, (times - start).reshape(-1, *[1] * (values.ndim - 1))

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.motion.humanoid import BONES, HUMANOID
-from motet.motion.quaternions import quat_product, quat_rotated, wrapped
-from motet.motion.rotations import Array
+from motet.motion.rotations import Array, quat_product, quat_rotated, wrapped
 
 Floats = NDArray[np.float32]
 

@@ -1,4 +1,4 @@
-"""Conversions between rotation representations; names say ``from_to``.
+"""Conversions between rotation representations, named ``from_to``, and arithmetic with matrices and quaternions.
 
 Any number of leading dimensions may precede the last one (angles, vectors, quaternions) or the last two (matrices).
 Angles are radians, arrays float64. Matrices rotate column vectors. An Euler ``order`` such as ``"zyx"`` lists the
@@ -10,12 +10,12 @@ frames are contiguous in memory (:func:`frames_last`). Results and slices of suc
 give the same products, more slowly.
 """
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-
-_AXES = {"x": 0, "y": 1, "z": 2}
 
 UP = np.array([0.0, 1.0, 0.0])
 """Where y points."""
@@ -43,7 +43,7 @@ def angle_of(sine: Array, cosine: Array) -> Array:
 
 def axis_to_rotmat(axis: str, angle: Array) -> Array:
     """Rotation matrices (..., 3, 3) about one coordinate axis ("x", "y" or "z") by ``angle`` (...)."""
-    i = _AXES[axis]
+    i = "xyz".index(axis)
     j, k = (i + 1) % 3, (i + 2) % 3
     cos, sin = np.cos(angle), np.sin(angle)
     matrix = np.zeros((*np.shape(angle), 3, 3))
@@ -55,7 +55,7 @@ def axis_to_rotmat(axis: str, angle: Array) -> Array:
 
 def euler_to_rotmat(angles: Array, order: str) -> Array:
     """Euler angles (..., 3) in ``order``, three different axes, to matrices (..., 3, 3): the product multiplied out."""
-    i, j, k = (_AXES[axis] for axis in order)
+    i, j, k = map("xyz".index, order)
     # cosine and sine from the tangent of the half angle, several times as fast in numpy as both
     tangent = np.tan(angles * (0.5 * _handedness(order)))
     part = 1 / (1 + tangent**2)
@@ -76,7 +76,7 @@ def rotmat_to_euler(matrix: Array, order: str) -> Array:
 
     ``order`` must name three different axes. At a gimbal lock the last angle is 0.
     """
-    i, j, k = (_AXES[axis] for axis in order)
+    i, j, k = map("xyz".index, order)
     sign = _handedness(order)
     cos_middle = np.sqrt(matrix[..., i, i] ** 2 + matrix[..., i, j] ** 2)
     angles = frames_last((*matrix.shape[:-2], 3))
@@ -91,8 +91,7 @@ def rotmat_to_euler(matrix: Array, order: str) -> Array:
 
 
 def _handedness(order: str) -> float:
-    """1 for cyclic permutations of "xyz", -1 for those of "zyx"."""
-    return 1.0 if (_AXES[order[1]] - _AXES[order[0]]) % 3 == 1 else -1.0
+    return 1.0 if order in "xyzxy" else -1.0
 
 
 def continuous_euler(angles: Array, turn: Array | float = 2 * np.pi) -> Array:
@@ -107,18 +106,16 @@ def continuous_euler(angles: Array, turn: Array | float = 2 * np.pi) -> Array:
     # steps of less than a sixth of a turn are nearer than the other solution, of which two angles are half a turn off
     leaping = (np.abs(np.diff(result, axis=0)) > turn / 6).any(axis=(0, -1))
     if leaping.any():
-        result[:, leaping] = _without_leaps(result[:, leaping], turn[leaping])
+        own, turn = result[:, leaping], turn[leaping]
+        flipped = own * [1, -1, 1] + turn / 2
+        # the solutions lie as far from each other seen from either: where one is nearer than the other does not depend
+        # on which of them the frame before took
+        stay, change = ((then - own[:-1]) / turn for then in (own[1:], flipped[1:]))
+        stay, change = (2 * np.pi * np.abs(turns - np.round(turns)).sum(axis=-1) for turns in (stay, change))
+        changed = np.cumsum(change < stay - 1e-9, axis=0) % 2 == 1
+        own[1:] = np.where(changed[..., None], flipped[1:], own[1:])
+        result[:, leaping] = without_turns(own, turn)
     return result
-
-
-def _without_leaps(angles: Array, turn: Array) -> Array:
-    flipped = angles * [1, -1, 1] + turn / 2
-    # the solutions lie as far from each other seen from either: where one is nearer than the other does not depend on
-    # which of them the frame before took
-    stay, change = (_distance(then - angles[:-1], turn) for then in (angles[1:], flipped[1:]))
-    changed = np.cumsum(change < stay - 1e-9, axis=0) % 2 == 1
-    angles[1:] = np.where(changed[..., None], flipped[1:], angles[1:])
-    return without_turns(angles, turn)
 
 
 def rotmats_to_euler(matrices: Array, order: str, leaps: bool = False) -> Array:
@@ -142,13 +139,6 @@ def without_turns(angles: Array, turn: Array | float = 2 * np.pi) -> Array:
     """Angles (T, ...) that differ by no more than half a turn from frame to frame; the first frame stays."""
     turns = np.round(np.diff(angles, axis=0) / turn).cumsum(axis=0)
     return np.concatenate([angles[:1], angles[1:] - turns * turn])
-
-
-def _distance(steps: Array, turn: Array) -> Array:
-    """Summed radians (T, ...) of angles (T, ..., 3), modulo whole turns."""
-    turns = steps / turn
-    distance: Array = 2 * np.pi * np.abs(turns - np.round(turns)).sum(axis=-1)
-    return distance
 
 
 def continuous_rotvec(vectors: Array) -> Array:
@@ -286,3 +276,41 @@ def twist(rotations: Array, axis: Array) -> Array:
 def angle_between(one: Array, other: Array) -> float:
     """Angle in degrees between two rotations (3, 3)."""
     return float(np.degrees(np.arccos(np.clip((np.sum(one * other) - 1) / 2, -1, 1))))
+
+
+def quat_product(left: NDArray[Any], right: NDArray[Any]) -> NDArray[Any]:
+    """Products of quaternions (..., 4): the right rotation first, then the left."""
+    a, b = left[..., :3], right[..., :3]
+    found = np.empty(np.broadcast_shapes(left.shape, right.shape), dtype=left.dtype)
+    found[..., :3] = left[..., 3:] * b + right[..., 3:] * a + cross(a, b)
+    found[..., 3] = left[..., 3] * right[..., 3] - (a * b).sum(axis=-1)
+    return found
+
+
+def quat_rotated(quats: NDArray[Any], vectors: NDArray[Any]) -> NDArray[Any]:
+    """Vectors (..., 3) rotated by unit quaternions (..., 4)."""
+    axis = quats[..., :3]
+    twice = 2 * cross(axis, vectors)
+    found: NDArray[Any] = vectors + quats[..., 3:] * twice + cross(axis, twice)
+    return found
+
+
+def cross(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
+    """Cross products of vectors (..., 3); numpy's own takes several times as long for small arrays."""
+    found = np.empty(np.broadcast_shapes(a.shape, b.shape), dtype=a.dtype)
+    found[..., 0] = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
+    found[..., 1] = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
+    found[..., 2] = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    return found
+
+
+def conjugate(quats: NDArray[Any]) -> NDArray[Any]:
+    """The inverse rotations (..., 4)."""
+    found: NDArray[Any] = quats * np.array([-1, -1, -1, 1], dtype=quats.dtype)
+    return found
+
+
+def wrapped(angle: NDArray[Any]) -> NDArray[Any]:
+    """Angles in radians, between -pi and pi."""
+    found: NDArray[Any] = angle - 2 * np.pi * np.round(angle / (2 * np.pi))
+    return found

@@ -1,7 +1,9 @@
-"""The skeleton: a tree of joints with offsets, and each joint's rotation convention."""
+"""The skeleton: a tree of joints with offsets, each joint's rotation convention and side, and the unit of lengths."""
 
+import math
+import re
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from operator import index
@@ -14,6 +16,11 @@ from motet.errors import MotionError, UnitError
 from motet.motion.rotations import Array, euler_to_rotmat
 
 END_SUFFIX = "_end"
+
+METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254}
+"""Name of a unit of length -> its metres."""
+
+LEFT, MIDDLE, RIGHT = "left", "middle", "right"
 
 
 @dataclass(frozen=True)
@@ -133,6 +140,13 @@ class Skeleton:
             found.extend(self.children[i])
         return tuple(sorted(found))
 
+    def ancestors(self, joint: int) -> list[int]:
+        """Indices of a joint and all that it hangs on, upwards to the root."""
+        chain = [joint]
+        while chain[-1]:
+            chain.append(self.joints[chain[-1]].parent)
+        return chain
+
     def scaled(self, metres_per_unit: float) -> "Skeleton":
         """The same skeleton in another length unit; MotionError if its own unit is not known."""
         factor = self.unit_factor(metres_per_unit)
@@ -177,3 +191,40 @@ def _triple(values: Iterable[float]) -> tuple[float, float, float]:
     if not np.isfinite([x, y, z]).all():
         raise ValueError(f"{x:g}, {y:g}, {z:g} are not three finite numbers")
     return x, y, z
+
+
+def metres(unit: str | float) -> float:
+    """Metres of a unit of length: one of :data:`METRES`, or a number of metres; MotionError for anything else."""
+    value = METRES.get(unit, math.nan) if isinstance(unit, str) else float(unit)
+    if not (math.isfinite(value) and value > 0):
+        raise MotionError(f"expected a length unit ({', '.join(METRES)}) or a number of metres, not {unit!r}")
+    return value
+
+
+def partners_of(names: Sequence[str]) -> tuple[int, ...]:
+    """For each name the index of its partner on the other side, or its own if there is none."""
+    return tuple(partner for partner, _ in _partners(names))
+
+
+def sides_of(names: Sequence[str]) -> tuple[str, ...]:
+    """:data:`LEFT`, :data:`RIGHT` or :data:`MIDDLE` for each name; one without a partner is in the middle."""
+    return tuple(side for _, side in _partners(names))
+
+
+def _partners(names: Sequence[str]) -> list[tuple[int, str]]:
+    """For each name the index of its partner and the side that it is on itself."""
+    patterns = (
+        r"left|Left|LEFT|right|Right|RIGHT",  # LeftArm, arm_left, mixamorig:RightHand
+        r"(?<![A-Za-z])[lLrR](?![A-Za-z])",  # L_Arm, arm.R, "Bip01 L Thigh"
+        r"^[lr](?=[A-Za-z])|^[LR](?=[A-Z])",  # lfemur, RThigh
+        r"(?<=[a-z])[LR]$",  # armL
+    )
+    pairs = (("l", "r"), ("L", "R"), ("left", "right"), ("Left", "Right"), ("LEFT", "RIGHT"))
+    other = dict(pairs) | {right: left for left, right in pairs}
+    places, found = {name: place for place, name in enumerate(names)}, []
+    for place, name in enumerate(names):
+        matches = (match for pattern in patterns for match in re.finditer(pattern, name))
+        swapped = ((name[: m.start()] + other[m[0]] + name[m.end() :], m[0][0]) for m in matches)
+        partners = ((places[partner], LEFT if own in "lL" else RIGHT) for partner, own in swapped if partner in places)
+        found.append(next(partners, (place, MIDDLE)))
+    return found

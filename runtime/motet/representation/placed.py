@@ -13,7 +13,7 @@ from motet.motion.humanoid import BONES
 from motet.motion.kinematics import AXES, continued, local_rotations, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, inverse, product, rotmat_to_rotvec, rotvec_to_rotmat
-from motet.motion.sides import partners_of
+from motet.motion.skeleton import partners_of
 from motet.representation.base import FrameMirror
 from motet.representation.root_sixd import ROOT_SIXD, SIXD_KINDS, SIXD_SIGNS, rotmat_to_sixd, sixd_to_rotmat
 

@@ -1,7 +1,7 @@
 """``root_angles``: Euler angles of the joints in degrees, and the root block in the root's place.
 
 The root block is six channels that say how a figure moves over the ground, wherever it is and whichever way it faces.
-The facing is the heading of :mod:`motet.motion.heading`, the angle about the vertical y axis; the rest of the root's
+The facing is the heading of :mod:`motet.motion.kinematics`, the angle about the vertical y axis; the rest of the root's
 rotation is pitch and roll: R = Ry(heading) Rx(pitch) Rz(roll). Displacements are those since the previous frame, in the
 facing frame of the previous frame, so that adding them up gives the path exactly, at the frame rate they were computed
 at.
@@ -15,10 +15,10 @@ from numpy.typing import ArrayLike
 from motet.errors import MotionError
 from motet.motion.feet.contacts import feet_of, ground_of, has_feet
 from motet.motion.feet.root_path import led_along, velocity_by_feet
-from motet.motion.heading import heading
 from motet.motion.kinematics import (
     AXES,
     euler_of,
+    heading,
     local_rotations,
     local_translations,
     positions,

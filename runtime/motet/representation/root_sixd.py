@@ -18,8 +18,7 @@ from motet.motion.humanoid import HUMANOID
 from motet.motion.kinematics import AXES, continued, local_rotations, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, axis_to_rotmat, product, rotmat_to_quat
-from motet.motion.sides import partners_of
-from motet.motion.skeleton import END_SUFFIX
+from motet.motion.skeleton import END_SUFFIX, partners_of
 from motet.representation.base import FrameMirror, at_rest, lateral_x
 from motet.representation.root_block import ground_velocities, last_place, way
 

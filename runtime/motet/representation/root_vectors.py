@@ -14,8 +14,7 @@ from motet.errors import MotionError, listed
 from motet.motion.kinematics import continued, local_rotations, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, rotmat_to_rotvec, rotvec_to_rotmat
-from motet.motion.sides import partners_of
-from motet.motion.skeleton import END_SUFFIX
+from motet.motion.skeleton import END_SUFFIX, partners_of
 from motet.representation.base import FrameMirror, at_rest, lateral_x
 from motet.representation.root_block import (
     ROOT_BLOCK,

@@ -10,7 +10,7 @@ from typing import Any
 import click
 import torch
 
-from motet.motion.units import METRES
+from motet.motion.skeleton import METRES
 from motet_train import distributed
 from motet_train.manifest import About
 from motet_train.progress import log

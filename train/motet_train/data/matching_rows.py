@@ -12,7 +12,7 @@ from motet.motion.humanoid import BONES, HUMANOID, LEFT_RIGHT, ground_under, sid
 from motet.motion.kinematics import global_transforms
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, rotmat_to_quat
-from motet.motion.sides import partners_of
+from motet.motion.skeleton import partners_of
 from motet.representation import named
 from motet.representation.root_sixd import ROOT_SIXD, joint_rotations
 from motet_train.data.locomotion import Recording

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from motet.errors import MotionError
 from motet.motion.rotations import Array
-from motet.motion.sides import partners_of
-from motet.motion.skeleton import Skeleton
+from motet.motion.skeleton import Skeleton, partners_of
 
 GROUND_PERCENT = 10
 """Percentage of frames whose lowest point of the feet is below ground."""
@@ -85,12 +84,11 @@ def smoothed(points: Array, calm: float, fps: float) -> Array:
 
 def feet_of(skeleton: Skeleton) -> list[int]:
     """Indices of the joints of both feet, the low ones at rest; MotionError if no joints are paired."""
-    paired, height = _paired(skeleton), skeleton.rest_positions[:, 1]
-    if not paired:
+    if not has_feet(skeleton):
         raise MotionError("no left-right pairs of joints to find the feet among: name the joints of the feet")
+    paired, height = _paired(skeleton), skeleton.rest_positions[:, 1]
     # joints of the feet are within a tenth of the figure's height
-    limit = height[paired].min() + 0.1 * skeleton.height
-    return [i for i in paired if height[i] <= limit]
+    return [i for i in paired if height[i] <= height[paired].min() + 0.1 * skeleton.height]
 
 
 def has_feet(skeleton: Skeleton) -> bool:
@@ -98,10 +96,10 @@ def has_feet(skeleton: Skeleton) -> bool:
     return bool(_paired(skeleton))
 
 
+def _paired(skeleton: Skeleton) -> list[int]:
+    return [i for i, partner in enumerate(partners_of(skeleton.names)) if partner != i]
+
+
 def ground_of(heights: Array) -> float:
     """The height of the ground under feet at ``heights`` (T, K)."""
     return float(np.percentile(heights.min(axis=1), GROUND_PERCENT))
-
-
-def _paired(skeleton: Skeleton) -> list[int]:
-    return [i for i, partner in enumerate(partners_of(skeleton.names)) if partner != i]

@@ -4,10 +4,9 @@ A foot stands while its heel, ball or toe tip is low and slow. The contact of ea
 movement over the ground is removed from the foot: the heel's after landing, that of all three while the sole is flat,
 the ball's and toes' as the foot rolls off. The removed movement adds up to a shift of the foot; over a stance its
 median is 0, so the foot stands where it stood on average. Before and after, the shift blends in and out smoothly. Hip,
-knee and ankle follow by :mod:`motet.motion.two_bone`.
+knee and ankle follow by two-bone inverse kinematics (:class:`Leg`).
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,11 +14,10 @@ from numpy.typing import NDArray
 
 from motet.errors import MotionError
 from motet.motion.feet.contacts import SOLES, ContactSettings, contacts_of, rise, smoothed
-from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, Figure, ground_under, leg_length, sided, sole_points
-from motet.motion.kinematics import AXES, euler_of, global_transforms, skeleton_of, with_channels
-from motet.motion.motion import TURN, Motion
-from motet.motion.rotations import Array, inverse, product, rotated
-from motet.motion.two_bone import Leg
+from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, LEG, Figure, ground_under, leg_length, sided, sole_points
+from motet.motion.kinematics import AXES, global_transforms, posed, skeleton_of, with_channels
+from motet.motion.motion import Motion
+from motet.motion.rotations import Array, inverse, product, rotated, rotvec_to_rotmat, swing, unit
 
 
 @dataclass(frozen=True)
@@ -42,13 +40,6 @@ class HoldSettings:
     anchor: float | None = None
 
 
-HOLD_RECORDED = HoldSettings()
-HOLD_TREMBLING = HoldSettings(contact=ContactSettings(speeds=(0.7, 3.0), calm=0.06))
-"""For feet that tremble and slide: contact is measured over a longer time, and may slide faster."""
-
-BENT = ("UpperLeg", "LowerLeg", "Foot")
-
-
 def hold_feet(
     motion: Motion, trembling: bool = False, ground: float | None = None, anchor: float | None = None
 ) -> Motion:
@@ -67,36 +58,43 @@ def hold_feet(
     if len(motion) < 2:
         return motion
     skeleton, (rotations, places) = skeleton_of(motion), global_transforms(motion)
-    known = _of_humanoid(rotations, places, ground) if skeleton == HUMANOID else None
-    legs, scale, soles = known or _measured(motion, rotations, places)
-    settings = replace(HOLD_TREMBLING if trembling else HOLD_RECORDED, anchor=anchor)
-    places = places * scale
+    legs, scale, soles = _measured(motion, rotations, places, ground)
+    settings = HoldSettings(anchor=anchor)
+    if trembling:  # contact is measured over a longer time, and may slide faster
+        settings = replace(settings, contact=ContactSettings(speeds=(0.7, 3.0), calm=0.06))
     turned = np.array(rotations)
     for (joints, hinge), points in zip(legs, np.split(soles, 2, axis=1), strict=True):
-        hip, knee, ankle = (places[:, joint] for joint in joints)
+        hip, knee, ankle = (places[:, i] * scale for i in joints)
         leg = Leg(hip, knee, ankle, rotated(rotations[:, joints[1]], hinge))
         turns = leg.turns(_target(leg, points, motion.fps, settings))
-        for joint, turn in zip(joints, (*turns, np.eye(3)), strict=True):
-            hanging = list(skeleton.subtree(skeleton.names[joint]))
+        for i, turn in zip(joints, (*turns, np.eye(3)), strict=True):
+            hanging = list(skeleton.subtree(skeleton.names[i]))
             turned[:, hanging] = product(turn[..., None, :, :], rotations[:, hanging])
-    return _with_joints(motion, [joint for joints, _ in legs for joint in joints], turned)
+    own = {}
+    for i in (i for joints, _ in legs for i in joints):
+        joint = skeleton.joints[i]
+        lacking = tuple(name for axis in AXES if (name := f"{joint.name}.r{axis}") not in motion.channels)
+        # the humanoid's joints get three angles; those of another figure keep to the ones they have, as knees with one
+        if lacking and (skeleton == HUMANOID or len(lacking) == 3):
+            still = np.zeros((len(motion), len(lacking)))
+            motion = with_channels(motion, lacking, still, ("deg",) * len(lacking))
+        own[joint.name] = product(inverse(turned[:, joint.parent]), turned[:, i])
+    return posed(motion, own, {})
 
 
-Legs = list[tuple[list[int], Array]]
-"""For each side the joints of hip, knee and ankle, and the knee's axis (3,), to the left, in its joint's frame."""
+def _measured(
+    motion: Motion, rotations: Array, places: Array, ground: float | None
+) -> tuple[list[tuple[list[int], Array]], float, Array]:
+    """The left and right leg of a motion, the scale to the humanoid's size, and points (T, P, 3) of both soles in it.
 
-
-def _of_humanoid(rotations: Array, places: Array, ground: float | None) -> tuple[Legs, float, Array]:
-    """Like :func:`_measured`, for the humanoid itself."""
-    soles = sole_points(rotations, places)
-    soles[..., 1] -= ground_under(soles) if ground is None else ground
-    legs = [([HUMANOID.index(sided(side, part)) for part in BENT], np.array([1.0, 0.0, 0.0])) for side in LEFT_RIGHT]
-    return legs, 1.0, soles
-
-
-def _measured(motion: Motion, rotations: Array, places: Array) -> tuple[Legs, float, Array]:
-    """The legs, what makes lengths those of the humanoid's size, and points (T, P, 3) of both soles, first the left
-    one, above a ground at 0, at that size."""
+    A leg: the joints of hip, knee and ankle, and the knee's axis (3,), to the left, in its joint's frame. The soles are
+    above a ground at 0, the left one's points first.
+    """
+    if motion.skeleton == HUMANOID:
+        soles = sole_points(rotations, places)
+        soles[..., 1] -= ground_under(soles) if ground is None else ground
+        sides = [[HUMANOID.index(sided(side, part)) for part in LEG[:3]] for side in LEFT_RIGHT]
+        return [(joints, np.array([1.0, 0.0, 0.0])) for joints in sides], 1.0, soles
     figure = Figure.of(motion)
     fitted, joints_of = figure.fitted, figure.fitted.joint_map.joints
     if not np.array_equal(figure.turn, np.eye(3)):
@@ -105,21 +103,25 @@ def _measured(motion: Motion, rotations: Array, places: Array) -> tuple[Legs, fl
     soles = fitted.soles(fitted.bones(rotations), places) * scale
     # how thick the soles of another figure are is not known: each of their points is on the ground where it is lowest
     soles[..., 1] -= np.percentile(soles[..., 1], 5, axis=0)
-    sides = [[joints_of[sided(side, part)] for part in BENT] for side in LEFT_RIGHT]
+    sides = [[joints_of[sided(side, part)] for part in LEG[:3]] for side in LEFT_RIGHT]
     return [(joints, fitted.aligned[joints[1]][:, 0]) for joints in sides], scale, soles
 
 
-def _target(leg: Leg, points: Array, fps: float, settings: HoldSettings) -> Array:
+def _target(leg: "Leg", points: Array, fps: float, settings: HoldSettings) -> Array:
     """The ankle's target (T, 3), from points (T, K, 3) of the sole over ground at 0."""
-    over_ground = _held(points, fps, settings)
-    target = leg.eased(leg.ankle + np.insert(over_ground, 1, 0.0, axis=1))
-    lowest = points[..., 1].min(axis=1) + target[:, 1] - leg.ankle[:, 1]
-    target[:, 1] += np.minimum(_lift(-lowest, settings.soft * fps), settings.farthest)
+    target = leg.eased(leg.ankle + np.insert(_shift(points, fps, settings), 1, 0.0, axis=1))
+    depth = -(points[..., 1].min(axis=1) + target[:, 1] - leg.ankle[:, 1])
+    # what is under the ground comes out of it in ``soft`` seconds, without kinks: a mean over the window in which each
+    # is the deepest is as high as the one in the middle
+    reach = max(1, round(settings.soft * fps))
+    deepest = np.max(windows(np.maximum(depth, 0), reach), axis=1)
+    bell = np.hanning(2 * reach + 3)[1:-1]
+    target[:, 1] += np.minimum(windows(deepest, reach) @ (bell / bell.sum()), settings.farthest)
     return target
 
 
-def _held(points: Array, fps: float, settings: HoldSettings) -> Array:
-    """The shift (T, 2) over the ground."""
+def _shift(points: Array, fps: float, settings: HoldSettings) -> Array:
+    """The shift (T, 2) of a foot over the ground."""
     steps = np.diff(points[..., [0, 2]], axis=0)
     touch = contacts_of(points, fps, settings.contact)
     weights = touch / np.maximum(touch.sum(axis=1, keepdims=True), 1e-9)
@@ -131,7 +133,11 @@ def _held(points: Array, fps: float, settings: HoldSettings) -> Array:
         times.append(np.arange(start, stop + 1))
         values.append(path)
     shift = _between(times, values, len(points), settings.blend * fps)
-    return _bounded(smoothed(shift[:, None], settings.tremble, fps)[:, 0], settings.farthest)
+    shift = smoothed(shift[:, None], settings.tremble, fps)[:, 0]
+    # no longer than the farthest; short ones are as they are within a few per cent
+    length = np.linalg.norm(shift, axis=-1, keepdims=True) / settings.farthest
+    bounded: Array = shift / (1 + length**4) ** 0.25
+    return bounded
 
 
 def _stances(standing: NDArray[np.bool_], lifted: float) -> list[tuple[int, int]]:
@@ -168,42 +174,71 @@ def _between(times: list[NDArray[np.intp]], values: list[Array], frames: int, bl
     return found
 
 
-def _lift(depth: Array, soft: float) -> Array:
-    """Heights (T,), without kinks, by which what is ``depth`` (T,) under the ground comes out of it in ``soft``
-    frames."""
-    reach = max(1, round(soft))
-    deepest = np.max(windows(np.maximum(depth, 0), reach), axis=1)
-    # a mean over the window in which each is the deepest is as high as the one in the middle
-    bell = np.hanning(2 * reach + 3)[1:-1]
-    found: Array = windows(deepest, reach) @ (bell / bell.sum())
-    return found
-
-
 def windows(values: Array, reach: int) -> Array:
     """Values (T,) with ``reach`` before and as many after each, (T, 2 reach + 1); those at the ends go on."""
     return np.lib.stride_tricks.sliding_window_view(np.pad(values, reach, mode="edge"), 2 * reach + 1)
 
 
-def _bounded(shift: Array, farthest: float) -> Array:
-    """Shifts (T, N) no longer than ``farthest``; short ones are as they are within a few per cent."""
-    length = np.linalg.norm(shift, axis=-1, keepdims=True) / farthest
-    bounded: Array = shift / (1 + length**4) ** 0.25
-    return bounded
+class Leg:
+    """A thigh and a shin: positions of hip, knee and ankle (T, 3), and the knee's axis (T, 3), about which the shin
+    turns back when the knee bends. Any unit of length."""
+
+    SHORTEST = -0.95
+    """The cosine of the largest bend of a knee, 162 degrees: targets beyond it are not reached."""
+
+    EASED_SHARE = 0.5
+    """The largest lengthening of a leg, as a share of the length left until it is straight."""
+
+    GIVES = (0.012, 0.006)
+    """Shares of the length of a straight leg: 1 cm, how much too long it stays when it has to bend; and 5 mm short of
+    straight, or a knee bent by 12 degrees, where that is e times less."""
+
+    def __init__(self, hip: Array, knee: Array, ankle: Array, hinge: Array) -> None:
+        self.hip, self.knee, self.ankle = hip, knee, ankle
+        along, down = knee - hip, ankle - knee
+        self._upper, self._lower = _length(along), _length(down)
+        self._axis = unit(hinge - _dot(hinge, along) / _dot(along, along) * along)
+        # the part of the shin in the plane of the bend
+        self._in_plane = np.sqrt(np.maximum(1 - _dot(unit(down), self._axis) ** 2, 1e-12))
+        self._longest = np.sqrt(self._upper**2 + self._lower**2 + 2 * self._upper * self._lower * self._in_plane)
+
+    def eased(self, target: Array) -> Array:
+        """The position (T, 3) near ``target`` (T, 3), on the line to the hip, that the ankle reaches without a snap.
+
+        Near straight, a knee bends or straightens infinitely fast relative to the leg's length. So a leg lengthens less
+        the straighter it gets, and a straight one bends only softly.
+        """
+        away = target - self.hip
+        now, wanted = _length(self.ankle - self.hip), _length(away)
+        left = np.maximum(self._longest - now, 1e-9)
+        longer = -self.EASED_SHARE * left * np.expm1(-np.maximum(wanted - now, 0) / (self.EASED_SHARE * left))
+        less = np.maximum(now - wanted, 0)
+        give, fade = (part * self._longest for part in self.GIVES)
+        shorter = less**2 / np.maximum(less + give * np.exp(-left / fade), 1e-12)
+        found: Array = self.hip + away * ((now + longer - shorter) / np.maximum(wanted, 1e-12))
+        return found
+
+    def turns(self, target: Array) -> tuple[Array, Array]:
+        """World rotations (T, 3, 3) of thigh and shin that bring the ankle to ``target`` (T, 3), or as near as
+        possible.
+
+        The knee turns about its axis, as far as that is square to the thigh, until the leg is as long as it has to be,
+        bent back, as knees are, even where it was bent forward; then thigh and shin turn together the shortest way.
+        What of the shin stands out of the plane of the bend stays.
+        """
+        along, down, upper, lower = self.knee - self.hip, self.ankle - self.knee, self._upper, self._lower
+        cosine = (_length(target - self.hip) ** 2 - upper**2 - lower**2) / (2 * upper * lower * self._in_plane)
+        bent = np.arctan2(_dot(np.cross(along, down), self._axis), _dot(along, down))  # negative if forward
+        bend = rotvec_to_rotmat(self._axis * (np.arccos(np.clip(cosine, self.SHORTEST, 1.0)) - bent))
+        turn = swing(along + rotated(bend, down), target - self.hip)
+        return turn, product(turn, bend)
 
 
-def _with_joints(motion: Motion, joints: Sequence[int], turned: Array) -> Motion:
-    """The motion with the angles of some joints from the joints' rotations in the world (T, J, 3, 3).
+def _dot(one: Array, other: Array) -> Array:
+    found: Array = (one * other).sum(axis=-1, keepdims=True)
+    return found
 
-    The humanoid's get three. Those of another figure keep to the angles that they have, as knees that have one.
-    """
-    skeleton = skeleton_of(motion)
-    for index in joints:
-        joint, had = skeleton.joints[index], dict(zip(motion.channels, motion.units, strict=True))
-        names = tuple(f"{joint.name}.r{axis}" for axis in AXES)
-        own = [] if skeleton == HUMANOID else [i for i, name in enumerate(names) if name in had]
-        kept = own or [0, 1, 2]
-        units = tuple(had.get(names[i], "deg") for i in kept)
-        angles = euler_of(product(inverse(turned[:, joint.parent]), turned[:, index]), joint)[:, kept]
-        values = angles * np.array([TURN[unit] for unit in units]) / (2 * np.pi)
-        motion = with_channels(motion, tuple(names[i] for i in kept), values, units)
-    return motion
+
+def _length(vectors: Array) -> Array:
+    found: Array = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return found

@@ -2,8 +2,8 @@
 
 Contacts come from the table being played, by :func:`motet.motion.feet.contacts.contacts_of` of the recordings. While a
 foot stands, the movement of its lowest point over the ground is removed, tick by tick; when it lifts off, the
-correction fades. Hip, knee and ankle follow (:mod:`motet.motion.two_bone`). The offline twin, which knows how long a
-foot will stand, is :mod:`motet.motion.feet.hold`.
+correction fades. Hip, knee and ankle follow (:class:`motet.motion.feet.hold.Leg`). The offline twin, which knows how
+long a foot will stand, is :mod:`motet.motion.feet.hold`.
 """
 
 from dataclasses import dataclass, replace
@@ -11,12 +11,11 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from motet.motion.humanoid import BONES, HUMANOID, LEFT_RIGHT, SOLE, sided
+from motet.motion.feet.hold import Leg
+from motet.motion.humanoid import BONES, HUMANOID, LEFT_RIGHT, LEG, SOLE, sided
 from motet.motion.pose import Floats, Pose
-from motet.motion.quaternions import conjugate, quat_product, quat_rotated
-from motet.motion.rotations import Array, rotmat_to_quat
+from motet.motion.rotations import Array, conjugate, quat_product, quat_rotated, rotmat_to_quat
 from motet.motion.springs import damped, damping_of
-from motet.motion.two_bone import Leg
 from motet.settings import Range, Settings
 
 
@@ -34,16 +33,15 @@ class FootLockSettings(Settings):
     stands: Annotated[float, Range(0, 1)] = 0.5
 
 
-CHAIN = ("UpperLeg", "LowerLeg", "Foot", "Toes")
-LEG_BONES = np.array([[BONES.index(sided(side, part)) for part in CHAIN] for side in LEFT_RIGHT])
+LEG_BONES = np.array([[BONES.index(sided(side, part)) for part in LEG] for side in LEFT_RIGHT])
 """Bones (2, 4) of both legs among the humanoid's."""
 
-LEG_OFFSETS = np.array([[HUMANOID.offsets[HUMANOID.index(sided(side, part))] for part in CHAIN] for side in LEFT_RIGHT])
+LEG_OFFSETS = HUMANOID.offsets[[[HUMANOID.index(BONES[bone]) for bone in leg] for leg in LEG_BONES]]
 """Where they begin in their parents' frames (2, 4, 3), the hips' for the first."""
 
 POINTS = np.array([place for places in SOLE.values() for place in places], dtype=np.float32)
-CARRIERS = [CHAIN.index(part) for part, places in SOLE.items() for _ in places]
-"""Points (3, 3) of a sole, and which joint of CHAIN carries each."""
+CARRIERS = [LEG.index(part) for part, places in SOLE.items() for _ in places]
+"""Points (3, 3) of a sole, and which joint of a leg carries each."""
 
 
 @dataclass(eq=False)
@@ -63,18 +61,8 @@ class FootLock:
 
     def held(self, pose: Pose) -> Pose:
         """The next pose, one tick later, with standing feet held in place and above ground."""
-        hips, turned, places = _legs(pose)
+        how, (hips, turned, places) = self.settings, _legs(pose)
         soles = places[:, :, CARRIERS] + quat_rotated(turned[:, :, CARRIERS], POINTS)
-        shift = self._shift(soles, pose.contacts)
-        lift = np.maximum(-soles[..., 1].min(axis=2), 0)
-        if not shift.any() and not lift.any():
-            return pose
-        target = places[:, :, 2] + np.stack([shift[..., 0], lift, shift[..., 1]], axis=-1)
-        return replace(pose, rotations=_reached(pose.rotations, hips, turned, places, target))
-
-    def _shift(self, soles: Array, contacts: Floats) -> Array:
-        """The current shift of each foot (B, 2, 2), from the points of the soles (B, 2, 3, 3)."""
-        how = self.settings
         if self.soles is None or self.shift is None or self.drift is None:
             self.shift = self.drift = np.zeros((*soles.shape[:2], 2))
             self.soles = soles
@@ -82,13 +70,15 @@ class FootLock:
         moved = np.take_along_axis(soles - self.soles, lowest, axis=2)[:, :, 0, ::2]
         faded, slower = damped(self.shift, self.drift, damping_of(how.fade), self.dt)
         held = self.shift - moved
-        stands = contacts[..., None] > how.stands
+        stands = pose.contacts[..., None] > how.stands
         stands &= np.linalg.norm(held, axis=-1, keepdims=True) < how.farthest
         stands &= np.linalg.norm(moved, axis=-1, keepdims=True) < how.swings * self.dt
-        self.drift = np.where(stands, 0, slower)
-        self.shift = np.where(stands, held, faded)
-        self.soles = soles
-        return self.shift
+        self.drift, self.shift, self.soles = np.where(stands, 0, slower), np.where(stands, held, faded), soles
+        lift = np.maximum(-soles[..., 1].min(axis=2), 0)
+        if not self.shift.any() and not lift.any():
+            return pose
+        target = places[:, :, 2] + np.stack([self.shift[..., 0], lift, self.shift[..., 1]], axis=-1)
+        return replace(pose, rotations=_reached(pose.rotations, hips, turned, places, target))
 
 
 def _legs(pose: Pose) -> tuple[Floats, Floats, Array]:

@@ -25,16 +25,13 @@ from motet.motion.kinematics import positions, skeleton_of, with_channels
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 
-GRAVITY = 9.81  # m/s^2
 ADULT_HEIGHT = 1.7  # m: assumed if the skeleton's length unit is unknown
-VOTES = ContactSettings(heights=(0.0, 0.07))  # a vote counts less the higher its point is
-TREMBLE = 0.015  # s: anything shorter is noise
 
 
 def lay_root_path(
     motion: Motion,
     feet: tuple[Sequence[str], Sequence[str]] | None = None,
-    tremble: float = TREMBLE,
+    tremble: float = 0.015,
     keep_height: bool = False,
 ) -> Motion:
     """The motion with root channels tx, ty, tz in "length" units, found from the feet's contact with the ground.
@@ -54,11 +51,13 @@ def lay_root_path(
     metres = skeleton.metres_per_unit or ADULT_HEIGHT / skeleton.height
     places = positions(motion)
     points = (places[:, joints] - places[:, :1]) * metres
-    height = _height(points[..., 1], motion.fps)
-    plane = smoothed(points[..., [0, 2]], tremble, motion.fps)
-    velocity = (
-        velocity_by_feet(plane, points[..., 1] + height[:, None], motion.fps) if len(motion) > 1 else np.zeros((0, 2))
-    )
+    standing = -points[..., 1].min(axis=1)
+    # a jump up forward in time is a fall backward: only frames on which both agree are flight
+    flight = np.minimum(_with_flight(standing, motion.fps), _with_flight(standing[::-1], motion.fps)[::-1])
+    height = smoothed(flight[:, None, None], 0.015, motion.fps)[:, 0, 0]
+    plane, velocity = smoothed(points[..., [0, 2]], tremble, motion.fps), np.zeros((0, 2))
+    if len(motion) > 1:
+        velocity = velocity_by_feet(plane, points[..., 1] + height[:, None], motion.fps)
     return led_along(motion, velocity, places[:, 0, 1] * metres if keep_height else height, metres)
 
 
@@ -71,22 +70,15 @@ def led_along(motion: Motion, velocity: Array, height: Array, metres: float) -> 
     return with_channels(motion, names, path / metres, ("length",) * 3)
 
 
-def _height(points: Array, fps: float) -> Array:
-    """Heights (T,) of the root above the ground from those of the feet's points (T, K) above the root, in metres."""
-    standing = -points.min(axis=1)
-    # a jump up forward in time is a fall backward: only frames on which both agree are flight
-    flight = np.minimum(_with_flight(standing, fps), _with_flight(standing[::-1], fps)[::-1])
-    return smoothed(flight[:, None, None], TREMBLE, fps)[:, 0, 0]
-
-
 def _with_flight(standing: Array, fps: float) -> Array:
+    """Heights (T,) of the root in metres, from those at which the feet are on the ground, where it falls freely."""
     # the upward velocity is measured over .05 s
-    heights, speed, span = standing.tolist(), 0.0, max(1, round(0.05 * fps))
+    heights, speed, span, gravity = standing.tolist(), 0.0, max(1, round(0.05 * fps)), 9.81
     for t in range(1, len(heights)):
-        falling = heights[t - 1] + speed / fps - 0.5 * GRAVITY / fps**2
+        falling = heights[t - 1] + speed / fps - 0.5 * gravity / fps**2
         if falling > heights[t]:
             heights[t] = falling
-            speed -= GRAVITY / fps
+            speed -= gravity / fps
         else:
             start = max(0, t - span)
             speed = (heights[t] - heights[start]) * fps / (t - start)
@@ -100,25 +92,20 @@ def velocity_by_feet(
 
     guess: (T - 1, 2) in m/s, a vote of weight ``trust`` that always counts.
     """
-    between = (above[1:] + above[:-1]) / 2
-    near = contacts(between, None, VOTES)
-    slip = 0.2  # m/s: how far off a slower vote may be; a faster one three times as far
-    votes = -np.diff(points, axis=0) * fps
-    velocity = _agreed(votes, near, fps, guess, trust)
-    for _ in range(10):
-        off = votes - velocity[:, None]
-        faster = (off * velocity[:, None]).sum(axis=-1) > 0
-        allowed = np.where(faster, 3 * slip, slip)
-        velocity = _agreed(votes, near / (1 + (off**2).sum(axis=-1) / allowed**2) ** 2, fps, guess, trust)
-    return velocity
-
-
-def _agreed(votes: Array, weights: Array, fps: float, guess: Array | float, trust: float) -> Array:
-    """The mean (T, 2) of votes (T, K, 2) by their weights (T, K) and by how near they are in time, and of the guess."""
-    reach = round(1.0 * fps)
+    # a vote counts less the higher its point is
+    near = contacts((above[1:] + above[:-1]) / 2, None, ContactSettings(heights=(0.0, 0.07)))
+    votes, reach = -np.diff(points, axis=0) * fps, round(1.0 * fps)
     nearness = np.exp(-np.abs(np.arange(-reach, reach + 1)) / (0.05 * fps))  # votes are brought together over .05 s
-    columns = [weights.sum(axis=1), *np.moveaxis((weights[..., None] * votes).sum(axis=1), 1, 0)]
-    total, x, z = (np.convolve(column, nearness)[reach : reach + len(votes)] for column in columns)
-    # without any vote within a second: the guess
-    mean: Array = (np.stack([x, z], axis=1) + trust * guess) / (total + trust)[:, None]
-    return mean
+    weights, velocity = near, np.zeros(votes[:, 0].shape)
+    for attempt in range(11):
+        if attempt:
+            off = votes - velocity[:, None]
+            faster = (off * velocity[:, None]).sum(axis=-1) > 0
+            # m/s: how far off a slower vote may be; a faster one three times as far
+            allowed = np.where(faster, 3 * 0.2, 0.2)
+            weights = near / (1 + (off**2).sum(axis=-1) / allowed**2) ** 2
+        columns = [weights.sum(axis=1), *np.moveaxis((weights[..., None] * votes).sum(axis=1), 1, 0)]
+        total, x, z = (np.convolve(column, nearness)[reach : reach + len(votes)] for column in columns)
+        # without any vote within a second: the guess
+        velocity = (np.stack([x, z], axis=1) + trust * guess) / (total + trust)[:, None]
+    return velocity

@@ -17,8 +17,7 @@ from motet.motion.humanoid.joint_names import HalfKnownError, map_by_names
 from motet.motion.kinematics import local_translations, positions, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, unit
-from motet.motion.sides import LEFT, RIGHT, partners_of, sides_of
-from motet.motion.skeleton import END_SUFFIX, Skeleton
+from motet.motion.skeleton import END_SUFFIX, LEFT, RIGHT, Skeleton, partners_of, sides_of
 
 NO_HUMAN = "this skeleton is no human's: expected hips with two legs, and a back with two arms"
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from motet.models.steer import SteerModel
 from motet.motion.humanoid import BONES, HUMANOID
 from motet.motion.rotations import Array
-from motet.motion.sides import partners_of
+from motet.motion.skeleton import partners_of
 from motet_train.evaluate.steer.track import Track
 
 CHUNK = 30

@@ -9,8 +9,7 @@ from scipy.ndimage import find_objects, label, uniform_filter1d
 
 from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, on_humanoid, sided
 from motet.motion.kinematics import positions
-from motet.motion.motion import Motion
-from motet.motion.resample import resampled
+from motet.motion.motion import Motion, resampled
 from motet.motion.rotations import Array
 from motet_train.data.errors import DataError
 

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.motion.sides import LEFT, MIDDLE, sides_of
-from motet.motion.skeleton import Skeleton
+from motet.motion.skeleton import LEFT, MIDDLE, Skeleton, sides_of
 
 TRUNK_PART = "trunk"
 

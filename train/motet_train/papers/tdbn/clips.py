@@ -6,8 +6,7 @@ from pathlib import Path
 
 from motet.errors import MotionError
 from motet.formats import READABLE, read_motion
-from motet.motion.heading import without_heading
-from motet.motion.kinematics import skeleton_of
+from motet.motion.kinematics import skeleton_of, without_heading
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton

@@ -17,8 +17,7 @@ from motet.motion.feet.contacts import ContactSettings, standing
 from motet.motion.feet.lock import FootLock
 from motet.motion.humanoid import sole_points
 from motet.motion.pose import Pose
-from motet.motion.quaternions import wrapped
-from motet.motion.rotations import Array, quat_to_rotmat, rotmat_to_quat
+from motet.motion.rotations import Array, quat_to_rotmat, rotmat_to_quat, wrapped
 from motet.representation.root_sixd import ROOT_SIXD, sixd_to_rotmat
 from motet_train.papers.tdbn.courses import LABELS, controls_of
 

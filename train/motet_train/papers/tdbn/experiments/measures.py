@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.motion.resample import lines
+from motet.motion.motion import lines
 from motet.motion.rotations import Array
 from motet.representation.contract import LIVING_STD
 from motet_train.papers.tdbn.period import period
