@@ -24,8 +24,8 @@ from fuzzing import Files, Generator, Mutant, altered, damaged, fuzz, options
 
 import motet
 from motet.bundle.bundle import Bundle, list_bundles
-from motet.bundle.protobuf import Value, fields
-from motet.bundle.session import SessionOptions
+from motet.bundle.graph import SessionOptions
+from motet.bundle.graph_safety import Value, fields
 from motet.models.generate_codes import CodesModel
 from motet.models.load import verify
 from motet.motion.motion import Motion

@@ -8,21 +8,18 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from motet.bundle.arrays import array_bytes
 from motet.bundle.bundle import Bundle, write_bundle
-from motet.bundle.graph import GraphSpec, OnnxGraph
+from motet.bundle.graph import GraphSpec, OnnxGraph, SessionOptions
 from motet.bundle.manifest import Manifest
-from motet.bundle.session import SessionOptions
+from motet.bundle.members import array_bytes
 from motet.files import check_place
 from motet.models.base import BundleModel
 from motet.models.load import build, kind_of
-from motet_export.decoded import whole_runs
+from motet_export.decoded import differences, golden_vectors, whole_runs
 from motet_export.examples import Examples, examples
 from motet_export.exporter import ExportError, export_graph
-from motet_export.golden import FILE, golden_vectors
-from motet_export.half import HALF, halved, round_weights
 from motet_export.parity import check_carried, check_one_step, check_runs
-from motet_export.quantise import difference, quantised
+from motet_export.weights import halved, quantised, round_weights
 from motet_train.runs import Run
 
 log = logging.getLogger("motet.export")
@@ -51,11 +48,11 @@ def export_run(run: Run, out: str | Path, int8: bool = False, half: bool = False
     onnx = _served(torch, files)
     report = parity(onnx, torch)
     if half:
-        report["weights"] = HALF
+        report["weights"] = "float16"
     if int8:
         files, exact = {name: quantised(data) for name, data in files.items()}, onnx
         onnx = _served(torch, files)
-        report["int8"] = difference(onnx, exact)
+        report["int8"] = differences(onnx, exact)
     _write(out, onnx, files, {**run.manifest, "parity": report}, examples(manifest, torch.graphs))
     return report
 
@@ -88,8 +85,8 @@ def halve_bundle(bundle: Bundle, out: str | Path) -> dict[str, Any]:
     exact = kind_of(bundle.manifest).load(bundle)
     files = {f"{role}.onnx": halved(bundle.read(g.file), rounded=True) for role, g in bundle.manifest.graphs.items()}
     onnx = _served(exact, files)
-    changes = difference(onnx, exact)
-    report = {**bundle.manifest.parity, "weights": HALF, "half": changes}
+    changes = differences(onnx, exact)
+    report = {**bundle.manifest.parity, "weights": "float16", "half": changes}
     _write(out, onnx, files, {**bundle.manifest.source, "parity": report}, examples(bundle.manifest, exact.graphs))
     return changes
 
@@ -117,7 +114,7 @@ def _write(
     arrays = {f"{name}.npy": array_bytes(array) for name, array in model.tables.items()}
     settings = {kind.FEATURE: asdict(model.settings(kind)) for kind in model.SETTINGS}
     manifest = {**about, "settings": settings, "graphs": specs, "tables": tables, "golden": golden}
-    write_bundle(out, manifest, {**graphs, **arrays, FILE: vectors})
+    write_bundle(out, manifest, {**graphs, **arrays, golden["file"]: vectors})
 
 
 def parity_of(run: Run, bundle: Bundle, options: SessionOptions | None = None) -> dict[str, Any]:
@@ -127,7 +124,7 @@ def parity_of(run: Run, bundle: Bundle, options: SessionOptions | None = None) -
     """
     if "int8" in bundle.manifest.parity:
         raise ExportError(f"bundle {bundle.path} has 8-bit weights, which torch cannot check; export without --int8")
-    if bundle.manifest.parity.get("weights") == HALF:
+    if bundle.manifest.parity.get("weights") == "float16":
         round_weights(run.model)
     model = kind_of(bundle.manifest).load(bundle, options)
     return parity(model, build(bundle.manifest, run.torch_graphs(), run.tables()))

@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from motet.bundle.bundle import Bundle
-from motet.bundle.session import SessionOptions
+from motet.bundle.graph import SessionOptions
 from motet.cli.options import session_options
 from motet.models.load import KINDS
 from motet_export.bundles import export_run, halve_bundle, parity_of

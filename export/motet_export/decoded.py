@@ -1,13 +1,17 @@
-"""Whole runs of each verb, decoded by ONNX Runtime and by torch from the same inputs and seeds."""
+"""Whole runs of each verb: those decoded by ONNX Runtime and by torch from the same inputs, and the golden run."""
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial, singledispatch
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from motet.bundle.golden import TOLERANCE, vectors
+from motet.bundle.graph import Arrays
+from motet.decode.loop import Recording
+from motet.decode.words import noise_of
 from motet.errors import TextWarning
 from motet.models.base import BundleModel
 from motet.models.describe import DescribeModel
@@ -19,163 +23,233 @@ from motet.models.search import SearchModel
 from motet.models.steer import SteerModel
 from motet.models.tdbn_control import TdbnModel
 from motet.motion.motion import Motion
-from motet.motion.rotations import Array
-from motet_export.examples import sides, walks
+from motet_export.examples import Examples, sides, walks
 
 Decoded = dict[str, NDArray[Any]]
-Runs = dict[str, Callable[[], tuple[Decoded, Decoded]]]
-"""By name of a run: what ONNX Runtime decoded, and what torch decoded."""
-
-Named = dict[str, Callable[[Any], Decoded]]
+Runs = dict[str, Callable[[], Decoded]]
 """By name of a run: what a model decodes."""
 
+Golden = tuple[Arrays, dict[str, Any]]
+"""The inputs of a whole run, and its settings."""
 
-def whole_runs(onnx: BundleModel, torch: BundleModel) -> Runs:
-    """The runs by which a model is judged, each by its name."""
-    runs = runs_of(onnx)
-    return {name: partial(_pair, (onnx, torch), run) for name, run in runs.items()}
+
+def whole_runs(onnx: BundleModel, torch: BundleModel) -> dict[str, Callable[[], tuple[Decoded, Decoded]]]:
+    """By name of a run: what one and what the other model decodes."""
+
+    def both(name: str) -> tuple[Decoded, Decoded]:
+        return runs_of(onnx)[name](), runs_of(torch)[name]()
+
+    return {name: partial(both, name) for name in runs_of(onnx)}
+
+
+def differences(small: BundleModel, exact: BundleModel) -> dict[str, float]:
+    """What fewer bits change in whole runs, for the manifest.
+
+    "<run>.equal": share of the decoded sentences that are the same. "<run>.score": mean |difference| of the
+    log-likelihoods of known pairs, in units of their mean |value|. "<run>.frames", where nothing but frames is decoded:
+    their mean |difference|.
+    """
+    report: dict[str, float] = {}
+    for name, run in whole_runs(small, exact).items():
+        found, expected = run()
+        if "words" in found and found["words"].shape == expected["words"].shape:
+            report[f"{name}.equal"] = float((found["words"] == expected["words"]).all(axis=1).mean())
+        if "scores" in found:
+            off = np.abs(found["scores"] - expected["scores"]).mean() / np.abs(expected["scores"]).mean()
+            report[f"{name}.score"] = float(off)
+        if set(found) == {"frames"}:
+            report[f"{name}.frames"] = float(np.abs(found["frames"] - expected["frames"]).mean())
+    return report
+
+
+def golden_vectors(model: BundleModel, draws: Mapping[str, Examples]) -> tuple[bytes, dict[str, Any]]:
+    """The file of golden vectors of a bundle that is being exported, and what the manifest says of it."""
+    rng = np.random.default_rng(5)
+    feeds = {role: draws[role](rng, 2) for role in model.graphs}
+    given, settings = golden_run(model, rng)
+    return vectors(model, feeds, given, settings), {"file": "golden.npz", "tolerance": TOLERANCE, "run": settings}
 
 
 @singledispatch
-def runs_of(model: BundleModel) -> Named:
+def runs_of(model: BundleModel) -> Runs:
     """What a model is asked to decode, by name."""
     raise NotImplementedError(f"no whole runs of {model!r} are defined")
 
 
+@singledispatch
+def golden_run(model: BundleModel, _: np.random.Generator) -> Golden:
+    """The whole run by which a bundle is verified, one that :meth:`BundleModel.replay` takes."""
+    raise NotImplementedError(f"no golden run of {model!r} is defined")
+
+
 @runs_of.register
-def _tdbn(_: TdbnModel) -> Named:
-    return {"mean_field": partial(_controlled, 0.0), "sampled": partial(_controlled, 1.0)}
-
-
-def _controlled(variety: float, model: TdbnModel) -> Decoded:
+def _(model: TdbnModel) -> Runs:
     """Four characters go through all labels, one after the other, half a second of ramp between."""
-    labels = len(model.labels)
-    hold, ramp = round(2 * model.fps), round(model.fps / 2)
-    corners = np.repeat(np.eye(labels), hold + ramp, axis=0)
+    ramp = round(model.fps / 2)
+    corners = np.repeat(np.eye(len(model.labels)), round(2 * model.fps) + ramp, axis=0)
     smooth = np.stack([np.convolve(column, np.ones(ramp) / ramp)[: len(corners)] for column in corners.T], axis=1)
+
+    def controlled(variety: float) -> Decoded:
+        iterations = 2 if model.has_free_units else 1
+        session = model.start(characters=4, seed=7, variety=variety, iterations=iterations, smooth=False)
+        return {"frames": session.frames(smooth.clip(0, 1))}
+
+    return {"mean_field": partial(controlled, 0.0), "sampled": partial(controlled, 1.0)}
+
+
+@golden_run.register
+def _(model: TdbnModel, rng: np.random.Generator) -> Golden:
+    """From the first label to each other one, in 12 ticks."""
+    places = np.linspace(0, len(model.labels) - 1, 12)[:, None]
+    track = np.maximum(0, 1 - np.abs(places - np.arange(len(model.labels)))).astype(np.float32)
     iterations = 2 if model.has_free_units else 1
-    session = model.start(characters=4, seed=7, variety=variety, iterations=iterations, smooth=False)
-    return {"frames": session.frames(smooth.clip(0, 1))}
+    noise = rng.random((12 * iterations, model.sizes["N"]), np.float32)
+    return {"track": track, "noise": noise}, {"iterations": iterations}
 
 
 @runs_of.register
-def _steer(_: SteerModel) -> Named:
-    return {"steered": _steered}
-
-
-def _steered(model: SteerModel) -> Decoded:
+def _(model: SteerModel) -> Runs:
     """Four characters in all gaits, one after the other, for a second each, every one in another direction."""
-    session = model.start(characters=4)
-    poses = []
-    for gait in model.gaits:
-        session.control(gait=gait, speed=model.usual[gait], direction=np.arange(4) * 70.0 - 100)
-        poses += [session.tick() for _ in range(round(model.fps))]
-    return {"frames": session.frames_of(poses)}
+
+    def steered() -> Decoded:
+        session, poses = model.start(characters=4), []
+        for gait in model.gaits:
+            session.control(gait=gait, speed=model.usual[gait], direction=np.arange(4) * 70.0 - 100)
+            poses += [session.tick() for _ in range(round(model.fps))]
+        return {"frames": session.frames_of(poses)}
+
+    return {"steered": steered}
+
+
+@golden_run.register
+def _(_model: SteerModel, rng: np.random.Generator) -> Golden:
+    """Off into any direction, and into another, at a walk's speeds, 12 ticks each."""
+    return {"track": np.repeat(rng.uniform(-1.5, 1.5, (2, 3)), 12, axis=0).astype(np.float32)}, {}
 
 
 @runs_of.register
-def _describe(_: DescribeModel) -> Named:
-    searches = {"greedy": (1, None), "beam": (5, None), "consensus": (5, 50)}
-    runs: Named = {name: partial(_described, *settings) for name, settings in searches.items()}
-    return {**runs, "scores": _sentence_scores}
+def _(model: DescribeModel) -> Runs:
+    """Sentences of eight motions: ids of their words and log-probabilities, and the motions' contexts; and scores."""
+
+    def described(beams: int, draws: int | None = None) -> Decoded:
+        rows = model.describe(_motions(model), beams, draws, decoding="consensus" if draws else "beam")
+        found = [description for row in rows for description in row]
+        ids = np.zeros((len(found), MAX_WORDS), dtype=np.int64)
+        for row, description in zip(ids, found, strict=True):
+            if description.text:
+                words, _ = model.vocabulary.encode(description.text)
+                row[: len(words)] = words
+        scores = np.array([description.log_probability for description in found])
+        return {"words": ids, "log_probabilities": scores, "contexts": model.embed(_motions(model))}
+
+    def scores() -> Decoded:
+        return {
+            "scores": np.array([model.score(*pair) for pair in zip(_motions(model), _sentences(model), strict=True)])
+        }
+
+    searches = {"greedy": (1,), "beam": (5,), "consensus": (5, 50)}
+    return {name: partial(described, *settings) for name, settings in searches.items()} | {"scores": scores}
 
 
-def _described(beams: int, draws: int | None, model: DescribeModel) -> Decoded:
-    """Sentences of eight motions: ids of their words and log-probabilities, and the motions' contexts."""
-    found = [
-        row
-        for motion in model.describe(_motions(model), beams, draws, decoding="consensus" if draws else "beam")
-        for row in motion
-    ]
-    ids = np.zeros((len(found), MAX_WORDS), dtype=np.int64)
-    for row, description in zip(ids, found, strict=True):
-        if description.text:
-            words, _ = model.vocabulary.encode(description.text)
-            row[: len(words)] = words
-    scores = np.array([description.log_probability for description in found])
-    return {"words": ids, "log_probabilities": scores, "contexts": model.embed(_motions(model))}
-
-
-def _sentence_scores(model: DescribeModel) -> Decoded:
-    pairs = zip(_motions(model), _sentences(model), strict=True)
-    return {"scores": np.array([model.score(motion, sentence) for motion, sentence in pairs])}
+@golden_run.register
+def _(model: DescribeModel, rng: np.random.Generator) -> Golden:
+    frames = walks(model.contract, rng, 1, 20)[0]
+    if "draws" not in model.defaults:
+        return {"frames": frames}, {}
+    return {"frames": frames, "noise": noise_of(model.limits(model.defaults), int(model.defaults["draws"]))}, {}
 
 
 @runs_of.register
-def _generate(model: GenerateModel) -> Named:
-    if "candidates" not in model.defaults:
-        return {"decoded": partial(_generated, None)}
-    return {"samples": partial(_generated, 1), "beam": partial(_generated, 4), "scores": _motion_scores}
-
-
-def _generated(candidates: int | None, model: GenerateModel) -> Decoded:
+def _(model: GenerateModel) -> Runs:
     """Three motions for each of eight sentences: normalised frames, lengths and log-likelihoods, and the contexts."""
-    hypotheses = 3 if "hypotheses" in model.defaults else None
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", TextWarning)  # these sentences make no sense
-        rows = model.generate(_sentences(model), hypotheses, candidates=candidates, seed=7, max_seconds=4)
-    found = [generated for row in rows for generated in row]
-    return {
-        "frames": np.concatenate([model.contract.normalised(g.frames) for g in found]),
-        "lengths": np.array([len(g.frames) for g in found]),
-        "log_likelihoods": np.array([g.log_likelihood or 0.0 for g in found]),
-        "contexts": model.embed(_sentences(model)),
-    }
+
+    def generated(candidates: int | None = None) -> Decoded:
+        hypotheses = 3 if "hypotheses" in model.defaults else None
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", TextWarning)  # these sentences make no sense
+            rows = model.generate(_sentences(model), hypotheses, candidates=candidates, seed=7, max_seconds=4)
+        found = [generated for row in rows for generated in row]
+        return {
+            "frames": np.concatenate([model.contract.normalised(g.frames) for g in found]),
+            "lengths": np.array([len(g.frames) for g in found]),
+            "log_likelihoods": np.array([g.log_likelihood or 0.0 for g in found]),
+            "contexts": model.embed(_sentences(model)),
+        }
+
+    def scores() -> Decoded:
+        return {
+            "scores": np.array([model.score(*pair) for pair in zip(_sentences(model), _motions(model), strict=True)])
+        }
+
+    if "candidates" not in model.defaults:
+        return {"decoded": generated}
+    return {"samples": partial(generated, 1), "beam": partial(generated, 4), "scores": scores}
 
 
-def _motion_scores(model: GenerateModel) -> Decoded:
-    pairs = zip(_sentences(model), _motions(model), strict=True)
-    return {"scores": np.array([model.score(sentence, motion) for sentence, motion in pairs])}
+@golden_run.register
+def _(model: GenerateModel, rng: np.random.Generator) -> Golden:
+    """Two seconds for a sentence of five words, with few hypotheses where the loop has such."""
+    text, few = _text(model, rng), ("hypotheses", "candidates", "max_seconds", "seconds")
+    settings: dict[str, Any] = {name: 2 for name in few if name in model.defaults}
+    noise = Recording(rng)
+    model.decode(model.contexts([model.ids(text)]), [noise], {**model.defaults, **settings})
+    given = {kind: np.array(drawn, dtype=np.float32) for kind, drawn in noise.drawn.items() if drawn}
+    return given, {**settings, "text": text}
 
 
 @runs_of.register
-def _predict(_: PredictModel) -> Named:
-    return {"horizon": partial(_predicted, 1), "beyond": partial(_predicted, 3)}
-
-
-def _predicted(horizons: int, model: PredictModel) -> Decoded:
+def _(model: PredictModel) -> Runs:
     """What follows eight random walks, normalised."""
-    contract = model.contract
-    seeds = walks(contract, np.random.default_rng(3), 8, model.seed_frames)
-    found = model.next_frames(seeds, horizons * model.horizon)
-    return {"frames": contract.normalised(found)}
+
+    def predicted(horizons: int) -> Decoded:
+        seeds = walks(model.contract, np.random.default_rng(3), 8, model.seed_frames)
+        return {"frames": model.contract.normalised(model.next_frames(seeds, horizons * model.horizon))}
+
+    return {"horizon": partial(predicted, 1), "beyond": partial(predicted, 3)}
+
+
+@golden_run.register
+def _(model: PredictModel, rng: np.random.Generator) -> Golden:
+    """One frame more than the horizon, so that the encoder is asked again."""
+    return {"frames": walks(model.contract, rng, 1, model.seed_frames)[0]}, {"frames": model.horizon + 1}
 
 
 @runs_of.register
-def _fill(_: FillModel) -> Named:
-    return {"short": partial(_filled, 4), "longest": partial(_filled, None)}
-
-
-def _filled(frames: int | None, model: FillModel) -> Decoded:
+def _(model: FillModel) -> Runs:
     """What fills a gap in each of eight random walks."""
-    rng = np.random.default_rng(3)
-    known = [sides(model.contract, rng, model.context) for _ in range(8)]
-    return {"frames": np.stack([model.frames_between(*one, frames or model.longest) for one in known])}
+
+    def filled(frames: int) -> Decoded:
+        rng = np.random.default_rng(3)
+        known = [sides(model.contract, rng, model.context) for _ in range(8)]
+        return {"frames": np.stack([model.frames_between(*one, frames) for one in known])}
+
+    return {"short": partial(filled, 4), "longest": partial(filled, model.longest)}
+
+
+@golden_run.register
+def _(model: FillModel, rng: np.random.Generator) -> Golden:
+    """Half a second between two parts of a random walk."""
+    past, after = sides(model.contract, rng, model.context)
+    return {"past": past, "after": after}, {"frames": round(model.fps / 2)}
 
 
 @runs_of.register
-def _search(_: SearchModel) -> Named:
-    return {"vectors": lambda model: {"motions": model.embed(_motions(model)), "texts": _texts(model)}}
+def _(model: SearchModel) -> Runs:
+    return {"vectors": lambda: {"motions": model.embed(_motions(model)), "texts": model.embed_text(_sentences(model))}}
 
 
-def _texts(model: SearchModel) -> NDArray[np.float32]:
-    return model.embed_text(_sentences(model))
-
-
-def _pair(models: Sequence[Any], run: Callable[[Any], Decoded]) -> tuple[Decoded, Decoded]:
-    return run(models[0]), run(models[1])
+@golden_run.register
+def _(model: SearchModel, rng: np.random.Generator) -> Golden:
+    """A motion, and a sentence of five words."""
+    return {"frames": walks(model.contract, rng, 1, 20)[0]}, {"text": _text(model, rng)}
 
 
 def _motions(model: LanguageModel) -> list[Motion]:
     """Eight random walks of 5 to 75 frames about the mean of the training data."""
-    rng = np.random.default_rng(3)
-    contract = model.contract
-
-    def walk(frames: int) -> Array:
-        found: Array = 0.3 * rng.normal(size=(frames, len(contract.mean))).cumsum(axis=0)
-        return np.tanh(found) * 2 * contract.std + contract.mean
-
-    return [contract.features(walk(frames)) for frames in range(5, 85, 10)]
+    rng, contract = np.random.default_rng(3), model.contract
+    steps = (rng.normal(size=(frames, len(contract.mean))) for frames in range(5, 85, 10))
+    drawn = (np.tanh(0.3 * one.cumsum(axis=0)) for one in steps)
+    return [contract.features(walk * 2 * contract.std + contract.mean) for walk in drawn]
 
 
 def _sentences(model: LanguageModel) -> list[str]:
@@ -183,3 +257,7 @@ def _sentences(model: LanguageModel) -> list[str]:
     rng = np.random.default_rng(4)
     words = model.vocabulary.words[len(SPECIALS) :]
     return [" ".join(rng.choice(words, length)) for length in range(1, 17, 2)]
+
+
+def _text(model: LanguageModel, rng: np.random.Generator) -> str:
+    return " ".join(rng.choice(model.vocabulary.words[len(SPECIALS) :], 5))

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from motet.bundle.golden import difference
 from motet.bundle.graph import Graph
-from motet.decode.rollout import advance
+from motet.decode.loop import advance
 from motet.errors import BundleError
 from motet_export.examples import Examples, example
 from motet_export.exporter import ExportError

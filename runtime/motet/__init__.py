@@ -9,7 +9,7 @@ from importlib.metadata import version
 
 from motet import motion
 from motet.bundle.bundle import Bundle, list_bundles
-from motet.bundle.session import SessionOptions
+from motet.bundle.graph import SessionOptions
 from motet.checked import Checked, check
 from motet.errors import (
     BundleError,

@@ -9,10 +9,9 @@ from motet.bundle.fields import Fields
 from motet.bundle.graph import Arrays, Graph, GraphSpec, TensorSpec
 from motet.bundle.manifest import Manifest, read_contract
 from motet.models.load import KINDS
-from motet_export.decoded import runs_of
+from motet_export.decoded import golden_run, runs_of
 from motet_export.examples import examples, walks
 from motet_export.exporter import ExportError
-from motet_export.golden import golden_run
 from motet_export.parity import check_carried
 
 MOTION = {

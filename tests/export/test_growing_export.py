@@ -9,7 +9,7 @@ import torch
 from torch import Tensor, nn
 
 from motet.bundle.graph import GraphSpec, OnnxGraph, TensorSpec
-from motet.decode.beam import Limits, beam_search
+from motet.decode.words import Limits, beam_search
 from motet.models.describe import DescribeModel
 from motet.models.language import EOS, PAD, RULES, SOS, SPECIALS, UNK
 from motet.models.load import load, verify

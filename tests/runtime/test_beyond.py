@@ -13,8 +13,7 @@ from command_line import run
 import motet
 from motet.bundle.manifest import Manifest
 from motet.decode.codec import Inertialization
-from motet.decode.continuation_settings import ContinuationSettings
-from motet.decode.continue_codes import Pace
+from motet.decode.continue_codes import ContinuationSettings, Pace
 from motet.errors import DecodingError, MotionError
 from motet.models.continuation import Continuation, at_rate, levelled, paced
 from motet.models.generate_codes import CodesModel

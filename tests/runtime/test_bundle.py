@@ -17,7 +17,7 @@ from click.testing import CliRunner
 
 from motet.bench import figures
 from motet.bundle.bundle import FORMAT, Bundle, list_bundles, write_bundle, zip_bytes
-from motet.bundle.session import SessionOptions
+from motet.bundle.graph import SessionOptions
 from motet.cli import main
 from motet.decode.loops import LOOPS
 from motet.errors import BundleError, OutputError, SettingError

@@ -10,8 +10,17 @@ import pytest
 from fake_codes import ACTIONS, END, KNOWN, NULL_ACTION, PARTS, memory_tables, numbers_of, remembered, source
 from numpy.typing import NDArray
 
-from motet.decode.codes import Drawing, Source, Writer, draw_codes, drawn_actions, drawn_steps, nucleus
-from motet.decode.memory import EARLY, LATER, LATEST, NEAR, PAST, Memory
+from motet.decode.codes import (
+    PAST,
+    Drawing,
+    Memory,
+    Source,
+    Writer,
+    draw_codes,
+    drawn_actions,
+    drawn_steps,
+    nucleus,
+)
 
 Array = NDArray[Any]
 PLAIN = Drawing(temperature=1.0, first=1.0, top_p=1.0, guidance=1.0)
@@ -127,13 +136,13 @@ def naive_shares(action: int, recent: list[Array], age: int, ends: bool) -> dict
     found = {}
     for start, (of, codes) in zip(STARTS.tolist(), MOTIONS, strict=False):
         for at in range(len(codes)) if of == action else ():
-            if not (at > 0 if age else at / len(codes) < EARLY):
+            if not (at > 0 if age else at / len(codes) < 0.3):
                 continue
-            off = LATER * (at - age) ** 2 if ends else min(LATER * (at - age) ** 2, LATEST)
+            off = (at - age) ** 2 / 64 if ends else min((at - age) ** 2 / 64, 2.0)
             for back, weight in enumerate(PAST, start=1):
                 known = CLOSE * numbers_of(codes[[max(at - back, 0)]])[0]
                 off += weight * float(((known - recent[min(back, len(recent)) - 1]) ** 2).sum())
-            found[start + at] = float(np.exp(-off / NEAR))
+            found[start + at] = float(np.exp(-2 * off))
     total = sum(found.values())
     return {place: chance / total for place, chance in found.items()}
 
@@ -142,7 +151,7 @@ def naive_shares(action: int, recent: list[Array], age: int, ends: bool) -> dict
 def test_a_memory_goes_on_where_the_past_resembles_the_present(age: int, ends: bool) -> None:
     """Amid all remembered places, as often at each as it is near."""
     known, rng = memory(), np.random.default_rng(age)
-    known = replace(known, keys=np.float32(CLOSE) * known.keys)
+    known = replace(known, keys={action: np.float32(CLOSE) * keys for action, keys in known.keys.items()})
     middle = CLOSE * np.mean([numbers_of(codes[:-1]).mean(axis=0) for _, codes in MOTIONS], axis=0)
     recent = [(middle + 0.1 * rng.normal(size=middle.shape)).astype(np.float32) for _ in PAST[: age or 3]]
     found = [known.next(1, recent, age, ends, (one + 0.5) / 2000) for one in range(2000)]
@@ -295,7 +304,7 @@ def _seen(given: Source, steps: list[Array], ages: list[int]) -> dict[str, Array
 def test_what_was_done_before_is_gone_on_with() -> None:
     given, (action, codes) = source(), MOTIONS[2]
     writer = Writer(given, rngs(0), PLAIN._replace(memory=1.0))
-    early = math.ceil(EARLY * len(codes)) - 1
+    early = math.ceil(0.3 * len(codes)) - 1
     writer.see(codes[:early])
     # the age says that the action has just begun, but the past decides where in its early part
     found = [step[0].tolist() for _, step in drawn_steps(writer, np.array([action]), 50)]

@@ -6,9 +6,7 @@ import pytest
 from fake_models import STATE, Array, FakeGraph, word_step
 from numpy.typing import NDArray
 
-from motet.decode.ancestral import Drawn, draw_sequences
-from motet.decode.beam import Limits
-from motet.decode.consensus import agreement, by_consensus
+from motet.decode.words import Drawn, Limits, agreement, by_consensus, draw_sequences
 
 START, END, WORDS = 0, 1, 5
 LIMITS = Limits(START, END, 6)

@@ -7,9 +7,8 @@ import onnxruntime
 import pytest
 from wire import EXTERNAL, doubling, field, graph, model, node, tensor, varint
 
-from motet.bundle.graph import GraphSpec, OnnxGraph, TensorSpec
+from motet.bundle.graph import GraphSpec, OnnxGraph, SessionOptions, TensorSpec
 from motet.bundle.graph_safety import MAX_FIELDS, MAX_TEXT, check_graph
-from motet.bundle.session import SessionOptions
 from motet.errors import BundleError
 
 SPEC = GraphSpec((TensorSpec("x", ("batch", 3)),), (TensorSpec("y", ("batch", 3)),))

@@ -9,10 +9,9 @@ from fake_models import CONTRACT, FakeGraph, manifest, spec
 
 from motet.bundle.fields import Fields
 from motet.bundle.graph import GraphSpec, TensorSpec
-from motet.decode.ancestral import draw_sequences
-from motet.decode.beam import Limits, beam_search
-from motet.decode.free_run import free_run
-from motet.decode.rollout import zero_state
+from motet.decode.loop import zero_state
+from motet.decode.loops import free_run
+from motet.decode.words import Limits, beam_search, draw_sequences
 from motet.errors import BundleError
 from motet.models.predict import PredictModel
 

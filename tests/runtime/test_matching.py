@@ -3,10 +3,17 @@
 import numpy as np
 import pytest
 
-from motet.decode.matching import FEATURES, TRAJECTORY, Matcher, Table, horizons, mirrored_features
-from motet.decode.playback import Playback
-from motet.decode.pose_codes import PoseCodes
-from motet.decode.steering_settings import SteeringSettings
+from motet.decode.matching import (
+    FEATURES,
+    TRAJECTORY,
+    Matcher,
+    Playback,
+    SteeringSettings,
+    Table,
+    horizons,
+    mirrored_features,
+)
+from motet.decode.steering import PoseCodes
 from motet.motion.rotations import conjugate, quat_product, quat_rotated, quat_to_rotmat, wrapped
 
 SETTINGS = SteeringSettings()

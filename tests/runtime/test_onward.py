@@ -10,8 +10,7 @@ import pytest
 from fake_codes import ACTIONS, END, MOVES, numbers_of, remembered, source
 
 from motet.decode.codes import Drawing
-from motet.decode.continuation_settings import ContinuationSettings
-from motet.decode.continue_codes import Continuer, Pace
+from motet.decode.continue_codes import ContinuationSettings, Continuer, Pace
 from motet.decode.continue_codes import numbers_of as asked_numbers
 
 MOTIONS, RULES = remembered(), ContinuationSettings()

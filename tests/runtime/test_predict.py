@@ -10,7 +10,7 @@ from fake_models import FakeGraph, manifest, spec
 from figures import walker
 
 import motet
-from motet.decode.free_run import free_run
+from motet.decode.loops import free_run
 from motet.errors import BundleError, DecodingError, MotionError
 from motet.formats import read_motion, write_motion
 from motet.models.predict import PredictModel

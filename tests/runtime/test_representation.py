@@ -14,8 +14,7 @@ from motet.errors import BundleError, MotionError
 from motet.formats import read_motion, write_motion
 from motet.motion import Joint, Motion, Skeleton, heading, mirror, positions
 from motet.motion.kinematics import euler_of, local_rotations
-from motet.representation import REPRESENTATIONS, named
-from motet.representation.contract import LIVING_STD, Z_LIMIT, MotionContract, living, sequences
+from motet.representation.contract import LIVING_STD, REPRESENTATIONS, Z_LIMIT, MotionContract, living, named, sequences
 
 NAMES = tuple(REPRESENTATIONS)
 

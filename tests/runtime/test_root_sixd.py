@@ -12,8 +12,7 @@ from motet.formats import read_motion
 from motet.motion import Motion, mirror, positions
 from motet.motion.kinematics import euler_of, local_rotations
 from motet.motion.rotations import axis_to_rotmat, rotvec_to_rotmat
-from motet.representation import named
-from motet.representation.contract import MotionContract, sequences
+from motet.representation.contract import MotionContract, named, sequences
 from motet.representation.root_sixd import FACING_CALM, ROOT_SIXD, SIXD_KINDS, facing, in_world, sixd_to_rotmat
 
 SIXD = named("root_sixd")

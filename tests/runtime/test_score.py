@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from fake_models import CHANNELS, STATE, FakeGraph, describe_model, generate_model, log_likelihood
 
-from motet.decode.score import score_frames, score_words
+from motet.decode.mixture import score_frames
+from motet.decode.words import score_words
 from motet.errors import DecodingError
 from motet.models.generate import GenerateModel
 

@@ -7,7 +7,7 @@ import pytest
 from fake_models import CONTRACT, VOCABULARY, FakeGraph, moving, search_model, spec
 
 from motet.bench import figures
-from motet.decode.nearest import nearest
+from motet.decode.loops import nearest
 from motet.errors import BundleError, MotionError, TextError, TextWarning
 from motet.models.load import build
 from motet.models.search import SearchModel

@@ -7,7 +7,7 @@ import pytest
 
 from motet import ControlError, ControlWarning, SteerModel, load
 from motet.decode import steering
-from motet.decode.playback import Playback
+from motet.decode.matching import Playback
 from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.kinematics import positions
 from motet.motion.pose import Pose

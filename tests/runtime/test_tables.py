@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from motet.bundle.arrays import array_bytes
 from motet.bundle.bundle import Bundle, write_bundle
 from motet.bundle.manifest import TABLE_DTYPES
+from motet.bundle.members import array_bytes
 from motet.errors import BundleError
 from motet.models.search import SearchModel
 

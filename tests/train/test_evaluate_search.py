@@ -7,7 +7,7 @@ import pytest
 from language_models import KINDS, FakeDescribe, small_store, told
 from numpy.typing import NDArray
 
-from motet.decode.nearest import LOOP
+from motet.decode.loops import LOOPS
 from motet.models.search import IndexSettings
 from motet.motion.motion import Motion
 from motet_train.data.store import Store
@@ -21,8 +21,8 @@ Floats = NDArray[np.float32]
 class FakeSearch:
     """Puts motions of a kind near each other, and a sentence to the motion it is about, or nearer to the next one."""
 
-    loop = LOOP
-    defaults = LOOP.defaults({})
+    loop = LOOPS["nearest"]
+    defaults = LOOPS["nearest"].defaults({})
 
     def __init__(self, store: Store, off: bool = False) -> None:
         self.manifest, self.off = told(store, "search"), off

@@ -7,11 +7,8 @@ import pytest
 import torch
 
 from motet import to_humanoid
-from motet.decode.matching import TRAJECTORY, Matcher, Table, mirrored_features
-from motet.decode.playback import Playback
-from motet.decode.pose_codes import PoseCodes
-from motet.decode.steering import tick
-from motet.decode.steering_settings import SteeringSettings
+from motet.decode.matching import TRAJECTORY, Matcher, Playback, SteeringSettings, Table, mirrored_features
+from motet.decode.steering import PoseCodes, tick
 from motet.formats import read_motion
 from motet.models.steer import FEATURE_STEPS
 from motet.motion.humanoid.bones import BONES, HUMANOID
@@ -20,8 +17,7 @@ from motet.motion.mirroring import mirror
 from motet.motion.motion import Motion
 from motet.motion.pose import Pose
 from motet.motion.rotations import Array
-from motet.representation import named
-from motet.representation.contract import MotionContract
+from motet.representation.contract import MotionContract, named
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.gaits import Gait, read_gaits
 from motet_train.data.locomotion import Recording

@@ -16,8 +16,7 @@ from motet.motion.mirroring import mirror
 from motet.motion.motion import Motion
 from motet.motion.rotations import continuous_rotvec, rotmat_to_euler, rotmat_to_rotvec, rotvec_to_rotmat
 from motet.motion.skeleton import END_SUFFIX
-from motet.representation import named
-from motet.representation.contract import MotionContract
+from motet.representation.contract import MotionContract, named
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.errors import DataError
 from motet_train.data.predict_data import Material, store_material

@@ -20,7 +20,7 @@ from motet.models.load import build
 from motet.models.steer import SteerModel
 from motet.motion.humanoid.bones import HUMANOID, sole_points
 from motet.motion.kinematics import global_transforms
-from motet.representation import named
+from motet.representation.contract import named
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.errors import DataError
 from motet_train.data.locomotion import gaits_of, recordings

@@ -21,12 +21,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.bundle.arrays import array_of
 from motet.bundle.fields import LARGEST
-from motet.bundle.graph import OnnxGraph
+from motet.bundle.graph import OnnxGraph, SessionOptions
 from motet.bundle.manifest import FORMAT, MANIFEST, FileEntry, Manifest
-from motet.bundle.members import Archive, Folder, Members
-from motet.bundle.session import SessionOptions
+from motet.bundle.members import Archive, Folder, Members, array_of
 from motet.errors import BundleError
 from motet.files import new_folder, write_whole
 

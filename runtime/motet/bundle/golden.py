@@ -11,11 +11,10 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.bundle.arrays import array_bytes, array_of
 from motet.bundle.bundle import archive_bytes
 from motet.bundle.graph import Arrays, Graph
 from motet.bundle.manifest import Golden
-from motet.bundle.members import Archive
+from motet.bundle.members import Archive, array_bytes, array_of
 from motet.errors import BundleError
 
 TOLERANCE = 1e-3

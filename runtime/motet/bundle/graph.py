@@ -1,17 +1,67 @@
-"""One graph as a function of named arrays, and the contract that it keeps."""
+"""One graph as a function of named arrays, the contract that it keeps, and how ONNX Runtime runs it."""
 
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
+import onnxruntime
 from numpy.typing import NDArray
 
 from motet.bundle.fields import Fields
 from motet.bundle.graph_safety import check_graph
-from motet.bundle.session import SessionOptions
-from motet.errors import BundleError
+from motet.errors import BundleError, SettingError
+from motet.settings import checked_int
+
+MAX_THREADS = 256
+
+Options = Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class SessionOptions:
+    """Options of every session of a model; the default is one thread of the CPU.
+
+    threads: of one call of a graph, 1 to 256. 1 is right for step graphs: no idle spinning, and many sessions side by
+        side; more pay in large batches.
+    providers: execution providers of ONNX Runtime, the preferred first. ONNX Runtime gives the CPU what the others
+        cannot run, all of it where one does not start: a model's ``providers`` are those that are really active.
+    provider_options: options of each provider, in the same order; none by default.
+    configure: called with the ``onnxruntime.SessionOptions`` of each session before it is made, for all else: the level
+        of optimisation, profiling, spinning threads. A function of a module, if models are to be pickled.
+    SettingError for a number of threads out of range, and for a provider that this build of ONNX Runtime does not have.
+    """
+
+    threads: int = 1
+    providers: tuple[str, ...] = ("CPUExecutionProvider",)
+    provider_options: tuple[Options, ...] = ()
+    configure: Callable[[Any], None] | None = None
+
+    def __post_init__(self) -> None:
+        checked_int("threads", self.threads, 1, MAX_THREADS)
+        if isinstance(self.providers, str):
+            raise SettingError(f"providers must be a tuple of names, such as ({self.providers!r},)")
+        available = onnxruntime.get_available_providers()
+        for provider in self.providers:
+            if provider not in available:
+                raise SettingError(f"ONNX Runtime has no provider {provider!r} here; available: {', '.join(available)}")
+        if not self.providers or len(self.provider_options) not in {0, len(self.providers)}:
+            raise SettingError("give at least one provider, and options for each provider or for none")
+
+    def session(self, model: bytes) -> Any:
+        """A session of ONNX Runtime for a model in memory; raises what ONNX Runtime raises."""
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = int(self.threads)
+        options.inter_op_num_threads = 1
+        options.enable_cpu_mem_arena = False  # memory goes back after a large batch, at the same speed
+        options.log_severity_level = 4
+        if self.configure is not None:
+            self.configure(options)
+        options.add_session_config_entry("session.load_model_format", "ONNX")  # the one that was checked
+        given = [dict(one) for one in self.provider_options] or None
+        return onnxruntime.InferenceSession(model, options, list(self.providers), given, enable_fallback=0)
+
 
 Arrays = Mapping[str, NDArray[Any]]
 Floats = NDArray[np.float32]
@@ -203,3 +253,53 @@ def _check(found: list[Any], declared: tuple[TensorSpec, ...], kind: str) -> Non
 def _sizes(shape: Any) -> tuple[int | None, ...]:
     """A shape with None for dynamic axes."""
     return tuple(axis if isinstance(axis, int) else None for axis in shape)
+
+
+Sizes = dict[str, int]
+"""Letter of an axis -> its size."""
+
+
+def bind(
+    role: str,
+    spec: GraphSpec,
+    inputs: Mapping[str, str],
+    outputs: Mapping[str, str],
+    sizes: Sizes,
+    given: Collection[TensorSpec] = (),
+) -> None:
+    """Check a graph's tensors, and note the sizes of axes not known before.
+
+    inputs, outputs: shapes by name. A small word is a dynamic axis; a capital letter is a size, the same wherever it
+        stands; "*" in front is int64. The graph may have more outputs, and more inputs where something gives them.
+    given: tensors that another graph gives. All other inputs must be fed back, and how they start be known.
+    BundleError names the role, the tensor and what is expected.
+    """
+    for wanted, find in ((inputs, spec.input), (outputs, spec.output)):
+        for name, shape in wanted.items():
+            try:
+                bind_tensor(find(name), shape.lstrip("*"), "int64" if shape.startswith("*") else "float32", sizes)
+            except BundleError as error:
+                raise BundleError(f"manifest, graphs.{role}: {error}") from error
+    for tensor in spec.inputs:
+        if tensor in given or tensor.name in inputs:
+            continue
+        if tensor.name not in spec.feedback:
+            raise BundleError(f"manifest, graphs.{role}: input {tensor.name!r} is neither supplied nor fed back")
+        spec.start_shape(tensor.name)
+
+
+def bind_tensor(tensor: TensorSpec, shape: str, dtype: str, sizes: Sizes) -> None:
+    """Check one tensor, whose shape is put as :func:`bind` has it; BundleError says what is expected."""
+    axes = shape.split()
+    expected = tuple(sizes.get(axis, axis) if axis.isupper() else axis for axis in axes)
+    fits = tensor.dtype == dtype and len(tensor.shape) == len(axes)
+    for axis, size in zip(axes, tensor.shape, strict=False):
+        if axis.isdecimal():
+            fits &= size == int(axis)
+        elif axis.isupper():
+            fits &= isinstance(size, int) and sizes.get(axis, size) == size
+        else:
+            fits &= isinstance(size, str)
+    if not fits:
+        raise BundleError(f"{tensor.name!r} is {tensor.dtype} {list(tensor.shape)}, expected {dtype} {list(expected)}")
+    sizes.update({a: s for a, s in zip(axes, tensor.shape, strict=True) if a.isupper() and isinstance(s, int)})

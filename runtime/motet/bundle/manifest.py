@@ -13,8 +13,7 @@ from motet.bundle.members import MAX_SIZE, NAME
 from motet.errors import BundleError, MotionError
 from motet.motion.motion import UNITS
 from motet.motion.skeleton import Skeleton
-from motet.representation import REPRESENTATIONS
-from motet.representation.contract import MotionContract
+from motet.representation.contract import REPRESENTATIONS, MotionContract
 
 FORMAT = 3
 """Version of the bundle format that this motet writes and reads."""

@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 from motet.bench import Row, figures, rows
-from motet.bundle.session import SessionOptions
+from motet.bundle.graph import SessionOptions
 from motet.cli.options import session_options
 from motet.models.load import load
 

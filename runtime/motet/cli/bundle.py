@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from motet.bundle.bundle import Bundle, list_bundles
-from motet.bundle.session import SessionOptions
+from motet.bundle.graph import SessionOptions
 from motet.cli.options import session_options
 from motet.models.load import verify as verify_bundle
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from motet.bundle.session import SessionOptions
+from motet.bundle.graph import SessionOptions
 from motet.cli.notes import noted
 from motet.cli.options import session_options
 from motet.cli.reading import Read, naming, out_option, read_options

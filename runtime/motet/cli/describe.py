@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from motet.bundle.session import SessionOptions
+from motet.bundle.graph import SessionOptions
 from motet.cli.options import session_options
 from motet.cli.reading import Read, Source, Tries, bar, read_options, say_resampled
 from motet.formats import READS

@@ -8,7 +8,7 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.bundle.session import SessionOptions
+from motet.bundle.graph import SessionOptions
 from motet.cli.notes import noted
 from motet.cli.options import session_options
 from motet.cli.reading import Read, Source, Tries, read_options, say_resampled

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from motet.bundle.session import SessionOptions
+from motet.bundle.graph import SessionOptions
 from motet.cli.options import session_options
 from motet.cli.reading import Read, Tries, naming, out_option, places, read_options
 from motet.cli.writing import Output, size, spare, write_options

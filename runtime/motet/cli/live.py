@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from motet.bundle.session import SessionOptions
+from motet.bundle.graph import SessionOptions
 from motet.cli import missing
 from motet.cli.options import session_options
 from motet.files import check_place

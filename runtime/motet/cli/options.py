@@ -7,7 +7,7 @@ from typing import Any
 import click
 import onnxruntime
 
-from motet.bundle.session import MAX_THREADS, SessionOptions
+from motet.bundle.graph import MAX_THREADS, SessionOptions
 
 _SUFFIX = "ExecutionProvider"
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from motet.bundle.session import SessionOptions
+from motet.bundle.graph import SessionOptions
 from motet.cli.options import session_options
 from motet.cli.reading import Read, Tries, bar, out_option, places, read_options, say_resampled
 from motet.cli.writing import Output, size, write_options

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from motet.bundle.session import SessionOptions
+from motet.bundle.graph import SessionOptions
 from motet.cli.notes import noted
 from motet.cli.options import session_options
 from motet.cli.reading import bar, unit_option

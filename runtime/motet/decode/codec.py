@@ -1,4 +1,9 @@
-"""Codes of frames, and frames of codes as they come: as many as the decoder can give before it knows what follows."""
+"""Codes of frames, and frames of codes as they come: as many as the decoder can give before it knows what follows.
+
+A pose on the ground is (..., 3): x and z in metres, and the facing in radians about the vertical axis, 0 along z. A
+move is (..., 3): forward and to the left in metres, and a turn to the left in radians, seen from the pose that it
+starts from.
+"""
 
 import math
 from dataclasses import dataclass
@@ -6,13 +11,55 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from motet.bundle.graph import Graph
-from motet.decode.continuation_settings import ContinuationSettings
-from motet.decode.planar import moved, nearest_moves, seen_from, way_of
-from motet.decode.rollout import Ids
+from motet.decode.loop import Ids
 from motet.motion.rotations import Array
 from motet.motion.springs import damped, damping_of
+
+REACH = 0.5
+"""Metres that count as much as a radian where moves are compared."""
+
+
+def moved(pose: Array, move: Array) -> Array:
+    """The poses (..., 3) that moves (..., 3) lead to."""
+    sin, cos = np.sin(pose[..., 2]), np.cos(pose[..., 2])
+    x = pose[..., 0] + move[..., 0] * sin + move[..., 1] * cos
+    z = pose[..., 1] + move[..., 0] * cos - move[..., 1] * sin
+    found: Array = np.stack([x, z, pose[..., 2] + move[..., 2]], axis=-1)
+    return found
+
+
+def seen_from(pose: Array, other: Array) -> Array:
+    """The moves (..., 3) that lead from poses (..., 3) to others: :func:`moved` undone. Turns are not wrapped."""
+    sin, cos = np.sin(pose[..., 2]), np.cos(pose[..., 2])
+    x, z = other[..., 0] - pose[..., 0], other[..., 1] - pose[..., 1]
+    found: Array = np.stack([x * sin + z * cos, x * cos - z * sin, other[..., 2] - pose[..., 2]], axis=-1)
+    return found
+
+
+def way_of(start: Array, moves: Array) -> Array:
+    """The poses (..., N + 1, 3) on the way from ``start`` (..., 3) by moves (..., N, 3), both ends included."""
+    poses = [start]
+    for place in range(moves.shape[-2]):
+        poses.append(moved(poses[-1], moves[..., place, :]))
+    return np.stack(poses, axis=-2)
+
+
+def nearest_moves(poses: Array, book: Array) -> tuple[NDArray[np.int64], Array]:
+    """Entries (..., N) int64 of a book (K, 3), and the way (..., N + 1, 3) they lead, along poses (..., N + 1, 3).
+
+    The way starts at the first pose; each entry is the one that leads nearest to the next pose from where the way is.
+    """
+    scale, way, found = np.array([1.0, 1.0, REACH]), [poses[..., 0, :]], []
+    for place in range(1, poses.shape[-2]):
+        wanted = seen_from(way[-1], poses[..., place, :])
+        off = ((wanted[..., None, :] - book) * scale) ** 2
+        found.append(off.sum(axis=-1).argmin(axis=-1))
+        way.append(moved(way[-1], book[found[-1]]))
+    return np.stack(found, axis=-1), np.stack(way, axis=-2)
+
 
 PATH = 3
 """Of the decoder's channels the first: the root's forward, left and turn, seen from where the moves have led."""
@@ -100,12 +147,11 @@ class StreamingDecoder:
     """Frames (T, D) of steps of codes (N, P) that are pushed as they come; holds all state of one request.
 
     The root's forward, left and turn come as rates a second, from each frame to the next, so that adding them up gives
-    the way. context: the end of a motion, which the frames continue without a leap.
+    the way. context: the end of a motion, which the frames continue without a leap, by a spring of
+    ``half_life`` seconds.
     """
 
-    def __init__(
-        self, codec: Codec, context: Context | None = None, half_life: float = ContinuationSettings.half_life
-    ) -> None:
+    def __init__(self, codec: Codec, context: Context | None = None, half_life: float = 0.1) -> None:
         self.codec, self.half_life = codec, half_life
         self.codes = [] if context is None else list(context.codes)
         self.given = None if context is None else context.frames[-2:]
@@ -126,7 +172,7 @@ class StreamingDecoder:
         return self._settled(len(self.codes))
 
     def _settled(self, until: int) -> Array:
-        codec = self.codec
+        codec, hop = self.codec, self.codec.field.hop
         if until <= self.count:
             return np.empty((0, codec.decoder.spec.output("frames").size(-1)))
         start = max(0, self.count - codec.field.back)
@@ -136,7 +182,11 @@ class StreamingDecoder:
         frames = found["frames"][0, self.count - start : until - start].astype(np.float64)
         way = way_of(self.way[-1], moves[self.count - start : until - start])
         self.way, self.count = way[-1:], until
-        return self._joined(self._rated(frames, way[:-1]))
+        frames = self._rated(frames, way[:-1])
+        if self.given is not None:
+            self.join = Inertialization(self.given, frames[hop - 2 : hop], codec.fps, self.half_life)
+            self.given, frames = None, frames[hop:]
+        return frames if self.join is None else self.join(frames)
 
     def _rated(self, frames: Array, way: Array) -> Array:
         """Frames (N, H, D), the root seen from the way (N, 3), as frames (N H, D) with rates."""
@@ -147,10 +197,3 @@ class StreamingDecoder:
             rates[:1] = rates[1:2]
         self.pose = poses[-1:]
         return np.concatenate([rates, frames.reshape(len(poses), -1)[:, PATH:]], axis=1)
-
-    def _joined(self, frames: Array) -> Array:
-        if self.given is not None:
-            codec, hop = self.codec, self.codec.field.hop
-            self.join = Inertialization(self.given, frames[hop - 2 : hop], codec.fps, self.half_life)
-            self.given, frames = None, frames[hop:]
-        return frames if self.join is None else self.join(frames)

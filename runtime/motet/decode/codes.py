@@ -3,6 +3,10 @@
 A step of codes is a move of the root and some codes of the body; each is drawn knowing those before it, as words are:
 by temperature, and from the likeliest that make up ``top_p`` together (nucleus sampling: Holtzman et al. 2020). How far
 an action is followed can be raised by classifier-free guidance (Ho and Salimans 2022).
+
+Steps of training motions are remembered, to continue as people did after similar steps, as a nearest-neighbour language
+model does with words (Khandelwal et al. 2020): the distribution of the next step is that of a net, mixed with the next
+steps of remembered places whose past resembles the present.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -13,15 +17,80 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.bundle.graph import Floats, Graph
-from motet.decode.loop import Loop
-from motet.decode.memory import PAST, Memory
-from motet.decode.noise import Noise
-from motet.decode.rollout import Ids, Scores, advance, zero_state
+from motet.decode.loop import Ids, Noise, Scores, advance, zero_state
+from motet.errors import BundleError
 from motet.settings import Range, Settings
+
+PAST = (1.0, 0.5, 0.25)
+"""Weights of the last step and those before it."""
 
 WINDOW = 64
 """Steps that a writer looks back at most, those of the windows that writers are trained on: a stream may last for ever.
 """
+
+
+@dataclass(frozen=True, eq=False)
+class Memory:
+    """M remembered steps. codes: (M, P) int64. ages: (M,) int64 steps since its motion began. parts: (M,) which part of
+    its motion was over, 0 to 1.
+
+    rows: of each action the remembered steps (R,), and keys: their (R, K L) float32 numbers of the K steps before each.
+    """
+
+    codes: Ids
+    ages: Ids
+    parts: Scores
+    rows: dict[int, Ids]
+    keys: dict[int, Floats]
+
+    @staticmethod
+    def of(steps: NDArray[np.int16], moves: Floats, body: Floats, actions: int) -> "Memory":
+        """What the tables of a bundle hold: steps (M, P + 2), of each the codes, the action and the age.
+
+        moves: (E, 3) numbers of each move, body: (V, L) of each code of the body; the move E, an end, has none.
+        actions: how many there are. BundleError where a step has others.
+        """
+        found = steps.astype(np.int64)
+        codes, done, ages, end = found[:, :-2], found[:, -2], found[:, -1], len(moves)
+        at = np.arange(len(ages))
+        limits: dict[str, tuple[Ids, int | Ids]] = {"move": (codes[:, 0], end), "code": (codes[:, 1:], len(body) - 1)}
+        for name, (values, most) in {**limits, "action": (done, actions - 1), "age": (ages, at)}.items():
+            if values.min() < 0 or (most < values.T).any():
+                raise BundleError(f"table memory: {name} is out of range")
+        real = (codes[:, :1] < end).astype(np.float32)
+        way = moves[np.minimum(codes[:, 0], end - 1)]
+        numbers = np.concatenate([way, body[codes[:, 1:]].reshape(len(codes), -1)], axis=1) * real
+        # before the first step a figure is taken to have stood in it
+        past = [np.sqrt(weight) * numbers[at - np.minimum(ages, back)] for back, weight in enumerate(PAST, start=1)]
+        order = np.argsort(done, kind="stable")
+        names, begins = np.unique(done[order], return_index=True)
+        keys = np.concatenate(past, axis=1).astype(np.float32)[order]
+        rows, own = (dict(zip(names.tolist(), np.split(one, begins[1:]), strict=True)) for one in (order, keys))
+        starts = np.flatnonzero(np.diff(ages, prepend=ages[:1] + 1) != 1)
+        lengths = np.diff(starts, append=len(ages))
+        parts = (ages - np.repeat(ages[starts], lengths)) / np.repeat(lengths, lengths)
+        return Memory(codes, ages, parts, rows, own)
+
+    def next(self, action: int, recent: Sequence[Floats], age: int, ends: bool, uniform: float) -> int:
+        """The place (a row) at which an action continues, by exp(-2 d) of the distance d of the squared numbers.
+
+        recent: numbers (L,) of the last steps, the latest first, no more than K. None yet: any start of a motion.
+        ends: whether it is to end where remembered motions do; else it may come back to what was done before.
+        """
+        rows = self.rows[action]
+        ages = self.ages[rows]
+        if not recent:
+            starts = rows[ages == ages.min()]
+            return int(starts[int(uniform * len(starts))])
+        seen = np.stack([recent[min(back, len(recent) - 1)] for back in range(len(PAST))])
+        off = ((self.keys[action] - (np.sqrt(PAST)[:, None] * seen).ravel()) ** 2).sum(axis=1)
+        later = (ages - age) ** 2 / 64  # earlier or later in its motion
+        off += later if ends else np.minimum(later, 2.0)
+        # after a first step, to begin again would look like going on; and nothing is begun where it is nearly over
+        fitting = ages > 0 if age else self.parts[rows] < 0.3
+        off[~fitting & fitting.any()] = np.inf
+        shares = np.cumsum(np.exp((off.min() - off) / 0.5))
+        return int(rows[np.searchsorted(shares, uniform * shares[-1], side="right")])
 
 
 class Drawing(NamedTuple):
@@ -100,17 +169,16 @@ class Writer:
         ends: whether a motion may end; else an action that would end begins again. Each row takes one block of uniform
         numbers (P + 2,) from its noise.
         """
-        known = self._known(actions)
-        uniform = self.source.uniform(self.noise)
-        given = self._remembered(actions, uniform[:, :2], ends)
-        codes, again = self._parts(known, uniform[:, 2:], given, ends)
+        known, uniform, memory = self._known(actions), self.source.uniform(self.noise), self.source.memory
+        codes = np.full((len(actions), self.source.parts), -1, dtype=np.int64)
+        for row in np.flatnonzero(uniform[:, 0] < self.drawing.memory):
+            if (action := int(actions[row])) in memory.rows:
+                recent = [numbers[row] for numbers in self.recent]
+                codes[row] = memory.codes[memory.next(action, recent, int(self.age[row]), ends, uniform[row, 1])]
+        again = self._parts(known, uniform[:, 2:], codes, ends)
         self.last = np.tile(codes, (2, 1))
         self.age = np.where(again, 0, self.age + 1)
         return codes
-
-    def begin(self) -> None:
-        """An action begins with the next step, whatever was done before."""
-        self.age = np.zeros_like(self.age)
 
     def take_back(self) -> None:
         """Undo the last draw, such as that of an end, and continue from before it."""
@@ -120,33 +188,24 @@ class Writer:
         self._before = self.last, self.state, self.recent, self.age
         told = np.concatenate([actions, np.full(len(actions), self.source.null_action)]).astype(np.int64)
         inputs = {"codes": self.last, "action": told, "age": np.tile(self.age, 2)}
-        outputs, state = advance(self.source.step, self.state, inputs)
-        self.state = {name: lately(array, self.source.step, name) for name, array in state.items()}
+        outputs, self.state = advance(self.source.step, self.state, inputs)
+        for name, array in self.state.items():  # attention falls with the distance in time
+            sizes = self.source.step.spec.start_shape(name)
+            if 0 in sizes and array.shape[axis := 1 + sizes.index(0)] > WINDOW:
+                self.state[name] = np.ascontiguousarray(np.take(array, range(-WINDOW, 0), axis))
         if self.last[0, 0] != self.source.nothing:
             self.recent = [outputs["numbers"][: len(actions)], *self.recent][: len(PAST)]
         known: Floats = outputs["known"]
         return known
 
-    def _remembered(self, actions: Ids, uniform: Scores, ends: bool) -> Ids:
-        """Steps (B, P) from memory, -1 in rows that the net draws."""
-        found = np.full((len(actions), self.source.parts), -1, dtype=np.int64)
-        memory = self.source.memory
-        for row in np.flatnonzero(uniform[:, 0] < self.drawing.memory):
-            if int(actions[row]) not in memory.rows:
-                continue
-            recent = [numbers[row] for numbers in self.recent]
-            place = memory.next(int(actions[row]), recent, int(self.age[row]), ends, uniform[row, 1])
-            found[row] = memory.codes[place]
-        return found
-
-    def _parts(self, known: Floats, uniform: Scores, given: Ids, ends: bool) -> tuple[Ids, NDArray[np.bool_]]:
-        """Steps (B, P), their parts drawn one after the other where they are not given; and which rows begin again."""
+    def _parts(self, known: Floats, uniform: Scores, codes: Ids, ends: bool) -> NDArray[np.bool_]:
+        """Draw the parts of steps (B, P) one after the other where they are not given; which rows (B,) begin again."""
         drawing, end = self.drawing, self.source.end
-        again = (given[:, 0] == end) & (not ends)
-        rows = np.flatnonzero((given[:, 0] < 0) | again)
-        codes = given.copy()
+        again: NDArray[np.bool_] = (codes[:, 0] == end) & (not ends)
+        rows = np.flatnonzero((codes[:, 0] < 0) | again)
+        told = known[np.concatenate([rows, rows + len(codes)])]
+        temperature = np.where(self.age == 0, drawing.first, drawing.temperature)[rows]
         codes[rows] = 0
-        told, temperature = known[np.concatenate([rows, rows + len(given)])], self._temperature()[rows]
         for part in range(self.source.parts) if len(rows) else ():
             asked = {"known": told, "codes": np.tile(codes[rows], (2, 1))}
             with_action, without = np.split(self.source.part(asked)["log_probabilities"][:, part].astype(np.float64), 2)
@@ -158,11 +217,7 @@ class Writer:
                 other = uniform[rows, part] * 1024 % 1  # the same number would give a neighbour of the end
                 drawn = nucleus(chances, np.where(again[rows], other, uniform[rows, part]), temperature, drawing.top_p)
             codes[rows, part] = drawn
-        return codes, again
-
-    def _temperature(self) -> Scores:
-        """Of each row (B,)."""
-        return np.where(self.age == 0, self.drawing.first, self.drawing.temperature)
+        return again
 
     def keep(self, rows: NDArray[np.intp]) -> None:
         """Go on with some of the rows only."""
@@ -170,14 +225,6 @@ class Writer:
         self.noise, self.age = [self.noise[row] for row in rows], self.age[rows]
         self.recent = [numbers[rows] for numbers in self.recent]
         self.last, self.state = self.last[both], {name: array[both] for name, array in self.state.items()}
-
-
-def lately(array: NDArray[Any], step: Graph, name: str) -> NDArray[Any]:
-    """A state, of one that grows the last WINDOW steps: attention falls with the distance in time."""
-    sizes = step.spec.start_shape(name)
-    if 0 not in sizes or array.shape[1 + sizes.index(0)] <= WINDOW:
-        return array
-    return np.ascontiguousarray(np.take(array, range(-WINDOW, 0), axis=1 + sizes.index(0)))
 
 
 def nucleus(log_weights: Scores, uniform: Scores, temperature: Scores | float, top_p: float) -> Ids:
@@ -219,7 +266,7 @@ def drawn_steps(writer: Writer, actions: Ids, longest: int, exactly: bool = Fals
     A writer whose rows have all ended can draw other actions from there.
     """
     rows = np.arange(len(actions))
-    writer.begin()
+    writer.age = np.zeros_like(writer.age)
     for length in range(longest):
         codes = writer.draw(actions[rows], ends=not exactly and length > 0)
         going = codes[:, 0] != writer.source.end
@@ -246,11 +293,3 @@ class CodesSettings(Settings):
     certainty: Annotated[float, Range(0.01, 100)] = 1.0
     seconds: Annotated[float, Range(0, 600, "s")] = 0.0
     max_seconds: Annotated[float, Range(0, 600, "s")] = 30.0
-
-
-LOOP = Loop(
-    draw_codes,
-    {"codes": "*batch P", "action": "*batch", "age": "*batch"},
-    {"known": "batch H", "numbers": "batch L"},
-    CodesSettings,
-)

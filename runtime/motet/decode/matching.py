@@ -9,17 +9,122 @@ Letters in shapes: B figures, N rows, K codes of a pose, F features, G gaits. Th
 of 0 faces z, and positive ones are to the left (towards x). Units are metres, seconds and radians.
 """
 
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from dataclasses import dataclass, fields
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motet.bundle.graph import Floats
-from motet.decode.playback import Playback, Rows
-from motet.decode.steering_settings import SteeringSettings
 from motet.motion.rotations import Array, wrapped
 from motet.motion.springs import damped, damped_path, damping_of
+from motet.settings import Range, Settings
+
+HalfLife = Annotated[float, Range(0.01, 10, "s")]
+Radians = Annotated[float, Range(0, 3.15, "rad")]
+Share = Annotated[float, Range(0, 1)]
+Factor = Annotated[float, Range(0, 100)]
+Count = Annotated[int, Range(0, 10_000, "rows")]
+
+
+@dataclass(frozen=True)
+class SteeringSettings(Settings):
+    """Settings of a figure steered by motion matching.
+
+    The desired trajectory:
+        velocity, facing: half-lives of the springs by which target velocity and facing are approached.
+        horizon: how far ahead rows are compared with it, at each third. half_speed: the speed that is half way from
+        standing to any speed, on the scale on which speeds are compared.
+
+    The search:
+        search_every: ticks between searches. lag: the cost of each metre by which a row covers less than half the
+        desired displacement within the horizon (others start, or turn aside, if not as smoothly). lasting: the fewest
+        rows left after a jump target. jump_back, jump_ahead: jumps within this window are ignored, or playback would
+        loop on the spot. row_step: one in so many rows is a jump target. stands: the least contact of a foot in rows
+        that are jumped to and from, so that flights are played to their end.
+
+    The step:
+        blend: half-life of the inertialization offset. slowest, fastest: limits of the playback rate. shortest,
+        longest: limits of the stride, relative to the recorded one. idle: speed below which a row is played as it is.
+        turn: half-life of the error of the facing; turn_still, turn_moving, turn_turning: limits of its correction, in
+        rad/s at a standstill, for each m/s up to turn_speed, and for each rad/s of the recorded turn.
+        veer: the largest correction of the direction of travel; veer_within: it is made where the cosine of the angle
+        is above this share of its sine.
+
+    What gaits can do:
+        aside, back: angles from the facing at which going sideways and going backwards begin. ahead: how far from its
+        facing a gait goes that goes neither way.
+    """
+
+    FEATURE: ClassVar[str] = "steering"
+
+    velocity: HalfLife = 0.22
+    facing: HalfLife = 0.18
+    horizon: Annotated[float, Range(0.1, 10, "s")] = 1.0
+    half_speed: Annotated[float, Range(0.01, 100, "m/s")] = 0.7
+    search_every: Annotated[int, Range(1, 60, "ticks")] = 6
+    lag: Annotated[float, Range(0, 1e6, "per metre")] = 50.0
+    lasting: Count = 20
+    jump_back: Count = 20
+    jump_ahead: Count = 5
+    row_step: Annotated[int, Range(1, 100, "rows")] = 2
+    stands: Share = 0.1
+    blend: HalfLife = 0.13
+    slowest: Annotated[float, Range(0.1, 1)] = 0.8
+    fastest: Annotated[float, Range(1, 10)] = 1.15
+    shortest: Annotated[float, Range(0.1, 1)] = 0.8
+    longest: Annotated[float, Range(1, 10)] = 1.25
+    idle: Annotated[float, Range(0.01, 100, "m/s")] = 0.4
+    turn: HalfLife = 0.15
+    turn_still: Factor = 0.1
+    turn_moving: Factor = 1.0
+    turn_speed: Annotated[float, Range(0, 100, "m/s")] = 1.5
+    turn_turning: Factor = 0.5
+    veer: Radians = 0.35
+    veer_within: Factor = 0.4
+    aside: Radians = 1.0471975511965976
+    back: Radians = 2.0943951023931953
+    ahead: Radians = 0.5235987755982988
+
+
+Rows = NDArray[np.int64]
+
+
+@dataclass(eq=False)
+class Playback:
+    """Of B figures; K are the codes of a pose. Whole numbers are int64, others float64.
+
+    row, part: (B,) the row that is played, and the part of the way to the next one. mirror: (B,) 1 for the mirror image
+    of the row, else 0. rate: (B,) rows that are played in the next tick. ticks_to_search: (B,).
+    root: (B, 3) x, z in metres and facing in radians. spring, spring_rate: (B, 3) the springs that approach the target:
+    velocity along x and z in m/s and facing in radians, and how fast they change. offset, offset_rate: (B, K) the
+    inertialization offset of the codes, and how fast it changes.
+    """
+
+    row: Rows
+    part: Array
+    mirror: Rows
+    rate: Array
+    ticks_to_search: Rows
+    root: Array
+    spring: Array
+    spring_rate: Array
+    offset: Array
+    offset_rate: Array
+
+    @staticmethod
+    def at(row: int, figures: int, codes: int) -> "Playback":
+        """Figures at the origin that play a row, and search in the next tick."""
+        # all search in the same tick: each moves as it would alone
+        whole, ground, pose = (np.zeros(shape) for shape in (figures, (figures, 3), (figures, codes)))
+        rows, count = np.full(figures, row, dtype=np.int64), np.zeros(figures, dtype=np.int64)
+        found = Playback(rows, whole, count, whole + 1, count, ground, ground, ground, pose, pose)
+        return found.copy()
+
+    def copy(self) -> "Playback":
+        """One that shares no array."""
+        return Playback(*(getattr(self, field.name).copy() for field in fields(self)))
+
 
 HORIZONS = 3
 """Number of times ahead at which trajectories are compared: thirds of the settings' horizon."""
@@ -30,9 +135,6 @@ speed at the second of them. The others say how it is now, all seen from the fac
 of both feet, three numbers each, the hips' velocity, and the places of both hands."""
 
 FEATURES = TRAJECTORY + 21
-
-FARTHEST = slice(2 * HORIZONS - 2, 2 * HORIZONS)
-"""The features of the place at the last of the horizons."""
 
 
 def mirrored_features() -> tuple[NDArray[np.intp], Floats]:
@@ -96,7 +198,8 @@ class Table:
 
     def places(self, features: NDArray[Any]) -> NDArray[Any]:
         """Where features (..., F) lead at the last of the horizons (..., 2): left and forward, metres."""
-        found: NDArray[Any] = features[..., FARTHEST] / self.scale[FARTHEST] + self.mean[FARTHEST]
+        last = slice(2 * HORIZONS - 2, 2 * HORIZONS)
+        found: NDArray[Any] = features[..., last] / self.scale[last] + self.mean[last]
         return found
 
 
@@ -120,14 +223,12 @@ class Matcher:
         self.least_left = max(self.reserve, settings.lasting)
         self.half: Floats = (table.features[0] ** 2).sum(axis=1) / 2
         self.flies = table.frames[0, :, -2:].max(axis=1) < settings.stands
-        self.goals = [self._goals(gait) for gait in range(table.shows.shape[1])]
-
-    def _goals(self, gait: int) -> Goals:
-        enough = self.table.left >= self.least_left
-        rows = np.flatnonzero(self.table.shows[:, gait] & enough & ~self.flies)[:: self.settings.row_step]
-        features = self.table.features[:, rows].reshape(-1, FEATURES)
-        places = self.table.places(features).astype(np.float32)
-        return Goals(rows, np.ascontiguousarray(features.T), np.tile(self.half[rows], 2), places)
+        self.goals = []
+        for shows in table.shows.T:
+            rows = np.flatnonzero(shows & (table.left >= self.least_left) & ~self.flies)[:: settings.row_step]
+            features = table.features[:, rows].reshape(-1, FEATURES)
+            places = table.places(features).astype(np.float32)
+            self.goals.append(Goals(rows, np.ascontiguousarray(features.T), np.tile(self.half[rows], 2), places))
 
     def stillest(self, gait: int) -> int:
         """The row of a gait in which there is the least speed; of those that something follows."""

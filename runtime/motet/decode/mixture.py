@@ -2,20 +2,27 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motet.bundle.graph import Arrays, Floats, Graph
-from motet.decode.loop import Loop
-from motet.decode.noise import Noise
-from motet.decode.rollout import Ids, Scores, advance, two_rows, zero_state
-from motet.decode.sample import Sample
+from motet.decode.loop import Ids, Noise, Sample, Scores, advance, two_rows, zero_state
 from motet.settings import Range, Settings
 
 SMALLEST = 2.0**-24
 """A probability of the flag below this counts as this, where a logarithm is taken."""
+
+
+@dataclass(frozen=True)
+class MixtureSettings(Settings):
+    """hypotheses: motions that are given. candidates: frames that are drawn for each."""
+
+    hypotheses: Annotated[int, Range(1, 100)]
+    candidates: Annotated[int, Range(1, 100)]
+    temperature: Annotated[float, Range(0.01, 100)]
+    max_seconds: Annotated[float, Range(0.01, 600, "s")]
 
 
 def mixture_search(
@@ -46,23 +53,9 @@ def mixture_search(
     Row i draws from ``noise[i]``, and does not depend on the rows around it.
     """
     beam = _Beam(step, context, hypotheses, candidates)
-    for length in range(max_frames + 1):
-        if not beam.advance(noise, temperature, forced=_forced(length, max_frames)):
-            break
+    while beam.advance(noise, temperature, max_frames):
+        pass
     return beam.samples()
-
-
-def _forced(length: int, max_frames: int) -> bool | None:
-    """The flag where there is no choice."""
-    return False if length == max_frames else True if length == 0 else None
-
-
-class _Drawn(NamedTuple):
-    """What n hypotheses drew: frames (n, C, D), flags (n, C), log-likelihoods of both (n, C)."""
-
-    frames: Floats
-    flags: NDArray[np.bool_]
-    gains: Scores
 
 
 class _Beam:
@@ -79,44 +72,40 @@ class _Beam:
         self.state = zero_state(step, rows * hypotheses)
         self.history: list[tuple[Floats, Ids]] = []  # of each step the frames (B, W, D) and parents (B, W)
 
-    def advance(self, generators: Sequence[Noise], temperature: float, forced: bool | None) -> bool:
+    def advance(self, noise: Sequence[Noise], temperature: float, max_frames: int) -> bool:
         """One step of all hypotheses that have not ended; whether there were any."""
         alive = two_rows(np.flatnonzero(~self.ended))
         if not len(alive):
             return False
-        inputs: Arrays = {"frame": self.frame[alive], "context": self.context[alive // self.shape[1]]}
+        (rows, hypotheses), length = self.shape, len(self.history)
+        inputs = {"frame": self.frame[alive], "context": self.context[alive // hypotheses]}
         outputs, state = advance(self.step, {name: array[alive] for name, array in self.state.items()}, inputs)
-        normal, uniform = self._noise(generators, alive)
-        drawn = draw(outputs, normal, uniform, temperature, forced)
-        parents, chosen = self._rank(alive, drawn)
+        running, place = np.unique(alive // hypotheses, return_inverse=True)
+        size, slot = (hypotheses, self.candidates), alive % hypotheses
+        normal = [noise[row].standard_normal((*size, self.frame.shape[1] - 1), np.float32) for row in running]
+        uniform = [noise[row].random((*size, 2), np.float32) for row in running]
+        forced = False if length == max_frames else True if length == 0 else None
+        drawn = draw(outputs, np.stack(normal)[place, slot], np.stack(uniform)[place, slot], temperature, forced)
+        parents, chosen = self._rank(alive, *drawn[1:])
         # a parent that has ended finds the place of some other: what it takes there is never used
-        places = np.searchsorted(alive, parents + np.arange(self.shape[0])[:, None] * self.shape[1]) % len(alive)
-        frames = drawn.frames[places, chosen]
+        places = np.searchsorted(alive, parents + np.arange(rows)[:, None] * hypotheses) % len(alive)
+        frames = drawn[0][places, chosen]
         self.history.append((frames, parents))
         ones = np.ones((*self.shape, 1), dtype=np.float32)
         self.frame = np.concatenate([frames, ones], axis=2).reshape(self.frame.shape)
         self.state = {name: np.take(array, places.ravel(), axis=0) for name, array in state.items()}
         return True
 
-    def _noise(self, generators: Sequence[Noise], alive: Ids) -> tuple[Floats, Floats]:
-        """Normal (n, C, D) and uniform (n, C, 2) numbers of the hypotheses ``alive``."""
-        hypotheses, size = self.shape[1], self.frame.shape[1] - 1
-        rows, place = np.unique(alive // hypotheses, return_inverse=True)
-        normal = [generators[row].standard_normal((hypotheses, self.candidates, size), np.float32) for row in rows]
-        uniform = [generators[row].random((hypotheses, self.candidates, 2), np.float32) for row in rows]
-        slot = alive % hypotheses
-        return np.stack(normal)[place, slot], np.stack(uniform)[place, slot]
-
-    def _rank(self, alive: Ids, drawn: _Drawn) -> tuple[Ids, Ids]:
+    def _rank(self, alive: Ids, flags: NDArray[np.bool_], gains: Scores) -> tuple[Ids, Ids]:
         """Keep the best of each row's candidates: the parent and the candidate of each, (B, W)."""
         rows, hypotheses = self.shape
         scores = np.full((rows * hypotheses, self.candidates), -np.inf)
         scores[:, 0] = self.scores.ravel()  # what has ended goes on as it is
-        scores[alive] = self.scores.ravel()[alive, None] + drawn.gains
+        scores[alive] = self.scores.ravel()[alive, None] + gains
         lengths = np.repeat(self.lengths.reshape(-1, 1), self.candidates, axis=1)
-        lengths[alive] += drawn.flags
+        lengths[alive] += flags
         ended = np.ones_like(lengths, dtype=np.bool_)
-        ended[alive] = ~drawn.flags
+        ended[alive] = ~flags
         flat_scores, flat_lengths = scores.reshape(rows, -1), lengths.reshape(rows, -1)
         order = np.argsort(-flat_scores / np.maximum(flat_lengths, 1), axis=1, kind="stable")[:, :hypotheses]
         self.scores = np.take_along_axis(flat_scores, order, 1)
@@ -138,8 +127,13 @@ class _Beam:
         ]
 
 
-def draw(outputs: Arrays, normal: Floats, uniform: Floats, temperature: float, forced: bool | None) -> _Drawn:
-    """Turn noise, normal (n, C, D) and uniform (n, C, 2), into frames and flags of a step's distributions."""
+def draw(
+    outputs: Arrays, normal: Floats, uniform: Floats, temperature: float, forced: bool | None
+) -> tuple[Floats, NDArray[np.bool_], Scores]:
+    """What noise, normal (n, C, D) and uniform (n, C, 2), draws from a step's distributions for n hypotheses.
+
+    forced: the flag where there is no choice. Frames (n, C, D), flags (n, C) and the log-likelihoods of both (n, C).
+    """
     log_weights, means, stds, active = (outputs[name] for name in ("log_weights", "means", "stds", "active"))
     weights = np.exp(log_weights - log_weights.max(axis=1, keepdims=True), dtype=np.float64)
     bounds = np.cumsum(weights, axis=1)
@@ -152,7 +146,7 @@ def draw(outputs: Arrays, normal: Floats, uniform: Floats, temperature: float, f
     gains = np.log(np.maximum(chance, SMALLEST), dtype=np.float64)
     gains[flags] += log_density(frames, log_weights, means, stds)[flags]
     gains[~flags & (np.cumsum(~flags, axis=1) > 1)] = -np.inf  # a second end would be the same motion again
-    return _Drawn(frames, flags, gains)
+    return frames, flags, gains
 
 
 def log_density(frames: Floats, log_weights: Floats, means: Floats, stds: Floats) -> Scores:
@@ -171,19 +165,18 @@ def log_density(frames: Floats, log_weights: Floats, means: Floats, stds: Floats
     return found
 
 
-@dataclass(frozen=True)
-class MixtureSettings(Settings):
-    """hypotheses: motions that are given. candidates: frames that are drawn for each."""
+def score_frames(step: Graph, context: Floats, frames: Floats) -> float:
+    """Log-likelihood of normalised frames (T, D) float32 and of their end, under a context (C,).
 
-    hypotheses: Annotated[int, Range(1, 100)]
-    candidates: Annotated[int, Range(1, 100)]
-    temperature: Annotated[float, Range(0.01, 100)]
-    max_seconds: Annotated[float, Range(0.01, 600, "s")]
-
-
-LOOP = Loop(
-    mixture_search,
-    {"frame": "batch F", "context": "batch C"},
-    {"log_weights": "batch K", "means": "batch K D", "stds": "batch K D", "active": "batch"},
-    MixtureSettings,
-)
+    step: as :func:`mixture_search`.
+    """
+    contexts, state, steps = np.stack([context, context]), zero_state(step, 2), []
+    given = np.ones((2, frames.shape[1] + 1), dtype=np.float32)
+    for n in range(len(frames) + 1):
+        given[:, :-1] = frames[n - 1] if n else 1
+        outputs, state = advance(step, state, {"frame": given, "context": contexts})
+        steps.append([outputs[name][0] for name in ("active", "log_weights", "means", "stds")])
+    active, *mixtures = map(np.stack, zip(*steps, strict=True))
+    chances = np.maximum(np.append(active[:-1], 1 - active[-1]), SMALLEST)
+    densities = log_density(frames[:, None], *(part[:-1] for part in mixtures))
+    return float(np.log(chances, dtype=np.float64).sum() + densities.sum())

@@ -2,20 +2,51 @@
 
 What is asked, a velocity and a facing, is approached by critically damped springs. Recordings are played a little
 slower or faster, with shorter or longer strides, and turned a little, to go as fast and where the springs are. The
-letters are those of :mod:`motet.decode.matching`, which says what is played.
+letters are those of :mod:`motet.decode.matching`, which says what is played; and J bones, and P = 4 J + 1 numbers of
+a pose.
 """
 
-import numpy as np
-from numpy.typing import NDArray
+from dataclasses import dataclass
+from functools import cached_property
 
-from motet.decode.loop import Loop
-from motet.decode.matching import Matcher
-from motet.decode.playback import Playback, Rows
-from motet.decode.pose_codes import PoseCodes
-from motet.decode.steering_settings import SteeringSettings
+import numpy as np
+
+from motet.bundle.graph import Floats
+from motet.decode.matching import Matcher, Playback, Rows, SteeringSettings
 from motet.motion.pose import Pose
 from motet.motion.rotations import Array, wrapped
 from motet.motion.springs import damped, damping_of
+
+
+@dataclass(frozen=True, eq=False)
+class PoseCodes:
+    """Poses in few numbers: quaternions and the hips' height are a linear map of codes.
+
+    mean: (P,) the pose whose codes are 0. basis: (K, P) what each code adds to it; float64.
+    """
+
+    mean: Array
+    basis: Array
+
+    def decode(self, codes: Array) -> tuple[Floats, Floats]:
+        """Codes (B, K) to unit quaternions (B, J, 4) and the hips' height (B,) in metres, both float32."""
+        # one row at a time: how a product rounds depends on how many rows it has
+        values = self.mean + np.matmul(codes[:, None], self.basis)[:, 0]
+        quats = values[:, :-1].reshape(len(values), -1, 4)
+        quats /= np.sqrt(np.maximum((quats * quats).sum(axis=2, keepdims=True), 1e-12))
+        return quats.astype(np.float32), values[:, -1].astype(np.float32)
+
+    def encode(self, rotations: Floats, height: Floats) -> Array:
+        """The codes (B, K) whose poses are nearest to quaternions (B, J, 4) and heights (B,)."""
+        mean = self.mean[:-1].reshape(-1, 4)
+        nearer = np.where((rotations * mean).sum(axis=2, keepdims=True) < 0, -rotations, rotations)
+        values = np.concatenate([nearer.reshape(len(nearer), -1), height[:, None]], axis=1)
+        found: Array = np.matmul((values - self.mean)[:, None], self._inverse)[:, 0]
+        return found
+
+    @cached_property
+    def _inverse(self) -> Array:
+        return np.linalg.pinv(self.basis).astype(np.float64)
 
 
 def tick(matcher: Matcher, poses: PoseCodes, playback: Playback, target: Array, gait: Rows) -> Pose:
@@ -29,27 +60,22 @@ def tick(matcher: Matcher, poses: PoseCodes, playback: Playback, target: Array, 
     playback.row = playback.row + whole.astype(np.int64)
     played, _ = matcher.table.at(playback)
     codes, moves, recorded = played[:, :-6], played[:, -6:-3].T, played[:, -3]
-    _approach(playback, target, how, dt)
+    off = playback.spring - target
+    off[:, 2] = wrapped(off[:, 2])
+    damping = np.array([damping_of(how.velocity)] * 2 + [damping_of(how.facing)])
+    off, playback.spring_rate = damped(off, playback.spring_rate, damping, dt)
+    playback.spring = target + off
     playback.root, playback.rate = _moved(playback, moves, recorded, how, dt)
     playback.offset, playback.offset_rate = damped(playback.offset, playback.offset_rate, damping_of(how.blend), dt)
     rotations, height = poses.decode(codes + playback.offset)
     return Pose(playback.root, rotations, height, played[:, -2:].astype(np.float32))
 
 
-def _approach(playback: Playback, target: Array, how: SteeringSettings, dt: float) -> None:
-    """The springs of velocity and facing, a tick later."""
-    off = playback.spring - target
-    off[:, 2] = wrapped(off[:, 2])
-    damping = np.array([damping_of(how.velocity)] * 2 + [damping_of(how.facing)])
-    off, playback.spring_rate = damped(off, playback.spring_rate, damping, dt)
-    playback.spring = target + off
-
-
 def _moved(playback: Playback, moves: Array, recorded: Array, how: SteeringSettings, dt: float) -> tuple[Array, Array]:
     """The next root (B, 3) and playback rate (B,), of recorded moves (3, B) forward, left and turn, and speeds (B,)."""
     x, z, facing = playback.root.T
-    velocity, rate = playback.spring[:, :2].T, playback.rate
-    pace = np.hypot(*velocity)
+    (velocity_x, velocity_z), rate = playback.spring[:, :2].T, playback.rate
+    pace = np.hypot(velocity_x, velocity_z)
     moving, ratio = np.minimum(recorded, pace) > how.idle, pace / np.maximum(recorded, how.idle)
     forward, left, turn = moves * (rate * dt)
     error = wrapped(playback.spring[:, 2] - facing)
@@ -57,20 +83,10 @@ def _moved(playback: Playback, moves: Array, recorded: Array, how: SteeringSetti
     turned = wrapped(facing + turn + (error * (1 - 0.5 ** (dt / how.turn))).clip(-most, most))
     stride = np.where(moving, (ratio / rate).clip(how.shortest, how.longest), 1)
     sin, cos = np.sin(facing) * stride, np.cos(facing) * stride
-    step = np.stack([sin * forward + cos * left, cos * forward - sin * left])
-    step_x, step_z = _veered(step, velocity, moving, how)
-    rate = np.where(moving, ratio.clip(how.slowest, how.fastest), 1)
-    return np.stack([x + step_x, z + step_z, turned], axis=1), rate
-
-
-def _veered(step: Array, velocity: Array, moving: NDArray[np.bool_], how: SteeringSettings) -> Array:
-    """Steps (2, B) turned towards velocities (2, B) by a small angle, where they do not go apart."""
-    along = (step * velocity).sum(axis=0)
-    across = step[1] * velocity[0] - step[0] * velocity[1]
+    step_x, step_z = sin * forward + cos * left, cos * forward - sin * left
+    # turned towards the velocity by a small angle, where the two do not go apart
+    along, across = step_x * velocity_x + step_z * velocity_z, step_z * velocity_x - step_x * velocity_z
     veers = moving & (along > how.veer_within * np.abs(across))
     angle = np.where(veers, np.arctan(across / np.maximum(along, 1e-6)).clip(-how.veer, how.veer), 0)
-    found: Array = step + angle * np.stack([step[1], -step[0]])
-    return found
-
-
-LOOP = Loop(tick, {}, {})
+    rate = np.where(moving, ratio.clip(how.slowest, how.fastest), 1)
+    return np.stack([x + (step_x + angle * step_z), z + (step_z - angle * step_x), turned], axis=1), rate

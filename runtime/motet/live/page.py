@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.decode.matching import mirrored_features
-from motet.decode.steering_settings import SteeringSettings
+from motet.decode.matching import SteeringSettings, mirrored_features
 from motet.draw.body import Body
 from motet.draw.page import bone_data, filled, source
 from motet.errors import BundleError, ControlError

@@ -10,10 +10,8 @@ from typing import Any, ClassVar, Self, TypeVar, cast
 from numpy.typing import NDArray
 
 from motet.bundle.bundle import Bundle
-from motet.bundle.graph import Arrays, Graph, TensorSpec
+from motet.bundle.graph import Arrays, Graph, SessionOptions, Sizes, TensorSpec, bind, bind_tensor
 from motet.bundle.manifest import Manifest
-from motet.bundle.session import SessionOptions
-from motet.bundle.signature import Sizes, bind, bind_tensor
 from motet.decode.loops import LOOPS
 from motet.errors import BundleError
 from motet.motion.motion import Motion

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from motet.decode.codes import Drawing
-from motet.decode.continuation_settings import ContinuationSettings
-from motet.decode.continue_codes import Continuer, Pace
+from motet.decode.continue_codes import ContinuationSettings, Continuer, Pace
 from motet.errors import DecodingError, MotionError
 from motet.models.generate import SETTLED, GenerateModel
 from motet.models.generate_codes import CodesModel

@@ -13,12 +13,9 @@ import numpy as np
 
 from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
-from motet.decode.ancestral import noise_of
-from motet.decode.beam import Hypothesis, Limits
-from motet.decode.loop import Loop
+from motet.decode.loop import Loop, Scores
 from motet.decode.loops import LOOPS
-from motet.decode.rollout import Scores
-from motet.decode.score import score_words
+from motet.decode.words import Hypothesis, Limits, noise_of, score_words
 from motet.errors import DecodingError
 from motet.models.language import EOS, MAX_SECONDS, PAD, SOS, UNK, LanguageModel, padded
 from motet.motion.motion import Motion
@@ -126,7 +123,7 @@ class DescribeModel(LanguageModel):
         """Up to ``beams`` descriptions of a motion, the best first; for several motions, a list for each.
 
         decoding: "beam" for beam search, whose best is the most probable sentence; "consensus" for sampling ``draws``
-            sentences, the best being the one that agrees most with all (:mod:`motet.decode.consensus`), not necessarily
+            sentences, the best being the one that agrees most with all (:mod:`motet.decode.words`), not necessarily
             a probable one. By default consensus where ``draws`` is given, and otherwise the bundle's loop.
         seed: of sampling; each motion gets the same samples as alone.
         progress: called with the number of motions done and in total.

@@ -12,9 +12,8 @@ import numpy as np
 
 from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
-from motet.decode.noise import Noise, Recorded
-from motet.decode.sample import Sample
-from motet.decode.score import score_frames
+from motet.decode.loop import Noise, Recorded, Sample
+from motet.decode.mixture import score_frames
 from motet.errors import DecodingError, TextError, TextWarning
 from motet.files import File
 from motet.formats import write_motion

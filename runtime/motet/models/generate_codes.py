@@ -14,11 +14,9 @@ from motet.bundle.fields import Fields
 from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
 from motet.decode.codec import Codec, Context, ReceptiveField, StreamingDecoder
-from motet.decode.codes import Drawing, Source, Writer, draw_codes, drawn_actions, drawn_steps
-from motet.decode.continuation_settings import ContinuationSettings
-from motet.decode.memory import Memory
-from motet.decode.noise import Noise, apart
-from motet.decode.sample import Sample
+from motet.decode.codes import Drawing, Memory, Source, Writer, draw_codes, drawn_actions, drawn_steps
+from motet.decode.continue_codes import ContinuationSettings
+from motet.decode.loop import Noise, Sample, apart
 from motet.errors import BundleError, DecodingError, MotionError, TextError, TextWarning, warn
 from motet.models.generate import Generated, GenerateModel, LoopSettings
 from motet.models.language import TextRules

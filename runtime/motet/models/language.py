@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from motet.bundle.fields import Fields
 from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
-from motet.decode.rollout import two_rows
+from motet.decode.loop import two_rows
 from motet.errors import BundleError, MotionError, TextError, TextWarning, warn
 from motet.models.base import BundleModel
 from motet.motion.motion import Motion

@@ -7,9 +7,8 @@ from typing import Literal, TypeVar, cast, overload
 
 from motet.bundle.bundle import Bundle
 from motet.bundle.golden import replay
-from motet.bundle.graph import Arrays, Graph
+from motet.bundle.graph import Arrays, Graph, SessionOptions
 from motet.bundle.manifest import Manifest
-from motet.bundle.session import SessionOptions
 from motet.errors import BundleError
 from motet.models.base import BundleModel
 from motet.models.describe import DescribeModel

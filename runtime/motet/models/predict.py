@@ -9,10 +9,9 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from motet.bundle.graph import Arrays, Floats, Graph
+from motet.bundle.graph import Arrays, Floats, Graph, bind
 from motet.bundle.manifest import Manifest
-from motet.bundle.signature import bind
-from motet.decode.rollout import two_rows
+from motet.decode.loop import two_rows
 from motet.errors import BundleError, DecodingError, MotionError
 from motet.models.base import BundleModel
 from motet.models.continuation import carried_on, futures, together

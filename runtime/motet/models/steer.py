@@ -9,10 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 from motet.bundle.fields import LARGEST, Fields
 from motet.bundle.graph import Arrays, Graph
 from motet.bundle.manifest import Manifest
-from motet.decode.matching import FEATURES, Matcher, Table
-from motet.decode.playback import Playback
-from motet.decode.pose_codes import PoseCodes
-from motet.decode.steering_settings import SteeringSettings
+from motet.decode.matching import FEATURES, Matcher, Playback, SteeringSettings, Table
+from motet.decode.steering import PoseCodes
 from motet.errors import BundleError, ControlError
 from motet.models.base import ControlModel
 from motet.models.steer_command import Gaits
@@ -39,7 +37,7 @@ class SteerModel(ControlModel):
 
     tables: of N rows "codes" (N, K), "moves" (N, 6), "features" (N, F), "shows" (N, G) and "left" (N,), the
         parts of a :class:`motet.decode.matching.Table`; "feature_mean" and "feature_scale" (F,); "pose_mean" (P,) and
-        "pose_basis" (K, P), see :class:`motet.decode.pose_codes.PoseCodes`.
+        "pose_basis" (K, P), see :class:`motet.decode.steering.PoseCodes`.
     """
 
     LOOPS = ("matching",)

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.bundle.fields import Fields
-from motet.decode.playback import Rows
-from motet.decode.steering_settings import SteeringSettings
+from motet.decode.matching import Rows, SteeringSettings
 from motet.errors import BundleError, ControlError
 from motet.motion.rotations import Array, wrapped
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from motet.decode.playback import Playback, Rows
+from motet.decode.matching import Playback, Rows
 from motet.decode.steering import tick
 from motet.errors import ControlError, ControlWarning, warn
 from motet.models.steer_command import Command

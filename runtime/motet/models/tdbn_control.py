@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
 from motet.decode.lookahead import Ahead, Lookahead, LookaheadSettings
-from motet.decode.noise import RowNoise, RowsOfNoise
-from motet.decode.session import tick
+from motet.decode.loop import RowNoise, RowsOfNoise
+from motet.decode.loops import tick
 from motet.errors import BundleError, ControlError, DecodingError, MotionError
 from motet.models.base import ControlModel
 from motet.models.tdbn_script import control_track, parse_script, starts_of

@@ -1,4 +1,4 @@
-"""The motion contract of a bundle: what the frames are that a model takes and gives."""
+"""Representations by name, and the motion contract of a bundle: what the frames are that a model takes and gives."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -8,14 +8,32 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from motet.errors import MotionError
+from motet.errors import BundleError, MotionError
 from motet.motion.humanoid import Figure, to_humanoid
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
-from motet.representation import named
-from motet.representation.base import FrameMirror, phases
+from motet.representation.base import FrameMirror, Representation, phases
 from motet.representation.retargeting import foreign, in_joints_of, in_known_unit, to_model_figure
+from motet.representation.root_block import Angles, RootAngles
+from motet.representation.root_sixd import RootSixd
+from motet.representation.root_vectors import RootVectors
+
+REPRESENTATIONS: dict[str, Representation] = {
+    "angles": Angles(),
+    "root_angles": RootAngles(),
+    "root_sixd": RootSixd(),
+    "root_vectors": RootVectors(),
+}
+"""By the names that manifests have."""
+
+
+def named(name: str) -> Representation:
+    """The representation of a name as manifests have it; BundleError for another."""
+    if name not in REPRESENTATIONS:
+        raise BundleError(f"representation must be one of {', '.join(REPRESENTATIONS)}, not {name!r}")
+    return REPRESENTATIONS[name]
+
 
 Z_LIMIT = 50.0
 """Standard deviations: z is clipped to this, in the nets' graphs too. Of 256 of CMU's trials one frame in a thousand
@@ -40,7 +58,7 @@ have up to .12 degrees; the stillest channel that means something, the bend of t
 class MotionContract:
     """What the frames (T, D) of a model mean.
 
-    representation: a name of :data:`motet.representation.REPRESENTATIONS`. channels, units: D each. fps: frames per
+    representation: a name of ``REPRESENTATIONS``. channels, units: D each. fps: frames per
     second. mean, std: (D,) of the training data; a channel of std 0 is dead: always at its mean. skeleton: the figure
     that the frames move, or None.
     """

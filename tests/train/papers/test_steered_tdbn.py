@@ -17,7 +17,7 @@ from motet.models.load import build
 from motet.models.tdbn_control import TdbnModel
 from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.kinematics import positions
-from motet.representation import named
+from motet.representation.contract import named
 from motet.representation.root_block import way
 from motet.representation.root_sixd import ROOT_SIXD
 from motet_train.cli.suites import as_steered

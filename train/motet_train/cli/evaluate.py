@@ -9,8 +9,8 @@ from pathlib import Path
 import click
 import torch
 
+from motet.bundle.graph import SessionOptions
 from motet.bundle.manifest import Manifest
-from motet.bundle.session import SessionOptions
 from motet.cli.options import session_options
 from motet.models.base import BundleModel
 from motet.models.load import build, load, load_as

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from motet.representation import named
+from motet.representation.contract import named
 from motet_train.cli.train_options import unit_in
 from motet_train.data.corpus import Corpus, read_corpus
 from motet_train.data.errors import DataError

@@ -8,7 +8,7 @@ import numpy as np
 
 from motet.motion.motion import Motion
 from motet.motion.rotations import rotmat_to_rotvec
-from motet.representation import named
+from motet.representation.contract import named
 from motet.representation.root_sixd import joint_rotations
 from motet_train.data.errors import DataError
 from motet_train.data.gaits import Gait, read_gaits

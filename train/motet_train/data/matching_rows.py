@@ -5,15 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.decode.matching import HORIZONS, horizons, mirrored_features, speed_feature
-from motet.decode.steering_settings import SteeringSettings
+from motet.decode.matching import HORIZONS, SteeringSettings, horizons, mirrored_features, speed_feature
 from motet.motion.feet.contacts import contacts_of
 from motet.motion.humanoid import BONES, HUMANOID, LEFT_RIGHT, ground_under, sided, sole_points
 from motet.motion.kinematics import global_transforms
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, rotmat_to_quat
 from motet.motion.skeleton import partners_of
-from motet.representation import named
+from motet.representation.contract import named
 from motet.representation.root_sixd import ROOT_SIXD, joint_rotations
 from motet_train.data.locomotion import Recording
 from motet_train.data.sixd_windows import poses_of

@@ -7,7 +7,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from motet.decode.planar import nearest_moves, seen_from
+from motet.decode.codec import nearest_moves, seen_from
 from motet.motion.rotations import Array
 from motet.representation.base import FrameMirror
 from motet.representation.root_block import way

@@ -12,9 +12,8 @@ import torch
 from motet.bundle.manifest import Manifest
 from motet.models.describe import ConfidenceSettings, DescribeModel
 from motet.models.language import MAX_SECONDS, RULES, Vocabulary
-from motet.representation import named
 from motet.representation.base import FrameMirror
-from motet.representation.contract import MotionContract
+from motet.representation.contract import MotionContract, named
 from motet_train.data.batch import Batch
 from motet_train.data.batches import Examples, examples, frame_mirror, usable
 from motet_train.data.mirror_text import mirror_text

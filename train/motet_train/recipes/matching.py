@@ -9,7 +9,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from motet.decode.steering_settings import SteeringSettings
+from motet.decode.matching import SteeringSettings
 from motet.motion.feet.lock import FootLockSettings
 from motet.motion.humanoid import LEFT_RIGHT, sided
 from motet.representation.contract import MotionContract

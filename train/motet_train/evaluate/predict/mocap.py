@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from motet.models.predict import PredictModel
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
-from motet.representation import named
+from motet.representation.contract import named
 from motet_train.data.errors import DataError
 from motet_train.data.store import Entry, Store
 from motet_train.evaluate.predict import mocap_floors

@@ -12,7 +12,7 @@ from motet.motion.kinematics import chained, local_rotations, local_translations
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
-from motet.representation import named
+from motet.representation.contract import named
 from motet_train.data.errors import DataError
 from motet_train.data.store import Store
 from motet_train.evaluate.predict.floors import (

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import partial, singledispatch
 
-from motet.decode.steering_settings import SteeringSettings
+from motet.decode.matching import SteeringSettings
 from motet.errors import ControlWarning
 from motet.models.steer import SteerModel
 from motet_train.data.errors import DataError

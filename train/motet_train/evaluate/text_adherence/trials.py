@@ -9,7 +9,7 @@ from motet.bundle.manifest import Manifest
 from motet.errors import MotionError
 from motet.models.language import RULES
 from motet.motion.motion import Motion
-from motet.representation import named
+from motet.representation.contract import named
 from motet_train.data.corpus import read_corpus
 from motet_train.data.errors import DataError
 from motet_train.data.records import Record
