@@ -18,7 +18,7 @@ from motet.cli.writing import size
 from motet.errors import FormatError, MotetError
 from motet.files import files_in
 from motet.formats import CLIPPED, MOCAP, READS, html
-from motet.formats.clips import MARK
+from motet.formats.lines import MARK
 from motet.motion.humanoid import LENGTH_UNITS, to_humanoid
 from motet.motion.motion import Motion
 

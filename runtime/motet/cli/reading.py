@@ -16,8 +16,7 @@ from motet.cli.writing import FPS, Output, spare
 from motet.errors import MotetError, MotionError, UnitError, quoted
 from motet.files import place_of
 from motet.formats import FORMATS, READABLE, WRITABLE, check_writable, clips, read_motion
-from motet.formats.clips import MARK, chosen, split_clip
-from motet.formats.lines import plain_names
+from motet.formats.lines import MARK, chosen, plain_names, split_clip
 from motet.models.language import LanguageModel
 from motet.motion.motion import Motion
 from motet.motion.skeleton import METRES

@@ -20,7 +20,7 @@ import numpy as np
 from motet.errors import FormatError, MotionError, OutputError
 from motet.files import File, check_place, place_of
 from motet.formats.character import Character, put_onto
-from motet.formats.clips import Clip, split_clip
+from motet.formats.lines import Clip, split_clip
 from motet.motion.humanoid import rig
 from motet.motion.motion import Motion
 from motet.motion.skeleton import Skeleton, metres

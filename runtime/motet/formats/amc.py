@@ -1,7 +1,6 @@
 """AMC motion with its ASF skeleton (Acclaim), the format of the CMU motion capture database."""
 
 import logging
-import re
 from collections.abc import Iterator, Mapping
 from itertools import islice
 from pathlib import Path
@@ -10,10 +9,17 @@ import numpy as np
 
 from motet.errors import FormatError, quoted
 from motet.files import File, check_place, place_of, write_whole
-from motet.formats.asf import ASF_ROOT, CMU_METRES, Asf, read_skeleton, write_skeleton
-from motet.formats.lines import frame_rate, number, numbers, plain_names, read_text
-from motet.formats.words import Words
-from motet.formats.writable import ANGLE_KINDS, TRANSLATION_KINDS, with_names, with_still_offsets
+from motet.formats.asf import CMU_METRES, Asf, asf_text, read_skeleton, words_of
+from motet.formats.lines import (
+    finite,
+    frame_rate,
+    number,
+    numbers,
+    plain_names,
+    read_text,
+    with_names,
+    with_still_offsets,
+)
 from motet.motion.kinematics import skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
@@ -21,11 +27,8 @@ from motet.motion.skeleton import Joint
 
 log = logging.getLogger(__name__)
 
-FPS_COMMENT = "# fps "
-EACH_LINE = r".+\n?|\n"
-"""Finds lines one by one, so reading the first lines does not split the whole file."""
-
 Layout = list[tuple[str, int]]
+"""The bones of a frame, and how many values each has."""
 
 
 def read(file: File, asf: str | Path | None = None, fps: float | None = None, partial: bool = False) -> Motion:
@@ -39,24 +42,20 @@ def read(file: File, asf: str | Path | None = None, fps: float | None = None, pa
     Channels come in the file's order of bones, units "length" for translations, "deg" or "rad" as in the file.
     FormatError names the file, and the line where it is cut or wrong.
     """
-    path, text = place_of(file), read_text(file)
+    path, lines = place_of(file), read_text(file).split("\n")
     if asf is None and not isinstance(file, str | Path):
         raise FormatError(path, "a file object has no folder to find the skeleton in: pass it as asf")
     skeleton = read_skeleton(asf if asf is not None else _find_asf(path))
-    header, unit, said_fps = _header(path, text, skeleton)
-    layout = _layout(path, _frame_lines(text, header), skeleton.dofs)
-    values = _values(path, text, header, layout, partial)
+    header, unit, said = _header(path, lines, skeleton)
+    if said is not None and fps is not None and abs(said - fps) > 1e-6 * said:
+        raise FormatError(path, f"the file states {said:g} fps, but {fps:g} was given")
+    layout = _layout(path, words_of(lines, header), skeleton.dofs)
+    values = _values(path, lines, header, layout, partial)
     channels = [(bone, dof) for bone, _ in layout for dof in skeleton.dofs[bone]]
     names = tuple(f"{bone}.{dof}" for bone, dof in channels)
     units = tuple("length" if dof[0] == "t" else unit for _, dof in channels)
-    return Motion(values, names, units, _rate(path, said_fps, fps), skeleton.skeleton)
-
-
-def _rate(path: Path, said: float | None, given: float | None) -> float:
-    if said is not None and given is not None and abs(said - given) > 1e-6 * said:
-        raise FormatError(path, f"the file states {said:g} fps, but {given:g} was given")
-    # CMU's files state none: theirs is 120
-    return frame_rate(120.0 if said is None and given is None else said or given or 0.0, path)
+    rate = next((rate for rate in (said, fps) if rate is not None), 120.0)
+    return Motion(values, names, units, frame_rate(rate, path), skeleton.skeleton)
 
 
 def _find_asf(path: Path) -> Path:
@@ -67,45 +66,34 @@ def _find_asf(path: Path) -> Path:
         except OSError as error:
             raise FormatError(path, f"cannot look for a skeleton in {folder}: {error.strerror}") from error
         by_stem = {file.stem: file for file in found if file.suffix.lower() == ".asf"}
-        for stem in stems:
-            if stem in by_stem:
-                return by_stem[stem]
-        if len(by_stem) == 1:
-            return next(iter(by_stem.values()))
+        fitting = [by_stem[stem] for stem in stems if stem in by_stem]
+        if fitting or len(by_stem) == 1:
+            return (fitting or list(by_stem.values()))[0]
     names = " or ".join(f"{stem}.asf" for stem in stems)
     raise FormatError(path, f"no skeleton found: expected {names}, or a single .asf, beside it or in ../asf")
 
 
-def _header(path: Path, text: str, asf: Asf) -> tuple[int, str, float | None]:
+def _header(path: Path, lines: list[str], asf: Asf) -> tuple[int, str, float | None]:
     """The number of lines before the first frame, the angle unit, and the frame rate if a comment states it."""
-    unit, fps, line = asf.angle, None, -1
-    for line, content in enumerate(re.finditer(EACH_LINE, text)):
-        word = content[0].strip().lower()
+    unit, fps = asf.angle, None
+    for line, content in enumerate(lines):
+        word = content.strip().lower()
         if word in (":degrees", ":radians"):
             unit = word[1:4]
-        elif word.startswith(FPS_COMMENT):
-            fps = frame_rate(number(word.removeprefix(FPS_COMMENT), path, line + 1), path, line + 1)
+        elif word.startswith("# fps "):
+            fps = frame_rate(number(word.removeprefix("# fps "), path, line + 1), path, line + 1)
         elif word and word[0] not in "#:":
             return line, unit, fps
-    return line + 1, unit, fps
-
-
-def _frame_lines(text: str, header: int) -> Iterator[tuple[int, list[str]]]:
-    """Every non-empty line after the header, and its number."""
-    for line, content in enumerate(re.finditer(EACH_LINE, text), start=1):
-        words = content[0].split("#")[0].split()
-        if words and line > header:
-            yield line, words
+    return len(lines), unit, fps
 
 
 def _layout(path: Path, lines: Iterator[tuple[int, list[str]]], dofs: Mapping[str, tuple[str, ...]]) -> Layout:
     """The first frame's bones, each with its number of values; those of the skeleton if there is no frame."""
-    line, words = next(lines, (0, [""]))
-    if not words[0]:
+    line, words = next(lines, (0, []))
+    if not words:
         return [(bone, len(names)) for bone, names in dofs.items()]
     if not _is_frame_number(words):
-        reason = f"expected a frame number alone on its line, not {quoted(' '.join(words))}"
-        raise FormatError(path, reason, line)
+        raise FormatError(path, f"expected a frame number alone on its line, not {quoted(' '.join(words))}", line)
     layout: dict[str, int] = {}
     for line, words in lines:
         if _is_frame_number(words):
@@ -122,38 +110,36 @@ def _is_frame_number(words: list[str]) -> bool:
     return len(words) == 1 and words[0].isdigit()
 
 
-def _values(path: Path, text: str, header: int, layout: Layout, partial: bool) -> Array:
-    values = _values_at_once(text, header, layout)
+def _values(path: Path, lines: list[str], header: int, layout: Layout, partial: bool) -> Array:
+    values = _values_at_once(lines[header:], layout)
     if values is not None:
         return values
     try:
-        return _values_by_line(path, _frame_lines(text, header), layout)
+        return _values_by_line(path, words_of(lines, header), layout)
     except FormatError:
-        frames = [match.start() for match in re.finditer(r"^\d+\s*$", text, re.MULTILINE)]
-        if not (partial and frames):
+        last = max((n for n, line in enumerate(lines) if line.rstrip().isdecimal()), default=None)
+        if last is None or not partial:
             raise
     log.info("%s: the last frame is truncated and was left out", path)
-    return _values_by_line(path, _frame_lines(text[: frames[-1]], header), layout)
+    return _values_by_line(path, words_of(lines[:last], header), layout)
 
 
-def _values_at_once(text: str, header: int, layout: Layout) -> Array | None:
+def _values_at_once(lines: list[str], layout: Layout) -> Array | None:
     """All values (T, D) if all frames have the same layout, else None: several times faster than line by line."""
-    try:
-        words = Words("".join(text.split("\n", header)[header:]))
-    except UnicodeEncodeError:
-        return None
-    width = 1 + sum(1 + count for _, count in layout)
+    words = "\n".join(lines).split()
+    places = np.cumsum([1, *(1 + count for _, count in layout)]).tolist()
+    width = places.pop()
     frames, rest = divmod(len(words), width)
-    if rest or not words.are_digits(slice(0, None, width)):
-        return None
-    is_value, here = np.zeros(width, dtype=bool), 1
-    for bone, count in layout:
-        if not words.are(slice(here, None, width), bone):
+    for place, (bone, _) in reversed(list(zip(places, layout, strict=True))):
+        if rest or not set(words[place::width]) <= {bone}:
             return None
-        is_value[here + 1 : here + 1 + count] = True
-        here += 1 + count
-    values = words.numbers(np.tile(is_value, frames))
-    return None if values is None else values.reshape(frames, -1)
+        del words[place::width]
+        width -= 1
+    if rest or not all(map(str.isdigit, words[::width])):
+        return None
+    del words[::width]
+    values = finite(words)
+    return None if values is None else values.reshape(frames, width - 1)
 
 
 def _values_by_line(path: Path, lines: Iterator[tuple[int, list[str]]], layout: Layout) -> Array:
@@ -188,7 +174,8 @@ def write(file: File, motion: Motion) -> None:
 
     The frame rate goes into a comment that :func:`read` understands. The root becomes "root"; characters not allowed
     in the format become ``_``. Values are lossless, translations in the skeleton's unit; a skeleton with a known unit
-    is written in CMU's, the only one the format can name.
+    is written in CMU's, the only one the format can name. If the children of a joint start at different places, each
+    gets a bone ``NAME_base`` without channels leading to it.
 
     FormatError for channels other than Euler angles and translations, and for a joint other than the root whose
     translation varies; MotionError for a motion without skeleton.
@@ -202,33 +189,30 @@ def write(file: File, motion: Motion) -> None:
     if skeleton_of(motion).metres_per_unit not in (None, CMU_METRES):
         motion = motion.scaled(CMU_METRES)
     # a bone's name has no blanks or comments, and is neither a number nor a keyword
-    names = plain_names([ASF_ROOT, *skeleton_of(motion).names[1:]], r"[\s#]|^(?=\d+$)|^(?=:)")
-    motion = with_names(motion, names)
+    motion = with_names(motion, plain_names(["root", *skeleton_of(motion).names[1:]], r"[\s#]|^(?=\d+$)|^(?=:)"))
     joints = skeleton_of(motion).joints
-    asf = Asf(skeleton_of(motion), {joint.name: dofs for joint in joints if (dofs := _dofs(motion, joint))}, "deg")
-    text = _text(motion, asf.dofs)
-    write_skeleton(path.with_suffix(".asf"), asf)
-    write_whole(path, text)
+    asf = Asf(skeleton_of(motion), {joint.name: dofs for joint in joints if (dofs := _dofs_of(motion, joint))}, "deg")
+    frames = _frames(motion, asf.dofs)
+    write_whole(path.with_suffix(".asf"), asf_text(asf))
+    write_whole(path, frames)
 
 
-def _dofs(motion: Motion, joint: Joint) -> tuple[str, ...]:
+def _dofs_of(motion: Motion, joint: Joint) -> tuple[str, ...]:
     """The joint's channels in the motion's order if the rotation order allows it: the first one turns first."""
-    prefix = f"{joint.name}."
-    dofs = tuple(name.removeprefix(prefix) for name in motion.channels if name.rpartition(".")[0] == joint.name)
+    parts = (name.rpartition(".") for name in motion.channels)
+    dofs = tuple(kind for name, _, kind in parts if name == joint.name)
     turns = [f"r{axis}" for axis in reversed(joint.order) if f"r{axis}" in dofs]
-    if [dof for dof in dofs if dof in ANGLE_KINDS] == turns:
-        return dofs
-    return (*(dof for dof in dofs if dof in TRANSLATION_KINDS), *turns)
+    kept = [dof for dof in dofs if dof[0] == "r"] == turns
+    return dofs if kept else (*(dof for dof in dofs if dof[0] == "t"), *turns)
 
 
-def _text(motion: Motion, dofs: Mapping[str, tuple[str, ...]]) -> str:
+def _frames(motion: Motion, dofs: Mapping[str, tuple[str, ...]]) -> str:
     bones = list(dict.fromkeys(channel.rpartition(".")[0] for channel in motion.channels))
     unit = "rad" if "rad" in motion.units and "deg" not in motion.units else "deg"
     channels = tuple(f"{bone}.{dof}" for bone in bones for dof in dofs[bone])
     values = motion.select(channels, tuple("length" if name[-2] == "t" else unit for name in channels)).values
-    lines = [f"{FPS_COMMENT}{motion.fps!r}", ":FULLY-SPECIFIED", ":RADIANS" if unit == "rad" else ":DEGREES"]
+    lines = [f"# fps {motion.fps!r}", ":FULLY-SPECIFIED", ":RADIANS" if unit == "rad" else ":DEGREES"]
     for frame, row in enumerate(values.tolist(), start=1):
         words = map(repr, row)
-        lines.append(str(frame))
-        lines += [" ".join([bone, *islice(words, len(dofs[bone]))]) for bone in bones]
+        lines += [str(frame), *(" ".join([bone, *islice(words, len(dofs[bone]))]) for bone in bones)]
     return "\n".join([*lines, ""])

@@ -8,8 +8,6 @@ The writer sticks to what every reader accepts.
 
 import logging
 import re
-from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
@@ -18,18 +16,27 @@ import numpy as np
 
 from motet.errors import FormatError, MotionError, quoted
 from motet.files import File, place_of, write_whole
-from motet.formats.lines import Names, complete_order, frame_rate, number, numbers, plain_names, read_text
-from motet.formats.words import Words
-from motet.formats.writable import with_names, with_still_offsets
+from motet.formats.lines import (
+    Names,
+    Triple,
+    complete_order,
+    finite,
+    frame_rate,
+    number,
+    numbers,
+    plain_names,
+    read_text,
+    spaced,
+    triple,
+    with_names,
+    with_still_offsets,
+)
 from motet.motion.kinematics import local_rotations, local_translations, skeleton_of
 from motet.motion.motion import TURN, Motion
 from motet.motion.rotations import Array, rotmats_to_euler
 from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
 
 log = logging.getLogger(__name__)
-
-BVH_ORDER = "zyx"
-BVH_POSITION, BVH_ROTATION = "Xposition Yposition Zposition", "Zrotation Yrotation Xrotation"
 
 
 def read(file: File, partial: bool = False) -> Motion:
@@ -46,10 +53,13 @@ def read(file: File, partial: bool = False) -> Motion:
     start, declared, fps = _motion_header(path, lines, motion_line)
     channels = [f"{node.name}.{kind}" for node in nodes for kind in node.channels]
     # without channels nothing else confirms the number
-    if not channels and declared > (10**7):
+    if not channels and declared > 10**7:
         raise FormatError(path, f"the file declares {declared} frames and has no channels", start)
-    kept = _without_broken_end(lines, start, len(channels)) if partial else lines
-    values = _values(path, kept, start, len(channels)) if channels else np.zeros((declared, 0))
+    if partial:  # leave out an incomplete last frame
+        last = max((n for n in range(start, len(lines)) if lines[n].strip()), default=start)
+        if last < len(lines) and len(lines[last].split()) != len(channels):
+            lines = lines[:last]
+    values = _values(path, lines, start, len(channels)) if channels else np.zeros((declared, 0))
     if len(values) < declared and not partial:
         reason = f"the file declares {declared} frames but holds {len(values)}: correct the line 'Frames:'"
         raise FormatError(path, f"{reason}, or read it with partial=True (--partial)", start)
@@ -66,7 +76,7 @@ class _Node:
     name: str
     parent: int
     line: int
-    offset: tuple[float, float, float] | None = None
+    offset: Triple | None = None
     channels: tuple[str, ...] = ()
 
 
@@ -83,7 +93,8 @@ def _hierarchy(path: Path, lines: list[str]) -> tuple[list[_Node], int]:
     open_nodes: list[int] = []
     names = Names()
     declared = False  # a joint has been named and its brace must follow
-    for line, statement in _statements(lines):
+    pieces = ((line, piece.strip()) for line, text in enumerate(lines, 1) for piece in re.split("([{}])", text))
+    for line, statement in ((line, piece) for line, piece in pieces if piece):
         keyword, _, rest = statement.replace("\t", " ").partition(" ")
         match keyword.lower():
             case "root" | "joint" | "end" as kind:
@@ -98,7 +109,7 @@ def _hierarchy(path: Path, lines: list[str]) -> tuple[list[_Node], int]:
             case "}" if open_nodes and not declared:
                 open_nodes.pop()
             case "offset" if open_nodes and not declared:
-                nodes[open_nodes[-1]].offset = _offset(path, rest.split(), line)
+                nodes[open_nodes[-1]].offset = triple(rest.split(), path, line)
             case "channels" if open_nodes and not declared:
                 nodes[open_nodes[-1]].channels = _channels(path, rest.split(), line)
             case "motion" if nodes and not open_nodes and not declared:
@@ -111,27 +122,13 @@ def _hierarchy(path: Path, lines: list[str]) -> tuple[list[_Node], int]:
     raise FormatError(path, "not a BVH file, or truncated: the line MOTION is missing")
 
 
-def _statements(lines: list[str]) -> Iterator[tuple[int, str]]:
-    for line, text in enumerate(lines, start=1):
-        for piece in re.split("([{}])", text):
-            if piece.strip():
-                yield line, piece.strip()
-
-
-def _offset(path: Path, words: list[str], line: int) -> tuple[float, float, float]:
-    values = numbers(words, path, line)
-    if len(values) != 3:
-        raise FormatError(path, f"OFFSET needs three numbers, not {len(values)}", line)
-    return values[0], values[1], values[2]
-
-
 def _channels(path: Path, words: list[str], line: int) -> tuple[str, ...]:
-    kinds = [re.fullmatch("([xyz])(position|rotation)", word.lower()) for word in words[1:]]
-    channels = tuple(("t" if kind[2] == "position" else "r") + kind[1] for kind in kinds if kind)
-    if len(channels) < len(kinds):
-        unknown = quoted(next(word for word, kind in zip(words[1:], kinds, strict=True) if not kind))
-        reason = f"channel {unknown}: expected one of Xposition ... Zposition, Xrotation ... Zrotation"
+    kinds = (("position", "t"), ("rotation", "r"))
+    known = {f"{axis}{kind}": f"{letter}{axis}" for kind, letter in kinds for axis in "xyz"}
+    if unknown := [word for word in words[1:] if word.lower() not in known]:
+        reason = f"channel {quoted(unknown[0])}: expected one of Xposition ... Zposition, Xrotation ... Zrotation"
         raise FormatError(path, reason, line)
+    channels = tuple(known[word.lower()] for word in words[1:])
     if words[:1] != [str(len(channels))] or len(set(channels)) < len(channels):
         reason = f"CHANNELS needs a count and that many different channels, not {quoted(' '.join(words))}"
         raise FormatError(path, reason, line)
@@ -140,18 +137,18 @@ def _channels(path: Path, words: list[str], line: int) -> tuple[str, ...]:
 
 def _motion_header(path: Path, lines: list[str], motion_line: int) -> tuple[int, int, float]:
     """The number of lines before the first frame, the declared number of frames and the frame rate."""
-    frames, time = None, None
+    frames, fps = None, None
     for line, text in enumerate(lines[motion_line:], start=motion_line + 1):
         found = re.fullmatch(r"\s*(frames|frame\s+time)\s*:\s*(\S+)\s*", text, re.IGNORECASE)
         if found and found[1].lower() == "frames" and re.fullmatch("[0-9]{1,15}", found[2]):
             frames = int(found[2])
         elif found and found[1].lower() != "frames":
-            time = _fps(path, found[2], line)
+            fps = _fps(path, found[2], line)
         elif text.strip():
             reason = f"expected 'Frames: N' and 'Frame Time: SECONDS', not {quoted(text.strip())}"
             raise FormatError(path, reason, line)
-        if frames is not None and time is not None:
-            return line, frames, time
+        if frames is not None and fps is not None:
+            return line, frames, fps
     raise FormatError(path, "the file ends before 'Frames:' and 'Frame Time:'", len(lines))
 
 
@@ -166,36 +163,17 @@ def _fps(path: Path, word: str, line: int) -> float:
     return whole[0] if len(whole) == 1 else fps
 
 
-def _without_broken_end(lines: list[str], start: int, width: int) -> list[str]:
-    """The lines without an incomplete last frame."""
-    last = max((n for n in range(start, len(lines)) if lines[n].strip()), default=start)
-    whole = last < len(lines) and len(lines[last].split()) == width
-    return lines if whole else lines[:last]
-
-
 def _values(path: Path, lines: list[str], start: int, width: int) -> Array:
     """The frames (T, width) after the header, one per line or not; FormatError if one is truncated."""
-    text = "\n".join(lines[start:])
-    with suppress(UnicodeEncodeError):
-        words = Words(text)
-        values = words.numbers(np.ones(len(words), dtype=bool))
-        if values is not None and len(words) % width == 0:
-            return values.reshape(-1, width)
-    return _values_by_line(path, lines, start, width, len(text.split()))
-
-
-def _values_by_line(path: Path, lines: list[str], start: int, width: int, count: int) -> Array:
-    """The same of ``count`` words, each of which is checked."""
-    found: list[float] = []
+    words = "\n".join(lines[start:]).split()
+    values = finite(words)
+    if values is not None and len(words) % width == 0:
+        return values.reshape(-1, width)
     for line, content in enumerate(lines[start:], start=start + 1):
         row = numbers(content.split(), path, line)
-        if count % width and len(row) not in (0, width):
-            reason = f"truncated frame: a frame has {width} values, this line has {len(row)}"
-            raise FormatError(path, reason, line)
-        found += row
-    if count % width:
-        raise FormatError(path, f"{count} values do not make complete frames of {width}")
-    return np.array(found).reshape(-1, width)
+        if len(words) % width and len(row) not in (0, width):
+            raise FormatError(path, f"truncated frame: a frame has {width} values, this line has {len(row)}", line)
+    raise FormatError(path, f"{len(words)} values do not make complete frames of {width}")
 
 
 def write(file: File, motion: Motion) -> None:
@@ -210,85 +188,55 @@ def write(file: File, motion: Motion) -> None:
     motion, moving = with_still_offsets(place_of(file), motion)
     # some readers fail on blanks and colons in names
     names = plain_names(skeleton_of(motion).names, r"[^\w.-]")
-    translated = {names[0], *(names[skeleton_of(motion).index(name)] for name in moving)}
+    translated = {0, *(skeleton_of(motion).index(name) for name in moving)}
     motion = with_names(motion, names)
-    joints = _jointed(motion)
-    lines = ["HIERARCHY", *_tree(skeleton_of(motion), joints, translated), "MOTION"]
-    lines += [f"Frames: {len(motion)}", f"Frame Time: {1 / motion.fps!r}"]
-    rows = _rows(motion, joints, translated)
+    lines, joints = _tree(motion, translated)
+    translations, angles = local_translations(motion), _zyx_degrees(motion)
+    blocks = [block[:, i] for i in joints for block in ((translations, angles) if i in translated else (angles,))]
+    rows = np.concatenate(blocks, axis=1)
     if not np.isfinite(rows).all():
         raise MotionError("values of this motion are too large to convert")
-    lines += [" ".join(map(repr, row)) for row in rows.tolist()]
-    write_whole(file, "\n".join([*lines, ""]))
+    lines = ["HIERARCHY", *lines, "MOTION", f"Frames: {len(motion)}", f"Frame Time: {1 / motion.fps!r}"]
+    write_whole(file, "\n".join([*lines, *(" ".join(map(repr, row)) for row in rows.tolist()), ""]))
 
 
-def _jointed(motion: Motion) -> list[int]:
-    """The joints written as JOINT, in the file's order; the others are End Sites."""
-    skeleton = skeleton_of(motion)
-    moved = {channel.rpartition(".")[0] for channel in motion.channels}
-    order, waiting = [], [0]
+def _tree(motion: Motion, translated: set[int]) -> tuple[list[str], list[int]]:
+    """The lines of the hierarchy, and the joints written as ROOT or JOINT in their order; others are End Sites."""
+    skeleton, moved = skeleton_of(motion), {channel.rpartition(".")[0] for channel in motion.channels}
+    lines: list[str] = []
+    joints: list[int] = []
+    waiting: list[tuple[int | None, int]] = [(0, 0)]
     while waiting:
-        i = waiting.pop()
-        joint = skeleton.joints[i]
-        alone = joint.parent != -1 and skeleton.children[joint.parent] == (i,)
-        if not (alone and joint.name.endswith(END_SUFFIX) and not skeleton.children[i] and joint.name not in moved):
-            order.append(i)
-        waiting.extend(reversed(skeleton.children[i]))
-    return order
-
-
-def _tree(skeleton: Skeleton, joints: list[int], translated: set[str]) -> Iterator[str]:
-    """The lines of the hierarchy; ``joints`` are depth first."""
-    written = set(joints)
-    # 40 tabs at most, so that a long chain of joints does not make a huge file
-    indents = ["\t" * min(depth, 40) for depth in range(len(joints))]
-    open_joints: list[int] = []
-    for i in joints:
-        joint, children = skeleton.joints[i], skeleton.children[i]
-        while open_joints and open_joints[-1] != joint.parent:
-            yield indents[len(open_joints) - 1] + "}"
-            open_joints.pop()
-        indent = indents[len(open_joints)]
-        open_joints.append(i)
-        yield from (indent + line for line in _joint_lines(skeleton, i, joint.name in translated))
-        if written.isdisjoint(children):
-            tip = skeleton.joints[children[0]].offset if children else (0.0, 0.0, 0.0)
-            yield from (f"{indent}\t{line}" for line in ("End Site", "{", f"\tOFFSET {_text(tip)}", "}"))
-    yield from (indents[depth] + "}" for depth in reversed(range(len(open_joints))))
-
-
-def _joint_lines(skeleton: Skeleton, i: int, translated: bool) -> list[str]:
-    name, offset = skeleton.joints[i].name, skeleton.joints[i].offset if i else (0.0, 0.0, 0.0)
-    channels = f"6 {BVH_POSITION} {BVH_ROTATION}" if translated else f"3 {BVH_ROTATION}"
-    return [f"{'JOINT' if i else 'ROOT'} {name}", "{", f"\tOFFSET {_text(offset)}", f"\tCHANNELS {channels}"]
-
-
-def _text(values: tuple[float, float, float]) -> str:
-    return " ".join(repr(float(value)) for value in values)
-
-
-def _rows(motion: Motion, joints: list[int], translated: set[str]) -> Array:
-    """The file's values (T, D)."""
-    skeleton = skeleton_of(motion)
-    translations, angles = local_translations(motion), _zyx_degrees(motion)
-    blocks = []
-    for i in joints:
-        blocks += [translations[:, i]] if skeleton.joints[i].name in translated else []
-        blocks.append(angles[:, i])
-    return np.concatenate(blocks, axis=1)
+        i, depth = waiting.pop()
+        indent = "\t" * min(depth, 40)  # so that a long chain of joints does not make a huge file
+        if i is None:
+            lines.append(indent + "}")
+            continue
+        joints.append(i)
+        children = [skeleton.joints[child] for child in skeleton.children[i]]
+        lone = [c.name for c in children if c.name.endswith(END_SUFFIX) and c.name not in moved]
+        is_last = not children or (len(children) == len(lone) == 1 and not skeleton.children[skeleton.children[i][0]])
+        offset = skeleton.joints[i].offset if i else (0.0, 0.0, 0.0)
+        kinds = "6 Xposition Yposition Zposition" if i in translated else "3"
+        lines += [f"{indent}{'JOINT' if i else 'ROOT'} {skeleton.joints[i].name}", indent + "{"]
+        lines += [f"{indent}\tOFFSET {spaced(offset)}", f"{indent}\tCHANNELS {kinds} Zrotation Yrotation Xrotation"]
+        if is_last:
+            tip = children[0].offset if children else (0.0, 0.0, 0.0)
+            lines += [f"{indent}\t{line}" for line in ("End Site", "{", f"\tOFFSET {spaced(tip)}", "}")]
+        waiting.append((None, depth))
+        waiting += [(child, depth + 1) for child in reversed(skeleton.children[i]) if not is_last]
+    return lines, joints
 
 
 def _zyx_degrees(motion: Motion) -> Array:
     """Angles (T, J, 3) about z, y, x in degrees; unchanged if they already are."""
     skeleton = skeleton_of(motion)
-    converted = rotmats_to_euler(local_rotations(motion), BVH_ORDER)
-    angles: Array = np.round(np.degrees(converted), 9).astype(np.float64)
-    kept = [i for i, joint in enumerate(skeleton.joints) if joint.order == BVH_ORDER and not any(joint.axis)]
+    angles: Array = np.round(np.degrees(rotmats_to_euler(local_rotations(motion), "zyx")), 9).astype(np.float64)
+    kept = [i for i, joint in enumerate(skeleton.joints) if joint.order == "zyx" and not any(joint.axis)]
     angles[:, kept] = 0.0
-    for joint, columns in motion.rotation_columns().items():
-        if skeleton.index(joint) in kept:
+    for name, columns in motion.rotation_columns().items():
+        if (joint := skeleton.index(name)) in kept:
             for column in columns:
                 factor = TURN["deg"] / TURN[motion.units[column]]
-                place = BVH_ORDER.index(motion.channels[column][-1])
-                angles[:, skeleton.index(joint), place] = motion.values[:, column] * factor
+                angles[:, joint, "zyx".index(motion.channels[column][-1])] = motion.values[:, column] * factor
     return angles

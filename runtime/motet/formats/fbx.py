@@ -15,8 +15,7 @@ from motet.errors import FormatError
 from motet.files import File, place_of
 from motet.formats import gltf, gltf_character
 from motet.formats.character import Character
-from motet.formats.clips import Clip, chosen, clip_names
-from motet.formats.lines import read_bytes
+from motet.formats.lines import Clip, chosen, clip_names, read_bytes
 from motet.motion.motion import Motion
 
 PROGRAM = Path(__file__).with_name("fbx_to_gltf.py")

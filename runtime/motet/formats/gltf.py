@@ -11,11 +11,10 @@ from typing import Any
 
 from motet.errors import FormatError, MotionError
 from motet.files import File, place_of
-from motet.formats.clips import Clip, chosen, clip_names, split_clip
 from motet.formats.gltf_data import Gltf, parse
 from motet.formats.gltf_figures import Figure, above, figure_of, figures, likeliest
 from motet.formats.gltf_tracks import GLTF_FPS, moved, tracks
-from motet.formats.lines import Names
+from motet.formats.lines import Clip, Names, chosen, clip_names, split_clip
 from motet.formats.nodes import Poses, motion_of_nodes, rested
 from motet.motion.humanoid import BONES
 from motet.motion.motion import Motion

@@ -1,39 +1,52 @@
-"""Shared by the formats: reading a file's bytes, text and numbers, and names that a file can hold."""
+"""Shared by the formats: bytes, text and numbers of files, names, clips, and the skeletons that text files can hold.
 
-import math
+Clips are the motions of a file that holds several, each by a name; "file.glb#Walk" is the clip Walk of file.glb.
+"""
+
+import logging
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from itertools import permutations
 from pathlib import Path
 
-from motet.errors import FormatError, quoted
+import numpy as np
+
+from motet.errors import FormatError, listed, quoted
 from motet.files import File, place_of
+from motet.motion.kinematics import AXES, local_translations, skeleton_of
+from motet.motion.motion import TURN, Motion
+from motet.motion.rotations import Array
+from motet.motion.skeleton import Skeleton
+
+log = logging.getLogger(__name__)
+
+Triple = tuple[float, float, float]
+
+Clip = str | int | None
+"""One of a file's clips: its name, its number from 1, or None for the first."""
+
+MARK = "#"
+"""Separates a file from its clip."""
 
 
 def read_bytes(file: File, most: int | None = None) -> bytes:
-    """All bytes of a file or file object; FormatError if it is missing or cannot be read.
-
-    most: FormatError for more bytes than this, before reading them.
-    """
-    path = place_of(file)
+    """All bytes of a file or file object; FormatError if it is missing, unreadable or longer than ``most``."""
+    path, limit = place_of(file), -1 if most is None else most + 1
     try:
         if not isinstance(file, str | Path):
-            content = file.read() if most is None else file.read(most + 1)
-            if most is not None and len(content) > most:
-                raise _too_large(path, most)
-            return content
-        if not path.is_file():
+            content = file.read(limit)
+        elif path.is_file():
+            with path.open("rb") as opened:
+                content = opened.read(limit)
+        else:
             missing = "a link that leads nowhere" if path.is_symlink() else "no such file"
             raise FormatError(path, "it is not a file" if path.exists() else missing)
-        if most is not None and path.stat().st_size > most:
-            raise _too_large(path, most)
-        return path.read_bytes()
     except OSError as error:
         raise FormatError(path, f"cannot be read: {error.strerror}") from error
-
-
-def _too_large(path: Path, most: int) -> FormatError:
-    return FormatError(path, f"it is too large: expected at most {most} bytes")
+    if most is not None and len(content) > most:
+        raise FormatError(path, f"it is too large: expected at most {most} bytes")
+    return content
 
 
 def read_text(file: File) -> str:
@@ -51,21 +64,40 @@ def read_text(file: File) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
 
 
-def numbers(words: Iterable[str], path: Path, line: int | None) -> list[float]:
+def finite(words: Sequence[str]) -> Array | None:
+    """Many words as numbers (N,), or None unless all are finite numbers."""
+    try:
+        values = np.array(words, dtype=np.float64)
+    except ValueError:
+        return None
+    # Python would read 1_000, which no other program does
+    return None if "_" in "".join(words) or not np.isfinite(values).all() else values
+
+
+def numbers(words: Sequence[str], path: Path, line: int | None) -> list[float]:
     """Finite numbers; FormatError with file and line for any other word."""
-    return [number(word, path, line) for word in words]
+    if finite(words) is None:
+        wrong = next(word for word in words if finite([word]) is None)
+        raise FormatError(path, f"{quoted(wrong)} is not a finite number", line)
+    return [float(word) for word in words]
 
 
 def number(word: str, path: Path, line: int | None) -> float:
     """One finite number; FormatError like :func:`numbers`."""
-    try:
-        # Python would read 1_000, which no other program does
-        value = math.nan if "_" in word else float(word)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise FormatError(path, f"{quoted(word)} is not a finite number", line)
-    return value
+    return numbers([word], path, line)[0]
+
+
+def triple(words: Sequence[str], path: Path, line: int) -> Triple:
+    """Three finite numbers; FormatError like :func:`numbers`."""
+    values = numbers(words, path, line)
+    if len(values) != 3:
+        raise FormatError(path, f"expected three numbers, not {len(values)}", line)
+    return values[0], values[1], values[2]
+
+
+def spaced(values: Iterable[float]) -> str:
+    """Numbers as text, exact."""
+    return " ".join(repr(float(value)) for value in values)
 
 
 def frame_rate(fps: float, path: Path, line: int | None = None) -> float:
@@ -92,8 +124,8 @@ class Names:
         """``name``, with a numeric suffix if it is taken; the result is then taken too."""
         candidate = name
         while candidate in self._taken:
-            number = self._next.get(name, 2)
-            candidate, self._next[name] = f"{name}_{number}", number + 1
+            suffix = self._next.get(name, 2)
+            candidate, self._next[name] = f"{name}_{suffix}", suffix + 1
         self._taken.add(candidate)
         return candidate
 
@@ -102,3 +134,98 @@ def plain_names(names: Iterable[str], forbidden: str) -> list[str]:
     """Unique non-empty names, with ``_`` for every character that matches the regular expression ``forbidden``."""
     given = Names()
     return [given.unique(re.sub(forbidden, "_", name) or "_") for name in names]
+
+
+def with_names(motion: Motion, names: Sequence[str]) -> Motion:
+    """The motion with its skeleton's joints renamed, one name for each."""
+    skeleton = skeleton_of(motion)
+    new = dict(zip(skeleton.names, names, strict=True))
+    joints = tuple(replace(joint, name=new[joint.name]) for joint in skeleton.joints)
+    parts = (channel.rpartition(".") for channel in motion.channels)
+    channels = tuple(f"{new.get(joint, joint)}.{kind}" for joint, _, kind in parts)
+    return replace(motion, channels=channels, skeleton=Skeleton(joints, skeleton.metres_per_unit))
+
+
+def with_still_offsets(path: str | Path, motion: Motion) -> tuple[Motion, tuple[str, ...]]:
+    """The motion with constant translations turned into offsets of the skeleton, and the joints that still translate.
+
+    The root keeps its translation and is not among those joints; all translations are in "length".
+    MotionError for a motion without skeleton; FormatError names channels that are neither an Euler angle nor a
+    translation of one of its joints.
+    """
+    skeleton = skeleton_of(motion)
+    allowed = {f"r{axis}": (*TURN,) for axis in AXES} | {f"t{axis}": ("length", "m") for axis in AXES}
+    parts = [(name, *name.rpartition(".")[::2]) for name in motion.channels]
+    bad = [
+        f"{name} [{unit}]"
+        for (name, joint, kind), unit in zip(parts, motion.units, strict=True)
+        if joint not in skeleton.places or unit not in allowed.get(kind, ())
+    ]
+    if bad:
+        raise FormatError(path, f"holds only Euler angles and translations of joints, not {', '.join(bad)}")
+    translations, moved = local_translations(motion), {joint for _, joint, kind in parts if kind[0] == "t"}
+    joints, moving = list(skeleton.joints), []
+    for i, joint in enumerate(skeleton.joints[1:], start=1):
+        if joint.name in moved and len(motion):
+            if np.ptp(translations[:, i], axis=0).max() > 1e-9 * skeleton.height:
+                moving.append(joint.name)
+            else:
+                x, y, z = translations[0, i].tolist()
+                joints[i] = replace(joint, offset=(x, y, z))
+    translated = (skeleton.names[0], *moving)
+    still = motion.select(tuple(name for name, joint, kind in parts if kind[0] == "r" or joint in translated))
+    units = tuple("length" if unit == "m" else unit for unit in still.units)
+    still = still.select(still.channels, units)
+    return replace(still, skeleton=Skeleton(tuple(joints), skeleton.metres_per_unit)), tuple(moving)
+
+
+def clip_names(given: Iterable[str]) -> tuple[str, ...]:
+    """Unique names for a file's clips, in order: printable and on one line, "clip3" for an empty third."""
+    names = Names()
+    return tuple(names.unique(_tidy(name) or f"clip{i}") for i, name in enumerate(given, start=1))
+
+
+def _tidy(name: str) -> str:
+    printable = "".join(letter if letter.isprintable() else " " for letter in name)
+    return " ".join(printable.split())[:200]
+
+
+def chosen(path: Path, names: Sequence[str], clip: Clip) -> int:
+    """The index of a clip among a file's; for a number as text, a clip of that name precedes the clip of that number.
+
+    None is the first, with a note in the log if there are others. FormatError, with the names, for an unknown clip.
+    """
+    if clip is None:
+        if len(names) > 1:
+            said = "%s: reading the first of %d clips, %s; the next is %s%s%s"
+            log.warning(said, path, len(names), quoted(names[0]), path.name, MARK, names[1])
+            log.info("%s: clips: %s", path, ", ".join(map(quoted, names)))
+        return 0
+    if isinstance(clip, str) and _tidy(clip) in names:
+        return names.index(_tidy(clip))
+    at = int(clip) if isinstance(clip, int) or (clip.isdecimal() and len(clip) < 10) else 0
+    if 1 <= at <= len(names):
+        return at - 1
+    known = f"{listed([quoted(name) for name in names])}, or 1 to {len(names)}" if names else "none"
+    raise FormatError(path, f"no clip {clip if isinstance(clip, int) else quoted(clip)}: expected {known}")
+
+
+def split_clip(file: File, extensions: Sequence[str]) -> tuple[File, str | None]:
+    """A file and the clip named after :data:`MARK`, or None.
+
+    An existing file with the mark in its name takes precedence, then the shortest existing path before a mark, then
+    the shortest one with one of ``extensions``.
+    """
+
+    def exists(path: Path) -> bool:
+        try:
+            return path.is_file()
+        except OSError:  # not a valid file name
+            return False
+
+    if not isinstance(file, str | Path) or MARK not in str(file) or exists(Path(file)):
+        return file, None
+    parts = str(file).split(MARK)
+    ways = [(Path(MARK.join(parts[:i])), MARK.join(parts[i:])) for i in range(1, len(parts))]
+    ways = [(path, clip) for path, clip in ways if path.suffix.lower() in extensions]
+    return next((way for way in ways if exists(way[0])), ways[0] if ways else (file, None))

@@ -15,14 +15,6 @@ from motet.errors import FormatError
 from motet.files import File, place_of
 from motet.formats.lines import frame_rate, numbers, read_bytes
 from motet.motion.motion import Motion
-from motet.motion.rotations import Array
-
-MMM_ROOT = ("root.tx", "root.ty", "root.tz", "root.rx", "root.ry", "root.rz")
-XML_CHUNK = 2**20
-"""Bytes per call of the XML parser: it restarts on a longer token, so few large pieces are fast."""
-
-FRAME_PARTS = {"Timestep": 1, "RootPosition": 3, "RootRotation": 3}
-"""Element of a frame -> how many numbers it has; the joints' angles follow."""
 
 
 def read(file: File) -> Motion:
@@ -33,7 +25,7 @@ def read(file: File) -> Motion:
     """
     path = place_of(file)
     joints: list[str] = []
-    frames: list[Array] = []
+    frames: list[list[float]] = []
     for element in _elements(file):
         if element.tag == "JointOrder":
             if joints or frames:
@@ -47,9 +39,18 @@ def read(file: File) -> Motion:
     if not joints or not frames:
         raise FormatError(path, "not an MMM motion: expected a Motion with JointOrder and MotionFrames")
     rows = np.array(frames)
-    values = np.column_stack([_root(rows[:, 1:4], rows[:, 4:7]), rows[:, 7:]])
-    units = ("m",) * 3 + ("rad",) * (3 + len(joints))
-    return Motion(values, (*MMM_ROOT, *joints), units, _fps(path, rows[:, 0]))
+    # the file's angles are roll, pitch and yaw, R = Rz Ry Rx
+    (x, y, z), (roll, pitch, yaw) = rows[:, 1:4].T * 0.001, rows[:, 4:7].T
+    values = np.column_stack([-x, z, y, -roll, yaw, pitch, rows[:, 7:]])
+    names = ("root.tx", "root.ty", "root.tz", "root.rx", "root.ry", "root.rz", *joints)
+    steps = np.diff(rows[:, 0])
+    if not len(steps):
+        raise FormatError(path, "cannot tell the frame rate from a single frame")
+    uneven = np.flatnonzero(np.abs(steps - steps.mean()) > 0.5 * abs(steps.mean()))
+    if steps.mean() <= 0 or len(uneven):
+        raise FormatError(path, f"frame {uneven[0] + 1 if len(uneven) else 1}: the time steps are uneven")
+    fps = frame_rate(round(float(1 / steps.mean()), 3), path)
+    return Motion(values, names, ("m",) * 3 + ("rad",) * (3 + len(joints)), fps)
 
 
 def motion_name(file: File) -> str:
@@ -61,9 +62,10 @@ def _elements(file: File, event: Literal["start", "end"] = "end") -> Iterator[El
     """The elements up to the end of the first motion, in order; nothing after it is read."""
     path, content = place_of(file), read_bytes(file)
     parser: ElementTree.XMLPullParser[Any] = ElementTree.XMLPullParser([event])
+    size = 2**20  # bytes per call: the parser restarts on a longer token, so few large pieces are fast
     try:
-        for start in range(0, len(content), XML_CHUNK):
-            parser.feed(content[start : start + XML_CHUNK])
+        for start in range(0, len(content), size):
+            parser.feed(content[start : start + size])
             events: Iterator[Any] = parser.read_events()
             for _, element in events:
                 yield element
@@ -76,10 +78,10 @@ def _elements(file: File, event: Literal["start", "end"] = "end") -> Iterator[El
         raise FormatError(path, f"unknown encoding: {error}", 1) from error
 
 
-def _frame(path: Path, element: ElementTree.Element, joints: int, number: int) -> Array:
-    """Time step, root position and rotation, and the joints' angles of one frame: (7 + J,)."""
+def _frame(path: Path, element: ElementTree.Element, joints: int, number: int) -> list[float]:
+    """Time step, root position and rotation, and the joints' angles of one frame."""
     found: list[float] = []
-    for tag, count in {**FRAME_PARTS, "JointPosition": joints}.items():
+    for tag, count in {"Timestep": 1, "RootPosition": 3, "RootRotation": 3, "JointPosition": joints}.items():
         words = (element.findtext(tag) or "").split()
         if len(words) != count:
             raise FormatError(path, f"frame {number}: {tag} needs {count} values, not {len(words)}")
@@ -87,21 +89,4 @@ def _frame(path: Path, element: ElementTree.Element, joints: int, number: int) -
             found += numbers(words, path, None)
         except FormatError as error:
             raise FormatError(path, f"frame {number}: {tag}: {error.reason}") from error
-    return np.array(found)
-
-
-def _root(positions: Array, rotations: Array) -> Array:
-    """Root channels (T, 6) from positions (T, 3) in millimetres and angles (T, 3): roll, pitch, yaw, R = Rz Ry Rx."""
-    # millimetres
-    (x, y, z), (roll, pitch, yaw) = positions.T * 0.001, rotations.T
-    return np.column_stack([-x, z, y, -roll, yaw, pitch])
-
-
-def _fps(path: Path, times: Array) -> float:
-    steps = np.diff(times)
-    if not len(steps):
-        raise FormatError(path, "cannot tell the frame rate from a single frame")
-    uneven = np.flatnonzero(np.abs(steps - steps.mean()) > 0.5 * abs(steps.mean()))
-    if steps.mean() <= 0 or len(uneven):
-        raise FormatError(path, f"frame {uneven[0] + 1 if len(uneven) else 1}: the time steps are uneven")
-    return frame_rate(round(float(1 / steps.mean()), 3), path)
+    return found

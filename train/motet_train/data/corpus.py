@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from motet.formats import CLIPPED, MOCAP, clips, read_motion
-from motet.formats.clips import MARK
+from motet.formats.lines import MARK
 from motet_train.data import kit
 from motet_train.data.archive import BROKEN, Archive
 from motet_train.data.errors import DataError
