@@ -37,7 +37,7 @@ def export_run(run: Run, out: str | Path, int8: bool = False, half: bool = False
         raise ExportError("weights are kept in 8 bits or in 16: export with --int8 or with --half")
     if half:
         round_weights(run.model)
-    modules, torch = run.graphs(), build(Manifest.from_json(run.manifest), run.torch_graphs(), run.tables())
+    modules, torch = run.model.graphs(), run.bundle_model()
     manifest = torch.manifest
     files = {}
     for role, (module, spec) in modules.items():
@@ -127,7 +127,7 @@ def parity_of(run: Run, bundle: Bundle, options: SessionOptions | None = None) -
     if bundle.manifest.parity.get("weights") == "float16":
         round_weights(run.model)
     model = kind_of(bundle.manifest).load(bundle, options)
-    return parity(model, build(bundle.manifest, run.torch_graphs(), run.tables()))
+    return parity(model, build(bundle.manifest, run.torch_graphs(), run.model.tables()))
 
 
 def parity(onnx: BundleModel, torch: BundleModel) -> dict[str, Any]:

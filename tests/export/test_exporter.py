@@ -9,7 +9,7 @@ from torch import Tensor, nn
 from motet.bundle.graph import GraphSpec, OnnxGraph, TensorSpec
 from motet_export.exporter import MAX_IR_VERSION, OPSET, ExportError, export_graph
 from motet_export.parity import check_carried, check_one_step, error
-from motet_train.torch_graph import TorchGraph
+from motet_train.runs import TorchGraph
 
 pytestmark = pytest.mark.slow  # torch's exporter
 

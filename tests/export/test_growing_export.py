@@ -16,8 +16,7 @@ from motet.models.load import load, verify
 from motet_export.bundles import export_run
 from motet_export.exporter import export_graph
 from motet_export.parity import check_carried
-from motet_train.runs import Run
-from motet_train.torch_graph import TorchGraph
+from motet_train.runs import Run, TorchGraph
 
 WORDS = [*SPECIALS, "a", "person", "walks", "runs"]
 CHANNELS, WIDTH, HEADS = 3, 8, 2

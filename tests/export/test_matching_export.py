@@ -55,7 +55,7 @@ def bundle(run: Run, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_it_holds_plain_arrays_and_no_graph(run: Run, bundle: Path) -> None:
     assert not [name for name in zipfile.ZipFile(bundle).namelist() if name.endswith(".onnx")]
     opened = Bundle.open(bundle)
-    for name, table in run.tables().items():
+    for name, table in run.model.tables().items():
         np.testing.assert_array_equal(opened.table(name), table)
     assert set(verify(opened).errors) == {"run"}
     model = load_as(SteerModel, bundle)

@@ -10,7 +10,7 @@ from motet.decode.loops import free_run
 from motet_export.exporter import export_graph
 from motet_train.papers.li2018.srnn import EDGES, NODES, SRNN, Config
 from motet_train.papers.li2018.stepwise import Stepwise
-from motet_train.torch_graph import TorchGraph
+from motet_train.runs import TorchGraph
 
 pytestmark = pytest.mark.slow  # torch's exporter
 

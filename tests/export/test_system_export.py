@@ -16,7 +16,7 @@ from motet_train.papers.li2018.lstm_3lr import EncoderRecurrentDecoder
 from motet_train.papers.li2018.lstm_ae import LSTMAE
 from motet_train.papers.li2018.rrnn import RRNN
 from motet_train.papers.li2018.stepwise import Stepwise, System
-from motet_train.torch_graph import TorchGraph
+from motet_train.runs import TorchGraph
 
 pytestmark = pytest.mark.slow  # torch's exporter
 

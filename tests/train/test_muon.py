@@ -9,9 +9,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from motet_train.descent import GradientLearner, Term, Terms, Training
+from motet_train.descent import GradientLearner, Muon, Term, Terms, Training
 from motet_train.models.net import Net
-from motet_train.muon import Muon
 from motet_train.trainer import train
 
 

@@ -11,7 +11,7 @@ from click.testing import CliRunner, Result
 from test_predict_data import write_files
 
 from motet.cli import main
-from motet_train.precision import has_bfloat16
+from motet_train.run_folder import has_bfloat16
 from motet_train.settings import read_settings
 
 CPUINFO = Path("/proc/cpuinfo")
@@ -51,12 +51,12 @@ def test_a_run_says_and_records_what_it_is_trained_in(
 ) -> None:
     files, out = write_files(tmp_path / "files", actions=("walking",)), tmp_path / "run"
     (tmp_path / "small.toml").write_text("[model]\nhidden = 8\n")
-    monkeypatch.setattr("motet_train.precision.has_bfloat16", lambda device: has)
+    monkeypatch.setattr("motet_train.run_folder.has_bfloat16", lambda device: has)
     result = trained(out, files)
     assert result.exit_code == 0, result.output
     assert result.output.count("cpu has no products in bfloat16: training in float32") == (not has)
     assert json.loads((out / "run.json").read_text())["training"]["recipe"]["precision"] == used
     assert read_settings(out / "run.toml")[1]["training"]["precision"] == used
-    monkeypatch.setattr("motet_train.precision.has_bfloat16", lambda device: not has)
+    monkeypatch.setattr("motet_train.run_folder.has_bfloat16", lambda device: not has)
     other = trained(out, files, "--resume")
     assert (other.exit_code, "other settings, so cannot be resumed: precision" in other.output) == (2, True)

@@ -16,7 +16,6 @@ from motet.formats import read_motion, write_motion
 from motet.models.predict import PredictModel
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.evaluate.predict.floors import ZERO
-from motet_train.manifest import About
 from motet_train.models.predictor import LEAST, ErrorHead, Predictor, PredictorConfig, error_signs
 from motet_train.papers.li2018.expmap_files import CMU_ACTIONS, read_expmap
 from motet_train.papers.li2018.material import expmap_material
@@ -24,7 +23,7 @@ from motet_train.papers.li2018.published import CONV
 from motet_train.papers.li2018.report import FEW, MEAN, complete, protocol_results
 from motet_train.recipes.predict import DEFAULT, train_predict
 from motet_train.recipes.recipe import Job
-from motet_train.runs import Run
+from motet_train.runs import About, Run
 
 
 def job(folder: Path, seed: int = 0, **training: float) -> Job:

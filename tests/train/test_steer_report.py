@@ -62,7 +62,7 @@ def folder(store: Store, tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def model(folder: Path) -> SteerModel:
     run = Run.load(folder / "run")
-    found = build(Manifest.from_json(run.manifest), {}, run.tables())
+    found = build(Manifest.from_json(run.manifest), {}, run.model.tables())
     assert isinstance(found, SteerModel)
     return found
 

@@ -16,7 +16,6 @@ from motet.cli import main
 from motet.formats import write_motion
 from motet_train.data.store import Store
 from motet_train.descent import Training
-from motet_train.manifest import About
 from motet_train.models.motion_to_language import MotionToLanguageConfig
 from motet_train.papers.plappert2017 import recipe as generate
 from motet_train.papers.plappert2017.language_to_motion import LanguageToMotionConfig
@@ -24,7 +23,7 @@ from motet_train.progress import Shown
 from motet_train.recipes import describe
 from motet_train.recipes.language import LanguageVisits, divided, train_language
 from motet_train.recipes.recipe import SETTINGS, Job, Recipe
-from motet_train.runs import Run
+from motet_train.runs import About, Run
 from motet_train.trainer import CHECKPOINT, LOG
 
 COMMANDS = {"describe": "describe", "mixture": "generate"}

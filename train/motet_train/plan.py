@@ -10,14 +10,13 @@ from motet_train.data.corpus import Corpus
 from motet_train.data.predict_data import store_material
 from motet_train.data.preparation import ALL, preparation
 from motet_train.data.store import Store, part, prepare_parts
-from motet_train.manifest import About
 from motet_train.progress import log, preparing
 from motet_train.recipes import actions, codec, codes, describe, fill, matching, predict, search
 from motet_train.recipes.actions import WordVectors
 from motet_train.recipes.language import train_language
 from motet_train.recipes.recipe import Job, Recipe
 from motet_train.run_folder import is_finished, trained
-from motet_train.runs import Run, RunError
+from motet_train.runs import About, Run, RunError
 from motet_train.settings import changed
 from motet_train.trainer import LOG
 

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from tqdm import tqdm
 
@@ -21,8 +21,8 @@ SOON = 10.0
 """Seconds after which a line is said, as a chunk, or preparing motions, may take many minutes."""
 
 
-class Watcher(Protocol):
-    """What is told about a training as it runs; of its units, epochs or steps, ``done`` of ``total`` are done."""
+class Watcher:
+    """Is told about a training as it runs, and says nothing; ``done`` of ``total`` epochs or steps are done."""
 
     def step(self, done: int, total: int, unit: str, loss: float) -> None:
         """After each step."""
@@ -31,20 +31,10 @@ class Watcher(Protocol):
         """After each chunk, with its line of the log."""
 
 
-class Silent:
-    """Says nothing."""
-
-    def step(self, done: int, total: int, unit: str, loss: float) -> None:
-        """Nothing."""
-
-    def chunk(self, line: Mapping[str, Any], total: int, unit: str) -> None:
-        """Nothing."""
+SILENT = Watcher()
 
 
-SILENT = Silent()
-
-
-class Shown:
+class Shown(Watcher):
     """A bar with loss, speed and remaining time; where nobody watches, a line soon and one for each chunk.
 
     The lines are logged by "motet.train"; with ``motet --quiet`` there are neither.
@@ -53,10 +43,17 @@ class Shown:
 
     def __init__(self, boards: Path | None = None) -> None:
         self.watched = sys.stderr.isatty() and distributed.rank() == 0 and log.isEnabledFor(logging.INFO)
-        self.writer = _writer(boards) if boards is not None and distributed.rank() == 0 else None
+        self.writer: Any = None
         self.bar: tqdm[Any] | None = None
-        self.done = 0
-        self.due = time.monotonic() + SOON
+        self.done, self.due = 0, time.monotonic() + SOON
+        if boards is not None and distributed.rank() == 0:
+            try:
+                from torch.utils.tensorboard import SummaryWriter
+            except ImportError as error:
+                raise RunError(
+                    "--tensorboard needs the package tensorboard: pip install 'motet[tensorboard]'"
+                ) from error
+            self.writer = SummaryWriter(boards)
 
     def step(self, done: int, total: int, unit: str, loss: float) -> None:
         """Move the bar; say the first line."""
@@ -112,11 +109,3 @@ def preparing(total: int) -> Iterator[Callable[[Record | Skipped], None]]:
                 log.info("prepared %d of %d motions", count, total)
 
         yield done
-
-
-def _writer(folder: Path) -> Any:
-    try:
-        from torch.utils.tensorboard import SummaryWriter
-    except ImportError as error:
-        raise RunError("--tensorboard needs the package tensorboard: pip install 'motet[tensorboard]'") from error
-    return SummaryWriter(folder)

@@ -1,4 +1,4 @@
-"""The folder of a training run: whether one can start, resume or is finished there, and a training in it."""
+"""A training in its folder: whether one can start, resume or is finished there, on which device, and how precisely."""
 
 import json
 import shutil
@@ -12,14 +12,11 @@ import torch
 
 from motet.errors import OutputError
 from motet_train import distributed
-from motet_train.precision import for_device
 from motet_train.progress import Shown, log
-from motet_train.recipes.recipe import SETTINGS, Job
+from motet_train.recipes.recipe import SETTINGS, Job, Recipe
 from motet_train.runs import MANIFEST, WEIGHTS, Run, RunError
 from motet_train.settings import to_toml
 from motet_train.trainer import CHECKPOINT, LOG
-
-BOARDS = "tensorboard"
 
 
 def trained(
@@ -37,11 +34,33 @@ def trained(
     with (
         distributed.processes(job.device) as device,
         run_folder(job.folder, resume),
-        closing(Shown(job.folder / BOARDS if boards else None)) as progress,
+        closing(Shown(job.folder / "tensorboard" if boards else None)) as progress,
     ):
-        recipe = for_device(job.recipe, device)
+        recipe = _for_device(job.recipe, device)
         settings = to_toml(options, recipe)
         return train(replace(job, recipe=recipe, device=device, progress=progress, settings=settings))
+
+
+def _for_device(recipe: Recipe, device: str) -> Recipe:
+    """The recipe, in float32 where it says bfloat16 and the device does not have that, which is logged."""
+    if recipe.training is None or recipe.training.precision == "float32" or has_bfloat16(device):
+        return recipe
+    if distributed.rank() == 0:
+        log.info("%s has no products in bfloat16: training in float32", device)
+    return replace(recipe, training=replace(recipe.training, precision="float32"))
+
+
+def has_bfloat16(device: str) -> bool:
+    """Whether a device multiplies in bfloat16 itself.
+
+    Where it does not, torch's layers take 4 to 30 times as long as in float32, and its LSTM refuses to run.
+    """
+    if device.startswith("cuda"):
+        return bool(torch.cuda.is_bf16_supported(including_emulation=False))
+    try:  # what torch no longer answers is a no; oneDNN's answer heeds ONEDNN_MAX_CPU_ISA
+        return bool(torch.ops.mkldnn._is_mkldnn_bf16_supported() and torch.cpu._is_avx512_bf16_supported())
+    except (AttributeError, RuntimeError):
+        return False
 
 
 @contextmanager
@@ -84,7 +103,7 @@ def _unborn(out: Path) -> bool:
     """Whether a folder is empty, or a run's that was killed before its first checkpoint: it may start over."""
     if not out.is_dir() or (out / CHECKPOINT).exists():
         return False
-    ours = (MANIFEST, SETTINGS, LOG, WEIGHTS, BOARDS)
+    ours = (MANIFEST, SETTINGS, LOG, WEIGHTS, "tensorboard")
     temporary = tuple(f".{name}." for name in (*ours, CHECKPOINT))
-    foreign = [path.name for path in out.iterdir() if path.name not in ours and not path.name.startswith(temporary)]
-    return not foreign and not is_finished(out)
+    names = [path.name for path in out.iterdir()]
+    return all(name in ours or name.startswith(temporary) for name in names) and not is_finished(out)

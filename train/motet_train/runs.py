@@ -3,6 +3,7 @@
 import io
 import json
 import pickle
+import platform
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -13,9 +14,13 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
-from motet.bundle.graph import Graph, GraphSpec
+from motet.bundle.graph import Arrays, Graph, GraphSpec
+from motet.bundle.manifest import Manifest
 from motet.errors import MotetError
 from motet.files import write_whole
+from motet.models.base import BundleModel
+from motet.models.load import build
+from motet_train import distributed
 from motet_train.models.action_net import ActionNet
 from motet_train.models.codec import MotionCodec
 from motet_train.models.filler import Filler
@@ -28,7 +33,6 @@ from motet_train.models.predictor import Predictor
 from motet_train.papers.li2018 import systems
 from motet_train.papers.plappert2017 import language_to_motion
 from motet_train.papers.tdbn import angle_crbm, tdbn
-from motet_train.torch_graph import TorchGraph
 
 MANIFEST, WEIGHTS = "run.json", "weights.pt"
 
@@ -53,6 +57,34 @@ class RunError(MotetError, ValueError):
     """A training run that cannot be read, or not be resumed."""
 
 
+@dataclass(frozen=True)
+class About:
+    """What a manifest says that no computation finds out; a licence that nobody stated is None."""
+
+    name: str
+    command: str
+    seed: int = 0
+    licence: str | None = None
+    data_licence: str | None = None
+
+
+class TorchGraph:
+    """A torch module behind the same face as an ONNX graph, so that one decoding loop serves both.
+
+    Its forward takes the inputs by name and gives the outputs in order.
+    """
+
+    def __init__(self, module: nn.Module, spec: GraphSpec) -> None:
+        self.module, self.spec = module.eval(), spec
+
+    @torch.inference_mode()
+    def __call__(self, feeds: Arrays) -> dict[str, NDArray[Any]]:
+        """Run eagerly on the CPU."""
+        outputs = self.module(**{tensor.name: torch.tensor(feeds[tensor.name]) for tensor in self.spec.inputs})
+        outputs = outputs if isinstance(outputs, tuple) else (outputs,)
+        return {tensor.name: output.numpy() for tensor, output in zip(self.spec.outputs, outputs, strict=True)}
+
+
 @dataclass(frozen=True, eq=False)
 class Run:
     """A trained model and its manifest: see :meth:`motet_train.recipes.recipe.Job.manifest`."""
@@ -60,17 +92,13 @@ class Run:
     manifest: Mapping[str, Any]
     model: Net
 
-    def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
-        """For each role the module to export and the contract that its forward keeps."""
-        return self.model.graphs()
-
-    def tables(self) -> dict[str, NDArray[Any]]:
-        """The plain arrays of the bundle, by name."""
-        return self.model.tables()
-
     def torch_graphs(self) -> dict[str, Graph]:
         """The graphs, run by torch."""
-        return {role: TorchGraph(module, spec) for role, (module, spec) in self.graphs().items()}
+        return {role: TorchGraph(module, spec) for role, (module, spec) in self.model.graphs().items()}
+
+    def bundle_model(self) -> BundleModel:
+        """The model as it will be in its bundle, run by torch."""
+        return build(Manifest.from_json(self.manifest), self.torch_graphs(), self.model.tables())
 
     def save(self, folder: Path) -> None:
         """Write the run into an existing folder."""
@@ -92,6 +120,12 @@ class Run:
         return Run(manifest, model)
 
 
+def eager_model(manifest: Manifest, threads: int) -> BundleModel:
+    """A bundle's model with the same sizes in torch, its weights untrained: the baseline of ``motet bench``."""
+    torch.set_num_threads(threads)
+    return Run(manifest.source, MODELS[manifest.model](manifest.config)).bundle_model()
+
+
 def to_bytes(state: Any) -> bytes:
     """States of modules and optimisers, and plain values, as bytes."""
     buffer = io.BytesIO()
@@ -105,3 +139,35 @@ def read_state(path: Path) -> Any:
         return torch.load(path, map_location="cpu", weights_only=True)
     except (OSError, EOFError, RuntimeError, ValueError, pickle.UnpicklingError) as error:
         raise RunError(f"{path} cannot be read: {error}") from error
+
+
+def surroundings(device: str) -> dict[str, Any]:
+    """Where a training ran, for its manifest."""
+    processes = {"processes": distributed.count()} if distributed.count() > 1 else {}
+    return {
+        "threads": torch.get_num_threads(),
+        **processes,
+        "machine": f"{platform.system()} {platform.machine()}, {device.partition(':')[0].upper()}",
+        "torch": torch.__version__,
+    }
+
+
+def refuse_other(path: Path, manifest: Mapping[str, Any]) -> None:
+    """RunError if the run.json at ``path`` is of a run that was started with other data or settings."""
+    if not path.exists():
+        return
+
+    def essence(manifest: Mapping[str, Any]) -> dict[str, Any]:
+        """What has to be as it was for a run to continue: not the length of its training."""
+        training = manifest.get("training", {})
+        recipe = {key: value for key, value in training.get("recipe", {}).items() if key not in ("epochs", "steps")}
+        same = {key: manifest.get(key) for key in ("model", "config", "motion", "vocabulary", "control")}
+        return {**same, **{key: training.get(key) for key in ("seed", "data", "split")}, **recipe}
+
+    try:
+        before = essence(json.loads(path.read_text()))
+    except (AttributeError, TypeError, ValueError) as error:
+        raise RunError(f"{path} is not a run that can be resumed: {error}") from error
+    different = [key for key, value in essence(manifest).items() if before.get(key) != value]
+    if different:
+        raise RunError(f"{path.parent} was started with other settings, so cannot be resumed: {', '.join(different)}")

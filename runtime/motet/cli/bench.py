@@ -30,7 +30,7 @@ def bench(
     baseline = None
     if torch and model.graphs and importlib.util.find_spec("torch"):
         # by name: the runtime does not depend on the training package
-        eager = importlib.import_module("motet_train.eager").eager_model(model.manifest, session.threads)
+        eager = importlib.import_module("motet_train.runs").eager_model(model.manifest, session.threads)
         baseline = figures(eager, seconds, motion)
     table = rows(found, baseline)
     if as_json:

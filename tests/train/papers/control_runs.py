@@ -4,12 +4,11 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from motet_train.manifest import About
 from motet_train.papers.tdbn.clips import Clips
 from motet_train.papers.tdbn.recipe import train_control
 from motet_train.papers.tdbn.tdbn import TDBNConfig
 from motet_train.recipes.recipe import Job, Recipe
-from motet_train.runs import Run
+from motet_train.runs import About, Run
 
 
 def control_run(clips: Clips, config: Any, seed: int = 0) -> Run:

@@ -12,7 +12,7 @@ from motet_train.data.errors import DataError
 from motet_train.papers.li2018.expmap_files import CMU_LAYOUT, H36M_LAYOUT
 from motet_train.papers.li2018.noise import noise_at, noisy
 from motet_train.papers.li2018.srnn import SRNN, Config, parts_of
-from motet_train.precision import has_bfloat16
+from motet_train.run_folder import has_bfloat16
 
 Array = NDArray[np.float64]
 TINY = Config(9, ((8, 0, 4), (1, 2), (5, 6), (3,), (7,)), linear=6, units=5, narrow=4)

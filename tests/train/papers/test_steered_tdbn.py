@@ -28,13 +28,12 @@ from motet_train.data.records import Record
 from motet_train.data.store import Store, prepare
 from motet_train.evaluate.steer import following, standing
 from motet_train.evaluate.steer.report import Recorded, steer_report
-from motet_train.manifest import About
 from motet_train.papers.tdbn.body import TRUNK_PART, body_parts
 from motet_train.papers.tdbn.courses import FULL_CONTROL, LABELS, controls_of, course
 from motet_train.papers.tdbn.driven import Driven, DrivenSession, moved
 from motet_train.papers.tdbn.steered import RECIPES, mirrored_too, train_steered
 from motet_train.recipes.recipe import Job
-from motet_train.runs import Run
+from motet_train.runs import About, Run
 
 SETTINGS = """
 [model]

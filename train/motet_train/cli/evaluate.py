@@ -10,13 +10,12 @@ import click
 import torch
 
 from motet.bundle.graph import SessionOptions
-from motet.bundle.manifest import Manifest
 from motet.cli.options import session_options
 from motet.models.base import BundleModel
-from motet.models.load import build, load, load_as
+from motet.models.load import load, load_as
 from motet.models.search import SearchModel
-from motet_train.cli.prepared import store_beside
-from motet_train.cli.suites import SAYS, Given, Results, Suite, suite_of
+from motet_train.cli.prepare import store_beside
+from motet_train.cli.suites import Given, Results, Suite, suite_of
 from motet_train.cli.train_options import unit_in
 from motet_train.data.errors import DataError
 from motet_train.data.store import INDEX, part
@@ -69,51 +68,32 @@ def evaluate(
     the space of a search model.
     """
     torch.set_num_threads(1)
-    runs, loaded = _loaded(models, session)
-    suite = _says(loaded, keep) if says else suite_of(loaded)
+    if says and keep:
+        raise click.UsageError("--says only prints figures, or draws them with --plots: drop --save")
+    runs = {name: Run.load(Path(name)) for name in models if (Path(name) / MANIFEST).is_file()}
+    loaded = {name: runs[name].bundle_model() if name in runs else load(name, session) for name in models}
+    suite = suite_of(loaded, says)
     if keep and (bundles := [name for name in models if name not in runs]):
         raise click.UsageError(f"--save stores figures in training runs, but {', '.join(bundles)} is a bundle")
     found = dict.fromkeys(loaded, data) if says else data_of(loaded, suite, data)
-    _check(suite, plots)
+    if plots is not None:  # before hours of measuring
+        if not suite.draws:
+            raise click.UsageError(f"--plots is not available for {suite.what}")
+        make_folder(plots)
     results = suite.measure(loaded, Given(found, unit_in, load_as(SearchModel, search, session) if says else None))
-    _draw(results, plots)
-    for name in runs if keep else ():
-        Run({**runs[name].manifest, "quality": results.figures[name]}, runs[name].model).save(Path(name))
+    _finish(results, {name: runs[name] for name in runs if keep}, plots)
     figures = results.figures[models[0]] if len(models) == 1 else results.figures
     click.echo(json.dumps(figures) if as_json else results.text)
 
 
-def _loaded(names: tuple[str, ...], session: SessionOptions) -> tuple[dict[str, Run], dict[str, BundleModel]]:
-    """The runs among some models, and all models."""
-    runs = {name: Run.load(Path(name)) for name in names if (Path(name) / MANIFEST).is_file()}
-    built = {
-        name: build(Manifest.from_json(run.manifest), run.torch_graphs(), run.tables()) for name, run in runs.items()
-    }
-    return runs, {name: built[name] if name in built else load(name, session) for name in names}
-
-
-def _check(suite: Suite, plots: Path | None) -> None:
-    """Check that pictures can be drawn and written before hours of measuring."""
-    if plots is not None and not suite.draws:
-        raise click.UsageError(f"--plots is not available for {suite.what}")
-    if plots is not None:
-        make_folder(plots)
-
-
-def _draw(results: Results, plots: Path | None) -> None:
-    """Pictures of one model into the folder, of several into one of its folders each."""
+def _finish(results: Results, runs: Mapping[str, Run], plots: Path | None) -> None:
+    """Draw pictures of one model into the folder, of several into one of its folders each; save figures in runs."""
     if plots is not None and results.drawings is not None:
         drawings = results.drawings()
         for name, drawn in drawings.items():
             save(drawn, plots / Path(name).name if len(drawings) > 1 else plots)
-
-
-def _says(models: Mapping[str, BundleModel], keep: bool) -> Suite:
-    if keep:
-        raise click.UsageError("--says only prints figures, or draws them with --plots: drop --save")
-    if others := [name for name, model in models.items() if model.VERB != "generate"]:
-        raise click.UsageError(f"--says takes generate models, not {', '.join(others)}")
-    return SAYS
+    for name, run in runs.items():
+        Run({**run.manifest, "quality": results.figures[name]}, run.model).save(Path(name))
 
 
 def data_of(models: Mapping[str, BundleModel], suite: Suite, data: Path | None) -> dict[str, Path | None]:
@@ -121,12 +101,12 @@ def data_of(models: Mapping[str, BundleModel], suite: Suite, data: Path | None) 
     else the given data; else its training data, if it still exists."""
     told = {name: _told(name, model) for name, model in models.items()}
     found = {name: _found(Path(name), told[name], data, not suite.data) for name in models}
-    lost = next(((name, path) for name, path in told.items() if path is not None and found[name] is None), None)
+    missing = [name for name in models if told[name] and not found[name]]
+    lost = f"{missing[0]} was trained on {told[missing[0]]}, which is missing" if missing else ""
     if suite.data and not any(found.values()):
-        was = "" if lost is None else f" ({lost[0]} was trained on {lost[1]}, which is missing)"
-        raise click.UsageError(f"{suite.what} need --data: {suite.data}{was}")
-    if lost is not None and not suite.data:
-        raise DataError(f"{lost[0]} was trained on {lost[1]}, which is missing: give --data")
+        raise click.UsageError(f"{suite.what} need --data: {suite.data}" + (f" ({lost})" if lost else ""))
+    if lost and not suite.data:
+        raise DataError(f"{lost}: give --data")
     return {name: at and part(at, models[name].manifest.motion.representation) for name, at in found.items()}
 
 
@@ -143,9 +123,9 @@ def _found(run: Path, told: Path | None, data: Path | None, bundled: bool) -> Pa
 def _told(name: str, model: BundleModel) -> Path | None:
     """The --data of its training: from the settings of a run, or the command of a bundle."""
     if (Path(name) / SETTINGS).is_file():
-        given = [str(value) for key, value in read_settings(Path(name) / SETTINGS)[0].items() if key == "data"]
+        given = [value for key, value in read_settings(Path(name) / SETTINGS)[0].items() if key == "data"]
     else:
         words = shlex.split(str(model.manifest.training.get("command", "")))
         given = [word.removeprefix("--data=") for word in words if word.startswith("--data=")]
         given += [after for word, after in pairwise(words) if word == "--data"]
-    return Path(given[-1]) if given else None
+    return Path(str(given[-1])) if given else None

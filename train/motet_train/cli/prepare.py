@@ -1,35 +1,38 @@
-"""``motet prepare``: turns a corpus into a store for training."""
+"""``motet prepare``: turns a corpus into a store for training; and the store of a training command."""
 
-from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import click
 
 from motet.representation.contract import named
-from motet_train.cli.train_options import unit_in
+from motet_train import distributed
+from motet_train.cli.train_options import unit_in, with_options
 from motet_train.data.corpus import Corpus, read_corpus
 from motet_train.data.errors import DataError
 from motet_train.data.gaits import read_gaits
 from motet_train.data.preparation import ALL, FIGURES, Preparation, preparation
 from motet_train.data.records import Record
-from motet_train.data.store import Store, prepare_parts
+from motet_train.data.store import INDEX, Store, prepare_parts
 from motet_train.data.table import read_people
+from motet_train.plan import kind_for, store_for
 from motet_train.progress import preparing
+from motet_train.recipes.recipe import Job
+from motet_train.trainer import CHECKPOINT
 
-SOURCE = (
+source_options = with_options(
     click.option("--sentences", type=Path, help="Table of sentences. [default: the only .tsv in or next to the data]"),
     click.option("--people", type=Path, help="Table of performers by clip. [default: from the clips' names]"),
     click.option("--gaits", type=Path, help="Table of gaits (TOML) for steering. [default: the column gait]"),
     unit_in,
 )
 
-CORPUS = (
-    *SOURCE,
+corpus_options = with_options(
+    source_options,
     click.option(
         "--figure", type=click.Choice(FIGURES), help="Skeleton of the store. [default: humanoid; for KIT's data, own]"
     ),
 )
-"""Options for interpreting a corpus."""
 
 
 def corpus_of(
@@ -40,16 +43,9 @@ def corpus_of(
     unit_in: str | None,
     described: bool = True,
 ) -> Corpus:
-    """The corpus read with the options of :data:`SOURCE`, see :func:`motet_train.data.corpus.read_corpus`."""
+    """The corpus read with the options of a source, see :func:`motet_train.data.corpus.read_corpus`."""
     who = () if people is None else read_people(people)
     return read_corpus(data, sentences, who, unit_in, described, () if gaits is None else read_gaits(gaits))
-
-
-def corpus_options(function: Callable[..., None]) -> Callable[..., None]:
-    """The options of :data:`CORPUS` on a command."""
-    for option in reversed(CORPUS):
-        function = option(function)
-    return function
 
 
 @click.command()
@@ -65,17 +61,7 @@ def corpus_options(function: Callable[..., None]) -> Callable[..., None]:
 )
 @click.option("--fps", type=click.FloatRange(1, 240), help="Frames per second. [default: 10; for codes, predict 30]")
 @corpus_options
-def prepare(
-    data: tuple[Path, ...],
-    out: Path,
-    verb: str,
-    fps: float | None,
-    sentences: Path | None,
-    people: Path | None,
-    gaits: Path | None,
-    figure: str | None,
-    unit_in: str | None,
-) -> None:
+def prepare(data: tuple[Path, ...], out: Path, verb: str, fps: float | None, figure: str | None, **source: Any) -> None:
     """Prepare the corpus DATA once: folders or zips of motions with sentences become a store to train on.
 
     DATA is the KIT Motion-Language data, or motion files .amc (with .asf) .bvh .npz .glb .vrma with a
@@ -84,7 +70,7 @@ def prepare(
     retargeted to the humanoid. Unusable motions are named and skipped; those over 30 s are cut into pieces that share
     their sentences.
     """
-    corpus = corpus_of(data, sentences, people, gaits, unit_in, verb != "predict")
+    corpus = corpus_of(data, **source, described=verb != "predict")
     if verb == "all" and (figure or fps):
         raise click.UsageError("--figure and --fps apply to a store of one kind: add --for")
     parts = ALL if verb == "all" else {".": preparation(verb, corpus.kit, figure, fps)}
@@ -93,20 +79,16 @@ def prepare(
     with preparing(len(corpus)) as done:
         prepare_parts(corpus, out, parts, done)
     for name in parts:
-        _summarise(out / name)
-
-
-def _summarise(place: Path) -> None:
-    store = Store.open(place)
-    seconds = sum(stop - start for entry in store.records for start, stop in entry.spans[:1]) / store.fps
-    texts = sum(len(entry.sentences) for entry in store.records)
-    click.echo(
-        f"{place}: {len(store.records)} motions of {seconds:.0f} s with {texts} sentences, "
-        f"{len(store.channels)} channels at {store.fps:g} fps; {len(store.skipped)} skipped"
-    )
-    if len(store.skipped) > len(store.records):
-        first = store.records[0].name
-        click.echo(f"motet: most motions were skipped; channels and axes are taken from the first, {first}", err=True)
+        store = Store.open(out / name)
+        seconds = sum(stop - start for entry in store.records for start, stop in entry.spans[:1]) / store.fps
+        texts = sum(len(entry.sentences) for entry in store.records)
+        click.echo(
+            f"{out / name}: {len(store.records)} motions of {seconds:.0f} s with {texts} sentences, "
+            f"{len(store.channels)} channels at {store.fps:g} fps; {len(store.skipped)} skipped"
+        )
+        if len(store.skipped) > len(store.records):
+            said = "most motions were skipped; channels and axes are taken from the first"
+            click.echo(f"motet: {said}, {store.records[0].name}", err=True)
 
 
 def _check_unit(corpus: Corpus, preparation: Preparation) -> None:
@@ -116,3 +98,24 @@ def _check_unit(corpus: Corpus, preparation: Preparation) -> None:
     first = next((item for item in corpus if isinstance(item, Record)), None)
     if first is not None and first.motion.skeleton is not None and first.motion.skeleton.metres_per_unit is None:
         raise DataError(f"{first.name} does not state its length unit: give --unit-in for such files")
+
+
+def prepared(data: Path, job: Job, **corpus: Any) -> Store:
+    """The store at ``data``, or one prepared next to the run from the corpus there; a resumed run has its own.
+
+    corpus: options of ``motet prepare``.
+    """
+    if ((found := store_for(data, job.recipe)) / INDEX).is_file():
+        return Store.open(found)
+    place = store_beside(job.folder)
+    if not (job.folder / CHECKPOINT).is_file():
+        verb = kind_for(job.recipe)
+        if distributed.count() > 1:
+            raise DataError(f"several processes need a prepared store: motet prepare {data} --for {verb} --out {place}")
+        click.get_current_context().invoke(prepare, data=(data,), out=place, verb=verb, fps=None, **corpus)
+    return Store.open(place)
+
+
+def store_beside(run: Path) -> Path:
+    """The path of the store of a run that was given a corpus."""
+    return run.with_name(f"{run.name}-store")

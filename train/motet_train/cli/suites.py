@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial, singledispatch
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Any, cast
@@ -19,7 +19,7 @@ from motet.models.predict import PredictModel
 from motet.models.search import SearchModel
 from motet.models.steer import SteerModel
 from motet.models.tdbn_control import TdbnModel
-from motet_train.cli.train_predict import read_expmap_files
+from motet_train.cli.train import read_expmap_files
 from motet_train.data.errors import DataError
 from motet_train.data.store import Store
 from motet_train.evaluate.figures import Drawings, strips
@@ -90,20 +90,11 @@ class Suite:
     draws: bool = True
 
 
-@singledispatch
-def as_steered(_: BundleModel) -> SteerModel | None:
+def as_steered(model: BundleModel) -> SteerModel | None:
     """A steered figure to measure: a model of one, or its stand-in; None for all others."""
-    return None
-
-
-@as_steered.register
-def _(model: SteerModel) -> SteerModel:
-    return model
-
-
-@as_steered.register
-def _(model: TdbnModel) -> SteerModel | None:
-    return cast(SteerModel, Driven(model)) if Driven.fits(model) else None
+    if isinstance(model, TdbnModel) and Driven.fits(model):
+        return cast(SteerModel, Driven(model))
+    return model if isinstance(model, SteerModel) else None
 
 
 def _steered(models: Mapping[str, BundleModel], given: Given) -> Results:
@@ -130,39 +121,32 @@ def _language(models: Mapping[str, LanguageModel], given: Given) -> Results:
     corpora = {name: split_as(model.manifest, store) for name, model in models.items()}
     reports = {name: _language_report(name, models, corpora) for name in models}
     found = Results.of(reports, {**LANGUAGE_GOALS, **SEARCH_GOALS})
-    for name in models:
-        if (other := _by_subject(models, name)) is not None:
-            found.figures[name]["people_unseen"] = json_ready(reports[other])
+    unseen = {models[key].VERB: key for key in reversed([*models]) if _divided_by(models[key]) == "subject"}
+    for name, model in models.items():  # how one divided by trial would do with people it has never seen
+        if _divided_by(model) != "subject" and model.VERB in unseen:
+            found.figures[name]["people_unseen"] = json_ready(reports[unseen[model.VERB]])
     return Results(found.figures, found.text, lambda: _language_drawings(models, corpora))
 
 
-_REPORTS: Mapping[str, Callable[..., Report]] = {
-    "describe": lambda model, corpus, _: describe_report(model, corpus),
-    "generate": generate_report,
-    "search": search_report,
-}
-"""Measures a model of a verb, with its corpus and the describe model of the same split."""
-
-
-def _language_report(name: str, models: Mapping[str, LanguageModel], corpora: Mapping[str, SplitStore]) -> Report:
+def _language_report(name: str, models: Mapping[str, Any], corpora: Mapping[str, SplitStore]) -> Report:
     model, corpus = models[name], corpora[name]
     alike = (other for key, other in models.items() if corpora[key].parts == corpus.parts)
     partner = next((other for other in alike if other.VERB == "describe"), None)
-    report = _REPORTS[model.VERB](model, corpus, partner)
-    if model.VERB == "generate" and partner is None:
+    if model.VERB == "describe":
+        return describe_report(model, corpus)
+    if model.VERB == "search":
+        return search_report(model, corpus, partner)
+    report = generate_report(model, corpus, partner)
+    if partner is None:
         click.echo(f"{name}: omitting tables 3 and 4, which need a describe model of the same split", err=True)
-    lacking = [f"asked.{key}" for key in ASKED if key not in report.get("asked", {})]
-    if model.VERB == "generate" and lacking:
+    if lacking := [f"asked.{key}" for key in ASKED if key not in report.get("asked", {})]:
         said = "training motions of that kind, or a root block, are missing"
         click.echo(f"{name}: {', '.join(lacking)} cannot be measured: {said}", err=True)
     return report
 
 
-def _by_subject(models: Mapping[str, LanguageModel], name: str) -> str | None:
-    """The model that shows how this one would do with unseen people: the same verb, split by subject."""
-    by = {other: model.manifest.training["split"]["by"] for other, model in models.items()}
-    alike = (other for other, model in models.items() if model.VERB == models[name].VERB)
-    return next((other for other in alike if by[other] == "subject" and by[name] != "subject"), None)
+def _divided_by(model: LanguageModel) -> str:
+    return str(model.manifest.training["split"]["by"])
 
 
 def _language_drawings(models: Mapping[str, LanguageModel], corpora: Mapping[str, SplitStore]) -> dict[str, Drawings]:
@@ -219,10 +203,6 @@ def _says(models: Mapping[str, GenerateModel], given: Given) -> Results:
     return Results(json_ready(reports), says_text(reports), lambda: drawings)
 
 
-SAYS = Suite("generate models", _says, data="")
-
-STEERED = Suite("figures that are steered", _steered, draws=False)
-
 _LANGUAGE = Suite("describe, generate and search models", _language)
 
 SUITES = {
@@ -232,13 +212,18 @@ SUITES = {
     "generate": _LANGUAGE,
     "predict": Suite("predictors", _predict, "text files of the protocol, or the store they were trained on"),
     "search": _LANGUAGE,
+    "steered": Suite("figures that are steered", _steered, draws=False),
 }
-"""Verb -> the suite of its models, except steered figures."""
+"""Verb -> the suite of its models; steered figures have one of their own."""
 
 
-def suite_of(models: Mapping[str, BundleModel]) -> Suite:
-    """The suite of all the models; UsageError if they need several."""
-    first, *others = {SUITES[model.VERB] if as_steered(model) is None else STEERED for model in models.values()}
+def suite_of(models: Mapping[str, BundleModel], says: bool = False) -> Suite:
+    """The suite of all the models; UsageError if they need several. says: the one of everyday prompts."""
+    if says:
+        if wrong := [name for name, model in models.items() if model.VERB != "generate"]:
+            raise click.UsageError(f"--says takes generate models, not {', '.join(wrong)}")
+        return Suite("generate models", _says, data="")
+    first, *others = {SUITES["steered" if as_steered(model) else model.VERB] for model in models.values()}
     if others:
         raise click.UsageError("evaluate control, fill, predict and language models separately: their data differ")
     return first

@@ -12,21 +12,32 @@ import torch
 
 from motet.motion.skeleton import METRES
 from motet_train import distributed
-from motet_train.manifest import About
 from motet_train.progress import log
 from motet_train.recipes.recipe import Job, Recipe
 from motet_train.run_folder import trained
-from motet_train.runs import Run
+from motet_train.runs import About, Run
 from motet_train.settings import SettingsError, changed, read_settings
 
-TABLES = "motet.tables"
+Option = Callable[[Any], Any]
+"""What ``click.option`` gives."""
+
+
+def with_options(*options: Option) -> Option:
+    """All of some options as one, in their order in the help."""
+
+    def decorate(function: Any) -> Any:
+        for option in reversed(options):
+            function = option(function)
+        return function
+
+    return decorate
 
 
 def _configure(context: click.Context, option: click.Parameter, path: Path | None) -> None:
     """Make the file's settings the options' defaults; the command line wins."""
     if path is None:
         return
-    options, context.meta[TABLES] = read_settings(path)
+    options, context.meta["motet.tables"] = read_settings(path)
     names = {_long(option).replace("-", "_"): option.name for option in context.command.params}
     if unknown := sorted(options.keys() - names.keys()):
         raise SettingsError(f"{path}: unknown setting {unknown[0]}: expected one of {', '.join(sorted(names))}")
@@ -38,7 +49,7 @@ def _long(option: click.Parameter) -> str:
     return max(option.opts, key=len).lstrip("-")
 
 
-WHERE = (
+where = with_options(
     click.option("--seed", type=click.IntRange(0), default=0, show_default=True),
     click.option("--device", type=click.Choice(["cpu", "cuda"]), default="cpu", show_default=True),
     click.option("--threads", type=click.IntRange(1), default=1, show_default=True),
@@ -46,12 +57,12 @@ WHERE = (
     click.option("--data-licence", help="Licence of the data. [default: the data's own, or not stated]"),
 )
 
-OPTIONS = (
+every_training = with_options(
     click.option(
         "--config", type=Path, is_eager=True, expose_value=False, callback=_configure, help="TOML file of settings."
     ),
     click.option("-o", "--out", type=Path, required=True, help="Folder to write; must not exist."),
-    *WHERE,
+    where,
     click.option(
         "--precision",
         type=click.Choice(["float32", "bfloat16"]),
@@ -62,18 +73,12 @@ OPTIONS = (
     click.option("--name", help="Bundle name. [default: the run's folder]"),
 )
 
-SPLIT = click.option("--split", "by", type=click.Choice(["trial", "subject"]), default="trial", show_default=True)
-
+split = click.option("--split", "by", type=click.Choice(["trial", "subject"]), default="trial", show_default=True)
 unit_in = click.option("--unit-in", type=click.Choice(list(METRES)), help="Length unit of files that do not state it.")
-
-SHARED = ("out", "seed", "device", "precision", "threads", "resume", "tensorboard", "name", "licence", "data_licence")
 
 
 def train_command(
-    name: str,
-    recipes: Mapping[str, Recipe],
-    *options: Callable[..., Any],
-    defaults: Mapping[str, Any] | None = None,
+    name: str, recipes: Mapping[str, Recipe], *options: Option, defaults: Mapping[str, Any] | None = None
 ) -> Callable[[Callable[..., Run]], click.Command]:
     """A command that trains one of the recipes: the function receives the job and the command's own options.
 
@@ -85,14 +90,11 @@ def train_command(
         def command(context: click.Context, /, **given: Any) -> None:
             _train(context, recipes, function, given)
 
-        command.__doc__ = function.__doc__
-        presets = click.option("--preset", type=click.Choice(list(recipes)), default="default", show_default=True)
-        decorated: Callable[..., Any] = command
-        for option in reversed((*OPTIONS, presets, *options)):
-            decorated = option(decorated)
+        text = command.__doc__ = function.__doc__ or ""
+        preset = click.option("--preset", type=click.Choice(list(recipes)), default="default", show_default=True)
         settings = {"default_map": dict(defaults or {})}
-        first, _, _ = (function.__doc__ or "").partition("\n")
-        return click.command(name, short_help=first, context_settings=settings)(decorated)
+        made = click.command(name, short_help=text.partition("\n")[0], context_settings=settings)
+        return made(with_options(every_training, preset, *options)(command))
 
     return decorate
 
@@ -100,18 +102,18 @@ def train_command(
 def _train(
     context: click.Context, recipes: Mapping[str, Recipe], function: Callable[..., Run], given: dict[str, Any]
 ) -> None:
-    shared = {name: given.pop(name) for name in (*SHARED, "preset")}
-    preset = recipes[shared["preset"]]
-    recipe = changed(preset, context.meta.get(TABLES, {}), {**given, "precision": shared["precision"]})
-    if shared["precision"] == "bfloat16" and recipe.training is None:
+    shared = ("out", "seed", "device", "precision", "threads", "resume", "tensorboard", "name", "licence")
+    common = {name: given.pop(name) for name in (*shared, "data_licence", "preset")}
+    precision, out = common.pop("precision"), common.pop("out")
+    tables = context.meta.get("motet.tables", {})
+    recipe = changed(recipes[common["preset"]], tables, {**given, "precision": precision})
+    if precision == "bfloat16" and recipe.training is None:
         raise SettingsError(f"{recipe.model} trains in float32 only")
-    own = {name: value for name, value in given.items() if not _is_of(name, recipe)}
-    torch.set_num_threads(shared["threads"])
-    out: Path = shared["out"]
-    licences = shared["licence"], shared["data_licence"]
-    about = About(shared["name"] or out.name, shlex.join(["motet", *sys.argv[1:]]), shared["seed"], *licences)
-    show_lines()
-    job = Job(recipe, about, out, shared["device"])
+    # an option changes the recipe where that has its name; values found in the data cannot be set
+    parts = [part for part in (recipe.training, recipe.config, recipe.visits) if part is not None]
+    fields = {name for name in given if any(hasattr(part, name) for part in parts)} - set(recipe.derived)
+    own = {name: value for name, value in given.items() if name not in fields}
+    about = begun(common["name"] or out.name, common)
 
     def train(job: Job) -> Run:
         run = function(job, **own)
@@ -120,32 +122,25 @@ def _train(
             click.echo(f"next: {_next(out, run.manifest)}")
         return run
 
-    trained(job, train, _kept(context, {**shared, **own}), shared["resume"], shared["tensorboard"])
-
-
-def show_lines() -> None:
-    """Show a line for each chunk even without --verbose; none with --quiet."""
-    log.setLevel(logging.INFO if logging.getLogger("motet").isEnabledFor(logging.WARNING) else logging.NOTSET)
-
-
-def _is_of(name: str, recipe: Recipe) -> bool:
-    """Whether an option changes the recipe; options cannot set values found in the data."""
-    parts = (part for part in (recipe.training, recipe.config, recipe.visits) if part is not None)
-    return name not in recipe.derived and any(hasattr(part, name) for part in parts)
-
-
-def _kept(context: click.Context, given: Mapping[str, Any]) -> dict[str, Any]:
-    """The options that repeat the run, by their command-line names."""
+    resume, boards = common.pop("resume"), common.pop("tensorboard")
     names = {option.name: _long(option) for option in context.command.params}
-    left_out = ("out", "resume", "tensorboard", "precision")  # the recipe has the last
-    return {names[name]: value for name, value in given.items() if name not in left_out}
+    options = {names[name]: value for name, value in {**common, **own}.items()}
+    trained(Job(recipe, about, out, common["device"]), train, options, resume, boards)
+
+
+def begun(name: str, given: Mapping[str, Any]) -> About:
+    """Set torch's threads and show a line for each chunk, unless --quiet; what the command line says of the run."""
+    torch.set_num_threads(given["threads"])
+    log.setLevel(logging.INFO if logging.getLogger("motet").isEnabledFor(logging.WARNING) else logging.NOTSET)
+    command = shlex.join(["motet", *sys.argv[1:]])
+    return About(name, command, given["seed"], given["licence"], given["data_licence"])
 
 
 def _next(out: Path, manifest: Mapping[str, Any]) -> str:
     """The next command for a run."""
-    parts = {"codec": "--codec {0} --actions RUN", "actions": "--codec RUN --actions {0}"}
-    if manifest["verb"] in parts:
-        return f"motet train codes {parts[manifest['verb']].format(out)}"
+    parts = {"codec": f"--codec {out} --actions RUN", "actions": f"--codec RUN --actions {out}"}
+    if (verb := manifest["verb"]) in parts:
+        return f"motet train codes {parts[verb]}"
     return f"motet evaluate {out}; motet export {out} -o {out.name}.zip"
 
 

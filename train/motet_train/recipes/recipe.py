@@ -11,10 +11,9 @@ from motet.representation.contract import MotionContract
 from motet.settings import Settings
 from motet_train import distributed
 from motet_train.descent import Training
-from motet_train.manifest import About, refuse_other, surroundings
 from motet_train.models.net import Net
 from motet_train.progress import SILENT, Watcher
-from motet_train.runs import MANIFEST, Run
+from motet_train.runs import MANIFEST, About, Run, refuse_other, surroundings
 from motet_train.trainer import Learner, Line, kept, train
 
 SETTINGS = "run.toml"
