@@ -10,7 +10,7 @@ from motet.motion.feet.contacts import smoothed
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
 from motet_train.data.cmu_trials import CMU_CLIPS, cmu_trial
-from motet_train.evaluate.feet import acceleration, leap, slide, speed, stances
+from motet_train.evaluate.positions import acceleration, leap, slide, speed, stances
 
 Array = np.ndarray
 FPS = 40.0

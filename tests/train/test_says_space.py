@@ -14,10 +14,9 @@ from motet.formats import read_motion
 from motet.models.search import IndexSettings
 from motet.motion.motion import Motion
 from motet_train.evaluate.text_adherence import table
-from motet_train.evaluate.text_adherence.prompts import prompts
+from motet_train.evaluate.text_adherence.prompts import Trial, prompts
 from motet_train.evaluate.text_adherence.space import CHOICES, embedded, frechet, r_precision, rivals, space_report
 from motet_train.evaluate.text_adherence.table import says_table
-from motet_train.evaluate.text_adherence.trials import Trial
 
 Array = NDArray[np.float64]
 STAND, LIE = gliding(), gliding(tip=90)

@@ -15,13 +15,12 @@ from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.motion import Motion
 from motet.representation.root_block import to_root_block
 from motet_train.data.errors import DataError
-from motet_train.data.store import Entry, Store
+from motet_train.data.store import INDEX, Entry, Store
+from motet_train.evaluate.positions import jerk, length
 from motet_train.evaluate.text_adherence import table
-from motet_train.evaluate.text_adherence.measures import depth, distance, jerk, poses, slide, spread
-from motet_train.evaluate.text_adherence.prompts import Prompt, prompts
-from motet_train.evaluate.text_adherence.table import says_table, says_text
+from motet_train.evaluate.text_adherence.prompts import LookUp, Prompt, Trial, prompts, read_trials, trained_on
+from motet_train.evaluate.text_adherence.table import depth, poses, says_table, says_text, slide, spread
 from motet_train.evaluate.text_adherence.track import RATE, Track
-from motet_train.evaluate.text_adherence.trials import LookUp, Trial, of_store, read_trials, trained_on
 
 CMU = Path(__file__).parents[2] / "train/motet_train/data/cmu"
 STILL, LYING, LEFT, ZOMBIE = (
@@ -130,13 +129,15 @@ def test_training_trials_are_those_not_held_out() -> None:
     assert trained_on(Told(), list(TRIALS)) == names - {"16_01", "unheard_of"}  # type: ignore[arg-type]
 
 
-def test_a_store_gives_its_motions_where_they_go() -> None:
+def test_a_store_gives_its_motions_where_they_go(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     motion = gliding(speed=1.5, turn=60)
     block = to_root_block(motion)
     frames = block.values.astype(np.float32)
     entry = Entry("16_01", "16", ("a jump",), ((0, len(frames)),), 0)
     store = Store(frames, "root_angles", block.channels, block.units, RATE, (HUMANOID,), (entry,), ())
-    (trial,) = of_store(store)
+    (tmp_path / INDEX).touch()
+    monkeypatch.setattr(Store, "open", lambda _: store)
+    (trial,) = read_trials(tmp_path)
     assert trial.action == "jump"
     np.testing.assert_allclose(trial.track.pace, 1.5, atol=0.02)
     assert trial.track.turn == pytest.approx(54, abs=1)
@@ -159,10 +160,10 @@ def test_feet_of_a_figure_that_is_led_slide_as_fast_as_it() -> None:
 
 
 def test_jerk_of_a_cubic_and_of_a_tremble() -> None:
-    assert jerk(Track(shifted(standing(), "", x=0.5 * times(2.0) ** 3))) == pytest.approx(3.0)
+    assert jerk(shifted(standing(), "", x=0.5 * times(2.0) ** 3), RATE) == pytest.approx(3.0)
     tremble = 0.01 * (-1.0) ** np.arange(61)
-    assert jerk(Track(shifted(standing(), "", y=tremble))) == pytest.approx(8 * 0.01 * RATE**3)
-    assert np.isnan(jerk(Track(standing()[:3])))
+    assert jerk(shifted(standing(), "", y=tremble), RATE) == pytest.approx(8 * 0.01 * RATE**3)
+    assert np.isnan(jerk(standing()[:3], RATE))
 
 
 def test_depth_is_under_the_ground() -> None:
@@ -173,11 +174,11 @@ def test_depth_is_under_the_ground() -> None:
 def test_poses_differ_by_what_a_figure_does_alone() -> None:
     here = poses(Track(walking(1.0)))
     np.testing.assert_allclose(here, poses(Track(walking(1.0) + np.array([3.0, 0.0, 5.0]))), atol=1e-9)
-    assert distance(here, poses(Track(led(stepping(4.0), 0.0, turn=120)))) < 1e-9
+    assert length(here - poses(Track(led(stepping(4.0), 0.0, turn=120)))).mean() < 1e-9
     raised = shifted(standing(), "Hand", y=0.5)
     moved = sum("Hand" in name for name in HUMANOID.names)
     expected = 0.5 * moved / len(HUMANOID.names)
-    assert distance(poses(Track(raised)), poses(Track(standing(5.0)))) == pytest.approx(expected)
+    assert length(poses(Track(raised)) - poses(Track(standing(5.0)))).mean() == pytest.approx(expected)
     assert spread([Track(raised), Track(standing()), Track(standing())]) == pytest.approx(expected * 2 / 3)
     assert np.isnan(spread([Track(raised)]))
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from motet_train.evaluate.arrival import arrival
+from motet_train.evaluate.positions import arrival
 from motet_train.papers.tdbn.body import body_parts
 from motet_train.papers.tdbn.clips import read_clips
 from motet_train.papers.tdbn.experiments.measures import ARRIVED, Reference, upsample

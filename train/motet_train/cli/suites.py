@@ -32,9 +32,8 @@ from motet_train.evaluate.predict import liveliness, mocap
 from motet_train.evaluate.predict.plots import error_over_time
 from motet_train.evaluate.steer.report import Recorded, steer_report, steer_text
 from motet_train.evaluate.tables import Goals, Report, json_ready, report_table
-from motet_train.evaluate.text_adherence.prompts import outside, prompts
+from motet_train.evaluate.text_adherence.prompts import outside, prompts, read_trials, trained_on
 from motet_train.evaluate.text_adherence.table import Best, said_to_be_outside, says_drawings, says_table, says_text
-from motet_train.evaluate.text_adherence.trials import read_trials, trained_on
 from motet_train.papers.li2018.expmap_files import is_expmap
 from motet_train.papers.li2018.figures import drawings as protocol_drawings
 from motet_train.papers.li2018.report import protocol_results

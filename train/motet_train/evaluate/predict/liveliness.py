@@ -7,7 +7,7 @@ whole recording is given. What follows is measured over :data:`SPANS`:
 speed: the root's mean speed over the ground, relative to that of the given motion's last two seconds.
 kept: the share of motions whose speed is within 15 % of that.
 energy: the mean speed of all joints as seen from the root, relative to the same.
-slide: how far the balls of the feet slide in a stance (:mod:`motet_train.evaluate.feet`), centimetres.
+slide: how far the balls of the feet slide in a stance (:mod:`motet_train.evaluate.positions`), centimetres.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -24,9 +24,8 @@ from motet.motion.humanoid import HUMANOID, on_humanoid
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
-from motet_train.evaluate.feet import slide, stances
+from motet_train.evaluate.positions import BALLS, slide, stances
 from motet_train.evaluate.tables import Report, aligned, short_names
-from motet_train.evaluate.text_adherence.measures import BALLS
 
 GIVEN_SECONDS = 2.0
 """Seconds of a recording's end by which its pace is known; or all of it, where it is shorter."""

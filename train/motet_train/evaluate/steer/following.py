@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from motet.models.steer import SteerModel
 from motet.models.steer_session import SteerSession
 from motet.motion.rotations import Array, wrapped
-from motet_train.evaluate.arrival import arrival
+from motet_train.evaluate.positions import arrival
 from motet_train.evaluate.steer.standing import standing
 from motet_train.evaluate.steer.track import Track
 

@@ -1,6 +1,6 @@
 """How well a gait stands and how calmly it moves, steered and recorded.
 
-By the measures of :mod:`motet_train.evaluate.feet`: the slide in a stance, in centimetres, of the joints in the
+By the measures of :mod:`motet_train.evaluate.positions`: the slide in a stance, in centimetres, of the joints in the
 balls of the feet and of the points of the soles (heel, ball, tip); the speed of the balls while they stand; and the
 acceleration of all joints.
 """
@@ -13,7 +13,7 @@ from scipy.ndimage import find_objects, label, uniform_filter1d
 from motet.models.steer import SteerModel
 from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, sided
 from motet.motion.rotations import Array
-from motet_train.evaluate.feet import acceleration, slide, speed, stances
+from motet_train.evaluate.positions import acceleration, slide, speed, stances
 from motet_train.evaluate.steer.track import Track
 
 MEASURED_SPEEDS = {"walk": 1.4, "run": 3.0}

@@ -15,14 +15,10 @@ from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet_train.evaluate.language.split_store import unknown_words_allowed
 from motet_train.evaluate.tables import Report
-from motet_train.evaluate.text_adherence.prompts import SHORTEST_MOTION, Prompt, actions
-from motet_train.evaluate.text_adherence.trials import Trial
+from motet_train.evaluate.text_adherence.prompts import SHORTEST_MOTION, Prompt, Trial, actions
 
 CHOICES = 32
 """Prompts among which a motion's own is to be found."""
-
-TOPS = (1, 2, 3)
-"""Among so many of the nearest it is looked for."""
 
 Vectors = Mapping[str, Floats]
 """The text of a prompt -> vectors (N, E) of motions, as :func:`embedded` gives them."""
@@ -49,12 +45,19 @@ def space_report(
     real = {"_real": {text: seen[rows] for text, rows in shown.items()}} if shown else {}
     report = {f"r_precision{kind}": _precisions(found, asked, texts) for kind, found in (*made.items(), *real.items())}
     if shown:
-        recorded = seen[sorted({row for rows in shown.values() for row in rows})]
-        found = {
+        sets = {
             kind.strip("_") or "generated": np.concatenate([vectors[text] for text in shown])
             for kind, vectors in made.items()
         }
-        report["frechet"] = _distances(found, recorded)
+        sets["trials"] = seen[sorted({row for rows in shown.values() for row in rows})]
+        usable = {name: vectors[np.isfinite(vectors).all(axis=1)] for name, vectors in sets.items()}
+        trials_seen = usable["trials"]
+        order = np.random.default_rng(0).permutation(len(trials_seen))
+        report["frechet"] = {
+            **{name: frechet(vectors, trials_seen) for name, vectors in usable.items() if name != "trials"},
+            "halves": frechet(trials_seen[order[::2]], trials_seen[order[1::2]]),
+            **{f"{name}_motions": float(len(vectors)) for name, vectors in usable.items()},
+        }
     return report
 
 
@@ -86,12 +89,12 @@ def r_precision(own: Array, others: Array) -> dict[str, float]:
     K rivals nearer than the own prompt, or as near, the number of those that are drawn is hypergeometric. With fewer
     rivals all are drawn; NaN with none. Motions without a vector (NaN) find nothing, nor do no motions.
     """
-    count = others.shape[1]
+    tops, count = (1, 2, 3), others.shape[1]
     if not count:
-        return {str(top): np.nan for top in TOPS}
+        return {str(top): np.nan for top in tops}
     nearer = (~(own[:, None] > others)).sum(axis=1)
     drawn = hypergeom(count, nearer, min(CHOICES - 1, count))
-    return {str(top): float(drawn.cdf(top - 1).mean()) if len(nearer) else 0.0 for top in TOPS}
+    return {str(top): float(drawn.cdf(top - 1).mean()) if len(nearer) else 0.0 for top in tops}
 
 
 def frechet(one: Floats, other: Floats) -> float:
@@ -104,13 +107,9 @@ def frechet(one: Floats, other: Floats) -> float:
     """
     if min(len(one), len(other)) < 2:
         return np.nan
-    means, roots = [], []
-    for vectors in (one, other):
-        mean = vectors.mean(axis=0, dtype=np.float64)
-        means.append(mean)
-        roots.append((vectors - mean) / np.sqrt(len(vectors) - 1))
-    spreads = sum((root**2).sum() for root in roots)
-    return float(((means[0] - means[1]) ** 2).sum() + spreads - 2 * np.linalg.norm(roots[0] @ roots[1].T, "nuc"))
+    m, n = (vectors.mean(axis=0, dtype=np.float64) for vectors in (one, other))
+    a, b = (one - m) / np.sqrt(len(one) - 1), (other - n) / np.sqrt(len(other) - 1)
+    return float(((m - n) ** 2).sum() + (a**2).sum() + (b**2).sum() - 2 * np.linalg.norm(a @ b.T, "nuc"))
 
 
 def _precisions(vectors: Vectors, asked: Sequence[Prompt], texts: Floats) -> dict[str, float]:
@@ -121,16 +120,3 @@ def _precisions(vectors: Vectors, asked: Sequence[Prompt], texts: Floats) -> dic
             scores = (vectors[prompt.text] @ texts.T).astype(np.float64)
             rows.append(r_precision(scores[:, own], scores[:, others]))
     return {key: float(np.mean([row[key] for row in rows])) for key in rows[0]}
-
-
-def _distances(made: Vectors, recorded: Floats) -> dict[str, float]:
-    """The distance from recorded motions of each of several sets of motions, and that between halves of them."""
-    usable = {name: vectors[np.isfinite(vectors).all(axis=1)] for name, vectors in {**made, "trials": recorded}.items()}
-    trials = usable["trials"]
-    order = np.random.default_rng(0).permutation(len(trials))
-    halves = (trials[order[::2]], trials[order[1::2]])
-    return {
-        **{name: frechet(usable[name], trials) for name in made},
-        "halves": frechet(*halves),
-        **{f"{name}_motions": float(len(vectors)) for name, vectors in usable.items()},
-    }

@@ -12,30 +12,32 @@ from motet.bundle.graph import Floats
 from motet.errors import TextError
 from motet.models.generate import GenerateModel
 from motet.models.search import SearchModel
+from motet.motion.feet.contacts import feet_of, ground_of
+from motet.motion.humanoid import HUMANOID
 from motet.motion.motion import Motion
+from motet.motion.rotations import Array
 from motet_train.data.errors import DataError
 from motet_train.evaluate.figures import Drawings, strips
 from motet_train.evaluate.language.split_store import unknown_words_allowed
+from motet_train.evaluate.positions import BALLS, jerk, length, skate
 from motet_train.evaluate.tables import Goals, Report, aligned, report_table, short_names
-from motet_train.evaluate.text_adherence.measures import depth, jerk, slide, spread
-from motet_train.evaluate.text_adherence.prompts import Prompt, prompts
+from motet_train.evaluate.text_adherence.prompts import LookUp, Prompt, Trial, prompts
 from motet_train.evaluate.text_adherence.space import embedded, space_report
-from motet_train.evaluate.text_adherence.track import Track, track_of
-from motet_train.evaluate.text_adherence.trials import LookUp, Trial
-
-LEFT_90, RIGHT_90 = (f"a person walks forward and turns {side} 90 degrees" for side in ("left", "right"))
+from motet_train.evaluate.text_adherence.track import RATE, Track, track_of
 
 SAYS_GOALS: Goals = {
     "says.all": (0.8, None),
     "says.locomotion": (0.95, None),
     "says.rest": (0.7, None),
-    f"turn.{LEFT_90}": (80, 100),
-    f"turn.{RIGHT_90}": (-100, -80),
+    "turn.a person walks forward and turns left 90 degrees": (80, 100),
+    "turn.a person walks forward and turns right 90 degrees": (-100, -80),
     "quality.slide": (None, 0.2),
     "quality.jerk_ratio": (0.85, 1.15),
     "quality.spread_ratio": (0.7, None),
 }
 """Figure -> (least, most) that the models that come with motet are to reach."""
+
+Figures = dict[str, float]
 
 
 class Generator(Protocol):
@@ -54,9 +56,6 @@ class Best:
     def generate(self, text: str, seed: int) -> Motion:
         """The motion at 30 frames a second, its feet planted."""
         return self.model.generate(text, seed=seed)[0].motion
-
-
-Figures = dict[str, float]
 
 
 def says_table(
@@ -84,24 +83,23 @@ def says_table(
     seen: dict[str, dict[str, Floats]] = {kind: {} for kind in sources}
     for prompt in tqdm(prompts(), unit=" prompts", disable=None, leave=False):
         for kind, (source, count) in sources.items():
-            motions = asked(source, prompt, count)
-            rows[kind][prompt.text] = figures(prompt, [track_of(motion) for motion in motions])
+            motions = _asked(source, prompt, count)
+            rows[kind][prompt.text] = _figures(prompt, [track_of(motion) for motion in motions])
             if search is not None:
                 seen[kind][prompt.text] = embedded(search, motions)
         if own:
-            rows["_real"][prompt.text] = real(prompt, trials)
-            others[prompt.text] = _share(prompt, [trial.track for trial in trials if trial.shows(prompt) is False])
+            rows["_real"][prompt.text] = _real(prompt, trials)
+            unlike = [trial.track for trial in trials if trial.shows(prompt) is False]
+            others[prompt.text] = _mean([prompt.passes(track) for track in unlike])
     known = [prompt.text for prompt in prompts() if any(trial.shows(prompt) for trial in own)]
-    report: Report = {}
-    for kind, found in rows.items():
-        report |= _groups(kind, found, known)
+    report = {group: row for kind, found in rows.items() for group, row in _groups(kind, found, known).items()}
     if own:
         report["prompt_others"] = others
         report["quality"] |= _ratios(rows[""], rows["_real"])
     return report if search is None else report | space_report(search, prompts(), seen, trials)
 
 
-def asked(generator: Generator, prompt: Prompt, seeds: int) -> list[Motion]:
+def _asked(generator: Generator, prompt: Prompt, seeds: int) -> list[Motion]:
     """The motions for a prompt, one for each seed; none where the generator cannot take the prompt."""
     with unknown_words_allowed():
         try:
@@ -110,28 +108,87 @@ def asked(generator: Generator, prompt: Prompt, seeds: int) -> list[Motion]:
             return []
 
 
-def figures(prompt: Prompt, tracks: Sequence[Track]) -> Figures:
+def _figures(prompt: Prompt, tracks: Sequence[Track]) -> Figures:
     """What is measured of the motions for a prompt: means, NaN for what is not asked of it. No motions do nothing."""
     return {
-        "share": _share(prompt, tracks) if tracks else 0.0,
+        "share": _mean([prompt.passes(track) for track in tracks]) if tracks else 0.0,
         "turn": _mean([track.turn for track in tracks]) if prompt.turns else np.nan,
         "slide": _mean([slide(track) for track in tracks]) if prompt.walk else np.nan,
-        "jerk": _mean([jerk(track) for track in tracks]),
+        "jerk": _mean([jerk(track.points, RATE) for track in tracks]),
         "depth": _mean([depth(track) for track in tracks]),
         "seconds": _mean([track.seconds for track in tracks]),
         "spread": spread(tracks),
     }
 
 
-def real(prompt: Prompt, trials: Sequence[Trial]) -> Figures:
+def _real(prompt: Prompt, trials: Sequence[Trial]) -> Figures:
     """The same of the trials that show what is asked; the spread is that between takes of the same action, of which ten
     are compared at most."""
-    shown = [trial for trial in trials if trial.shows(prompt)]
-    found = figures(prompt, [trial.track for trial in shown])
-    actions = dict.fromkeys(trial.action for trial in shown)
-    takes = [[trial.track for trial in shown if trial.action == one] for one in actions]
-    apart = _mean([spread(tracks[:: -(-len(tracks) // 10)]) for tracks in takes])
-    return found | {"share": found["share"] if shown else np.nan, "spread": apart}
+    takes: dict[str | None, list[Track]] = {}
+    for trial in trials:
+        if trial.shows(prompt):
+            takes.setdefault(trial.action, []).append(trial.track)
+    found = _figures(prompt, [trial.track for trial in trials if trial.shows(prompt)])
+    apart = _mean([spread(tracks[:: -(-len(tracks) // 10)]) for tracks in takes.values()])
+    return found | {"share": found["share"] if takes else np.nan, "spread": apart}
+
+
+def slide(track: Track) -> float:
+    """How fast the balls of the feet slide, m/s, while they stand: while they are no higher than 2 cm above where they
+    are in standing. NaN where none ever does."""
+    balls = track.points[:, BALLS]
+    return skate(balls, balls[..., 1] - ground_of(track.points[:, feet_of(HUMANOID), 1]), 0.04, RATE)
+
+
+def depth(track: Track) -> float:
+    """How deep the lowest joint is under y = 0, metres: the mean over all frames, 0 where it is above."""
+    return float(np.maximum(-track.points[..., 1].min(axis=1), 0).mean())
+
+
+def poses(track: Track, count: int = 32) -> Array:
+    """Poses (count, J, 3), evenly spaced in time: what is in front, to the left and how high, each seen from the hips,
+    so that neither the place nor the heading nor how long it takes makes a difference."""
+    part = track.frames(np.round(np.linspace(0, len(track) - 1, count)).astype(np.intp))
+    return np.stack([part.body(name) for name in HUMANOID.names], axis=1)
+
+
+def spread(tracks: Sequence[Track]) -> float:
+    """The mean distance of joints, metres, between the :func:`poses` of two of several motions; NaN for less than
+    two."""
+    seen = [poses(track) for track in tracks]
+    pairs = [length(one - other).mean() for i, one in enumerate(seen) for other in seen[:i]]
+    return float(np.mean(pairs)) if pairs else np.nan
+
+
+def _groups(kind: str, found: Mapping[str, Figures], known: list[str]) -> Report:
+    """The means over groups of prompts, the figures of each, and the quality of all."""
+    shares = {text: row["share"] for text, row in found.items()}
+    groups = {"all": [prompt.text for prompt in prompts()]}
+    groups |= {name: [p.text for p in prompts() if p.group == name] for name in ("locomotion", "rest")}
+    groups |= {"known": known} if known else {}
+    keys = ("slide", "jerk", "depth", "spread", "seconds")
+    return {
+        f"says{kind}": {name: _mean([shares[text] for text in texts]) for name, texts in groups.items()},
+        f"quality{kind}": {key: _mean([row[key] for row in found.values()]) for key in keys},
+        f"turn{kind}": {prompt.text: found[prompt.text]["turn"] for prompt in prompts() if prompt.turns},
+        f"prompt{kind}": shares,
+    }
+
+
+def _ratios(found: Mapping[str, Figures], recorded: Mapping[str, Figures]) -> Figures:
+    """Jerk and spread over those of recorded trials, of the prompts that have both."""
+    ratios = {}
+    for key in ("jerk", "spread"):
+        pairs = np.array([(found[text][key], recorded[text][key]) for text in found])
+        own, data = pairs[np.isfinite(pairs).all(axis=1)].sum(axis=0)
+        ratios[f"{key}_ratio"] = float(own / data) if data else np.nan
+    return ratios
+
+
+def _mean(values: Sequence[float]) -> float:
+    """The mean of the values that are numbers; NaN where none is."""
+    kept = [value for value in values if np.isfinite(value)]
+    return float(np.mean(kept)) if kept else np.nan
 
 
 def said_to_be_outside(model: GenerateModel, sentences: Sequence[str]) -> float:
@@ -181,38 +238,3 @@ def says_drawings(generator: Generator, every: int = 8) -> Drawings:
         return strips(list(shown.values()), list(shown), title)
 
     return {"says": draw}
-
-
-def _groups(kind: str, found: Mapping[str, Figures], known: list[str]) -> Report:
-    """The means over groups of prompts, the figures of each, and the quality of all."""
-    shares = {text: row["share"] for text, row in found.items()}
-    groups = {"all": [prompt.text for prompt in prompts()]}
-    groups |= {name: [p.text for p in prompts() if p.group == name] for name in ("locomotion", "rest")}
-    groups |= {"known": known} if known else {}
-    keys = ("slide", "jerk", "depth", "spread", "seconds")
-    return {
-        f"says{kind}": {name: _mean([shares[text] for text in texts]) for name, texts in groups.items()},
-        f"quality{kind}": {key: _mean([row[key] for row in found.values()]) for key in keys},
-        f"turn{kind}": {prompt.text: found[prompt.text]["turn"] for prompt in prompts() if prompt.turns},
-        f"prompt{kind}": shares,
-    }
-
-
-def _ratios(found: Mapping[str, Figures], recorded: Mapping[str, Figures]) -> Figures:
-    """Jerk and spread over those of recorded trials, of the prompts that have both."""
-    ratios = {}
-    for key in ("jerk", "spread"):
-        pairs = np.array([(found[text][key], recorded[text][key]) for text in found])
-        own, data = pairs[np.isfinite(pairs).all(axis=1)].sum(axis=0)
-        ratios[f"{key}_ratio"] = float(own / data) if data else np.nan
-    return ratios
-
-
-def _share(prompt: Prompt, tracks: Sequence[Track]) -> float:
-    return _mean([float(prompt.passes(track)) for track in tracks])
-
-
-def _mean(values: Sequence[float]) -> float:
-    """The mean of the values that are numbers; NaN where none is."""
-    kept = [value for value in values if np.isfinite(value)]
-    return float(np.mean(kept)) if kept else np.nan

@@ -1,29 +1,20 @@
 """A figure as a camera would see it: the positions of its joints, and what follows from them."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import find_objects, label, uniform_filter1d
 
 from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, on_humanoid, sided
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion, resampled
 from motet.motion.rotations import Array
 from motet_train.data.errors import DataError
-
-Flags = NDArray[np.bool_]
-"""What is so in which frames."""
+from motet_train.evaluate.positions import Flags, length, running_mean, spells
 
 RATE = 30.0
 """Frames per second at which rules look at a motion, whatever its own rate is."""
-
-
-def pair(part: str) -> tuple[str, str]:
-    """The names of the left and the right joint of a part."""
-    left, right = (sided(side, part) for side in LEFT_RIGHT)
-    return left, right
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,26 +36,25 @@ class Track:
         """How long it takes."""
         return len(self) / RATE
 
-    def part(self, start: float, stop: float) -> "Track":
-        """The part between two times, each a share of the whole; one frame at least. The ground stays the same."""
-        first = min(int(start * len(self)), len(self) - 1)
-        return self.on_ground(self.points[first : max(first + 1, round(stop * len(self)))])
-
-    def on_ground(self, points: Array) -> "Track":
-        """Some frames (T', J, 3) of the same track, above the same ground."""
-        found = replace(self, points=points)
+    def frames(self, which: slice | NDArray[np.intp]) -> "Track":
+        """Some of the frames, above the same ground."""
+        found = Track(self.points[which])
         found.__dict__["ground"] = self.ground
         return found
 
-    def joint(self, name: str) -> Array:
-        """Positions (T, 3) of one joint."""
-        found: Array = self.points[:, HUMANOID.index(name)]
-        return found
+    def part(self, start: float, stop: float) -> "Track":
+        """The part between two times, each a share of the whole; one frame at least."""
+        first = min(int(start * len(self)), len(self) - 1)
+        return self.frames(slice(first, max(first + 1, round(stop * len(self)))))
 
     @cached_property
     def ground(self) -> float:
         """The height under which the lowest joint is in one frame of twenty: single bad frames do not matter."""
         return float(np.percentile(self.points[..., 1].min(axis=1), 5))
+
+    def joint(self, name: str) -> Array:
+        """Positions (T, 3) of one joint."""
+        return self.points[:, HUMANOID.index(name)]
 
     def height(self, name: str) -> Array:
         """Height (T,) of a joint above the ground."""
@@ -72,8 +62,8 @@ class Track:
 
     def heights(self, part: str) -> tuple[Array, Array]:
         """Heights (T,) of the left and the right joint of a part above the ground."""
-        left, right = pair(part)
-        return self.height(left), self.height(right)
+        left, right = map(self.height, pair(part))
+        return left, right
 
     @cached_property
     def soles(self) -> Array:
@@ -89,8 +79,8 @@ class Track:
     @cached_property
     def facing(self) -> Array:
         """The angle (T,) about y that hips and shoulders face, in degrees, unwrapped; 0 is along z, 90 along x."""
-        pairs = [[self.joint(name) for name in pair(part)] for part in ("UpperLeg", "UpperArm")]
-        across = np.sum([_unit((left - right)[:, [0, 2]]) for left, right in pairs], axis=0)
+        pairs = [[self.joint(name)[:, [0, 2]] for name in pair(part)] for part in ("UpperLeg", "UpperArm")]
+        across = np.sum([direction(left - right) for left, right in pairs], axis=0)
         found: Array = np.degrees(np.unwrap(np.arctan2(-across[:, 1], across[:, 0])))
         return found
 
@@ -118,8 +108,7 @@ class Track:
     @cached_property
     def pace(self) -> Array:
         """Speed (T,) over the ground, m/s."""
-        found: Array = np.linalg.norm(self.velocity, axis=1)
-        return found
+        return length(self.velocity)
 
     def body(self, name: str) -> Array:
         """A joint (T, 3) as the figure sees it: to its left and in front of its hips, and above the ground (y)."""
@@ -129,19 +118,13 @@ class Track:
 
     def bodies(self, part: str) -> tuple[Array, Array]:
         """The left and the right joint of a part as :meth:`body` gives them."""
-        left, right = pair(part)
-        return self.body(left), self.body(right)
+        left, right = map(self.body, pair(part))
+        return left, right
 
     def motion_of(self, name: str, beside: str = "hips") -> Array:
         """Speed (T,) of a joint relative to another one, m/s, over a tenth of a second."""
-        steps = np.linalg.norm(np.diff(self.joint(name) - self.joint(beside), axis=0), axis=1) * RATE
+        steps = length(np.diff(self.joint(name) - self.joint(beside), axis=0)) * RATE
         return np.concatenate([[0.0], calm(steps, 0.1)])
-
-    def angle(self, above: str, joint: str, below: str) -> Array:
-        """The angle (T,) between two bones at a joint, degrees: 180 where they are in line."""
-        one, other = (_unit(self.joint(end) - self.joint(joint)) for end in (above, below))
-        found: Array = np.degrees(np.arccos(np.clip((one * other).sum(axis=-1), -1, 1)))
-        return found
 
 
 def track_of(motion: Motion) -> Track:
@@ -150,17 +133,20 @@ def track_of(motion: Motion) -> Track:
     return Track(resampled(positions(own), own.fps / RATE))
 
 
+def pair(part: str) -> tuple[str, str]:
+    """The names of the left and the right joint of a part."""
+    left, right = (sided(side, part) for side in LEFT_RIGHT)
+    return left, right
+
+
+def direction(vectors: Array) -> Array:
+    """Vectors (T, N) at length 1."""
+    return vectors / np.maximum(length(vectors), 1e-9)[:, None]
+
+
 def calm(values: Array, seconds: float) -> Array:
     """Values (T, ...) averaged over a window of so many seconds; at the ends over the part of it that there is."""
-    window = 2 * (round(seconds * RATE) // 2) + 1
-    total, frames = (uniform_filter1d(of, window, axis=0, mode="constant") for of in (values, np.ones_like(values)))
-    found: Array = total / frames
-    return found
-
-
-def spells(flags: Flags) -> list[tuple[int, int]]:
-    """The frames (start, stop) of each stretch over which flags (T,) are true."""
-    return [(part.start, part.stop) for (part,) in find_objects(label(flags)[0])]
+    return running_mean(values, 2 * (round(seconds * RATE) // 2) + 1)
 
 
 def longest(flags: Flags) -> float:
@@ -177,8 +163,3 @@ def swings(values: Array, least: float) -> int:
         if up or down:
             count, rising, low, high = count + 1, up, value, value
     return count
-
-
-def _unit(vectors: Array) -> Array:
-    found: Array = vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
-    return found

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from motet.motion.rotations import Array
-from motet_train.evaluate.arrival import arrival
+from motet_train.evaluate.positions import arrival
 from motet_train.papers.tdbn.experiments.measures import Reference, upsample
 from motet_train.papers.tdbn.experiments.study import Codes, ControlStudy
 from motet_train.papers.tdbn.period import period

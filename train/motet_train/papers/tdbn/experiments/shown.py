@@ -1,6 +1,6 @@
 """What a user sees of a control model: smooth sessions, whose path is laid and whose feet stand.
 
-Measured by :mod:`motet_train.evaluate.feet`, beside the training motions, of which there are joint angles
+Measured by :mod:`motet_train.evaluate.positions`, beside the training motions, of which there are joint angles
 alone: their path is laid, too, and their feet are left as they then are.
 """
 
@@ -11,7 +11,7 @@ from motet.motion.feet.root_path import lay_root_path
 from motet.motion.humanoid import map_of
 from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
-from motet_train.evaluate.feet import acceleration, leap, slide, speed, stances
+from motet_train.evaluate.positions import acceleration, leap, slide, speed, stances
 from motet_train.papers.tdbn.experiments.gaits import Figures
 from motet_train.papers.tdbn.experiments.study import ControlStudy
 

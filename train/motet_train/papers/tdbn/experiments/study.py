@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from motet.models.tdbn_control import TdbnModel, TdbnSession
 from motet.motion.rotations import Array
-from motet_train.evaluate.arrival import arrival
+from motet_train.evaluate.positions import arrival
 from motet_train.papers.tdbn.experiments.measures import ARRIVED, Reference, upsample
 from motet_train.papers.tdbn.period import period
 
