@@ -21,9 +21,8 @@ from motet.errors import MotetError
 from motet.formats import read_motion
 from motet.models.describe import DescribeModel
 from motet.models.language import MAX_SECONDS
-from motet.motion.humanoid.bones import BONES, HUMANOID
+from motet.motion.humanoid.bones import BONES, HUMANOID, MIXAMO
 from motet.motion.humanoid.retarget import from_humanoid, to_humanoid
-from motet.motion.humanoid.rigs import MIXAMO
 from motet.motion.kinematics import global_transforms, motion_of, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.skeleton import Skeleton

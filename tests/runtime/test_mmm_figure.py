@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from motet.formats import read_motion
-from motet.motion.humanoid.bones import HUMANOID, sole_points
-from motet.motion.humanoid.mmm_figure import MMM_SKELETON, is_mmm, with_figure
+from motet.motion.humanoid.bones import HUMANOID, MMM_SKELETON, is_mmm, sole_points, with_figure
 from motet.motion.humanoid.retarget import to_humanoid
 from motet.motion.kinematics import global_transforms, positions
 from motet.motion.motion import Motion

@@ -295,7 +295,7 @@ def test_a_foot_in_line_with_the_shin_has_no_direction() -> None:
     motion = replace(like, skeleton=Skeleton((*skeleton.joints, *tips)))
     found = to_humanoid(motion)
     assert found.confidence > 0.9
-    assert found.figure.fitted.at_rest
+    assert found.figure.fitted.up is not None
     turned = global_transforms(found.motion)[0]
     for side in ("left", "right"):
         foot, shin = (turned[:, HUMANOID.index(f"{side}{part}")] for part in ("Foot", "LowerLeg"))

@@ -7,7 +7,7 @@ import pytest
 from motet.errors import MotionError
 from motet.formats import clips, read_motion
 from motet.motion.humanoid.bones import HUMANOID
-from motet.motion.humanoid.joint_names import map_by_names
+from motet.motion.humanoid.joint_map import map_by_names
 from motet.motion.humanoid.retarget import to_humanoid
 from motet.motion.kinematics import global_transforms
 

@@ -12,8 +12,7 @@ from test_retarget import SKELETONS, dancing
 import motet
 from motet.errors import MotionError
 from motet.motion import HUMANOID, Motion, positions, rig
-from motet.motion.humanoid.bones import LEG, sided
-from motet.motion.humanoid.rigs import RIGS
+from motet.motion.humanoid.bones import LEG, RIGS, sided
 
 NAMES = {
     "mixamo": ("mixamorig:Hips", "mixamorig:Spine2", "mixamorig:LeftForeArm", "mixamorig:RightToeBase"),

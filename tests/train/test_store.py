@@ -12,9 +12,8 @@ from language_data import walker
 from motet.cli import main
 from motet.errors import OutputError
 from motet.formats import read_motion, write_motion
-from motet.motion.humanoid.bones import HUMANOID
+from motet.motion.humanoid.bones import HUMANOID, MIXAMO
 from motet.motion.humanoid.retarget import from_humanoid, to_humanoid
-from motet.motion.humanoid.rigs import MIXAMO
 from motet.motion.kinematics import euler_of, local_rotations, positions, with_channels
 from motet.motion.motion import Motion
 from motet.representation.contract import LIVING_STD

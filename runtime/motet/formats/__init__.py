@@ -184,7 +184,7 @@ def names_motion(text: str) -> bool:
 def read_character(file: File) -> Character:
     """Read a skeleton to put motions onto: from the nodes of glTF, VRM and FBX, otherwise the motion's skeleton.
 
-    The name of a rig in :data:`motet.motion.humanoid.rigs.RIGS`, such as "mixamo", gives that rig unless a file of that
+    The name of a rig in :data:`motet.motion.humanoid.RIGS`, such as "mixamo", gives that rig unless a file of that
     name exists. FormatError like :func:`read_motion`.
     """
     if isinstance(file, str | Path) and not Path(file).suffix and not Path(file).exists():

@@ -100,7 +100,8 @@ def _measured(
     if not np.array_equal(figure.turn, np.eye(3)):
         raise MotionError("this figure does not stand along y: turn it upright with to_humanoid")
     scale = leg_length() / fitted.leg
-    soles = fitted.soles(fitted.bones(rotations), places) * scale
+    feet = {bone: product(rotations[:, joints_of[bone]], fitted.aligned[joints_of[bone]]) for bone in fitted.heights}
+    soles = fitted.soles(feet, places) * scale
     # how thick the soles of another figure are is not known: each of their points is on the ground where it is lowest
     soles[..., 1] -= np.percentile(soles[..., 1], 5, axis=0)
     sides = [[joints_of[sided(side, part)] for part in LEG[:3]] for side in LEFT_RIGHT]

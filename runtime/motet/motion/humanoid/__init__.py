@@ -9,20 +9,23 @@ from motet.motion.humanoid.bones import (
     HUMANOID,
     LEFT_RIGHT,
     LEG,
+    MIXAMO,
     PARENTS,
     REQUIRED,
+    RIGS,
     SOLE,
     T_POSE,
     ground_under,
+    is_mmm,
     leg_length,
+    rig,
     sided,
     sole_points,
+    with_figure,
 )
-from motet.motion.humanoid.fingers import relaxed
 from motet.motion.humanoid.joint_map import JointMap, check_map, read_map
 from motet.motion.humanoid.joint_tree import map_of
 from motet.motion.humanoid.measure import LENGTH_UNITS, unit_by_legs
-from motet.motion.humanoid.mmm_figure import is_mmm, with_figure
 from motet.motion.humanoid.retarget import (
     SURE_OF_JOINTS,
     Figure,
@@ -30,9 +33,9 @@ from motet.motion.humanoid.retarget import (
     from_humanoid,
     grounded,
     on_humanoid,
+    relaxed,
     to_humanoid,
 )
-from motet.motion.humanoid.rigs import MIXAMO, RIGS, rig
 
 __all__ = [
     "ARM",

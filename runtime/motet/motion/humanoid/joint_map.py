@@ -1,33 +1,53 @@
-"""Which joint of a skeleton is which bone of the humanoid, and the user's file that says so."""
+"""Which joint of a skeleton is which bone of the humanoid: by the names of joints, or the user's file; and where bones
+point.
+
+There is one table for each convention of names, in the folder conventions, a JSON object: "title"; "sides", pairs of
+what stands for left and right; "joints", bone -> the names it can have, with ``{s}`` in the place of the side (of
+"spine" and "neck" all that are there count, upwards, of others the first); "aside", other joints that files of this
+convention have and that tell it from its neighbours; "prefixes", regular expressions of what can stand before every
+name; "rest", for files that are known to rest in a T-pose of their own, what that pose is on the humanoid: bone ->
+rotation vector in degrees, of the left side, and "points", where bones point there, by which such a file is known among
+others of these names; "axes", for files that rest in no body's pose: name -> the joint's axes that point left, up and
+forward in a T-pose. Upper and lower case and separators do not count.
+"""
 
 import json
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache, lru_cache
+from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from motet.errors import FormatError, MotionError
-from motet.motion.humanoid.bones import ARM, BONES, LEFT_RIGHT, LEG, NECK, SPINE, sided
-from motet.motion.skeleton import Skeleton
+from motet.motion.humanoid.bones import ARM, BONES, HUMANOID, LEFT_RIGHT, LEG, NECK, SPINE, sided
+from motet.motion.rotations import Array, unit
+from motet.motion.skeleton import END_SUFFIX, Skeleton
 
 Triple = tuple[float, float, float]
 
 NEEDED = ("hips", "spine", *(sided(side, part) for side in LEFT_RIGHT for part in (*LEG[:3], *ARM[1:3])))
 """Bones without which a figure is not taken for a human's; the others stay at rest where it lacks them."""
 
-PAIRED = tuple((sided("left", part), sided("right", part)) for part in (*LEG, *ARM))
-"""Bones of the left with their partners on the right."""
-
-PARTNERS = dict(PAIRED) | {right: left for left, right in PAIRED}
+PARTNERS = {
+    sided(side, part): sided(other, part) for part in (*LEG, *ARM) for side, other in (LEFT_RIGHT, LEFT_RIGHT[::-1])
+}
 """For each bone of one side its partner."""
 
-MAP_KEYS = tuple(bone for bone in BONES if bone not in (*SPINE[1:], *NECK[:1]))
-"""What a map can name, besides "neck": the joints of the back all go by the name "spine"."""
+LIMB_BONES = tuple(tuple(sided(side, part) for part in limb) for side in LEFT_RIGHT for limb in (LEG, ARM[1:]))
 
+UNSIDED = ("hips", "head", "spine", "neck")
 
 BY_THE_TREE = "by the tree"
 """What stands for a convention where none was found."""
+
+
+class HalfKnownError(MotionError):
+    """Names of a convention that lack needed bones or are out of order: the tree may tell more."""
 
 
 @dataclass(frozen=True)
@@ -63,30 +83,97 @@ class JointMap:
 
     def names(self, skeleton: Skeleton) -> dict[str, tuple[str, ...]]:
         """For each bone ("spine" and "neck" for all of the back and of the neck) the names of its joints."""
-        chains = {"spine": self.spine, "neck": self.neck}
-        found = {bone: (joint,) for bone, joint in self.joints.items()} | chains
+        found = {bone: (joint,) for bone, joint in self.joints.items()} | {"spine": self.spine, "neck": self.neck}
         return {bone: tuple(skeleton.names[joint] for joint in joints) for bone, joints in found.items()}
 
 
-def missing_bones(found: Mapping[str, object], spine: tuple[int, ...]) -> list[str]:
+class Body:
+    """A skeleton and which of its joints are bones: where its bones point, of positions (..., J, 3) of its joints.
+
+    aims: bone of a limb -> the joints whose mean place it points to: the limb's next bone, or the joints after it but
+    the thumb; none if none.
+    """
+
+    def __init__(self, skeleton: Skeleton, joint_map: JointMap) -> None:
+        self.skeleton, self.joint_map, self.joints = skeleton, joint_map, joint_map.joints
+        self.aims: dict[str, tuple[int, ...]] = {}
+        for limb in LIMB_BONES:
+            for bone, after in zip(limb, (*limb[1:], ""), strict=True):
+                if bone in self.joints:
+                    ends = (self.joints[after],) if after in self.joints else self._ends(self.joints[bone])
+                    self.aims[bone] = ends
+        rest = skeleton.rest_positions
+        for shin, foot, toes in ([sided(side, part) for part in LEG[1:]] for side in LEFT_RIGHT):
+            # a foot without toes that continues the shin within 15 degrees, as in old files, has no own direction
+            if self.aims.get(foot) and toes not in self.joints:
+                straight = self.direction(rest, shin) @ self.direction(rest, foot) > np.cos(np.radians(15))
+                self.aims[foot] = () if straight else self.aims[foot]
+
+    def _ends(self, joint: int) -> tuple[int, ...]:
+        children = [i for i in self.skeleton.children[joint] if "thumb" not in self.skeleton.names[i].lower()]
+        apart = tuple(child for child in children if np.any(self.skeleton.offsets[child]))
+        return apart or next((ends for child in children if (ends := self._ends(child))), ())
+
+    def along(self, positions: Array, bone: str) -> Array:
+        """Vectors (..., 3) from the joint of a bone to the middle of what it points to."""
+        ends: Array = positions[..., list(self.aims[bone]), :].mean(axis=-2) - positions[..., self.joints[bone], :]
+        return ends
+
+    def direction(self, positions: Array, bone: str) -> Array:
+        """Directions (..., 3) in which a bone points."""
+        return unit(self.along(positions, bone))
+
+    def middle(self, positions: Array, part: str) -> Array:
+        """The middle (..., 3) between a joint of the left and its partner."""
+        left, right = (positions[..., self.joints[sided(side, part)], :] for side in LEFT_RIGHT)
+        between: Array = (left + right) / 2
+        return between
+
+    def to_left(self, positions: Array, part: str) -> Array:
+        """Vectors (..., 3) from a joint of the right to its partner on the left."""
+        left, right = (positions[..., self.joints[sided(side, part)], :] for side in LEFT_RIGHT)
+        across: Array = left - right
+        return across
+
+    def trunk_up(self, positions: Array) -> Array:
+        """Directions (..., 3) from the middle of the legs' joints to that of the arms'."""
+        return unit(self.middle(positions, "UpperArm") - self.middle(positions, "UpperLeg"))
+
+    def legs_up(self, positions: Array) -> Array:
+        """Directions (..., 3) from the feet to the legs' joints, the mean of both sides."""
+        legs = [[positions[..., self.joints[sided(side, part)], :] for part in LEG[:3]] for side in LEFT_RIGHT]
+        return unit(unit(legs[0][0] - legs[0][2]) + unit(legs[1][0] - legs[1][2]))
+
+
+def humanoid_direction(bone: str) -> Array:
+    """Where a bone of the humanoid points in the T-pose (3,)."""
+    return unit(HUMANOID.offsets[HUMANOID.children[HUMANOID.index(bone)][0]])
+
+
+def missing_bones(joint_map: JointMap) -> list[str]:
     """The required bones that are missing, and those present on the other side only."""
-    there = {*found, *(["spine"] if spine else [])}
-    missing = [bone for bone in NEEDED if bone not in there]
-    return missing + [bone for bone in _one_sided(there) if bone not in missing]
+    there = {*joint_map.joints, *(["spine"] if joint_map.spine else [])}
+    one_sided = [bone for bone, other in PARTNERS.items() if other in there]
+    return [bone for bone in dict.fromkeys((*NEEDED, *one_sided)) if bone not in there]
+
+
+def missing_on_one_side(missing: list[str], joint_map: JointMap) -> bool:
+    """Whether bones are missing, all of them present on the other side."""
+    return bool(missing) and all(PARTNERS.get(bone) in joint_map.joints for bone in missing)
 
 
 def check_map(skeleton: Skeleton, joint_map: JointMap) -> JointMap:
     """The map itself; MotionError where bones are missing or the joints do not hang on each other as bones do."""
-    missing = missing_bones(joint_map.joints, joint_map.spine)
+    missing = missing_bones(joint_map)
     if missing:
-        raise MotionError(missing_reason(missing, joint_map.joints))
-    hips = joint_map.joints["hips"]
+        raise MotionError(missing_reason(missing, joint_map))
+    back = joint_map.spine[0]
     # the joint that carries the legs may hang beside the back, below what carries both
-    limbs = {"back": joint_map.spine, "neck": (joint_map.spine[0], *joint_map.neck)}
+    limbs = {"back": joint_map.spine, "neck": (back, *joint_map.neck)}
     for side in LEFT_RIGHT:
-        for limb, first, parts in (("leg", hips, LEG), ("arm", joint_map.spine[0], ARM)):
-            bones = [sided(side, part) for part in parts]
-            limbs[f"{side} {limb}"] = (first, *(joint_map.joints[bone] for bone in bones if bone in joint_map.joints))
+        for limb, first, parts in (("leg", joint_map.joints["hips"], LEG), ("arm", back, ARM)):
+            bones = (bone for part in parts if (bone := sided(side, part)) in joint_map.joints)
+            limbs[f"{side} {limb}"] = (first, *(joint_map.joints[bone] for bone in bones))
     for limb, joints in limbs.items():
         for upper, lower in pairwise(joints):
             if lower not in skeleton.subtree(skeleton.names[upper]) or lower == upper:
@@ -95,26 +182,15 @@ def check_map(skeleton: Skeleton, joint_map: JointMap) -> JointMap:
     return joint_map
 
 
-def missing_reason(missing: list[str], found: Mapping[str, object]) -> str:
+def missing_reason(missing: list[str], joint_map: JointMap) -> str:
     """A sentence naming the bones a skeleton lacks."""
-    legs = [sided(side, part) for side in LEFT_RIGHT for part in LEG[:3]]
     remedy = "export them, too, or name them in a map"
-    if all(bone in missing for bone in legs):
+    if {sided(side, part) for side in LEFT_RIGHT for part in LEG[:3]} <= set(missing):
         return f"this skeleton has no legs: a human needs hips with two legs, a spine and two arms; {remedy}"
-    if one_sided(missing, found):
+    if missing_on_one_side(missing, joint_map):
         there = ", ".join(PARTNERS[bone] for bone in missing)
         return f"joints are missing on one side only: {', '.join(missing)} (the other side has {there}); {remedy}"
     return f"no joint was found for {', '.join(missing)}; {remedy}"
-
-
-def one_sided(missing: list[str], found: Mapping[str, object]) -> bool:
-    """Whether bones are missing, all of them present on the other side."""
-    return bool(missing) and all(PARTNERS.get(bone) in found for bone in missing)
-
-
-def _one_sided(there: set[str]) -> list[str]:
-    pairs = [pair for pair in PAIRED if (pair[0] in there) != (pair[1] in there)]
-    return [left if right in there else right for left, right in pairs]
 
 
 def read_map(path: str | Path, skeleton: Skeleton) -> JointMap:
@@ -125,33 +201,41 @@ def read_map(path: str | Path, skeleton: Skeleton) -> JointMap:
     the fault: an unknown bone or joint, a joint named twice, a required bone that is missing.
     """
     path = Path(path)
+    known = (*(bone for bone in BONES if bone not in (*SPINE[1:], *NECK[:1])), "neck")
     places: dict[str, tuple[int, ...]] = {}
     for bone, names in _entries(path).items():
-        if bone not in (*MAP_KEYS, "neck"):
-            expected = ", ".join((*MAP_KEYS, "neck"))
-            raise FormatError(path, f"{bone!r} is not a bone of the humanoid: expected {expected}")
+        if bone not in known:
+            raise FormatError(path, f"{bone!r} is not a bone of the humanoid: expected {', '.join(known)}")
         unknown = [name for name in names if name not in skeleton.names]
         if unknown:
-            raise FormatError(path, f"{bone}: the skeleton has no joint {unknown[0]!r}; it has {_list(skeleton)}")
+            its = ", ".join(skeleton.names)
+            raise FormatError(path, f"{bone}: the skeleton has no joint {unknown[0]!r}; it has {its}")
         places[bone] = tuple(skeleton.index(name) for name in names)
     used = [joint for joints in places.values() for joint in joints]
     twice = sorted({skeleton.names[joint] for joint in used if used.count(joint) > 1})
     if twice:
         raise FormatError(path, f"a joint can be only one bone; named twice: {', '.join(twice)}")
-    chains = {chain: places.pop(chain, ()) for chain in ("spine", "neck")}
+    spine, neck = (places.pop(chain, ()) for chain in ("spine", "neck"))
     longer = [bone for bone, joints in places.items() if len(joints) != 1]
     if longer:
         raise FormatError(path, f"{longer[0]}: expected one joint; only spine and neck take a list")
     joints = {bone: joint for bone, (joint,) in places.items()}
     try:
-        return check_map(skeleton, JointMap(joints, chains["spine"], chains["neck"], path.name, 1.0))
+        return check_map(skeleton, JointMap(joints, spine, neck, path.name, 1.0))
     except MotionError as error:
         raise FormatError(path, str(error)) from error
 
 
 def _entries(path: Path) -> dict[str, list[str]]:
+    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        keys = [key for key, _ in pairs]
+        twice = sorted({key for key in keys if keys.count(key) > 1})
+        if twice:
+            raise ValueError(f"{', '.join(twice)} appears twice")
+        return dict(pairs)
+
     try:
-        content: Any = json.loads(path.read_text("utf-8"), object_pairs_hook=_once)
+        content: Any = json.loads(path.read_text("utf-8"), object_pairs_hook=once)
     except OSError as error:
         raise FormatError(path, f"cannot be read: {error.strerror}") from error
     except ValueError as error:
@@ -165,13 +249,111 @@ def _entries(path: Path) -> dict[str, list[str]]:
     return entries
 
 
-def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    keys = [key for key, _ in pairs]
-    twice = sorted({key for key in keys if keys.count(key) > 1})
-    if twice:
-        raise ValueError(f"{', '.join(twice)} appears twice")
-    return dict(pairs)
+@dataclass(frozen=True)
+class Convention:
+    """One table: for each bone the plain names that its joint can have; the same of joints that are no bones."""
+
+    title: str
+    names: dict[str, tuple[str, ...]]
+    aside: frozenset[str]
+    prefixes: tuple[str, ...]
+    rest: dict[str, Triple] | None
+    points: dict[str, Triple]
+    axes: dict[str, str]
 
 
-def _list(skeleton: Skeleton) -> str:
-    return ", ".join(skeleton.names)
+@cache
+def conventions() -> tuple[Convention, ...]:
+    """All tables; one with several ways to write the sides comes once for each."""
+    tables = sorted((files("motet.motion.humanoid") / "conventions").iterdir(), key=lambda table: table.name)
+    contents = [json.loads(table.read_text("utf-8")) for table in tables]
+    return tuple(_convention(content, sides) for content in contents for sides in content["sides"])
+
+
+def _convention(content: dict[str, Any], sides: Sequence[str]) -> Convention:
+    names = {}
+    for bone, known in content["joints"].items():
+        for side, word in [("", "")] if bone in UNSIDED else zip(LEFT_RIGHT, sides, strict=True):
+            names[sided(side, bone)] = tuple(_plain(name.replace("{s}", word)) for name in known)
+    return Convention(
+        content["title"],
+        names,
+        frozenset(_plain(name.replace("{s}", word)) for name in content.get("aside", []) for word in sides),
+        tuple(content.get("prefixes", ())),
+        _both_sides(content["rest"], (1, -1, -1)) if "rest" in content else None,
+        _both_sides(content.get("points", {}), (-1, 1, 1)),
+        {_plain(name): known for name, known in content.get("axes", {}).items()},
+    )
+
+
+def _both_sides(of_left: dict[str, list[float]], signs: tuple[int, int, int]) -> dict[str, Triple]:
+    """Vectors of bones of both sides: those of the right are those of the left with signs, which mirror them."""
+    found: dict[str, Triple] = {}
+    for bone, (x, y, z) in of_left.items():
+        right = (signs[0] * x, signs[1] * y, signs[2] * z)
+        found |= {bone: (x, y, z)} if bone in UNSIDED else {sided("left", bone): (x, y, z), sided("right", bone): right}
+    return found
+
+
+def _plain(name: str) -> str:
+    """A name without what differs between files: case, separators, and the namespace before a colon."""
+    return re.sub(r"[^a-z0-9]", "", name.rsplit(":", maxsplit=1)[-1].lower())
+
+
+@lru_cache(maxsize=256)
+def map_by_names(skeleton: Skeleton) -> JointMap | None:
+    """The map by the convention that fits best, None where none does.
+
+    HalfKnownError where a convention fits but for bones that are missing or out of order; MotionError where the one
+    that knows most of the names lacks bones of one side only, or where two joints are the hips.
+    """
+    matches = [_match(convention, skeleton) for convention in conventions()]
+    fits = sorted(range(len(matches)), key=lambda i: matches[i][0], reverse=True)
+    fullest = matches[fits[0]][1]
+    whole = (matches[i] for i in fits if not missing_bones(matches[i][1]))
+    told = missing_on_one_side(missing_bones(fullest), fullest)
+    (known, _), best = matches[fits[0]] if told else next(whole, matches[fits[0]])
+    missing = missing_bones(best)
+    if missing:
+        if len(best.joints) >= 6 and known > 0.5 * len(skeleton.names):
+            raise (MotionError if told else HalfKnownError)(missing_reason(missing, best))
+        return None
+    try:
+        return check_map(skeleton, best)
+    except MotionError as error:
+        raise HalfKnownError(str(error)) from error
+
+
+def _match(convention: Convention, skeleton: Skeleton) -> tuple[tuple[int, int], JointMap]:
+    """The map that a convention makes of a skeleton's names, and how well it fits: how many joints the convention has
+    names for, and less how many of its bones are absent."""
+    names = _plain_names(skeleton.names, convention.prefixes)
+    hips = [i for i, name in enumerate(names) if name == convention.names["hips"][0] and len(skeleton.children[i]) >= 3]
+    if len(hips) > 1:
+        both = " and ".join(repr(skeleton.names[i]) for i in hips)
+        raise MotionError(f"this file has two hips, {both}: put each figure in a file of its own")
+    chains = {chain: convention.names.get(chain, ()) for chain in ("spine", "neck")}
+    spine, neck = (tuple(sorted(names.index(name) for name in chain if name in names)) for chain in chains.values())
+    limbs = {bone: known for bone, known in convention.names.items() if bone not in chains}
+    found = {bone: [name for name in known if name in names] for bone, known in limbs.items()}
+    joints = {bone: names.index(there[0]) for bone, there in found.items() if there}
+    known = {name for bone in convention.names.values() for name in bone} | convention.aside
+    count = sum(name in known for name in names)
+    absent = len(limbs) - len(joints) + sum(bone in convention.names for bone in chains) - bool(spine) - bool(neck)
+    absent += sum(name not in names for chain in chains.values() for name in chain)
+    # other makers' figures of these names have joints besides, or rest in another pose
+    rest = convention.rest if count >= sum(not name.endswith(END_SUFFIX) for name in skeleton.names) else None
+    axes = {i: convention.axes[name] for i, name in enumerate(names) if name in convention.axes}
+    confidence = round(1.0 - 0.3 * absent / (absent + count), 2)
+    found_map = JointMap(joints, spine, neck, convention.title, confidence, rest, convention.points, axes)
+    return (count, -absent), found_map
+
+
+def _plain_names(names: Sequence[str], prefixes: Sequence[str]) -> list[str]:
+    """Plain names without the prefixes given, or without the first word where nearly all names begin with it."""
+    first = [re.match(r"[A-Za-z]+[0-9]*[ _:.-]+(?=.)", name) for name in names]
+    words = [match[0] for match in first if match]
+    common = max(words, key=words.count, default="")
+    alternatives = [*prefixes, re.escape(common)] if words.count(common) > 0.8 * len(names) else prefixes
+    pattern = "|".join(f"(?:{prefix})[ _:.-]*" for prefix in alternatives) or "(?!)"
+    return [_plain(re.sub(f"^(?:{pattern})(?=.)", "", name, flags=re.IGNORECASE)) for name in names]

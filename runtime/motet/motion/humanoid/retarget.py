@@ -2,26 +2,37 @@
 
 A bone of the humanoid has the rotation of its joint in the world, times a constant that makes up for the rest pose
 (:mod:`motet.motion.humanoid.measure`). Back and neck share their turns out among their joints; what a figure lacks
-stays at rest. Paths are scaled by the lengths of the legs and laid so that the feet are on the ground.
+stays at rest, but fingers, which are found by their names, bend as in a relaxed hand. Paths are scaled by the lengths
+of the legs and laid so that the feet are on the ground.
 """
 
 import logging
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
 from motet.errors import MotionError
 from motet.motion.humanoid import bones
-from motet.motion.humanoid.bones import HUMANOID, LEFT_RIGHT, NECK, PARENTS, SPINE, leg_length, sided
-from motet.motion.humanoid.fingers import relaxed
+from motet.motion.humanoid.bones import (
+    HUMANOID,
+    LEFT_RIGHT,
+    NECK,
+    PARENTS,
+    SPINE,
+    is_mmm,
+    leg_length,
+    sided,
+    with_figure,
+)
 from motet.motion.humanoid.joint_map import BY_THE_TREE, JointMap
 from motet.motion.humanoid.joint_tree import map_of
 from motet.motion.humanoid.measure import Fitted, check_frames, fit, height_of, unit_of, upright
-from motet.motion.humanoid.mmm_figure import is_mmm, with_figure
-from motet.motion.humanoid.rest_pose import middle, to_left
 from motet.motion.kinematics import (
+    chained,
     global_transforms,
     local_rotations,
     local_translations,
@@ -43,6 +54,7 @@ from motet.motion.rotations import (
     rotvec_to_rotmat,
     swing,
     twist,
+    unit,
 )
 from motet.motion.skeleton import END_SUFFIX, Skeleton
 
@@ -74,34 +86,39 @@ class Figure:
         example = like if isinstance(like, Motion) else Motion(np.zeros((1, 0)), (), (), 1.0, like)
         transforms = global_transforms(example)
         fitted = fit(skeleton_of(example), joint_map or map_of(example), *transforms)
-        return Figure(fitted, example[:1], upright(fitted, transforms[1]).turn)
+        return Figure(fitted, example[:1], upright(fitted, transforms[1])[0])
 
     def to_humanoid(self, motion: Motion) -> Motion:
         """Another motion of the skeleton on the humanoid."""
         motion = with_figure(motion) if is_mmm(motion) else motion
-        return self._grounded(*self._on_humanoid(*global_transforms(motion)), motion.fps)[0]
+        return self._retargeted(*global_transforms(motion), motion.fps)[0]
 
-    def _on_humanoid(self, rotations: Array, places: Array) -> tuple[Array, Array]:
-        """Rotations (T, J, 3, 3) in the world and positions (T, J, 3) of the humanoid, over no ground yet."""
+    def _retargeted(self, rotations: Array, places: Array, fps: float) -> tuple[Motion, "Figure"]:
+        """The humanoid's motion of rotations (T, J, 3, 3) in the world and positions (T, J, 3), laid on the ground, and
+        the figure that knows how high that is."""
         turned = product(self.turn, _humanoid_rotations(rotations, places, self.fitted))
-        legs = middle(places, self.fitted.joint_map, "UpperLeg") @ self.turn.T * (leg_length() / self.fitted.leg)
+        legs = self.fitted.body.middle(places, "UpperLeg") @ self.turn.T * (leg_length() / self.fitted.leg)
         found = places_of(HUMANOID, turned)
-        return turned, found + (legs - found[:, HIPS].mean(axis=1))[:, None]
-
-    def _grounded(self, turned: Array, places: Array, fps: float) -> tuple[Motion, "Figure"]:
-        """The motion of rotations and positions of the humanoid laid on the ground, and the figure that knows it."""
-        ground = bones.ground_under(bones.sole_points(turned, places)) if self.ground is None else self.ground
-        root = places[:, 0] - (0.0, ground, 0.0)
+        found += (legs - found[:, HIPS].mean(axis=1))[:, None]
+        ground = bones.ground_under(bones.sole_points(turned, found)) if self.ground is None else self.ground
+        root = found[:, 0] - (0.0, ground, 0.0)
         return motion_of(HUMANOID, turned, {0: root}, fps), replace(self, ground=ground)
 
     @cached_property
     def posture(self) -> tuple[Skeleton, Array]:
         """The skeleton with its unit, where that is known, and local rotations (J, 3, 3) of joints that are no bones:
         at rest, or as in the first frame, but for fingers, which bend as in a relaxed hand."""
-        skeleton, still = _still(self.first, self.fitted)
+        skeleton = skeleton_of(self.first)
+        still = np.tile(np.eye(3), (len(skeleton.joints), 1, 1))
+        if self.fitted.up is None:  # measured in frames, not at rest
+            still = local_rotations(self.first)[0]
+            offsets = local_translations(self.first)[0].tolist()
+            offsets[0] = skeleton.joints[0].offset
+            zipped = zip(skeleton.joints, offsets, strict=True)
+            skeleton = replace(skeleton, joints=tuple(replace(joint, offset=tuple(at)) for joint, at in zipped))
         if skeleton.metres_per_unit is None:
             skeleton = replace(skeleton, metres_per_unit=unit_of(skeleton, self.fitted.leg).metres)
-        return skeleton, relaxed(skeleton, still, self.fitted.joint_map.joints)
+        return skeleton, relaxed(skeleton, still, self.fitted.body.joints)
 
 
 @dataclass(frozen=True)
@@ -157,24 +174,21 @@ def to_humanoid(motion: Motion, joint_map: JointMap | None = None) -> Humanoid:
     joint_map = joint_map or map_of(motion)
     rotations, places = global_transforms(motion)
     fitted = fit(skeleton, joint_map, rotations, places)
-    check_frames(places, joint_map, fitted.aims, _hinges(rotations, fitted))
-    unit, up = unit_of(skeleton, fitted.leg), upright(fitted, places)
-    figure = Figure(fitted, motion[:1], up.turn)
-    found, figure = figure._grounded(*figure._on_humanoid(rotations, places), motion.fps)
-    notes = [note for note in (*fitted.notes, unit.note, up.note) if note]
+    # knees bend about the axis of the thigh
+    thighs = {side: joint_map.joints[sided(side, "UpperLeg")] for side in LEFT_RIGHT}
+    hinges = {side: rotated(rotations[:, i], fitted.aligned[i][:, 0]) for side, i in thighs.items()}
+    check_frames(fitted.body, places, hinges)
+    unit, (turn, note) = unit_of(skeleton, fitted.leg), upright(fitted, places)
+    found, figure = Figure(fitted, motion[:1], turn)._retargeted(rotations, places, motion.fps)
+    notes = [text for text in (*fitted.notes, unit.note, note) if text]
     if joint_map.joints["hips"]:
         notes.append(f"the joint {skeleton.names[0]!r} above the hips is folded in")
-    return Humanoid(
-        found,
-        joint_map.names(skeleton),
-        joint_map.convention,
-        round(joint_map.confidence * fitted.confidence, 2),
-        unit.metres,
-        None if unit.metres is None else fitted.leg * unit.metres,
-        None if unit.metres is None else height_of(skeleton, joint_map, fitted.leg) * unit.metres,
-        tuple(notes),
-        figure,
-    )
+    confidence = round(joint_map.confidence * fitted.confidence, 2)
+    leg = height = None
+    if unit.metres is not None:
+        leg, height = fitted.leg * unit.metres, height_of(fitted) * unit.metres
+    joints, convention = joint_map.names(skeleton), joint_map.convention
+    return Humanoid(found, joints, convention, confidence, unit.metres, leg, height, tuple(notes), figure)
 
 
 def on_humanoid(motion: Motion) -> Motion:
@@ -193,32 +207,40 @@ def grounded(motion: Motion) -> Motion:
     return replace(motion, values=values)
 
 
-def _hinges(rotations: Array, fitted: Fitted) -> dict[str, Array]:
-    """Of each side the axis (T, 3) about which the knee bends, to the left: that of the thigh."""
-    thighs = {side: fitted.joint_map.joints[sided(side, "UpperLeg")] for side in LEFT_RIGHT}
-    return {side: rotated(rotations[:, i], fitted.aligned[i][:, 0]) for side, i in thighs.items()}
-
-
 def _humanoid_rotations(rotations: Array, places: Array, fitted: Fitted) -> Array:
     """Rotations in the world (T, J, 3, 3) of the humanoid's joints, from those (T, J, 3, 3) and the positions
     (T, J, 3) of the figure's."""
     joint_map, own = fitted.joint_map, product(rotations, fitted.aligned)
     turned = {bone: own[:, joint] for bone, joint in joint_map.joints.items()}
     if not fitted.pelvis:
-        to_legs = swing(turned["hips"][:, :, 0], to_left(places, joint_map, "UpperLeg"))
+        to_legs = swing(turned["hips"][:, :, 0], fitted.body.to_left(places, "UpperLeg"))
         turned["hips"] = product(to_legs, turned["hips"])
     spine, neck = ([own[:, joint] for joint in chain] for chain in (joint_map.spine, joint_map.neck))
     neck += [turned["head"]] if "head" in turned else []
-    turned |= _shared_out([turned["hips"], *spine], SPINE)
-    turned |= _shared_out([spine[-1], *neck], NECK) if neck else {}
+    turned |= dict(zip(SPINE, _spread([turned["hips"], *spine], len(SPINE)), strict=True))
+    turned |= dict(zip(NECK, _spread([spine[-1], *neck], len(NECK)), strict=True)) if neck else {}
     for bone, parent in PARENTS.items():
         turned.setdefault(bone, turned[parent])
     return side_by_side([turned[name.removesuffix(END_SUFFIX)] for name in HUMANOID.names], len(rotations))
 
 
-def _shared_out(chain: list[Array], names: tuple[str, ...]) -> dict[str, Array]:
-    shared = spread(side_by_side(chain, len(chain[0])), len(names))
-    return {name: shared[:, i] for i, name in enumerate(names)}
+def _spread(chain: list[Array], count: int) -> list[Array]:
+    """World rotations (T, 3, 3) of ``count`` joints of another chain with the same ends, from those of a chain.
+
+    The first rotation is that of the joint that carries the chain and is not among the result; the last of both
+    chains is the same. Between joints rotations go the shortest way, by how far up the chain they are.
+    """
+    stacked = side_by_side(chain, len(chain[0]))
+    places = np.arange(1, count + 1) * (len(chain) - 1) / max(count, 1)
+    below = np.ceil(places).astype(int) - 1
+    part = places - below
+    shared: Array = stacked[:, below + 1]
+    inner = np.flatnonzero(part < 1)
+    if len(inner):
+        lower = stacked[:, below[inner]]
+        turn = rotmat_to_rotvec(product(inverse(lower), shared[:, inner]))
+        shared[:, inner] = product(lower, rotvec_to_rotmat(turn * part[inner, None]))
+    return list(np.moveaxis(shared, 1, 0))
 
 
 def from_humanoid(
@@ -246,8 +268,9 @@ def from_humanoid(
     figure = like if isinstance(like, Figure) else Figure.of(like, joint_map)
     fitted, (skeleton, still) = figure.fitted, figure.posture
     source, places = global_transforms(motion)
-    if ahead:
-        front = _front(fitted)
+    x, _, z = fitted.aligned[fitted.body.joints["hips"]][:, 2]
+    if ahead and np.hypot(x, z) > 0.5:  # it faces neither up nor down
+        front = axis_to_rotmat("y", angle_of(x, z))
         source, places = product(front, source), rotated(front, places)
     turned = _figure_rotations(source, fitted, skeleton, still)
     moved = _moved(fitted, skeleton, (source, places), turned, skin or {})
@@ -259,12 +282,18 @@ def _moved(
 ) -> Array:
     """Translations (T, 3) of a figure's carrier in its parent's frame, from rotations and positions of the humanoid's
     joints and its own rotations (T, J, 3, 3): its path is scaled, its feet are as high over the ground."""
-    scale, joint_map = fitted.leg / leg_length(), fitted.joint_map
+    scale, joints = fitted.leg / leg_length(), fitted.body.joints
     figure = places_of(skeleton, turned)
-    moved: Array = source[1][:, HIPS].mean(axis=1) * scale - middle(figure, joint_map, "UpperLeg")
-    soles = _soles(fitted, skeleton, source[0], (turned, figure + moved[:, None]), skin)
+    moved: Array = source[1][:, HIPS].mean(axis=1) * scale - fitted.body.middle(figure, "UpperLeg")
+    places = figure + moved[:, None]
+    # the soles are those of its mesh, else as they are measured on the humanoid
+    feet = [skeleton.subtree(skeleton.names[joints[sided(side, "Foot")]]) for side in LEFT_RIGHT]
+    own = [joint for foot in feet for joint in foot if joint in skin]
+    meshes = [places[:, joint, None] + rotated(turned[:, joint, None], skin[joint]) for joint in own]
+    rotations = {bone: source[0][:, HUMANOID.index(bone)] for bone in fitted.heights}
+    soles = np.concatenate(meshes, 1) if own else fitted.soles(rotations, places)
     moved[:, 1] += scale * bones.ground_under(bones.sole_points(*source)) - bones.ground_under(soles)
-    carrier = joint_map.carrier(skeleton)
+    carrier = fitted.joint_map.carrier(skeleton)
     if carrier:
         above = skeleton.joints[carrier].parent
         from_above = figure[:, carrier] + moved - figure[:, above] - skeleton.offsets[0]
@@ -272,56 +301,23 @@ def _moved(
     return moved
 
 
-def _front(fitted: Fitted) -> Array:
-    """The turn (3, 3) about y from z to where a figure faces at rest; none where it faces up or down."""
-    x, _, z = fitted.aligned[fitted.joint_map.joints["hips"]][:, 2]
-    return axis_to_rotmat("y", angle_of(x, z)) if np.hypot(x, z) > 0.5 else np.eye(3)
-
-
-def _soles(
-    fitted: Fitted, skeleton: Skeleton, source: Array, figure: tuple[Array, Array], skin: Mapping[int, Array]
-) -> Array:
-    """Points (T, P, 3) of the soles of a figure, from its rotations and positions: of its mesh, else as they are
-    measured on the humanoid, whose rotations are ``source``."""
-    turned, places = figure
-    feet = [fitted.joint_map.joints[sided(side, "Foot")] for side in LEFT_RIGHT]
-    own = [joint for foot in feet for joint in skeleton.subtree(skeleton.names[foot]) if joint in skin]
-    if own:
-        return np.concatenate(
-            [places[:, joint, None] + rotated(turned[:, joint, None], skin[joint]) for joint in own], 1
-        )
-    bones = {bone: source[:, HUMANOID.index(bone)] for bone in fitted.heights}
-    return fitted.soles(bones, places)
-
-
-def _still(example: Motion, fitted: Fitted) -> tuple[Skeleton, Array]:
-    """The skeleton and local rotations (J, 3, 3) of joints that are no bones: at rest, or as in the first frame."""
-    skeleton = skeleton_of(example)
-    if fitted.at_rest:
-        return skeleton, np.tile(np.eye(3), (len(skeleton.joints), 1, 1))
-    first = example[:1]
-    offsets = local_translations(first)[0].tolist()
-    offsets[0] = skeleton.joints[0].offset
-    joints = [replace(joint, offset=tuple(offset)) for joint, offset in zip(skeleton.joints, offsets, strict=True)]
-    return Skeleton(tuple(joints), skeleton.metres_per_unit), local_rotations(first)[0]
-
-
 def _figure_rotations(source: Array, fitted: Fitted, skeleton: Skeleton, still: Array) -> Array:
     """Rotations in the world (T, J, 3, 3) of a figure's joints, from those of the humanoid's."""
     joint_map = fitted.joint_map
     wanted = {joint: source[:, HUMANOID.index(bone)] for bone, joint in joint_map.joints.items()}
-    back = [source[:, HUMANOID.index(bone)] for bone in ("hips", *SPINE)]
-    wanted |= dict(zip(joint_map.spine, _chain(back, len(joint_map.spine)), strict=True))
-    neck = [source[:, HUMANOID.index(bone)] for bone in (SPINE[-1], *NECK)]
+    back, neck = (
+        [source[:, HUMANOID.index(bone)] for bone in chain] for chain in (("hips", *SPINE), (SPINE[-1], *NECK))
+    )
+    wanted |= dict(zip(joint_map.spine, _spread(back, len(joint_map.spine)), strict=True))
     # the head is the last of the chain, whether the figure has a joint for it or not
-    shared = _chain(neck, len(joint_map.neck) + ("head" in joint_map.joints))
+    shared = _spread(neck, len(joint_map.neck) + ("head" in joint_map.joints))
     wanted |= dict(zip(joint_map.neck, shared, strict=False))
     wanted.setdefault(joint_map.carrier(skeleton), wanted[joint_map.joints["hips"]])
     # a joint between forearm and hand, as CMU's wrists, takes the hand's twist
     hands = {joint_map.joints.get(sided(side, "Hand")) for side in LEFT_RIGHT} - {None}
     turned = frames_last((len(source), len(skeleton.joints), 3, 3))
-    bones = list(wanted)
-    turned[:, bones] = product(side_by_side(list(wanted.values()), len(source)), inverse(fitted.aligned[bones]))
+    known = list(wanted)
+    turned[:, known] = product(side_by_side(list(wanted.values()), len(source)), inverse(fitted.aligned[known]))
     for i, joint in enumerate(skeleton.joints):
         if i not in wanted:
             turned[:, i] = product(turned[:, joint.parent], still[i]) if i else still[0]
@@ -332,24 +328,59 @@ def _figure_rotations(source: Array, fitted: Fitted, skeleton: Skeleton, still: 
     return turned
 
 
-def _chain(chain: list[Array], count: int) -> list[Array]:
-    return list(np.moveaxis(spread(side_by_side(chain, len(chain[0])), count), 1, 0)) if count else []
+FINGER_SHARES = {"thumb": 0.5, "index": 0.8, "mid": 1.0, "ring": 1.15, "pinky|little": 1.3}
+"""What the names of a finger's joints hold, and how far it is bent in a relaxed hand, times a finger's bend."""
 
 
-def spread(chain: Array, count: int) -> Array:
-    """World rotations (T, count, 3, 3) of another chain with the same ends, from those of a chain (T, N + 1, 3, 3).
+def relaxed(skeleton: Skeleton, still: Array, joints: Mapping[str, int]) -> Array:
+    """Local rotations (J, 3, 3) of a pose with its hands relaxed; those of hands without such fingers stay.
 
-    The first rotation is that of the joint that carries the chain and is not among the result; the last of both
-    chains is the same. Between joints rotations go the shortest way, by how far up the chain they are.
+    joints: of the humanoid's bones; "leftHand" and "rightHand" count. Fingers bend a little, more from index to little
+    finger, in the plane of themselves and the palm's normal, the thumb towards the other fingers, too; the side of the
+    palm is told by where the knuckles of index and other fingers lie. What is bent at rest already counts.
     """
-    last = chain.shape[1] - 1
-    places = np.arange(1, count + 1) * last / count
-    below = np.ceil(places).astype(int) - 1
-    part = places - below
-    shared: Array = chain[:, below + 1]
-    inner = np.flatnonzero(part < 1)
-    if len(inner):
-        lower = chain[:, below[inner]]
-        turn = rotmat_to_rotvec(product(inverse(lower), shared[:, inner]))
-        shared[:, inner] = product(lower, rotvec_to_rotmat(turn * part[inner, None]))
-    return shared
+    turns, places = chained(skeleton, still[None].copy(), skeleton.offsets[None].copy())
+    bent = still.copy()
+    for side, sign in zip(LEFT_RIGHT, (-1.0, 1.0), strict=True):
+        hand = joints.get(sided(side, "Hand"))
+        fingers = {} if hand is None else _fingers(skeleton, hand)
+        knuckles = {finger: places[0, chain[0]] for finger, chain in fingers.items() if finger != "thumb"}
+        if hand is None or "index" not in knuckles or len(knuckles) < 2:
+            continue
+        along = unit(np.mean(list(knuckles.values()), axis=0) - places[0, hand])
+        across = unit(knuckles[list(knuckles)[-1]] - knuckles["index"])
+        palm = unit(sign * np.cross(along, across))
+        for finger, chain in fingers.items():
+            pointing = [unit(places[0, after] - places[0, joint]) for joint, after in pairwise(chain)]
+            # the last joint, where it has no tip, points where the one before it does
+            pointing = [*pointing, *pointing[-1:]] or [np.zeros(3)]
+            thumb = finger == "thumb"
+            start = pointing[0] if thumb else along
+            axis = np.cross(start, palm + across if thumb else palm)
+            for joint, turn in zip(chain, _bends([start, *pointing], axis, FINGER_SHARES[finger]), strict=False):
+                bent[joint] = bent[joint] @ rotvec_to_rotmat(turns[0, joint].T @ turn)
+    return bent
+
+
+def _bends(pointing: list[Array], axis: Array, share: float) -> Iterator[Array]:
+    """Rotation vectors (3,) that bend each bone against the one before it, about what of the axis is across it."""
+    # degrees by which the three joints of a finger are bent in a hand at rest
+    for before, bone, degrees in zip(pointing, pointing[1:], (15.0, 25.0, 15.0), strict=False):
+        across = unit(axis - (axis @ bone) * bone)
+        now = np.arctan2(np.cross(before, bone) @ across, before @ bone - (before @ across) * (bone @ across))
+        yield max(0.0, np.radians(degrees) * share - float(now)) * across
+
+
+def _fingers(skeleton: Skeleton, hand: int) -> dict[str, list[int]]:
+    """The fingers of a hand by the names of its joints: the joints of each, from the knuckle on."""
+    fingers: dict[str, list[int]] = {}
+    for joint in skeleton.subtree(skeleton.names[hand]):
+        name = skeleton.names[joint].lower()
+        finger = next((words for words in FINGER_SHARES if re.search(words, name)), None)
+        within_palm = finger != "thumb" and re.search("meta|carpal|palm|inhand", name)
+        if joint == hand or finger is None or within_palm:
+            continue
+        chain = fingers.setdefault(finger, [joint])
+        if skeleton.joints[joint].parent == chain[-1]:
+            chain.append(joint)
+    return {finger: fingers[finger] for finger in FINGER_SHARES if finger in fingers}
