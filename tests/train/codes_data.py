@@ -8,8 +8,8 @@ from click.testing import CliRunner
 from language_data import walker
 
 from motet.cli import main
+from motet_train.data.corpus import Record
 from motet_train.data.preparation import Preparation
-from motet_train.data.records import Record
 from motet_train.data.store import Store, prepare
 from motet_train.runs import Run
 

@@ -7,8 +7,8 @@ import numpy as np
 
 from motet.motion.motion import Motion
 from motet.motion.skeleton import Joint, Skeleton
+from motet_train.data.corpus import Record
 from motet_train.data.preparation import Preparation
-from motet_train.data.records import Record
 from motet_train.data.store import Store, prepare
 
 SKELETON = Skeleton(

@@ -12,11 +12,9 @@ from codes_data import ACTIONS, TEXT, small_store, trained
 from torch import nn
 
 from motet.cli import main
-from motet_train.data.actions import actions_of
 from motet_train.data.errors import DataError
-from motet_train.data.mirror_text import mirror_text
+from motet_train.data.sentences import actions_of, mirror_text, principal, read_word_vectors
 from motet_train.data.store import Store
-from motet_train.data.word_vectors import principal, read_word_vectors
 from motet_train.models.action_net import ActionNet, ActionsConfig, stem, stems_of
 from motet_train.recipes.actions import Said
 from motet_train.recipes.language import divided

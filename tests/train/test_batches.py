@@ -8,10 +8,9 @@ from language_data import small_store, walker
 from motet.models.language import RULES
 from motet.motion.mirroring import mirror
 from motet.representation.root_block import to_root_block
-from motet_train.data.batch import Batch
-from motet_train.data.batches import Examples, examples, frame_mirror
+from motet_train.data.batches import Batch, Examples, examples, frame_mirror
 from motet_train.data.errors import DataError
-from motet_train.data.mirror_text import mirror_text
+from motet_train.data.sentences import mirror_text
 from motet_train.data.store import Store
 from motet_train.recipes.language import divided
 

@@ -12,8 +12,8 @@ from codes_data import CODEC, CODES, TEXT, small_store, trained
 from torch import Tensor, nn
 
 from motet.cli import main
-from motet_train.data.actions import actions_of
-from motet_train.data.code_windows import CodedMotion, CodeWindows, memory_of
+from motet_train.data.sentences import actions_of
+from motet_train.data.sixd_windows import CodedMotion, CodeWindows, memory_of
 from motet_train.data.store import Store
 from motet_train.models.action_net import ActionsConfig
 from motet_train.models.codec import CodecConfig, MotionCodec

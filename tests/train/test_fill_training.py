@@ -22,11 +22,10 @@ from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
 from motet.representation.placed import PLACED_CHANNELS, bridge, mirror, placed, placed_by_way, pose_of, unplaced
 from motet_train.data.batches import frame_mirror
+from motet_train.data.corpus import Record
 from motet_train.data.errors import DataError
-from motet_train.data.gap_windows import GapWindow, GapWindows, gap_window
-from motet_train.data.records import Record
-from motet_train.data.split import split
-from motet_train.data.store import Store, prepare
+from motet_train.data.sixd_windows import GapWindow, GapWindows, gap_window
+from motet_train.data.store import Store, prepare, split
 from motet_train.evaluate.fill.report import FILL_GOALS, fill_report
 from motet_train.evaluate.tables import reached
 from motet_train.models.filler import Filler, FillerConfig

@@ -16,10 +16,10 @@ from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.kinematics import positions
 from motet.representation.contract import MotionContract
 from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS
-from motet_train.data.alike import alike
+from motet_train.data.batches import Pairs, views
 from motet_train.data.preparation import Preparation
+from motet_train.data.sentences import alike
 from motet_train.data.store import Store, prepare
-from motet_train.data.views import Pairs, views
 from motet_train.models.joint_embedding import (
     SMALLEST,
     JointEmbedding,

@@ -8,7 +8,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from motet_train.data.batch import Batch
+from motet_train.data.batches import Batch
 from motet_train.models.motion_to_language import (
     EOS,
     PAD,

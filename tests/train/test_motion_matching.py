@@ -19,9 +19,8 @@ from motet.motion.pose import Pose
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract, named
 from motet_train.data.cmu_trials import CMU_FOLDER
-from motet_train.data.gaits import Gait, read_gaits
-from motet_train.data.locomotion import Recording
-from motet_train.data.matching_rows import MatchingRows, mirrored_poses, rows_of
+from motet_train.data.matching_rows import MatchingRows, Recording, mirrored_poses, rows_of
+from motet_train.data.table import Gait, read_gaits
 from motet_train.models.kinematics import tree_of
 from motet_train.models.matching import DTYPES, Matching, MatchingConfig
 from motet_train.recipes.matching_table import take

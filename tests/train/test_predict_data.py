@@ -18,13 +18,11 @@ from motet.motion.rotations import continuous_rotvec, rotmat_to_euler, rotmat_to
 from motet.motion.skeleton import END_SUFFIX
 from motet.representation.contract import MotionContract, named
 from motet_train.data.cmu_trials import CMU_FOLDER
+from motet_train.data.corpus import Record
 from motet_train.data.errors import DataError
-from motet_train.data.predict_data import Material, store_material
+from motet_train.data.predict_data import Material, Windows, store_material
 from motet_train.data.preparation import FULL, VECTORS, Preparation
-from motet_train.data.records import Record
-from motet_train.data.split import split
-from motet_train.data.store import Store, prepare
-from motet_train.data.windows import Windows
+from motet_train.data.store import Store, prepare, split
 from motet_train.models.kinematics import VectorPlaces
 from motet_train.papers.li2018.expmap_files import (
     CMU_LAYOUT,

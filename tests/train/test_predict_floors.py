@@ -12,9 +12,9 @@ from motet.formats import read_motion
 from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.kinematics import chained, local_rotations, local_translations, positions
 from motet_train.data.cmu_trials import CMU_FOLDER
+from motet_train.data.corpus import Record
 from motet_train.data.errors import DataError
 from motet_train.data.preparation import VECTORS
-from motet_train.data.records import Record
 from motet_train.data.store import prepare
 from motet_train.evaluate.predict import mocap_floors
 from motet_train.evaluate.predict.floors import CONSTANT, DAMPED, FLOORS, OF_JOINTS, ZERO, best, gone_on, key, reach

@@ -16,8 +16,7 @@ from motet.motion.motion import Motion
 from motet.motion.pose import Pose
 from motet.representation.contract import named
 from motet_train.data.cmu_trials import CMU_FOLDER
-from motet_train.data.locomotion import Recording
-from motet_train.data.matching_rows import rows_of
+from motet_train.data.matching_rows import Recording, rows_of
 from motet_train.evaluate.steer.following import PACES, aside_errors, speed_errors, turn_errors
 from motet_train.evaluate.steer.standing import standing, stretches
 from motet_train.evaluate.steer.track import Track, tracks_of

@@ -22,9 +22,9 @@ from motet.motion.humanoid.bones import HUMANOID, sole_points
 from motet.motion.kinematics import global_transforms
 from motet.representation.contract import named
 from motet_train.data.cmu_trials import CMU_FOLDER
+from motet_train.data.corpus import Record
 from motet_train.data.errors import DataError
-from motet_train.data.locomotion import gaits_of, recordings
-from motet_train.data.records import Record
+from motet_train.data.matching_rows import gaits_of, recordings
 from motet_train.data.store import Store, prepare
 from motet_train.evaluate.steer import following, standing
 from motet_train.evaluate.steer.report import Recorded, seldom, steer_report, steer_text

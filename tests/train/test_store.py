@@ -19,13 +19,10 @@ from motet.motion.motion import Motion
 from motet.representation.contract import LIVING_STD
 from motet.representation.root_block import ROOT_BLOCK, from_root_block
 from motet_train.data.cmu_trials import CMU_FOLDER
-from motet_train.data.corpus import read_corpus
+from motet_train.data.corpus import Record, Skipped, read_corpus
 from motet_train.data.errors import DataError
-from motet_train.data.preparation import ANGLES, FULL, SIXD, VECTORS, Preparation, preparation
-from motet_train.data.records import Record, Skipped
-from motet_train.data.split import split
-from motet_train.data.store import Entry, Store, prepare
-from motet_train.data.trim import trim
+from motet_train.data.preparation import ANGLES, FULL, SIXD, VECTORS, Preparation, preparation, trim
+from motet_train.data.store import Entry, Store, prepare, split
 
 PLAIN = Preparation("root_angles", humanoid=False, trim=False, cut=False)
 

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import torch
 
-from motet_train.data.batch import Batch
+from motet_train.data.batches import Batch
 from motet_train.models.motion_to_language import SummaryHead, summary
 from motet_train.papers.plappert2017.language_to_motion import LanguageToMotion, LanguageToMotionConfig
 

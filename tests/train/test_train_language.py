@@ -180,7 +180,7 @@ def test_a_corpus_is_prepared_beside_the_run(tmp_path: Path) -> None:
     out = tmp_path / "runs" / "mine"
     given = ("--sentences", tmp_path / "said.tsv", "--epochs", 1)
     refused = motet("train", "describe", "--data", folder, "--out", out, *given)
-    assert "what is no human figure is prepared with --figure own" in refused.output
+    assert "figures that are not human need --figure own" in refused.output
     run = trained("describe", folder, out, "--figure", "own", *given)
     assert run.manifest["training"]["data"]["motions"] == 12
     assert len(Store.open(tmp_path / "runs" / "mine-store").records) == 12

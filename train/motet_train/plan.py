@@ -78,7 +78,7 @@ class Plan:
     """What is trained on, and where to.
 
     data: a corpus (:func:`motet_train.data.corpus.read_corpus`), or where its store is. out: the folder of the runs,
-    and of the corpus' store. verbs: which. by: how motions are divided, see :func:`motet_train.data.split.split`.
+    and of the corpus' store. verbs: which. by: how motions are divided, see :func:`motet_train.data.store.split`.
     vectors: of words, from which the net of actions starts. changes: of stages' recipes, by name
     (:func:`motet_train.settings.read_stages`). about: of the runs but for their names.
     """

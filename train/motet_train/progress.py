@@ -12,7 +12,7 @@ from typing import Any
 from tqdm import tqdm
 
 from motet_train import distributed
-from motet_train.data.records import Record, Skipped
+from motet_train.data.corpus import Record, Skipped
 from motet_train.runs import RunError
 
 log = logging.getLogger("motet.train")

@@ -8,13 +8,11 @@ import click
 from motet.representation.contract import named
 from motet_train import distributed
 from motet_train.cli.train_options import unit_in, with_options
-from motet_train.data.corpus import Corpus, read_corpus
+from motet_train.data.corpus import Corpus, Record, read_corpus
 from motet_train.data.errors import DataError
-from motet_train.data.gaits import read_gaits
 from motet_train.data.preparation import ALL, FIGURES, Preparation, preparation
-from motet_train.data.records import Record
 from motet_train.data.store import INDEX, Store, prepare_parts
-from motet_train.data.table import read_people
+from motet_train.data.table import read_gaits, read_people
 from motet_train.plan import kind_for, store_for
 from motet_train.progress import preparing
 from motet_train.recipes.recipe import Job

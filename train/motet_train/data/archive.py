@@ -18,9 +18,9 @@ BROKEN = (MotionError, DataError, OSError, zipfile.BadZipFile, zlib.error, Runti
 
 
 class Archive:
-    """The files of folders and zips by name, as "amc/01_02.amc", as if they were one; a context manager.
+    """The files of folders and zips by name, such as "amc/01_02.amc", as if they were one; a context manager.
 
-    Of two files of one name that of the later place counts. Hidden files are left out. DataError for a place that is
+    Of two files of one name the one in the later place counts. Hidden files are left out. DataError for a place that is
     neither a folder nor a zip.
     """
 
@@ -28,17 +28,24 @@ class Archive:
         self._sources: dict[str, tuple[Path, zipfile.ZipFile | None]] = {}
         with ExitStack() as stack:
             for path in paths:
-                opened = None if path.is_dir() else stack.enter_context(_opened(path))
-                self._sources |= dict.fromkeys(_files(path, opened), (path, opened))
+                if path.is_dir():
+                    files = (file.relative_to(path).as_posix() for file in path.rglob("*") if file.is_file())
+                    self._sources |= dict.fromkeys(files, (path, None))
+                else:
+                    opened = stack.enter_context(_opened(path))
+                    files = (name for name in opened.namelist() if not name.endswith("/"))
+                    self._sources |= dict.fromkeys(files, (path, opened))
             self._borrowed = len(paths) == 1 and paths[0].is_dir()
             self._folder = paths[0]
             if not self._borrowed:
                 self._folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="motet-")))
             self._stack = stack.pop_all()
-        self.names = tuple(sorted(name for name in self._sources if not _hidden(name)))
+        hidden = (".", "__MACOSX")
+        shown = (n for n in self._sources if not any(part.startswith(hidden) for part in PurePosixPath(n).parts))
+        self.names = tuple(sorted(shown))
 
     def origin(self, name: str) -> Path:
-        """What a file is called in errors: its name in the folder or zip that it is of."""
+        """A file's path for errors, with its folder or zip."""
         return self._sources[name][0] / name
 
     def __enter__(self) -> Self:
@@ -50,7 +57,7 @@ class Archive:
         self._stack.close()
 
     def place(self, name: str) -> Path:
-        """Where a file lies; one of a zip or of several places is brought to one folder, and stays until the end.
+        """Where a file lies; one of a zip or of several places is copied to one folder, and stays until the end.
 
         A damaged one raises an error of BROKEN.
         """
@@ -68,19 +75,13 @@ class Archive:
 
     @contextmanager
     def opened(self, name: str) -> Iterator[Path]:
-        """Where a file lies as long as the context lasts."""
+        """Where a file lies, for as long as the context lasts."""
         place = self.place(name)
         try:
             yield place
         finally:
             if not self._borrowed:
                 place.unlink()
-
-
-def _files(path: Path, opened: zipfile.ZipFile | None) -> list[str]:
-    if opened is not None:
-        return [name for name in opened.namelist() if not name.endswith("/")]
-    return [file.relative_to(path).as_posix() for file in path.rglob("*") if file.is_file()]
 
 
 def _opened(path: Path) -> zipfile.ZipFile:
@@ -90,7 +91,3 @@ def _opened(path: Path) -> zipfile.ZipFile:
         return zipfile.ZipFile(path)
     except (zipfile.BadZipFile, OSError) as error:
         raise DataError(f"{path} is neither a folder nor a readable zip file: {error}") from error
-
-
-def _hidden(name: str) -> bool:
-    return any(part.startswith((".", "__MACOSX")) for part in PurePosixPath(name).parts)

@@ -1,31 +1,62 @@
-"""Batches of motions with sentences, out of a store: motions of like length together, little in memory at a time."""
+"""Batches of motions with sentences, out of a store: motions of similar length together, little in memory at a time."""
 
 import sys
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Self
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from torch import Tensor
 
 from motet.bundle.graph import Floats
 from motet.errors import MotionError
 from motet.models.language import MAX_WORDS, RULES, Vocabulary, padded
 from motet.representation.base import FrameMirror
 from motet.representation.contract import MotionContract
-from motet_train.data.batch import Batch
 from motet_train.data.errors import DataError
-from motet_train.data.mirror_text import mirror_text
+from motet_train.data.sentences import alike, mirror_text, usable
 from motet_train.data.store import Store
 
 Ids = NDArray[np.int64]
-Row = tuple[Floats, bool, Ids]
-"""Frames (T, D), whether the motion ends with them, and the ids of a sentence."""
 
-MAX = sys.maxsize
 
-SHUFFLED = 16
-"""Batches that are sorted by length together: more would waste less on padding, and mix motions less."""
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """A batch: fields are tensors with a row for each of B things, or None."""
+
+    def __len__(self) -> int:
+        """B."""
+        return len(getattr(self, fields(self)[0].name))
+
+    def __getitem__(self, rows: slice) -> Self:
+        """Some of the rows, padded like all of them."""
+        return self._each(lambda tensor: tensor[rows])
+
+    def to(self, device: torch.device | str) -> Self:
+        """The same rows on a device."""
+        return self._each(lambda tensor: tensor.to(device))
+
+    def _each(self, changed: Callable[[Tensor], Tensor]) -> Self:
+        tensors = {one.name: getattr(self, one.name) for one in fields(self)}
+        return replace(self, **{name: changed(tensor) for name, tensor in tensors.items() if tensor is not None})
+
+
+@dataclass(frozen=True, eq=False)
+class Batch(Rows):
+    """B motions of up to T frames, each with one sentence of up to W words, padded on the right.
+
+    frames: (B, T, D) float32 in the contract's units; finite, of any value, after the motion's end.
+    lengths: (B,) int64, frames of each motion, at least 1.
+    words: (B, W) int64, ids without SOS and EOS; PAD = 0 after the sentence's end.
+    ended: (B,) bool, whether the motion ends after its last frame rather than being part of a longer one; None: all do.
+    """
+
+    frames: Tensor
+    lengths: Tensor
+    words: Tensor
+    ended: Tensor | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,20 +78,23 @@ class Examples:
         """Visit motions once in batches of at most ``batch``, each with one of its sentences, drawn afresh.
 
         Every down-sampling offset of a motion is a visit of its own; ``offsets`` draws only so many for each. With a
-        mirror every other visit, by chance, is to the mirrored motion and sentence. With
-        ``windows`` a batch takes no more frames of a motion than a number drawn between the two, as often short as
-        long on a logarithmic scale, and from a place drawn afresh.
+        mirror every other visit, by chance, is to the mirrored motion and sentence. With ``windows`` a batch takes at
+        most :func:`drawn_length` frames of a motion, from a random place.
         """
-        longest = windows[1] if windows else MAX
-        visits = [(i, int(offset)) for i in range(len(self.records)) for offset in self._drawn(rng, i, offsets)]
+        longest = windows[1] if windows else sys.maxsize
+        together = 16 * batch  # are sorted by length: more would waste less on padding, and mix motions less
+        visits = [
+            (i, int(offset))
+            for i, record in enumerate(self.records)
+            for offset in rng.permutation(len(self.store.records[record].spans))[:offsets]
+        ]
         shuffled = [visits[i] for i in rng.permutation(len(visits))]
         found = []
-        for start in range(0, len(shuffled), SHUFFLED * batch):
-            alike = shuffled[start : start + SHUFFLED * batch]
-            alike.sort(key=lambda visit: min(self._length(*visit), longest))
-            found += [alike[i : i + batch] for i in range(0, len(alike), batch)]
+        for start in range(0, len(shuffled), together):
+            near = sorted(shuffled[start : start + together], key=lambda visit: min(self._length(*visit), longest))
+            found += [near[i : i + batch] for i in range(0, len(near), batch)]
         for place in rng.permutation(len(found)):
-            limit = round(float(np.exp(rng.uniform(*np.log(windows))))) if windows else MAX
+            limit = drawn_length(rng, windows) if windows else sys.maxsize
             yield _padded([self._visit(rng, i, offset, limit) for i, offset in found[place]])
 
     def everything(self, batch: int, longest: int | None = None) -> Iterator[Batch]:
@@ -71,18 +105,13 @@ class Examples:
         pairs = [(i, sentence) for i, found in enumerate(self.sentences) for sentence in found]
         pairs.sort(key=lambda pair: self._length(pair[0], 0))
         for start in range(0, len(pairs), batch):
-            cut = [(*self._part(i, 0, 0, longest or MAX), s) for i, s in pairs[start : start + batch]]
-            yield _padded(cut)
-
-    def _drawn(self, rng: np.random.Generator, i: int, offsets: int | None) -> Ids:
-        count = len(self.store.records[self.records[i]].spans)
-        return rng.permutation(count)[:offsets]
+            yield _padded([(*self._part(i, 0, 0, longest or sys.maxsize), s) for i, s in pairs[start : start + batch]])
 
     def _length(self, i: int, offset: int) -> int:
         start, stop = self.store.records[self.records[i]].spans[offset]
         return stop - start
 
-    def _visit(self, rng: np.random.Generator, i: int, offset: int, longest: int) -> Row:
+    def _visit(self, rng: np.random.Generator, i: int, offset: int, longest: int) -> tuple[Floats, bool, Ids]:
         start = int(rng.integers(max(0, self._length(i, offset) - longest) + 1))
         frames, ended = self._part(i, offset, start, longest)
         sentence = int(rng.integers(len(self.sentences[i])))
@@ -97,11 +126,14 @@ class Examples:
         return frames[start : start + longest], ends
 
 
-def examples(store: Store, records: Sequence[int], vocabulary: Vocabulary, mirror: FrameMirror | None) -> Examples:
-    """The examples of those records that have a sentence which can be used; DataError if there are none.
+def drawn_length(rng: np.random.Generator, windows: tuple[int, int]) -> int:
+    """A number of frames between two, as often short as long on a logarithmic scale."""
+    return round(float(np.exp(rng.uniform(*np.log(windows)))))
 
-    A sentence that is not :func:`usable`, or has no word of the vocabulary, is left out.
-    """
+
+def examples(store: Store, records: Sequence[int], vocabulary: Vocabulary, mirror: FrameMirror | None) -> Examples:
+    """The examples of those records that have a :func:`usable` sentence with a word of the vocabulary; DataError if
+    there are none."""
     kept, sentences, mirrored = [], [], []
     for record in records:
         said = (s for s in store.records[record].sentences if usable(s))
@@ -123,14 +155,72 @@ def frame_mirror(contract: MotionContract) -> FrameMirror:
         raise DataError(f"the motions cannot be mirrored ({error}): train with --no-mirror") from error
 
 
-def usable(sentence: str) -> bool:
-    """Whether a sentence has 1 to MAX_WORDS words."""
-    return 1 <= len(RULES.words(sentence)) <= MAX_WORDS
-
-
-def _padded(rows: Sequence[Row]) -> Batch:
-    """The rows as one batch, padded on the right, sentences with PAD, whose id is 0."""
+def _padded(rows: Sequence[tuple[Floats, bool, Ids]]) -> Batch:
+    """Frames (T, D), whether the motion ends with them, and ids of a sentence, as one batch."""
     frames, lengths = padded([frames for frames, _, _ in rows], "float32")
     sentences, _ = padded([sentence for _, _, sentence in rows], "int64")
     ended = torch.tensor([end for _, end, _ in rows])
     return Batch(torch.from_numpy(frames), torch.from_numpy(lengths), torch.from_numpy(sentences), ended)
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs(Rows):
+    """B motions with two sentences each, which may be the same.
+
+    seen: (B, S) float32, the numbers by which a net knows a motion. words, others: (B, W) int64, ids, PAD = 0 after the
+    end. groups: (B,) int64, equal for rows with a sentence in common.
+    """
+
+    seen: Tensor
+    words: Tensor
+    others: Tensor
+    groups: Tensor
+
+
+@dataclass(frozen=True, eq=False)
+class Views:
+    """N motions, as they are and perhaps mirrored: M = 1 or 2 kinds.
+
+    seen: (M, N, K, S), of each motion K views. sentences: of each kind and motion. groups: (M, N).
+    """
+
+    seen: Tensor
+    sentences: tuple[tuple[tuple[Ids, ...], ...], ...]
+    groups: NDArray[np.int64]
+
+    def epoch(self, rng: np.random.Generator, batch: int) -> Iterator[Pairs]:
+        """Visit every motion once, with mirroring, view and two sentences drawn afresh."""
+        kinds, motions, views, _ = self.seen.shape
+        order = rng.permutation(motions)
+        for start in range(0, motions, batch):
+            rows = order[start : start + batch]
+            kind, view = rng.integers(kinds, size=len(rows)), rng.integers(views, size=len(rows))
+            said = [self.sentences[m][i] for m, i in zip(kind, rows, strict=True)]
+            words, others = (padded([s[rng.integers(len(s))] for s in said], "int64")[0] for _ in range(2))
+            groups = torch.from_numpy(self.groups[kind, rows])
+            yield Pairs(self.seen[kind, rows, view], torch.from_numpy(words), torch.from_numpy(others), groups)
+
+
+def views(
+    examples: Examples, see: Callable[[Tensor, Tensor], Tensor], count: int, windows: tuple[int, int], seed: int
+) -> Views:
+    """``count`` views of each motion of the examples, of any offset and of at most :func:`drawn_length` frames.
+
+    see: from frames (B, T, D) of lengths (B,) to the numbers (B, S) by which a net knows a motion; computed once.
+    """
+    rng, found = np.random.default_rng(seed), []
+    for record in examples.records:
+        parts = []
+        for _ in range(count):
+            offset = int(rng.integers(len(examples.store.records[record].spans)))
+            frames = examples.store.sequence(record, offset)
+            longest = drawn_length(rng, windows)
+            start = int(rng.integers(max(0, len(frames) - longest) + 1))
+            parts.append(frames[start : start + longest])
+        mirrored = [] if examples.mirror is None else [examples.mirror(part) for part in parts]
+        given, lengths = padded([*parts, *mirrored], "float32")
+        found.append(see(torch.from_numpy(given), torch.from_numpy(lengths)))
+    sentences = (examples.sentences,) if examples.mirror is None else (examples.sentences, examples.mirrored)
+    seen = torch.stack(found).reshape(len(found), len(sentences), count, -1).transpose(0, 1)
+    groups = alike([[ids.tobytes() for ids in said] for kind in sentences for said in kind])
+    return Views(seen, sentences, np.array(groups, dtype=np.int64).reshape(len(sentences), -1))

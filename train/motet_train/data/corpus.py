@@ -1,27 +1,56 @@
 """Corpora: motions with sentences, from the KIT Motion-Language data or from mocap files beside a table."""
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
-from motet.formats import CLIPPED, MOCAP, clips, read_motion
+from motet.formats import CLIPPED, MOCAP, clips, mmm, read_motion
 from motet.formats.lines import MARK
-from motet_train.data import kit
+from motet.motion.motion import Motion
 from motet_train.data.archive import BROKEN, Archive
 from motet_train.data.errors import DataError
-from motet_train.data.gaits import Gait
-from motet_train.data.records import Record, Skipped
-from motet_train.data.table import Described, Person, person, read_table
+from motet_train.data.table import Described, Gait, Person, person, read_table
+
+KIT_MOTION, KIT_SENTENCES = "_mmm.xml", "_annotations.json"
+"""Ends of the names of KIT's files."""
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """One motion and what people said about it.
+
+    subject: who moved, if the corpus tells. unseen: sentences whose wordings are for measuring, never for training.
+    take: what it is a part of that must not be divided; "" where it is a take of its own. action: what it shows, named
+    alike for all motions that show it; "" where that is not said. gaits: the ways of moving that it shows.
+    """
+
+    name: str
+    subject: str
+    motion: Motion
+    sentences: tuple[str, ...]
+    unseen: tuple[str, ...] = ()
+    take: str = ""
+    action: str = ""
+    gaits: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Skipped:
+    """A motion of the corpus that cannot be used, and why."""
+
+    name: str
+    reason: str
 
 
 @dataclass(frozen=True)
 class Corpus:
     """A corpus on disk; iterating reads it anew, one motion at a time.
 
-    paths: its folders and zips, of which the later takes the place of the earlier's files. names: the motion files.
-    kit: whether it is KIT's. table: of sentences, None for motions alone. people: who moves in which clips. A motion
-    that cannot be read, comes twice or is not in the table is given as Skipped, and so is a clip of the table without a
-    motion. gaits: which motions show them, beside those of which the table says so.
+    paths: its folders and zips; later ones replace files of earlier ones. names: the motion files. kit: whether it is
+    KIT's. table: of sentences, None for motions alone. people: who moves in which clips. gaits: which motions show
+    them, in addition to what the table says.
     """
 
     paths: tuple[Path, ...]
@@ -39,7 +68,7 @@ class Corpus:
     def __iter__(self) -> Iterator[Record | Skipped]:
         with Archive(*self.paths) as archive:
             if self.kit:
-                found = kit.records(archive)
+                found = kit_recordings(archive)
             else:
                 said = None if self.table is None else read_table(self.table)
                 found = recordings(archive, self.unit, said, self.people)
@@ -59,24 +88,32 @@ def read_corpus(
     described: bool = True,
     gaits: tuple[Gait, ...] = (),
 ) -> Corpus:
-    """The corpus at ``paths``, folders and zips; DataError where it is none.
+    """The corpus at ``paths``, folders and zips; DataError where there is none.
 
     With files ``*_annotations.json`` it is KIT's. Else it has motion files of the types .amc (with .asf) .bvh .npz
-    .glb .vrma and a table of sentences: ``table``, or the only .tsv in the first folder, or the only one beside
-    it. Of two files of one name that of the later place counts. people: who moves in which clips.
+    .glb .vrma and a table of sentences: ``table``, or the only .tsv in the first folder, or the only one beside it.
     unit: the length unit of mocap files that do not state theirs, as in :func:`motet.read`. described: whether its
-    motions need sentences; else a table that is not named is not looked for. gaits: see :class:`Corpus`.
+    motions need sentences; if not, only a named table is used. people, gaits: see :class:`Corpus`.
     """
     places = (paths,) if isinstance(paths, Path) else tuple(paths)
     with Archive(*places) as archive:
         names, motions = archive.names, motion_files(archive)
-    if any(name.endswith(kit.ANNOTATIONS) for name in names):
-        return Corpus(places, tuple(name for name in names if name.endswith(kit.MOTION)), kit=True, gaits=gaits)
+    if any(name.endswith(KIT_SENTENCES) for name in names):
+        return Corpus(places, tuple(name for name in names if name.endswith(KIT_MOTION)), kit=True, gaits=gaits)
     if not motions:
         raise DataError(
-            f"no motion files ({' '.join(MOCAP)}) in {', '.join(map(str, places))}, nor KIT's NNNNN{kit.ANNOTATIONS}"
+            f"no motion files ({' '.join(MOCAP)}) in {', '.join(map(str, places))}, nor KIT's NNNNN{KIT_SENTENCES}"
         )
-    table = table or (_only_table(places[0]) if described else None)
+    if table is None and described:
+        path = places[0]
+        inside = sorted(path.glob("*.tsv")) if path.is_dir() else []
+        found = inside or sorted(path.absolute().parent.glob("*.tsv"))
+        if len(found) != 1:
+            raise DataError(
+                f"{path} needs one table of sentences (.tsv) in it or beside it, with the columns clip and sentence; "
+                f"found: {', '.join(map(str, found)) or 'none'}"
+            )
+        table = found[0]
     return Corpus(places, motions, False, table, people, unit, gaits)
 
 
@@ -103,14 +140,23 @@ def recordings(
             archive.place(name)  # the reader of an AMC file looks for its skeleton near it
     seen: set[str] = set()
     for file, own in _motions(archive):
-        clip = _clip(file, own, table or {})
+        path, behind = PurePosixPath(file), "" if own is None else f"{MARK}{own}"
+        whole = path.with_suffix("").as_posix() + behind
+        clip = whole if whole in (table or {}) else path.stem + behind
         said = Described() if table is None else table.get(clip)
         if said is None:
-            yield Skipped(clip, "no sentence")
+            found: Record | Skipped = Skipped(clip, "no sentence")
         elif clip in seen:
-            yield Skipped(clip, f"a second motion of this name: {file}")
+            found = Skipped(clip, f"a second motion of this name: {file}")
         else:
-            yield _record(archive, file, own, said, person(people, clip), clip, unit)
+            who, told = person(people, clip), (tuple(said.sentences), tuple(said.unseen))
+            try:
+                with archive.opened(file) as place:
+                    motion = read_motion(place, unit=unit, clip=own)
+                found = Record(clip, said.subject or who.subject, motion, *told, who.take, said.action, said.gaits)
+            except BROKEN as error:
+                found = Skipped(clip, archive.reason(error))
+        yield found
         seen.add(clip)
     yield from (Skipped(clip, "no motion file of this name") for clip in table or () if clip not in seen)
 
@@ -118,45 +164,34 @@ def recordings(
 def _motions(archive: Archive) -> Iterator[tuple[str, str | None]]:
     """The motion files of an archive; one of several motions with the name of each."""
     for file in motion_files(archive):
-        names = _clips(archive, file) if PurePosixPath(file).suffix.lower() in CLIPPED else ()
+        names: tuple[str, ...] = ()
+        if PurePosixPath(file).suffix.lower() in CLIPPED:
+            with suppress(*BROKEN), archive.opened(file) as place:  # reading it will say what is wrong
+                names = clips(place)
         yield from ((file, name) for name in (names if len(names) > 1 else (None,)))
 
 
-def _clips(archive: Archive, file: str) -> tuple[str, ...]:
-    try:
-        with archive.opened(file) as place:
-            return clips(place)
-    except BROKEN:  # it is said when the file is read
-        return ()
+def kit_recordings(archive: Archive) -> Iterator[Record | Skipped]:
+    """NNNNN_mmm.xml with the sentences of NNNNN_annotations.json; Skipped where there are none or a file is damaged."""
+    names = frozenset(archive.names)
+    for stem in (name.removesuffix(KIT_MOTION) for name in archive.names if name.endswith(KIT_MOTION)):
+        found: Record | Skipped = Skipped(stem, "no sentence")
+        try:
+            if sentences := _kit_sentences(archive, stem + KIT_SENTENCES) if stem + KIT_SENTENCES in names else ():
+                with archive.opened(stem + KIT_MOTION) as place:
+                    who = mmm.motion_name(place) or stem
+                    found = Record(stem.rpartition("/")[2], who, mmm.read(place), sentences)
+        except BROKEN as error:
+            found = Skipped(stem, archive.reason(error))
+        yield found
 
 
-def _record(
-    archive: Archive, file: str, own: str | None, said: Described, who: Person, clip: str, unit: str | float | None
-) -> Record | Skipped:
-    try:
-        with archive.opened(file) as place:
-            motion = read_motion(place, unit=unit, clip=own)
-        subject = said.subject or who.subject
-        return Record(
-            clip, subject, motion, tuple(said.sentences), tuple(said.unseen), who.take, said.action, said.gaits
-        )
-    except BROKEN as error:
-        return Skipped(clip, archive.reason(error))
-
-
-def _clip(file: str, own: str | None, table: Mapping[str, Described]) -> str:
-    """The name of a motion in the table: its file's path without the extension, or else its stem; and its own name."""
-    path, behind = PurePosixPath(file), "" if own is None else f"{MARK}{own}"
-    whole = path.with_suffix("").as_posix() + behind
-    return whole if whole in table else path.stem + behind
-
-
-def _only_table(path: Path) -> Path:
-    inside = sorted(path.glob("*.tsv")) if path.is_dir() else []
-    found = inside or sorted(path.absolute().parent.glob("*.tsv"))
-    if len(found) != 1:
-        raise DataError(
-            f"{path} needs one table of sentences (.tsv) in it or beside it, with the columns clip and sentence; "
-            f"found: {', '.join(map(str, found)) or 'none'}"
-        )
-    return found[0]
+def _kit_sentences(archive: Archive, name: str) -> tuple[str, ...]:
+    with archive.opened(name) as path:
+        try:
+            found = json.loads(path.read_text(encoding="utf-8"))
+        except ValueError as error:
+            raise DataError(f"{path.name} is not JSON: {error}") from error
+        if not (isinstance(found, list) and all(isinstance(sentence, str) for sentence in found)):
+            raise DataError(f"{path.name} is not a list of sentences")
+    return tuple(sentence.strip() for sentence in found if sentence.strip())

@@ -1,6 +1,11 @@
-"""The rows of motion matching: what a loop needs to know of each recorded frame (:mod:`motet.decode.matching`)."""
+"""The rows of motion matching: what its loop needs to know of each recorded frame (:mod:`motet.decode.matching`).
 
+Letters in shapes: T frames, N rows, J bones, F features, G gaits.
+"""
+
+from collections import Counter
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,34 +15,86 @@ from motet.motion.feet.contacts import contacts_of
 from motet.motion.humanoid import BONES, HUMANOID, LEFT_RIGHT, ground_under, sided, sole_points
 from motet.motion.kinematics import global_transforms
 from motet.motion.motion import Motion
-from motet.motion.rotations import Array, rotmat_to_quat
+from motet.motion.rotations import Array, rotmat_to_quat, rotmat_to_rotvec
 from motet.motion.skeleton import partners_of
 from motet.representation.contract import named
 from motet.representation.root_sixd import ROOT_SIXD, joint_rotations
-from motet_train.data.locomotion import Recording
+from motet_train.data.errors import DataError
 from motet_train.data.sixd_windows import poses_of
+from motet_train.data.store import Store
+from motet_train.data.table import Gait, read_gaits
 
-WEIGHTS = {
-    "places": 1.0,
-    "facings": 1.5,
-    "speed": 2.5,
-    "feet": 0.75,
-    "feet_speeds": 1.0,
-    "hips_speed": 1.0,
-    "hands": 0.5,
+GROUPS = {
+    "places": (2 * HORIZONS, 1.0),
+    "facings": (2 * HORIZONS, 1.5),
+    "speed": (1, 2.5),
+    "feet": (6, 0.75),
+    "feet_speeds": (6, 1.0),
+    "hips_speed": (3, 1.0),
+    "hands": (6, 0.5),
 }
-"""How much each group of features counts; most as in Holden's "Learned Motion Matching" (2020)."""
+"""Groups of features, the length of each and its weight; most as in Holden's "Learned Motion Matching" (2020)."""
 
-LENGTHS = (2 * HORIZONS, 2 * HORIZONS, 1, 6, 6, 3, 6)
-"""Of the groups."""
 
-AS_RECORDED = frozenset({"jump"})
-"""Gaits that are played neither faster nor slower: what flies falls as it does."""
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """features: a motion in ``root_sixd``. gaits: names of those that it shows."""
 
-STEADY = 0.5
-"""Seconds over which the speed of a row is the mean."""
+    features: Motion
+    gaits: frozenset[str]
 
-TRACKED = ("hips", *(sided(side, part) for part in ("Toes", "Hand") for side in LEFT_RIGHT))
+
+def gaits_of(store: Store) -> tuple[Gait, ...]:
+    """The gaits that a store's records name, that of the most frames first; CMU's and ACCAD's where none is named."""
+    frames = Counter[str]()
+    for record in store.records:
+        frames.update(dict.fromkeys(record.gaits, sum(stop - start for start, stop in record.spans)))
+    return tuple(Gait(name, (), ()) for name, _ in frames.most_common()) or read_gaits()
+
+
+def recordings(store: Store, gaits: tuple[Gait, ...], held: bool = True) -> list[Recording]:
+    """The recordings of a store that show gaits, of 1.5 s or more; DataError where a gait has none.
+
+    held: their feet are held to the ground.
+    """
+    representation, found = named(store.representation), list[Recording]()
+    for index, record in enumerate(store.records):
+        shown = frozenset(g.name for g in gaits if g.name in record.gaits or g.shown(record.shows, record.subject))
+        if not shown:
+            continue
+        features = store.motion(index)
+        if held:
+            features = representation.planted(features)
+        pieces = _jumps(features) if shown == {"jump"} else _sound(features)
+        found += [Recording(piece, shown) for piece in pieces if len(piece) >= 1.5 * store.fps]
+    missing = [gait.name for gait in gaits if not any(gait.name in one.gaits for one in found)]
+    if missing:
+        how = "name gaits in a column gait of the table of sentences, or give motet prepare a table of them, --gaits"
+        raise DataError(f"no recording of 1.5 s shows the gait {missing[0]!r}: {how}")
+    return found
+
+
+def _sound(features: Motion) -> list[Motion]:
+    """The parts of a recording without flaws, where a bone other than the toes turns by over 45 degrees in a frame.
+
+    Its first and last frames, where flaws are common, are left out.
+    """
+    turns = [
+        np.degrees(np.linalg.norm(rotmat_to_rotvec(np.swapaxes(local[:-1], 1, 2) @ local[1:]), axis=1))
+        for bone, local in joint_rotations(features).items()
+        if not bone.endswith("Toes")
+    ]
+    flaws = np.flatnonzero(np.max(turns, axis=0) > 45.0)
+    edges = [1, *(flaws + 1).tolist(), len(features) - 1]
+    return [features[start:stop] for start, stop in pairwise(edges) if stop > start]
+
+
+def _jumps(features: Motion) -> list[Motion]:
+    """The parts of a recording up to half a second before and after the hips are 6 cm above their median height."""
+    height, reach = features.select(("root.height",)).values[:, 0], round(0.5 * features.fps)
+    high = np.convolve(height > np.median(height) + 0.06, np.ones(2 * reach + 1), "same") > 0
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], high, [False]]).astype(int))).reshape(-1, 2)
+    return [features[start:stop] for start, stop in edges.tolist()]
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,15 +120,15 @@ class MatchingRows:
 
 
 def rows_of(found: list[Recording], gaits: tuple[str, ...], how: SteeringSettings) -> MatchingRows:
-    """The rows of recordings on the humanoid; quaternions of a bone lie on one half of their sphere, where they can.
+    """The rows of recordings on the humanoid, quaternions of a bone on one half of their sphere where they can be.
 
-    Those of gaits in ``AS_RECORDED`` have no speed: they are played as they are.
+    Jumps have no speed, as they are played neither faster nor slower: who flies falls at a rate of its own.
     """
     parts = [_rows(one.features, how) for one in found]
     poses, moves, speed, contacts, features = (np.concatenate(column) for column in zip(*parts, strict=True))
     lengths = [len(one.features) for one in found]
     shown = np.repeat([[gait in one.gaits for gait in gaits] for one in found], lengths, axis=0)
-    speed = np.where(np.repeat([one.gaits <= AS_RECORDED for one in found], lengths), 0.0, speed)
+    speed = np.where(np.repeat([one.gaits <= {"jump"} for one in found], lengths), 0.0, speed)
     left = np.concatenate([np.arange(length)[::-1] for length in lengths])
     return MatchingRows(_aligned(poses), moves, speed, contacts, features, shown, left)
 
@@ -84,11 +141,14 @@ def _rows(features: Motion, how: SteeringSettings) -> tuple[Array, Array, Array,
     soles[..., 1] -= ground_under(soles)
     touch = contacts_of(soles, features.fps).reshape(-1, 2, 3).max(axis=2)
     contacts = np.concatenate([touch[:1], touch])
-    speed = _mean(np.hypot(block[:, 0], block[:, 1]), round(STEADY * features.fps))
+    speed = np.hypot(block[:, 0], block[:, 1])
+    window = np.ones(min(round(0.5 * features.fps), len(speed)))  # half a second
+    speed = np.convolve(speed, window, "same") / np.convolve(np.ones(len(speed)), window, "same")
     local = joint_rotations(features)
     quats = np.stack([rotmat_to_quat(local[bone]) for bone in BONES], axis=1)
     poses = np.column_stack([quats.reshape(len(features), -1), block[:, 3]])
-    points = places[:, [HUMANOID.index(joint) for joint in TRACKED]]
+    tracked = ("hips", *(sided(side, part) for part in ("Toes", "Hand") for side in LEFT_RIGHT))
+    points = places[:, [HUMANOID.index(joint) for joint in tracked]]
     times = horizons(how)
     soon = speed[np.minimum(np.arange(len(speed)) + round(times[1] * features.fps), len(speed) - 1)]
     known = [_trajectory(way, times, features.fps), speed_feature(soon, how)[:, None], _now(points, way, features.fps)]
@@ -119,27 +179,14 @@ def _now(points: Array, way: Array, fps: float) -> Array:
     """The features (T, 21) of points (T, 5, 3) in the world, of hips, feet and hands."""
     speeds = np.gradient(points, axis=0) * fps
     from_root = points - np.insert(way[:, None, :2], 1, 0.0, axis=2)
-    groups = (from_root[:, 1:3], speeds[:, 1:3], speeds[:, :1], from_root[:, 3:])
-    turned = [_turned(values, way[:, 2]) for values in groups]
-    return np.concatenate([values.reshape(len(points), -1) for values in turned], axis=1)
-
-
-def _turned(points: Array, facing: Array) -> Array:
-    found = np.array(points)
-    for joint in range(points.shape[1]):
-        found[:, joint, [0, 2]] = seen(points[:, joint][:, [0, 2]], facing)
-    return found
-
-
-def _mean(values: Array, count: int) -> Array:
-    """The mean over so many values around each."""
-    window = np.ones(min(count, len(values)))
-    found: Array = np.convolve(values, window, "same") / np.convolve(np.ones(len(values)), window, "same")
-    return found
+    now = np.concatenate([from_root[:, 1:3], speeds[:, 1:3], speeds[:, :1], from_root[:, 3:]], axis=1)
+    for joint in range(now.shape[1]):
+        now[:, joint, [0, 2]] = seen(now[:, joint][:, [0, 2]], way[:, 2])
+    return now.reshape(len(now), -1)
 
 
 def _aligned(poses: Array) -> Array:
-    """Quaternions with the signs that are nearest to their bone's mean one; the mirror image keeps to the same."""
+    """Poses with the signs of quaternions that are nearest to their bone's mean one, also for the mirror image."""
     quats = poses[:, :-1].reshape(len(poses), -1, 4)
     mean = quats[0]
     for _ in range(3):
@@ -149,7 +196,7 @@ def _aligned(poses: Array) -> Array:
 
 
 def mirrored_poses() -> tuple[NDArray[np.intp], Array]:
-    """Of which columns (P,), with which signs (P,), the pose of a mirror image is made."""
+    """The columns (P,) and signs (P,) that make the pose of the mirror image."""
     partners = np.array(partners_of(BONES))
     columns = (4 * partners[:, None] + np.arange(4)).ravel()
     signs = np.tile([1.0, -1.0, -1.0, 1.0], len(BONES))
@@ -157,9 +204,10 @@ def mirrored_poses() -> tuple[NDArray[np.intp], Array]:
 
 
 def scaling(features: Array) -> tuple[Array, Array]:
-    """Mean and scale (F,) that weigh groups of features; a mirror image is scaled alike."""
+    """Mean and scale (F,) that weigh groups of features, the same for a mirror image."""
     columns, signs = mirrored_features()
     both = np.concatenate([features, features[:, columns] * signs])
-    groups = np.split(both.var(axis=0), np.cumsum(LENGTHS)[:-1])
-    scale = [weight / np.sqrt(group.mean()) for weight, group in zip(WEIGHTS.values(), groups, strict=True)]
-    return both.mean(axis=0), np.repeat(scale, LENGTHS)
+    lengths, weights = zip(*GROUPS.values(), strict=True)
+    groups = np.split(both.var(axis=0), np.cumsum(lengths)[:-1])
+    scale = [weight / np.sqrt(group.mean()) for weight, group in zip(weights, groups, strict=True)]
+    return both.mean(axis=0), np.repeat(scale, lengths)

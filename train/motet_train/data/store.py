@@ -1,14 +1,14 @@
-"""The store: a corpus prepared once, its frames in one memory-mapped array.
+"""The store: a corpus prepared once, its frames in one memory-mapped array, and divided for training.
 
-A folder with ``frames.npy``, (N, D) float32 in the contract's channels, and ``store.json``, which says what they
-are, where each record's sequences lie, and what was skipped. Or a folder with such a store in each of several
+A folder with ``frames.npy``, (N, D) float32 in the contract's channels, and ``store.json``, which says what they are,
+where each record's sequences lie, and what was skipped. Or a folder with such a store for each of several
 representations, by their names.
 """
 
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -20,9 +20,9 @@ from motet.files import new_folder
 from motet.motion.motion import Motion
 from motet.motion.skeleton import Skeleton
 from motet.representation.contract import MotionContract, living
+from motet_train.data.corpus import Record, Skipped
 from motet_train.data.errors import DataError
 from motet_train.data.preparation import Preparation
-from motet_train.data.records import Record, Skipped
 
 Floats = NDArray[np.float32]
 Item = Record | Skipped
@@ -34,10 +34,9 @@ FRAMES, INDEX = "frames.npy", "store.json"
 class Entry:
     """A record of the store: a motion or a piece of it, for each down-sampling offset the span (start, stop) of frames.
 
-    skeleton: the index of its figure among the store's. unseen: sentences for measuring. take: what must not be
-    divided, which the pieces of a motion have in common. ends: whether the motion ends with it. starts: whether it
-    begins with it. action: what is shown, named alike in all records that show it; "" where it is not said. gaits: the
-    ways of moving that are shown, where that is said.
+    skeleton: the index of its figure among the store's. take: what must not be divided, shared by the pieces of a
+    motion. ends, starts: whether the motion ends and begins with it. Other fields: see
+    :class:`motet_train.data.corpus.Record`.
     """
 
     name: str
@@ -51,6 +50,11 @@ class Entry:
     starts: bool = True
     action: str = ""
     gaits: tuple[str, ...] = ()
+
+    @property
+    def shows(self) -> str:
+        """The action shown, by the name that its corpus gives, or else by the record's own."""
+        return self.action or self.take or self.name
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,11 +155,11 @@ def prepare_parts(
 ) -> None:
     """Write stores of a corpus into the new folder ``path``, whole or not at all, one motion in memory at a time.
 
-    parts: the preparation of each, by its folder inside.
+    parts: the preparation of each, by its folder inside. progress: called with each item when it is done; what some
+    part could not use comes as Skipped.
 
-    The first motion that can be used sets channels and the joints' axes; others are brought to these, and one that
-    lacks channels, or whose bones point elsewhere at rest, is skipped, as is any that the representation refuses.
-    progress: called with each item when it is done; what some part could not use comes as Skipped.
+    The first usable motion sets channels and the joints' axes; others are converted to these, and one that lacks
+    channels, or whose bones point elsewhere at rest, is skipped, as is any that the representation refuses.
     OutputError if there is something at ``path``, DataError if no motion can be used.
     """
     with new_folder(path) as folder, ExitStack() as files:
@@ -195,40 +199,34 @@ class _Writer:
         pieces = self.preparation.pieces(record.motion)
         found = [list(self.preparation.sequences(piece, self.first)) for piece in pieces]
         for number, phases in enumerate(found, start=1):
-            place = number == len(found), number == 1
+            spans = []
+            for features in phases:
+                if self.first is None:
+                    self.first = features
+                    self._header()
+                self.file.write(features.values.astype("<f4").tobytes())
+                spans.append((self.frames, self.frames + len(features)))
+                self.frames += len(features)
+            own, skeleton = None, features.skeleton
+            if skeleton is not None:
+                skeleton = skeleton if skeleton.metres_per_unit is None else skeleton.scaled(1.0)
+                own = self.skeletons.setdefault(skeleton, len(self.skeletons))
             name = record.name if len(found) == 1 else f"{record.name}.{number}"
-            self._write_piece(replace(record, name=name, take=record.take or record.name), phases, place)
-
-    def _write_piece(self, record: Record, phases: Sequence[Motion], place: tuple[bool, bool]) -> None:
-        spans = []
-        for features in phases:
-            if self.first is None:
-                self.first = features
-                self._header()
-            self.file.write(features.values.astype("<f4").tobytes())
-            spans.append((self.frames, self.frames + len(features)))
-            self.frames += len(features)
-        own = None if features.skeleton is None else self._number(features.skeleton)
-        said = record.sentences, tuple(spans), own, record.unseen, record.take, *place, record.action, record.gaits
-        self.entries.append(Entry(record.name, record.subject, *said))
-
-    def _number(self, skeleton: Skeleton) -> int:
-        if skeleton.metres_per_unit is not None:
-            skeleton = skeleton.scaled(1.0)
-        return self.skeletons.setdefault(skeleton, len(self.skeletons))
+            place = record.take or record.name, number == len(found), number == 1
+            said = record.sentences, tuple(spans), own, record.unseen, *place, record.action, record.gaits
+            self.entries.append(Entry(name, record.subject, *said))
 
     def _header(self) -> None:
-        """The header of an NPY file, at the place where the file is: as long whatever the number of frames is."""
+        """Write the header of an NPY file, whose length does not depend on the number of frames."""
         assert self.first is not None
-        shape = (self.frames, len(self.first.channels))
-        header = {"descr": "<f4", "fortran_order": False, "shape": shape}
+        header = {"descr": "<f4", "fortran_order": False, "shape": (self.frames, len(self.first.channels))}
         np.lib.format.write_array_header_1_0(self.file, header)
 
     def finish(self) -> dict[str, Any]:
         """Write the header, now that the number of frames is known; the content of ``store.json``."""
         if self.first is None:
             reasons = "; ".join(f"{item.name}: {item.reason}" for item in self.skipped[:3])
-            other = "; what is no human figure is prepared with --figure own" if self.preparation.humanoid else ""
+            other = "; figures that are not human need --figure own" if self.preparation.humanoid else ""
             raise DataError(f"no motion can be used, {len(self.skipped)} were skipped: {reasons}{other}")
         self.file.seek(0)
         self._header()
@@ -241,3 +239,39 @@ class _Writer:
             "records": [asdict(entry) for entry in self.entries],
             "skipped": [asdict(item) for item in self.skipped],
         }
+
+
+@dataclass(frozen=True)
+class Split:
+    """Indices into the entries of a store, sorted."""
+
+    train: tuple[int, ...]
+    validation: tuple[int, ...]
+    test: tuple[int, ...]
+
+
+def split(entries: Sequence[Entry], seed: int, by: str = "trial") -> Split:
+    """Divide motions .8/.1/.1 by chance (Plappert et al. 2017, section 5.1), the same for the same seed.
+
+    by: "trial", which keeps the pieces of a take together, or "subject" to keep all motions of a person together, so
+    that validation and test show people never seen in training; these parts then have at most .1 each. DataError where
+    a part would be empty.
+    """
+    if by not in ("trial", "subject"):
+        raise DataError(f"motions are split by trial or by subject, not by {by!r}")
+    groups: dict[str, list[int]] = {}
+    for index, entry in enumerate(entries):
+        groups.setdefault(entry.subject if by == "subject" else entry.take or entry.name, []).append(index)
+    wanted = max(1, round(0.1 * len(entries)))
+    parts: list[list[int]] = [[], [], []]
+    for key in np.random.default_rng(seed).permutation(sorted(groups)).tolist():
+        room = [2, 1, 0] if len(parts[1]) >= len(parts[2]) else [1, 2, 0]
+        fits = (part for part in room if part == 0 or len(parts[part]) + len(groups[key]) <= wanted)
+        parts[next(fits)].extend(groups[key])
+    if not all(parts):
+        who = " (who moved: the column subject of the table, or else the name up to its first _)"
+        raise DataError(
+            f"{len(entries)} motions of {len(groups)} {by}s are too few for training, validation and test"
+            + who * (by == "subject")
+        )
+    return Split(*(tuple(sorted(part)) for part in parts))

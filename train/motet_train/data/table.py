@@ -1,5 +1,6 @@
-"""Tables beside mocap files: what is said of each clip, and who moves in which."""
+"""Tables beside mocap files: what is said of each clip, who moves in which, and which gaits they show."""
 
+import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
@@ -7,17 +8,10 @@ from pathlib import Path
 
 from motet_train.data.errors import DataError
 
-POOLS = ("train", "test")
-
 
 @dataclass
 class Described:
-    """What a table says of a clip.
-
-    sentences: to train on. unseen: those whose wordings no training sees. subject: who moved, "" where it is not said.
-    action: what the clip shows, in words that all clips which show it share; "" where it is not said. gaits: which
-    ways of moving it shows, for a figure to be steered by.
-    """
+    """What a table says of a clip; for its fields see :class:`motet_train.data.corpus.Record`."""
 
     sentences: list[str] = field(default_factory=list)
     unseen: list[str] = field(default_factory=list)
@@ -27,20 +21,20 @@ class Described:
 
 
 def read_table(path: Path) -> dict[str, Described]:
-    """What a table says of each clip: tabs between, and a header that has the columns ``clip`` and ``sentence``.
+    """What a table says of each clip: tab-separated, with a header that has the columns ``clip`` and ``sentence``.
 
-    Several lines of a clip give several sentences, empty ones are left out, as are clips without any. A column ``pool``
-    says which are to train on, "train" or empty, and which are kept for measuring, "test". A column ``subject`` says
-    who moved, once for each clip or always alike; a column ``description`` which action is shown; a column ``gait``
-    which ways of moving are, such as "walk" or, of several, "walk, run". DataError names the line that does not fit.
+    Several lines of a clip give several sentences; empty ones are left out, as are clips without any. The other columns
+    are optional. ``pool``: "train" or empty for sentences to train on, "test" for those to measure by. ``subject``: who
+    moved, once for each clip or the same each time. ``description``: which action is shown. ``gait``: which ways of
+    moving, such as "walk" or "walk, run". DataError names the line that does not fit.
     """
     found: dict[str, Described] = {}
     for number, row in _rows(path, "clip", "sentence"):
-        said, pool = found.setdefault(row["clip"], Described()), row.get("pool", "") or POOLS[0]
-        if pool not in POOLS:
-            raise DataError(f"{path}, line {number}: the pool is one of {', '.join(POOLS)}, not {pool!r}")
+        said, pool = found.setdefault(row["clip"], Described()), row.get("pool", "") or "train"
+        if pool not in ("train", "test"):
+            raise DataError(f"{path}, line {number}: the pool is one of train, test, not {pool!r}")
         if row["sentence"]:
-            (said.sentences if pool == POOLS[0] else said.unseen).append(row["sentence"])
+            (said.sentences if pool == "train" else said.unseen).append(row["sentence"])
         subject = row.get("subject", "")
         if subject and said.subject and subject != said.subject:
             raise DataError(
@@ -62,17 +56,17 @@ class Person:
 
 
 def read_people(path: Path) -> tuple[Person, ...]:
-    """Who moves in which clips: a table with the columns ``clip`` and ``subject``, and ``take`` if wanted.
+    """Who moves in which clips: a table with the columns ``clip``, ``subject`` and, optionally, ``take``.
 
-    A clip may be a pattern, as "ACCAD_Male1_*"; of several that fit the first counts. Clips of one take are never
-    divided between training and test. DataError names the line that does not fit.
+    A clip may be a pattern, such as "ACCAD_Male1_*"; the first that fits counts. Clips of one take are never divided
+    between training and test. DataError names the line that does not fit.
     """
     rows = _rows(path, "clip", "subject")
     return tuple(Person(row["clip"], row["subject"], row.get("take", "")) for _, row in rows)
 
 
 def person(people: tuple[Person, ...], clip: str) -> Person:
-    """Who moves in a clip; who is not in the table is called by the clip's name up to its first "_"."""
+    """Who moves in a clip; by default somebody called like the clip up to its first "_"."""
     plain = clip.rpartition("/")[2]
     fits = (row for row in people if fnmatchcase(plain, row.pattern))
     return next(fits, Person(plain, plain.split("_")[0]))
@@ -84,13 +78,42 @@ def _rows(path: Path, *needed: str) -> Iterator[tuple[int, dict[str, str]]]:
         lines = [line.split("\t") for line in path.read_text(encoding="utf-8-sig").split("\n")]
     except (OSError, UnicodeDecodeError) as error:
         raise DataError(f"the table {path} cannot be read: {error}") from error
-    header = [name.strip() for name in lines[0]] if lines else []
+    header = [name.strip() for name in lines[0]]
     if not set(needed) <= set(header):
-        wanted = " and ".join(needed)
-        raise DataError(f"{path}, line 1: the header needs the columns {wanted}, with tabs between: {header}")
+        raise DataError(
+            f"{path}, line 1: the header needs the columns {' and '.join(needed)}, with tabs between: {header}"
+        )
     for number, line in enumerate(lines[1:], start=2):
         if line == [""]:
             continue
         if len(line) != len(header):
             raise DataError(f"{path}, line {number}: {len(line)} columns where the header has {len(header)}")
         yield number, dict(zip(header, map(str.strip, line), strict=True))
+
+
+@dataclass(frozen=True)
+class Gait:
+    """A way of moving that a figure is steered by. actions, people: patterns of what its recordings show, and who."""
+
+    name: str
+    actions: tuple[str, ...]
+    people: tuple[str, ...]
+
+    def shown(self, action: str, person: str) -> bool:
+        """Whether a recording of a person's action shows it."""
+        pairs = ((action, self.actions), (person, self.people))
+        return all(any(fnmatchcase(name, pattern) for pattern in patterns) for name, patterns in pairs)
+
+
+def read_gaits(path: Path | None = None) -> tuple[Gait, ...]:
+    """A table of gaits: each a ``[[gait]]`` with a ``name``, ``actions`` and, where not everybody counts, ``people``.
+
+    By default that of CMU's and ACCAD's recordings, of which the bundle ``control`` is made. DataError where it cannot
+    be read.
+    """
+    path = path or Path(__file__).with_name("gaits.toml")
+    try:
+        rows = tomllib.loads(path.read_text(encoding="utf-8"))["gait"]
+        return tuple(Gait(row["name"], tuple(row["actions"]), tuple(row.get("people", ["*"]))) for row in rows)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise DataError(f"{path} is not a table of gaits: {error}") from error

@@ -16,7 +16,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from motet.bundle.graph import GraphSpec, TensorSpec
-from motet_train.data.views import Pairs
+from motet_train.data.batches import Pairs
 from motet_train.models.kinematics import EulerPlaces, Figure
 from motet_train.models.net import Net, Part, before, normalised
 from motet_train.models.recurrent import WordEmbedding

@@ -13,7 +13,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from motet.bundle.graph import GraphSpec, TensorSpec
-from motet_train.data.batch import Batch
+from motet_train.data.batches import Batch
 from motet_train.models.net import Net, Part, before, normalised
 from motet_train.models.recurrent import GRU, Decoder, Encoder, WordEmbedding
 

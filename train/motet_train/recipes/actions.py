@@ -11,10 +11,9 @@ from torch import Tensor
 from torch.nn import functional
 
 from motet.models.language import RULES, Vocabulary, padded
-from motet_train.data.actions import Actions, actions_of
 from motet_train.data.errors import DataError
+from motet_train.data.sentences import Actions, actions_of, principal, read_word_vectors
 from motet_train.data.store import Store
-from motet_train.data.word_vectors import principal, read_word_vectors
 from motet_train.descent import GradientLearner, Term, Terms, Training
 from motet_train.models.action_net import ActionNet, ActionsConfig, stems_of
 from motet_train.recipes.language import divided, manifest
@@ -44,7 +43,7 @@ RECIPES = {"default": DEFAULT}
 
 @dataclass(frozen=True)
 class WordVectors:
-    """A file of vectors of words (:mod:`motet_train.data.word_vectors`). origin: whose they are, and their licence."""
+    """A file of vectors of words (:mod:`motet_train.data.sentences`). origin: whose they are, and their licence."""
 
     file: Path
     origin: str | None = None

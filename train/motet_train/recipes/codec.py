@@ -16,8 +16,7 @@ from motet.representation.contract import MotionContract
 from motet_train.data.batches import frame_mirror
 from motet_train.data.errors import DataError
 from motet_train.data.sixd_windows import SixdWindows, Window
-from motet_train.data.split import split
-from motet_train.data.store import Store
+from motet_train.data.store import Store, split
 from motet_train.descent import GradientLearner, Term, Terms, Training
 from motet_train.models.codec import CodecConfig, MotionCodec, places_in_world
 from motet_train.models.kinematics import tree_of

@@ -5,9 +5,8 @@ import torch
 from numpy.typing import NDArray
 
 from motet.representation.base import FrameMirror
-from motet_train.data.actions import Actions
-from motet_train.data.code_windows import CodedMotion, Codes
-from motet_train.data.sixd_windows import poses_of, with_way
+from motet_train.data.sentences import Actions
+from motet_train.data.sixd_windows import CodedMotion, Codes, poses_of, with_way
 from motet_train.data.store import Store
 from motet_train.models.codec import MotionCodec
 

@@ -8,10 +8,10 @@ import numpy as np
 import torch
 
 from motet.models.language import Vocabulary
-from motet_train.data.actions import Actions
 from motet_train.data.batches import frame_mirror
-from motet_train.data.code_windows import CodeBatch, CodeWindows, memory_of
 from motet_train.data.errors import DataError
+from motet_train.data.sentences import Actions
+from motet_train.data.sixd_windows import CodeBatch, CodeWindows, memory_of
 from motet_train.data.store import Store
 from motet_train.descent import GradientLearner, Term, Terms, Training
 from motet_train.models.action_net import ActionNet

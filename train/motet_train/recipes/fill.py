@@ -15,9 +15,8 @@ from motet.representation.contract import MotionContract
 from motet.representation.placed import PLACED_CHANNELS
 from motet_train.data.batches import frame_mirror
 from motet_train.data.errors import DataError
-from motet_train.data.gap_windows import GapWindow, GapWindows
-from motet_train.data.split import split
-from motet_train.data.store import Store
+from motet_train.data.sixd_windows import GapWindow, GapWindows
+from motet_train.data.store import Store, split
 from motet_train.descent import GradientLearner, Term, Terms, Training
 from motet_train.models.filler import Filler, FillerConfig
 from motet_train.models.kinematics import tree_of

@@ -14,11 +14,9 @@ from motet.models.describe import ConfidenceSettings, DescribeModel
 from motet.models.language import MAX_SECONDS, RULES, Vocabulary
 from motet.representation.base import FrameMirror
 from motet.representation.contract import MotionContract, named
-from motet_train.data.batch import Batch
-from motet_train.data.batches import Examples, examples, frame_mirror, usable
-from motet_train.data.mirror_text import mirror_text
-from motet_train.data.split import Split, split
-from motet_train.data.store import Store
+from motet_train.data.batches import Batch, Examples, examples, frame_mirror
+from motet_train.data.sentences import mirror_text, usable
+from motet_train.data.store import Split, Store, split
 from motet_train.descent import GradientLearner, Term, Terms
 from motet_train.evaluate.language.confidence import calibrated, judged
 from motet_train.evaluate.language.split_store import SplitStore
@@ -65,7 +63,7 @@ class Divided:
 def divided(store: Store, mirror: bool, by: str = "trial") -> Divided:
     """Divide a store; contract and vocabulary are those of its training part. DataError where that is not possible.
 
-    by: see :func:`motet_train.data.split.split`; the split is drawn with seed 0 whatever the seed of the training is,
+    by: see :func:`motet_train.data.store.split`; the split is drawn with seed 0 whatever the seed of the training is,
     so that runs can be compared and chained.
     """
     parts = split(store.records, 0, by)

@@ -14,8 +14,7 @@ from motet.motion.feet.lock import FootLockSettings
 from motet.motion.humanoid import LEFT_RIGHT, sided
 from motet.representation.contract import MotionContract
 from motet_train.data.errors import DataError
-from motet_train.data.locomotion import gaits_of, recordings
-from motet_train.data.matching_rows import MatchingRows, rows_of
+from motet_train.data.matching_rows import MatchingRows, gaits_of, recordings, rows_of
 from motet_train.data.store import Store
 from motet_train.descent import GradientLearner, Term, Terms, Training
 from motet_train.models.kinematics import tree_of

@@ -8,8 +8,7 @@ import torch
 from torch import Tensor
 
 from motet_train.data.errors import DataError
-from motet_train.data.predict_data import Material
-from motet_train.data.windows import Windows
+from motet_train.data.predict_data import Material, Windows
 from motet_train.descent import GradientLearner, Term, Terms, Training
 from motet_train.models.kinematics import VectorPlaces
 from motet_train.models.predictor import Predictor, PredictorConfig

@@ -21,7 +21,7 @@ SETTINGS = "run.toml"
 
 @dataclass(frozen=True)
 class Visits:
-    """How the windows of motions vary that a predictor is trained on, see :class:`motet_train.data.windows.Windows`."""
+    """How a predictor's training windows vary, see :class:`motet_train.data.predict_data.Windows`."""
 
     warp: float = 0.0
     reverse: float = 0.0

@@ -7,10 +7,9 @@ from torch import Tensor
 from torch.nn import functional
 
 from motet.models.language import RULES, padded
-from motet_train.data.alike import alike
-from motet_train.data.batches import usable
+from motet_train.data.batches import Pairs, views
+from motet_train.data.sentences import alike, usable
 from motet_train.data.store import Store
-from motet_train.data.views import Pairs, views
 from motet_train.descent import GradientLearner, Term, Training
 from motet_train.models.joint_embedding import JointEmbedding, JointEmbeddingConfig
 from motet_train.models.kinematics import figure_of
@@ -23,7 +22,7 @@ from motet_train.runs import Run
 class SearchVisits:
     """How motions are seen: so many views of each, of at most a number of frames drawn between the two; mirrored, too.
 
-    See :func:`motet_train.data.views.views`.
+    See :func:`motet_train.data.batches.views`.
     """
 
     views: int = 8

@@ -14,8 +14,7 @@ from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, sided
 from motet.motion.rotations import Array
 from motet.representation.placed import ROOT_PLACE, bridge, placed_by_way, straight
 from motet_train.data.errors import DataError
-from motet_train.data.split import split
-from motet_train.data.store import Store
+from motet_train.data.store import Store, split
 from motet_train.evaluate.tables import Goals, Report, gathered
 from motet_train.models.kinematics import SixdPlaces, tree_of
 

@@ -13,7 +13,7 @@ from motet.models.language import RULES
 from motet.models.search import Index, IndexSettings, Member, SearchModel
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
-from motet_train.data.alike import alike
+from motet_train.data.sentences import alike
 from motet_train.evaluate.language.floors import retrieved
 from motet_train.evaluate.language.looks import Looks
 from motet_train.evaluate.language.report import origin

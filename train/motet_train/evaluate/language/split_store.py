@@ -14,10 +14,9 @@ from motet.models.language import RULES
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
-from motet_train.data.batches import usable
 from motet_train.data.errors import DataError
-from motet_train.data.split import Split
-from motet_train.data.store import Store
+from motet_train.data.sentences import usable
+from motet_train.data.store import Split, Store
 
 
 @dataclass(frozen=True, eq=False)

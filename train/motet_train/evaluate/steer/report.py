@@ -9,8 +9,7 @@ from motet.decode.matching import SteeringSettings
 from motet.errors import ControlWarning
 from motet.models.steer import SteerModel
 from motet_train.data.errors import DataError
-from motet_train.data.locomotion import Recording, gaits_of, recordings
-from motet_train.data.matching_rows import rows_of
+from motet_train.data.matching_rows import Recording, gaits_of, recordings, rows_of
 from motet_train.data.store import Store
 from motet_train.evaluate.steer.following import aside_errors, speed_errors, turn_errors
 from motet_train.evaluate.steer.standing import MEASURED_SPEEDS, held_on, standing, stretches

@@ -13,8 +13,7 @@ from motet.motion.humanoid import sole_points
 from motet.motion.pose import Pose
 from motet.motion.rotations import Array, quat_to_rotmat
 from motet.representation.root_sixd import ROOT_SIXD
-from motet_train.data.locomotion import Recording
-from motet_train.data.matching_rows import MatchingRows
+from motet_train.data.matching_rows import MatchingRows, Recording
 from motet_train.data.sixd_windows import poses_of
 
 

@@ -14,9 +14,8 @@ from motet.errors import MotionError
 from motet.models.language import RULES as TEXT_RULES
 from motet.motion.motion import Motion
 from motet.representation.contract import named
-from motet_train.data.corpus import read_corpus
+from motet_train.data.corpus import Record, read_corpus
 from motet_train.data.errors import DataError
-from motet_train.data.records import Record
 from motet_train.data.store import INDEX, Store
 from motet_train.evaluate.text_adherence import rules
 from motet_train.evaluate.text_adherence.track import Track, track_of

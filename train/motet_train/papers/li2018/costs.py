@@ -10,7 +10,7 @@ from motet_train.evaluate.tables import aligned
 from motet_train.papers.li2018.seed_groups import SeedGroup
 
 AUGMENTATION = ("warp", "reverse", "mirror", "average")
-"""What varies the windows (:class:`motet_train.data.windows.Windows`), and the running mean of the weights."""
+"""What varies the windows (:class:`motet_train.data.predict_data.Windows`), and the running mean of the weights."""
 
 
 def harness_table(models: Mapping[str, PredictModel], groups: Sequence[SeedGroup]) -> str:

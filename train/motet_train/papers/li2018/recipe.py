@@ -11,8 +11,7 @@ from torch import Tensor, nn
 from torch.nn.functional import softplus
 
 from motet_train.data.errors import DataError
-from motet_train.data.predict_data import Material
-from motet_train.data.windows import Windows
+from motet_train.data.predict_data import Material, Windows
 from motet_train.descent import Descent, GradientLearner, Term, Terms, Training
 from motet_train.papers.li2018 import convseq2seq, lstm_3lr, lstm_ae, rrnn, srnn
 from motet_train.papers.li2018.material import ExpmapMaterial

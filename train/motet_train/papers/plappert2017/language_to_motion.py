@@ -14,7 +14,7 @@ from torch.nn import functional
 
 from motet.bundle.graph import GraphSpec, TensorSpec
 from motet.representation.contract import Z_LIMIT
-from motet_train.data.batch import Batch
+from motet_train.data.batches import Batch
 from motet_train.models.motion_to_language import LanguageNet, SummaryHead
 from motet_train.models.net import Part, before, normalised, tuples
 from motet_train.models.recurrent import Decoder, Encoder, WordEmbedding

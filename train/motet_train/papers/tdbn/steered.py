@@ -10,9 +10,9 @@ from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract, living
 from motet.representation.root_sixd import ROOT_SIXD
 from motet_train.data.errors import DataError
-from motet_train.data.gaits import Gait
-from motet_train.data.locomotion import Recording, gaits_of, recordings
+from motet_train.data.matching_rows import Recording, gaits_of, recordings
 from motet_train.data.store import Store
+from motet_train.data.table import Gait
 from motet_train.papers.tdbn.angle_crbm import AngleCRBMConfig
 from motet_train.papers.tdbn.contrastive import Learning
 from motet_train.papers.tdbn.courses import LABELS, controls_of, course
