@@ -7,8 +7,7 @@ from figures import walker
 from motet.errors import MotionError
 from motet.formats import read_motion
 from motet.formats.amc import read
-from motet.motion.feet.contacts import has_feet
-from motet.motion.feet.root_path import lay_root_path
+from motet.motion.feet.contacts import has_feet, lay_root_path
 from motet.motion.kinematics import local_translations, positions
 from motet.motion.motion import Motion
 from motet.motion.skeleton import Joint, Skeleton

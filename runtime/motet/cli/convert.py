@@ -10,8 +10,8 @@ import click
 from motet.cli.reading import Read, Source, Tries, places, read_options
 from motet.cli.writing import Output, size, write_options
 from motet.formats import READS, WRITES, write_motion
+from motet.motion.feet.contacts import lay_root_path
 from motet.motion.feet.hold import hold_feet as feet_held
-from motet.motion.feet.root_path import lay_root_path
 from motet.motion.humanoid import read_map, to_humanoid
 from motet.motion.kinematics import skeleton_of
 from motet.motion.looping import looped

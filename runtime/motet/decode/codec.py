@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from motet.bundle.graph import Graph
 from motet.decode.loop import Ids
+from motet.motion.pose import damped, damping_of
 from motet.motion.rotations import Array
-from motet.motion.springs import damped, damping_of
 
 REACH = 0.5
 """Metres that count as much as a radian where moves are compared."""

@@ -16,7 +16,7 @@ from typing import Annotated, ClassVar, NamedTuple
 import numpy as np
 
 from motet.bundle.graph import Floats
-from motet.motion.springs import damped
+from motet.motion.pose import damped
 from motet.settings import Range, Settings
 
 

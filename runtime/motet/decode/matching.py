@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.bundle.graph import Floats
+from motet.motion.pose import damped, damped_path, damping_of
 from motet.motion.rotations import Array, wrapped
-from motet.motion.springs import damped, damped_path, damping_of
 from motet.settings import Range, Settings
 
 HalfLife = Annotated[float, Range(0.01, 10, "s")]

@@ -13,9 +13,8 @@ import numpy as np
 
 from motet.bundle.graph import Floats
 from motet.decode.matching import Matcher, Playback, Rows, SteeringSettings
-from motet.motion.pose import Pose
+from motet.motion.pose import Pose, damped, damping_of
 from motet.motion.rotations import Array, wrapped
-from motet.motion.springs import damped, damping_of
 
 
 @dataclass(frozen=True, eq=False)

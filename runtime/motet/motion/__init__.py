@@ -1,8 +1,7 @@
 """Geometry: motions, skeletons, rotations, and operations on them that need no model."""
 
-from motet.motion.feet.contacts import feet_of, ground_of, has_feet
+from motet.motion.feet.contacts import feet_of, ground_of, has_feet, lay_root_path
 from motet.motion.feet.hold import hold_feet
-from motet.motion.feet.root_path import lay_root_path
 from motet.motion.humanoid import HUMANOID, MIXAMO, Humanoid, JointMap, from_humanoid, read_map, rig, to_humanoid
 from motet.motion.kinematics import (
     global_transforms,

@@ -229,8 +229,7 @@ def lines(values: Array, times: Array) -> Array:
     if len(values) < 2:
         return np.repeat(values[:1], len(times), axis=0)
     start, part = _between(values, times)
-    found: Array = values[start] + part * (values[start + 1] - values[start])
-    return found
+    return values[start] + part * (values[start + 1] - values[start])
 
 
 def spline(values: Array, times: Array) -> Array:

@@ -37,8 +37,7 @@ def angle_of(sine: Array, cosine: Array) -> Array:
 
     Old numpy mistakes a strided array that ends next to the result's memory for overlapping, and rounds differently.
     """
-    found: Array = np.arctan2(np.array(sine, order="K"), np.array(cosine, order="K"))
-    return found
+    return np.arctan2(np.array(sine, order="K"), np.array(cosine, order="K"))
 
 
 def axis_to_rotmat(axis: str, angle: Array) -> Array:
@@ -162,8 +161,8 @@ def _whole_turns(now: Array, after: Array) -> Array:
     angle, other = (np.linalg.norm(vector, axis=-1, keepdims=True) for vector in (now, after))
     # a rotation by no angle takes the axis of the frame after it
     axis = np.where(angle > 1e-3, now / np.maximum(angle, 1e-9), after / np.maximum(other, 1e-9))
-    turns: Array = axis * (np.round(((after * axis).sum(-1, keepdims=True) - angle) / (2 * np.pi)) * 2 * np.pi)
-    return turns
+    found: Array = axis * (np.round(((after * axis).sum(-1, keepdims=True) - angle) / (2 * np.pi)) * 2 * np.pi)
+    return found
 
 
 def rotvec_to_rotmat(vector: Array) -> Array:
@@ -194,8 +193,7 @@ def rotmat_to_rotvec(matrix: Array) -> Array:
     sin_half = np.linalg.norm(quat[..., :3], axis=-1, keepdims=True)
     half = angle_of(sin_half, quat[..., 3:])
     scale = np.where(sin_half > 1e-12, 2 * half / np.where(sin_half > 1e-12, sin_half, 1.0), 2.0)
-    vector: Array = quat[..., :3] * scale
-    return vector
+    return quat[..., :3] * scale
 
 
 def quat_to_rotmat(quat: Array) -> Array:
@@ -233,8 +231,8 @@ def product(left: Array, right: Array) -> Array:
 
 def rotated(rotations: Array, vectors: Array) -> Array:
     """Vectors (..., 3) rotated by rotations (..., 3, 3)."""
-    result: Array = np.einsum("...ij,...j->...i", rotations, vectors)
-    return result
+    found: Array = np.einsum("...ij,...j->...i", rotations, vectors)
+    return found
 
 
 def inverse(rotations: Array) -> Array:
@@ -245,8 +243,7 @@ def inverse(rotations: Array) -> Array:
 def unit(vectors: Array) -> Array:
     """Vectors (..., 3) of length 1; zero vectors stay."""
     lengths = np.sqrt(np.einsum("...i,...i->...", vectors, vectors))[..., None]
-    scaled: Array = vectors / np.where(lengths > 1e-12, lengths, 1.0)
-    return scaled
+    return vectors / np.where(lengths > 1e-12, lengths, 1.0)
 
 
 def swing(start: Array, end: Array) -> Array:
@@ -312,5 +309,4 @@ def conjugate(quats: NDArray[Any]) -> NDArray[Any]:
 
 def wrapped(angle: NDArray[Any]) -> NDArray[Any]:
     """Angles in radians, between -pi and pi."""
-    found: NDArray[Any] = angle - 2 * np.pi * np.round(angle / (2 * np.pi))
-    return found
+    return angle - 2 * np.pi * np.round(angle / (2 * np.pi))

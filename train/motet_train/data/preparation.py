@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from motet.errors import MotionError
-from motet.motion.feet.root_path import ADULT_HEIGHT
+from motet.motion.feet.contacts import ADULT_HEIGHT
 from motet.motion.humanoid import on_humanoid
 from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion

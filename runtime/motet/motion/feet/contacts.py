@@ -1,19 +1,39 @@
-"""Which feet stand: the one definition used for planting and holding feet and for measuring foot sliding.
+"""Which feet stand: the one definition used for planting and holding feet and for measuring foot sliding; and the root
+translation that follows from it.
 
 A point of a foot stands if it is low and slow. Only the bounds depend on the points and the source of the motion.
+
+A foot that carries weight stays in place, so the root moves against it. Which foot that is has to be found together
+with the velocity. Every point of the feet votes for a velocity; a vote counts more the nearer its point is to the
+ground and the better it agrees with others around it in time: robust regression by iteratively reweighted least squares
+(Beaton and Tukey 1974). Votes that are too slow count less, because the joints of a foot rolling from heel to toe do
+move forward. Between steps of a run nothing agrees, and the velocity of the last and the next step carries through.
+
+The ground pushes but does not pull: where the root falls faster than gravity while the lowest point of the feet is
+held at the ground, the figure has jumped. It then flies along a parabola until its feet reach the ground again.
+
+On level ground with feet that do not slide this is within a few per cent of the true path: in 42 of CMU's trials that
+had no part in the choice of the constants, the end is off by 5 % of the path on average in walking (at most 8)
+and by 6 % in running (at most 15, in a leap), nearly always too near. Stairs, sitting, lying and walking on hands are
+beyond it.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motet.errors import MotionError
+from motet.motion.kinematics import positions, skeleton_of, with_channels
+from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton, partners_of
 
 GROUND_PERCENT = 10
 """Percentage of frames whose lowest point of the feet is below ground."""
+
+ADULT_HEIGHT = 1.7  # m: assumed if the skeleton's length unit is unknown
 
 
 @dataclass(frozen=True)
@@ -57,15 +77,14 @@ def contacts_of(points: Array, fps: float, settings: ContactSettings = SOLES) ->
 
 def ground_speeds(points: Array, fps: float) -> Array:
     """Speeds (..., T - 1, K) over the ground of points (..., T, K, 3), per frame."""
-    speeds: Array = np.linalg.norm(np.diff(points[..., [0, 2]], axis=-3), axis=-1) * fps
-    return speeds
+    found: Array = np.linalg.norm(np.diff(points[..., [0, 2]], axis=-3), axis=-1) * fps
+    return found
 
 
 def rise(values: Array, start: float, end: float) -> Array:
     """Smoothly from 0 at ``start`` to 1 at ``end`` (Perlin's "smootherstep", 2002)."""
     part = np.clip((values - start) / max(end - start, 1e-12), 0, 1)
-    found: Array = part**3 * (10 - 15 * part + 6 * part**2)
-    return found
+    return part**3 * (10 - 15 * part + 6 * part**2)
 
 
 def smoothed(points: Array, calm: float, fps: float) -> Array:
@@ -103,3 +122,86 @@ def _paired(skeleton: Skeleton) -> list[int]:
 def ground_of(heights: Array) -> float:
     """The height of the ground under feet at ``heights`` (T, K)."""
     return float(np.percentile(heights.min(axis=1), GROUND_PERCENT))
+
+
+def lay_root_path(
+    motion: Motion,
+    feet: tuple[Sequence[str], Sequence[str]] | None = None,
+    tremble: float = 0.015,
+    keep_height: bool = False,
+) -> Motion:
+    """The motion with root channels tx, ty, tz in "length" units, found from the feet's contact with the ground.
+
+    The path begins at x = z = 0; y is such that the lowest joint of the feet touches the ground, y = 0, within
+    millimetres, but in flight. A translation that the motion has already is replaced.
+    feet: the names of the joints of each foot, toes included; by default the lowest left-right pairs of joints.
+        MotionError for a motion without skeleton or without such joints.
+    tremble: seconds over which the feet are smoothed; recorded motions need little, generated ones 0.06 s, and 0
+        smooths nothing.
+    keep_height: keep y, for a motion in place whose height is right.
+    """
+    if not 0 <= tremble < np.inf:
+        raise MotionError(f"the smoothing time of feet must be 0 or more seconds, not {tremble}")
+    skeleton = skeleton_of(motion)
+    joints = feet_of(skeleton) if feet is None else [skeleton.index(name) for name in (*feet[0], *feet[1])]
+    metres = skeleton.metres_per_unit or ADULT_HEIGHT / skeleton.height
+    places = positions(motion)
+    points = (places[:, joints] - places[:, :1]) * metres
+    standing = -points[..., 1].min(axis=1)
+    # a jump up forward in time is a fall backward: only frames on which both agree are flight
+    flight = np.minimum(_with_flight(standing, motion.fps), _with_flight(standing[::-1], motion.fps)[::-1])
+    height = smoothed(flight[:, None, None], 0.015, motion.fps)[:, 0, 0]
+    plane, velocity = smoothed(points[..., [0, 2]], tremble, motion.fps), np.zeros((0, 2))
+    if len(motion) > 1:
+        velocity = velocity_by_feet(plane, points[..., 1] + height[:, None], motion.fps)
+    return led_along(motion, velocity, places[:, 0, 1] * metres if keep_height else height, metres)
+
+
+def led_along(motion: Motion, velocity: Array, height: Array, metres: float) -> Motion:
+    """The motion with its root led by velocities (T - 1, 2) in m/s, from x = z = 0, at heights (T,) in m."""
+    path = np.zeros((len(motion), 3))
+    path[1:, [0, 2]] = np.cumsum(velocity, axis=0) / motion.fps
+    path[:, 1] = height
+    names = tuple(f"{skeleton_of(motion).names[0]}.{kind}" for kind in ("tx", "ty", "tz"))
+    return with_channels(motion, names, path / metres, ("length",) * 3)
+
+
+def _with_flight(standing: Array, fps: float) -> Array:
+    """Heights (T,) of the root in metres, from those at which the feet are on the ground, where it falls freely."""
+    # the upward velocity is measured over .05 s
+    heights, speed, span, gravity = standing.tolist(), 0.0, max(1, round(0.05 * fps)), 9.81
+    for t in range(1, len(heights)):
+        falling = heights[t - 1] + speed / fps - 0.5 * gravity / fps**2
+        if falling > heights[t]:
+            heights[t] = falling
+            speed -= gravity / fps
+        else:
+            start = max(0, t - span)
+            speed = (heights[t] - heights[start]) * fps / (t - start)
+    return np.array(heights)
+
+
+def velocity_by_feet(
+    points: Array, above: Array, fps: float, guess: Array | float = 0.0, trust: float = 1e-12
+) -> Array:
+    """Velocity (T - 1, 2) in m/s of the root, from points of the feet (T, K, 2) and their heights (T, K).
+
+    guess: (T - 1, 2) in m/s, a vote of weight ``trust`` that always counts.
+    """
+    # a vote counts less the higher its point is
+    near = contacts((above[1:] + above[:-1]) / 2, None, ContactSettings(heights=(0.0, 0.07)))
+    votes, reach = -np.diff(points, axis=0) * fps, round(1.0 * fps)
+    nearness = np.exp(-np.abs(np.arange(-reach, reach + 1)) / (0.05 * fps))  # votes are brought together over .05 s
+    weights, velocity = near, np.zeros(votes[:, 0].shape)
+    for attempt in range(11):
+        if attempt:
+            off = votes - velocity[:, None]
+            faster = (off * velocity[:, None]).sum(axis=-1) > 0
+            # m/s: how far off a slower vote may be; a faster one three times as far
+            allowed = np.where(faster, 3 * 0.2, 0.2)
+            weights = near / (1 + (off**2).sum(axis=-1) / allowed**2) ** 2
+        columns = [weights.sum(axis=1), *np.moveaxis((weights[..., None] * votes).sum(axis=1), 1, 0)]
+        total, x, z = (np.convolve(column, nearness)[reach : reach + len(votes)] for column in columns)
+        # without any vote within a second: the guess
+        velocity = (np.stack([x, z], axis=1) + trust * guess) / (total + trust)[:, None]
+    return velocity

@@ -128,7 +128,11 @@ def _shift(points: Array, fps: float, settings: HoldSettings) -> Array:
     weights = touch / np.maximum(touch.sum(axis=1, keepdims=True), 1e-9)
     undone = -(touch.max(axis=1) * (weights[..., None] * steps).sum(axis=1).T).T
     times, values = [], []
-    for start, stop in _stances(touch.max(axis=1) > 0, settings.lifted * fps):
+    # the first and last frame of each stance; those with less between them than a lifted foot are one
+    edges = np.flatnonzero(np.diff([False, *(touch.max(axis=1) > 0), False])).reshape(-1, 2)
+    apart = edges[1:, 0] - edges[:-1, 1] >= settings.lifted * fps
+    starts, stops = edges[np.r_[True, apart][: len(edges)], 0], edges[np.r_[apart, True][: len(edges)], 1]
+    for start, stop in zip(starts, stops, strict=True):
         path = np.concatenate([np.zeros((1, 2)), np.cumsum(undone[start:stop], axis=0)])
         path -= np.median(path if settings.anchor is None else path[: round(settings.anchor * fps) + 1], axis=0)
         times.append(np.arange(start, stop + 1))
@@ -137,20 +141,7 @@ def _shift(points: Array, fps: float, settings: HoldSettings) -> Array:
     shift = smoothed(shift[:, None], settings.tremble, fps)[:, 0]
     # no longer than the farthest; short ones are as they are within a few per cent
     length = np.linalg.norm(shift, axis=-1, keepdims=True) / settings.farthest
-    bounded: Array = shift / (1 + length**4) ** 0.25
-    return bounded
-
-
-def _stances(standing: NDArray[np.bool_], lifted: float) -> list[tuple[int, int]]:
-    """First and last frame of each stance, from whether the foot stands from each frame to the next (T - 1,).
-
-    lifted: frames; stances with fewer between them are one.
-    """
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], standing, [False]]).astype(int))).reshape(-1, 2)
-    found: list[tuple[int, int]] = []
-    for start, stop in edges.tolist():
-        goes_on = bool(found) and start - found[-1][1] < lifted
-        found.append((found.pop()[0] if goes_on else start, stop))
+    found: Array = shift / (1 + length**4) ** 0.25
     return found
 
 
@@ -171,8 +162,7 @@ def _between(times: list[NDArray[np.intp]], values: list[Array], frames: int, bl
     frame = np.arange(frames)
     after = np.clip(np.searchsorted(at, frame, side="right"), 1, len(at) - 1)
     part = rise((frame - at[after - 1]) / (at[after] - at[after - 1]), 0, 1)[:, None]
-    found: Array = of[after - 1] + part * (of[after] - of[after - 1])
-    return found
+    return of[after - 1] + part * (of[after] - of[after - 1])
 
 
 def windows(values: Array, reach: int) -> Array:
@@ -216,8 +206,7 @@ class Leg:
         less = np.maximum(now - wanted, 0)
         give, fade = (part * self._longest for part in self.GIVES)
         shorter = less**2 / np.maximum(less + give * np.exp(-left / fade), 1e-12)
-        found: Array = self.hip + away * ((now + longer - shorter) / np.maximum(wanted, 1e-12))
-        return found
+        return self.hip + away * ((now + longer - shorter) / np.maximum(wanted, 1e-12))
 
     def turns(self, target: Array) -> tuple[Array, Array]:
         """World rotations (T, 3, 3) of thigh and shin that bring the ankle to ``target`` (T, 3), or as near as

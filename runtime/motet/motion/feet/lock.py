@@ -13,9 +13,8 @@ import numpy as np
 
 from motet.motion.feet.hold import Leg
 from motet.motion.humanoid import BONES, HUMANOID, LEFT_RIGHT, LEG, SOLE, sided
-from motet.motion.pose import Floats, Pose
+from motet.motion.pose import Floats, Pose, damped, damping_of
 from motet.motion.rotations import Array, conjugate, quat_product, quat_rotated, rotmat_to_quat
-from motet.motion.springs import damped, damping_of
 from motet.settings import Range, Settings
 
 

@@ -128,8 +128,7 @@ def _foot_turn(target: Array, body: Array, leg: Array) -> Array:
     x, y, z = base.T @ target
     if z < 0.5 * np.hypot(x, y) and z < 0.5:
         return swing(base @ humanoid_direction("leftFoot"), target) @ base
-    flat: Array = base @ swing(np.array([0.0, 0.0, 1.0]), np.array([x, 0.0, z]))
-    return flat
+    return base @ swing(np.array([0.0, 0.0, 1.0]), np.array([x, 0.0, z]))
 
 
 def axes_agree(body: Body, rotations: Array, positions: Array) -> bool:

@@ -116,8 +116,8 @@ class Body:
 
     def along(self, positions: Array, bone: str) -> Array:
         """Vectors (..., 3) from the joint of a bone to the middle of what it points to."""
-        ends: Array = positions[..., list(self.aims[bone]), :].mean(axis=-2) - positions[..., self.joints[bone], :]
-        return ends
+        found: Array = positions[..., list(self.aims[bone]), :].mean(axis=-2) - positions[..., self.joints[bone], :]
+        return found
 
     def direction(self, positions: Array, bone: str) -> Array:
         """Directions (..., 3) in which a bone points."""
@@ -126,14 +126,12 @@ class Body:
     def middle(self, positions: Array, part: str) -> Array:
         """The middle (..., 3) between a joint of the left and its partner."""
         left, right = (positions[..., self.joints[sided(side, part)], :] for side in LEFT_RIGHT)
-        between: Array = (left + right) / 2
-        return between
+        return (left + right) / 2
 
     def to_left(self, positions: Array, part: str) -> Array:
         """Vectors (..., 3) from a joint of the right to its partner on the left."""
         left, right = (positions[..., self.joints[sided(side, part)], :] for side in LEFT_RIGHT)
-        across: Array = left - right
-        return across
+        return left - right
 
     def trunk_up(self, positions: Array) -> Array:
         """Directions (..., 3) from the middle of the legs' joints to that of the arms'."""

@@ -7,7 +7,7 @@ alone: their path is laid, too, and their feet are left as they then are.
 import numpy as np
 
 from motet.errors import MotionError
-from motet.motion.feet.root_path import lay_root_path
+from motet.motion.feet.contacts import lay_root_path
 from motet.motion.humanoid import map_of
 from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
