@@ -1,0 +1,64 @@
+import { integers, type NumberArray } from "./arrays.js";
+import { type Graph, taken } from "./graph.js";
+
+/** A finished sequence of ids, without its end, and the sum of its log-probabilities, with it. */
+export interface Hypothesis {
+  ids: number[];
+  logProbability: number;
+}
+
+interface Open {
+  ids: number[];
+  score: number;
+  ended: boolean;
+}
+
+/** Ids of start and end, ids that are never chosen, the longest sequence, and how many hypotheses are kept. */
+export interface BeamSettings {
+  start: number;
+  end: number;
+  banned: number[];
+  longest: number;
+  beams: number;
+}
+
+/** The most probable sequences for a context (1, C), best first: docs/bundle.md, the loop `beam`. */
+export async function beamSearch(step: Graph, context: NumberArray<Float32Array>, settings: BeamSettings): Promise<Hypothesis[]> {
+  const { start, end, banned, longest, beams } = settings;
+  let kept: Open[] = [{ ids: [], score: 0, ended: false }];
+  let states = step.zeroState(1);
+  for (let length = 0; length <= longest && kept.some((one) => !one.ended); length++) {
+    const open = kept.filter((one) => !one.ended);
+    const word = integers(open.map((one) => one.ids.at(-1) ?? start));
+    const repeated = taken({ context }, open.map(() => 0));
+    const { outputs, states: next } = await step.step({ word, context: repeated.context! }, states);
+    const { data, shape } = outputs.log_probabilities!;
+    const words = shape[1]!;
+    const grown: (Open & { parent: number })[] = [];
+    for (const one of kept) {
+      if (one.ended) {
+        grown.push({ ...one, parent: -1 });
+        continue;
+      }
+      const parent = open.indexOf(one);
+      const gains = data.subarray(parent * words, (parent + 1) * words);
+      const chosen = length === longest ? [end] : best(gains, beams, banned);
+      for (const id of chosen) {
+        const ids = id === end ? one.ids : [...one.ids, id];
+        grown.push({ ids, score: one.score + gains[id]!, ended: id === end, parent });
+      }
+    }
+    const order = grown.map((_, at) => at).sort((a, b) => grown[b]!.score - grown[a]!.score || a - b);
+    const winners = order.slice(0, beams).map((at) => grown[at]!);
+    const parents = winners.filter((one) => !one.ended).map((one) => one.parent);
+    states = taken(next, parents);
+    kept = winners;
+  }
+  return kept.map(({ ids, score }) => ({ ids, logProbability: score }));
+}
+
+/** The ids of the highest values, highest first. */
+function best(values: Float32Array, count: number, banned: number[]): number[] {
+  const ids = Array.from(values.keys()).filter((id) => !banned.includes(id));
+  return ids.sort((a, b) => values[b]! - values[a]! || a - b).slice(0, count);
+}

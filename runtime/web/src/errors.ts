@@ -1,0 +1,14 @@
+/** A bundle that is damaged, unsafe, of another format, or does not fit its own contract. */
+export class BundleError extends Error {
+  override name = "BundleError";
+}
+
+/** A sentence that a model cannot read. */
+export class TextError extends Error {
+  override name = "TextError";
+}
+
+/** Settings or frames that a model cannot work with. */
+export class DecodingError extends Error {
+  override name = "DecodingError";
+}

@@ -1,0 +1,106 @@
+import type { InferenceSession, TypedTensor } from "onnxruntime-web";
+import type { NumberArray } from "./arrays.js";
+import { BundleError } from "./errors.js";
+import { checkGraph } from "./graphSafety.js";
+
+/** A tensor of a graph: a word in its shape is an axis of any size. */
+export interface TensorSpec {
+  name: string;
+  dtype: "float32" | "int64" | "bool";
+  shape: (number | string)[];
+}
+
+/** What a graph takes and gives, and which outputs come back as inputs of the next step. */
+export interface GraphSpec {
+  inputs: TensorSpec[];
+  outputs: TensorSpec[];
+  feedback: Record<string, string>;
+  start?: Record<string, number[]>;
+}
+
+/** Settings of ONNX Runtime's session, such as `executionProviders`. */
+export type SessionSettings = InferenceSession.SessionOptions;
+
+export type Arrays = Record<string, NumberArray>;
+
+/** A function from named arrays to named arrays, computed by ONNX Runtime. */
+export class Graph {
+  private constructor(
+    readonly role: string,
+    readonly spec: GraphSpec,
+    private readonly session: InferenceSession,
+    private readonly runtime: typeof import("onnxruntime-web"),
+  ) {}
+
+  /** Load a graph that is safe and keeps the contract of the manifest; BundleError otherwise. */
+  static async load(role: string, model: Uint8Array, spec: GraphSpec, settings: SessionSettings = {}): Promise<Graph> {
+    checkGraph(model);
+    const runtime = await import("onnxruntime-web");
+    const session = await runtime.InferenceSession.create(model, settings).catch((error: unknown) => {
+      throw new BundleError(`graph ${role}: ONNX Runtime cannot load it: ${String(error)}`);
+    });
+    for (const [wanted, given] of [[spec.inputs, session.inputNames], [spec.outputs, session.outputNames]] as const) {
+      const names = wanted.map((tensor) => tensor.name);
+      if (`${[...names].sort()}` !== `${[...given].sort()}`) {
+        throw new BundleError(`graph ${role}: it has ${given.join(", ")}, and its manifest ${names.join(", ")}`);
+      }
+    }
+    return new Graph(role, spec, session, runtime);
+  }
+
+  /** The outputs for inputs, which must have the contract's names, types and shapes. */
+  async run(inputs: Arrays): Promise<Record<string, NumberArray<Float32Array>>> {
+    const feeds: Record<string, TypedTensor<"float32"> | TypedTensor<"int64">> = {};
+    for (const { name, dtype, shape } of this.spec.inputs) {
+      const given = inputs[name];
+      if (!given) throw new BundleError(`graph ${this.role}: the input ${name} is missing`);
+      const fits = given.shape.length === shape.length && shape.every((size, i) => typeof size === "string" || size === given.shape[i]);
+      if (!fits || (dtype === "int64") !== given.data instanceof BigInt64Array) {
+        throw new BundleError(`graph ${this.role}: ${name} is (${given.shape}), expected ${dtype} (${shape})`);
+      }
+      feeds[name] = given.data instanceof BigInt64Array
+        ? new this.runtime.Tensor("int64", given.data, given.shape)
+        : new this.runtime.Tensor("float32", Float32Array.from(given.data as Float32Array), given.shape);
+    }
+    const found: Record<string, NumberArray<Float32Array>> = {};
+    for (const [name, tensor] of Object.entries(await this.session.run(feeds))) {
+      const data = tensor.data as Float32Array;
+      // codes are int64, and small
+      found[name] = { data: tensor.type === "int64" ? Float32Array.from(data as ArrayLike<unknown>, Number) : data, shape: [...tensor.dims] };
+      if (!found[name].data.every(Number.isFinite)) throw new BundleError(`graph ${this.role}: ${name} is not finite`);
+    }
+    return found;
+  }
+
+  /** The states of so many rows before the first step: zeros. */
+  zeroState(rows: number): Record<string, NumberArray<Float32Array>> {
+    const found: Record<string, NumberArray<Float32Array>> = {};
+    for (const name of Object.keys(this.spec.feedback)) {
+      const tensor = this.spec.inputs.find((input) => input.name === name);
+      const sizes = this.spec.start?.[name] ?? tensor?.shape.slice(1).map(Number) ?? [];
+      const shape = [rows, ...sizes];
+      found[name] = { data: new Float32Array(shape.reduce((product, size) => product * size, 1)), shape };
+    }
+    return found;
+  }
+
+  /** One step: its outputs, and the states for the next one. */
+  async step(inputs: Arrays, states: Arrays) {
+    const outputs = await this.run({ ...states, ...inputs });
+    const next: Record<string, NumberArray<Float32Array>> = {};
+    for (const [name, source] of Object.entries(this.spec.feedback)) next[name] = outputs[source]!;
+    return { outputs, states: next };
+  }
+}
+
+/** Rows of all states, in a new order, with any repeated or left out. */
+export function taken(states: Record<string, NumberArray<Float32Array>>, order: number[]) {
+  const found: Record<string, NumberArray<Float32Array>> = {};
+  for (const [name, { data, shape }] of Object.entries(states)) {
+    const width = data.length / shape[0]!;
+    const picked = new Float32Array(order.length * width);
+    order.forEach((row, at) => picked.set(data.subarray(row * width, (row + 1) * width), at * width));
+    found[name] = { data: picked, shape: [order.length, ...shape.slice(1)] };
+  }
+  return found;
+}

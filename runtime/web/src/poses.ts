@@ -1,0 +1,29 @@
+import type { Manifest } from "./bundle.js";
+import { DecodingError } from "./errors.js";
+import type { Frames } from "./models.js";
+import { moved, type Pose as Ground } from "./planar.js";
+import { product, type Quaternion, quaternionOf, rotationOf } from "./rotations.js";
+
+/** The humanoid in one frame: its hips in metres, and each bone's rotation in its parent's frame, by VRM 1.0's names. */
+export interface Pose {
+  hips: [number, number, number];
+  rotations: Record<string, Quaternion>;
+}
+
+const ROOT = ["root.forward", "root.left", "root.turn", "root.height"];
+
+/** Poses of frames in `root_sixd` (docs/bundle.md, Frames), from the origin, facing z; such as `generate` gives. */
+export function posesOf(frames: Frames, { motion: { representation, channels, fps } }: Manifest): Pose[] {
+  if (representation !== "root_sixd" || `${channels.slice(0, 4)}` !== `${ROOT}`) {
+    throw new DecodingError(`poses are made of root_sixd, not of ${representation}`);
+  }
+  const bones = channels.filter((name) => name.endsWith(".xx")).map((name) => name.slice(0, -3));
+  let ground: Ground = [0, 0, 0];
+  return frames.map((frame, at) => {
+    if (at) ground = moved(ground, [frame[0]! / fps, frame[1]! / fps, frame[2]! / fps]);
+    const rotations = Object.fromEntries(bones.map((bone, i) => [bone, quaternionOf(rotationOf(frame, ROOT.length + 6 * i))]));
+    const half = ground[2] / 2;
+    rotations[bones[0]!] = product([0, Math.sin(half), 0, Math.cos(half)], rotations[bones[0]!]!);
+    return { hips: [ground[0], frame[3]!, ground[1]], rotations };
+  });
+}

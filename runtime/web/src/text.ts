@@ -1,0 +1,94 @@
+import type { TextTables } from "./bundle.js";
+import { BundleError, TextError } from "./errors.js";
+
+const [PAD, SOS, EOS, UNK] = [0, 1, 2, 3];
+const MAX_WORDS = 40;
+const MAX_LETTERS = 2000;
+
+/** From a sentence to the words that a model knows, and back: docs/bundle.md, "Text". */
+export class Vocabulary {
+  static readonly SOS = SOS!;
+  static readonly EOS = EOS!;
+  /** Words that are never chosen. */
+  static readonly BANNED = [PAD!, SOS!, UNK!];
+  private readonly ids: Map<string, number>;
+  private readonly misspelt: RegExp;
+
+  constructor(
+    readonly words: string[],
+    private readonly rules: TextTables,
+  ) {
+    if (`${words.slice(0, 4)}` !== "PAD,SOS,EOS,UNK" || rules.rules !== 1) throw new BundleError("its vocabulary is damaged");
+    this.ids = new Map(words.map((word, id) => [word, id]));
+    const wrong = Object.keys(rules.spelling).sort((a, b) => b.length - a.length);
+    this.misspelt = new RegExp(`(?<![\\p{L}\\p{N}_])(${wrong.join("|") || "(?!)"})(?![\\p{L}\\p{N}_])`, "gu");
+  }
+
+  /** The ids of a sentence's words, and the words that are unknown; TextError where there is none that is known. */
+  encode(sentence: string): { ids: number[]; unknown: string[] } {
+    if (sentence.length > MAX_LETTERS) {
+      throw new TextError(`the sentence has ${sentence.length} letters, but at most ${MAX_LETTERS} are allowed`);
+    }
+    const words = this.normalise(sentence).match(/\d|\p{L}+/gu) ?? [];
+    if (!words.length) throw new TextError(`the sentence ${JSON.stringify(sentence)} has no words`);
+    if (words.length > MAX_WORDS) {
+      throw new TextError(`the sentence has ${words.length} words, but at most ${MAX_WORDS} are allowed`);
+    }
+    const unknown = words.filter((word) => !this.ids.has(word));
+    if (unknown.length === words.length) throw new TextError(`the model knows no word of ${JSON.stringify(sentence)}`);
+    return { ids: words.map((word) => this.ids.get(word) ?? UNK!), unknown };
+  }
+
+  /** The sentence of ids, without PAD, SOS, EOS and UNK. */
+  decode(ids: Iterable<number>): string {
+    const { numbers, spelled, point } = this.rules;
+    const small = new Map(Object.entries(numbers).filter(([, value]) => value <= spelled).map(([word, value]) => [`${value}`, word]));
+    return Array.from(ids, (id) => (id > UNK! ? this.words[id]! : ""))
+      .join(" ")
+      .replace(/(?<=\d) (?=\d)/g, "")
+      .replaceAll(new RegExp(`(?<=\\d) ${point} (?=\\d)`, "g"), ".")
+      .split(" ")
+      .filter(Boolean)
+      .map((word) => small.get(word) ?? word)
+      .join(" ");
+  }
+
+  private normalise(sentence: string): string {
+    const kept = [...sentence].filter((letter) => !this.rules.dropped.includes(letter)).join("");
+    const plain = kept
+      .normalize("NFKD")
+      .toLowerCase()
+      .replace(/\p{M}/gu, "")
+      .replace(/(?<=\d)\.(?=\d)/g, ` ${this.rules.point} `)
+      .replace(/[^\p{L}\p{N}]+/gu, " ")
+      .trim();
+    const spelt = plain.replace(this.misspelt, (wrong) => this.rules.spelling[wrong]!);
+    return this.withDigits(spelt.split(" ")).join(" ");
+  }
+
+  private withDigits(words: string[]): string[] {
+    const found: string[] = [];
+    for (let at = 0; at < words.length; ) {
+      const [value, used] = this.number(words.slice(at, at + 5));
+      found.push(used ? `${value}` : words[at]!);
+      at += used || 1;
+    }
+    return found;
+  }
+
+  /** The number that words begin with, and how many of them it takes: 0 for none. */
+  private number(words: string[]): [number, number] {
+    let [value, used] = this.belowHundred(words);
+    if (words[used] !== this.rules.hundred) return [value, used];
+    [value, used] = [100 * (used ? value : 1), used + 1];
+    const skipped = words[used] === this.rules.conjunction ? 1 : 0;
+    const [more, length] = this.belowHundred(words.slice(used + skipped));
+    return length ? [value + more, used + skipped + length] : [value, used];
+  }
+
+  private belowHundred(words: string[]): [number, number] {
+    const [first, second] = words.map((word) => (Object.hasOwn(this.rules.numbers, word) ? this.rules.numbers[word] : undefined));
+    if (first === undefined) return [0, 0];
+    return first >= 20 && second !== undefined && second > 0 && second < 10 ? [first + second, 2] : [first, 1];
+  }
+}

@@ -1,0 +1,74 @@
+/* Bundles, sentences and frames that are wrong are refused by name. */
+import assert from "node:assert/strict";
+import { readFile } from "node:fs/promises";
+import test from "node:test";
+import { Bundle, BundleError, DecodingError, load, type PredictModel, type SearchModel, TextError } from "../src/index.js";
+import { checkGraph } from "../src/graphSafety.js";
+import { Pcg64 } from "../src/random.js";
+
+const bytes = async (name: string) => new Uint8Array(await readFile(`../motet/bundles/${name}.zip`));
+
+test("bundles with an altered byte are refused, wherever it is read", async () => {
+  const whole = await bytes("predict");
+  let refused = 0;
+  const places = Array.from({ length: 20 }, (_, at) => 100 + Math.floor((at * (whole.length - 200)) / 20));
+  for (const place of places) {
+    const altered = Uint8Array.from(whole);
+    altered[place]! ^= 255;
+    await load(altered).catch((error: unknown) => {
+      assert.ok(error instanceof BundleError, `${String(error)} at ${place}`);
+      refused++;
+    });
+  }
+  assert.ok(refused >= 16, `${refused} of ${places.length}`); // golden vectors are not read
+});
+
+test("what is cut short or no bundle is refused", async () => {
+  const whole = await bytes("predict");
+  for (const damaged of [new Uint8Array(), whole.subarray(0, 1000), whole.subarray(1000), new TextEncoder().encode("no zip")]) {
+    await assert.rejects(Bundle.open(damaged), BundleError);
+  }
+});
+
+/** A field of a protocol buffer: bytes, or a number. */
+function field(number: number, value: Uint8Array | string | number): number[] {
+  const tag = number * 8 + (typeof value === "number" ? 0 : 2);
+  const start = tag < 128 ? [tag] : [(tag & 127) | 128, tag >> 7];
+  if (typeof value === "number") return [...start, value];
+  const data = typeof value === "string" ? new TextEncoder().encode(value) : value;
+  return [...start, data.length, ...data];
+}
+
+test("graphs that reach outside, or may never end, are refused", () => {
+  const model = (...graph: number[][]) => Uint8Array.from(field(7, Uint8Array.from(graph.flat())));
+  const node = (...fields: number[][]) => field(1, Uint8Array.from(fields.flat()));
+  checkGraph(model(node(field(4, "Add"))));
+  const tensor = (...fields: number[][]) => field(5, Uint8Array.from(fields.flat()));
+  assert.throws(() => checkGraph(model(node(field(4, "Loop")))), /may never end/);
+  assert.throws(() => checkGraph(model(node(field(7, "com.microsoft")))), /not ONNX's own/);
+  assert.throws(() => checkGraph(model(tensor(field(13, "weights.bin")))), /in another file/);
+  assert.throws(() => checkGraph(model(tensor(field(14, 1)))), /in another file/);
+  assert.throws(() => checkGraph(Uint8Array.from(field(25, "f"))), /unknown field 25/);
+  assert.throws(() => checkGraph(new TextEncoder().encode("0000ORTM")), /cannot be checked/);
+  assert.throws(() => checkGraph(Uint8Array.from([58, 9, 1])), /truncated/);
+});
+
+test("sentences and frames that a model cannot read are refused", async () => {
+  const search = (await load(await bytes("search"))) as SearchModel;
+  for (const text of ["", "...", "xyzzy qwrt", "walk ".repeat(41), "a".repeat(2001)]) {
+    await assert.rejects(search.embedText(text), TextError, `${text.slice(0, 20)} is refused`);
+  }
+  assert.equal(search.vocabulary.decode(search.vocabulary.encode("Walks one hundred and five steps, wlaks!").ids), "walks 105 steps walks");
+  const predict = (await load(await bytes("predict"))) as PredictModel;
+  for (const frames of [[], [[1, 2]], Array(10).fill(Array(69).fill(NaN))]) {
+    await assert.rejects(predict.predict(frames), DecodingError);
+  }
+});
+
+test("noise is numpy's: default_rng(seed).random(3, float32), and what it spawns", () => {
+  const near = (found: number[], wanted: number[]) => found.forEach((value, at) => assert.ok(Math.abs(value - wanted[at]!) < 1e-7));
+  near(new Pcg64(0).uniform(5), [0.8506242, 0.63696164, 0.5111365, 0.26978666, 0.30782938]);
+  near(new Pcg64(12345678901).uniform(3), [0.0879392, 0.8361378, 0.7384326]);
+  near(new Pcg64(7, 0).uniform(3), [0.30536908, 0.79785913, 0.2038976]);
+  near(new Pcg64(7, 2).uniform(3), [0.3966366, 0.6320442, 0.7854183]);
+});
