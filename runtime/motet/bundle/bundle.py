@@ -10,7 +10,6 @@ import io
 import json
 import os
 import zipfile
-from collections import ChainMap
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from importlib import resources
@@ -24,14 +23,11 @@ from numpy.typing import NDArray
 from motet.bundle.fields import LARGEST
 from motet.bundle.graph import OnnxGraph, SessionOptions
 from motet.bundle.manifest import FORMAT, MANIFEST, FileEntry, Manifest
-from motet.bundle.members import Archive, Folder, Members, array_of
+from motet.bundle.members import Archive, Folder, array_of
 from motet.errors import BundleError
 from motet.files import new_folder, write_whole
 
 DEFAULT_BUNDLES = Path(__file__).parents[1] / "bundles"
-PLUGINS = "motet.bundles"
-"""Entry points whose values are packages with more bundles in them, as zips."""
-
 MAX_MANIFEST = 4 << 20
 """Bytes; as JSON objects in memory they can be twenty times as many."""
 
@@ -43,7 +39,7 @@ class Bundle:
     manifest: the contents of its ``manifest.json``.
     """
 
-    def __init__(self, path: Path, members: Members) -> None:
+    def __init__(self, path: Path, members: Folder | Archive) -> None:
         self.path = path
         self._members = members
         if MANIFEST not in members.names:
@@ -109,8 +105,8 @@ class Bundle:
 
     def pack(self, path: str | Path) -> None:
         """Write the bundle as one zip: the same bytes for the same bundle. Checks every file first."""
-        files = {name: self.read(name) for name in self.manifest.files}
-        write_whole(path, zip_bytes(files, self._read(MANIFEST, MAX_MANIFEST)))
+        files = {name: self.read(name) for name in sorted(self.manifest.files)}
+        write_whole(path, archive_bytes({MANIFEST: self._read(MANIFEST, MAX_MANIFEST), **files}))
 
     @contextmanager
     def named(self, where: str = "") -> Iterator[None]:
@@ -133,7 +129,7 @@ class Bundle:
 def find_bundle(name_or_path: str | Path) -> Path:
     """Path of an installed bundle's name or of an existing folder or zip; BundleError lists the known names."""
     name = str(name_or_path)
-    known = _zips(DEFAULT_BUNDLES)
+    known = {path.stem: path for path in DEFAULT_BUNDLES.glob("*.zip")}
     if name in known or name in (known := list_bundles()):
         return known[name]
     try:
@@ -143,18 +139,16 @@ def find_bundle(name_or_path: str | Path) -> Path:
         fault = "neither a folder nor a file" if path.exists() else "no such path"
     except (OSError, TypeError, ValueError) as error:
         fault = str(error)
-    more = "" if entry_points(group=PLUGINS) else "; more with pip install ./papers, from a clone of motet"
+    more = "" if entry_points(group="motet.bundles") else "; more with pip install ./papers, from a clone of motet"
     raise BundleError(f"unknown bundle {name!r}: {fault}; expected one of {', '.join(known)}{more}")
 
 
 def list_bundles() -> dict[str, Path]:
     """The installed bundles by name: motet's own, and those of packages with an entry point ``motet.bundles``."""
-    plugins = [_zips(Path(str(resources.files(point.value)))) for point in entry_points(group=PLUGINS)]
-    return dict(sorted(ChainMap(_zips(DEFAULT_BUNDLES), *plugins).items()))
-
-
-def _zips(folder: Path) -> dict[str, Path]:
-    return {path.stem: path for path in sorted(folder.glob("*.zip"))}
+    plugins = [Path(str(resources.files(point.value))) for point in entry_points(group="motet.bundles")]
+    # motet's own come first
+    found = {path.stem: path for folder in [*reversed(plugins), DEFAULT_BUNDLES] for path in folder.glob("*.zip")}
+    return dict(sorted(found.items()))
 
 
 def entry(data: bytes) -> FileEntry:
@@ -168,24 +162,20 @@ def write_bundle(path: str | Path, manifest: Mapping[str, Any], files: Mapping[s
     BundleError for a manifest that could not be read back.
     """
     path = Path(path)
-    entries = {name: vars(entry(data)) for name, data in sorted(files.items())}
+    files = dict(sorted(files.items()))
+    entries = {name: entry(data)._asdict() for name, data in files.items()}
     text = (json.dumps({"format": FORMAT, **manifest, "files": entries}, indent=1) + "\n").encode()
     Manifest.of_bundle(text)
     if path.suffix == ".zip":
-        write_whole(path, zip_bytes(files, text))
+        write_whole(path, archive_bytes({MANIFEST: text, **files}))
         return
     with new_folder(path) as folder:
         for name, data in {**files, MANIFEST: text}.items():
             write_whole(folder / name, data)
 
 
-def zip_bytes(files: Mapping[str, bytes], manifest: bytes) -> bytes:
-    """The zip of a bundle, the manifest first, with fixed dates so that equal content gives equal bytes."""
-    return archive_bytes({MANIFEST: manifest, **{name: files[name] for name in sorted(files)}})
-
-
 def archive_bytes(files: Mapping[str, bytes]) -> bytes:
-    """A zip of files in their order, with fixed dates."""
+    """A zip of files in their order, with fixed dates so that equal content gives equal bytes."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, data in files.items():

@@ -17,14 +17,14 @@ LARGEST = 1e9
 
 def parse(text: bytes) -> Any:
     """A JSON document; BundleError if it is invalid, nested too deeply, or contains NaN or Infinity."""
+
+    def no_constant(name: str) -> None:
+        raise ValueError(f"JSON has no number {name}")
+
     try:
-        return json.loads(text, parse_constant=_no_constant)
+        return json.loads(text, parse_constant=no_constant)
     except (ValueError, RecursionError) as error:
         raise BundleError(f"manifest.json is not valid JSON: {error}") from error
-
-
-def _no_constant(name: str) -> None:
-    raise ValueError(f"JSON has no number {name}")
 
 
 class Fields:
@@ -129,8 +129,8 @@ class Fields:
         return self.fields(key).data if key in self else {}
 
     def entries(self, key: str) -> Iterator[tuple[str, "Fields"]]:
-        """The objects of an object, by name."""
-        found = self.fields(key)
+        """The objects of an object, by name; none where there is none."""
+        found = Fields(self.mapping(key), self.at(key))
         return ((name, found.fields(name)) for name in found.data)
 
     def list_of_fields(self, key: str) -> "list[Fields]":

@@ -16,8 +16,6 @@ from motet.settings import checked_int
 
 MAX_THREADS = 256
 
-Options = Mapping[str, str]
-
 
 @dataclass(frozen=True)
 class SessionOptions:
@@ -35,7 +33,7 @@ class SessionOptions:
 
     threads: int = 1
     providers: tuple[str, ...] = ("CPUExecutionProvider",)
-    provider_options: tuple[Options, ...] = ()
+    provider_options: tuple[Mapping[str, str], ...] = ()
     configure: Callable[[Any], None] | None = None
 
     def __post_init__(self) -> None:
@@ -69,8 +67,8 @@ Floats = NDArray[np.float32]
 DTYPES = {"float32": "tensor(float)", "int64": "tensor(int64)", "bool": "tensor(bool)"}
 """dtype in a manifest -> type in ONNX Runtime."""
 
-MAX_AXIS, MAX_ROW = 1 << 20, 1 << 22
-"""Of a fixed axis, and of all the fixed axes of a tensor multiplied."""
+MAX_AXIS = 1 << 20
+"""Of a fixed axis."""
 
 _creation = threading.Lock()  # ONNX Runtime sessions are safe to share but not to create concurrently
 
@@ -94,8 +92,8 @@ class TensorSpec:
         fixed = [axis for axis in shape if not isinstance(axis, str)]
         if any(isinstance(axis, bool) or not isinstance(axis, int) or not 1 <= axis <= MAX_AXIS for axis in fixed):
             raise data.fault(f"names, and numbers between 1 and {MAX_AXIS}", shape, "shape")
-        if len(shape) > 8 or np.prod(fixed, dtype=np.float64) > MAX_ROW:
-            raise data.fault(f"at most 8 axes with at most {MAX_ROW} numbers a row", shape, "shape")
+        if len(shape) > 8 or np.prod(fixed, dtype=np.float64) > 1 << 22:
+            raise data.fault(f"at most 8 axes with at most {1 << 22} numbers a row", shape, "shape")
         return TensorSpec(data.text("name"), tuple(shape), data.one_of("dtype", DTYPES))
 
     def size(self, axis: int) -> int:
@@ -154,32 +152,25 @@ class GraphSpec:
     def read(data: Fields) -> "GraphSpec":
         """The inverse of :meth:`to_json`; BundleError if it contradicts itself."""
         inputs, outputs = (tuple(map(TensorSpec.read, data.list_of_fields(key))) for key in ("inputs", "outputs"))
-        fed = data.fields("feedback") if "feedback" in data else Fields({})
+        fed, start = (data.fields(key) if key in data else Fields({}) for key in ("feedback", "start"))
         feedback = {name: fed.text(name) for name in fed.data}
-        start = data.fields("start") if "start" in data else Fields({})
         sizes = {name: tuple(int(size) for size in start.numbers(name, len(start.items(name)))) for name in start.data}
         found = GraphSpec(inputs, outputs, feedback, sizes)
-        found._check(data.path)
-        return found
-
-    def _check(self, path: str) -> None:
-        for tensors in (self.inputs, self.outputs):
+        for tensors in (inputs, outputs):
             if len({spec.name for spec in tensors}) != len(tensors):
-                raise BundleError(f"manifest, {path}: two tensors have the same name")
-        for name, source in self.feedback.items():
-            given, taken = self.output(source), self.input(name)
-            alike = [
-                b in {a, given.shape[0]} or isinstance(b, str) for a, b in zip(given.shape, taken.shape, strict=False)
-            ]
-            if given.dtype != taken.dtype or len(given.shape) != len(taken.shape) or not all(alike):
-                raise BundleError(f"manifest, {path}.feedback: {source!r} does not fit the input {name!r}")
-        for name, sizes in self.start.items():
-            shape = self.input(name).shape[1:]
-            fits = len(sizes) == len(shape) and all(
-                isinstance(b, str) or a == b for a, b in zip(sizes, shape, strict=True)
-            )
-            if name not in self.feedback or not fits or not all(0 <= size <= MAX_AXIS for size in sizes):
-                raise BundleError(f"manifest, {path}.start: {list(sizes)} does not fit the state {name!r}")
+                raise BundleError(f"manifest, {data.path}: two tensors have the same name")
+        for name, source in feedback.items():
+            given, taken = found.output(source), found.input(name)
+            pairs = zip(given.shape, taken.shape, strict=False)
+            alike = all(b in {a, given.shape[0]} or isinstance(b, str) for a, b in pairs)
+            if given.dtype != taken.dtype or len(given.shape) != len(taken.shape) or not alike:
+                raise BundleError(f"manifest, {data.path}.feedback: {source!r} does not fit the input {name!r}")
+        for name, own in sizes.items():
+            shape = found.input(name).shape[1:]
+            fits = len(own) == len(shape) and all(isinstance(b, str) or a == b for a, b in zip(own, shape, strict=True))
+            if name not in feedback or not fits or not all(0 <= size <= MAX_AXIS for size in own):
+                raise BundleError(f"manifest, {data.path}.start: {list(own)} does not fit the state {name!r}")
+        return found
 
 
 def _named(name: str, tensors: tuple[TensorSpec, ...], kind: str) -> TensorSpec:
@@ -214,9 +205,17 @@ class OnnxGraph:
                 self._session = (options or SessionOptions()).session(model)
         except Exception as error:  # ONNX Runtime's errors share no base class of their own
             raise BundleError(f"ONNX Runtime rejected the graph: {str(error).partition(chr(10))[0]}") from error
-        _check(self._session.get_inputs(), spec.inputs, "input")
-        _check(self._session.get_outputs(), spec.outputs, "output")
         self._outputs = [tensor.name for tensor in spec.outputs]
+        inputs = ("input", self._session.get_inputs(), spec.inputs)
+        for kind, nodes, declared in (inputs, ("output", self._session.get_outputs(), spec.outputs)):
+            actual = {node.name: (node.type, _sizes(node.shape)) for node in nodes}
+            wanted = {tensor.name: (DTYPES[tensor.dtype], _sizes(tensor.shape)) for tensor in declared}
+            for name in actual.keys() | wanted.keys():
+                if actual.get(name) != wanted.get(name):
+                    raise BundleError(
+                        f"the graph does not match its contract: {kind} {name!r} is {actual.get(name, 'absent')}, "
+                        f"declared {wanted.get(name, 'nowhere')}"
+                    )
 
     @property
     def providers(self) -> tuple[str, ...]:
@@ -236,18 +235,6 @@ class OnnxGraph:
             if array.dtype.kind == "f" and not np.isfinite(array).all():
                 raise BundleError(f"the graph's output {name!r} is not finite")
         return found
-
-
-def _check(found: list[Any], declared: tuple[TensorSpec, ...], kind: str) -> None:
-    """Refuse a graph whose tensors differ from the manifest's; dynamic axes may have other names."""
-    actual = {node.name: (node.type, _sizes(node.shape)) for node in found}
-    wanted = {spec.name: (DTYPES[spec.dtype], _sizes(spec.shape)) for spec in declared}
-    for name in actual.keys() | wanted.keys():
-        if actual.get(name) != wanted.get(name):
-            raise BundleError(
-                f"the graph does not match its contract: {kind} {name!r} is {actual.get(name, 'absent')}, "
-                f"declared {wanted.get(name, 'nowhere')}"
-            )
 
 
 def _sizes(shape: Any) -> tuple[int | None, ...]:

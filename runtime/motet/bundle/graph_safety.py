@@ -15,52 +15,8 @@ from motet.errors import BundleError
 Value = int | memoryview
 """A number, or the bytes of a string or of a message within the message."""
 
-_VARINT, _FIXED64, _BYTES, _FIXED32 = 0, 1, 2, 5
-_SIZES = {_FIXED64: 8, _FIXED32: 4}
-
-
-def fields(message: memoryview) -> Iterator[tuple[int, Value]]:
-    """The fields of a message as (number, value), in their order; BundleError where the bytes are not a message.
-
-    Groups are refused: no writer has used them since 2008, and what they hold would be hidden.
-    """
-    place = 0
-    while place < len(message):
-        tag, place = _varint(message, place)
-        number, wire = tag >> 3, tag & 7
-        if tag >> 32 or not number:
-            raise BundleError("the graph is not valid ONNX: a field has an invalid number")
-        if wire == _VARINT:
-            value, place = _varint(message, place)
-            yield number, value
-            continue
-        if wire == _BYTES:
-            size, place = _varint(message, place)
-        elif wire in _SIZES:
-            size = _SIZES[wire]
-        else:
-            raise BundleError(f"the graph is not valid ONNX: a field has the wire type {wire}")
-        if size > len(message) - place:
-            raise BundleError("the graph is not valid ONNX: it is truncated")
-        yield number, message[place : place + size]
-        place += size
-
-
-def _varint(message: memoryview, place: int) -> tuple[int, int]:
-    """The number at ``place``, seven bits a byte, and where it ends."""
-    value = 0
-    for shift, byte in enumerate(message[place : place + 10]):
-        value |= (byte & 127) << 7 * shift
-        if byte < 128:
-            return value, place + shift + 1
-    raise BundleError("the graph is not valid ONNX: a number is unterminated")
-
-
-DOMAINS = ("", "ai.onnx")
-"""Of operators: ONNX's own. Quantised graphs need no other (MatMulInteger, DynamicQuantizeLinear)."""
-
-MAX_DEPTH, MAX_FIELDS, MAX_TEXT = 64, 100_000, 1 << 20
-"""Messages within messages, fields of a whole graph, and bytes of a field that is no tensor's data."""
+MAX_FIELDS, MAX_TEXT = 100_000, 1 << 20
+"""Fields of a whole graph, and bytes of a field that is no tensor's data."""
 
 
 class Message(NamedTuple):
@@ -88,25 +44,16 @@ MESSAGES = {
 """The fields of onnx.proto by number. Types of values (fields 11 to 13 of a graph, 14 and 15 of an attribute) and
 annotations hold neither tensors nor nodes."""
 
-_REFUSED = {
-    ("tensor", 13): "has its data in another file",
-    ("model", 20): "holds training information",
-    ("model", 25): "holds functions",
-}
-_LOCATION = 14  # of a tensor's data: 0 is in the file
-_DATA = frozenset({4, 5, 6, 7, 9, 10, 11})  # fields of a tensor
-_OPERATOR = 4  # of a node
-
 
 def check_graph(model: bytes) -> None:
     """BundleError where an ONNX model is damaged or could reach outside its bytes: what was found, and where."""
     if model[4:8] == b"ORTM":
         raise BundleError("the graph is in ONNX Runtime's own format, which cannot be checked")
-    waiting, count = [("model", memoryview(model), "the graph", 0)], 0
+    waiting, count, deepest = [("model", memoryview(model), "the graph", 0)], 0, 64
     while waiting:
         kind, data, outer, depth = waiting.pop()
-        if depth > MAX_DEPTH:
-            raise BundleError(f"the graph is nested more than {MAX_DEPTH} messages deep")
+        if depth > deepest:
+            raise BundleError(f"the graph is nested more than {deepest} messages deep")
         inner = []
         for number, value in fields(data):
             count += 1
@@ -121,26 +68,61 @@ def check_graph(model: bytes) -> None:
             waiting += [(message, part, place, depth + 1) for message, part in inner]
 
 
+def fields(message: memoryview) -> Iterator[tuple[int, Value]]:
+    """The fields of a message of protocol buffers as (number, value), in their order, without a schema or copies.
+
+    BundleError where the bytes are not a message. Groups are refused: no writer has used them since 2008, and what they
+    hold would be hidden.
+    """
+    place = 0
+    while place < len(message):
+        tag, place = _varint(message, place)
+        number, wire = tag >> 3, tag & 7
+        if tag >> 32 or not number:
+            raise BundleError("the graph is not valid ONNX: a field has an invalid number")
+        if wire not in (0, 1, 2, 5):
+            raise BundleError(f"the graph is not valid ONNX: a field has the wire type {wire}")
+        if wire in (0, 2):  # a number, and bytes after their count; else 8 or 4 bytes
+            size, place = _varint(message, place)
+        else:
+            size = 8 if wire == 1 else 4
+        if wire == 0:
+            yield number, size
+            continue
+        if size > len(message) - place:
+            raise BundleError("the graph is not valid ONNX: it is truncated")
+        yield number, message[place : place + size]
+        place += size
+
+
+def _varint(message: memoryview, place: int) -> tuple[int, int]:
+    """The number at ``place``, seven bits a byte, and where it ends."""
+    value = 0
+    for shift, byte in enumerate(message[place : place + 10]):
+        value |= (byte & 127) << 7 * shift
+        if byte < 128:
+            return value, place + shift + 1
+    raise BundleError("the graph is not valid ONNX: a number is unterminated")
+
+
 def _fault(kind: str, number: int, value: Value) -> str | None:
     """What is wrong with a field that holds no message to look into."""
-    if (kind, number) in _REFUSED:
-        return _REFUSED[kind, number]
-    if (kind, number) == ("tensor", _LOCATION):
-        return "has its data in another file" if value != 0 else None
-    if number not in MESSAGES[kind].plain:
-        return f"has the unknown field {number}"
-    if not isinstance(value, int) and len(value) > MAX_TEXT and (kind != "tensor" or number not in _DATA):
-        return f"has a text of {len(value)} bytes; at most {MAX_TEXT} are read"
-    return _fault_of_name(kind, number, value)
-
-
-def _fault_of_name(kind: str, number: int, value: Value) -> str | None:
-    """What is wrong with the name of an operator, or of a domain of operators."""
-    if (kind, number) == ("node", _OPERATOR) and _text(value) == "Loop":
-        return "may never end; unroll it, or use Scan"
-    if number == MESSAGES[kind].domain and (domain := _text(value)) not in DOMAINS:
-        return f"needs operators of the domain {domain[:60]!r}; only ONNX's own are allowed"
-    return None
+    place, fault = (kind, number), None
+    data = kind == "tensor" and number in (4, 5, 6, 7, 9, 10, 11)
+    if place == ("tensor", 13) or (place == ("tensor", 14) and value != 0):
+        fault = "has its data in another file"
+    elif kind == "model" and number in (20, 25):
+        fault = "holds training information" if number == 20 else "holds functions"
+    elif number not in MESSAGES[kind].plain and place != ("tensor", 14):
+        fault = f"has the unknown field {number}"
+    elif not data and not isinstance(value, int) and len(value) > MAX_TEXT:
+        fault = f"has a text of {len(value)} bytes; at most {MAX_TEXT} are read"
+    elif place == ("node", 4) and _text(value) == "Loop":
+        fault = "may never end; unroll it, or use Scan"
+    # quantised graphs need no other domain than ONNX's own (MatMulInteger, DynamicQuantizeLinear)
+    elif number == MESSAGES[kind].domain and (domain := _text(value)) not in ("", "ai.onnx"):
+        fault = f"needs operators of the domain {domain[:60]!r}; only ONNX's own are allowed"
+    return fault
 
 
 def _place(kind: str, data: memoryview, outer: str) -> str:

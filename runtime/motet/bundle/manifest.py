@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,28 +23,25 @@ MANIFEST = "manifest.json"
 TABLE_DTYPES = ("float16", "float32", "int8", "uint8", "int16", "uint16", "int32", "int64")
 """Of the numbers of a table."""
 
-MAX_CHANNELS, FASTEST = 10_000, 1000.0
-"""Channels of a model, and its frames per second."""
+MAX_CHANNELS = 10_000
+"""Of a model, and its joints."""
 
 
-@dataclass(frozen=True)
-class FileEntry:
+class FileEntry(NamedTuple):
     """A file of the bundle: its size in bytes and its sha256, in hexadecimal digits."""
 
     size: int
     sha256: str
 
 
-@dataclass(frozen=True)
-class GraphEntry:
+class GraphEntry(NamedTuple):
     """The graph of a role: the file that it is in, and its contract."""
 
     file: str
     spec: GraphSpec
 
 
-@dataclass(frozen=True)
-class TableEntry:
+class TableEntry(NamedTuple):
     """A plain array: the .npy file that it is in, its dtype and its shape."""
 
     file: str
@@ -52,16 +49,14 @@ class TableEntry:
     shape: tuple[int, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class Control:
+class Control(NamedTuple):
     """What a model of control is told: its labels, and for each the frames (K, D) that a run starts from."""
 
     labels: tuple[str, ...]
     starts: Mapping[str, NDArray[np.float64]]
 
 
-@dataclass(frozen=True)
-class Golden:
+class Golden(NamedTuple):
     """The golden vectors: their file, the largest error that is taken for rounding, and the settings of the run."""
 
     file: str
@@ -113,7 +108,7 @@ class Manifest:
             version=top.text("version") if "version" in top else "",
             motion=motion,
             defaults=top.fields("defaults").data,
-            settings={name: entry.data for name, entry in top.entries("settings")} if "settings" in top else {},
+            settings={name: entry.data for name, entry in top.entries("settings")},
             text=top.mapping("text") if "text" in top else None,
             vocabulary=top.texts("vocabulary") if "vocabulary" in top else (),
             control=_control(top.fields("control"), len(motion.channels)) if "control" in top else None,
@@ -122,9 +117,9 @@ class Manifest:
             training=top.mapping("training"),
             quality=top.mapping("quality"),
             parity=top.mapping("parity"),
-            graphs={role: _graph(entry) for role, entry in top.entries("graphs")} if "graphs" in top else {},
-            tables={name: _table(entry) for name, entry in top.entries("tables")} if "tables" in top else {},
-            files={name: _file(name, entry) for name, entry in top.entries("files")} if "files" in top else {},
+            graphs={role: GraphEntry(one.text("file"), GraphSpec.read(one)) for role, one in top.entries("graphs")},
+            tables={name: _table(one) for name, one in top.entries("tables")},
+            files={name: _file(name, one) for name, one in top.entries("files")},
             golden=_golden(top.fields("golden")) if "golden" in top else None,
             source=top.data,
         )
@@ -164,7 +159,7 @@ def read_contract(data: Fields) -> MotionContract:
         raise BundleError(f"manifest, {data.at('channels')}: {name} needs {', '.join(lacking)}")
     if len(units) != len(channels) or any(unit not in UNITS for unit in units):
         raise data.fault(f"one of {', '.join(UNITS)} for each of {len(channels)} channels", units, "units")
-    fps, mean = data.number("fps", 1, FASTEST), data.numbers("mean", len(channels))
+    fps, mean = data.number("fps", 1, 1000), data.numbers("mean", len(channels))
     std = data.numbers("std", len(channels), low=0.0)
     skeleton = _skeleton(data.fields("skeleton"), channels) if "skeleton" in data else None
     return MotionContract(name, channels, tuple(units), fps, mean, std, skeleton)
@@ -196,10 +191,6 @@ def _control(data: Fields, channels: int) -> Control:
     if not labels or set(starts.data) != set(labels):
         raise data.fault(f"frames for each of {', '.join(labels)}", list(starts.data), "starts")
     return Control(labels, {label: starts.table(label, channels) for label in labels})
-
-
-def _graph(data: Fields) -> GraphEntry:
-    return GraphEntry(data.text("file"), GraphSpec.read(data))
 
 
 def _table(data: Fields) -> TableEntry:

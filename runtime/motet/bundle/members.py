@@ -10,7 +10,7 @@ import zipfile
 import zlib
 from collections.abc import Collection, Mapping
 from pathlib import Path
-from typing import Any, BinaryIO, Protocol
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,25 +20,12 @@ from motet.errors import BundleError
 MAX_FILES, MAX_SIZE = 64, 256 << 20
 """Files of a bundle, and bytes of all of them together."""
 
-MAX_RATIO, FREE = 100, 1 << 20
-"""A file of a zip that unpacks to more than ``FREE`` bytes has at most so many times its packed size. Weights hardly
-shrink; a bomb of zeros does by a thousand."""
-
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,127}")
 """A plain file name on every system."""
 
 
 _DAMAGE = (zipfile.BadZipFile, zlib.error, struct.error, OSError, EOFError, RuntimeError, ValueError, OverflowError)
-"""What reading a damaged zip raises."""
-
-
-class Members(Protocol):
-    """Files by name."""
-
-    names: frozenset[str]
-
-    def read(self, name: str, limit: int) -> bytes:
-        """One file's bytes, the first ``limit`` + 1 of them where it is longer; BundleError where it cannot be read."""
+"""What reading a damaged file raises."""
 
 
 class Folder:
@@ -57,7 +44,7 @@ class Folder:
         self.names = frozenset(found)
 
     def read(self, name: str, limit: int) -> bytes:
-        """See :meth:`Members.read`."""
+        """One file's bytes, the first ``limit`` + 1 of them where it is longer; BundleError where it cannot be read."""
         try:
             with (self._path / name).open("rb") as file:
                 return file.read(limit + 1)
@@ -73,7 +60,11 @@ class Archive:
         try:
             with self._file() as file:
                 file.seek(max(0, file.seek(0, io.SEEK_END) - 42))
-                small = _is_small(file.read())
+                end = file.read()
+                if end[-22:-18] != b"PK\x05\x06" or end[:4] == b"PK\x06\x07":
+                    raise zipfile.BadZipFile("its end is not that of a plain zip")
+                # how long the table of contents is, before it is read
+                small = int.from_bytes(end[-10:-6], "little") <= MAX_FILES * 1024
                 infos = zipfile.ZipFile(file).infolist() if small else []
         except _DAMAGE as error:
             raise BundleError(f"not a zip that can be read ({error})") from error
@@ -81,14 +72,19 @@ class Archive:
             raise BundleError(f"it holds too many files; a bundle has at most {MAX_FILES}")
         _check({info.orig_filename: info.file_size for info in infos})
         for info in infos:
-            _check_entry(info)
-        self._infos: Mapping[str, zipfile.ZipInfo] = {info.filename: info for info in infos}
+            if stat.S_IFMT(info.external_attr >> 16) not in {0, stat.S_IFREG}:
+                raise BundleError(f"{info.filename!r} is not a plain file")
+            if info.compress_type not in {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED} or info.flag_bits & 1:
+                raise BundleError(f"{info.filename!r} is encrypted, or not compressed with deflate")
+            if info.file_size > max(1 << 20, 100 * info.compress_size):  # weights hardly shrink; a bomb does by 1000
+                raise BundleError(f"{info.filename!r} unpacks to more than 100 times its size")
+        self._infos = {info.filename: info for info in infos}
         if len(self._infos) != len(infos):
             raise BundleError("the zip contains a file twice")
         self.names = frozenset(self._infos)
 
     def read(self, name: str, limit: int) -> bytes:
-        """See :meth:`Members.read`; the limit holds whatever size the zip announces."""
+        """As :meth:`Folder.read`; the limit holds whatever size the zip announces."""
         try:
             with self._file() as source, zipfile.ZipFile(source) as archive, archive.open(self._infos[name]) as file:
                 return file.read(limit + 1)
@@ -99,23 +95,6 @@ class Archive:
         return io.BytesIO(self._source) if isinstance(self._source, bytes) else self._source.open("rb")
 
 
-def _is_small(end: bytes) -> bool:
-    """Whether the table of contents of a plain zip is short, by its last 42 bytes, which say so before it is read."""
-    record = end[-22:]
-    if record[:4] != b"PK\x05\x06" or end[:4] == b"PK\x06\x07":
-        raise zipfile.BadZipFile("its end is not that of a plain zip")
-    return int.from_bytes(record[12:16], "little") <= MAX_FILES * 1024
-
-
-def _check_entry(info: zipfile.ZipInfo) -> None:
-    if stat.S_IFMT(info.external_attr >> 16) not in {0, stat.S_IFREG}:
-        raise BundleError(f"{info.filename!r} is not a plain file")
-    if info.compress_type not in {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED} or info.flag_bits & 1:
-        raise BundleError(f"{info.filename!r} is encrypted, or not compressed with deflate")
-    if info.file_size > max(FREE, MAX_RATIO * info.compress_size):
-        raise BundleError(f"{info.filename!r} unpacks to more than {MAX_RATIO} times its size")
-
-
 def _check(sizes: Mapping[str, int]) -> None:
     if len(sizes) > MAX_FILES:
         raise BundleError(f"it holds {len(sizes)} files; a bundle has at most {MAX_FILES}")
@@ -124,18 +103,6 @@ def _check(sizes: Mapping[str, int]) -> None:
             raise BundleError(f"{name[:80]!r} is not a plain file name")
     if sum(sizes.values()) > MAX_SIZE:
         raise BundleError(f"its files total more than {MAX_SIZE} bytes")
-
-
-_NOT_AN_ARRAY = (
-    ValueError,
-    SyntaxError,
-    TypeError,
-    EOFError,
-    struct.error,
-    tokenize.TokenError,
-    RecursionError,
-    MemoryError,
-)
 
 
 def array_of(content: bytes, name: str, dtypes: Collection[str]) -> NDArray[Any]:
@@ -153,7 +120,7 @@ def array_of(content: bytes, name: str, dtypes: Collection[str]) -> NDArray[Any]
         if version != (1, 0) or fortran or not known or math.prod(shape) * dtype.itemsize != len(rest):
             raise ValueError(f"expected {' or '.join(dtypes)} in C order, and nothing after it")
         return np.frombuffer(rest, dtype).reshape(shape)
-    except _NOT_AN_ARRAY as error:
+    except (*_DAMAGE, SyntaxError, TypeError, tokenize.TokenError, MemoryError) as error:
         raise BundleError(f"{name!r} is not a plain array: {error}") from error
 
 
