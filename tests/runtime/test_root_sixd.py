@@ -13,7 +13,7 @@ from motet.motion import Motion, mirror, positions
 from motet.motion.kinematics import euler_of, local_rotations
 from motet.motion.rotations import axis_to_rotmat, rotvec_to_rotmat
 from motet.representation.contract import MotionContract, named, sequences
-from motet.representation.root_sixd import FACING_CALM, ROOT_SIXD, SIXD_KINDS, facing, in_world, sixd_to_rotmat
+from motet.representation.root_sixd import ROOT_SIXD, SIXD_KINDS, facing, in_world, sixd_to_rotmat
 
 SIXD = named("root_sixd")
 CLIPS = ("02_06", "09_07", "39_14")
@@ -147,7 +147,7 @@ def test_the_facing_smooths_what_hips_do_in_a_stride() -> None:
     values[:, motion.channels.index("hips.ry")] = np.degrees(sway)
     found = facing(replace(motion, values=values))
     # twice the angle is smoothed as a complex number: nearly by what a Gaussian leaves of two swings a second
-    left = np.exp(-0.5 * (2 * np.pi * 2 * FACING_CALM) ** 2)
+    left = np.exp(-0.5 * (2 * np.pi * 2 * 4 / 30) ** 2)
     assert np.abs(found[20:-20]).max() == pytest.approx(0.3 * left, rel=0.1)
 
 

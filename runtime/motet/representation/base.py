@@ -1,8 +1,9 @@
 """What representations offer, and what they share: mirroring by columns, down-sampling in phases, rest."""
 
-from collections.abc import Callable, Iterator, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,37 +12,36 @@ from motet.errors import MotionError
 from motet.motion.kinematics import AXES, skeleton_of
 from motet.motion.mirroring import lateral_axis
 from motet.motion.motion import Motion
-from motet.motion.skeleton import Skeleton
+from motet.motion.skeleton import Skeleton, partners_of
 
 
-class Representation(Protocol):
+class Representation(ABC):
     """What the channels of a model mean. *Features* are a motion in these channels, frame for frame a model's frames.
 
-    name: as manifests have it. required: channels that features always have.
+    required: channels that features always have.
     """
 
-    name: str
-    required: tuple[str, ...]
+    required: tuple[str, ...] = ()
 
+    @abstractmethod
     def features(self, motion: Motion, like: Motion | None = None) -> Motion:
         """The features of a continuous motion at the model's frame rate; features are given back as they are.
 
         like: features whose channels, units and joints are wanted; else all that the motion has. MotionError names
         what the motion lacks.
         """
-        ...
 
     def planted(self, features: Motion) -> Motion:
         """Features of a generated motion whose feet stand where they are on the ground, where that can be said."""
-        ...
+        return features
 
+    @abstractmethod
     def motion(self, features: Motion, after: Motion | None = None) -> Motion:
         """A motion that can be played, from features: from the origin, or as the continuation of another motion."""
-        ...
 
+    @abstractmethod
     def mirror(self, features: Motion) -> "FrameMirror":
         """How frames of such features are mirrored; MotionError where they cannot be."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +67,30 @@ def phases(motion: Motion, fps: float) -> Iterator[Motion]:
     count = round(ratio) if abs(ratio - round(ratio)) < 1e-9 else 1
     smooth = motion.continuous()
     return (smooth[offset:].resample(fps) for offset in range(max(1, count)))
+
+
+def root_signs(channels: Sequence[str]) -> NDArray[np.float32]:
+    """The signs (D,) by which channels of the root change in a mirror image; 1 for all others."""
+    turned = ("root.left", "root.turn", "root.roll")
+    return np.array([-1.0 if name in turned else 1.0 for name in channels], dtype=np.float32)
+
+
+def joints_with(channels: Sequence[str], kind: str) -> tuple[str, ...]:
+    """The joints that have a channel of a kind."""
+    return tuple(name.rpartition(".")[0] for name in channels if name.endswith(f".{kind}"))
+
+
+def mirror_by_joints(features: Motion, signs: Mapping[str, float]) -> FrameMirror:
+    """The mirror of features that have the same kinds of channels for every joint, by the ``signs`` of these."""
+    lateral_x(features)
+    joints = joints_with(features.channels, next(iter(signs)))
+    places = {name: column for column, name in enumerate(features.channels)}
+    columns, found = np.arange(len(places)), root_signs(features.channels)
+    for joint, partner in zip(joints, partners_of(joints), strict=True):
+        for kind, sign in signs.items():
+            columns[places[f"{joint}.{kind}"]] = places[f"{joints[partner]}.{kind}"]
+            found[places[f"{joint}.{kind}"]] = sign
+    return FrameMirror(columns, found)
 
 
 def lateral_x(features: Motion) -> Skeleton:

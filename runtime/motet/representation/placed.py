@@ -82,8 +82,9 @@ def bridge(past: Array, after: Array, count: int, pace: float = 1.0) -> Array:
     """
     part = (np.arange(1, count + 1) / (count + 1))[:, None]
     start, end = past[..., -1:, :], after[..., :1, :]
-    # the hips' velocities are taken over 3 frames
-    leaves, arrives = (_speed(past[..., -3 - 1 :, :]), _speed(after[..., : 3 + 1, :]))
+    sides = (past[..., -4:, :ROOT_PLACE], after[..., :4, :ROOT_PLACE])
+    # the hips' velocities, metres a frame, over 3 frames; 0 where there is only one
+    leaves, arrives = ((side[..., -1:, :] - side[..., :1, :]) / max(1, side.shape[-2] - 1) for side in sides)
     span = (count + 1) * pace
     found = np.empty((*past.shape[:-2], count, past.shape[-1]))
     found[..., :ROOT_PLACE] = (
@@ -105,13 +106,6 @@ def straight(past: Array, after: Array, count: int) -> Array:
     found = bridge(past, after, count)
     start, end = past[..., -1:, :ROOT_PLACE], after[..., :1, :ROOT_PLACE]
     found[..., :ROOT_PLACE] = start + part * (end - start)
-    return found
-
-
-def _speed(frames: Array) -> Array:
-    """Metres a frame (..., 1, 3) that the root moves in frames (..., S, E), 0 where there is only one."""
-    steps = max(1, frames.shape[-2] - 1)
-    found: Array = (frames[..., -1:, :ROOT_PLACE] - frames[..., :1, :ROOT_PLACE]) / steps
     return found
 
 

@@ -19,7 +19,7 @@ from motet.motion.kinematics import (
     with_channels,
 )
 from motet.motion.motion import TURN, Motion
-from motet.motion.rotations import Array, inverse, product, rotmat_to_rotvec, rotvec_to_rotmat
+from motet.motion.rotations import inverse, product, rotmat_to_rotvec, rotvec_to_rotmat
 from motet.motion.skeleton import Skeleton
 
 log = logging.getLogger(__name__)
@@ -33,36 +33,35 @@ def foreign(motion: Motion, skeleton: Skeleton, joints: Iterable[str]) -> str | 
     lacking = [name for name in joints if name not in own.places]
     if lacking:
         return f"this motion lacks joints of the model's figure: {listed(lacking)}"
-    return _other_bones(own, skeleton)
+    return _apart(own, skeleton)[0]
 
 
 @lru_cache(maxsize=256)
-def _other_bones(own: Skeleton, other: Skeleton) -> str | None:
-    """Why the angles of any joint mean other poses in another skeleton, None if none does."""
-    return next((reason for name in own.names if (reason := _other_bone(own, other, name))), None)
-
-
-def _other_bone(own: Skeleton, other: Skeleton, name: str) -> str | None:
-    """Why a joint's angles mean other poses in another skeleton: its bone points elsewhere; None if they do not."""
-    if name not in other.places:
-        return None
-    parent = other.joints[other.places[name]].parent
-    if parent < 0 or other.names[parent] not in own.places:
-        return None
-    bones = [
-        skeleton.rest_positions[skeleton.places[name]] - skeleton.rest_positions[skeleton.places[other.names[parent]]]
-        for skeleton in (own, other)
-    ]
-    lengths = [float(np.linalg.norm(bone)) for bone in bones]
-    if min(lengths) < 1e-6:
-        return None
-    apart = np.degrees(np.arccos(np.clip(bones[0] @ bones[1] / (lengths[0] * lengths[1]), -1, 1)))
-    if apart <= 45:  # degrees; the bones of 16 of CMU's subjects, measured one by one, lie up to 24 apart
-        return None
-    return (
-        f"the bone to {name!r} points {apart:.0f} degrees away from its direction in the model's rest pose: "
-        "the same angles mean different poses"
-    )
+def _apart(own: Skeleton, other: Skeleton) -> tuple[str | None, tuple[str, ...]]:
+    """Why angles mean other poses in another skeleton: a bone points elsewhere; None if they do not. And names of the
+    joints of both that turn about other axes."""
+    turned = []
+    for name in own.names:
+        if name not in other.places:
+            continue
+        one, two = own.joints[own.places[name]], other.joints[other.places[name]]
+        if two.parent >= 0 and (parent := other.names[two.parent]) in own.places:
+            ends = [(at.rest_positions[at.places[name]], at.rest_positions[at.places[parent]]) for at in (own, other)]
+            bones = [end - start for end, start in ends]
+            lengths = [float(np.linalg.norm(bone)) for bone in bones]
+            cosine = bones[0] @ bones[1] / max(lengths[0] * lengths[1], 1e-12)
+            apart = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+            # the bones of 16 of CMU's subjects, measured one by one, lie up to 24 degrees apart
+            if min(lengths) >= 1e-6 and apart > 45:
+                reason = (
+                    f"the bone to {name!r} points {apart:.0f} degrees away from its direction in the model's rest "
+                    "pose: the same angles mean different poses"
+                )
+                return reason, ()
+        # entries of two frames that are the same axes, written differently, differ by less
+        if one.order != two.order or not np.allclose(one.frame, two.frame, rtol=0, atol=1e-3):
+            turned.append(name)
+    return None, tuple(turned)
 
 
 def in_known_unit(motion: Motion, figure: Skeleton) -> Motion:
@@ -71,21 +70,17 @@ def in_known_unit(motion: Motion, figure: Skeleton) -> Motion:
     own = motion.skeleton
     if own is None or own.metres_per_unit is not None:
         return motion
-    if figure.metres_per_unit is not None and _same_bones(own, figure):
-        return motion.with_unit(figure.metres_per_unit)
+    shared = [name for name in own.names[1:] if name in figure.places]
+    if figure.metres_per_unit is not None and shared:
+        apart = [own.offsets[own.places[name]] - figure.offsets[figure.places[name]] for name in shared]
+        if float(np.abs(apart).max()) < 1e-5 * figure.height:  # files round lengths
+            return motion.with_unit(figure.metres_per_unit)
     try:
         unit = unit_by_legs(motion)
     except MotionError:  # it is no human's
         return motion
     log.info("%s", unit.note)
     return motion if unit.metres is None else motion.with_unit(unit.metres)
-
-
-def _same_bones(own: Skeleton, figure: Skeleton) -> bool:
-    """Whether the joints that both skeletons have are as far from their parents, but for what a file rounds."""
-    shared = [name for name in own.names[1:] if name in figure.places]
-    apart = [own.offsets[own.places[name]] - figure.offsets[figure.places[name]] for name in shared]
-    return bool(shared) and float(np.abs(apart).max()) < 1e-5 * figure.height  # files round lengths
 
 
 def to_model_figure(motion: Motion, pose: Motion, reason: str, figure: Figure | None = None) -> Motion:
@@ -133,8 +128,13 @@ def from_model_figure(found: Motion, own: Motion, ends: Motion, figure: Figure |
     turned, moved = local_rotations(back), local_translations(back)
     turns, off = product(inverse(turned[at]), local_rotations(ends)), local_translations(ends) - moved[at]
     carrier = next(name.rpartition(".")[0] for name in back.channels if name.endswith(".tx"))
-    channels = {f"{carrier}.t{axis}" for axis in AXES} <= set(own.channels)
-    if not channels or not all(_same_world(turn, skeleton, carrier) for turn in turns):
+    joint, above = skeleton.index(carrier), []  # the hips and all above them
+    while joint >= 0:
+        above.append(joint)
+        joint = skeleton.joints[joint].parent
+    # they come back within a degree where y is up in both worlds
+    alike = (np.degrees(np.linalg.norm(rotmat_to_rotvec(turns[:, above]), axis=-1)) < 1.0).all()
+    if not {f"{carrier}.t{axis}" for axis in AXES} <= set(own.channels) or not alike:
         log.info("the new frames use the model's figure: the file's own turns or moves its hips in another way")
         return None
     part = np.linspace(0, 1, len(found))[:, None]
@@ -149,15 +149,6 @@ def from_model_figure(found: Motion, own: Motion, ends: Motion, figure: Figure |
     return replace(whole, values=values)[1 : len(found) + 1 - len(ends)]
 
 
-def _same_world(turns: Array, skeleton: Skeleton, carrier: str) -> bool:
-    """Whether hips and all above them come back within a degree, as where y is up in both worlds."""
-    joint, above = skeleton.index(carrier), []
-    while joint >= 0:
-        above.append(joint)
-        joint = skeleton.joints[joint].parent
-    return bool((np.degrees(np.linalg.norm(rotmat_to_rotvec(turns[above]), axis=-1)) < 1.0).all())
-
-
 def in_joints_of(motion: Motion, skeleton: Skeleton | None) -> Motion:
     """The motion with Euler angles in the order and axes that joints of the same name have in another skeleton.
 
@@ -166,7 +157,10 @@ def in_joints_of(motion: Motion, skeleton: Skeleton | None) -> Motion:
     """
     if motion.skeleton is None or skeleton is None or motion.skeleton == skeleton:
         return motion
-    for name in _other_joints(motion.skeleton, skeleton):
+    reason, turned = _apart(motion.skeleton, skeleton)
+    if reason:
+        raise MotionError(reason)
+    for name in turned:
         columns = motion.rotation_columns().get(name)
         own = motion.skeleton
         if own is None or columns is None:
@@ -174,24 +168,8 @@ def in_joints_of(motion: Motion, skeleton: Skeleton | None) -> Motion:
         place, joint = own.places[name], skeleton.joints[skeleton.places[name]]
         unit = motion.units[columns[0]]
         angles = euler_of(local_rotations(motion, [place])[:, 0], joint) * TURN[unit] / (2 * np.pi)
-        turned = replace(own.joints[place], order=joint.order, axis=joint.axis)
-        joints = (*own.joints[:place], turned, *own.joints[place + 1 :])
+        mended = replace(own.joints[place], order=joint.order, axis=joint.axis)
+        joints = (*own.joints[:place], mended, *own.joints[place + 1 :])
         motion = with_channels(motion, tuple(f"{name}.r{axis}" for axis in AXES), angles, (unit,) * 3)
         motion = replace(motion, skeleton=replace(own, joints=joints))
     return motion
-
-
-@lru_cache(maxsize=256)
-def _other_joints(own: Skeleton, other: Skeleton) -> tuple[str, ...]:
-    """Names of the joints of both skeletons that turn about other axes; MotionError for other bones."""
-    found = []
-    for name in own.names:
-        if name not in other.places:
-            continue
-        if reason := _other_bone(own, other, name):
-            raise MotionError(reason)
-        one, two = own.joints[own.places[name]], other.joints[other.places[name]]
-        # entries of two frames that are the same axes, written differently, differ by less
-        if one.order != two.order or not np.allclose(one.frame, two.frame, rtol=0, atol=1e-3):
-            found.append(name)
-    return tuple(found)

@@ -7,8 +7,6 @@ facing frame of the previous frame, so that adding them up gives the path exactl
 at.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -28,17 +26,14 @@ from motet.motion.kinematics import (
 from motet.motion.mirroring import mirror
 from motet.motion.motion import TURN, Motion
 from motet.motion.rotations import Array, euler_to_rotmat, rotmats_to_euler
-from motet.representation.base import FrameMirror, in_units, lateral_x
+from motet.representation.base import FrameMirror, Representation, in_units, lateral_x, root_signs
 
 
-class Angles:
+class Angles(Representation):
     """Euler angles of joints, and whatever other channels a model has, as they are in motions.
 
     They do not say where a figure goes: its path is laid by what its feet do, and what then still slides is held.
     """
-
-    name = "angles"
-    required: tuple[str, ...] = ()
 
     def features(self, motion: Motion, like: Motion | None = None) -> Motion:
         """The channels of ``like``, or all but the root's."""
@@ -78,8 +73,6 @@ ROOT_BLOCK = ("root.forward", "root.left", "root.turn", "root.height", "root.pit
 ROOT_BLOCK_UNITS = ("m/s", "m/s", "deg/s", "m", "deg", "deg")
 """Forward, to the left, turning to the left (counterclockwise seen from above), above y = 0, and what remains."""
 
-BLOCK_ORDER = "yxz"
-
 
 def to_root_block(motion: Motion) -> Motion:
     """The motion with the root block first, instead of the root's translation and rotation.
@@ -92,7 +85,7 @@ def to_root_block(motion: Motion) -> Motion:
     missing = [name for name in names if name not in motion.channels]
     if missing:
         raise MotionError(f"the root's path and rotation are needed, but this motion lacks {', '.join(missing)}")
-    angles = rotmats_to_euler(local_rotations(motion, [0])[:, 0], BLOCK_ORDER)
+    angles = rotmats_to_euler(local_rotations(motion, [0])[:, 0], "yxz")
     places = motion.select(names[:3], ("m",) * 3).values
     velocities = ground_velocities(places, angles[:, 0], motion.fps)
     velocities[:, 2] = np.degrees(velocities[:, 2])
@@ -135,7 +128,7 @@ def root_in_world(motion: Motion, after: Motion | None = None) -> tuple[Array, A
         facing, x, z = way(steps)
     else:
         facing, x, z = way(steps, last_place(after), heading(after[-1])[0])
-    rotations = euler_to_rotmat(np.column_stack([facing, np.radians(block[:, 4:])]), BLOCK_ORDER)
+    rotations = euler_to_rotmat(np.column_stack([facing, np.radians(block[:, 4:])]), "yxz")
     return rotations, np.column_stack([x, block[:, 3], z])
 
 
@@ -158,11 +151,6 @@ def last_place(motion: Motion) -> Array:
     """The root's place (3,) in a motion's last frame, in metres."""
     place: Array = local_translations(motion[-1])[0, 0] * skeleton_of(motion).unit_factor(1.0)
     return place
-
-
-def mirrored_signs(channels: Sequence[str]) -> Array:
-    """The signs (D,) by which channels of the root block change in a mirror image; 1 for all others."""
-    return np.array([-1.0 if name in ("root.left", "root.turn", "root.roll") else 1.0 for name in channels])
 
 
 def plant_feet(motion: Motion) -> Motion:
@@ -191,11 +179,10 @@ def _root_channels(motion: Motion) -> tuple[str, ...]:
     return tuple(f"{root}.{kind}{axis}" for kind in "tr" for axis in AXES)
 
 
-class RootAngles:
-    """See :class:`motet.representation.base.Representation`."""
+class RootAngles(Representation):
+    """Euler angles of joints in degrees, and the root block."""
 
-    name = "root_angles"
-    required: tuple[str, ...] = ROOT_BLOCK
+    required = ROOT_BLOCK
 
     def features(self, motion: Motion, like: Motion | None = None) -> Motion:
         """The root block, and the joints' channels of ``like`` or all there are, angles in degrees."""
@@ -221,6 +208,6 @@ class RootAngles:
         joints = np.flatnonzero([name not in ROOT_BLOCK for name in features.channels])
         found = Angles().mirror(features.select(tuple(features.channels[d] for d in joints)))
         columns = np.arange(len(features.channels))
-        signs = mirrored_signs(features.channels).astype(np.float32)
+        signs = root_signs(features.channels)
         columns[joints], signs[joints] = joints[found.columns], found.signs
         return FrameMirror(columns, signs)

@@ -11,15 +11,14 @@ tilted, so it stays calm in cartwheels and where a figure lies.
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from motet.motion.feet.hold import hold_feet
 from motet.motion.humanoid import HUMANOID
 from motet.motion.kinematics import AXES, continued, local_rotations, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, axis_to_rotmat, product, rotmat_to_quat
-from motet.motion.skeleton import END_SUFFIX, partners_of
-from motet.representation.base import FrameMirror, at_rest, lateral_x
+from motet.motion.skeleton import END_SUFFIX
+from motet.representation.base import FrameMirror, Representation, at_rest, joints_with, mirror_by_joints
 from motet.representation.root_block import ground_velocities, last_place, way
 
 ROOT_SIXD = ("root.forward", "root.left", "root.turn", "root.height")
@@ -32,22 +31,27 @@ SIXD_KINDS = ("xx", "xy", "xz", "yx", "yy", "yz")
 SIXD_SIGNS = (1.0, -1.0, -1.0, -1.0, 1.0, 1.0)
 """What a mirror image in the plane x = 0 makes of them."""
 
-FACING_CALM = 4 / 30
-"""Seconds: the standard deviation of the window by which the facing is smoothed. Hips sway by a stride, .5 s."""
 
+class RootSixd(Representation):
+    """How the root moves over the ground, its height, and two axes of every joint."""
 
-class RootSixd:
-    """See :class:`motet.representation.base.Representation`."""
-
-    name = "root_sixd"
-    required: tuple[str, ...] = ROOT_SIXD
+    required = ROOT_SIXD
 
     def features(self, motion: Motion, like: Motion | None = None) -> Motion:
         """Root and two axes of the joints of ``like``, or of all that are no tips."""
-        if set(ROOT_SIXD) <= set(motion.channels):
-            return motion if like is None else motion.select(like.channels, like.units)
-        features = to_sixd(motion)
-        return features if like is None else features.select(like.channels, like.units)
+        if not set(ROOT_SIXD) <= set(motion.channels):
+            skeleton = skeleton_of(motion)
+            joints = [i for i, name in enumerate(skeleton.names) if not name.endswith(END_SUFFIX)]
+            rotations = np.ascontiguousarray(local_rotations(motion, joints))
+            angles = facing(motion)
+            rotations[:, 0] = product(axis_to_rotmat("y", -angles), rotations[:, 0])
+            places = motion.select(tuple(f"{skeleton.names[0]}.t{axis}" for axis in AXES), ("m",) * 3).values
+            axes = rotmat_to_sixd(rotations).reshape(len(motion), -1)
+            values = np.column_stack([ground_velocities(places, angles, motion.fps), places[:, 1], axes])
+            names = tuple(f"{skeleton.names[joint]}.{kind}" for joint in joints for kind in SIXD_KINDS)
+            units = ROOT_SIXD_UNITS + ("1",) * len(names)
+            motion = replace(motion, values=values, channels=ROOT_SIXD + names, units=units)
+        return motion if like is None else motion.select(like.channels, like.units)
 
     def planted(self, features: Motion) -> Motion:
         """The features with feet that stay where they stand (:func:`motet.motion.feet.hold.hold_feet`)."""
@@ -61,16 +65,7 @@ class RootSixd:
 
     def mirror(self, features: Motion) -> FrameMirror:
         """The axes of each joint's partner, mirrored."""
-        lateral_x(features)
-        joints = joints_of(features)
-        places = {name: column for column, name in enumerate(features.channels)}
-        columns, signs = np.arange(len(places)), np.ones(len(places), dtype=np.float32)
-        signs[[places["root.left"], places["root.turn"]]] = -1
-        for joint, partner in zip(joints, partners_of(joints), strict=True):
-            for kind, sign in zip(SIXD_KINDS, SIXD_SIGNS, strict=True):
-                columns[places[f"{joint}.{kind}"]] = places[f"{joints[partner]}.{kind}"]
-                signs[places[f"{joint}.{kind}"]] = sign
-        return FrameMirror(columns, signs)
+        return mirror_by_joints(features, dict(zip(SIXD_KINDS, SIXD_SIGNS, strict=True)))
 
 
 def in_world(features: Motion, after: Motion | None = None, pose: Array | None = None) -> tuple[Motion, Array]:
@@ -78,7 +73,7 @@ def in_world(features: Motion, after: Motion | None = None, pose: Array | None =
 
     From the origin; or after a motion, in its channels, from its last pose or from a ``pose`` that is known better.
     """
-    last = at_rest(features, joints_of(features)) if after is None else after[-1]
+    last = at_rest(features, joints_with(features.channels, "xx")) if after is None else after[-1]
     skeleton = skeleton_of(last)
     steps = features.select(ROOT_SIXD[:3]).values / features.fps
     if after is None:
@@ -96,25 +91,6 @@ def in_world(features: Motion, after: Motion | None = None, pose: Array | None =
     return continued(last, rotations, {root: path}), np.array([x[-1], z[-1], facings[-1]])
 
 
-def joints_of(features: Motion) -> tuple[str, ...]:
-    """The joints whose axes are among the channels."""
-    return tuple(name.rpartition(".")[0] for name in features.channels if name.endswith(".xx"))
-
-
-def to_sixd(motion: Motion) -> Motion:
-    """The motion's features; MotionError where it has no skeleton that knows its unit of length."""
-    skeleton = skeleton_of(motion)
-    joints = [i for i, name in enumerate(skeleton.names) if not name.endswith(END_SUFFIX)]
-    rotations = np.ascontiguousarray(local_rotations(motion, joints))
-    angles = facing(motion)
-    rotations[:, 0] = product(axis_to_rotmat("y", -angles), rotations[:, 0])
-    places = motion.select(tuple(f"{skeleton.names[0]}.t{axis}" for axis in AXES), ("m",) * 3).values
-    axes = rotmat_to_sixd(rotations).reshape(len(motion), -1)
-    values = np.column_stack([ground_velocities(places, angles, motion.fps), places[:, 1], axes])
-    names = tuple(f"{skeleton.names[joint]}.{kind}" for joint in joints for kind in SIXD_KINDS)
-    return replace(motion, values=values, channels=ROOT_SIXD + names, units=ROOT_SIXD_UNITS + ("1",) * len(names))
-
-
 def facing(motion: Motion) -> Array:
     """The angle (T,) in radians about the vertical axis that the root faces, calm and unwrapped; 0 is along z.
 
@@ -123,20 +99,16 @@ def facing(motion: Motion) -> Array:
     """
     quat = rotmat_to_quat(local_rotations(motion, [0])[:, 0])
     half = quat[:, 3] + 1j * quat[:, 1]
-    smooth = _smoothed(half * half, FACING_CALM * motion.fps)
-    return np.unwrap(np.angle(smooth))
-
-
-def _smoothed(values: NDArray[np.complex128], spread: float) -> NDArray[np.complex128]:
+    spread = 4 / 30 * motion.fps  # s, of the window that smooths it: hips sway by a stride, .5 s
     reach = max(1, round(4 * spread))
     window = np.exp(-0.5 * (np.arange(-reach, reach + 1) / spread) ** 2)
-    found: NDArray[np.complex128] = np.convolve(values, window)[reach : reach + len(values)]
-    return found
+    smooth = np.convolve(half * half, window)[reach : reach + len(motion)]
+    return np.unwrap(np.angle(smooth))
 
 
 def joint_rotations(features: Motion) -> dict[str, Array]:
     """Local rotations (T, 3, 3) by joint; the root's is seen from the facing."""
-    joints = joints_of(features)
+    joints = joints_with(features.channels, "xx")
     values = features.select(tuple(f"{joint}.{kind}" for joint in joints for kind in SIXD_KINDS)).values
     matrices = sixd_to_rotmat(values.reshape(len(features), len(joints), 6))
     return {joint: matrices[:, place] for place, joint in enumerate(joints)}

@@ -13,27 +13,18 @@ import numpy as np
 from motet.errors import MotionError, listed
 from motet.motion.kinematics import continued, local_rotations, skeleton_of
 from motet.motion.motion import Motion
-from motet.motion.rotations import Array, rotmat_to_rotvec, rotvec_to_rotmat
-from motet.motion.skeleton import END_SUFFIX, partners_of
-from motet.representation.base import FrameMirror, at_rest, lateral_x
-from motet.representation.root_block import (
-    ROOT_BLOCK,
-    ROOT_BLOCK_UNITS,
-    mirrored_signs,
-    root_in_world,
-    to_root_block,
-)
+from motet.motion.rotations import rotmat_to_rotvec, rotvec_to_rotmat
+from motet.motion.skeleton import END_SUFFIX
+from motet.representation.base import FrameMirror, Representation, at_rest, joints_with, mirror_by_joints
+from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS, root_in_world, to_root_block
 
 VECTOR_KINDS = ("ex", "ey", "ez")
 
-ROOT_VECTOR_UNITS = tuple(unit.replace("deg", "rad") for unit in ROOT_BLOCK_UNITS)
 
+class RootVectors(Representation):
+    """The root block in radians, and exponential maps; a prediction's path continues a recorded one, unplanted."""
 
-class RootVectors:
-    """See :class:`motet.representation.base.Representation`."""
-
-    name = "root_vectors"
-    required: tuple[str, ...] = ROOT_BLOCK
+    required = ROOT_BLOCK
 
     def features(self, motion: Motion, like: Motion | None = None) -> Motion:
         """Exponential maps that do not leap, of the joints of ``like`` or of all but the root."""
@@ -43,10 +34,6 @@ class RootVectors:
             motion = to_joint_vectors(motion, joints_of(like.channels))
         return motion.select(like.channels, like.units).continuous()
 
-    def planted(self, features: Motion) -> Motion:
-        """The features themselves: a prediction's path continues a recorded one, which is better than laying one."""
-        return features
-
     def motion(self, features: Motion, after: Motion | None = None) -> Motion:
         """In the channels of ``after``, which may be features too; from the origin in Euler angles of the skeleton."""
         if after is not None and set(features.channels) <= set(after.channels):
@@ -55,20 +42,12 @@ class RootVectors:
 
     def mirror(self, features: Motion) -> FrameMirror:
         """As :func:`motet.motion.mirroring.mirror` does it, for exponential maps in the parent joint's axes."""
-        lateral_x(features)
-        joints = joints_of(features.channels)
-        places = {name: column for column, name in enumerate(features.channels)}
-        columns, signs = np.arange(len(places)), mirrored_signs(features.channels).astype(np.float32)
-        for joint, partner in zip(joints, partners_of(joints), strict=True):
-            for kind, sign in zip(VECTOR_KINDS, (1, -1, -1), strict=True):
-                columns[places[f"{joint}.{kind}"]] = places[f"{joints[partner]}.{kind}"]
-                signs[places[f"{joint}.{kind}"]] = sign
-        return FrameMirror(columns, signs)
+        return mirror_by_joints(features, dict(zip(VECTOR_KINDS, (1, -1, -1), strict=True)))
 
 
 def joints_of(channels: Sequence[str]) -> tuple[str, ...]:
     """The joints whose exponential maps are among the channels."""
-    return tuple(name.rpartition(".")[0] for name in channels if name.endswith(".ex"))
+    return joints_with(channels, "ex")
 
 
 def to_joint_vectors(motion: Motion, joints: Sequence[str] | None = None) -> Motion:
@@ -84,10 +63,11 @@ def to_joint_vectors(motion: Motion, joints: Sequence[str] | None = None) -> Mot
     lacking = [name for name in joints if name not in skeleton.places]
     if lacking:
         raise MotionError(f"this motion lacks joints of the model's figure: {listed(lacking)}")
-    block = to_root_block(motion).select(ROOT_BLOCK, ROOT_VECTOR_UNITS)
+    root_units = tuple(unit.replace("deg", "rad") for unit in ROOT_BLOCK_UNITS)
+    block = to_root_block(motion).select(ROOT_BLOCK, root_units)
     vectors = rotmat_to_rotvec(local_rotations(motion, [skeleton.places[name] for name in joints]))
     channels = (*ROOT_BLOCK, *(f"{name}.{kind}" for name in joints for kind in VECTOR_KINDS))
-    units = (*ROOT_VECTOR_UNITS, *["rad"] * (3 * len(joints)))
+    units = (*root_units, *["rad"] * (3 * len(joints)))
     values = np.concatenate([block.values, vectors.reshape(len(motion), 3 * len(joints))], axis=1)
     return replace(motion, values=values, channels=channels, units=units)
 
@@ -98,16 +78,10 @@ def carry_on(after: Motion | None, features: Motion) -> Motion:
     They start where the motion ends and face as it does there; both have the same frame rate. Channels of which the
     features know nothing stay as they are in the motion's last frame.
     """
-    name = skeleton_of(features if after is None else after).names[0]
-    last = at_rest(features, (name, *joints_of(features.channels))) if after is None else after[-1]
+    name, joints = skeleton_of(features if after is None else after).names[0], joints_of(features.channels)
+    last = at_rest(features, (name, *joints)) if after is None else after[-1]
     root, places = root_in_world(features, after)
-    path = {name: places / skeleton_of(last).unit_factor(1.0)}
-    return continued(last, {name: root, **_rotations(features)}, path)
-
-
-def _rotations(features: Motion) -> dict[str, Array]:
-    """Local rotations (T, 3, 3) by joint."""
-    joints = joints_of(features.channels)
-    vectors = features.select(tuple(f"{name}.{kind}" for name in joints for kind in VECTOR_KINDS)).values
+    vectors = features.select(tuple(f"{joint}.{kind}" for joint in joints for kind in VECTOR_KINDS)).values
     matrices = rotvec_to_rotmat(vectors.reshape(len(features), len(joints), 3))
-    return {name: matrices[:, n] for n, name in enumerate(joints)}
+    rotations = {joint: matrices[:, n] for n, joint in enumerate(joints)}
+    return continued(last, {name: root, **rotations}, {name: places / skeleton_of(last).unit_factor(1.0)})
