@@ -6,7 +6,6 @@ from dataclasses import replace
 from itertools import islice
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from motet.decode.codes import Drawing
 from motet.decode.continue_codes import ContinuationSettings, Continuer, Pace
@@ -28,12 +27,6 @@ from motet.settings import Progress, silent
 
 RATES = 3
 """Number of root-rate channels; they scale with the tempo."""
-
-STANCE = 0.7
-"""Seconds before a stance and after its anchor that it affects (:mod:`motet.motion.feet.hold`)."""
-
-LEGS = {sided(side, part) for side in LEFT_RIGHT for part in LEG[:3]}
-"""Joints of the legs."""
 
 
 class Continuation:
@@ -62,7 +55,8 @@ class Continuation:
         """The next ``count`` frames, and the motion before them: :func:`brought_back`. With the same seed, a shorter
         continuation is the beginning of a longer one."""
         rules, contract = self.rules, self.model.contract
-        ahead = round((rules.anchor + STANCE + 2 * rules.ground_reach) * contract.fps)
+        # a stance affects 0.7 s before it and after its anchor (motet.motion.feet.hold)
+        ahead = round((rules.anchor + 0.7 + 2 * rules.ground_reach) * contract.fps)
         before = self.context.frames[: self.given][-round(rules.ground_seen * contract.fps) :]
         predicted = self.context.frames[self.given :]
         frames = np.concatenate([before, predicted, self._drawn(count - len(predicted) + ahead, seed)])
@@ -91,7 +85,8 @@ class Continuation:
         motion = contract.motion(level, plant=False)
         ground = ground_under(sole_points(*global_transforms(motion[:given])))
         held = contract.frames(hold_feet(motion, trembling=True, ground=ground, anchor=rules.anchor))
-        legs = [column for column, name in enumerate(contract.channels) if name.rpartition(".")[0] in LEGS]
+        bent = {sided(side, part) for side in LEFT_RIGHT for part in LEG[:3]}
+        legs = [column for column, name in enumerate(contract.channels) if name.rpartition(".")[0] in bent]
         share = np.clip((np.arange(len(frames)) - given) / (SETTLED * contract.fps), 0, 1)[:, None]
         level[:, legs] += share * (held - level)[:, legs]
         return level
@@ -144,61 +139,48 @@ def futures(
     motion: Motion,
     count: int,
     seeds: Sequence[int],
+    append: bool = False,
     progress: Progress = silent,
     predicted: float = 0.0,
-) -> list[tuple[Motion, Motion]]:
-    """For each seed, ``count`` frames that follow a motion, at its frame rate, and the motion before them.
+) -> list[Motion]:
+    """For each seed, ``count`` frames that follow a motion, at its frame rate, after the motion where ``append``.
 
-    Both are in the motion's own channels or, where that is impossible, on the model's figure. progress: called with the
+    They are in the motion's own channels or, where that is impossible, on the model's figure. progress: called with the
     number of futures done and in total. predicted and MotionError: like :class:`Continuation`. DecodingError unless the
     model is a motion-code model.
     """
     if not isinstance(model, CodesModel):
         raise DecodingError(f"beyond must be a motion-code model such as motet.load('generate'), not {model!r}")
-    continuation, found = Continuation(model, motion, predicted), list[tuple[Motion, Motion]]()
+    continuation, found = Continuation(model, motion, predicted), list[Motion]()
     own = motion[: len(motion) - round(predicted * motion.fps)]
     for seed in seeds:
         following, before = continuation.follow(math.ceil(count * model.fps / motion.fps) + 1, seed)
+        following = at_rate(before, following, motion.fps)[:count]
         whole = own if before is continuation.own else model.contract.on_figure(own)
-        found.append((at_rate(before, following, motion.fps)[:count], whole))
+        found.append(together(whole, following) if append else following)
         progress(len(found), len(seeds))
     return found
 
 
 def at_rate(before: Motion, following: Motion, fps: float) -> Motion:
     """What follows a motion's last frame, at another frame rate."""
-    if following.fps == fps:
-        return following
-    last = before[-1:].select(following.channels, following.units)
-    return replace(following, values=np.concatenate([last.values, following.values])).resample(fps)[1:]
-
-
-def carried_on(
-    contract: MotionContract, frames: ArrayLike, own: Motion, figure: Motion, measured: Figure | None = None
-) -> tuple[Motion, Motion]:
-    """Frames (T, D) that follow a motion as a motion, and that motion as it is to be put before them.
-
-    own: the motion at the contract's frame rate. figure: the same on the contract's figure. measured: the motion's
-    figure, where it is known already.
-    """
-    return brought_back(contract.motion(frames, after=figure, plant=False), own, figure, measured)
+    return following if following.fps == fps else together(before[-1:], following).resample(fps)[1:]
 
 
 def brought_back(
     following: Motion, own: Motion, figure: Motion, measured: Figure | None = None
 ) -> tuple[Motion, Motion]:
     """What follows on the contract's figure, and the motion before it: both the motion's own, or where that is not
-    possible on that figure. Arguments as :func:`carried_on`."""
-    if _same_joints(own, figure):
-        return following, figure
+    possible on that figure.
+
+    own: the motion at the contract's frame rate. figure: the same on the contract's figure. measured: the motion's
+    figure, where it is known already.
+    """
+    if figure is own or (own.skeleton and own.skeleton.joints) == (figure.skeleton and figure.skeleton.joints):
+        return following, figure  # the motion was taken as it is, with no more than its length unit found
     shown = together(figure[-1:], following.select(figure.channels, figure.units))
     back = from_model_figure(shown, own, own[-1:], measured)
     return (following, figure) if back is None else (back, own)
-
-
-def _same_joints(own: Motion, figure: Motion) -> bool:
-    """Whether a motion was taken as it is, with no more than its length unit found."""
-    return figure is own or (own.skeleton and own.skeleton.joints) == (figure.skeleton and figure.skeleton.joints)
 
 
 def together(before: Motion, following: Motion) -> Motion:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Any, overload
+from typing import Any, TypedDict, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,15 +14,15 @@ from motet.bundle.manifest import Manifest
 from motet.decode.loop import two_rows
 from motet.errors import BundleError, DecodingError, MotionError
 from motet.models.base import BundleModel
-from motet.models.continuation import carried_on, futures, together
+from motet.models.continuation import brought_back, futures, together
 from motet.models.generate import GenerateModel
 from motet.motion.humanoid import Figure
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.settings import Progress, Seed, checked_int, is_number, seeds_of, silent
 
-MAX_FRAMES, MAX_GOLDEN = 100_000, 1000
-"""Most frames of a prediction, which is held in memory as a whole, and of one in golden vectors."""
+MAX_FRAMES = 100_000
+"""Most frames of a prediction, which is held in memory as a whole."""
 
 SURE = 0.5
 """Seconds taken from the predictor where a code model continues beyond the horizon; later predictions regress to the
@@ -30,6 +30,17 @@ mean."""
 
 MAX_SAMPLES = 100
 """Most futures of one call."""
+
+
+class _Options(TypedDict, total=False):
+    """What a call of :meth:`PredictModel.predict` takes by name."""
+
+    seconds: float | None
+    frames: int | None
+    append: bool
+    progress: Progress
+    beyond: GenerateModel | None
+    seed: Seed
 
 
 class PredictModel(BundleModel):
@@ -52,14 +63,8 @@ class PredictModel(BundleModel):
         bind("step", step, self.loop.inputs, self.loop.outputs, self.sizes, given=encoder.outputs)
         self.seed_frames = self.sizes["L"]
         if self.knows_errors:
-            bind(
-                "error",
-                graphs["error"].spec,
-                {},
-                {"error": "batch N"},
-                self.sizes,
-                given=(*encoder.inputs, *encoder.outputs),
-            )
+            known = (*encoder.inputs, *encoder.outputs)
+            bind("error", graphs["error"].spec, {}, {"error": "batch N"}, self.sizes, given=known)
             if self.sizes["N"] != self.horizon:
                 raise BundleError(f"graph error: outputs {self.sizes['N']} errors for a horizon of {self.horizon}")
 
@@ -79,34 +84,14 @@ class PredictModel(BundleModel):
             return checked_int("frames", self.horizon if frames is None else frames, 1, MAX_FRAMES, DecodingError)
         longest = MAX_FRAMES / self.fps
         if frames is not None or not is_number(seconds) or not 0 < seconds <= longest:
-            given = f"not {seconds} and {frames}"
-            raise DecodingError(f"give seconds, more than 0 and at most {longest:g}, or frames; {given}")
+            limits = f"more than 0 and at most {longest:g}"
+            raise DecodingError(f"give seconds, {limits}, or frames; not {seconds} and {frames}")
         return max(1, round(seconds * self.fps))
 
     @overload
-    def predict(
-        self,
-        motions: Motion,
-        *,
-        seconds: float | None = None,
-        frames: int | None = None,
-        append: bool = False,
-        progress: Progress = ...,
-        beyond: GenerateModel | None = None,
-        seed: Seed = 0,
-    ) -> Motion: ...
+    def predict(self, motions: Motion, **options: Unpack[_Options]) -> Motion: ...
     @overload
-    def predict(
-        self,
-        motions: Sequence[Motion],
-        *,
-        seconds: float | None = None,
-        frames: int | None = None,
-        append: bool = False,
-        progress: Progress = ...,
-        beyond: GenerateModel | None = None,
-        seed: Seed = 0,
-    ) -> list[Motion]: ...
+    def predict(self, motions: Sequence[Motion], **options: Unpack[_Options]) -> list[Motion]: ...
     def predict(
         self,
         motions: Motion | Sequence[Motion],
@@ -134,36 +119,34 @@ class PredictModel(BundleModel):
         short, lacks channels of the model, or is not of a human figure; DecodingError for a length out of range, or
         where ``beyond`` is not a motion-code model.
         """
-        count = self.count(seconds, frames)
+        count, given = self.count(seconds, frames), [motions] if isinstance(motions, Motion) else list(motions)
         if beyond is not None and count > self.horizon:
-            return self._beyond(motions, count, append, progress, beyond, seed)
-        given = [motions] if isinstance(motions, Motion) else list(motions)
-        seeds = [self._seed(motion) for motion in given]
-        found: list[Motion] = []
-        for place in range(0, len(given), self.loop.batch):
-            part = seeds[place : place + self.loop.batch]
-            following = self.next_frames([last for _, _, last in part], count)
-            found += [self._carried_on(*one[:2], new, append) for one, new in zip(part, following, strict=True)]
-            progress(len(found), len(given))
+            found = self._beyond(given, count, append, progress, beyond, seeds_of(seed, len(given), DecodingError))
+        else:
+            found, seen = [], [self._seen(motion) for motion in given]
+            for start in range(0, len(given), self.loop.batch):
+                part = seen[start : start + self.loop.batch]
+                following = self.next_frames([last for *_, last in part], count)
+                found += [self._shown(new, *one[:2], append) for one, new in zip(part, following, strict=True)]
+                progress(len(found), len(given))
         return found[0] if isinstance(motions, Motion) else found
 
     def _beyond(
         self,
-        motions: Motion | Sequence[Motion],
-        frames: int,
+        given: Sequence[Motion],
+        count: int,
         append: bool,
         progress: Progress,
         writer: GenerateModel,
-        seed: Seed,
-    ) -> Motion | list[Motion]:
-        """See :meth:`predict`: more frames than the horizon, all but the first by a code model."""
-        given, found = [motions] if isinstance(motions, Motion) else list(motions), list[Motion]()
-        for motion, own in zip(given, seeds_of(seed, len(given), DecodingError), strict=True):
+        seeds: Sequence[int],
+    ) -> list[Motion]:
+        """More frames than the horizon, all but the first by a code model."""
+        found = list[Motion]()
+        for motion, seed in zip(given, seeds, strict=True):
             start = self.predict(motion, frames=self.sure, append=True)
-            ((following, before),) = futures(writer, start, frames, [own], predicted=self.sure / self.fps)
-            found.append(together(before, following) if append else following)
+            found += futures(writer, start, count, [seed], append, predicted=self.sure / self.fps)
             progress(len(found), len(given))
-        return found[0] if isinstance(motions, Motion) else found
+        return found
 
     def futures(  # noqa: PLR0913  settings, all but the first of which have a default
         self,
@@ -186,20 +169,9 @@ class PredictModel(BundleModel):
         """
         samples = checked_int("samples", samples, 1, MAX_SAMPLES, DecodingError)
         count, seeds = self.count(seconds, frames), seeds_of(seed, samples, DecodingError)
-        whole = self.at_own_rate(motion)
-        found = futures(beyond, whole, count, seeds, progress)
-        return [together(before, following) if append else following for following, before in found]
+        return futures(beyond, self.at_own_rate(motion), count, seeds, append, progress)
 
-    def measured(self, motion: Motion) -> Figure | None:
-        """The figure of a motion, measured once for all its predictions; None where it is the model's."""
-        return self.contract.measured(self.at_own_rate(motion))
-
-    def following(self, motion: Motion, frames: int, measured: Figure | None) -> Motion:
-        """Like :meth:`predict`, for a figure already measured."""
-        whole, figure, last = self._seed(motion, measured)
-        return carried_on(self.contract, self.next_frames([last], frames)[0], whole, figure, measured)[0]
-
-    def _seed(self, motion: Motion, measured: Figure | None = None) -> tuple[Motion, Motion, Array]:
+    def _seen(self, motion: Motion, measured: Figure | None = None) -> tuple[Motion, Motion, Array]:
         """The motion at the model's frame rate, the same on the model's figure, and its last frames (L, C)."""
         whole = self.at_own_rate(motion)
         figure = self.contract.on_figure(whole, measured)
@@ -209,8 +181,12 @@ class PredictModel(BundleModel):
             raise MotionError(f"{limit}, but the motion has {len(frames)} ({len(motion)} at {motion.fps:g} fps)")
         return whole, figure, frames[-self.seed_frames :]
 
-    def _carried_on(self, whole: Motion, figure: Motion, frames: Floats, append: bool) -> Motion:
-        following, before = carried_on(self.contract, frames, whole, figure)
+    def _shown(
+        self, frames: Floats, whole: Motion, figure: Motion, append: bool, measured: Figure | None = None
+    ) -> Motion:
+        """The next frames (T, C) in the motion's own channels, after it where they are to be appended."""
+        new = self.contract.motion(frames, after=figure, plant=False)
+        following, before = brought_back(new, whole, figure, measured)
         return together(before, following) if append else following
 
     def next_frames(self, seeds: ArrayLike, frames: int | None = None) -> Floats:
@@ -223,9 +199,8 @@ class PredictModel(BundleModel):
         count = self.count(None, frames)
         shape = (self.seed_frames, len(self.contract.channels))
         if given.ndim != 3 or given.shape[1:] != shape:
-            raise MotionError(
-                f"seeds of shape {given.shape} do not fit: the model takes (batch, {shape[0]}, {shape[1]})"
-            )
+            takes = f"the model takes (batch, {shape[0]}, {shape[1]})"
+            raise MotionError(f"seeds of shape {given.shape} do not fit: {takes}")
         if not np.isfinite(given).all():
             raise MotionError("seeds must be finite numbers")
         rows = two_rows(np.arange(len(given)))
@@ -244,7 +219,7 @@ class PredictModel(BundleModel):
         given = [motions] if isinstance(motions, Motion) else list(motions)
         seeds = np.zeros((len(given), self.seed_frames, len(self.contract.channels)), dtype=np.float32)
         for row, motion in zip(seeds, given, strict=True):
-            row[:] = self._seed(motion)[2]
+            row[:] = self._seen(motion)[2]
         known = {"frames": seeds[two_rows(np.arange(len(given)))]}
         known |= self.graphs["encoder"](known)
         error = self.graphs["error"]
@@ -254,8 +229,8 @@ class PredictModel(BundleModel):
     def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
         """Seed frames (L, C) and the number of "frames" of the settings to the next frames (frames, C)."""
         count = int(settings["frames"])
-        if count > MAX_GOLDEN:
-            raise BundleError(f"golden vectors hold at most {MAX_GOLDEN} frames, not {count}")
+        if count > 1000:
+            raise BundleError(f"golden vectors hold at most 1000 frames, not {count}")
         return {"frames": self.next_frames(given["frames"][None], count)[0]}
 
     def stream(self, start: Motion | None = None) -> "PredictSession":
@@ -297,10 +272,12 @@ class PredictSession:
 
     def predict(self, frames: int | None = None, *, seconds: float | None = None) -> Motion:
         """Like :meth:`PredictModel.predict`, after all frames pushed so far."""
-        return self.model.following(self._motion, self.model.count(seconds, frames), self._figure)
+        model, count = self.model, self.model.count(seconds, frames)
+        whole, figure, last = model._seen(self._motion, self._figure)
+        return model._shown(model.next_frames([last], count)[0], whole, figure, False, self._figure)
 
     @cached_property
     def _figure(self) -> Figure | None:
         known = self._start if len(self._start) >= len(self._motion) else self._motion
         self._start = known[:0]  # not needed any more
-        return self.model.measured(known)
+        return self.model.contract.measured(self.model.at_own_rate(known))
