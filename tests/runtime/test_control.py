@@ -13,8 +13,8 @@ from motet.bundle.bundle import list_bundles
 from motet.errors import ControlError, MotionError
 from motet.formats import read_motion, write_motion
 from motet.models.load import load
+from motet.models.scripts import control_track, parse_segments
 from motet.models.tdbn_control import TdbnModel
-from motet.models.tdbn_script import control_track, parse_script
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
 
@@ -40,7 +40,7 @@ def test_the_documented_loop_gives_the_same_frames(model: TdbnModel) -> None:
     history = encoder.run(["codes"], {"frames": start})[0][None]
     column = np.ones((1, 1), np.float32)
     frames = []
-    for control in control_track(parse_script(SCRIPT, model.labels), model.labels, manifest["motion"]["fps"]):
+    for control in control_track(parse_segments(SCRIPT, model.labels), model.labels, manifest["motion"]["fps"]):
         feeds = {
             "history": history,
             "control": control[None],
@@ -311,7 +311,7 @@ def test_a_snapshot_of_the_first_tick_is_restored_where_another_began(model: Tdb
 
 
 def _track(model: TdbnModel) -> np.ndarray:
-    return control_track(parse_script(SCRIPT, model.labels), model.labels, model.fps)
+    return control_track(parse_segments(SCRIPT, model.labels), model.labels, model.fps)
 
 
 def _period(values: np.ndarray) -> float:

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from motet.errors import ControlError, ScriptError
-from motet.models.tdbn_script import Segment, control_track, parse_script, starts_of
+from motet.models.scripts import Segment, captions, control_track, parse_segments
 
 LABELS = ("walk", "run", "bend_over")
 
 
 def test_a_script_is_its_segments() -> None:
-    assert parse_script(" walk 3s,walk>run 1.5s , bend_over .5s", LABELS) == [
+    assert parse_segments(" walk 3s,walk>run 1.5s , bend_over .5s", LABELS) == [
         Segment({"walk": 1.0}, {"walk": 1.0}, 3.0),
         Segment({"walk": 1.0}, {"run": 1.0}, 1.5),
         Segment({"bend_over": 1.0}, {"bend_over": 1.0}, 0.5),
@@ -18,7 +18,7 @@ def test_a_script_is_its_segments() -> None:
 
 
 def test_labels_mix_with_weights() -> None:
-    (segment,) = parse_script("walk*.3+run*0.7 2s", LABELS)
+    (segment,) = parse_segments("walk*.3+run*0.7 2s", LABELS)
     assert segment.start == {"walk": 0.3, "run": 0.7} == segment.stop
 
 
@@ -42,13 +42,13 @@ def test_labels_mix_with_weights() -> None:
 )
 def test_an_error_shows_the_place(script: str, position: int, reason: str) -> None:
     with pytest.raises(ScriptError, match=reason) as caught:
-        parse_script(script, LABELS)
+        parse_segments(script, LABELS)
     assert caught.value.position == position
     assert str(caught.value).splitlines()[-1] == "  " + " " * position + "^"
 
 
 def test_a_track_holds_ramps_and_loses_no_frame() -> None:
-    segments = parse_script("walk 0.1s, walk>run 0.25s, run .33s, run .33s, run .33s", LABELS)
+    segments = parse_segments("walk 0.1s, walk>run 0.25s, run .33s, run .33s, run .33s", LABELS)
     track = control_track(segments, LABELS, fps=40)
     assert track.dtype == np.float32
     assert len(track) == round(1.34 * 40)
@@ -58,9 +58,9 @@ def test_a_track_holds_ramps_and_loses_no_frame() -> None:
 
 
 def test_a_segment_shorter_than_half_a_frame_is_empty_and_such_a_script_is_refused() -> None:
-    assert len(control_track(parse_script("walk>run .001s, run 1s", LABELS), LABELS, 40)) == 40
+    assert len(control_track(parse_segments("walk>run .001s, run 1s", LABELS), LABELS, 40)) == 40
     with pytest.raises(ControlError, match="less than one frame at 40 fps"):
-        control_track(parse_script("walk .001s", LABELS), LABELS, 40)
+        control_track(parse_segments("walk .001s", LABELS), LABELS, 40)
 
 
 @pytest.mark.parametrize(
@@ -69,11 +69,11 @@ def test_a_segment_shorter_than_half_a_frame_is_empty_and_such_a_script_is_refus
 def test_long_scripts_are_read_in_no_time_and_refused_in_few_words(script: str) -> None:
     started = time.process_time()
     with pytest.raises(ScriptError) as caught:
-        parse_script(script, LABELS)
+        parse_segments(script, LABELS)
     assert time.process_time() - started < 2
     assert len(str(caught.value)) < 1000
 
 
 def test_captions_come_with_their_starts() -> None:
-    segments = parse_script("walk 3s, walk>run 2s, walk*.5+run*.5 1s", LABELS)
-    assert starts_of(segments) == [(0.0, "walk"), (3.0, "walk > run"), (5.0, "walk + run")]
+    segments = parse_segments("walk 3s, walk>run 2s, walk*.5+run*.5 1s", LABELS)
+    assert captions(segments) == [(0.0, "walk"), (3.0, "walk > run"), (5.0, "walk + run")]

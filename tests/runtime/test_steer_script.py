@@ -3,7 +3,7 @@
 import pytest
 
 from motet.errors import ScriptError
-from motet.models.steer_script import Order, captions, parse_orders
+from motet.models.scripts import Order, captions, parse_orders
 
 GAITS = ("walk", "run")
 

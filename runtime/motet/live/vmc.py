@@ -13,8 +13,8 @@ import numpy as np
 
 from motet.bundle.graph import Floats
 from motet.errors import OutputError
+from motet.models.scripts import parse_orders
 from motet.models.steer import SteerModel
-from motet.models.steer_script import parse_orders
 from motet.motion.humanoid import BONES, HUMANOID
 from motet.motion.pose import Pose
 
@@ -94,7 +94,7 @@ def run_script(
     repeats: int | None = None,
     rate: float | None = None,
 ) -> None:
-    """Let a figure follow a script (:mod:`motet.models.steer_script`) again and again, until Ctrl-C; each pose is sent
+    """Let a figure follow a script (:mod:`motet.models.scripts`) again and again, until Ctrl-C; each pose is sent
     with its time in seconds.
 
     repeats: how often, for ever by default. rate: ticks a second, by default the model's. ScriptError for a script that

@@ -125,6 +125,10 @@ class BundleModel(ABC):
         """The complete run of the golden vectors (docs/bundle.md): outputs from its inputs and settings."""
 
 
+MAX_CHARACTERS = 100_000
+"""Most of one session, whose state is in memory."""
+
+
 class ControlModel(BundleModel):
     """A model of controllable figures: :class:`motet.models.steer.SteerModel` or
     :class:`motet.models.tdbn_control.TdbnModel`, depending on the bundle's loop. Each has its own script syntax."""

@@ -12,11 +12,9 @@ from motet.bundle.manifest import Manifest
 from motet.decode.matching import FEATURES, Matcher, Playback, SteeringSettings, Table
 from motet.decode.steering import PoseCodes
 from motet.errors import BundleError, ControlError
-from motet.models.base import ControlModel
-from motet.models.steer_command import Gaits
-from motet.models.steer_script import captions, parse_orders
-from motet.models.steer_session import SteerSession
-from motet.models.tdbn_control import MAX_CHARACTERS
+from motet.models.base import MAX_CHARACTERS, ControlModel
+from motet.models.scripts import captions, parse_orders
+from motet.models.steer_session import Gaits, SteerSession
 from motet.motion.feet.lock import FootLockSettings
 from motet.motion.humanoid import BONES
 from motet.motion.motion import Motion
@@ -24,9 +22,6 @@ from motet.motion.pose import Pose
 from motet.motion.rotations import rotmat_to_quat
 from motet.representation.root_sixd import ROOT_SIXD, SIXD_KINDS, joint_rotations
 from motet.settings import checked_int
-
-CHANNELS = (*ROOT_SIXD, *(f"{bone}.{kind}" for bone in BONES for kind in SIXD_KINDS))
-"""In the order of a pose's numbers."""
 
 FEATURE_STEPS = 16
 """Quantisation steps of a feature per scaled unit: tables hold them in 8 bits."""
@@ -46,14 +41,13 @@ class SteerModel(ControlModel):
 
     def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:
         super().__init__(manifest, graphs, tables)
-        config = Fields(manifest.config, "config")
-        how = self.settings(SteeringSettings)
+        config, how = Fields(manifest.config, "config"), self.settings(SteeringSettings)
         self.abilities = Gaits.read(config, how)
         self.gaits = self.abilities.names
         low, usual, high = (column.tolist() for column in self.abilities.speeds.T[:3])
         self.speeds = dict(zip(self.gaits, zip(low, high, strict=True), strict=True))
         self.usual = dict(zip(self.gaits, usual, strict=True))
-        if self.contract.channels != CHANNELS:
+        if self.contract.channels != (*ROOT_SIXD, *(f"{bone}.{kind}" for bone in BONES for kind in SIXD_KINDS)):
             raise BundleError("manifest, motion.channels: must be those of the humanoid, in its order")
         self.sizes |= {"G": len(self.gaits), "F": FEATURES, "P": 4 * len(BONES) + 1}
         self.matcher = Matcher(self._table(config), how, self.fps)
@@ -117,15 +111,14 @@ class SteerModel(ControlModel):
 
     def pose_of(self, motion: Motion) -> Pose:
         """The last pose of a motion, at the origin; MotionError for one that is not of a human figure."""
-        same = motion if motion.fps == self.fps else motion.continuous().resample(self.fps, to_end=True)
-        features = self.contract.features(self.contract.frames(same)[-1:])
+        features = self.contract.features(self.contract.frames(self.at_own_rate(motion))[-1:])
         local = joint_rotations(features)
         quats = np.stack([rotmat_to_quat(local[bone]) for bone in BONES], axis=1).astype(np.float32)
         height = features.select(("root.height",)).values[:, 0].astype(np.float32)
         return Pose(np.zeros((1, 3)), quats, height, np.ones((1, 2), np.float32))
 
     def run(self, script: str, start: Motion | str | None = None, *, hold_feet: bool = True) -> Motion:
-        """The motion of one figure that is steered by a script (:mod:`motet.models.steer_script`).
+        """The motion of one figure that is steered by a script (:mod:`motet.models.scripts`).
 
         start, hold_feet: like :meth:`start`; by default the script's first gait.
         """

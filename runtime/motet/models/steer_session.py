@@ -1,17 +1,17 @@
-"""A session of steered figures: commands in, a pose per tick out."""
+"""A session of steered figures: commands in, within what gaits allow, and a pose per tick out."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from motet.decode.matching import Playback, Rows
+from motet.bundle.fields import Fields
+from motet.decode.matching import Playback, Rows, SteeringSettings
 from motet.decode.steering import tick
-from motet.errors import ControlError, ControlWarning, warn
-from motet.models.steer_command import Command
-from motet.models.steer_script import Order, parse_orders
+from motet.errors import BundleError, ControlError, ControlWarning, warn
+from motet.models.scripts import Order, parse_orders
 from motet.motion.feet.lock import FootLock, FootLockSettings
 from motet.motion.humanoid import BONES
 from motet.motion.motion import Motion
@@ -23,6 +23,81 @@ if TYPE_CHECKING:
 
 LARGEST = 1e6
 """Largest number of a command: metres, m/s, degrees."""
+
+
+@dataclass(frozen=True, eq=False)
+class Gaits:
+    """G gaits. speeds: (G, 5) m/s, the slowest, the usual one, and the fastest forward, sideways and
+    backwards; 0 where a gait cannot move that way."""
+
+    names: tuple[str, ...]
+    speeds: Array
+    settings: SteeringSettings
+
+    @staticmethod
+    def read(config: Fields, settings: SteeringSettings) -> "Gaits":
+        """Those of a manifest's configuration; BundleError naming the wrong key."""
+        names, speeds = config.texts("gaits"), config.table("speeds", 5)
+        if not names or len(speeds) != len(names) or not ((speeds >= 0) & (speeds <= 100)).all():
+            raise BundleError("manifest, config.speeds: must hold a row of 5 speeds, 0 to 100 m/s, for each gait")
+        return Gaits(names, speeds, settings)
+
+    def number(self, name: str) -> int:
+        """The number of a gait; ControlError for an unknown one."""
+        if name not in self.names:
+            raise ControlError(f"unknown gait {name!r}; expected one of {', '.join(self.names)}")
+        return self.names.index(name)
+
+    def target(self, command: "Command") -> tuple[Array, list[tuple[str, str]]]:
+        """A command's velocity along x and z, m/s, and its facing, radians, (B, 3), within the limits of its gaits; and
+        what exceeds them: gait and message."""
+        how, speeds, told, moving = self.settings, self.speeds[command.gait], command.speed, command.speed > 0
+        # not all gaits go sideways and backwards: those face the way they go, or nearly
+        farthest = np.where(speeds[:, 3:].min(axis=1) > 0, np.pi, how.ahead)
+        aside = np.clip(wrapped(command.direction - command.facing), -farthest, farthest)
+        facing = np.where(moving, command.direction - aside, command.facing)
+        sector = np.digitize(np.abs(wrapped(command.direction - facing)), (how.aside, how.back))
+        high = np.take_along_axis(speeds, 2 + sector[:, None], axis=1)[:, 0]
+        low = np.minimum(speeds[:, 0], high)
+        speed = np.where(moving, np.clip(told, low, high), 0.0)
+        x, z = speed * np.sin(command.direction), speed * np.cos(command.direction)
+        names = [self.names[gait] for gait in command.gait.tolist()]
+        beyond = [
+            (names[n], f"{names[n]!r} allows 0 or {low[n]:g}-{high[n]:g} m/s in this direction, not {told[n]:g}")
+            for n in np.flatnonzero(np.abs(speed - told) > 1e-6).tolist()
+        ]
+        return np.stack([x, z, wrapped(facing)], axis=1), beyond
+
+
+@dataclass(frozen=True, eq=False)
+class Command:
+    """The last command to B figures; its arrays are never modified.
+
+    gait: (B,) numbers. speed: (B,) m/s. direction: of travel, and facing: (B,) radians. faces_way: (B,) whether they
+    are to face the way they move.
+    """
+
+    gait: Rows
+    speed: Array
+    direction: Array
+    facing: Array
+    faces_way: NDArray[np.bool_]
+
+    def told(
+        self,
+        gait: Rows | None = None,
+        speed: Array | None = None,
+        direction: Array | None = None,
+        facing: Array | None = None,
+    ) -> "Command":
+        """With new values. Given a direction but no facing, they face it once they move."""
+        faces_way = self.faces_way if facing is None else np.zeros_like(self.faces_way)
+        if direction is not None and facing is None:
+            faces_way = np.ones_like(faces_way)
+        gait, speed = self.gait if gait is None else gait, self.speed if speed is None else speed
+        direction = self.direction if direction is None else direction
+        facing = np.where(faces_way & (speed > 0), direction, self.facing if facing is None else facing)
+        return Command(gait, speed, direction, facing, faces_way)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -48,7 +123,8 @@ class SteerSession:
     def __init__(self, model: "SteerModel", playback: Playback, gait: int, hold_feet: bool, strict: bool) -> None:
         self.model, self.characters, self.strict = model, len(playback.row), strict
         self._playback = playback
-        self._command = Command.standing(self.characters, gait)
+        zero = np.zeros(self.characters)
+        self._command = Command(np.full(self.characters, gait), zero, zero, zero, zero > 0)
         self._target = np.zeros((self.characters, 3))
         self._lock = self._new_lock() if hold_feet else None
         self._poses: tuple[Pose, Pose] | None = None
@@ -80,15 +156,23 @@ class SteerSession:
         not fit; the control is unchanged then.
         """
         given = {"speed": speed, "direction": direction, "facing": facing}
-        numbers = {name: self._numbers(name, values) for name, values in given.items() if values is not None}
+        numbers = {
+            name: self._numbers(f"{name} needs a number or one for each of {self.characters} characters", values)
+            for name, values in given.items()
+            if values is not None
+        }
         numbers |= {name: np.radians(numbers[name]) for name in ("direction", "facing") if name in numbers}
-        kinds = None if gait is None else self._gaits(gait)
+        told, gaits = self._command, None if gait is None else self._gaits(gait)
         if velocity is None:
-            self._tell(self._command.told(kinds, **numbers))
+            self._tell(told.told(gaits, **numbers))
             return
         if speed is not None or direction is not None:
             raise ControlError("give a velocity, or speed and direction, not both")
-        self._tell(self._command.steered(self._rows("a velocity needs x and z", velocity, 2), kinds, **numbers))
+        x, z = self._numbers(self._each("a velocity needs x and z"), velocity, 2).T
+        numbers["speed"] = np.hypot(x, z)
+        goes = numbers["speed"] > 0
+        command = told.told(gaits, direction=np.where(goes, np.arctan2(x, z), told.direction), **numbers)
+        self._tell(command if facing is not None else replace(command, faces_way=told.faces_way | goes))
 
     @property
     def target(self) -> Array:
@@ -97,7 +181,7 @@ class SteerSession:
         return self._target.copy()
 
     def _tell(self, command: Command) -> None:
-        target, beyond = command.target(self.model.abilities)
+        target, beyond = self.model.abilities.target(command)
         for gait, said in beyond:
             if self.strict:
                 raise ControlError(said)
@@ -108,24 +192,21 @@ class SteerSession:
         self._playback.ticks_to_search[changed] = 0  # what is told is searched for at once
         self._target, self._command = target, command
 
-    def _numbers(self, name: str, values: ArrayLike) -> Array:
-        try:
-            found = np.array(np.broadcast_to(np.asarray(values, dtype=np.float64), (self.characters,)))
-        except (TypeError, ValueError) as error:
-            raise ControlError(f"{name} needs a number or one for each of {self.characters} characters") from error
-        _check_size(name, found)
-        return found
+    def _each(self, needed: str) -> str:
+        return f"{needed}, for all or for each of {self.characters} characters"
 
-    def _rows(self, needed: str, values: ArrayLike, columns: int) -> Array:
-        """Numbers (columns,) or (characters, columns) as a new (characters, columns)."""
+    def _numbers(self, needed: str, values: ArrayLike, *columns: int) -> Array:
+        """Numbers (columns) for all or (characters, columns), as a new (characters, columns); ControlError for others,
+        which says what is needed."""
         try:
             found = np.array(values, dtype=np.float64)
-            if found.shape not in ((columns,), (self.characters, columns)):
+            if found.shape not in (columns, (1, *columns), (self.characters, *columns)):
                 raise ValueError(found.shape)
         except (TypeError, ValueError) as error:
-            raise ControlError(f"{needed}, for all or for each of {self.characters} characters") from error
-        _check_size(needed.partition(" need")[0], found)
-        return np.array(np.broadcast_to(found, (self.characters, columns)))
+            raise ControlError(needed) from error
+        if not (np.abs(found) <= LARGEST).all():
+            raise ControlError(f"{needed.partition(' need')[0]} must be finite numbers, no larger than {LARGEST:g}")
+        return np.array(np.broadcast_to(found, (self.characters, *columns)))
 
     def _gaits(self, names: str | Sequence[str]) -> Rows:
         each = list(names) if isinstance(names, Iterable) and not isinstance(names, str) else [names] * self.characters
@@ -161,18 +242,19 @@ class SteerSession:
 
     def push(self, velocity: ArrayLike) -> None:
         """Push the characters by a velocity (2,) or (characters, 2) along x and z, m/s, from which they recover."""
-        pushed = self._rows("a velocity needs x and z", velocity, 2)
-        self._playback.spring[:, :2] += pushed
+        self._playback.spring[:, :2] += self._numbers(self._each("a velocity needs x and z"), velocity, 2)
         self._playback.ticks_to_search[:] = 0
 
     def put(self, places: ArrayLike) -> None:
         """Place the characters elsewhere: (3,) or (characters, 3) x and z in metres, facing in degrees."""
-        wanted = self._rows("places need x, z and facing", places, 3)
+        wanted = self._numbers(self._each("places need x, z and facing"), places, 3)
         wanted[:, 2] = wrapped(np.radians(wanted[:, 2]))
         self._playback.root = wanted
         self._playback.spring[:, 2] = wanted[:, 2]
-        self._command = self._command.put(wanted[:, 2])
-        self._target, _ = self._command.target(self.model.abilities)
+        told, facing = self._command, wanted[:, 2]
+        direction = np.where(told.speed > 0, told.direction, facing)  # standing ones move the way they face
+        self._command = replace(told, direction=direction, facing=facing, faces_way=np.zeros_like(told.faces_way))
+        self._target, _ = self.model.abilities.target(self._command)
         self._poses = None  # nothing lies between there and here
         if self._lock is not None:
             self._lock = self._new_lock()
@@ -190,7 +272,7 @@ class SteerSession:
         self.model.matcher.pose(self._playback, np.broadcast_to(codes, (self.characters, codes.shape[1])))
 
     def run(self, script: str) -> list[Motion]:
-        """Run a script (:mod:`motet.models.steer_script`) for all characters; one motion for each."""
+        """Run a script (:mod:`motet.models.scripts`) for all characters; one motion for each."""
         poses = list(self.follow(parse_orders(script, self.model.gaits)))
         return [self.model.contract.motion(frames, plant=self._lock is not None) for frames in self.frames_of(poses)]
 
@@ -203,7 +285,7 @@ class SteerSession:
 
     def _obey(self, order: Order) -> None:
         told = self._command
-        facing, speed = told.heading, told.speed
+        facing, speed = np.where(told.faces_way, told.direction, told.facing), told.speed
         aside = wrapped(np.where(told.faces_way, 0, told.direction - facing))
         if order.way is not None:
             aside = np.full(self.characters, np.radians(order.way))
@@ -244,11 +326,5 @@ class SteerSession:
             has, lacks = ("without", "with") if snapshot.lock is None else ("with", "without")
             raise ControlError(f"a snapshot {has} held feet does not fit a session {lacks} them (hold_feet)")
         self._playback, self._poses, self._ahead = snapshot.playback.copy(), snapshot.poses, snapshot.ahead
-        self._command, (self._target, _) = command, command.target(self.model.abilities)
+        self._command, (self._target, _) = command, self.model.abilities.target(command)
         self._lock = None if snapshot.lock is None else replace(snapshot.lock)
-
-
-def _check_size(name: str, values: Array) -> None:
-    """ControlError for numbers that are not finite or too large."""
-    if not (np.abs(values) <= LARGEST).all():
-        raise ControlError(f"{name} must be finite numbers, no larger than {LARGEST:g}")

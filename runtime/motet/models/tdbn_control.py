@@ -14,14 +14,11 @@ from motet.decode.lookahead import Ahead, Lookahead, LookaheadSettings
 from motet.decode.loop import RowNoise, RowsOfNoise
 from motet.decode.loops import tick
 from motet.errors import BundleError, ControlError, DecodingError, MotionError
-from motet.models.base import ControlModel
-from motet.models.tdbn_script import control_track, parse_script, starts_of
+from motet.models.base import MAX_CHARACTERS, ControlModel
+from motet.models.scripts import captions, control_track, parse_segments
 from motet.motion.kinematics import without_heading
 from motet.motion.motion import TURN, Motion
 from motet.settings import Seed, checked_int, seeds_of
-
-MAX_CHARACTERS = 100_000
-"""Most of one session, whose state is in memory."""
 
 
 class TdbnModel(ControlModel):
@@ -86,11 +83,7 @@ class TdbnModel(ControlModel):
         """
         characters = checked_int("characters", characters, 1, MAX_CHARACTERS, ControlError)
         seeds = seeds_of(seed, characters, ControlError)
-        if isinstance(start, Motion):
-            first, label = self._frames_of(start), None
-        else:
-            label = self.labels[0] if start is None else start
-            first = self._frames_at(label)
+        first, label = self._begun(start)
         settings = self._settings(variety, temperature, iterations)
         session = TdbnSession(self, first, seeds, settings, smooth)
         if label is not None:
@@ -112,14 +105,14 @@ class TdbnModel(ControlModel):
 
         The parameters are those of :meth:`start` and :meth:`TdbnSession.run`.
         """
-        first = parse_script(script, self.labels)[0].start
+        first = parse_segments(script, self.labels)[0].start
         begin = max(first, key=first.__getitem__) if start is None else start
         session = self.start(begin, seed=seed, variety=variety, temperature=temperature, smooth=smooth)
         return session.run(script, in_place)[0]
 
     def captions(self, script: str) -> list[tuple[float, str]]:
         """See :meth:`ControlModel.captions`."""
-        return starts_of(parse_script(script, self.labels))
+        return captions(parse_segments(script, self.labels))
 
     def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
         """From the start of the first label, at variety 1: a track (T, labels) and noise (T, N) to frames (T, D).
@@ -130,19 +123,20 @@ class TdbnModel(ControlModel):
         session.noise = RowsOfNoise(given["noise"])
         return {"frames": session.frames(given["track"])[0]}
 
-    def _frames_at(self, label: str) -> Floats:
-        if label not in self.starts:
-            raise ControlError(f"cannot start from {label!r}; expected one of {', '.join(self.starts)}")
-        return np.asarray(self.starts[label], dtype=np.float32)
-
-    def _frames_of(self, motion: Motion) -> Floats:
-        last = self.contract.on_figure(motion.continuous().resample(self.fps, to_end=True))[-self.taps :]
+    def _begun(self, start: Motion | str | None) -> tuple[Floats, str | None]:
+        """The frames (K, D) that a session begins from, and the label that they show; None after a motion."""
+        if not isinstance(start, Motion):
+            label = self.labels[0] if start is None else start
+            if label not in self.starts:
+                raise ControlError(f"cannot start from {label!r}; expected one of {', '.join(self.starts)}")
+            return np.asarray(self.starts[label], dtype=np.float32), label
+        last = self.contract.on_figure(start.continuous().resample(self.fps, to_end=True))[-self.taps :]
         if len(last) < self.taps:
             raise MotionError(f"a start needs {self.taps} frames at {self.fps:g} fps, this motion has {len(last)}")
         # levelled by themselves: where the figure faced long before says nothing about where it faces now
-        return self.contract.frames(without_heading(last)).astype(np.float32)
+        return self.contract.frames(without_heading(last)).astype(np.float32), None
 
-    def _settings(self, variety: float, temperature: float | None, iterations: int | None) -> "_Settings":
+    def _settings(self, variety: float, temperature: float | None, iterations: int | None) -> dict[str, float]:
         if not 0 <= variety <= 1:
             raise ControlError(f"variety must be between 0 and 1, not {variety}")
         try:
@@ -151,14 +145,7 @@ class TdbnModel(ControlModel):
             raise ControlError(str(error)) from error
         if chosen["iterations"] > 1 and not self.has_free_units:
             raise ControlError("iterations must be 1 in a model without free hidden units")
-        return _Settings(np.float32(variety), np.float32(chosen["temperature"]), int(chosen["iterations"]))
-
-
-@dataclass(frozen=True)
-class _Settings:
-    variety: np.float32
-    temperature: np.float32
-    iterations: int
+        return {**chosen, "variety": variety}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -180,10 +167,11 @@ class TdbnSession:
     """Characters that move in one batch, each with its own control; holds their whole state."""
 
     def __init__(
-        self, model: TdbnModel, first: Floats, seeds: Sequence[int], settings: _Settings, smooth: bool
+        self, model: TdbnModel, first: Floats, seeds: Sequence[int], settings: Mapping[str, float], smooth: bool
     ) -> None:
         """first: the frames (K, D) that all characters continue from, one character for each seed."""
-        self.model, self.settings, self.smooth, self.characters = model, settings, smooth, len(seeds)
+        self.model, self.smooth, self.characters = model, smooth, len(seeds)
+        self.iterations, variety = int(settings["iterations"]), settings["variety"]
         self._first = np.repeat(first[:, None], self.characters, axis=1)
         self._history = np.repeat(model.encode(first)[None], self.characters, axis=0)
         self._ahead: Ahead | None = None
@@ -191,11 +179,11 @@ class TdbnSession:
         column = np.ones((self.characters, 1), dtype=np.float32)
         self._inputs: dict[str, Floats] = {
             "control": np.zeros((self.characters, len(model.labels)), dtype=np.float32),
-            "variety": column * settings.variety,
-            "temperature": column * settings.temperature,
+            "variety": column * np.float32(variety),
+            "temperature": column * np.float32(settings["temperature"]),
         }
         width = model.stepper.spec.input("noise").size(1)
-        self.noise: RowNoise | RowsOfNoise | None = RowNoise(seeds, width) if settings.variety > 0 else None
+        self.noise: RowNoise | RowsOfNoise | None = RowNoise(seeds, width) if variety > 0 else None
         if self.noise is None:  # noise has no effect: any array will do
             self._inputs["noise"] = np.zeros((self.characters, width), dtype=np.float32)
 
@@ -208,7 +196,17 @@ class TdbnSession:
         Labels not named become 0. ControlError for an unknown label or a value out of range; the control is unchanged
         then.
         """
-        self.set_control(self._control_of(values))
+        unknown = sorted(values.keys() - set(self.model.labels))
+        if unknown:
+            raise ControlError(f"unknown control {', '.join(unknown)}; expected one of {', '.join(self.model.labels)}")
+        control = np.zeros((self.characters, len(self.model.labels)), dtype=np.float32)
+        for label, value in values.items():
+            try:
+                control[:, self.model.labels.index(label)] = value
+            except (TypeError, ValueError) as error:
+                needed = f"a number or one for each of {self.characters} characters"
+                raise ControlError(f"control {label!r} needs {needed}") from error
+        self.set_control(control)
 
     def set_control(self, control: ArrayLike) -> None:
         """Set the control (labels,) or (characters, labels) from now on, in the order of ``model.labels``."""
@@ -221,23 +219,7 @@ class TdbnSession:
         try:
             self._inputs["control"] = np.array(np.broadcast_to(wanted, shape))  # a copy: the caller's may change
         except ValueError as error:
-            raise ControlError(
-                f"a control of shape {wanted.shape} does not fit {self.characters} characters"
-            ) from error
-
-    def _control_of(self, values: Mapping[str, ArrayLike]) -> Floats:
-        unknown = sorted(values.keys() - set(self.model.labels))
-        if unknown:
-            raise ControlError(f"unknown control {', '.join(unknown)}; expected one of {', '.join(self.model.labels)}")
-        control = np.zeros((self.characters, len(self.model.labels)), dtype=np.float32)
-        for label, value in values.items():
-            try:
-                control[:, self.model.labels.index(label)] = value
-            except (TypeError, ValueError) as error:
-                raise ControlError(
-                    f"control {label!r} needs a number or one for each of {self.characters} characters"
-                ) from error
-        return control
+            raise ControlError(f"a control of shape {wanted.shape} does not fit {shape[0]} characters") from error
 
     def step(self) -> Floats:
         """One tick: the next frame (characters, D) float32, in the units of ``model.contract``."""
@@ -253,33 +235,32 @@ class TdbnSession:
 
     def _run(self, history: Floats, later: int) -> tuple[Floats, Floats]:
         """The net's frame (characters, D) after a history, and the next history, ``later`` ticks from now."""
-        calls = count((self._tick + later) * self.settings.iterations)
+        calls = count((self._tick + later) * self.iterations)
 
         def inputs() -> Arrays:
             if self.noise is not None:
                 self._inputs["noise"] = self.noise.at(next(calls))
             return self._inputs
 
-        return tick(self.model.stepper, history, inputs, self.settings.iterations)
+        return tick(self.model.stepper, history, inputs, self.iterations)
 
     def run(self, script: str, in_place: bool = False) -> list[Motion]:
-        """Run a control script (:mod:`motet.models.tdbn_script`) for all characters; one motion for each.
+        """Run a control script (:mod:`motet.models.scripts`) for all characters; one motion for each.
 
         The root's path follows from the feet on the ground; ``in_place`` leaves it out.
         """
-        segments = parse_script(script, self.model.labels)
+        segments = parse_segments(script, self.model.labels)
         frames = self.frames(control_track(segments, self.model.labels, self.model.fps))
         return [self.model.contract.motion(character, plant=not in_place) for character in frames]
 
     def frames(self, track: ArrayLike) -> Floats:
         """Run a control track (T, labels) or (T, characters, labels): frames (characters, T, D) float32."""
-        result = []
-        for control in np.asarray(track, dtype=np.float32):
+        controls = np.asarray(track, dtype=np.float32)
+        found = np.empty((self.characters, len(controls), len(self.model.contract.channels)), dtype=np.float32)
+        for place, control in enumerate(controls):
             self.set_control(control)
-            result.append(self.step())
-        if not result:
-            return np.empty((self.characters, 0, len(self.model.contract.channels)), dtype=np.float32)
-        return np.stack(result, axis=1)
+            found[:, place] = self.step()
+        return found
 
     def snapshot(self) -> TdbnSnapshot:
         """Frames, control and tick, without the noise: a session that continues from it uses its own seeds."""

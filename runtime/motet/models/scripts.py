@@ -1,0 +1,233 @@
+"""Scripts: what a figure does, and for how long; the parts follow each other, separated by commas.
+
+Of steered figures, orders in words: ``walk 3s speed 1.4, turn left 90, run 4s, walk backwards 2s, stop``. An order is a
+gait, ``turn`` or ``stop``, followed in any order by a duration (``3s``; else 2 s, or 1.5 s of a turn or stop), a speed
+(``speed 1.4`` in m/s; else the gait's usual one), a way (``backwards``, ``left``, ``right``, relative to the facing,
+which does not change), and an angle in degrees to turn (``turn left 90``, or ``walk 3s turn right 45``). A turn alone
+keeps gait, speed and way.
+
+Of the thesis' net, segments of labels: ``walk 3s`` holds a label, ``walk>run 5s`` goes from one to the other linearly,
+``walk*.3+run*.7 2s`` mixes labels (a weight is between 0 and 1; labels that are not named have 0).
+"""
+
+import re
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import accumulate
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motet.errors import ControlError, ScriptError, quoted
+
+LONGEST_SCRIPT = 3600.0
+"""Seconds. A script is laid out in memory before it runs; longer ones are for a loop over a session's ticks."""
+
+WAYS = {"forward": 0.0, "left": 90.0, "backwards": 180.0, "right": -90.0}
+"""Degrees from the facing, positive to the left."""
+
+NUMBER = r"\d+\.?\d*|\.\d+"
+
+TOKEN = re.compile(
+    r"\s*+(?:(?P<number>\d++\.?\d*+|\.\d++)(?![\w.])|(?P<seconds>\d++\.?\d*+s|\.\d++s)\b"
+    r"|(?P<label>[^\W\d][\w-]*+)|(?P<sign>[,>+*])|(?P<end>\Z))"
+)
+
+
+@dataclass(frozen=True)
+class Order:
+    """gait: None for the previous one. speed: m/s, None for the gait's usual one, -1 for the previous one.
+
+    way: of travel, in degrees from the facing, None for the previous one. turn: degrees to the left. caption: in words.
+    """
+
+    gait: str | None
+    speed: float | None
+    way: float | None
+    turn: float
+    seconds: float
+    caption: str
+
+
+@dataclass(frozen=True)
+class Segment:
+    """The weights of labels at its start and at its end, and seconds."""
+
+    start: dict[str, float]
+    stop: dict[str, float]
+    seconds: float
+
+    @property
+    def caption(self) -> str:
+        """What a viewer shows: ``walk`` or ``walk > run``."""
+        names = [" + ".join(weights) for weights in (self.start, self.stop)]
+        return names[0] if self.start == self.stop else " > ".join(names)
+
+
+def captions(parts: Sequence[Order | Segment]) -> list[tuple[float, str]]:
+    """When each part of a script starts, in seconds, and its caption."""
+    starts = accumulate((part.seconds for part in parts), initial=0.0)
+    return [(start, part.caption) for start, part in zip(starts, parts, strict=False)]
+
+
+def parse_orders(script: str, gaits: Sequence[str]) -> list[Order]:
+    """Parse a script of orders over known gaits; ScriptError marks the place of an error."""
+    orders, words = list[Order](), list[tuple[str, int]]()
+    found = [(match[0], match.start()) for match in re.finditer(r"[^\s,]+|,", script)]
+    for word, place in [*found, (",", len(script))]:
+        if word != ",":
+            words.append((word, place))
+            continue
+        if not words:
+            raise ScriptError(script, place, f"expected an order here: {', '.join(gaits)}, turn or stop")
+        orders.append(_Words(script, words).order(gaits))
+        words = []
+    if sum(order.seconds for order in orders) > LONGEST_SCRIPT:
+        raise ScriptError(script, 0, f"a script lasts at most {LONGEST_SCRIPT:g} s")
+    return orders
+
+
+class _Words:
+    """The words of one order with their places, taken one after the other."""
+
+    def __init__(self, script: str, words: Sequence[tuple[str, int]]) -> None:
+        self.script, self.left, self.place = script, deque(words), 0
+        self.caption = " ".join(word for word, _ in words)
+
+    def order(self, gaits: Sequence[str]) -> Order:
+        kind = self.take("an order")
+        if kind not in (*gaits, "turn", "stop"):
+            raise self.fail(f"unknown order {kind!r}; expected one of {', '.join(gaits)}, turn, stop")
+        found = self.turn() if kind == "turn" else {}
+        while self.left:
+            detail = self.detail()
+            for name in detail.keys() & found.keys():
+                raise self.fail(f"this order gives its {name} twice")
+            found |= detail
+        turn, seconds = found.get("turn", 0.0), found.get("seconds", 1.5 if kind in ("turn", "stop") else 2.0)
+        if kind == "stop":
+            return Order(None, 0.0, None, turn, seconds, self.caption)
+        if kind == "turn":
+            return Order(None, found.get("speed", -1.0), found.get("way"), turn, seconds, self.caption)
+        return Order(kind, found.get("speed"), found.get("way", 0.0), turn, seconds, self.caption)
+
+    def detail(self) -> dict[str, float]:
+        word = self.take("more")
+        if re.fullmatch(f"({NUMBER})s", word):
+            return {"seconds": float(word[:-1])}
+        if word in WAYS:
+            return {"way": WAYS[word]}
+        if word == "speed":
+            return {"speed": self.number("metres a second")}
+        if word == "turn":
+            return self.turn()
+        raise self.fail('expected seconds such as "3s", "speed 1.4", "turn left 90", or a way such as "backwards"')
+
+    def turn(self) -> dict[str, float]:
+        side = self.take("left or right")
+        if side not in ("left", "right"):
+            raise self.fail("expected left or right")
+        degrees = self.number("degrees")
+        return {"turn": degrees if side == "left" else -degrees}
+
+    def number(self, wanted: str) -> float:
+        word = self.take(wanted)
+        if not re.fullmatch(NUMBER, word):
+            raise self.fail(f"expected {wanted}, such as 1.4 or 90")
+        return float(word)
+
+    def take(self, wanted: str) -> str:
+        if not self.left:
+            raise self.fail(f"expected {wanted} after this")
+        word, self.place = self.left.popleft()
+        return word
+
+    def fail(self, reason: str) -> ScriptError:
+        return ScriptError(self.script, self.place, reason)
+
+
+def parse_segments(script: str, labels: Sequence[str]) -> list[Segment]:
+    """Parse a script of segments over known labels; ScriptError marks the place of an error."""
+    parser = _Tokens(script, labels)
+    segments = [parser.segment()]
+    while parser.accept("end") is None:
+        parser.expect("sign", ",", "a comma between segments")
+        segments.append(parser.segment())
+    if sum(segment.seconds for segment in segments) > LONGEST_SCRIPT:
+        raise parser.fail(f"a script lasts at most {LONGEST_SCRIPT:g} s")
+    return segments
+
+
+class _Tokens:
+    """A recursive descent over the tokens of one script."""
+
+    def __init__(self, script: str, labels: Sequence[str]) -> None:
+        self.script, self.labels, self.position = script, labels, 0
+
+    def segment(self) -> Segment:
+        start = self.mix()
+        stop = self.mix() if self.accept("sign", ">") else start
+        before = self.position
+        seconds = float(self.expect("seconds", None, "a duration in seconds").removesuffix("s"))
+        if not 0 < seconds <= LONGEST_SCRIPT:
+            raise self.fail(f"a duration must be more than 0 and at most {LONGEST_SCRIPT:g} s", before)
+        return Segment(start, stop, seconds)
+
+    def mix(self) -> dict[str, float]:
+        weights: dict[str, float] = {}
+        while not weights or self.accept("sign", "+"):
+            before = self.position
+            label = self.expect("label", None, "the name of a control")
+            if label not in self.labels:
+                known = ", ".join(self.labels)
+                raise self.fail(f"unknown control {quoted(label)}; expected one of {known}", before)
+            if label in weights:
+                raise self.fail(f"{quoted(label)} appears twice in one mix", before)
+            weights[label] = 1.0
+            if self.accept("sign", "*"):
+                before = self.position
+                weights[label] = float(self.expect("number", None, "a weight between 0 and 1"))
+                if weights[label] > 1:
+                    raise self.fail("a weight is between 0 and 1", before)
+        return weights
+
+    def accept(self, kind: str, text: str | None = None) -> str | None:
+        """The next token if it is of that kind (and text), else None."""
+        match = TOKEN.match(self.script, self.position)
+        if match is None or match.lastgroup != kind or (text is not None and match[kind] != text):
+            return None
+        self.position = match.end()
+        return match[kind]
+
+    def expect(self, kind: str, text: str | None, wanted: str) -> str:
+        token = self.accept(kind, text)
+        if token is None:
+            raise self.fail(f'the script needs {wanted} here, such as "walk 3s, walk>run 5s"')
+        return token
+
+    def fail(self, reason: str, position: int | None = None, most: int = 200) -> ScriptError:
+        """An error at the next token; of a long script at most so many characters around it."""
+        rest = self.script[self.position if position is None else position :]
+        place = len(self.script) - len(rest.lstrip())
+        if len(self.script) <= most:
+            return ScriptError(self.script, place, reason)
+        start = max(0, place - most // 2)
+        return ScriptError(self.script[start : start + most], place - start, f"{reason} (at character {place})")
+
+
+def control_track(segments: Sequence[Segment], labels: Sequence[str], fps: float) -> NDArray[np.float32]:
+    """The control values (T, labels) float32 of segments, frame by frame; no frame is lost to rounding.
+
+    ControlError for a script of less than one frame.
+    """
+    ends = np.round(np.cumsum([segment.seconds for segment in segments]) * fps).astype(int)
+    if not ends[-1]:
+        raise ControlError(f"the script lasts less than one frame at {fps:g} fps")
+    track = []
+    for segment, count in zip(segments, np.diff(ends, prepend=0), strict=True):
+        start, stop = (np.array([side.get(label, 0.0) for label in labels]) for side in (segment.start, segment.stop))
+        # the last frame of a ramp is its end, and a segment that holds is the same throughout
+        share = (np.arange(1, count + 1) / max(1, count))[:, None]
+        track.append(start + share * (stop - start))
+    return np.concatenate(track, dtype=np.float32)
