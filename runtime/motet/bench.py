@@ -4,7 +4,7 @@ import itertools
 import tempfile
 import time
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import singledispatch
 from pathlib import Path
@@ -24,32 +24,20 @@ from motet.models.language import EOS, SPECIALS, LanguageModel
 from motet.models.predict import PredictModel
 from motet.models.search import SearchModel
 from motet.models.steer import SteerModel
-from motet.models.steer_session import SteerSession
 from motet.models.tdbn_control import TdbnModel
+from motet.motion.motion import Motion
+from motet.representation.contract import MotionContract
 from motet.representation.placed import placed
-
-BATCHES = (64, 256, 512, 1024, 2048, 4096)
-"""Numbers of characters to find the best batch among."""
 
 BEAMS, WORDS, SECONDS = 5, 10, 7.0
 """Lengths of all descriptions and motions, so that the speed does not depend on what a model produces."""
 
-FILE_SECONDS = 2.8
-"""How long the motion in the file is that is described."""
+SCALE = {"s": 1.0, "ms": 1e3, "us": 1e6}
+"""Of units where less is better."""
 
-DRAWS = 100
-"""Draws of a consensus."""
-
-CROWD = 1000
-"""Characters that are steered together."""
-
-VECTORS = 100_000
-"""Of motions that are searched."""
-
-TIMES = ("us", "ms")
-"""Units where less is better."""
-
-Figures = dict[str, tuple[float, str]]
+Call = Callable[[], object]
+Figure = tuple[float, str]
+Figures = dict[str, Figure]
 
 
 @dataclass(frozen=True)
@@ -63,40 +51,44 @@ class Row:
     ratio: float | None = None
 
 
-def durations(
-    call: Callable[[], object], seconds: float, least: int = 3
-) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def rows(figures: Figures, baseline: Figures | None) -> list[Row]:
+    """Figures beside those of the baseline; a ratio above 1 favours the figure, for times and rates alike."""
+    result = []
+    for name, (value, unit) in figures.items():
+        other = baseline[name][0] if baseline else None
+        ratio = None if other is None or unit == "characters" else (other / value if unit in SCALE else value / other)
+        result.append(Row(name, value, unit, other, ratio))
+    return result
+
+
+def durations(call: Call, seconds: float, least: int = 3) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     """Seconds of each call, over about ``seconds`` (at least ``least`` calls) after a warm-up of a tenth of that."""
-    _until(call, seconds / 10, 1)
-    return np.array(_until(call, seconds, least))
+    for limit, count in ((seconds / 10, 1), (seconds, least)):
+        taken, end = list[float](), time.perf_counter() + limit
+        while len(taken) < count or time.perf_counter() < end:
+            start = time.perf_counter()
+            call()
+            taken.append(time.perf_counter() - start)
+    return np.array(taken)
 
 
-def _until(call: Callable[[], object], seconds: float, least: int) -> list[float]:
-    taken: list[float] = []
-    end = time.perf_counter() + seconds
-    while len(taken) < least or time.perf_counter() < end:
-        start = time.perf_counter()
-        call()
-        taken.append(time.perf_counter() - start)
-    return taken
+def timed(call: Call, seconds: float, unit: str = "ms") -> Figure:
+    """The median time of a call."""
+    return float(np.median(durations(call, seconds))) * SCALE[unit], unit
+
+
+def rate(count: int, call: Call, seconds: float, unit: str, least: int = 2) -> Figure:
+    """How many things a second a call does that does ``count`` at once."""
+    return count / float(np.median(durations(call, seconds, least))), unit
 
 
 @singledispatch
 def figures(model: BundleModel, seconds: float, file: Path | None = None) -> Figures:
     """The figures of a model by name, each measured for about ``seconds``: values and units.
 
-    file: the motion file that is described; by default one of :data:`FILE_SECONDS` that is made for it.
+    file: the motion file that is described; by default one of 2.8 s that is made for it.
     """
     raise NotImplementedError(f"no figures of {model!r} are defined")
-
-
-def _made_file(model: DescribeModel, folder: Path) -> Path:
-    """An AMC and its ASF at 120 frames per second: a random walk from near the mean of the training data."""
-    rng, contract = np.random.default_rng(0), model.contract
-    steps = rng.normal(size=(round(FILE_SECONDS * model.fps), len(contract.channels)))
-    motion = contract.motion(contract.mean + 0.1 * contract.std * steps.cumsum(axis=0), plant=False)
-    write_motion(folder / "motion.amc", motion.resample(120.0))
-    return folder / "motion.amc"
 
 
 @figures.register
@@ -105,7 +97,7 @@ def tdbn_figures(model: TdbnModel, seconds: float, _: Path | None = None) -> Fig
 
     Of the net alone; and of a smooth session whose control stays, and of one whose control changes at every tick.
     """
-    tick = durations(model.start(smooth=False).step, seconds) * 1e6
+    tick = durations(model.start(smooth=False).step, seconds) * SCALE["us"]
     smooth, changing = model.start(), model.start()
     controls = itertools.cycle([np.ones(len(model.labels)), np.zeros(len(model.labels))])
 
@@ -113,90 +105,81 @@ def tdbn_figures(model: TdbnModel, seconds: float, _: Path | None = None) -> Fig
         changing.set_control(next(controls))
         changing.step()
 
-    figures = {
+    found = {
         "control.tick": (float(np.median(tick)), "us"),
         "control.tick_p99": (float(np.percentile(tick, 99)), "us"),
-        "control.tick_smooth": (float(np.median(durations(smooth.step, seconds)) * 1e6), "us"),
-        "control.tick_changing": (float(np.median(durations(changed, seconds)) * 1e6), "us"),
+        "control.tick_smooth": timed(smooth.step, seconds, "us"),
+        "control.tick_changing": timed(changed, seconds, "us"),
     }
     for name, variety in (("control.frames", 0.0), ("control.frames_sampled", 1.0)):
-        rates = {batch: _rate(model, batch, variety, seconds / 3) for batch in BATCHES}
-        best = max(rates, key=rates.__getitem__)
-        figures[name] = (rates[best], "frames/s")
-        figures[f"{name}_batch"] = (float(best), "characters")
-    return figures
-
-
-def _rate(model: TdbnModel, batch: int, variety: float, seconds: float) -> float:
-    session = model.start(characters=batch, variety=variety, smooth=False)
-    return batch / float(np.median(durations(session.step, seconds)))
+        rates = {}
+        for batch in (64, 256, 512, 1024, 2048, 4096):
+            session = model.start(characters=batch, variety=variety, smooth=False)
+            rates[rate(batch, session.step, seconds / 3, "frames/s", least=3)] = batch
+        best = max(rates)
+        found |= {name: best, f"{name}_batch": (float(rates[best]), "characters")}
+    return found
 
 
 @figures.register
 def steer_figures(model: SteerModel, seconds: float, _: Path | None = None) -> Figures:
-    """A tick of one character that walks, and of :data:`CROWD` that go all ways, without and with the foot lock; and
-    the positions of all joints of the crowd.
+    """A tick of one character that walks, and of 1000 that go all ways, without and with the foot lock; and the
+    positions of all joints of the crowd.
 
     Of ticks the median, the mean and the 99th percentile: only one in a few searches the table, for all at once.
     """
-    figures: Figures = {}
-    for name, characters, unit, factor in (("tick", 1, "us", 1e6), ("crowd", CROWD, "ms", 1e3)):
+    found: Figures = {}
+    for name, characters, unit in (("tick", 1, "us"), ("crowd", 1000, "ms")):
         for kind, hold_feet in (("", False), ("_locked", True)):
-            ticks = durations(_steered(model, characters, hold_feet).tick, seconds) * factor
-            found = {"": np.median(ticks), "_mean": ticks.mean(), "_p99": np.percentile(ticks, 99)}
-            figures |= {f"control.{name}{kind}{of}": (float(value), unit) for of, value in found.items()}
-    pose = _steered(model, CROWD, False).tick()
-    return {**figures, "control.crowd_positions": (_milliseconds(pose.positions, seconds), "ms")}
-
-
-def _steered(model: SteerModel, characters: int, hold_feet: bool) -> SteerSession:
-    session = model.start(characters=characters, hold_feet=hold_feet)
-    gait = model.gaits[0]
-    session.control(speed=model.usual[gait], direction=np.arange(characters) * 360 / characters)
-    return session
+            session = model.start(characters=characters, hold_feet=hold_feet)
+            session.control(speed=model.usual[model.gaits[0]], direction=np.arange(characters) * 360 / characters)
+            ticks = durations(session.tick, seconds) * SCALE[unit]
+            of = {"": np.median(ticks), "_mean": ticks.mean(), "_p99": np.percentile(ticks, 99)}
+            found |= {f"control.{name}{kind}{which}": (float(value), unit) for which, value in of.items()}
+    return {**found, "control.crowd_positions": timed(session.tick().positions, seconds)}
 
 
 @figures.register
 def _(model: DescribeModel, seconds: float, file: Path | None = None) -> Figures:
-    measured = describe_figures(model, seconds)
+    found = describe_figures(model, seconds)
     if file or model.contract.skeleton:
         with tempfile.TemporaryDirectory() as folder:
-            path = file or _made_file(model, Path(folder))
-            measured["describe.file"] = (_milliseconds(lambda: model.describe(read_motion(path)), seconds), "ms")
-    return measured
+            path = file or Path(folder) / "motion.amc"
+            if file is None:
+                write_motion(path, _wandering(model.contract, round(2.8 * model.fps)).resample(120.0))
+            found["describe.file"] = timed(lambda: model.describe(read_motion(path)), seconds)
+    return found
 
 
 def describe_figures(model: DescribeModel, seconds: float) -> Figures:
     """Descriptions of :data:`WORDS` words a second, many at once and one alone; encoder and step of one alone.
 
-    By beam search; and one by consensus of :data:`DRAWS` draws.
+    By beam search; and one by consensus of 100 draws.
     """
-    end = model.vocabulary.ids[EOS]
+    end, motion = model.vocabulary.ids[EOS], _noise(model.contract, model.fps)
     never = {"log_probabilities": lambda found: np.where(np.arange(found.shape[1]) == end, np.float32(-1e9), found)}
-    defaults = {"beams": BEAMS, "max_words": WORDS}
-    steady = DescribeModel(replace(model.manifest, defaults=defaults, loop="beam"), _steady(model.graphs, never))
-    size = (round(SECONDS * model.fps), len(model.contract.channels))
-    motion = model.contract.features(np.random.default_rng(0).normal(model.contract.mean, model.contract.std, size))
+    manifest = replace(model.manifest, defaults={"beams": BEAMS, "max_words": WORDS}, loop="beam")
+    steady = DescribeModel(manifest, {**model.graphs, "step": _Steady(model.graphs["step"], never)})
     return {
-        "describe.descriptions": (_batch_rate(steady.describe, [motion], 128, seconds), "motions/s"),
-        "describe.one": (_milliseconds(lambda: steady.describe(motion), seconds), "ms"),
-        "describe.consensus": (_milliseconds(lambda: steady.describe(motion, draws=DRAWS), seconds), "ms"),
-        "describe.encoder": (_milliseconds(lambda: model.embed(motion), seconds), "ms"),
-        "describe.step": (_milliseconds(_step_call(model.graphs["step"]), seconds), "ms"),
+        "describe.descriptions": rate(128, lambda: steady.describe([motion] * 128), seconds, "motions/s"),
+        "describe.one": timed(lambda: steady.describe(motion), seconds),
+        "describe.consensus": timed(lambda: steady.describe(motion, draws=100), seconds),
+        "describe.encoder": timed(lambda: model.embed(motion), seconds),
+        "describe.step": timed(_step_call(model.graphs["step"]), seconds),
     }
 
 
 @figures.register
 def mixture_figures(model: MixtureModel, seconds: float, _: Path | None = None) -> Figures:
     """Motions of :data:`SECONDS` a second, many at once and one alone; encoder and step of one alone."""
-    always = {"active": np.ones_like}
-    defaults = {**model.defaults, "hypotheses": BEAMS, "max_seconds": SECONDS}
-    steady, text = MixtureModel(replace(model.manifest, defaults=defaults), _steady(model.graphs, always)), _text(model)
+    text, step = _text(model), _Steady(model.graphs["step"], {"active": np.ones_like})
+    manifest = replace(model.manifest, defaults={**model.defaults, "hypotheses": BEAMS, "max_seconds": SECONDS})
+    steady = MixtureModel(manifest, {**model.graphs, "step": step})
     return {
-        "generate.motions": (_batch_rate(steady.generate, [text], 64, seconds), "motions/s"),
-        "generate.one": (_milliseconds(lambda: steady.generate(text), seconds), "ms"),
-        "generate.encoder": (_milliseconds(lambda: model.embed(text), seconds), "ms"),
-        "generate.step": (_milliseconds(_step_call(model.graphs["step"]), seconds), "ms"),
+        "generate.motions": rate(64, lambda: steady.generate([text] * 64), seconds, "motions/s"),
+        "generate.one": timed(lambda: steady.generate(text), seconds),
+        "generate.encoder": timed(lambda: model.embed(text), seconds),
+        "generate.step": timed(_step_call(model.graphs["step"]), seconds),
     }
 
 
@@ -206,16 +189,11 @@ def codes_figures(model: CodesModel, seconds: float, _: Path | None = None) -> F
     text = _text(model)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", TextWarning)
-        rate = _batch_rate(lambda texts: model.generate(texts, seconds=SECONDS), [text], 64, seconds)
         return {
-            "generate.motions": (rate, "motions/s"),
-            "generate.one": (_milliseconds(lambda: model.generate(text, seconds=SECONDS), seconds), "ms"),
-            "generate.first_frame": (_milliseconds(lambda: next(model.stream(text)), seconds), "ms"),
+            "generate.motions": rate(64, lambda: model.generate([text] * 64, seconds=SECONDS), seconds, "motions/s"),
+            "generate.one": timed(lambda: model.generate(text, seconds=SECONDS), seconds),
+            "generate.first_frame": timed(lambda: next(model.stream(text)), seconds),
         }
-
-
-def _text(model: LanguageModel) -> str:
-    return " ".join(model.vocabulary.words[len(SPECIALS) :][:WORDS])
 
 
 @figures.register
@@ -224,79 +202,69 @@ def predict_figures(model: PredictModel, seconds: float, _: Path | None = None) 
     figure; figures' horizons a second."""
     size = (512, model.seed_frames, len(model.contract.channels))
     seeds = np.random.default_rng(0).normal(model.contract.mean, model.contract.std, size).astype(np.float32)
-    horizon = _milliseconds(lambda: model.next_frames(seeds[:1]), seconds)
     motion = model.contract.motion(np.tile(seeds[0], (10, 1)))
     return {
-        "predict.first_frame": (1e3 * _milliseconds(lambda: model.next_frames(seeds[:1], 1), seconds), "us"),
-        "predict.frame": (1e3 * horizon / model.horizon, "us"),
-        "predict.motion": (_milliseconds(lambda: model.predict(motion), seconds), "ms"),
-        "predict.horizons": (len(seeds) / _milliseconds(lambda: model.next_frames(seeds), seconds) * 1e3, "figures/s"),
+        "predict.first_frame": timed(lambda: model.next_frames(seeds[:1], 1), seconds, "us"),
+        "predict.frame": (timed(lambda: model.next_frames(seeds[:1]), seconds, "us")[0] / model.horizon, "us"),
+        "predict.motion": timed(lambda: model.predict(motion), seconds),
+        "predict.horizons": rate(len(seeds), lambda: model.next_frames(seeds), seconds, "figures/s", least=3),
     }
 
 
 @figures.register
 def fill_figures(model: FillModel, seconds: float, _: Path | None = None) -> Figures:
     """The frames of a gap of a second, between placed frames, and in a motion of five on the model's own figure."""
-    count, rng = round(model.fps), np.random.default_rng(0)
-    steps = model.contract.std * rng.normal(size=(5 * count, len(model.contract.channels)))
-    motion = model.contract.motion(model.contract.mean + 0.1 * steps.cumsum(axis=0), plant=False)
+    count = round(model.fps)
+    motion = _wandering(model.contract, 5 * count)
     frames = placed(motion)
     past, after = frames[: 2 * count], frames[3 * count :]
     return {
-        "fill.second": (_milliseconds(lambda: model.frames_between(past, after, count), seconds), "ms"),
-        "fill.motion": (_milliseconds(lambda: model.fill(motion, [(2.0, 3.0)]), seconds), "ms"),
+        "fill.second": timed(lambda: model.frames_between(past, after, count), seconds),
+        "fill.motion": timed(lambda: model.fill(motion, [(2.0, 3.0)]), seconds),
     }
 
 
 @figures.register
 def search_figures(model: SearchModel, seconds: float, _: Path | None = None) -> Figures:
-    """A sentence of :data:`WORDS` words, a motion of :data:`SECONDS`, and a question to :data:`VECTORS` vectors."""
-    rng, known = np.random.default_rng(0), model.vocabulary.words[len(SPECIALS) :]
-    text, size = " ".join(rng.choice(known, WORDS)), (round(SECONDS * model.fps), len(model.contract.channels))
-    motion = model.contract.features(rng.normal(model.contract.mean, model.contract.std, size))
-    vectors = rng.normal(size=(VECTORS, model.sizes["E"])).astype(np.float32)
+    """A sentence of :data:`WORDS` words, a motion of :data:`SECONDS`, and a question to 100,000 vectors."""
+    text, motion = _text(model), _noise(model.contract, model.fps)
+    vectors = np.random.default_rng(0).normal(size=(100_000, model.sizes["E"])).astype(np.float32)
     return {
-        "search.text": (_milliseconds(lambda: model.embed_text(text), seconds), "ms"),
-        "search.motion": (_milliseconds(lambda: model.embed(motion), seconds), "ms"),
-        "search.nearest": (_milliseconds(lambda: model.loop.run(vectors @ vectors[0], 5), seconds), "ms"),
+        "search.text": timed(lambda: model.embed_text(text), seconds),
+        "search.motion": timed(lambda: model.embed(motion), seconds),
+        "search.nearest": timed(lambda: model.loop.run(vectors @ vectors[0], 5), seconds),
     }
 
 
-class _Steady:
-    """A graph some of whose outputs are changed: so that sentences and motions are all of one length."""
-
-    def __init__(self, graph: Graph, changes: Mapping[str, Callable[..., Any]]) -> None:
-        self.spec, self._graph, self._changes = graph.spec, graph, changes
-
-    def __call__(self, feeds: Arrays) -> dict[str, Any]:
-        outputs = self._graph(feeds)
-        return {**outputs, **{name: change(outputs[name]) for name, change in self._changes.items()}}
+def _wandering(contract: MotionContract, frames: int) -> Motion:
+    """A random walk from near the mean of the training data."""
+    steps = contract.std * np.random.default_rng(0).normal(size=(frames, len(contract.channels)))
+    return contract.motion(contract.mean + 0.1 * steps.cumsum(axis=0), plant=False)
 
 
-def _steady(graphs: Mapping[str, Graph], changes: Mapping[str, Callable[..., Any]]) -> dict[str, Graph]:
-    return {**graphs, "step": _Steady(graphs["step"], changes)}
+def _noise(contract: MotionContract, fps: float) -> Motion:
+    """Frames of :data:`SECONDS` that are drawn one by one."""
+    size = (round(SECONDS * fps), len(contract.channels))
+    return contract.features(np.random.default_rng(0).normal(contract.mean, contract.std, size))
 
 
-def _step_call(step: Graph) -> Callable[[], object]:
+def _text(model: LanguageModel) -> str:
+    return " ".join(model.vocabulary.words[len(SPECIALS) :][:WORDS])
+
+
+def _step_call(step: Graph) -> Call:
     """One call of a step for all beams of one request."""
     rng = np.random.default_rng(0)
     feeds = {tensor.name: tensor.example(rng, BEAMS) for tensor in step.spec.inputs}
     return lambda: step(feeds)
 
 
-def _milliseconds(call: Callable[[], object], seconds: float) -> float:
-    return float(np.median(durations(call, seconds))) * 1e3
+class _Steady:
+    """A graph some of whose outputs are changed: so that sentences and motions are all of one length."""
 
+    def __init__(self, graph: Graph, changes: dict[str, Callable[..., Any]]) -> None:
+        self.spec, self._graph, self._changes = graph.spec, graph, changes
 
-def _batch_rate(call: Callable[[list[Any]], object], given: list[Any], batch: int, seconds: float) -> float:
-    return batch / float(np.median(durations(lambda: call(given * batch), seconds, least=2)))
-
-
-def rows(figures: Figures, baseline: Figures | None) -> list[Row]:
-    """Figures beside those of the baseline; a ratio above 1 favours the figure, for times and rates alike."""
-    result = []
-    for name, (value, unit) in figures.items():
-        other = baseline[name][0] if baseline else None
-        ratio = None if other is None or unit == "characters" else (other / value if unit in TIMES else value / other)
-        result.append(Row(name, value, unit, other, ratio))
-    return result
+    def __call__(self, feeds: Arrays) -> dict[str, Any]:
+        outputs = self._graph(feeds)
+        return {**outputs, **{name: change(outputs[name]) for name, change in self._changes.items()}}

@@ -24,12 +24,6 @@ from motet.motion.humanoid import (
 from motet.motion.kinematics import global_transforms, heading, positions
 from motet.motion.motion import Motion
 
-STAYS = 0.3
-"""Metres over which hips move where a figure stays in place."""
-
-LEVEL = 0.5
-"""Sine of the angle from the vertical from which on the way that hips face is a way over the ground."""
-
 
 @dataclass(frozen=True)
 class Checked:
@@ -81,7 +75,7 @@ class Checked:
     @property
     def in_place(self) -> bool:
         """Whether the figure hardly leaves its place."""
-        return self.travel is not None and self.travel < STAYS
+        return self.travel is not None and self.travel < 0.3  # metres
 
     def to_json(self) -> dict[str, Any]:
         """All fields, and :attr:`seconds`, :attr:`sure` and :attr:`in_place`."""
@@ -104,17 +98,18 @@ def check(file: str | Path, *, clip: Clip = None, **options: Any) -> Checked:
         found = to_humanoid(motion)
     except MotionError as error:
         return Checked(*about, refused=str(error))
+    way = np.ptp(positions(found.motion)[:, 0], axis=0)
+    travel = float(np.hypot(way[0], way[2])) * (found.leg or leg_length()) / leg_length()
+    measured = (_facing(found.motion), *_heights(motion, found), travel)
     said = found.convention, found.confidence, found.unit, found.height
-    return Checked(
-        *about, None, *said, _facing(found.motion), *_heights(motion, found), _travel(found), found.notes, found.joints
-    )
+    return Checked(*about, None, *said, *measured, found.notes, found.joints)
 
 
 def _facing(motion: Motion) -> float | None:
-    """Degrees to the left of +z that the hips face in the first frame of a motion of the humanoid."""
+    """Degrees to the left of +z that the hips of the humanoid face in the first frame; None for up or down."""
     forward = global_transforms(motion[:1])[0][0, 0, :, 2]
-    level = float(np.hypot(forward[0], forward[2]))
-    return float(np.degrees(heading(motion[:1])[0])) if level > LEVEL else None
+    level = float(np.hypot(forward[0], forward[2]))  # the sine of the angle from the vertical
+    return float(np.degrees(heading(motion[:1])[0])) if level > 0.5 else None
 
 
 def _heights(motion: Motion, found: Humanoid) -> tuple[float, float]:
@@ -126,9 +121,3 @@ def _heights(motion: Motion, found: Humanoid) -> tuple[float, float]:
     lowest = min(float(places[..., 1].min()), float(soles[..., 1].min()))
     metres = (found.leg or leg_length()) / fitted.leg
     return ground_under(soles) * metres, lowest * metres
-
-
-def _travel(found: Humanoid) -> float:
-    """Metres between the ends of the ground that the hips pass over."""
-    way = np.ptp(positions(found.motion)[:, 0], axis=0)
-    return float(np.hypot(way[0], way[2])) * (found.leg or leg_length()) / leg_length()

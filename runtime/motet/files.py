@@ -12,9 +12,6 @@ from motet.errors import OutputError
 File = str | Path | BinaryIO
 """A path, or a file object of bytes."""
 
-PARTIAL = ".partial"
-"""How the temporary files end that a killed program may leave behind: ``.NAME.HEX.partial``. Nothing reads them."""
-
 
 def place_of(file: File) -> Path:
     """The path of a file, or the name by which errors call a file object."""
@@ -52,24 +49,21 @@ def write_whole(file: File, content: str | bytes) -> None:
     """
     try:
         data = content.encode() if isinstance(content, str) else content
-        if isinstance(file, str | Path):
-            _replace(check_place(file).resolve(), data)
-        else:
+        if not isinstance(file, str | Path):
             file.write(data)
+            return
+        path = check_place(file).resolve()
+        temporary = temporary_beside(path)
+        try:
+            temporary.write_bytes(data)
+            if path.exists():
+                shutil.copymode(path, temporary)
+            temporary.replace(path)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
     except (OSError, ValueError) as error:
         raise _refusal(place_of(file), error) from error
-
-
-def _replace(path: Path, data: bytes) -> None:
-    temporary = temporary_beside(path)
-    try:
-        temporary.write_bytes(data)
-        if path.exists():
-            shutil.copymode(path, temporary)
-        temporary.replace(path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
 
 
 @contextmanager
@@ -93,9 +87,12 @@ def new_folder(path: str | Path) -> Iterator[Path]:
 
 
 def temporary_beside(path: Path) -> Path:
-    """A new name in the same folder that ends in :data:`PARTIAL`, short enough where the name itself is long."""
+    """A new name in the same folder, ``.NAME.HEX.partial``, short enough where the name itself is long.
+
+    A killed program may leave such a file behind; nothing reads it.
+    """
     stem = path.name.encode(errors="replace")[:200].decode(errors="ignore")
-    return path.with_name(f".{stem}.{uuid.uuid4().hex}{PARTIAL}")
+    return path.with_name(f".{stem}.{uuid.uuid4().hex}.partial")
 
 
 def _refusal(path: Path, error: Exception) -> OutputError:

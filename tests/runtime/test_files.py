@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from motet.errors import OutputError
-from motet.files import PARTIAL, temporary_beside, write_whole
+from motet.files import temporary_beside, write_whole
 
 
 def test_text_and_bytes_are_written_and_replaced(tmp_path: Path) -> None:
@@ -53,7 +53,7 @@ def test_a_long_name_has_a_temporary_file_too(tmp_path: Path) -> None:
     assert path.read_text() == "x"
     name = temporary_beside(path).name
     assert name.startswith(".ä")
-    assert name.endswith(PARTIAL)
+    assert name.endswith(".partial")
     with pytest.raises(OutputError, match="cannot write"):
         write_whole(tmp_path / ("a" * 256), "x")
 
