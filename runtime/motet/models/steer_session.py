@@ -49,8 +49,8 @@ class Gaits:
         return self.names.index(name)
 
     def target(self, command: "Command") -> tuple[Array, list[tuple[str, str]]]:
-        """A command's velocity along x and z, m/s, and its facing, radians, (B, 3), within the limits of its gaits; and
-        what exceeds them: gait and message."""
+        """A command's velocity along x and z, m/s, and its facing, radians, (B, 3), within limits; and what exceeds
+        them: gait and message."""
         how, speeds, told, moving = self.settings, self.speeds[command.gait], command.speed, command.speed > 0
         # not all gaits go sideways and backwards: those face the way they go, or nearly
         farthest = np.where(speeds[:, 3:].min(axis=1) > 0, np.pi, how.ahead)
@@ -83,21 +83,13 @@ class Command:
     facing: Array
     faces_way: NDArray[np.bool_]
 
-    def told(
-        self,
-        gait: Rows | None = None,
-        speed: Array | None = None,
-        direction: Array | None = None,
-        facing: Array | None = None,
-    ) -> "Command":
-        """With new values. Given a direction but no facing, they face it once they move."""
-        faces_way = self.faces_way if facing is None else np.zeros_like(self.faces_way)
-        if direction is not None and facing is None:
-            faces_way = np.ones_like(faces_way)
-        gait, speed = self.gait if gait is None else gait, self.speed if speed is None else speed
-        direction = self.direction if direction is None else direction
-        facing = np.where(faces_way & (speed > 0), direction, self.facing if facing is None else facing)
-        return Command(gait, speed, direction, facing, faces_way)
+    def told(self, gait: Rows | None = None, **given: Array) -> "Command":
+        """With new speeds, directions and facings. Given a direction but no facing, they face it once they move."""
+        faces_way = self.faces_way
+        if given.keys() & {"direction", "facing"}:
+            faces_way = np.full_like(faces_way, "facing" not in given)
+        new = replace(self, gait=self.gait if gait is None else gait, faces_way=faces_way, **given)
+        return replace(new, facing=np.where(faces_way & (new.speed > 0), new.direction, new.facing))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -122,8 +114,7 @@ class SteerSession:
 
     def __init__(self, model: "SteerModel", playback: Playback, gait: int, hold_feet: bool, strict: bool) -> None:
         self.model, self.characters, self.strict = model, len(playback.row), strict
-        self._playback = playback
-        zero = np.zeros(self.characters)
+        self._playback, zero = playback, np.zeros(self.characters)
         self._command = Command(np.full(self.characters, gait), zero, zero, zero, zero > 0)
         self._target = np.zeros((self.characters, 3))
         self._lock = self._new_lock() if hold_feet else None
@@ -156,11 +147,7 @@ class SteerSession:
         not fit; the control is unchanged then.
         """
         given = {"speed": speed, "direction": direction, "facing": facing}
-        numbers = {
-            name: self._numbers(f"{name} needs a number or one for each of {self.characters} characters", values)
-            for name, values in given.items()
-            if values is not None
-        }
+        numbers = {name: self._numbers(f"{name} needs a number", one) for name, one in given.items() if one is not None}
         numbers |= {name: np.radians(numbers[name]) for name in ("direction", "facing") if name in numbers}
         told, gaits = self._command, None if gait is None else self._gaits(gait)
         if velocity is None:
@@ -168,7 +155,7 @@ class SteerSession:
             return
         if speed is not None or direction is not None:
             raise ControlError("give a velocity, or speed and direction, not both")
-        x, z = self._numbers(self._each("a velocity needs x and z"), velocity, 2).T
+        x, z = self._numbers("a velocity needs x and z", velocity, 2).T
         numbers["speed"] = np.hypot(x, z)
         goes = numbers["speed"] > 0
         command = told.told(gaits, direction=np.where(goes, np.arctan2(x, z), told.direction), **numbers)
@@ -176,8 +163,7 @@ class SteerSession:
 
     @property
     def target(self) -> Array:
-        """The characters' targets (characters, 3), within their gaits' limits: velocity along x and z, m/s, and facing,
-        radians."""
+        """Velocity along x and z, m/s, and facing, radians (characters, 3), within the limits of gaits."""
         return self._target.copy()
 
     def _tell(self, command: Command) -> None:
@@ -192,18 +178,15 @@ class SteerSession:
         self._playback.ticks_to_search[changed] = 0  # what is told is searched for at once
         self._target, self._command = target, command
 
-    def _each(self, needed: str) -> str:
-        return f"{needed}, for all or for each of {self.characters} characters"
-
     def _numbers(self, needed: str, values: ArrayLike, *columns: int) -> Array:
-        """Numbers (columns) for all or (characters, columns), as a new (characters, columns); ControlError for others,
-        which says what is needed."""
+        """Numbers for all characters or for each, as a new (characters, *columns)."""
         try:
             found = np.array(values, dtype=np.float64)
             if found.shape not in (columns, (1, *columns), (self.characters, *columns)):
                 raise ValueError(found.shape)
         except (TypeError, ValueError) as error:
-            raise ControlError(needed) from error
+            one = ", for all or" if columns else " or one"
+            raise ControlError(f"{needed}{one} for each of {self.characters} characters") from error
         if not (np.abs(found) <= LARGEST).all():
             raise ControlError(f"{needed.partition(' need')[0]} must be finite numbers, no larger than {LARGEST:g}")
         return np.array(np.broadcast_to(found, (self.characters, *columns)))
@@ -220,8 +203,7 @@ class SteerSession:
 
     def tick_to(self, target: Array) -> Pose:
         """A tick with a raw target (characters, 3): velocity along x and z in m/s, facing in radians; not checked."""
-        model = self.model
-        pose = tick(model.matcher, model.pose_codes, self._playback, target, self._command.gait)
+        pose = tick(self.model.matcher, self.model.pose_codes, self._playback, target, self._command.gait)
         return pose if self._lock is None else self._lock.held(pose)
 
     def advance(self, seconds: float) -> Pose:
@@ -242,16 +224,15 @@ class SteerSession:
 
     def push(self, velocity: ArrayLike) -> None:
         """Push the characters by a velocity (2,) or (characters, 2) along x and z, m/s, from which they recover."""
-        self._playback.spring[:, :2] += self._numbers(self._each("a velocity needs x and z"), velocity, 2)
+        self._playback.spring[:, :2] += self._numbers("a velocity needs x and z", velocity, 2)
         self._playback.ticks_to_search[:] = 0
 
     def put(self, places: ArrayLike) -> None:
         """Place the characters elsewhere: (3,) or (characters, 3) x and z in metres, facing in degrees."""
-        wanted = self._numbers(self._each("places need x, z and facing"), places, 3)
-        wanted[:, 2] = wrapped(np.radians(wanted[:, 2]))
-        self._playback.root = wanted
-        self._playback.spring[:, 2] = wanted[:, 2]
-        told, facing = self._command, wanted[:, 2]
+        wanted = self._numbers("places need x, z and facing", places, 3)
+        told, facing = self._command, wrapped(np.radians(wanted[:, 2]))
+        self._playback.root = np.column_stack([wanted[:, :2], facing])
+        self._playback.spring[:, 2] = facing
         direction = np.where(told.speed > 0, told.direction, facing)  # standing ones move the way they face
         self._command = replace(told, direction=direction, facing=facing, faces_way=np.zeros_like(told.faces_way))
         self._target, _ = self.model.abilities.target(self._command)
@@ -286,12 +267,9 @@ class SteerSession:
     def _obey(self, order: Order) -> None:
         told = self._command
         facing, speed = np.where(told.faces_way, told.direction, told.facing), told.speed
-        aside = wrapped(np.where(told.faces_way, 0, told.direction - facing))
-        if order.way is not None:
-            aside = np.full(self.characters, np.radians(order.way))
+        aside = wrapped(told.direction - facing) if order.way is None else np.radians(order.way)
         if order.speed is None:
-            gait = told.gait if order.gait is None else self._gaits(order.gait)
-            speed = self.model.abilities.speeds[gait, 1]
+            speed = self.model.abilities.speeds[told.gait if order.gait is None else self._gaits(order.gait), 1]
         elif order.speed >= 0:
             speed = np.full(self.characters, order.speed)
         degrees = np.degrees(facing) + order.turn
