@@ -29,12 +29,23 @@ from motet.models.language import RULES, Vocabulary
 from motet.motion.motion import Motion
 from motet_train.data.store import FRAMES as FRAMES_FILE
 from motet_train.data.store import INDEX, Store
-from motet_train.evaluate.language.bleu import bleu
-from motet_train.evaluate.language.chain import answers, best_descriptions, bounds_chained, chained
-from motet_train.evaluate.language.floors import copied_bleu, nearest_said
+from motet_train.evaluate.language.bleu import bleu, copied_bleu, nearest_motions
+from motet_train.evaluate.language.describe import describe_report
+from motet_train.evaluate.language.generate import (
+    LANGUAGE_GOALS,
+    answers,
+    best_descriptions,
+    bounds_chained,
+    chained,
+    generate_report,
+    kinds,
+    measurable,
+    prompted,
+    recognised,
+    thresholds,
+    travel,
+)
 from motet_train.evaluate.language.motions import energy, feet_of, last_energy, measures, skate, speed
-from motet_train.evaluate.language.prompts import kinds, measurable, prompted, recognised, thresholds, travel
-from motet_train.evaluate.language.report import LANGUAGE_GOALS, describe_report, generate_report
 from motet_train.evaluate.language.split_store import SplitStore, split_as
 from motet_train.evaluate.tables import aligned, json_ready, reached, report_table
 from motet_train.runs import MODELS, Run
@@ -149,7 +160,8 @@ def test_the_report_of_a_perfect_describe_model(corpus: SplitStore) -> None:
     unseen, best = corpus.unseen(test), [corpus.sentences(record)[0] for record in test]
     assert report["unseen"]["bleu_1"] == pytest.approx(bleu(best, unseen, longest=1)) != 0
     assert report["unseen"]["bleu_4"] == report["bleu_unseen"]["1"]
-    assert report["unseen"]["nearest_2"] == pytest.approx(copied_bleu(nearest_said(corpus, test), unseen, 2)) != 0
+    nearest = corpus.references(nearest_motions(corpus, corpus.motions(test)))
+    assert report["unseen"]["nearest_2"] == pytest.approx(copied_bleu(nearest, unseen, 2)) != 0
     assert report["words"] == {"verbs": 1, "sides": 1, "turns": 1, "verbs_of": 5, "sides_of": 2, "turns_of": 4}
     assert report["gain"]["frequent"] == 1 - report["floor"]["frequent"]
     assert report["likelihood"] == {"test": -2.0}

@@ -9,9 +9,15 @@ from language_models import FRAMES, FakeDescribe, small_store, told
 from motet.models.describe import ConfidenceSettings, Description, Part
 from motet.motion.motion import Motion
 from motet_train.evaluate.language.attributes import action_right
-from motet_train.evaluate.language.confidence import ENOUGH, calibrated, confidence
+from motet_train.evaluate.language.confidence import (
+    ENOUGH,
+    calibrated,
+    confidence,
+    joined,
+    matched,
+    timeline_figures,
+)
 from motet_train.evaluate.language.split_store import SplitStore, split_as
-from motet_train.evaluate.language.timelines import joined, matched, timeline_figures
 
 STORE = small_store()
 

@@ -9,7 +9,7 @@ from language_models import CHANNELS, FPS, FRAMES, KINDS, UNITS, moving, small_s
 from motet.motion.kinematics import positions
 from motet.representation.root_block import from_root_block
 from motet_train.data.store import Store
-from motet_train.evaluate.language.looks import Looks
+from motet_train.evaluate.language.motions import Looks
 from motet_train.evaluate.language.split_store import SplitStore, split_as
 
 TURN = KINDS["walks and turns left"]
@@ -55,5 +55,5 @@ def test_without_a_root_block_channels_are_seen(store: Store) -> None:
     angles = replace(angles, representation="angles", records=entries)
     corpus: SplitStore = split_as(told(angles, "describe"), angles)
     (seen,) = Looks(corpus).seen(corpus.motion(3))
-    np.testing.assert_allclose(seen, corpus.z(corpus.motion(3)))
+    np.testing.assert_allclose(seen, corpus.contract.normalised(corpus.contract.frames(corpus.motion(3))))
     assert Looks(corpus).features(corpus.motions([3, 4])).shape == (2, 4)

@@ -24,8 +24,8 @@ from motet_train.data.errors import DataError
 from motet_train.data.store import Store
 from motet_train.evaluate.figures import Drawings, strips
 from motet_train.evaluate.fill.report import FILL_GOALS, fill_report
-from motet_train.evaluate.language.prompts import ASKED
-from motet_train.evaluate.language.report import LANGUAGE_GOALS, describe_report, generate_report
+from motet_train.evaluate.language.describe import describe_report
+from motet_train.evaluate.language.generate import ASKED, LANGUAGE_GOALS, generate_report
 from motet_train.evaluate.language.search import SEARCH_GOALS, search_report
 from motet_train.evaluate.language.split_store import SplitStore, split_as
 from motet_train.evaluate.predict import liveliness, mocap

@@ -2,12 +2,10 @@
 
 import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+
+import numpy as np
 
 from motet_train.evaluate.language.split_store import plain
-
-if TYPE_CHECKING:
-    from motet_train.evaluate.language.bleu import References  # whose package training does without
 
 Patterns = dict[str, str]
 """Name of an attribute -> regular expression of the words that say it."""
@@ -21,7 +19,7 @@ SIDES: Patterns = {
     "left": r"left(?:wards?|most|handed)?",
     "right": r"right(?:wards?|most|handed)?(?! (?:angles?|angled|away))",
 }
-TURN_WORDS: Patterns = {"turn": r"(?<!in )turn\w*|veer\w*|swerv\w*|curv\w*|corner|rotat\w*|spin\w*|dodg\w*|circle"}
+TURNS: Patterns = {"turn": r"(?<!in )turn\w*|veer\w*|swerv\w*|curv\w*|corner|rotat\w*|spin\w*|dodg\w*|circle"}
 DIRECTIONS: Patterns = SIDES | {"backward": r"backwards?"}
 ACTIONS: Patterns = VERBS | {
     "dance": r"danc\w*|ballet|arabesque|pirouette\w*",
@@ -33,16 +31,11 @@ ACTIONS: Patterns = VERBS | {
     "squat or kneel": r"squat\w*|kneel\w*|crouch\w*",
 }
 
-_DENIED = re.compile(r"(?:instead of|without) \w+")
 
-Score = tuple[int, int]
-"""How many are right, out of how many."""
-
-
-def said(table: Patterns, sentence: str) -> frozenset[str]:
-    """The attributes that a sentence names."""
-    text = _DENIED.sub("", plain(sentence))
-    return frozenset(name for name, pattern in table.items() if re.search(rf"\b(?:{pattern})\b", text))
+def said(table: Patterns, *sentences: str) -> frozenset[str]:
+    """The attributes that any of some sentences names, but for words after "instead of" and "without"."""
+    texts = [re.sub(r"(?:instead of|without) \w+", "", plain(sentence)) for sentence in sentences]
+    return frozenset(key for key, words in table.items() for text in texts if re.search(rf"\b(?:{words})\b", text))
 
 
 def side(sentence: str) -> frozenset[str]:
@@ -51,14 +44,14 @@ def side(sentence: str) -> frozenset[str]:
     return found if len(found) == 1 else frozenset()
 
 
+def turning(sentence: str) -> bool:
+    """Whether a sentence about walking or running says that the path is not straight."""
+    return bool(said(TURNS, sentence) or side(sentence))
+
+
 def common(found: Sequence[frozenset[str]]) -> frozenset[str]:
     """The attributes that at least half of a motion's sentences name."""
     return frozenset(name for name in frozenset().union(*found) if 2 * sum(name in one for one in found) >= len(found))
-
-
-def turning(sentence: str) -> bool:
-    """Whether a sentence about walking or running says that the path is not straight."""
-    return bool(said(TURN_WORDS, sentence) or side(sentence))
 
 
 def common_verbs(sentences: Sequence[str]) -> frozenset[str]:
@@ -72,7 +65,7 @@ def common_side(sentences: Sequence[str]) -> str | None:
     return next(iter(found)) if len(found) == 1 else None
 
 
-def turns(sentences: Sequence[str]) -> bool | None:
+def common_turning(sentences: Sequence[str]) -> bool | None:
     """Whether half of the sentences say that a walk or run turns; None for anything but walking and running."""
     verbs = common_verbs(sentences)
     if not verbs or verbs - {"walk", "run"}:
@@ -80,32 +73,26 @@ def turns(sentences: Sequence[str]) -> bool | None:
     return 2 * sum(map(turning, sentences)) >= len(sentences)
 
 
-def verbs_right(hypotheses: Sequence[str], references: "References") -> Score:
-    """A hypothesis is right if it names a verb people agree on, and none that nobody named."""
-    found = []
-    for text, sentences in zip(hypotheses, references, strict=True):
-        agreed, anyone = common_verbs(sentences), frozenset().union(*(said(VERBS, sentence) for sentence in sentences))
-        if agreed:
-            named = said(VERBS, text)
-            found.append(bool(named & agreed) and named <= anyone)
-    return sum(found), len(found)
-
-
-def sides_right(hypotheses: Sequence[str], references: "References") -> Score:
-    """A hypothesis is right if it names the one side people agree on, not if it names none or both."""
-    sides = [(side(text), common_side(sentences)) for text, sentences in zip(hypotheses, references, strict=True)]
-    found = [named == {agreed} for named, agreed in sides if agreed]
-    return sum(found), len(found)
-
-
 def action_right(text: str, sentences: Sequence[str]) -> bool:
     """Whether a sentence about a motion names an action, and none that nobody named."""
     named = said(ACTIONS, text)
-    return bool(named) and named <= frozenset().union(*(said(ACTIONS, sentence) for sentence in sentences))
+    return bool(named) and named <= said(ACTIONS, *sentences)
 
 
-def turns_right(hypotheses: Sequence[str], references: "References") -> Score:
-    """Of walking and running: a hypothesis is right if it says about turning what people agree on."""
-    pairs = [(turning(text), turns(sentences)) for text, sentences in zip(hypotheses, references, strict=True)]
-    found = [named == agreed for named, agreed in pairs if agreed is not None]
-    return sum(found), len(found)
+def words_right(hypotheses: Sequence[str], references: Sequence[Sequence[str]]) -> dict[str, float]:
+    """The shares of hypotheses that are right, NaN of none; and of how many, "_of".
+
+    "verbs": a verb is named that people agree on, and none that nobody named. "sides": the one side is named that
+    people agree on. "turns", of walking and running: what people agree on is said about turning.
+    """
+    found: dict[str, list[bool]] = {"verbs": [], "sides": [], "turns": []}
+    for text, sentences in zip(hypotheses, references, strict=True):
+        if verbs := common_verbs(sentences):
+            named = said(VERBS, text)
+            found["verbs"].append(bool(named & verbs) and named <= said(VERBS, *sentences))
+        if agreed := common_side(sentences):
+            found["sides"].append(side(text) == {agreed})
+        if (turns := common_turning(sentences)) is not None:
+            found["turns"].append(turning(text) == turns)
+    shares = {key: sum(right) / len(right) if right else np.nan for key, right in found.items()}
+    return shares | {f"{key}_of": float(len(right)) for key, right in found.items()}

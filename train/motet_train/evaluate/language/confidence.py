@@ -1,13 +1,15 @@
-"""Whether a describe model knows when it is right: best descriptions of validation motions, believed or not."""
+"""Whether a describe model knows when it is right, and when something else begins, on validation motions."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motet.models.describe import ConfidenceSettings, DescribeModel, Description
 from motet.models.language import RULES
-from motet_train.evaluate.language.attributes import action_right
+from motet.motion.motion import Motion
+from motet_train.evaluate.language.attributes import ACTIONS, action_right, common, said
 from motet_train.evaluate.language.split_store import SplitStore
 
 ENOUGH = 20
@@ -60,6 +62,90 @@ def calibrated(scores: NDArray[np.float64], right: Truths) -> ConfidenceSettings
     start = int(np.append(np.cumsum(believed[::-1])[::-1], 0).argmax())
     ends = [2 * scores[order[0]], *scores[order], 0.0]
     return ConfidenceSettings(max(-1000.0, float(ends[start] + ends[start + 1]) / 2))
+
+
+def timeline_figures(
+    model: DescribeModel, corpus: SplitStore, records: Sequence[int], seed: int = 0, count: int = 60
+) -> dict[str, float]:
+    """Of ``count`` timelines, three motions of 2 to 12 s, joined at random, neighbours of different actions: which
+    joins are found, and what is said rightly.
+
+    "joins_found", "cuts_right": the shares of joins that have a cut within a second, and of cuts that have a join.
+    "parts": how many a timeline has. "time_right": the share of time at which an action is named that people named of
+    what goes on, and no other; "time_confident", "time_right_if_confident": of parts that are confident.
+    "alone_right": of the same motions, each described alone. Nothing where no motions differ.
+    """
+    others, random = _others(corpus, records), np.random.default_rng(seed)
+    found, cuts, right, sure, alone = 0, 0, list[bool](), list[bool](), list[bool]()
+    for _ in range(count if others else 0):
+        chain = _chain(others, random)
+        motions, references = corpus.motions(chain), corpus.references(chain)
+        parts = model.timeline(joined(motions))
+        ends = np.cumsum([motion.duration for motion in motions])
+        found += matched(ends[:-1].tolist(), [part.start for part in parts[1:]])
+        cuts += len(parts) - 1
+        for moment in np.arange(0.05, ends[-1], 0.1):
+            part = next((part for part in parts if moment < part.stop), parts[-1])
+            place = min(int(np.searchsorted(ends, moment)), len(chain) - 1)
+            right.append(action_right(part.text, references[place]))
+            sure.append(part.confident)
+        alone += judged(model, corpus, chain)[1].tolist()
+    if not others:
+        return {}
+    return {
+        "joins_found": found / (count * 2),
+        "cuts_right": found / cuts if cuts else np.nan,
+        "parts": cuts / count + 1,
+        "time_right": _share(np.array(right)),
+        "time_confident": _share(np.array(sure)),
+        "time_right_if_confident": _share(np.array(right)[sure]),
+        "alone_right": _share(np.array(alone)),
+    }
+
+
+def _others(corpus: SplitStore, records: Sequence[int]) -> Mapping[int, Sequence[tuple[str, int]]]:
+    """For each record the records of other actions, each as often as it has actions, with the action."""
+    named = {record: [said(ACTIONS, sentence) for sentence in corpus.sentences(record)] for record in records}
+    agreed = {record: common(found) for record, found in named.items() if 2.0 <= corpus.motion(record).duration <= 12.0}
+    anyone = {record: frozenset().union(*found) for record, found in named.items()}
+    found = {
+        one: [
+            (action, two)
+            for two in agreed
+            if agreed[one].isdisjoint(anyone[two]) and agreed[two].isdisjoint(anyone[one])
+            for action in sorted(agreed[two])
+        ]
+        for one in agreed
+        if agreed[one]
+    }
+    return {record: rest for record, rest in found.items() if rest}
+
+
+def _chain(others: Mapping[int, Sequence[tuple[str, int]]], random: np.random.Generator) -> list[int]:
+    """Three records one after the other: first the action is drawn, so that rare ones come as often, then the
+    motion."""
+    chain = [int(random.choice(list(others)))]
+    while len(chain) < 3:
+        actions = sorted({action for action, _ in others[chain[-1]]})
+        chosen = actions[random.integers(len(actions))]
+        chain.append(int(random.choice([record for action, record in others[chain[-1]] if action == chosen])))
+    return chain
+
+
+def joined(motions: Sequence[Motion]) -> Motion:
+    """Features one after the other, with a leap from each pose to the next: where the figure goes is in rates."""
+    return replace(motions[0], values=np.concatenate([motion.values for motion in motions]))
+
+
+def matched(joins: Sequence[float], cuts: Sequence[float]) -> int:
+    """How many joins have a cut of their own within a second, the nearest first."""
+    pairs = sorted((abs(join - cut), join, cut) for join in joins for cut in cuts)
+    free_joins, free_cuts = set(joins), set(cuts)
+    for distance, join, cut in pairs:
+        if distance <= 1.0 + 1e-9 and join in free_joins and cut in free_cuts:
+            free_joins.remove(join)
+            free_cuts.remove(cut)
+    return len(joins) - len(free_joins)
 
 
 def _share(truths: Truths) -> float:

@@ -1,18 +1,20 @@
-"""Measures of motions, generated or recorded alike: speed, motion energy, foot skate, stillness at the end."""
+"""Motions in numbers, generated or recorded alike: speed, energy, foot skate, stillness at the end; and how alike two
+motions look without any model, for the floors."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from motet.motion.feet.contacts import ContactSettings, feet_of, ground_of, ground_speeds, standing
+from motet.motion.feet.contacts import feet_of, ground_of
 from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
-from motet.representation.root_block import ROOT_BLOCK, from_root_block
-
-LOW_FEET_STAND = ContactSettings(heights=(0.05, 0.05))
-"""Joints of feet, by their heights alone."""
+from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS, from_root_block
+from motet_train.evaluate import positions as places
+from motet_train.evaluate.language.split_store import SplitStore
 
 
 def measures(motions: Sequence[Motion], contract: MotionContract, quiet: float) -> dict[str, float]:
@@ -65,16 +67,51 @@ def speed(motion: Motion) -> float:
 
 
 def skate(motion: Motion) -> float:
-    """How fast feet on the ground slide, m/s: the mean over all steps from one frame to the next.
-
-    A joint of a foot counts that stands before and after the step; of several the slowest does,
-    since the others roll. NaN where none ever is.
-    """
+    """How fast the joints of feet slide, m/s, while they are no higher than 5 cm above the ground: of several the
+    slowest. NaN where none ever is."""
     skeleton = skeleton_of(motion)
     feet = positions(from_root_block(motion))[:, feet_of(skeleton)] * skeleton.unit_factor(1.0)
-    low = standing(feet[..., 1] - ground_of(feet[..., 1]), None, LOW_FEET_STAND)
-    slides = ground_speeds(feet, motion.fps)
-    slides[~(low[1:] & low[:-1])] = np.inf
-    slowest = slides.min(axis=1)
-    stands = np.isfinite(slowest)
-    return float(slowest[stands].mean()) if stands.any() else np.nan
+    return places.skate(feet, feet[..., 1] - ground_of(feet[..., 1]), 0.05, motion.fps, slowest=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Looks:
+    """The features of motions, seen from the training motions of a corpus."""
+
+    corpus: SplitStore
+
+    def features(self, motions: Sequence[Motion]) -> Array:
+        """(N, F): mean and standard deviation over time of what is :meth:`seen` of motions, in standard deviations from
+        the mean of the training motions; each array of it weighs the same in distances, however many features it has.
+        """
+        mean, scale = self._training
+        return (self._statistics(motions) - mean) / scale
+
+    def seen(self, motion: Motion) -> tuple[Array, ...]:
+        """The joints' places seen from where the root is and faces (T, 3 J) in metres; their speeds, as seen from there
+        (T, J), m/s; and how the root goes forward and left and turns (T, 3). Of a motion that does not tell this, its
+        channels (T, D) in standard deviations from the mean of the training motions."""
+        if not moves(motion):
+            contract = self.corpus.contract
+            return (contract.normalised(contract.frames(motion)),)
+        path = motion.select(ROOT_BLOCK[:3], ROOT_BLOCK_UNITS[:3]).values
+        on_the_spot = motion.values.copy()
+        on_the_spot[:, [motion.channels.index(name) for name in ROOT_BLOCK[:3]]] = 0
+        placed = positions(from_root_block(replace(motion, values=on_the_spot)))
+        joints = placed * skeleton_of(motion).unit_factor(1.0)
+        speeds = places.length(np.diff(joints, axis=0, prepend=joints[:1])) * motion.fps
+        return joints.reshape(len(joints), -1), speeds, path
+
+    @cached_property
+    def _training(self) -> tuple[Array, Array]:
+        """Mean (F,), and by what features are divided (F,): at least by .001, what differs by less is the same."""
+        motions = self.corpus.motions(self.corpus.parts.train)
+        found = self._statistics(motions)
+        sizes = [frames.shape[1] for frames in self.seen(motions[0])]
+        weights = np.repeat(1 / np.sqrt(sizes), [2 * size for size in sizes])
+        return found.mean(axis=0), np.maximum(found.std(axis=0), 1e-3) / weights
+
+    def _statistics(self, motions: Sequence[Motion]) -> Array:
+        """(N, F): for each array its means, then its standard deviations."""
+        rows = [[np.r_[frames.mean(axis=0), frames.std(axis=0)] for frames in self.seen(motion)] for motion in motions]
+        return np.array([np.concatenate(row) for row in rows])

@@ -12,11 +12,11 @@ from motet.bundle.manifest import Manifest
 from motet.errors import TextWarning
 from motet.models.language import RULES
 from motet.motion.motion import Motion
-from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
 from motet_train.data.errors import DataError
 from motet_train.data.sentences import usable
 from motet_train.data.store import Split, Store
+from motet_train.evaluate.tables import Report
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,11 @@ class SplitStore:
 
     def sentences(self, record: int) -> tuple[str, ...]:
         """What was said about a record, normalised: words with one space between them; nothing that has no words."""
-        return tuple(plain(sentence) for sentence in self.store.records[record].sentences if usable(sentence))
+        return _plain(self.store.records[record].sentences)
+
+    def kept(self, record: int) -> tuple[str, ...]:
+        """The sentences about a record that are kept for measuring, normalised."""
+        return _plain(self.store.records[record].unseen)
 
     def references(self, records: Iterable[int]) -> list[tuple[str, ...]]:
         """The sentences of several records."""
@@ -62,18 +66,27 @@ class SplitStore:
         said = ((*self.kept(record), *self.sentences(record)) for record in records)
         return [tuple(sentence for sentence in found if sentence not in known) for found in said]
 
-    def kept(self, record: int) -> tuple[str, ...]:
-        """The sentences about a record that are kept for measuring, normalised."""
-        return tuple(plain(sentence) for sentence in self.store.records[record].unseen if usable(sentence))
+    def words(self, records: Iterable[int]) -> set[str]:
+        """The words said about some records."""
+        return {word for said in self.references(records) for sentence in said for word in sentence.split()}
 
-    def unknown_words(self, records: Iterable[int]) -> set[str]:
-        """The words said about some records that were not said about training motions: models read UNK."""
-        train, asked = (_vocabulary(self.references(part)) for part in (self.parts.train, records))
-        return asked - train
-
-    def z(self, motion: Motion) -> Array:
-        """The frames (T, D) of a motion in standard deviations from the mean of the training motions."""
-        return self.contract.normalised(self.contract.frames(motion))
+    def origin(self, manifest: Manifest) -> Report:
+        """How a model was trained, and how many motions and people are in each part of the data."""
+        training, parts = manifest.training, self.parts
+        told = ("seconds", "epochs", "kept_epoch", "loss", "validation", "steps_per_second")
+        people = [{self.store.records[i].subject for i in part} for part in (parts.train, parts.test)]
+        counts = {
+            "train": len(parts.train),
+            "validation": len(parts.validation),
+            "test": len(parts.test),
+            "test_unknown_words": len(self.words(parts.test) - self.words(parts.train)),
+            "test_people": len(people[1]),
+            "test_people_unseen": len(people[1] - people[0]),
+        }
+        return {
+            "train": {key: float(training[key]) for key in told if key in training},
+            "data": {key: float(count) for key, count in counts.items()},
+        }
 
 
 def split_as(manifest: Manifest, store: Store) -> SplitStore:
@@ -90,17 +103,17 @@ def split_as(manifest: Manifest, store: Store) -> SplitStore:
             f"{manifest.name} was not trained on this data: its {count} training, {len(validation)} validation "
             f"and {len(test)} test motions are not the {len(names)} that are here"
         )
-    parts = ([i for i, name in enumerate(names) if name in part] for part in (validation, test))
-    return SplitStore(store, Split(train, *(tuple(part) for part in parts)))
-
-
-def _vocabulary(rows: Iterable[Iterable[str]]) -> set[str]:
-    return {word for row in rows for sentence in row for word in sentence.split()}
+    parts = (tuple(i for i, name in enumerate(names) if name in part) for part in (validation, test))
+    return SplitStore(store, Split(train, *parts))
 
 
 def plain(sentence: str) -> str:
     """A sentence as BLEU sees it: normalised, every digit a word."""
     return " ".join(RULES.words(sentence))
+
+
+def _plain(sentences: Iterable[str]) -> tuple[str, ...]:
+    return tuple(plain(sentence) for sentence in sentences if usable(sentence))
 
 
 @contextmanager

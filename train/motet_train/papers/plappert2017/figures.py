@@ -15,9 +15,8 @@ from motet.representation.root_block import from_root_block
 from motet_train.data.errors import DataError
 from motet_train.evaluate.figures import Drawings, panels, strips
 from motet_train.evaluate.language.attributes import ACTIONS, DIRECTIONS, Patterns, common, said
-from motet_train.evaluate.language.chain import known_sentences, knows
+from motet_train.evaluate.language.generate import ASKED, known_sentences, knows
 from motet_train.evaluate.language.motions import moves
-from motet_train.evaluate.language.prompts import ASKED
 from motet_train.evaluate.language.split_store import SplitStore, unknown_words_allowed
 from motet_train.trainer import LOG
 
