@@ -123,7 +123,7 @@ def test_a_misspelt_command_is_told_its_name_and_an_interrupted_one_ends_with_13
     def interrupted() -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("motet.cli.bundle.list_bundles", interrupted)
+    monkeypatch.setattr("motet.cli.bundles.list_bundles", interrupted)
     result = run("bundle", "list")
     assert (result.exit_code, result.stderr) == (130, "")
 
@@ -163,7 +163,7 @@ def test_a_fault_of_a_file_is_not_said_of_the_output(monkeypatch: pytest.MonkeyP
     def fail() -> dict[str, Path]:
         raise FileNotFoundError(2, "No such file or directory", "lost.zip")
 
-    monkeypatch.setattr("motet.cli.bundle.list_bundles", fail)
+    monkeypatch.setattr("motet.cli.bundles.list_bundles", fail)
     with pytest.raises(FileNotFoundError, match=r"lost\.zip"):
         main.main(["bundle", "list"])
 

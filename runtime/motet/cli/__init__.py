@@ -10,24 +10,24 @@ from typing import Any
 
 import click
 
-from motet.cli.notes import show_log
+from motet.cli.options import StderrHandler, log
 from motet.errors import MotetError
 
 COMMANDS = {
-    "describe": ("motet.cli.describe:describe", "", "Describe motions in ranked sentences."),
-    "generate": ("motet.cli.generate:generate", "", "Generate motions from sentences."),
-    "predict": ("motet.cli.predict:predict", "", "Predict how motions continue."),
-    "fill": ("motet.cli.fill:fill", "", "Fill gaps of motions, and close loops."),
-    "join": ("motet.cli.fill:join", "", "Join two motions by a transition."),
-    "control": ("motet.cli.control:control", "", "Run a script such as 'walk 3s, run 3s'."),
+    "describe": ("motet.cli.language:describe", "", "Describe motions in ranked sentences."),
+    "generate": ("motet.cli.language:generate", "", "Generate motions from sentences."),
+    "predict": ("motet.cli.motions:predict", "", "Predict how motions continue."),
+    "fill": ("motet.cli.motions:fill", "", "Fill gaps of motions, and close loops."),
+    "join": ("motet.cli.motions:join", "", "Join two motions by a transition."),
+    "control": ("motet.cli.motions:control", "", "Run a script such as 'walk 3s, run 3s'."),
     "live": ("motet.cli.live:live", "", "Steer figures live: in a page, by a server, onto an avatar."),
-    "search": ("motet.cli.search:search", "", "Find motions in a folder by a sentence or a motion."),
-    "embed": ("motet.cli.embed:embed", "", "Write context vectors of motions or sentences."),
-    "check": ("motet.cli.check:check", "", "Say what motion files hold and how they are understood."),
-    "convert": ("motet.cli.convert:convert", "", "Convert motion files to other formats, rates, units."),
-    "view": ("motet.cli.convert:view", "", "Write a web page that plays a motion."),
-    "bundle": ("motet.cli.bundle:bundle", "", "List, inspect, verify and pack models (bundles)."),
-    "bench": ("motet.cli.bench:bench", "", "Measure how fast a model runs here."),
+    "search": ("motet.cli.vectors:search", "", "Find motions in a folder by a sentence or a motion."),
+    "embed": ("motet.cli.vectors:embed", "", "Write context vectors of motions or sentences."),
+    "check": ("motet.cli.files:check", "", "Say what motion files hold and how they are understood."),
+    "convert": ("motet.cli.files:convert", "", "Convert motion files to other formats, rates, units."),
+    "view": ("motet.cli.files:view", "", "Write a web page that plays a motion."),
+    "bundle": ("motet.cli.bundles:bundle", "", "List, inspect, verify and pack models (bundles)."),
+    "bench": ("motet.cli.bundles:bench", "", "Measure how fast a model runs here."),
     "prepare": ("motet_train.cli.prepare:prepare", "train", "Turn motions and sentences into a store to train on."),
     "train": ("motet_train.cli.train:train", "train", "Train a model."),
     "evaluate": ("motet_train.cli.evaluate:evaluate", "evaluate", "Measure a trained run or a bundle."),
@@ -117,4 +117,5 @@ def missing(extra: str) -> list[str]:
 @click.version_option(package_name="motet")
 def main(quiet: bool, verbose: bool) -> None:
     """Models of human motion that describe, generate, predict and control."""
-    show_log(logging.ERROR if quiet else logging.INFO if verbose else logging.WARNING)
+    log.handlers = [StderrHandler()]
+    log.setLevel(logging.ERROR if quiet else logging.INFO if verbose else logging.WARNING)

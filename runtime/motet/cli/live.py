@@ -6,7 +6,7 @@ import click
 
 from motet.bundle.graph import SessionOptions
 from motet.cli import missing
-from motet.cli.options import session_options
+from motet.cli.options import bundle_option, session_options
 from motet.files import check_place
 from motet.live.page import write_live_page
 from motet.models.load import load_as
@@ -25,7 +25,7 @@ from motet.models.steer import SteerModel
     "--origin", "origins", multiple=True, help="Origin of a web page that may connect; may be given several times."
 )
 @click.option("--characters", type=click.IntRange(1), default=1, show_default=True, help="Initial number of figures.")
-@click.option("--bundle", default="control", show_default=True, help="Name or path of a bundle.")
+@bundle_option("control")
 @session_options
 def live(
     out: Path | None,
@@ -52,15 +52,14 @@ def live(
         write_live_page(out, load_as(SteerModel, bundle, session), characters)
         click.echo(f"{out}: {out.stat().st_size / 1e6:.1f} MB")
         return
-    _need_extra()
+    if lacking := missing("live"):
+        raise click.UsageError(f"this needs {', '.join(lacking)}: install the extra with  pip install 'motet[live]'")
     target = None if osc is None else _address(osc)
     model = load_as(SteerModel, bundle, session)
-    if port is None:
-        assert target is not None
-        assert script is not None
-        _follow(model, target, script)
-    else:
+    if port is not None:
         _serve(model, target, host, port, characters, origins)
+    elif target is not None and script is not None:
+        _follow(model, target, script)
 
 
 def _check(out: Path | None, port: int | None, osc: str | None, script: str | None) -> None:
@@ -72,11 +71,6 @@ def _check(out: Path | None, port: int | None, osc: str | None, script: str | No
         raise click.UsageError("--script is for --osc without --port")
     if osc is not None and port is None and script is None:
         raise click.UsageError("--osc needs --script, or --port for clients that steer")
-
-
-def _need_extra() -> None:
-    if lacking := missing("live"):
-        raise click.UsageError(f"this needs {', '.join(lacking)}: install the extra with  pip install 'motet[live]'")
 
 
 def _address(place: str) -> tuple[str, int]:

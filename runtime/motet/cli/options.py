@@ -1,15 +1,27 @@
-"""Options that several commands share."""
+"""What all commands share: the options of running a model, what is said on stderr, and inputs that are tried."""
 
 import functools
-from collections.abc import Callable
+import logging
+import sys
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import click
 import onnxruntime
 
 from motet.bundle.graph import MAX_THREADS, SessionOptions
+from motet.errors import ControlWarning, MotetError, MotionError, TextWarning, UnitError, quoted
+from motet.settings import Progress, silent
 
-_SUFFIX = "ExecutionProvider"
+log = logging.getLogger("motet")
+
+
+def bundle_option(default: str) -> Callable[..., Any]:
+    """The option ``--bundle`` of a command that has a model by default."""
+    return click.option("--bundle", default=default, show_default=True, help="Name or path of a bundle.")
 
 
 def session_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -31,14 +43,89 @@ def session_options(command: Callable[..., Any]) -> Callable[..., Any]:
     )
     @functools.wraps(command)
     def with_session(*args: Any, threads: int, providers: tuple[str, ...], **kwargs: Any) -> Any:
-        session = SessionOptions(threads, tuple(map(_provider, providers or ("CPU",))))
-        return command(*args, session=session, **kwargs)
+        # ONNX Runtime's names, in letters of any case and without their ending
+        available: list[str] = onnxruntime.get_available_providers()
+        known = {name.removesuffix("ExecutionProvider").lower(): name for name in available}
+        asked = [known.get(name.removesuffix("ExecutionProvider").lower(), name) for name in providers or ("CPU",)]
+        return command(*args, session=SessionOptions(threads, tuple(asked)), **kwargs)
 
     return with_session
 
 
-def _provider(name: str) -> str:
-    """ONNX Runtime's name of a provider: its letters may be of any case, and its ending left out."""
-    available: list[str] = onnxruntime.get_available_providers()
-    known = {provider.removesuffix(_SUFFIX).lower(): provider for provider in available}
-    return known.get(name.removesuffix(_SUFFIX).lower(), name)
+class StderrHandler(logging.Handler):
+    """One line on stderr for each record."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print it."""
+        click.echo(f"motet: {self.format(record)}", err=True)
+
+
+@contextmanager
+def noted() -> Iterator[None]:
+    """Log what motet warns of, words that are not known and speeds that a gait does not have, each once."""
+    with warnings.catch_warnings(record=True) as caught:
+        for category in (TextWarning, ControlWarning):
+            warnings.simplefilter("always", category)
+        yield
+    for text in dict.fromkeys(str(warning.message) for warning in caught):
+        log.warning(text)
+
+
+@contextmanager
+def bar(label: str) -> Iterator[Progress]:
+    """A progress bar on stderr, if that is a terminal, as the callback of long work."""
+    if not (sys.stderr.isatty() and log.isEnabledFor(logging.WARNING)):
+        yield silent
+        return
+    with click.progressbar(length=1, label=label, file=sys.stderr) as shown:
+
+        def progress(done: int, total: int) -> None:
+            shown.length = total
+            shown.update(done - shown.pos)
+
+        yield progress
+
+
+class Tries:
+    """Tries one input after the other: failures are named on stderr, and in the end make exit code 1."""
+
+    def __init__(self) -> None:
+        self.failed = 0
+
+    @contextmanager
+    def of(self, given: object) -> Iterator[None]:
+        """What is done for one file or text; motet's own errors end only this."""
+        try:
+            yield
+        except MotetError as error:
+            self.failed += 1
+            click.echo(f"motet: {_named(given, error)}", err=True)
+
+    def usable(self, texts: Mapping[int, str], check: Callable[[str], object]) -> dict[int, str]:
+        """The texts that pass a check."""
+        found = {}
+        for index, text in texts.items():
+            with self.of(quoted(text)):
+                check(text)
+                found[index] = text
+        return found
+
+    def finish(self) -> None:
+        """Exit code 1 if anything failed."""
+        if self.failed:
+            sys.exit(1)
+
+
+@contextmanager
+def naming(path: Path | str | None) -> Iterator[None]:
+    """Errors about a motion name the file that it came from, if there is one."""
+    try:
+        yield
+    except MotionError as error:
+        raise error if path is None else MotionError(_named(path, error)) from error
+
+
+def _named(given: object, error: MotetError) -> str:
+    hint = " (--unit-in)" if isinstance(error, UnitError) else ""
+    text = str(error).removeprefix(f"{getattr(given, 'path', None)}: ")
+    return f"{text}{hint}" if str(given) in text else f"{given}: {text}{hint}"

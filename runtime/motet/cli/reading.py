@@ -1,37 +1,25 @@
-"""How commands take motion files: the options of reading, many files of which each is tried, and where results go."""
+"""How commands take motion files: the options of reading, and which clips of a file are meant."""
 
 import functools
 import logging
-import re
-import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import click
 
-from motet.cli.writing import FPS, Output, spare
-from motet.errors import MotetError, MotionError, UnitError, quoted
+from motet.errors import MotetError
 from motet.files import place_of
-from motet.formats import FORMATS, READABLE, WRITABLE, check_writable, clips, read_motion
+from motet.formats import FORMATS, READABLE, clips, read_motion
 from motet.formats.lines import MARK, chosen, plain_names, split_clip
-from motet.models.language import LanguageModel
 from motet.motion.motion import Motion
 from motet.motion.skeleton import METRES
-from motet.settings import Progress, silent
 
 log = logging.getLogger(__name__)
 
-ALL = "all"
-"""What ``--clip`` says for every clip of a file."""
-
-UNFIT = r'[<>:"/\\|?*#\x00-\x1f]|^[. ]|[. ]$'
-"""What the name of a file cannot have, on one system or another."""
-
-FIELDS = r"\{(name|clip)\}"
-"""What stands in OUT for what a result is of."""
+FPS = click.FloatRange(0, 10_000, min_open=True)
+"""Frame rates that a motion is read with or resampled to."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +41,8 @@ class Source:
     def label(self) -> str:
         """What stands for ``{clip}``: the clip's name, as a file name can have it, or the file's where it has none."""
         names, index = self._clips()
-        return plain_names(names, UNFIT)[index]
+        # what the name of a file cannot have, on one system or another
+        return plain_names(names, r'[<>:"/\\|?*#\x00-\x1f]|^[. ]|[. ]$')[index]
 
     @property
     def title(self) -> str:
@@ -72,15 +61,23 @@ class Source:
 
 @dataclass(frozen=True)
 class Read:
-    """Reads motion files as the options of a command say. clip: a name, a number or "all", where none is in a path."""
+    """Reads motion files as the options of a command say. clip: a name, a number or "all", where none is in a path.
+
+    rates: the frame rates of the motions that were read.
+    """
 
     options: Mapping[str, Any]
     clip: str | None
+    rates: list[float] = field(default_factory=list)
 
     def __call__(self, given: Path | Source) -> Motion:
         """The motion of a file, of one clip of it; FormatError as :func:`motet.read`."""
-        source = given if isinstance(given, Source) else self._only(given)
-        return read_motion(source.path, clip=source.clip, **self.options)
+        source, *others = [given] if isinstance(given, Source) else self.sources([given])
+        if others:
+            raise click.UsageError(f"expected one motion, but {given} holds {len(others) + 1} clips: name one")
+        motion = read_motion(source.path, clip=source.clip, **self.options)
+        self.rates.append(motion.fps)
+        return motion
 
     def sources(self, given: Sequence[Path], every: bool = False) -> list[Source]:
         """What files hold, as ``--clip`` says or their own names (a.glb#Walk). every: all clips where nothing does."""
@@ -88,8 +85,8 @@ class Read:
 
     def _of(self, given: Path, every: bool) -> list[Source]:
         file, named = split_clip(given, READABLE)
-        path, asked = place_of(file), ALL if every and self.clip is None else self.clip
-        if named is not None or asked != ALL:
+        path, asked = place_of(file), "all" if every and self.clip is None else self.clip
+        if named is not None or asked != "all":
             return [Source(path, asked if named is None else named)]
         try:
             names = clips(path)
@@ -97,37 +94,30 @@ class Read:
             names = ()
         return [Source(path, name) for name in names] if len(names) > 1 else [Source(path)]
 
-    def _only(self, given: Path) -> Source:
-        first, *others = self._of(given, every=False)
-        if others:
-            raise click.UsageError(f"expected one motion, but {given} holds {len(others) + 1} clips: name one")
-        return first
+    def say_resampled(self, fps: float) -> None:
+        """Log in one line how many of the motions that were read have another frame rate than a model's."""
+        if count := sum(abs(rate - fps) > 1e-6 for rate in self.rates):
+            log.info("resampled %d of %d motions to %g fps", count, len(self.rates), fps)
 
 
 unit_option = click.option(
     "--unit-in", type=click.Choice(list(METRES)), help="Length unit of files that do not state theirs."
 )
 
-out_option = click.option(
-    "-o", "--out", required=True, type=Path, help=f"File to write; its extension is the format: {' '.join(WRITABLE)}."
-)
-
 
 def read_options(command: Callable[..., None]) -> Callable[..., None]:
     """Gives a command ``read``, which reads a motion file as the options of :func:`motet.read` say."""
 
+    def takers(option: str) -> str:
+        return " ".join(kind.extension for kind in FORMATS if option in kind.options)
+
     @unit_option
-    @click.option("--fps-in", type=FPS, help=f"Frame rate of files that have none ({_takers('fps')}).")
-    @click.option("--asf", type=Path, help=f"Skeleton of the files ({_takers('asf')}). [default: found beside them]")
-    @click.option("--clip", metavar="NAME|N|all", help=f"Clip of files with several ({_takers('clip')}).")
+    @click.option("--fps-in", type=FPS, help=f"Frame rate of files that have none ({takers('fps')}).")
+    @click.option("--asf", type=Path, help=f"Skeleton of the files ({takers('asf')}). [default: found beside them]")
+    @click.option("--clip", metavar="NAME|N|all", help=f"Clip of files with several ({takers('clip')}).")
+    @click.option("--partial", is_flag=True, help=f"Take the complete frames of truncated files ({takers('partial')}).")
     @click.option(
-        "--partial", is_flag=True, help=f"Take the complete frames of truncated files ({_takers('partial')})."
-    )
-    @click.option(
-        "--rest",
-        type=Path,
-        metavar="FILE",
-        help=f"File with the same joints in a T-pose ({_takers('rest')}).",
+        "--rest", type=Path, metavar="FILE", help=f"File with the same joints in a T-pose ({takers('rest')})."
     )
     @functools.wraps(command)
     def with_read(
@@ -143,117 +133,3 @@ def read_options(command: Callable[..., None]) -> Callable[..., None]:
         command(read=Read(given, clip), **options)
 
     return with_read
-
-
-def _takers(option: str) -> str:
-    return " ".join(kind.extension for kind in FORMATS if option in kind.options)
-
-
-class Tries:
-    """Tries one input after the other: failures are named on stderr, and in the end make exit code 1."""
-
-    def __init__(self) -> None:
-        self.failed = 0
-
-    @contextmanager
-    def of(self, given: Source | Path | str) -> Iterator[None]:
-        """What is done for one file or text; motet's own errors end only this."""
-        try:
-            yield
-        except MotetError as error:
-            self.failed += 1
-            click.echo(f"motet: {_named(given, error)}", err=True)
-
-    def done(self, given: Source | Path | str, work: Callable[[], object]) -> bool:
-        """Whether work for one file or text ended without an error of motet's own."""
-        before = self.failed
-        with self.of(given):
-            work()
-        return self.failed == before
-
-    def usable(self, model: LanguageModel, texts: Sequence[str]) -> list[int]:
-        """The indices of the texts that the model takes."""
-        found = []
-        for index, text in enumerate(texts):
-            with self.of(quoted(text)):
-                model.unknown(text)
-                found.append(index)
-        return found
-
-    def finish(self) -> None:
-        """Exit code 1 if anything failed."""
-        if self.failed:
-            sys.exit(1)
-
-
-@contextmanager
-def naming(path: Path | str | None) -> Iterator[None]:
-    """Errors about a motion name the file that it came from, if there is one."""
-    try:
-        yield
-    except MotionError as error:
-        raise error if path is None else MotionError(_named(path, error)) from error
-
-
-def _named(given: Source | Path | str, error: MotetError) -> str:
-    hint = " (--unit-in)" if isinstance(error, UnitError) else ""
-    text = str(error).removeprefix(f"{given.path}: ") if isinstance(given, Source) else str(error)
-    return f"{text}{hint}" if str(given) in text else f"{given}: {text}{hint}"
-
-
-@contextmanager
-def bar(label: str) -> Iterator[Progress]:
-    """A progress bar on stderr, if that is a terminal, as the callback of long work."""
-    if not (sys.stderr.isatty() and log.isEnabledFor(logging.WARNING)):
-        yield silent
-        return
-    with click.progressbar(length=1, label=label, file=sys.stderr) as shown:
-
-        def progress(done: int, total: int) -> None:
-            shown.length = total
-            shown.update(done - shown.pos)
-
-        yield progress
-
-
-def places(out: Path, sources: Sequence[Source | str], samples: int = 1, output: Output | None = None) -> list[Path]:
-    """Where results go: by ``{name}`` and ``{clip}`` in OUT, or several numbered: out-1.bvh, out-2.bvh, ...
-
-    samples: how many results each source has, one after the other, which are numbered in any case.
-    output: how they are written; a character takes all that go to one place.
-    """
-    if output and output.onto:
-        found = [_place(out, source) for source in sources for _ in range(samples)]
-    elif re.search(FIELDS, str(out)):
-        found = [place for source in sources for place in _numbered(_place(out, source), samples)]
-    else:
-        found = _numbered(out, len(sources) * samples)
-    if len(set(found)) < len(found) and not (output and output.onto):
-        raise click.UsageError(
-            "several results have the same name: give an OUT with {name} and, for clips, {clip}, or without both"
-        )
-    for place in found:
-        output.check(place) if output else check_writable(place)
-        spare(place, *(source.path for source in sources if isinstance(source, Source)))
-    return found
-
-
-def _numbered(place: Path, count: int) -> list[Path]:
-    if count == 1:
-        return [place]
-    return [place.with_name(f"{place.stem}-{i}{place.suffix}") for i in range(1, count + 1)]
-
-
-def _place(out: Path, source: Source | str) -> Path:
-    def named(found: re.Match[str]) -> str:
-        if isinstance(source, str):
-            return source
-        return source.name if found[1] == "name" else source.label
-
-    return Path(re.sub(FIELDS, named, str(out)))
-
-
-def say_resampled(rates: Sequence[float], fps: float) -> None:
-    """Log in one line how many motions come at another frame rate than a model's."""
-    if count := sum(abs(rate - fps) > 1e-6 for rate in rates):
-        log.info("resampled %d of %d motions to %g fps", count, len(rates), fps)

@@ -1,22 +1,21 @@
-"""How commands write motions: the options that all of them share, and what they say of what was written."""
+"""How commands write motions: the options that all of them share, where results go, and what is said of them."""
 
 import functools
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import click
 
+from motet.cli.reading import FPS, Source
 from motet.formats import ONTO, WRITABLE, check_writable, read_character, write_all_on, write_on
 from motet.formats.character import Character, put_onto
 from motet.formats.lines import Names
 from motet.motion.humanoid import RIGS
 from motet.motion.motion import Motion
 from motet.motion.root_motion import in_place
-
-FPS = click.FloatRange(0, 10_000, min_open=True)
-"""Frame rates that a motion is resampled to."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +34,8 @@ class Output:
     def check(self, place: Path) -> None:
         """Refuse a place that cannot be written to, or an extension that does not fit, before long work starts."""
         check_writable(place, allowed=ONTO if self.onto else WRITABLE)
-        spare(place, *([self.onto] if self.onto else []))
+        if self.onto:
+            spare(place, self.onto)
 
     def shaped(self, motion: Motion) -> Motion:
         """The motion as it is to be written."""
@@ -62,6 +62,11 @@ class Output:
         for place, clips in self._clips.items():
             if self.character:
                 write_all_on(place, clips, self.character)
+
+
+out_option = click.option(
+    "-o", "--out", required=True, type=Path, help=f"File to write; its extension is the format: {' '.join(WRITABLE)}."
+)
 
 
 def write_options(command: Callable[..., None]) -> Callable[..., None]:
@@ -104,3 +109,39 @@ def spare(place: Path, *sources: Path) -> None:
 def size(frames: int, fps: float) -> str:
     """How long a motion is, in words."""
     return f"{frames} frames at {fps:g} fps, {round(frames / fps, 2):g} s"
+
+
+def places(out: Path, sources: Sequence[Source | str], samples: int = 1, output: Output | None = None) -> list[Path]:
+    """Where results go: by ``{name}`` and ``{clip}`` in OUT, or several numbered: out-1.bvh, out-2.bvh, ...
+
+    samples: how many results each source has, one after the other, which are numbered in any case.
+    output: how they are written; a character takes all that go to one place.
+    """
+    fields = r"\{(name|clip)\}"
+
+    def named(source: Source | str) -> Path:
+        def name(found: re.Match[str]) -> str:
+            if isinstance(source, str):
+                return source
+            return source.name if found[1] == "name" else source.label
+
+        return Path(re.sub(fields, name, str(out)))
+
+    def numbered(place: Path, count: int) -> list[Path]:
+        return [place.with_stem(f"{place.stem}-{i}") if count > 1 else place for i in range(1, count + 1)]
+
+    onto = output is not None and output.onto is not None
+    if onto:
+        found = [named(source) for source in sources for _ in range(samples)]
+    elif re.search(fields, str(out)):
+        found = [place for source in sources for place in numbered(named(source), samples)]
+    else:
+        found = numbered(out, len(sources) * samples)
+    if len(set(found)) < len(found) and not onto:
+        raise click.UsageError(
+            "several results have the same name: give an OUT with {name} and, for clips, {clip}, or without both"
+        )
+    for place in found:
+        output.check(place) if output else check_writable(place)
+        spare(place, *(source.path for source in sources if isinstance(source, Source)))
+    return found

@@ -1,0 +1,119 @@
+"""``motet bundle`` and ``motet bench``: bundles listed, described, verified and packed; and how fast they run."""
+
+import importlib
+import importlib.util
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import click
+
+from motet.bench import figures, rows
+from motet.bundle.bundle import Bundle, list_bundles
+from motet.bundle.graph import SessionOptions
+from motet.cli.options import bundle_option, session_options
+from motet.models.load import load
+from motet.models.load import verify as verify_bundle
+
+
+@click.group()
+def bundle() -> None:
+    """List, inspect, verify and pack models (bundles). NAME is the name of a bundle, or its folder or zip."""
+
+
+@bundle.command("list")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def list_(as_json: bool) -> None:
+    """List the installed bundles."""
+    found: list[dict[str, Any]] = []
+    for one in map(Bundle.open, list_bundles().values()):
+        manifest, size = one.manifest, sum(entry.size for entry in one.manifest.files.values())
+        about = {"name": one.name, "version": manifest.version, "verb": manifest.verb, "model": manifest.model}
+        found.append({**about, "size": size, "licence": manifest.licence.get("weights")})
+    if as_json:
+        click.echo(json.dumps(found))
+        return
+    for row in found:
+        megabytes, licence = row["size"] / 1e6, row["licence"] or "not stated"
+        click.echo(f"{row['name']:<16} {row['version']:<6} {row['verb']:<10} {megabytes:6.2f} MB  {licence}")
+
+
+@bundle.command()
+@click.argument("name")
+@click.option("--json", "as_json", is_flag=True, help="Print the whole manifest.")
+def info(name: str, as_json: bool) -> None:
+    """Show a bundle's inputs and outputs, licence, parity and quality."""
+    manifest = Bundle.open(name).manifest
+    if as_json:
+        click.echo(json.dumps(manifest.source, indent=1))
+        return
+    click.echo(f"{manifest.name} {manifest.version}: {manifest.verb} by {manifest.model}, decoded by {manifest.loop}")
+    click.echo(f"{len(manifest.motion.channels)} channels at {manifest.motion.fps:g} fps")
+    for key in ("control", "defaults", "settings", "licence", "training", "quality", "parity"):
+        if values := manifest.source.get(key):
+            click.echo(f"\n{key}")
+            _tree({k: v for k, v in values.items() if k not in ("starts", "kinds")})  # long: with --json alone
+
+
+def _tree(values: dict[str, Any], indent: str = "  ") -> None:
+    for key, value in values.items():
+        if isinstance(value, dict):
+            click.echo(f"{indent}{key}")
+            _tree(value, indent + "  ")
+        else:
+            click.echo(f"{indent}{key}: {'not stated' if value is None else value}")
+
+
+@bundle.command(short_help="Check that a bundle works here.")
+@click.argument("name")
+@session_options
+def verify(name: str, session: SessionOptions) -> None:
+    """Check that a bundle works here: its files and graphs, its model, and its golden vectors, replayed."""
+    opened = Bundle.open(name)
+    found = verify_bundle(opened, session)
+    worst = max(found.errors, key=found.errors.__getitem__)
+    click.echo(f"{opened.path}: {len(found.files)} files match the manifest")
+    click.echo(f"the model runs on {', '.join(found.providers) or 'numpy alone'}")
+    click.echo(
+        f"golden vectors: the largest difference is {found.errors[worst]:.1e} ({worst}), tolerance {found.tolerance:g}"
+    )
+
+
+@bundle.command()
+@click.argument("name")
+@click.option("-o", "--out", required=True, type=Path, help="The .zip to write.")
+def pack(name: str, out: Path) -> None:
+    """Pack a bundle into one zip: the same bytes for the same bundle."""
+    if out.suffix != ".zip":
+        raise click.UsageError(f"a packed bundle is a .zip, not {out.name!r}")
+    Bundle.open(name).pack(out)
+    click.echo(str(out))
+
+
+@click.command()
+@bundle_option("control")
+@click.option("--motion", type=Path, help="Motion file to describe.  [default: a generated one of 2.8 s]")
+@click.option("--seconds", default=1.0, show_default=True, help="How long to measure each row.")
+@click.option("--torch/--no-torch", default=True, help="Measure torch too, if it is installed.  [default: --torch]")
+@session_options
+@click.option("--json", "as_json", is_flag=True, help="Print a list of rows.")
+def bench(
+    bundle: str, motion: Path | None, seconds: float, torch: bool, as_json: bool, session: SessionOptions
+) -> None:
+    """Measure a bundle's speed, and torch's where it is installed."""
+    model = load(bundle, session)
+    found, baseline = figures(model, seconds, motion), None
+    if torch and model.graphs and importlib.util.find_spec("torch"):
+        # by name: the runtime does not depend on the training package
+        eager = importlib.import_module("motet_train.runs").eager_model(model.manifest, session.threads)
+        baseline = figures(eager, seconds, motion)
+    table = rows(found, baseline)
+    if as_json:
+        click.echo(json.dumps([asdict(row) for row in table]))
+        return
+    click.echo(f"on {', '.join(model.providers) or 'numpy'}, threads: {session.threads}")
+    for row in table:
+        beside = "" if row.baseline is None else f" torch eager {row.baseline:>12,.1f}"
+        ratio = "" if row.ratio is None else f"  x{row.ratio:.2f}"
+        click.echo(f"{row.name:<28} {row.value:>12,.1f} {row.unit:<10}{beside}{ratio}")

@@ -1,0 +1,291 @@
+"""``motet check``, ``convert`` and ``view``: motion files looked at, brought to other formats, and played."""
+
+import json
+import logging
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import chain, groupby, islice
+from pathlib import Path
+from typing import Any
+
+import click
+
+from motet import checked
+from motet.checked import Checked
+from motet.cli.options import Tries
+from motet.cli.reading import Read, Source, read_options
+from motet.cli.writing import Output, places, size, write_options
+from motet.errors import FormatError, MotetError
+from motet.files import files_in
+from motet.formats import CLIPPED, MOCAP, READS, WRITES, html, write_motion
+from motet.formats.lines import MARK
+from motet.motion.feet.contacts import lay_root_path
+from motet.motion.feet.hold import hold_feet as feet_held
+from motet.motion.humanoid import LENGTH_UNITS, read_map, to_humanoid
+from motet.motion.kinematics import skeleton_of
+from motet.motion.looping import looped
+from motet.motion.mirroring import mirror as mirrored
+from motet.motion.motion import Motion
+from motet.motion.skeleton import METRES
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Row:
+    """What was found of a file or clip, or why nothing was."""
+
+    source: Source
+    found: Checked | None
+    fault: str | None = None
+    page: Path | None = None
+
+    @property
+    def verdict(self) -> str:
+        """One word."""
+        if self.found is None:
+            return "unreadable"
+        return "refused" if self.found.refused else "understood" if self.found.sure else "unsure"
+
+    @property
+    def reason(self) -> str | None:
+        """Why it is unreadable or refused."""
+        return self.fault if self.found is None else self.found.refused
+
+    def to_json(self) -> dict[str, Any]:
+        """What was found, or "file", "clip" and "error"."""
+        if self.found is None:
+            return {"file": str(self.source.path), "clip": self.source.clip, "error": self.fault}
+        return self.found.to_json()
+
+
+@click.command(
+    help=f"""Look at motion files: which figure each has and how sure that is, its size, length, facing, ground, travel.
+
+    A folder, several files and a file of several clips give a table; a single motion gives all that was found, and what
+    was assumed. Exit code 1 if anything cannot be read or is no human's motion. Reads {READS}.
+    """
+)
+@click.argument("files", nargs=-1, required=True, type=Path, metavar="FILE|FOLDER...")
+@click.option("-o", "--out", type=Path, help="Page (.html) that plays the figure of the file beside the humanoid.")
+@read_options
+@click.option("--json", "as_json", is_flag=True, help="Print a list of objects, one for each clip.")
+def check(files: tuple[Path, ...], out: Path | None, read: Read, as_json: bool) -> None:
+    """Look at motion files."""
+    if out is not None and out.suffix.lower() != ".html":
+        raise click.UsageError(f"-o is a page: expected a name that ends in .html, not {out.name!r}")
+    paths = [path for given in files for path in (_motion_files(given) if given.is_dir() else [given])]
+    if out is None:
+        rows = (_row(source, None, read) for path in paths for source in read.sources([path], every=True))
+    else:
+        sources = read.sources(paths, every=True)
+        rows = (_row(source, page, read) for source, page in zip(sources, places(out, sources), strict=True))
+    counts = _print_json(rows) if as_json else _print_text(rows, paths)
+    if counts["unreadable"] or counts["refused"]:
+        sys.exit(1)
+
+
+def _motion_files(folder: Path) -> list[Path]:
+    kinds = tuple(dict.fromkeys((*MOCAP, *CLIPPED)))
+    found = files_in(folder, kinds)
+    if not found:
+        raise FormatError(folder, f"no motion files ({' '.join(kinds)}) are in it")
+    return found
+
+
+def _row(source: Source, page: Path | None, read: Read) -> Row:
+    try:
+        found = checked.check(source.path, clip=source.clip, **read.options)
+        if page is not None:
+            figures = {"as in the file": read(source)}
+            if found.refused is None:
+                figures["as the humanoid"] = to_humanoid(figures["as in the file"]).motion
+            title = Path(found.file).name + (f"{MARK}{found.clip}" if found.clip else "")
+            html.write_many(page, list(figures.values()), list(figures), title)
+        return Row(source, found, page=page)
+    except MotetError as error:
+        return Row(source, None, str(error).removeprefix(f"{source.path}: ").removeprefix(f"{source.path}, "))
+
+
+def _print_json(rows: Iterator[Row]) -> Counter[str]:
+    """The list, one line for each row as it is found."""
+    counts: Counter[str] = Counter()
+    for row in rows:
+        click.echo(("," if counts.total() else "[") + json.dumps(row.to_json()))
+        counts[row.verdict] += 1
+    click.echo("]" if counts else "[]")
+    return counts
+
+
+COLUMNS = "{:<26}{:>6}{:>8}{:>9}{:>7}{:>11}{:>10}{:>10}{:>7}"
+"""Columns of the table, after the name."""
+
+
+def _print_text(rows: Iterator[Row], paths: Sequence[Path]) -> Counter[str]:
+    """A report of one row, a table of several, line by line as they are found."""
+    first = list(islice(rows, 2))
+    if len(first) < 2:
+        for row in first:
+            click.echo("\n".join(_report(row)))
+        return Counter(row.verdict for row in first)
+    counts: Counter[str] = Counter()
+    width = min(max(12, *(len(str(path)) for path in paths)) + 2, 48)  # letters for the names of files
+    head = ("figure", "sure", "tall m", "seconds", "fps", "facing", "ground m", "travel m", "notes")
+    click.echo(f"{'file':<{width}}{COLUMNS.format(*head)}")
+    for file, of_file in groupby(chain(first, rows), key=lambda row: row.source.path):
+        last = None
+        for row in of_file:
+            if row.source.clip is not None and last is None:
+                click.echo(str(file))
+            name = str(file) if row.source.clip is None else f"  #{row.source.clip}"
+            said = f"{row.verdict}, as above" if row.reason and last and last.reason == row.reason else _line(row)
+            click.echo(f"{name:<{width - 2}}  {said}")
+            counts[row.verdict] += 1
+            last = row
+    click.echo(f"{counts.total()} motions: " + ", ".join(f"{count} {word}" for word, count in counts.items()))
+    return counts
+
+
+def _line(row: Row) -> str:
+    found = row.found
+    if found is None or found.refused:
+        return f"{row.verdict}: {row.reason}"
+    figure = f"{found.convention}" if found.sure else f"? {found.convention}"
+    return COLUMNS.format(
+        figure if len(figure) < 26 else f"{figure[:24]}…",
+        f"{found.confidence:.2f}",
+        "?" if found.height is None else f"{found.height:.2f}",
+        f"{found.seconds:.2f}",
+        f"{found.fps:g}",
+        _facing(found),
+        _metres(found.ground),
+        "in place" if found.in_place else _metres(found.travel),
+        len(found.notes) or "",
+    )
+
+
+def _report(row: Row) -> Iterator[str]:
+    """All that was found of one motion, as lines."""
+    found = row.found
+    if found is None:
+        return iter((str(row.source), f"  {row.verdict:<9} {row.fault}"))
+    said: list[tuple[str, str]] = []
+    if found.clips:
+        said.append(("clip", f"{found.clip}, {found.clips.index(found.clip or '') + 1} of {len(found.clips)}"))
+    said += [("refused", found.refused)] if found.refused else _understood(found)
+    said.append(("length", size(found.frames, found.fps)))
+    said += [("" if number else "assumed", note) for number, note in enumerate(found.notes)]
+    if row.page is not None:
+        said.append(("page", str(row.page)))
+    return chain([str(row.source)], (f"  {name:<9} {text}" for name, text in said))
+
+
+def _understood(found: Checked) -> list[tuple[str, str]]:
+    unsure = "" if found.sure else ": look at it, or give a map (motet convert --map)"
+    tall = "not known"
+    if found.height is not None and found.unit is not None:
+        near = (name for name, metres in LENGTH_UNITS.items() if abs(found.unit / metres - 1) < 1e-3)
+        tall = f"{found.height:.2f} m tall; lengths are in {next(near, f'units of {found.unit:g} m')}"
+    return [
+        ("figure", f"{found.convention}, confidence {found.confidence:.2f}{unsure}"),
+        ("size", tall),
+        ("facing", f"{_facing(found)} in the first frame; ahead is +z"),
+        ("ground", f"soles stand at {_metres(found.ground)} m; lowest point {_metres(found.lowest)} m"),
+        ("travel", "in place" if found.in_place else f"{_metres(found.travel)} m"),
+    ]
+
+
+def _facing(found: Checked) -> str:
+    if found.facing is None:
+        return "up or down"
+    degrees = round(abs(found.facing))
+    return f"{degrees}° {'left' if found.facing > 0 else 'right'}" if degrees else "ahead"
+
+
+def _metres(value: float | None) -> str:
+    return "" if value is None else f"{round(value, 2) + 0.0:.2f}"  # -0.0 is 0.0
+
+
+@click.command(
+    help=f"""Convert motion files; the extensions give the formats: IN OUT, or IN... -o OUT.
+
+    With several files OUT holds {{name}} for their names, as in -o 'bvh/{{name}}.bvh', or the results are numbered.
+    IN.glb#Walk is the clip Walk of a file of several, and --clip all takes each: --clip all -o 'bvh/{{clip}}.bvh'.
+
+    Reads {READS}; writes {WRITES}.
+    """
+)
+@click.argument("files", nargs=-1, required=True, type=Path, metavar="IN... [OUT]")
+@click.option("-o", "--out", type=Path, help="File to write. [default: the second of two files]")
+@click.option("--from", "start", type=click.FloatRange(0), default=0.0, help="Cut: seconds from the start.")
+@click.option("--to", "stop", type=click.FloatRange(0, min_open=True), help="Cut: seconds to stop at.")
+@click.option("--mirror", is_flag=True, help="Swap left and right.")
+@click.option("--unit", type=click.Choice(list(METRES)), help="Length unit to write.")
+@click.option("--humanoid", is_flag=True, help="Retarget the motions to the humanoid (docs/humanoid.md).")
+@click.option(
+    "--map", "map_file", type=Path, metavar="FILE", help="Which joint of IN is which bone, as JSON; implies --humanoid."
+)
+@click.option("--travel", is_flag=True, help="Give an in-place clip the path that its feet imply.")
+@click.option("--hold-feet", is_flag=True, help="Keep feet that stand from sliding; implies --humanoid.")
+@click.option("--loop", is_flag=True, help="Cut to a seamless loop, such as strides of a walk.")
+@write_options
+@read_options
+def convert(
+    files: Sequence[Path],
+    out: Path | None,
+    start: float,
+    stop: float | None,
+    mirror: bool,
+    unit: str | None,
+    humanoid: bool,
+    map_file: Path | None,
+    travel: bool,
+    hold_feet: bool,
+    loop: bool,
+    output: Output,
+    read: Read,
+) -> None:
+    """Convert motion files."""
+    if out is None:
+        if len(files) != 2:
+            raise click.UsageError("give IN and OUT, or several files and -o OUT")
+        *files, out = files
+    sources, tries = read.sources(files), Tries()
+    for source, place in zip(sources, places(out, sources, output=output), strict=True):
+        with tries.of(source):
+            motion = read(source)
+            motion = motion.cut(start, stop) if start or stop is not None else motion
+            motion = _to_humanoid(motion, map_file) if humanoid or map_file or hold_feet else motion
+            motion = lay_root_path(motion, keep_height=True) if travel else motion
+            motion = output.shaped(feet_held(motion) if hold_feet else motion)
+            motion = motion.scaled(METRES[unit]) if unit else motion
+            motion = looped(motion) if loop else motion
+            output.save(place, mirrored(motion) if mirror else motion, source.title)
+            click.echo(f"{place}: {size(len(motion), motion.fps)}")
+    output.finish()
+    tries.finish()
+
+
+def _to_humanoid(motion: Motion, map_file: Path | None) -> Motion:
+    found = to_humanoid(motion, read_map(map_file, skeleton_of(motion)) if map_file else None)
+    log.info("brought to the humanoid: %s", found.summary)
+    return found.motion
+
+
+@click.command()
+@click.argument("sources", nargs=-1, required=True, type=Path, metavar="MOTION...")
+@click.option("-o", "--out", type=Path, help="Page to write. [default: a new file in the temporary folder]")
+@read_options
+def view(sources: tuple[Path, ...], out: Path | None, read: Read) -> None:
+    """Write a self-contained page that plays each motion file, and print its path."""
+    tries, given = Tries(), read.sources(sources)
+    new = ((source, source.name if source.clip is None else source.label) for source in given)
+    pages = places(out, given) if out else [Path(tempfile.mkdtemp(prefix="motet-")) / f"{name}.html" for _, name in new]
+    for source, page in zip(given, pages, strict=True):
+        with tries.of(source):
+            write_motion(page, read(source))
+            click.echo(str(page))
+    tries.finish()

@@ -1,0 +1,111 @@
+"""``motet embed`` and ``motet search``: context vectors of motions and sentences, and the nearest motions."""
+
+import io
+import json
+import sys
+import warnings
+from dataclasses import asdict
+from pathlib import Path
+
+import click
+import numpy as np
+
+from motet.bundle.graph import SessionOptions
+from motet.cli.options import Tries, bar, bundle_option, noted, session_options
+from motet.cli.reading import Read, read_options, unit_option
+from motet.errors import TextWarning
+from motet.files import check_place, write_whole
+from motet.formats import names_motion, read_motion
+from motet.models.describe import DescribeModel
+from motet.models.generate import GenerateModel
+from motet.models.load import load_as
+from motet.models.search import NAME, Index, SearchModel
+
+
+@click.command()
+@click.argument("motions", nargs=-1, type=Path, metavar="[MOTION...]")
+@click.option("--text", "texts", multiple=True, help="A sentence, instead of motions; may be given several times.")
+@click.option("-o", "--out", required=True, type=Path, help="The .npy to write: (N, C) float32.")
+@click.option("--bundle", help="Name or path of a bundle. [default: describe, with --text generate]")
+@session_options
+@read_options
+def embed(
+    motions: tuple[Path, ...],
+    texts: tuple[str, ...],
+    out: Path,
+    bundle: str | None,
+    session: SessionOptions,
+    read: Read,
+) -> None:
+    """Write context vectors of motion files, or of sentences, one row each, to compare and cluster.
+
+    Motions have those of a bundle that describes, sentences those of one that generates; the two are not comparable.
+    A file or sentence that fails has no row.
+    """
+    if bool(motions) == bool(texts):
+        raise click.UsageError("give either motion files or --text")
+    if out.suffix.lower() != ".npy":
+        raise click.UsageError(f"context vectors are written as .npy, not {out.name!r}")
+    check_place(out)
+    tries = Tries()
+    if motions:
+        describer, prepared = load_as(DescribeModel, bundle or "describe", session), []
+        for source in read.sources(motions):
+            with tries.of(source):
+                prepared.append(describer.prepared(read(source)))
+        read.say_resampled(describer.fps)
+        vectors = describer.embed(prepared)
+    else:
+        generator = load_as(GenerateModel, bundle or "generate", session)
+        with noted():
+            vectors = generator.embed(list(tries.usable(dict(enumerate(texts)), generator.unknown).values()))
+    if len(vectors):
+        buffer = io.BytesIO()
+        np.save(buffer, vectors, allow_pickle=False)
+        write_whole(out, buffer.getvalue())
+        click.echo(f"{out}: {len(vectors)} context vectors of {vectors.shape[1]} numbers")
+    tries.finish()
+
+
+@click.command()
+@click.argument("query")
+@click.argument("folder", type=Path)
+@click.option("--count", type=click.IntRange(1, 1000), help="Motions to print. [default: the bundle's]")
+@bundle_option("search")
+@click.option("--index", "file", type=Path, help=f"File for the vectors. [default: {NAME} in FOLDER]")
+@unit_option
+@session_options
+@click.option("--json", "as_json", is_flag=True, help="Print a list with path, clip, start, stop and score of each.")
+def search(
+    query: str,
+    folder: Path,
+    count: int | None,
+    bundle: str,
+    file: Path | None,
+    unit_in: str | None,
+    session: SessionOptions,
+    as_json: bool,
+) -> None:
+    """Find the motions in FOLDER that are nearest to QUERY, a sentence or a motion file; FOLDER may be an index file.
+
+    Each is printed with how near it is (1 is the same) and the seconds in which it is so; of files of several clips,
+    each clip is a motion of its own. The first search reads and embeds all motion files, and later ones those that are
+    new or have changed.
+    """
+    model = load_as(SearchModel, bundle, session)
+    motion = read_motion(query, unit=unit_in) if names_motion(query) else None
+    if motion is None:
+        with noted():
+            model.ids(query)  # refused before all motions are read
+    with bar("embedding") as progress:
+        index = Index.open(folder, model, file, unit=unit_in, progress=progress)
+    with warnings.catch_warnings(action="ignore", category=TextWarning):  # said already
+        hits = index.search(query if motion is None else motion, count)
+    if as_json:
+        click.echo(json.dumps([{**asdict(hit), "path": str(hit.path)} for hit in hits]))
+    else:
+        for hit in hits:
+            click.echo(f"{hit.score:6.2f}  {hit.place}  {hit.start:.1f} to {hit.stop:.1f} s")
+    for path, fault in index.failed.items():
+        click.echo(f"motet: {path}: {fault}", err=True)
+    sys.exit(1 if index.failed else 0)
