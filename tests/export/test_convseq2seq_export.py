@@ -10,8 +10,8 @@ from predict_manifest import predict_manifest
 from motet.models.load import load
 from motet.models.predict import PredictModel
 from motet_export.bundles import export_run
+from motet_train.papers.li2018 import from_config
 from motet_train.papers.li2018.stepwise import Stepwise
-from motet_train.papers.li2018.systems import stepwise
 from motet_train.runs import Run
 
 pytestmark = pytest.mark.slow  # torch's exporter
@@ -24,7 +24,7 @@ def test_the_bundle_predicts_what_torch_predicts(tmp_path: Path) -> None:
     torch.manual_seed(0)
     system = {"dimensions": 45, "filters": [3, 4, 5], "units": 8}
     config = {"channels": CHANNELS, "kept": list(KEPT), "seed_frames": 50, "system": system}
-    net = stepwise("convseq2seq", config)
+    net = from_config("convseq2seq", config)
     net.mean.copy_(torch.randn(45)), net.scale.copy_(torch.rand(45) + 0.5)
     run = Run({**predict_manifest("convseq2seq", 16, 25), "config": config}, net)
     export_run(run, tmp_path / "x.zip")

@@ -11,10 +11,14 @@ from motet.bundle.graph import OnnxGraph
 from motet.decode.loops import free_run
 from motet_export.exporter import export_graph
 from motet_export.parity import check_carried, check_one_step
-from motet_train.papers.li2018 import lstm_3lr, lstm_ae, rrnn
-from motet_train.papers.li2018.lstm_3lr import EncoderRecurrentDecoder
-from motet_train.papers.li2018.lstm_ae import LSTMAE
-from motet_train.papers.li2018.rrnn import RRNN
+from motet_train.papers.li2018.recurrent import (
+    LSTMAE,
+    RRNN,
+    EncoderRecurrentDecoder,
+    ERDConfig,
+    LSTMAEConfig,
+    RRNNConfig,
+)
 from motet_train.papers.li2018.stepwise import Stepwise, System
 from motet_train.runs import TorchGraph
 
@@ -23,9 +27,9 @@ pytestmark = pytest.mark.slow  # torch's exporter
 SEED, CHANNELS = 6, 7
 KEPT = (0, 1, 3, 4, 6)
 SYSTEMS: dict[str, Callable[[], System]] = {
-    "rrnn": lambda: RRNN(rrnn.Config(5, 9)),
-    "erd": lambda: EncoderRecurrentDecoder(lstm_3lr.ERDConfig(5, (7, 6), 2, 8, (7, 4))),
-    "lstm_3lr, filtered": lambda: LSTMAE(lstm_ae.Config(5, (7,), 2, 6, autoencoder=(9, 4, 9))),
+    "rrnn": lambda: RRNN(RRNNConfig(5, 9)),
+    "erd": lambda: EncoderRecurrentDecoder(ERDConfig(5, (7, 6), 2, 8, (7, 4))),
+    "lstm_3lr, filtered": lambda: LSTMAE(LSTMAEConfig(5, (7,), 2, 6, autoencoder=(9, 4, 9))),
 }
 
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from motet_train.models.recurrent import GRU, Decoder, Encoder, WordEmbedding, mask
-from motet_train.papers.plappert2017.layer_norm_gru import LayerNormGRU
+from motet_train.papers.plappert2017.language_to_motion import LayerNormGRU
 
 Array = NDArray[np.float64]
 LAYERS = pytest.mark.parametrize("layer", [GRU, LayerNormGRU])

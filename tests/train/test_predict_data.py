@@ -24,16 +24,16 @@ from motet_train.data.predict_data import Material, Windows, store_material
 from motet_train.data.preparation import FULL, VECTORS, Preparation
 from motet_train.data.store import Store, prepare, split
 from motet_train.models.kinematics import VectorPlaces
-from motet_train.papers.li2018.expmap_files import (
+from motet_train.papers.li2018.expmap import (
     CMU_LAYOUT,
     H36M_LAYOUT,
     Scaling,
+    expmap_material,
     is_expmap,
     parse,
     read_expmap,
     scaling_of,
 )
-from motet_train.papers.li2018.material import expmap_material
 from motet_train.papers.li2018.protocol import (
     REPORTED,
     errors,

@@ -19,10 +19,15 @@ from motet_train.data.store import prepare
 from motet_train.evaluate.predict import mocap_floors
 from motet_train.evaluate.predict.floors import CONSTANT, DAMPED, FLOORS, OF_JOINTS, ZERO, best, gone_on, key, reach
 from motet_train.evaluate.predict.mocap_floors import Windows, apart, chosen, floors, places
-from motet_train.papers.li2018 import text_floors
-from motet_train.papers.li2018.expmap_files import ExpmapCorpus, read_expmap, scaling_of
-from motet_train.papers.li2018.protocol import OUTPUT_FRAMES, zero_velocity
-from motet_train.papers.li2018.text_floors import velocity
+from motet_train.papers.li2018.expmap import OUTPUT_FRAMES, ExpmapCorpus, read_expmap
+from motet_train.papers.li2018.protocol import (
+    chosen_decays,
+    text_floors,
+    training_windows,
+    velocity,
+    window_errors,
+    zero_velocity,
+)
 
 
 def test_the_last_step_is_gone_as_often_as_its_decay_says() -> None:
@@ -62,24 +67,26 @@ def test_text_floors_turn_on_exactly() -> None:
 
 def test_damped_velocity_is_the_best_of_the_three_on_training_files(tmp_path: Path) -> None:
     corpus = read_expmap(write_files(tmp_path))
-    decays = text_floors.chosen(corpus)
+    decays = chosen_decays(corpus)
     assert (decays.shape, decays.min() >= 0, decays.max() <= 1) == ((OUTPUT_FRAMES,), True, True)
-    windows = text_floors.training_windows(corpus.train, scaling_of(corpus.train))
-    angles = {group: text_floors.euler_frames(truth) for group, truth in windows.items()}
-    damped, *others = (text_floors._error(velocity(decay), windows, angles) for decay in (decays, 0.0, 1.0, 0.5))
+    windows = training_windows(corpus)
+    damped, *others = (
+        np.mean([window_errors(velocity(decay)(truth[:, :50]), truth).mean(axis=0) for truth in windows], axis=0)
+        for decay in (decays, 0.0, 1.0, 0.5)
+    )
     for other in others:
         assert (damped <= other + 1e-12).all()
-    assert list(text_floors.text_floors(corpus)) == [ZERO, CONSTANT, DAMPED]
+    assert list(text_floors(corpus)) == [ZERO, CONSTANT, DAMPED]
 
 
 def test_decays_do_not_look_at_test_files(tmp_path: Path) -> None:
     corpus = read_expmap(write_files(tmp_path))
     test = {action: {name: frames[::-1] * 2 for name, frames in files.items()} for action, files in corpus.test.items()}
     other = ExpmapCorpus(corpus.layout, corpus.train, test, corpus.missing)
-    np.testing.assert_array_equal(text_floors.chosen(other), text_floors.chosen(corpus))
+    np.testing.assert_array_equal(chosen_decays(other), chosen_decays(corpus))
     short = {group: {name: frames[:60] for name, frames in files.items()} for group, files in corpus.train.items()}
     with pytest.raises(DataError, match="no training file has a window of 75 frames"):
-        text_floors.chosen(ExpmapCorpus(corpus.layout, short, corpus.test, ()))
+        chosen_decays(ExpmapCorpus(corpus.layout, short, corpus.test, ()))
 
 
 def walk_windows(frames: int = 5) -> Windows:

@@ -17,8 +17,7 @@ from motet.models.predict import PredictModel
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.evaluate.predict.floors import ZERO
 from motet_train.models.predictor import LEAST, ErrorHead, Predictor, PredictorConfig, error_signs
-from motet_train.papers.li2018.expmap_files import CMU_ACTIONS, read_expmap
-from motet_train.papers.li2018.material import expmap_material
+from motet_train.papers.li2018.expmap import CMU_ACTIONS, expmap_material, read_expmap
 from motet_train.papers.li2018.published import CONV
 from motet_train.papers.li2018.report import FEW, MEAN, complete, protocol_results
 from motet_train.recipes.predict import DEFAULT, train_predict

@@ -176,7 +176,7 @@ def test_a_bad_file_is_refused_and_nothing_written(
 def test_these_resume_from_the_command_line_too(
     model: str, data: dict[str, tuple[object, ...]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("motet_train.papers.tdbn.divergence.EPOCHS_A_CHUNK", 2)
+    monkeypatch.setattr("motet_train.papers.tdbn.recipe.EPOCHS_A_CHUNK", 2)
     (tmp_path / "small.toml").write_text(SMALL[model])
     command = ("train", model, *data[model], "--config", tmp_path / "small.toml", "--out")
     assert motet(*command, tmp_path / "whole").exit_code == 0

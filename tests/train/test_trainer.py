@@ -19,12 +19,10 @@ from motet_train.descent import GradientLearner, Term, Terms, Training, rate
 from motet_train.papers.li2018.convseq2seq import Config, ConvSeq2Seq, Discriminator
 from motet_train.papers.li2018.recipe import Adversary
 from motet_train.papers.li2018.stepwise import Stepwise
-from motet_train.papers.tdbn.angle_crbm import AngleCRBM, AngleCRBMConfig
-from motet_train.papers.tdbn.body import body_parts
-from motet_train.papers.tdbn.clips import read_clips
-from motet_train.papers.tdbn.contrastive import Learning
-from motet_train.papers.tdbn.divergence import DivergenceLearner
-from motet_train.papers.tdbn.tdbn import TDBN, TDBNConfig
+from motet_train.papers.tdbn.clips import body_parts, read_clips
+from motet_train.papers.tdbn.rbm import Learning
+from motet_train.papers.tdbn.recipe import DivergenceLearner
+from motet_train.papers.tdbn.tdbn import TDBN, AngleCRBM, AngleCRBMConfig, TDBNConfig
 from motet_train.progress import Shown
 from motet_train.runs import WEIGHTS, RunError
 from motet_train.trainer import CHECKPOINT, LOG, Learner, kept, train
@@ -120,7 +118,7 @@ families = pytest.mark.parametrize("family", LEARNERS)
 
 @pytest.fixture(autouse=True)
 def short_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("motet_train.papers.tdbn.divergence.EPOCHS_A_CHUNK", 2)
+    monkeypatch.setattr("motet_train.papers.tdbn.recipe.EPOCHS_A_CHUNK", 2)
 
 
 def trained(learner: Learner, folder: Path, **options: Any) -> dict[str, Tensor]:

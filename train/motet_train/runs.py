@@ -30,25 +30,25 @@ from motet_train.models.motion_codes import MotionCodes
 from motet_train.models.motion_to_language import MotionToLanguage
 from motet_train.models.net import Net
 from motet_train.models.predictor import Predictor
-from motet_train.papers.li2018 import systems
-from motet_train.papers.plappert2017 import language_to_motion
-from motet_train.papers.tdbn import angle_crbm, tdbn
+from motet_train.papers import li2018
+from motet_train.papers.plappert2017.language_to_motion import LanguageToMotion
+from motet_train.papers.tdbn.tdbn import TDBN, AngleCRBM
 
 MANIFEST, WEIGHTS = "run.json", "weights.pt"
 
 MODELS: Mapping[str, Callable[[Mapping[str, Any]], Net]] = {
-    "tdbn": tdbn.from_config,
+    "tdbn": TDBN.from_config,
     "motion-to-language": MotionToLanguage.from_config,
-    "language-to-motion": language_to_motion.from_config,
+    "language-to-motion": LanguageToMotion.from_config,
     "joint-embedding": JointEmbedding.from_config,
     "motion-actions": ActionNet.from_config,
     "motion-codec": MotionCodec.from_config,
     "motion-codes": MotionCodes.from_config,
-    "angle-crbm": angle_crbm.from_config,
+    "angle-crbm": AngleCRBM.from_config,
     "motion-matching": Matching.from_config,
     "gap-filler": Filler.from_config,
     "trajectory": Predictor.from_config,
-    **{name: partial(systems.stepwise, name) for name in systems.SYSTEMS},
+    **{name: partial(li2018.from_config, name) for name in li2018.SYSTEMS},
 }
 """Name of a model -> how it is built from the configuration in its manifest."""
 

@@ -13,12 +13,12 @@ from motet.bundle.manifest import Manifest
 from motet.models.tdbn_control import TdbnModel
 from motet_export.bundles import export_run
 from motet_train.models.net import tuples
-from motet_train.papers.tdbn.angle_crbm import AngleCRBM, AngleCRBMConfig, from_config
 from motet_train.papers.tdbn.clips import read_clips
-from motet_train.papers.tdbn.contrastive import DivergedError, Learning
 from motet_train.papers.tdbn.crbm import CRBM
-from motet_train.papers.tdbn.experiments.gaits import limit_cycle, switch
-from motet_train.papers.tdbn.experiments.report import experiments, study_of
+from motet_train.papers.tdbn.experiments import limit_cycle, switch
+from motet_train.papers.tdbn.rbm import DivergedError, Learning
+from motet_train.papers.tdbn.report import experiments_of, study_of
+from motet_train.papers.tdbn.tdbn import AngleCRBM, AngleCRBMConfig
 from motet_train.runs import Run
 
 SHORT = replace(AngleCRBMConfig(), iterations=3, crbm=Learning(3, 3e-2, temperature=(1.0, 1.0)))
@@ -42,7 +42,7 @@ def test_a_slow_rate_from_the_past_keeps_walking() -> None:
     run = train("walk", config=replace(AngleCRBMConfig(), iterations=10))
     study = study_of(TdbnModel(Manifest.from_json(run.manifest), run.torch_graphs()), read_clips())
     assert study.run is None
-    assert set(experiments(study)) == {"cycle", "feet", "random", "sync"}
+    assert set(experiments_of(study)) == {"cycle", "feet", "random", "sync"}
     figures = limit_cycle(study, seconds=30.0)
     assert figures["period_error"] < 0.05
     assert figures["drift"] < 0.005
@@ -94,7 +94,7 @@ def test_a_run_reads_back_exports_and_iterates_as_its_manifest_says(tmp_path: Pa
     run = train("walk", "run")
     run.save(tmp_path)
     again = Run.load(tmp_path)
-    assert from_config(again.manifest["config"]).to_config() == tuples(run.manifest["config"])
+    assert AngleCRBM.from_config(again.manifest["config"]).to_config() == tuples(run.manifest["config"])
     export_run(again, tmp_path / "bundle.zip")
     model = TdbnModel(Manifest.from_json(run.manifest), run.torch_graphs())
     found, three, one = (model.start(iterations=n).frames(np.eye(2)) for n in (None, 3, 1))

@@ -10,9 +10,8 @@ from motet.formats import read_motion, write_motion
 from motet_train.data import cmu_trials
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.errors import DataError
-from motet_train.papers.tdbn.body import body_parts
-from motet_train.papers.tdbn.clips import read_clips
-from motet_train.papers.tdbn.contrastive import Learning
+from motet_train.papers.tdbn.clips import body_parts, read_clips
+from motet_train.papers.tdbn.rbm import Learning
 from motet_train.papers.tdbn.tdbn import TDBNConfig
 
 

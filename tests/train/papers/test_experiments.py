@@ -24,10 +24,10 @@ from motet_train.data.errors import DataError
 from motet_train.evaluate.figures import save
 from motet_train.evaluate.tables import reached
 from motet_train.papers.tdbn.clips import Clips, read_clips
-from motet_train.papers.tdbn.experiments.gaits import gait_transitions, limit_cycle
-from motet_train.papers.tdbn.experiments.plots import drawings
-from motet_train.papers.tdbn.experiments.report import GOALS, by_label, control_report, study_of
-from motet_train.papers.tdbn.experiments.study import ControlStudy
+from motet_train.papers.tdbn.experiments import gait_transitions, limit_cycle
+from motet_train.papers.tdbn.figures import drawings
+from motet_train.papers.tdbn.report import GOALS, by_label, control_report, study_of
+from motet_train.papers.tdbn.study import ControlStudy
 from motet_train.papers.tdbn.tdbn import TDBNConfig
 
 

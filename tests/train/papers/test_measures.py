@@ -2,10 +2,8 @@ import numpy as np
 import pytest
 
 from motet_train.evaluate.positions import arrival
-from motet_train.papers.tdbn.body import body_parts
-from motet_train.papers.tdbn.clips import read_clips
-from motet_train.papers.tdbn.experiments.measures import ARRIVED, Reference, upsample
-from motet_train.papers.tdbn.period import is_periodic, period
+from motet_train.papers.tdbn.clips import body_parts, is_periodic, period, read_clips
+from motet_train.papers.tdbn.study import ARRIVED, Reference, upsample
 
 
 def wave(frames: int, cycle: float, phase: float = 0.0) -> np.ndarray:

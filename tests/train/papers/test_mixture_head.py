@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 from torch import Tensor
 
-from motet_train.papers.plappert2017.mixture_head import Mixture, MixtureHead
+from motet_train.papers.plappert2017.language_to_motion import Mixture, MixtureHead
 
 N, K, D = 6, 3, 4
 

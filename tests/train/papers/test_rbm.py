@@ -5,8 +5,17 @@ import math
 import numpy as np
 import torch
 
-from motet_train.papers.tdbn.contrastive import Ascent, Epoch, Learning, balanced, schedule
-from motet_train.papers.tdbn.rbm import RBM, RBMLayer, block_mask, reconstruct
+from motet_train.papers.tdbn.rbm import (
+    RBM,
+    Ascent,
+    Epoch,
+    Learning,
+    RBMLayer,
+    balanced,
+    block_mask,
+    reconstruct,
+    schedule,
+)
 
 
 def small_rbm() -> RBM:

@@ -28,10 +28,19 @@ from motet_train.data.matching_rows import gaits_of, recordings
 from motet_train.data.store import Store, prepare
 from motet_train.evaluate.steer import following, standing
 from motet_train.evaluate.steer.report import Recorded, steer_report
-from motet_train.papers.tdbn.body import TRUNK_PART, body_parts
-from motet_train.papers.tdbn.courses import FULL_CONTROL, LABELS, controls_of, course
-from motet_train.papers.tdbn.driven import Driven, DrivenSession, moved
-from motet_train.papers.tdbn.steered import RECIPES, mirrored_too, train_steered
+from motet_train.papers.tdbn.clips import TRUNK_PART, body_parts
+from motet_train.papers.tdbn.steered import (
+    FULL_CONTROL,
+    LABELS,
+    RECIPES,
+    Driven,
+    DrivenSession,
+    controls_of,
+    course,
+    mirrored_too,
+    moved,
+    train_steered,
+)
 from motet_train.recipes.recipe import Job
 from motet_train.runs import About, Run
 

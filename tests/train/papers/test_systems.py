@@ -12,11 +12,10 @@ from click.testing import CliRunner, Result
 from test_predict_data import write_files
 
 from motet.cli import main
+from motet_train.papers.li2018 import SYSTEMS
 from motet_train.papers.li2018.convseq2seq import Config
-from motet_train.papers.li2018.expmap_files import read_expmap
-from motet_train.papers.li2018.material import expmap_material, validation_files
+from motet_train.papers.li2018.expmap import expmap_material, read_expmap, validation_files
 from motet_train.papers.li2018.recipe import RECIPES, sized, validation_error
-from motet_train.papers.li2018.systems import SYSTEMS
 from motet_train.recipes.recipe import Recipe
 from motet_train.runs import Run
 from motet_train.trainer import CHECKPOINT
@@ -72,7 +71,7 @@ def test_it_is_evaluated(trained: Path, data: Path) -> None:
 
 def test_what_is_kept_back_is_not_trained_on_and_is_measured(data: Path) -> None:
     corpus = read_expmap(data)
-    names = validation_files(corpus, 75)
+    names = validation_files(corpus)
     material = expmap_material(corpus, names)
     assert (len(material.sequences), len(material.validation)) == (1, 1)
     kept_back = corpus.train["walking"]["train/walking/walking_1.txt"][1:].astype(np.float32)

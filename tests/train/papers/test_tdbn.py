@@ -9,10 +9,9 @@ from control_runs import control_run
 from motet.bundle.manifest import Manifest
 from motet.models.tdbn_control import TdbnModel
 from motet_train.models.net import tuples
-from motet_train.papers.tdbn.body import body_parts
-from motet_train.papers.tdbn.clips import read_clips
-from motet_train.papers.tdbn.contrastive import Learning
-from motet_train.papers.tdbn.tdbn import TDBN, TDBNConfig, from_config
+from motet_train.papers.tdbn.clips import body_parts, read_clips
+from motet_train.papers.tdbn.rbm import Learning
+from motet_train.papers.tdbn.tdbn import TDBN, TDBNConfig
 from motet_train.runs import Run, RunError
 
 SHORT = replace(TDBNConfig(), restarts=1, tries=1, rbm=Learning(epochs=2), crbm=Learning(epochs=2))
@@ -47,7 +46,7 @@ def test_a_run_reads_back_as_it_was(config: TDBNConfig, tmp_path: Path) -> None:
     run.save(tmp_path)
     other = Run.load(tmp_path)
     assert other.manifest == run.manifest
-    assert tuples(from_config(other.manifest["config"]).to_config()) == tuples(run.manifest["config"])
+    assert tuples(TDBN.from_config(other.manifest["config"]).to_config()) == tuples(run.manifest["config"])
     frames = [
         TdbnModel(Manifest.from_json(r.manifest), r.torch_graphs()).start(seed=1, variety=0.5).frames(np.eye(3))
         for r in (run, other)

@@ -34,15 +34,15 @@ from motet_train.evaluate.steer.report import Recorded, steer_report, steer_text
 from motet_train.evaluate.tables import Goals, Report, json_ready, report_table
 from motet_train.evaluate.text_adherence.prompts import outside, prompts, read_trials, trained_on
 from motet_train.evaluate.text_adherence.table import Best, said_to_be_outside, says_drawings, says_table, says_text
-from motet_train.papers.li2018.expmap_files import is_expmap
+from motet_train.papers.li2018.expmap import is_expmap
 from motet_train.papers.li2018.figures import drawings as protocol_drawings
 from motet_train.papers.li2018.report import protocol_results
 from motet_train.papers.plappert2017.figures import describe_drawings, generate_drawings
 from motet_train.papers.tdbn.clips import read_clips
-from motet_train.papers.tdbn.driven import Driven
-from motet_train.papers.tdbn.experiments.plots import drawings as control_drawings
-from motet_train.papers.tdbn.experiments.report import GOALS as CONTROL_GOALS
-from motet_train.papers.tdbn.experiments.report import control_report, study_of
+from motet_train.papers.tdbn.figures import drawings as control_drawings
+from motet_train.papers.tdbn.report import GOALS as CONTROL_GOALS
+from motet_train.papers.tdbn.report import control_report, study_of
+from motet_train.papers.tdbn.steered import Driven
 from motet_train.trainer import LOG
 
 

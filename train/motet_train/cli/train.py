@@ -13,11 +13,9 @@ from motet_train.cli.train_options import Option, begun, split, train_command, u
 from motet_train.data.errors import DataError
 from motet_train.data.predict_data import store_material
 from motet_train.data.store import is_store
+from motet_train.papers.li2018 import SYSTEMS
 from motet_train.papers.li2018 import recipe as li2018
-from motet_train.papers.li2018.expmap_files import ExpmapCorpus, is_expmap, read_expmap
-from motet_train.papers.li2018.material import expmap_material, validation_files
-from motet_train.papers.li2018.protocol import PROTOCOL_WINDOW
-from motet_train.papers.li2018.systems import SYSTEM_TITLES
+from motet_train.papers.li2018.expmap import ExpmapCorpus, expmap_material, is_expmap, read_expmap, validation_files
 from motet_train.papers.plappert2017 import recipe as plappert2017
 from motet_train.papers.plappert2017.language_to_motion import LOSSES
 from motet_train.papers.tdbn import recipe as tdbn
@@ -246,7 +244,7 @@ def _system(name: str, title: str) -> None:
 
     def run(job: Job, data: Path, all_files: bool) -> Run:
         corpus = read_expmap_files(data)
-        kept_back = () if all_files else validation_files(corpus, PROTOCOL_WINDOW)
+        kept_back = () if all_files else validation_files(corpus)
         return li2018.train_system(expmap_material(corpus, kept_back), job)
 
     run.__doc__ = f"Train {title}, a baseline of `motet train predict`."
@@ -274,5 +272,5 @@ ablations = with_options(
     click.option("--l2", type=click.FloatRange(0), help="Weight of the squared weights in the loss."),
     click.option("--adversary", type=click.FloatRange(0), help="Weight of the discriminator in the loss; 0: none."),
 )
-for name, title in SYSTEM_TITLES.items():
+for name, (*_, title) in SYSTEMS.items():
     _system(name, title)

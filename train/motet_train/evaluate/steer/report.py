@@ -73,7 +73,7 @@ def _shown(store: Store, held: bool) -> list[tuple[Recording, Track]]:
 def steer_report(model: SteerModel, recorded: Recorded, minutes: float = 10.0, characters: int = 100) -> Report:
     """The figures of a model, of recordings and of the rival.
 
-    model: or a net that stands for one (:class:`motet_train.papers.tdbn.driven.Driven`), which has no rival.
+    model: or a net that stands for one (:class:`motet_train.papers.tdbn.steered.Driven`), which has no rival.
     minutes, characters: how long how many figures are told anything at random.
     DataError for a model without a walk and a run.
     """

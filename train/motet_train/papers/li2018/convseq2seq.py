@@ -9,16 +9,13 @@ from typing import Literal
 
 import torch
 from torch import Tensor, nn
-from torch.nn.functional import leaky_relu, pad
+from torch.nn.functional import conv2d, leaky_relu, pad
 
 from motet_train.data.errors import DataError
-from motet_train.papers.li2018.stepwise import State, System, free_run, squared_error
+from motet_train.papers.li2018.stepwise import State, System, free_run
 
 SLOPE = 0.2
 """Of the leaky rectifiers."""
-
-Padding = Literal["valid", "same"]
-Loss = Literal["square", "distance"]
 
 
 @dataclass(frozen=True)
@@ -37,20 +34,20 @@ class Config:
     seed_frames: int = 50
     window: int = 20
     kernel: tuple[int, int] = (2, 7)
-    padding: Padding = "valid"
+    padding: Literal["valid", "same"] = "valid"
     long_term: Literal["convolutional", "recurrent", "none"] = "convolutional"
     filters: tuple[int, ...] = (64, 128, 128)
     units: int = 512
     dropout: tuple[float, ...] = (0.0, 0.0, 0.5)
     decoder_dropout: float = 0.5
     own: float = 1.0
-    loss: Loss = "square"
+    loss: Literal["square", "distance"] = "square"
 
 
 class Convolution(nn.Module):
     """A convolution of stride 2 over frames and channels, without bias, and a leaky rectifier (section 3.1)."""
 
-    def __init__(self, inputs: int, outputs: int, kernel: tuple[int, int], padding: Padding) -> None:
+    def __init__(self, inputs: int, outputs: int, kernel: tuple[int, int], padding: str) -> None:
         super().__init__()
         self.weight = nn.Parameter(torch.empty(outputs, inputs, *kernel))
         nn.init.xavier_uniform_(self.weight)
@@ -58,22 +55,18 @@ class Convolution(nn.Module):
 
     def size(self, frames: int, channels: int) -> tuple[int, int]:
         """The size of what comes out for an image of frames x channels."""
-        pairs = zip((frames, channels), self.kernel, strict=True)
         if self.padding == "same":
             return -(-frames // 2), -(-channels // 2)
-        height, width = ((n - k) // 2 + 1 for n, k in pairs)
-        return height, width
+        return (frames - self.kernel[0]) // 2 + 1, (channels - self.kernel[1]) // 2 + 1
 
     def forward(self, x: Tensor) -> Tensor:
         """(B, inputs, T, D) to (B, outputs, T', D')."""
         if self.padding == "same":
-            x = pad(x, [*self._border(x.shape[3], 1), *self._border(x.shape[2], 0)])
-        return leaky_relu(nn.functional.conv2d(x, self.weight, stride=2), SLOPE)
-
-    def _border(self, length: int, axis: int) -> tuple[int, int]:
-        """What to add before and after, so that ceil(length / 2) places come out; the odd one goes after."""
-        total = max(0, 2 * (-(-length // 2) - 1) + self.kernel[axis] - length)
-        return total // 2, total - total // 2
+            (height, width), (frames, channels) = self.kernel, x.shape[2:]
+            tall, wide = self.size(frames, channels)
+            extra = max(0, 2 * (wide - 1) + width - channels), max(0, 2 * (tall - 1) + height - frames)
+            x = pad(x, [part for total in extra for part in (total // 2, total - total // 2)])  # the odd one goes after
+        return leaky_relu(conv2d(x, self.weight, stride=2), SLOPE)
 
 
 class EncodingModule(nn.Module):
@@ -110,8 +103,7 @@ class RecurrentEncoder(nn.Module):
 
     def forward(self, frames: Tensor) -> Tensor:
         """Frames (B, T, D) to (B, U)."""
-        out: Tensor = self.lstm(frames)[0][:, -1]
-        return out
+        return self.lstm(frames)[0][:, -1]  # type: ignore[no-any-return]
 
 
 class ConvSeq2Seq(System):
@@ -121,7 +113,11 @@ class ConvSeq2Seq(System):
         super().__init__()
         self.config = config
         self.carried = {"window": (config.window, config.dimensions)}
-        self.long_term = _long_term(config)
+        self.long_term: nn.Module | None = None
+        if config.long_term == "recurrent":
+            self.long_term = RecurrentEncoder(config)
+        elif config.long_term == "convolutional":
+            self.long_term = EncodingModule(config.seed_frames - 1, config, config.filters)
         self.constant = {} if self.long_term is None else {"long_term": (config.units,)}
         self.short_term = EncodingModule(config.window, config, config.filters)
         hidden = nn.Linear(config.units * (1 + len(self.constant)), config.units)
@@ -150,15 +146,9 @@ class ConvSeq2Seq(System):
     def error(self, predicted: Tensor, truth: Tensor) -> Tensor:
         """Eq. 7, per channel; or the mean distance of frames, over the root of the number of channels."""
         if self.config.loss == "square":
-            return squared_error(predicted, truth)
+            return super().error(predicted, truth)
         mean: Tensor = torch.linalg.vector_norm(predicted - truth, dim=-1).mean() / math.sqrt(truth.shape[-1])
         return mean
-
-
-def _long_term(config: Config) -> nn.Module | None:
-    if config.long_term == "recurrent":
-        return RecurrentEncoder(config)
-    return EncodingModule(config.seed_frames - 1, config, config.filters) if config.long_term != "none" else None
 
 
 class Discriminator(nn.Module):

@@ -3,8 +3,8 @@
 The 38 exponential maps of a line of CMU's text files are those of the joints of an ASF skeleton, depth first, its left
 leg first, tips of bones among them: the order of :attr:`motet.motion.skeleton.Skeleton.joints`. Vectors of joints are
 rows there and are turned by the matrix from the right, so a rotation here is the transposed one. (The .amc of a test
-file, 35_01 of walking/walking_1.txt, gives the same rotations.) Who moved is not in a file; bones are those of
-:data:`DRAWN_TRIAL`.
+file, 35_01 of walking/walking_1.txt, gives the same rotations.) Who moved is not in a file; bones are those of the
+trial 39_14.
 """
 
 from collections.abc import Mapping
@@ -22,20 +22,12 @@ from motet.motion.skeleton import Skeleton
 from motet_train.data.cmu_trials import cmu_trial
 from motet_train.evaluate.figures import SPACING, Drawings, bones_of, in_profile, panels, stick_figures
 from motet_train.evaluate.predict.plots import error_over_time
-from motet_train.papers.li2018.expmap_files import CMU_LAYOUT, ExpmapCorpus
-from motet_train.papers.li2018.material import STRIDE
-from motet_train.papers.li2018.protocol import OUTPUT_FRAMES, SEED_FRAMES, predictor, windows
+from motet_train.papers.li2018.expmap import CMU_LAYOUT, OUTPUT_FRAMES, SEED_FRAMES, STRIDE, ExpmapCorpus
+from motet_train.papers.li2018.protocol import predictor, windows
 from motet_train.papers.li2018.report import MANY, Results
-from motet_train.papers.li2018.seed_groups import drawn
 
 FRAMES_APART, SEED_POSES = 2, 4
 """Frames from one stick figure to the next, and stick figures of seed frames."""
-
-DRAWN = ("running", "jumping")
-"""Actions of which stick figures are drawn."""
-
-DRAWN_TRIAL = "39_14"
-"""The CMU trial whose skeleton they have."""
 
 
 def drawings(results: Results) -> Drawings:
@@ -46,10 +38,10 @@ def drawings(results: Results) -> Drawings:
             errors.setdefault(action, {})[name] = parts[MANY, action]
     found = {"predict-error": partial(error_over_time, errors, corpus.layout.fps / STRIDE, "Euler error")}
     if corpus.layout is CMU_LAYOUT:
-        skeleton = skeleton_of(read_motion(cmu_trial(DRAWN_TRIAL)))
-        for action in (action for action in DRAWN if action in corpus.test):
-            poses = strips(drawn(results.models, results.groups), corpus, action, skeleton)
-            found[f"predict-{action}"] = partial(strips_drawing, poses, skeleton, SEED_POSES)
+        skeleton = skeleton_of(read_motion(cmu_trial("39_14")))
+        models = {runs[0]: results.models[runs[0]] for runs in results.groups.values()}  # a mean of poses is none
+        for action in (action for action in ("running", "jumping") if action in corpus.test):
+            found[f"predict-{action}"] = partial(strips_drawing, strips(models, corpus, action, skeleton), skeleton)
     return found
 
 
@@ -64,19 +56,14 @@ def places(frames: Array, skeleton: Skeleton) -> Array:
         raise MotionError(f"frames of {frames.shape[-1]} columns do not fit a skeleton of {count} joints")
     vectors = frames[..., 3:].reshape(*frames.shape[:-1], count, 3)
     turns = np.swapaxes(rotvec_to_rotmat(vectors), -1, -2)
-    turns[..., 0, :, :] = _facing(turns[..., 0, :, :])
+    root = turns[..., 0, :, :]
+    turns[..., 0, :, :] = axis_to_rotmat("y", -np.arctan2(root[..., 0, 2], root[..., 2, 2])) @ root
     points = np.zeros(vectors.shape)
     for i, joint in enumerate(skeleton.joints[1:], start=1):
         parent = turns[..., joint.parent, :, :]
         points[..., i, :] = points[..., joint.parent, :] + parent @ np.array(joint.offset)
         turns[..., i, :, :] = parent @ turns[..., i, :, :]
     return points
-
-
-def _facing(turns: Array) -> Array:
-    """Rotations (..., 3, 3) turned about y so that their forward axis has no part along x."""
-    result: Array = axis_to_rotmat("y", -np.arctan2(turns[..., 0, 2], turns[..., 2, 2])) @ turns
-    return result
 
 
 def strips(
@@ -94,11 +81,10 @@ def strips(
     return {name: places(frames[0, shown], skeleton) for name, frames in found.items()}
 
 
-def strips_drawing(strips: Mapping[str, Array], skeleton: Skeleton, given: int = 0) -> Figure:
-    """Places of joints (K, J, 3) in profile, a strip below the other.
+def strips_drawing(strips: Mapping[str, Array], skeleton: Skeleton) -> Figure:
+    """Places of joints (K, J, 3) in profile, a strip below the other; seed frames are blue.
 
-    The first strip is the truth, which is drawn in grey behind the others too. given: how many poses of each are seed
-    frames, and blue.
+    The first strip is the truth, which is drawn in grey behind the others too.
     """
     truth, bones, width = next(iter(strips.values())), bones_of(skeleton), 13
     height = 0.4 + 1.1 * width / (SPACING * (len(truth) + 1))
@@ -106,7 +92,7 @@ def strips_drawing(strips: Mapping[str, Array], skeleton: Skeleton, given: int =
     for axis, (title, points) in zip(axes, strips.items(), strict=True):
         if points is not truth:
             stick_figures(axis, in_profile(truth, skeleton), bones, ["0.75"] * len(truth))
-        colours = ["tab:blue"] * given + ["black"] * (len(points) - given)
+        colours = ["tab:blue"] * SEED_POSES + ["black"] * (len(points) - SEED_POSES)
         stick_figures(axis, in_profile(points, skeleton), bones, colours)
         axis.set_title(title, loc="left")
     return figure

@@ -6,40 +6,32 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn.functional import softplus
 
 from motet_train.data.errors import DataError
 from motet_train.data.predict_data import Material, Windows
 from motet_train.descent import Descent, GradientLearner, Term, Terms, Training
-from motet_train.papers.li2018 import convseq2seq, lstm_3lr, lstm_ae, rrnn, srnn
-from motet_train.papers.li2018.material import ExpmapMaterial
-from motet_train.papers.li2018.protocol import OUTPUT_FRAMES, PROTOCOL_WINDOW, SEED_FRAMES
+from motet_train.papers.li2018 import convseq2seq, from_config, recurrent, srnn
+from motet_train.papers.li2018.expmap import OUTPUT_FRAMES, PROTOCOL_WINDOW, SEED_FRAMES, ExpmapMaterial
 from motet_train.papers.li2018.stepwise import Stepwise
-from motet_train.papers.li2018.systems import stepwise
 from motet_train.recipes.predict import possible
 from motet_train.recipes.recipe import AUGMENTED, Job, Recipe
 from motet_train.runs import Run
 from motet_train.trainer import Part
 
-VALIDATION_WINDOWS = 8
-"""Of each validation sequence, evenly spaced."""
-
 CODE = Training(steps=20_000, every=500, learning_rate=5e-5, decay=(0.99, 10_000), l2=0.0005, adversary=0.01)
 PAPER = Training(steps=20_000, every=500, learning_rate=2e-4, batch=64, l2=0.001, adversary=0.01)
-AVERAGE = 0.99
-"""Of the running mean of weights, which is what is kept, as of motet's own predictor."""
+SHORT = Training(steps=2000, every=100, falling=0.7, l2=1.4e-5, average=0.99)
+"""What learns best in a quarter of an hour on a CPU, by the error on held-out files: a higher learning rate, which
+falls; the paper's weight of the squared weights, .001, relative to an error that eq. 7 sums over 70 channels; no
+adversary, which doubles the time and brings nothing; and the running mean of the weights, as of motet's own
+predictor."""
 
-SHORT = Training(steps=2000, every=100, falling=0.7, l2=1.4e-5, average=AVERAGE)
-"""What learns best in a quarter of an hour on a CPU, by the error on held-out files: a higher learning rate,
-which falls, the paper's weight of the squared weights, .001, relative to an error that eq. 7 sums over 70 channels, and
-no adversary, which doubles the time and brings nothing."""
-
-RESIDUAL = Training(steps=3000, every=250, falling=0.5, clip=5.0, average=AVERAGE)
+RESIDUAL = Training(steps=3000, every=250, falling=0.5, clip=5.0, average=0.99)
 """Clipped as in Martinez et al. 2017; after 1,500 steps Adam is off by .62 on held-out files, and their SGD by .88."""
 
-TAUGHT = Training(every=100, falling=0.5, clip=25.0, average=AVERAGE)
+TAUGHT = Training(every=100, falling=0.5, clip=25.0, average=0.99)
 """Of nets that are taught the next frame: the clipping is that of Jain et al. 2016, who took SGD and more steps. How
 many each takes here was set by time; with twice as many, which three of them were tried with, the error on held-out
 files is smaller by seven per cent at most, see docs/predict.md."""
@@ -56,21 +48,19 @@ RECIPES: Mapping[str, Mapping[str, Recipe]] = {
         "paper": _recipe("convseq2seq", convseq2seq.Config(0), PAPER),
         "code": _recipe("convseq2seq", convseq2seq.Config(0, dropout=(0.2, 0.2, 0.5), own=0.95), CODE),
     },
-    "rrnn": {"default": _recipe("rrnn", rrnn.Config(0), RESIDUAL)},
-    "erd": {"default": _recipe("erd", lstm_3lr.ERDConfig(0), replace(TAUGHT, steps=900))},
-    "lstm-3lr": {"default": _recipe("lstm-3lr", lstm_3lr.Config(0), replace(TAUGHT, steps=700))},
+    "rrnn": {"default": _recipe("rrnn", recurrent.RRNNConfig(0), RESIDUAL)},
+    "erd": {"default": _recipe("erd", recurrent.ERDConfig(0), replace(TAUGHT, steps=900))},
+    "lstm-3lr": {"default": _recipe("lstm-3lr", recurrent.LSTM3LRConfig(0), replace(TAUGHT, steps=700))},
     "srnn": {"default": _recipe("srnn", srnn.Config(0, ()), replace(TAUGHT, steps=650, learning_rate=3e-3))},
-    "lstm-ae": {"default": _recipe("lstm-ae", lstm_ae.Config(0), replace(TAUGHT, steps=750))},
+    "lstm-ae": {"default": _recipe("lstm-ae", recurrent.LSTMAEConfig(0), replace(TAUGHT, steps=750))},
 }
 """Model -> name of a preset -> recipe."""
 
 
 def sized(recipe: Recipe, material: ExpmapMaterial) -> Any:
     """The system's configuration for the material."""
-    dimensions = len(material.kept)
-    if recipe.model != "srnn":
-        return recipe.sized(dimensions=dimensions)
-    return recipe.sized(dimensions=dimensions, parts=srnn.parts_of(material.layout, material.kept))
+    parts = {"parts": srnn.parts_of(material.layout, material.kept)} if "parts" in recipe.derived else {}
+    return recipe.sized(dimensions=len(material.kept), **parts)
 
 
 def train_system(material: ExpmapMaterial, job: Job) -> Run:
@@ -78,11 +68,11 @@ def train_system(material: ExpmapMaterial, job: Job) -> Run:
 
     The weights kept are those with the smallest :func:`validation_error`.
     """
-    visits = possible(job.recipe.visits, material)
+    visits, kept = possible(job.recipe.visits, material), list(material.kept)
     job = replace(job, recipe=replace(job.recipe, visits=visits))
     torch.manual_seed(job.about.seed)
     config = sized(job.recipe, material)
-    sizes = {"channels": len(material.contract.channels), "kept": list(material.kept), "seed_frames": SEED_FRAMES}
+    sizes = {"channels": len(material.contract.channels), "kept": kept, "seed_frames": SEED_FRAMES}
     manifest = job.manifest(
         material.contract,
         {**sizes, "system": asdict(config)},
@@ -90,7 +80,7 @@ def train_system(material: ExpmapMaterial, job: Job) -> Run:
         material.licence,
         {"data": material.about},
     )
-    net, kept = stepwise(job.recipe.model, manifest["config"]), list(material.kept)
+    net = from_config(job.recipe.model, manifest["config"])
     net.measure_by(material.contract.mean[kept], material.contract.std[kept])
     learner = _learner(net.to(job.device), config, Windows(material, PROTOCOL_WINDOW, **asdict(visits)), job)
     trained = learner.kept
@@ -110,20 +100,17 @@ def _learner(net: Stepwise, config: Any, windows: Windows, job: Job) -> Gradient
         assert isinstance(kept, Stepwise)
         return {"validation": round(validation_error(kept, windows.material), 6)}
 
-    given = net, training
-    if not training.adversary:
-        learner = GradientLearner(*given, lambda drawn: loss_of(net, drawn), batches, validated, net.system.progress)
-        return learner
-    if not isinstance(config, convseq2seq.Config):
-        raise DataError("this system is not trained against an adversary")
-    adversary = Adversary(net, convseq2seq.Discriminator(config, PROTOCOL_WINDOW).to(job.device), training)
-    learner = GradientLearner(*given, adversary.loss, batches, validated, net.system.progress, adversary.parts)
+    def loss(windows: Tensor) -> Terms:
+        return (Term(net.system.loss(net.normalised(windows), net.seed_frames), len(windows)),)
+
+    parts: dict[str, Part] = {}
+    if training.adversary:
+        if not isinstance(config, convseq2seq.Config):
+            raise DataError("this system is not trained against an adversary")
+        adversary = Adversary(net, convseq2seq.Discriminator(config, PROTOCOL_WINDOW).to(job.device), training)
+        loss, parts = adversary.loss, adversary.parts
+    learner = GradientLearner(net, training, loss, batches, validated, net.system.progress, parts)
     return learner
-
-
-def loss_of(net: Stepwise, windows: Tensor) -> Terms:
-    """The system's loss on windows (B, L + N, C) in the contract's units."""
-    return (Term(net.system.loss(net.normalised(windows), net.seed_frames), len(windows)),)
 
 
 class Adversary:
@@ -155,16 +142,12 @@ class Adversary:
 def validation_error(net: Stepwise, material: Material) -> float:
     """The mean distance of predicted and true frames, without the root, in the contract's units.
 
-    Over windows of the held-out motions, or of all where none could be held out.
+    Over eight evenly spaced windows of each of the held-out motions, or of all where none could be held out.
     """
-    long = [s for s in material.validation or material.sequences if len(s) > material.stride * (PROTOCOL_WINDOW - 1)]
-    windows = torch.from_numpy(np.concatenate([_spread(s, material.stride) for s in long])).to(net.mean.device)
+    last = material.stride * (PROTOCOL_WINDOW - 1)
+    steps = material.stride * np.arange(PROTOCOL_WINDOW)
+    long = [s for s in material.validation or material.sequences if len(s) > last]
+    cuts = [s[np.linspace(0, len(s) - last - 1, 8).astype(int)[:, None] + steps] for s in long]
+    windows = torch.from_numpy(np.concatenate(cuts)).to(net.mean.device)
     off = net(windows[:, :SEED_FRAMES], OUTPUT_FRAMES) - windows[:, SEED_FRAMES:]
-    moved = list(material.kept[material.held :])
-    return float(off[..., moved].norm(dim=-1).double().mean())
-
-
-def _spread(sequence: NDArray[np.float32], stride: int) -> NDArray[np.float32]:
-    """Windows (W, L + N, C) all along a sequence (T, C)."""
-    starts = np.linspace(0, len(sequence) - stride * (PROTOCOL_WINDOW - 1) - 1, VALIDATION_WINDOWS).astype(int)
-    return sequence[starts[:, None] + stride * np.arange(PROTOCOL_WINDOW)]
+    return float(off[..., list(material.kept[material.held :])].norm(dim=-1).double().mean())

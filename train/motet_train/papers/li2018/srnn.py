@@ -10,9 +10,8 @@ import torch
 from torch import Tensor, nn
 
 from motet_train.data.errors import DataError
-from motet_train.papers.li2018.expmap_files import Layout
-from motet_train.papers.li2018.noise import noise_at, noisy
-from motet_train.papers.li2018.stepwise import State, System, squared_error
+from motet_train.papers.li2018.expmap import Layout
+from motet_train.papers.li2018.stepwise import State, Taught
 
 Tensors = dict[str, Tensor]
 """Name of a type -> what its members have, (T, B, K, F)."""
@@ -20,7 +19,7 @@ Tensors = dict[str, Tensor]
 Halves = tuple[Tensor, Tensor]
 """Hidden units and memory of the members of a type, each (B, K, U)."""
 
-PAIRED_NODES = ("arm", "leg")
+LIMBS = ("arm", "leg")
 NODES = {"spine": 1, "arm": 2, "leg": 2}
 """Type -> its members; of limbs the left one, then the right one."""
 
@@ -52,14 +51,13 @@ def parts_of(layout: Layout, kept: Sequence[int]) -> tuple[tuple[int, ...], ...]
     """
     if len(layout.pairs) != 2:
         raise DataError(f"{layout.name} does not say which columns are legs and arms: its layout needs two pairs")
-    limbs = []
+    limbs: list[tuple[int, ...]] = []
     for left, right, width in reversed(layout.pairs):
-        starts = {start: [c - start for c in kept if start <= c < start + width] for start in (left, right)}
-        if starts[left] != starts[right]:
+        both = [[n for n, c in enumerate(kept) if start <= c < start + width] for start in (left, right)]
+        if [kept[n] - left for n in both[0]] != [kept[n] - right for n in both[1]]:
             raise DataError(f"{layout.name}: columns kept from {left} and from {right} on are not the same ones")
-        limbs += [tuple(n for n, c in enumerate(kept) if start <= c < start + width) for start in (left, right)]
-    taken = {n for limb in limbs for n in limb}
-    return (tuple(n for n in range(len(kept)) if n not in taken), *limbs)
+        limbs += map(tuple, both)
+    return (tuple(n for n in range(len(kept)) if not any(n in limb for limb in limbs)), *limbs)
 
 
 class Edge(nn.Module):
@@ -82,9 +80,8 @@ class Node(nn.Module):
     def __init__(self, features: int, config: Config) -> None:
         super().__init__()
         self.lstm = nn.LSTM(features + 3 * config.units, config.units)
-        self.hidden = nn.Sequential(
-            nn.Linear(config.units, config.linear), nn.ReLU(), nn.Linear(config.linear, config.narrow), nn.ReLU()
-        )
+        layers = nn.Linear(config.units, config.linear), nn.ReLU(), nn.Linear(config.linear, config.narrow), nn.ReLU()
+        self.hidden = nn.Sequential(*layers)
         self.outward = nn.Linear(config.narrow, features)
 
     def forward(self, x: Tensor, state: Halves) -> tuple[Tensor, Halves]:
@@ -110,7 +107,7 @@ def _along(lstm: nn.LSTM, x: Tensor, state: Halves) -> tuple[Tensor, Halves]:
     return out.reshape(steps, rows, members, -1), after
 
 
-class SRNN(System):
+class SRNN(Taught):
     """Seven edge RNNs and three node RNNs; the frame itself is predicted, not how it changes (section 4.1).
 
     Left and right share their RNNs. The state holds the last two frames, and hidden units and memory (2 U) of each
@@ -119,29 +116,22 @@ class SRNN(System):
 
     def __init__(self, config: Config) -> None:
         super().__init__()
-        self.config, self.std = config, 0.0
-        widths = _widths(config)
-        both = {f"{one}_{other}": widths[one] + widths[other] for one, other in _relations()}
+        self.config = config
+        spine, *limbs = config.parts
+        widths = {"spine": len(spine), "arm": len(limbs[0]), "leg": len(limbs[2])}
+        both = {name: sum(widths[end] for end in name.split("_")) for name in EDGES if "_" in name}
         features = {**{name: 2 * width for name, width in widths.items()}, **both}
         self.edges = nn.ModuleDict({name: Edge(features[name], config) for name in EDGES})
         self.nodes = nn.ModuleDict({name: Node(widths[name], config) for name in NODES})
-        self.constant = {}
         self.carried = {
-            "previous": (config.dimensions,),
-            "last": (config.dimensions,),
+            **dict.fromkeys(("previous", "last"), (config.dimensions,)),
             "edges": (sum(EDGES.values()), 2 * config.units),
             "nodes": (sum(NODES.values()), 2 * config.units),
         }
-        spine, *limbs = config.parts
-        self.register_buffer("spine", torch.tensor([spine]), persistent=False)
-        self.register_buffer("arm", torch.tensor(limbs[:2]), persistent=False)
-        self.register_buffer("leg", torch.tensor(limbs[2:]), persistent=False)
+        for name, parts in {"spine": [spine], "arm": limbs[:2], "leg": limbs[2:]}.items():
+            self.register_buffer(name, torch.tensor(parts), persistent=False)
         order = torch.tensor([channel for part in config.parts for channel in part])
         self.register_buffer("places", order.argsort(), persistent=False)
-
-    def progress(self, share: float) -> None:
-        """Set the noise of the training by the share of it that is done, 0 to 1."""
-        self.std = noise_at(share)
 
     def begin(self, seed: Tensor) -> State:
         """The RNNs have seen all of the seed frames, two at least, but the last one."""
@@ -149,8 +139,7 @@ class SRNN(System):
 
     def predict(self, state: State) -> tuple[Tensor, State]:
         """What the RNNs say after the last frame, and their state."""
-        now, before = state["last"][None], state["previous"][None]
-        found, after = self._run(now, before, state["edges"], state["nodes"])
+        found, after = self._run(state["last"][None], state["previous"][None], state["edges"], state["nodes"])
         return found[0], after
 
     def push(self, state: State, frame: Tensor) -> State:
@@ -158,28 +147,19 @@ class SRNN(System):
         return {**state, "previous": state["last"], "last": frame}
 
     def follow(self, frames: Tensor) -> tuple[Tensor, State]:
-        """For true frames (B, T, D) what is predicted after each (B, T, D), and the RNNs' state after all of them."""
+        """As of all that are taught; before the first frame there was the same one."""
         before = torch.cat([frames[:, :1], frames[:, :-1]], dim=1)
         edges, nodes = (frames.new_zeros(frames.shape[0], *self.carried[name]) for name in ("edges", "nodes"))
         found, after = self._run(frames.transpose(0, 1), before.transpose(0, 1), edges, nodes)
         return found.transpose(0, 1), after
 
-    def loss(self, windows: Tensor, seed_frames: int) -> Tensor:
-        """The mean squared error of the frame after each of the true ones, which are noisy in training."""
-        found, _ = self.follow(noisy(windows[:, :-1], self.std if self.training else 0.0))
-        return squared_error(found, windows[:, 1:])
-
     def _run(self, now: Tensor, before: Tensor, edges: Tensor, nodes: Tensor) -> tuple[Tensor, State]:
         """Frames and those before them (T, B, D) and the RNNs' states to the predicted frames (T, B, D) and states."""
-        features = self._parts(now)
-        told, edges = _each(self.edges, _concatenated(features, self._parts(before)), edges)
+        features, earlier = ({n: frames[..., self.get_buffer(n)] for n in NODES} for frames in (now, before))
+        told, edges = _each(self.edges, _concatenated(features, earlier), edges)
         found, nodes = _each(self.nodes, _known(features, told), nodes)
         frames = torch.cat([part.flatten(2) for part in found.values()], dim=2)
         return frames[..., self.get_buffer("places")], {"edges": edges, "nodes": nodes}
-
-    def _parts(self, frames: Tensor) -> Tensors:
-        """The nodes' features: frames (T, B, D) to (T, B, K, F)."""
-        return {name: frames[..., self.get_buffer(name)] for name in NODES}
 
 
 def _each(rnns: nn.ModuleDict, given: Tensors, state: Tensor) -> tuple[Tensors, Tensor]:
@@ -193,24 +173,10 @@ def _each(rnns: nn.ModuleDict, given: Tensors, state: Tensor) -> tuple[Tensors, 
     return found, torch.cat([torch.cat(half, dim=1) for half in zip(*ends, strict=True)], dim=-1).float()
 
 
-def _relations() -> list[tuple[str, str]]:
-    return [pair for limb in PAIRED_NODES for pair in (("spine", limb), (limb, limb))]
-
-
-def _widths(config: Config) -> dict[str, int]:
-    """Type of node -> its channels; ValueError where the parts do not fit."""
-    sizes = [len(part) for part in config.parts]
-    if len(sizes) != 5 or sizes[1] != sizes[2] or sizes[3] != sizes[4]:
-        raise ValueError(f"parts of {sizes} channels: spine, two arms and two legs, left as wide as right, are needed")
-    if sorted(channel for part in config.parts for channel in part) != list(range(config.dimensions)):
-        raise ValueError(f"each of the {config.dimensions} channels has to be in one part")
-    return {"spine": sizes[0], "arm": sizes[1], "leg": sizes[3]}
-
-
 def _concatenated(now: Tensors, before: Tensors) -> Tensors:
     """The edges' features: those of both nodes, summed over edges of one type to one node (the authors' code)."""
     found = {name: torch.cat([before[name], now[name]], dim=-1) for name in NODES}
-    for limb in PAIRED_NODES:
+    for limb in LIMBS:
         pair = now[limb]
         spine = torch.cat([now["spine"].expand(-1, -1, 2, -1), pair], dim=-1)
         found[f"spine_{limb}"] = torch.cat([spine.sum(2, keepdim=True), spine], dim=2)
@@ -220,6 +186,6 @@ def _concatenated(now: Tensors, before: Tensors) -> Tensors:
 
 def _known(features: Tensors, told: Tensors) -> Tensors:
     """What each node is given: its features and what the edges that lead to it tell."""
-    spine = [told["spine"], *(told[f"spine_{limb}"][:, :, :1] for limb in PAIRED_NODES)]
-    limbs = {limb: [told[limb], told[f"spine_{limb}"][:, :, 1:], told[f"{limb}_{limb}"]] for limb in PAIRED_NODES}
+    spine = [told["spine"], *(told[f"spine_{limb}"][:, :, :1] for limb in LIMBS)]
+    limbs = {limb: [told[limb], told[f"spine_{limb}"][:, :, 1:], told[f"{limb}_{limb}"]] for limb in LIMBS}
     return {name: torch.cat([features[name], *rest], dim=-1) for name, rest in {"spine": spine, **limbs}.items()}

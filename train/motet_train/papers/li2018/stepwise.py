@@ -1,11 +1,12 @@
-"""Systems that predict frame by frame: one face for all of them, and their encoder and step graphs.
+"""Systems that predict frame by frame: what all of them have in common, and their encoder and step graphs.
 
-Letters in shapes: B rows, L seed frames, N predicted frames, C channels of the contract, D of them that vary.
+Letters in shapes: B rows, L seed frames, N predicted frames, T frames, C channels of the contract, D of them that vary.
 """
 
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import torch
 from torch import Tensor, nn
@@ -17,17 +18,16 @@ State = dict[str, Tensor]
 """What a system knows, by name; each (B, ...)."""
 
 Shapes = Mapping[str, tuple[int, ...]]
-"""Name in a state -> shape of one row."""
 
 
 class System(nn.Module, ABC):
     """What a published system computes, on normalised frames of D channels.
 
-    carried: what changes with every frame. constant: what the seed alone decides.
+    carried, constant: name in the state -> shape of a row; of what changes with every frame, and what the seed decides.
     """
 
     carried: Shapes
-    constant: Shapes
+    constant: Shapes = MappingProxyType({})
 
     @abstractmethod
     def begin(self, seed: Tensor) -> State:
@@ -35,7 +35,7 @@ class System(nn.Module, ABC):
 
     @abstractmethod
     def predict(self, state: State) -> tuple[Tensor, State]:
-        """The next frame (B, D), and what is carried over, before that frame is pushed."""
+        """The next frame (B, D), and what changes in the state before that frame is pushed."""
 
     @abstractmethod
     def push(self, state: State, frame: Tensor) -> State:
@@ -49,17 +49,52 @@ class System(nn.Module, ABC):
         return free_run(self, windows[:, :seed_frames], windows.shape[1] - seed_frames)
 
     def error(self, predicted: Tensor, truth: Tensor) -> Tensor:
-        """How far predicted frames (B, N, D) are from true ones, in training: here :func:`squared_error`."""
-        return squared_error(predicted, truth)
+        """How far predicted frames (B, N, D) are from true ones, in training: here the mean square."""
+        return (predicted - truth).square().mean()
 
     def loss(self, windows: Tensor, seed_frames: int) -> Tensor:
         """What training makes small, of whole windows (B, L + N, D): here the :meth:`error` of :meth:`imagine`."""
         return self.error(self.imagine(windows, seed_frames), windows[:, seed_frames:])
 
 
-def squared_error(predicted: Tensor, truth: Tensor) -> Tensor:
-    """The mean over rows, frames and channels."""
-    return (predicted - truth).square().mean()
+class Taught(System):
+    """A system that learns the frame after each true one, those of the seed too.
+
+    noise: std, in normalised units, of what is added to the true frames in training (Jain et al. 2016, section 4.1), so
+    that the net learns to return from its own errors.
+    """
+
+    noise = 0.0
+
+    @abstractmethod
+    def follow(self, frames: Tensor) -> tuple[Tensor, State]:
+        """For true frames (B, T, D) what is predicted after each (B, T, D), and what is carried over after all."""
+
+    def progress(self, share: float) -> None:
+        """The noise grows over the training."""
+        self.noise = noise_at(share)
+
+    def loss(self, windows: Tensor, seed_frames: int) -> Tensor:
+        """The mean squared error of the frame after each of the true ones, which are noisy in training."""
+        seen = noisy(windows[:, :-1], self.noise if self.training else 0.0)
+        return self.error(self.follow(seen)[0], windows[:, 1:])
+
+
+def noise_at(share: float) -> float:
+    """The std at this share of the training, 0 to 1, by the settings that Jain et al. 2016 published with their code.
+
+    (iteration from which it holds, std), of 4,000 iterations, which the paper does not say; so the last fifth has most.
+    """
+    schedule = ((3300, 0.7), (2500, 0.5), (2000, 0.3), (1300, 0.2), (1000, 0.1), (500, 0.05), (250, 0.01))
+    return next((std for iteration, std in schedule if share * 4000 >= iteration), 0.0)
+
+
+def noisy(frames: Tensor, std: float) -> Tensor:
+    """Frames (..., D), half of them, drawn afresh at each call, with Gaussian noise; as they are where ``std`` is 0."""
+    if std == 0:
+        return frames
+    chosen = torch.rand_like(frames[..., :1]) < 0.5  # as in the authors' code; the paper does not say
+    return frames + std * chosen * torch.randn_like(frames)
 
 
 def free_run(system: System, seed: Tensor, count: int, truth: Tensor | None = None, own: float = 1.0) -> Tensor:
@@ -68,8 +103,7 @@ def free_run(system: System, seed: Tensor, count: int, truth: Tensor | None = No
     truth: the true frames (B, N, D), mixed into those that are fed back, of which ``own`` is the share that was
         predicted (Li et al. 2018, eq. 10).
     """
-    state = system.begin(seed)
-    frames = []
+    state, frames = system.begin(seed), []
     for n in range(count):
         frame, carried = system.predict(state)
         frames.append(frame)
@@ -97,23 +131,22 @@ class Stepwise(Net):
         """Frames (..., C) in the contract's units to (..., D)."""
         return normalised(frames[..., self.kept], self.mean, self.scale)
 
-    def whole(self, normalised: Tensor, still: Tensor) -> Tensor:
+    def _whole(self, normal: Tensor, still: Tensor) -> Tensor:
         """Normalised frames (..., D) and channels that do not vary (..., C), the others 0 there, to frames (..., C)."""
-        return still + (normalised * self.scale + self.mean) @ self.placing
+        return still + (normal * self.scale + self.mean) @ self.placing
 
-    def still(self, frames: Tensor) -> Tensor:
+    def _still(self, frames: Tensor) -> Tensor:
         """The channels of the last of the frames (B, L, C) that do not vary, and 0 for the others: (B, C)."""
         return frames[:, -1] * (1 - self.placing.sum(0))
 
     def forward(self, frames: Tensor, count: int) -> Tensor:
         """Seed frames (B, L, C) to the next ``count`` ones (B, N, C), both in the contract's units."""
-        found = free_run(self.system, self.normalised(frames), count)
-        return self.whole(found, self.still(frames)[:, None])
+        return self._whole(free_run(self.system, self.normalised(frames), count), self._still(frames)[:, None])
 
     def encode(self, frames: Tensor) -> tuple[Tensor, Tensor]:
         """Seed frames (B, L, C) to all that the step takes, context and state."""
         state = self.system.begin(self.normalised(frames))
-        context = torch.cat([self.still(frames), *_rows(state, self.system.constant)], dim=1)
+        context = torch.cat([self._still(frames), *_rows(state, self.system.constant)], dim=1)
         return context, torch.cat(_rows(state, self.system.carried), dim=1)
 
     def step(self, context: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
@@ -122,7 +155,7 @@ class Stepwise(Net):
         known = {**_parts(state, system.carried), **_parts(context[:, channels:], system.constant)}
         frame, carried = system.predict(known)
         after = system.push({**known, **carried}, frame)
-        return self.whole(frame, context[:, :channels]), torch.cat(_rows(after, system.carried), dim=1)
+        return self._whole(frame, context[:, :channels]), torch.cat(_rows(after, system.carried), dim=1)
 
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """The encoder and the step, each with its contract.
@@ -141,11 +174,9 @@ class Stepwise(Net):
 
 
 def _rows(state: State, shapes: Shapes) -> list[Tensor]:
-    """What has these names, in their order, each (B, ...) as (B, ?)."""
     return [state[name].flatten(1) for name in shapes]
 
 
 def _parts(rows: Tensor, shapes: Shapes) -> State:
-    """The inverse of :func:`_rows`, of what was joined."""
     parts = torch.split_with_sizes(rows, [math.prod(shape) for shape in shapes.values()], dim=1)
     return {name: part.view(-1, *shapes[name]) for name, part in zip(shapes, parts, strict=True)}

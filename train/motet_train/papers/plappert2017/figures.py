@@ -20,11 +20,6 @@ from motet_train.evaluate.language.motions import moves
 from motet_train.evaluate.language.split_store import SplitStore, unknown_words_allowed
 from motet_train.trainer import LOG
 
-DRAWN_MOTIONS = 6
-"""Strips of a picture of test motions."""
-
-ELSE = "other"
-
 
 def describe_drawings(model: DescribeModel, corpus: SplitStore, run: Path | None) -> Drawings:
     """Figures 5, 6, 9a and 10. run: the folder with the log of the training, if any."""
@@ -83,14 +78,16 @@ class Contexts:
     def draw(
         self, colours: Patterns, sentences: Sequence[Sequence[str]], title: str, only: str | None = None
     ) -> Figure:
-        """Each vector in the colour of what its sentences say; only: an action that they have to say."""
-        actions = [common([said(ACTIONS, sentence) for sentence in row]) for row in sentences]
-        shown = [only is None or only in found for found in actions]
-        kinds = [_kind(colours, row) if show else None for row, show in zip(sentences, shown, strict=True)]
+        """Each vector in the colour of what half of its sentences say; only: an action that they have to say."""
+        kinds: list[str | None] = []
+        for row in sentences:
+            actions, found = (common([said(patterns, sentence) for sentence in row]) for patterns in (ACTIONS, colours))
+            shown = only is None or only in actions
+            kinds.append((next(iter(found)) if len(found) == 1 else "other") if shown else None)
         picture, (axes,) = panels(1, 1, (7, 6), title)
-        for number, kind in enumerate([*colours, ELSE]):
+        for number, kind in enumerate([*colours, "other"]):
             chosen = self.places[[found == kind for found in kinds]]
-            colour = "lightgrey" if kind == ELSE else f"C{number}"
+            colour = "lightgrey" if kind == "other" else f"C{number}"
             if len(chosen):
                 axes.scatter(chosen[:, 0], chosen[:, 1], s=12, color=colour, label=f"{kind} ({len(chosen)})")
         axes.set(xticks=[], yticks=[])
@@ -100,7 +97,7 @@ class Contexts:
 
 def descriptions(model: DescribeModel, corpus: SplitStore) -> Figure:
     """Figure 6: test motions with the three best descriptions and their log-probabilities."""
-    test = corpus.described(corpus.parts.test, DRAWN_MOTIONS)
+    test = corpus.described(corpus.parts.test, 6)
     motions = corpus.motions(test)
     rows = [
         "\n".join(f"{found.text}   {found.log_probability:.2f}" for found in row[:3]) for row in model.describe(motions)
@@ -114,9 +111,3 @@ def generated(model: GenerateModel, texts: Sequence[str]) -> Figure:
     scores = ["" if row[0].log_likelihood is None else f"   {row[0].log_likelihood:.1f}" for row in rows]
     titles = [text + score for text, score in zip(texts, scores, strict=True)]
     return strips([row[0].motion for row in rows], titles, "Generated motions and their log-likelihood")
-
-
-def _kind(patterns: Patterns, sentences: Sequence[str]) -> str:
-    """The one attribute that half of the sentences agree on."""
-    found = common([said(patterns, sentence) for sentence in sentences])
-    return next(iter(found)) if len(found) == 1 else ELSE

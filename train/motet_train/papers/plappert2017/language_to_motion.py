@@ -1,12 +1,12 @@
-"""A motion for a sentence: layer-norm GRUs and a mixture of Gaussians for each frame (Plappert et al. 2017, 4.3).
+"""A motion for a sentence: layer-norm GRUs and a mixture of Gaussians for each frame (Plappert et al. 2017, 4.3, 5.2).
 
-Letters in shapes: B rows, T frames, D channels, W words, C units of the context, K components. A frame of D + 1 numbers
-is normalised and has the active flag at its end: 1 on every frame of a motion and 0 on the one that ends it.
+Letters in shapes: B rows, T frames, D channels, W words, C units of the context, K components, G directions, N units;
+"..." is any number of leading axes. A frame of D + 1 numbers is normalised and has the active flag at its end: 1 on
+every frame of a motion and 0 on the one that ends it.
 """
 
-from collections.abc import Mapping
+import math
 from dataclasses import dataclass, replace
-from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -16,10 +16,124 @@ from motet.bundle.graph import GraphSpec, TensorSpec
 from motet.representation.contract import Z_LIMIT
 from motet_train.data.batches import Batch
 from motet_train.models.motion_to_language import LanguageNet, SummaryHead
-from motet_train.models.net import Part, before, normalised, tuples
-from motet_train.models.recurrent import Decoder, Encoder, WordEmbedding
-from motet_train.papers.plappert2017.layer_norm_gru import LayerNormGRU
-from motet_train.papers.plappert2017.mixture_head import Mixture, MixtureHead
+from motet_train.models.net import Part, before, normalised
+from motet_train.models.recurrent import GATES, GRU, Decoder, Encoder, WordEmbedding, mask
+
+
+class LayerNormGRU(GRU):
+    """One layer; the reset gate acts after the recurrent product: candidate tanh(LN(W x + b) + r * LN(U h)).
+
+    Four normalisations, each with gain and bias, 12 N parameters for each direction: of the inputs of both gates
+    jointly, of the input of the candidate, and of the recurrent products of the same two.
+    """
+
+    def __init__(self, inputs: int, units: int, directions: int, gates: str, dropout: float) -> None:
+        super().__init__(inputs, units, directions, gates, dropout)
+        self.input_gate_norm, self.gate_norm = (Norm(directions, 2 * units) for _ in range(2))
+        self.input_candidate_norm, self.candidate_norm = (Norm(directions, units) for _ in range(2))
+
+    def project(self, x: Tensor) -> tuple[Tensor, Tensor]:
+        """As of the plain unit, normalised."""
+        gates, candidate = super().project(x)
+        return self.input_gate_norm(gates), self.input_candidate_norm(candidate)
+
+    def cell(self, state: Tensor, gates: Tensor, candidate: Tensor, keep: Tensor | None) -> Tensor:
+        """The next state (G, B, N); see :meth:`GRU.cell`."""
+        seen = state if keep is None else state * keep
+        squashed = GATES[self.gates](gates + self.gate_norm(seen @ self.gate_recurrence))
+        update, reset = squashed.chunk(2, dim=-1)
+        new = torch.tanh(candidate + reset * self.candidate_norm(seen @ self.candidate_recurrence))
+        return new + update * (state - new)
+
+
+class Norm(nn.Module):
+    """Layer normalisation with a gain and a bias for each direction."""
+
+    def __init__(self, directions: int, units: int) -> None:
+        super().__init__()
+        self.gain = nn.Parameter(torch.ones(directions, 1, units))
+        self.bias = nn.Parameter(torch.zeros(directions, 1, units))
+
+    def forward(self, x: Tensor) -> Tensor:
+        """(G, ?, N) to the same shape: zero mean and unit variance over N, times the gain, plus the bias."""
+        normal: Tensor = functional.layer_norm(x, x.shape[-1:])
+        return normal * self.gain + self.bias
+
+
+@dataclass(frozen=True, eq=False)
+class Mixture:
+    """The distribution of one frame: log_weights (..., K), means and variances (..., K, D), active (...) a logit.
+
+    A channel whose variance is 0 is dead: it is always at its mean, and no part of the density.
+    """
+
+    log_weights: Tensor
+    means: Tensor
+    variances: Tensor
+    active: Tensor
+
+    def log_density(self, frames: Tensor) -> Tensor:
+        """Logarithm of the mixture's density of frames (..., D), by log-sum-exp: eq. 8 without the flag."""
+        return torch.logsumexp(self.log_weights + self._log_densities(frames).sum(dim=-1), dim=-1)
+
+    def surrogate(self, frames: Tensor) -> Tensor:
+        """The weighted mean of the components' log-densities of frames (..., D): eq. 12 without the flag.
+
+        No product of densities is formed, and none lies below 1e-8 (the authors' code), so that none underflows.
+        """
+        floored = torch.log(self._log_densities(frames).exp() + 1e-8).sum(dim=-1)
+        return (self.log_weights.exp() * floored).sum(dim=-1)
+
+    def log_flag(self, flags: Tensor) -> Tensor:
+        """Logarithm of the probability of the flags (...), 1 or 0 (eq. 10)."""
+        # not logsigmoid, which would be exported as the logarithm of a sigmoid that underflows
+        return -functional.softplus(torch.where(flags > 0, -self.active, self.active))
+
+    def log_likelihood(self, frames: Tensor, flags: Tensor) -> Tensor:
+        """Of frames (..., D) with flags (...): eq. 8, and the flag's part alone where the flag is 0."""
+        return torch.where(flags > 0, self.log_density(frames), 0.0) + self.log_flag(flags)
+
+    def surrogate_loss(self, frames: Tensor, flags: Tensor) -> Tensor:
+        """The terms of eq. 12, to be averaged, for frames (..., D) with flags (...)."""
+        return -torch.where(flags > 0, self.surrogate(frames), 0.0) - self.log_flag(flags)
+
+    def _log_densities(self, frames: Tensor) -> Tensor:
+        """Of each channel under each component (..., K, D)."""
+        living = self.variances > 0
+        variances = torch.where(living, self.variances, 1.0)
+        square = (frames[..., None, :] - self.means) ** 2 / variances
+        return torch.where(living, -0.5 * (square + variances.log() + math.log(2 * math.pi)), 0.0)
+
+
+class MixtureHead(nn.Module):
+    """The output layer: from the decoder's outputs to the mixture (section 4.3.1), with dropout before it.
+
+    2 K D + K + 1 outputs. floor: least variance; the paper has none, but without one the likelihood of a channel
+    that never moves has no bound.
+    """
+
+    def __init__(self, inputs: int, channels: int, components: int, floor: float, dropout: float) -> None:
+        super().__init__()
+        self.sizes = [components * channels, components * channels, components, 1]
+        self.components, self.floor, self.dropout = components, floor, dropout
+        self.linear = nn.Linear(inputs, sum(self.sizes))
+        nn.init.zeros_(self.linear.bias)
+        for part in torch.split_with_sizes(self.linear.weight.detach(), self.sizes):
+            nn.init.xavier_uniform_(part)
+
+    def forward(self, x: Tensor) -> Mixture:
+        """Outputs (..., S) of the decoder to mixtures."""
+        keep = mask(self, self.dropout, x, *x.shape)
+        parameters = self.linear(x if keep is None else x * keep).float()
+        means, variances, weights, active = torch.split_with_sizes(parameters, self.sizes, dim=-1)
+        shape = (*x.shape[:-1], self.components, -1)
+        return Mixture(
+            weights.log_softmax(dim=-1),
+            means.reshape(shape),
+            functional.softplus(variances).reshape(shape) + self.floor,
+            active.squeeze(-1),
+        )
+
 
 LOSSES = {"surrogate": Mixture.surrogate_loss, "likelihood": lambda *given: -Mixture.log_likelihood(*given)}
 """Eq. 12, on which the paper's net was trained, and eq. 11, the true likelihood."""
@@ -53,6 +167,8 @@ class LanguageToMotionConfig:
 class LanguageToMotion(LanguageNet):
     """The net with its normalisation."""
 
+    CONFIG = LanguageToMotionConfig
+
     def __init__(self, config: LanguageToMotionConfig) -> None:
         super().__init__(config.channels)
         self.config = config
@@ -67,14 +183,12 @@ class LanguageToMotion(LanguageNet):
 
     def encode(self, words: Tensor, lengths: Tensor) -> Tensor:
         """Words (B, W) without SOS and EOS, of lengths (B,), to contexts (B, C)."""
-        context: Tensor = self.encoder(self.embedding(words), lengths)
-        return context
+        return self.encoder(self.embedding(words), lengths)  # type: ignore[no-any-return]
 
     def outputs(self, frames: Tensor, context: Tensor) -> Tensor:
         """Outputs of the decoder (B, T, S) from which each of the frames (B, T, D + 1) is predicted."""
         given = torch.cat([torch.ones_like(frames[:, :1]), frames[:, :-1]], dim=1).clamp(-Z_LIMIT, Z_LIMIT)
-        found: Tensor = self.decoder(given, context)
-        return found
+        return self.decoder(given, context)  # type: ignore[no-any-return]
 
     def mixture(self, outputs: Tensor) -> Mixture:
         """The distributions of frames from outputs (..., S) of the decoder; dead channels stay at 0."""
@@ -86,17 +200,14 @@ class LanguageToMotion(LanguageNet):
     def terms(self, batch: Batch) -> tuple[Tensor, Tensor | None]:
         """The loss of every frame and of the one after it where a motion ends (N,), eq. 12 or 11; and the summary's."""
         context = self.encode(batch.words, (batch.words != 0).sum(dim=1))
-        return LOSSES[self.config.loss](*self._predictions(batch, context)), self.summary_loss(batch, context)
-
-    def _predictions(self, batch: Batch, context: Tensor) -> tuple[Mixture, Tensor, Tensor]:
-        """Mixtures, frames (N, D) and flags (N,) of all active steps, in one row."""
         normal = functional.pad(normalised(batch.frames, self.mean, self.scale), (0, 0, 0, 1))
         flags = before(batch.lengths, normal.shape[1]).to(normal.dtype)
         active = before(batch.lengths + (1 if batch.ended is None else batch.ended), normal.shape[1])
         fed = self._blurred(normal) if self.training else normal
         outputs = self.outputs(torch.cat([fed, flags[..., None]], dim=-1), context)
         # padded steps are left out before the output layer, which is the largest product of all
-        return self.mixture(outputs[active]), normal[active], flags[active]
+        loss = LOSSES[self.config.loss](self.mixture(outputs[active]), normal[active], flags[active])
+        return loss, self.summary_loss(batch, context)
 
     def _blurred(self, normal: Tensor) -> Tensor:
         """Frames (B, T, D) as training feeds them back: with noise, and some of them left out."""
@@ -133,8 +244,3 @@ class LanguageToMotion(LanguageNet):
         step = GraphSpec((frame, context, state), (*mixture, following), {"state": "next_state"})
         encoder = GraphSpec((words, lengths), (context,))
         return {"encoder": (Part(self, self.encode), encoder), "step": (Part(self, self.step), step)}
-
-
-def from_config(config: Mapping[str, Any]) -> LanguageToMotion:
-    """An untrained net of a configuration as it stands in a manifest."""
-    return LanguageToMotion(LanguageToMotionConfig(**tuples(config)))

@@ -1,19 +1,24 @@
-"""Labelled clips: a few short motions, each with the name of what it shows; and sequences cut from them."""
+"""Labelled clips: a few short motions, each with the name of what it shows; their body parts, and their periods."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
 
 from motet.errors import MotionError
 from motet.formats import READABLE, read_motion
 from motet.motion.kinematics import skeleton_of, without_heading
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
-from motet.motion.skeleton import Skeleton
+from motet.motion.skeleton import LEFT, MIDDLE, Skeleton, sides_of
 from motet.representation.base import phases
 from motet.representation.retargeting import in_joints_of
 from motet_train.data.cmu_trials import CMU_CLIPS, CMU_LICENCE, cmu_trial
 from motet_train.data.errors import DataError
+
+TRUNK_PART = "trunk"
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,11 +70,10 @@ def read_clips(folder: Path | None = None, root_rotation: bool = True, unit: str
         for label, found in paths.items()
     }
     first_path, first = next(iter(read.values()))[0]
-    motions = {
-        label: [_fit(path, motion, first_path, first) for path, motion in found] for label, found in read.items()
-    }
-    licence = CMU_LICENCE if folder is None else None
-    return Clips(motions, _metric(skeleton_of(first)), licence)
+    motions = {label: [_fit(*one, first_path, first) for one in found] for label, found in read.items()}
+    skeleton = skeleton_of(first)
+    metric = skeleton if skeleton.metres_per_unit is None else skeleton.scaled(1.0)
+    return Clips(motions, metric, CMU_LICENCE if folder is None else None)
 
 
 def _find(folder: Path) -> dict[str, list[Path]]:
@@ -95,10 +99,8 @@ def _angles(motion: Motion, root_rotation: bool) -> Motion:
     """The Euler channels of a motion in degrees, without heading and without leaps."""
     level = without_heading(motion.continuous())
     root = skeleton_of(motion).joints[0].name
-    wanted = {
-        c for joint, columns in level.rotation_columns().items() if root_rotation or joint != root for c in columns
-    }
-    channels = tuple(name for column, name in enumerate(level.channels) if column in wanted)
+    columns = [c for joint, of in level.rotation_columns().items() if root_rotation or joint != root for c in of]
+    channels = tuple(level.channels[column] for column in sorted(columns))
     return level.select(channels, ("deg",) * len(channels))
 
 
@@ -112,5 +114,57 @@ def _fit(path: Path, motion: Motion, first_path: Path, first: Motion) -> Motion:
         raise DataError(f"{path} does not match {first_path}: {error}") from error
 
 
-def _metric(skeleton: Skeleton) -> Skeleton:
-    return skeleton if skeleton.metres_per_unit is None else skeleton.scaled(1.0)
+@dataclass(frozen=True, eq=False)
+class BodyParts:
+    """names: the parts that have channels, a limb by its topmost joint. of_channel (D,): which part a channel is of.
+
+    legs: the parts of the left and the right leg; empty where no two limbs go down.
+    """
+
+    names: tuple[str, ...]
+    of_channel: NDArray[np.intp]
+    legs: tuple[int, ...]
+
+
+def body_parts(skeleton: Skeleton, channels: tuple[str, ...]) -> BodyParts:
+    """Divide channels ("JOINT.rx") among the trunk and the limbs (thesis 4.1, figure 4.2).
+
+    A limb begins at a joint of the left or the right side whose parent is in the middle. CMU's skeleton gives the
+    thesis' five parts: trunk with head, two legs, two arms. Channels of no joint, which say where the root goes, are
+    the trunk's.
+    """
+    sides = sides_of(skeleton.names)
+    limb_of = [TRUNK_PART] * len(skeleton.joints)
+    for i, joint in enumerate(skeleton.joints[1:], start=1):
+        limb_of[i] = limb_of[joint.parent] if limb_of[joint.parent] != TRUNK_PART or sides[i] == MIDDLE else joint.name
+    limbs = dict(zip(skeleton.names, limb_of, strict=True))
+    of_joint = [limbs.get(channel.rpartition(".")[0], TRUNK_PART) for channel in channels]
+    names = tuple(dict.fromkeys(of_joint))
+    lowest: dict[str, tuple[float, str]] = {}  # the limbs of the lowest tip on each side at rest
+    for limb, side, (_, height, _) in zip(limb_of, sides, skeleton.rest_positions, strict=True):
+        if limb != TRUNK_PART:
+            lowest[side] = min(lowest.get(side, (np.inf, "")), (float(height), limb))
+    by_side = sorted(lowest.items(), key=lambda item: item[0] != LEFT)
+    legs = [names.index(limb) for _, (_, limb) in by_side if limb in names]
+    return BodyParts(names, np.array([names.index(limb) for limb in of_joint]), tuple(legs) if len(legs) == 2 else ())
+
+
+def period(frames: Array) -> float:
+    """The period of frames (T, D), in frames; NaN where there is none.
+
+    The first peak of the autocorrelation that reaches 0.9 of its largest peak, by a parabola through three points.
+    """
+    signal = frames - frames.mean(axis=0)
+    lags = min(len(signal) - 8, 200)
+    curve = np.array([(signal[lag:] * signal[: len(signal) - lag]).sum() / (len(signal) - lag) for lag in range(lags)])
+    peaks = np.flatnonzero((curve[1:-1] > curve[:-2]) & (curve[1:-1] >= curve[2:]) & (curve[1:-1] > 0)) + 1
+    if not len(peaks) or signal.std() < 1e-6:
+        return float("nan")
+    peak = int(peaks[np.argmax(curve[peaks] > 0.9 * curve[peaks].max())])
+    left, middle, right = curve[peak - 1 : peak + 2]
+    return float(peak + 0.5 * (left - right) / (left - 2 * middle + right))
+
+
+def is_periodic(sequences: Sequence[Array]) -> bool:
+    """Whether all sequences (T, D) of a motion come back to their poses, as walking does and bending over does not."""
+    return all(bool(np.isfinite(period(frames))) for frames in sequences)

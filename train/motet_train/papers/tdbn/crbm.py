@@ -9,18 +9,7 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor, nn
 
-from motet_train.papers.tdbn.contrastive import (
-    Ascent,
-    DivergedError,
-    Epoch,
-    Layer,
-    Learning,
-    balanced,
-    parameter,
-)
-
-LARGEST_WEIGHT = 1e3
-"""A weight beyond this shows that training diverged; normally weights stay near 1."""
+from motet_train.papers.tdbn.rbm import DivergedError, Epoch, Layer, Learning, balanced, parameter
 
 
 class CRBM(nn.Module):
@@ -125,17 +114,15 @@ class CRBMLayer(Layer):
     def __init__(
         self, crbm: CRBM, data: Transitions, learning: Learning, generator: torch.Generator, clamped: bool, recall: Past
     ) -> None:
+        super().__init__(crbm, learning, data.probabilities, generator)
         self.crbm, self.data, self.clamped, self.recall = crbm, data, clamped, recall
-        ascents = {name: Ascent(value, learning.decay) for name, value in crbm.named_parameters()}
-        super().__init__(learning, data.probabilities, ascents, generator)
 
     @torch.no_grad()
-    def learn(self, epoch: Epoch) -> float:
-        """Visit the epoch's batches; DivergedError where the weights leave all bounds."""
+    def _learn(self, epoch: Epoch) -> float:
         for rows in epoch.batches:
             error = self._update(self.data.past[rows], self.data.visible[rows], self.data.control[rows], epoch)
-        if not self.crbm.past_weight.abs().max() <= LARGEST_WEIGHT:
-            raise DivergedError(f"training diverged: the CRBM has weights beyond {LARGEST_WEIGHT:g}")
+        if not self.crbm.past_weight.abs().max() <= 1000:  # normally weights stay near 1
+            raise DivergedError("training diverged: the CRBM has weights beyond 1000")
         return float(error.square().mean())
 
     def _update(self, past: Tensor, visible: Tensor, control: Tensor, epoch: Epoch) -> Tensor:
@@ -144,8 +131,12 @@ class CRBMLayer(Layer):
             past = past + recall.noise * torch.randn(past.shape, generator=generator, device=past.device)
         if recall.own:
             past, control = self._own(past, control, epoch.temperature)
-        free = _sampled_free(crbm, visible, past, epoch.temperature, generator)
-        end, end_free = settle(crbm, past, control, free, self.learning.steps, epoch.temperature, generator)
+        free = self._sampled(visible, past, epoch.temperature)
+        drive, begun = crbm.drive(past, control), free
+        for _ in range(self.learning.steps - 1 if crbm.free_units else 0):  # Gibbs steps
+            begun = self._sampled(crbm.visible(drive, begun, epoch.temperature), past, epoch.temperature)
+        end = crbm.visible(drive, begun, epoch.temperature)
+        end_free = crbm.free(end, past, epoch.temperature)
         end_control = control if self.clamped else crbm.control(end, epoch.temperature)
         hidden, end_hidden = torch.cat([control, free], 1), torch.cat([end_control, end_free], 1)
         climb["past_weight"].outer(past, visible - end, replace(epoch, rate=epoch.rate * recall.rate))
@@ -170,27 +161,10 @@ class CRBMLayer(Layer):
             history = torch.cat([history[:, 1:], new[:, None]], dim=1)
         return history.flatten(1), told[-1]
 
-
-def settle(
-    crbm: CRBM,
-    past: Tensor,
-    control: Tensor,
-    free: Tensor,
-    steps: int,
-    temperature: float,
-    generator: torch.Generator,
-) -> tuple[Tensor, Tensor]:
-    """k Gibbs steps from free units (B, F): means of the visible (B, H) and of the free units (B, F)."""
-    drive = crbm.drive(past, control)
-    for _ in range(steps - 1 if crbm.free_units else 0):
-        free = _sampled_free(crbm, crbm.visible(drive, free, temperature), past, temperature, generator)
-    end = crbm.visible(drive, free, temperature)
-    return end, crbm.free(end, past, temperature)
-
-
-def _sampled_free(crbm: CRBM, visible: Tensor, past: Tensor, temperature: float, generator: torch.Generator) -> Tensor:
-    free = crbm.free(visible, past, temperature)
-    if not crbm.free_units:
-        return free
-    # not torch.bernoulli: learning that blows up is noticed at the end of its epoch
-    return (torch.rand(free.shape, generator=generator, device=free.device) < free).to(free.dtype)
+    def _sampled(self, visible: Tensor, past: Tensor, temperature: float) -> Tensor:
+        """Free units (B, F)."""
+        free = self.crbm.free(visible, past, temperature)
+        if not self.crbm.free_units:
+            return free
+        # not torch.bernoulli: learning that blows up is noticed at the end of its epoch
+        return (torch.rand(free.shape, generator=self.generator, device=free.device) < free).to(free.dtype)

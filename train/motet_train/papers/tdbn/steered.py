@@ -1,27 +1,63 @@
-"""The thesis' family as a figure that travels: its channels say where the root goes, its control values where to."""
+"""The thesis' family as a figure that travels: its channels say where the root goes, its control values where to.
+
+A control value is one of six numbers from 0 to 1 (:data:`LABELS`). A trained net is steered as a figure of motion
+matching is, so that the same measures see it: each tick a small rule turns speed, direction and facing into the control
+values, the velocity as the figure sees it and a turn by how far its facing is off; what the net says of the velocities
+of the root is where the figure goes.
+"""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from motet.bundle.graph import Floats
+from motet.models.tdbn_control import TdbnModel
+from motet.motion.feet.contacts import ContactSettings, standing
+from motet.motion.feet.lock import FootLock
+from motet.motion.humanoid import sole_points
 from motet.motion.motion import Motion
-from motet.motion.rotations import Array
+from motet.motion.pose import Pose
+from motet.motion.rotations import Array, quat_to_rotmat, rotmat_to_quat, wrapped
 from motet.representation.contract import MotionContract, living
-from motet.representation.root_sixd import ROOT_SIXD
+from motet.representation.root_sixd import ROOT_SIXD, sixd_to_rotmat
 from motet_train.data.errors import DataError
 from motet_train.data.matching_rows import Recording, gaits_of, recordings
 from motet_train.data.store import Store
 from motet_train.data.table import Gait
-from motet_train.papers.tdbn.angle_crbm import AngleCRBMConfig
-from motet_train.papers.tdbn.contrastive import Learning
-from motet_train.papers.tdbn.courses import LABELS, controls_of, course
+from motet_train.papers.tdbn.rbm import Learning
 from motet_train.papers.tdbn.recipe import Lessons, train_lessons, untrained
-from motet_train.papers.tdbn.tdbn import TDBNConfig
+from motet_train.papers.tdbn.tdbn import AngleCRBMConfig, TDBNConfig
 from motet_train.recipes.recipe import Job, Recipe
 from motet_train.runs import Run
 
-GAITS = ("walk", "run")
+LABELS = ("forward", "backward", "left", "right", "turn_left", "turn_right")
+
+FULL_CONTROL = (4.5, 4.5, 3.0)
+"""What a value of 1 stands for, ahead, aside (m/s) and turning (rad/s)."""
+
+
+def controls_of(velocities: ArrayLike) -> Array:
+    """Velocities (..., 3), forward, to the left (m/s) and turning to the left (rad/s), as control values (..., 6)."""
+    shares = np.asarray(velocities, dtype=np.float64) / FULL_CONTROL
+    both = np.stack([shares, -shares], axis=-1)
+    values: Array = np.clip(both, 0, 1).reshape(*shares.shape[:-1], len(LABELS))
+    return values
+
+
+def course(features: Motion) -> Array:
+    """Velocities (T, 3) of frames in ``root_sixd``: each the mean of the next half second, or to the end."""
+    values = features.select(ROOT_SIXD[:3]).values
+    total = np.concatenate([np.zeros((1, 3)), np.cumsum(values, axis=0)])
+    start = np.arange(len(values))
+    stop = np.minimum(start + max(1, round(0.5 * features.fps)), len(values))
+    found: Array = (total[stop] - total[start]) / (stop - start)[:, None]
+    return found
+
+
+GAITS = {"walk": (0.3, 1.8), "run": (1.8, 4.0)}
+"""The slowest and the fastest that each is asked for, m/s. The net has no gaits: it walks or runs as the speed asks."""
 
 TDBN = TDBNConfig(
     hidden_per_part=60,
@@ -87,3 +123,93 @@ def _stillest(found: Sequence[Recording], taps: int) -> Array:
     """The frames (K, D) at the start of the recording in which the root moves least there."""
     starts = [one.features.values[:taps] for one in found if len(one.features) >= taps]
     return min(starts, key=lambda frames: float(np.abs(frames[:, : len(ROOT_SIXD) - 1]).sum()))
+
+
+@dataclass(frozen=True, eq=False)
+class Driven:
+    """A control model with :data:`LABELS`, to be measured in place of :class:`motet.models.steer.SteerModel`: the part
+    of it that measures use."""
+
+    model: TdbnModel
+    gaits: tuple[str, ...] = tuple(GAITS)
+
+    @staticmethod
+    def fits(model: TdbnModel) -> bool:
+        """Whether a model is such a net."""
+        return model.labels == LABELS and model.contract.representation == "root_sixd"
+
+    @property
+    def fps(self) -> float:
+        """Ticks a second."""
+        return self.model.fps
+
+    @property
+    def speeds(self) -> dict[str, tuple[float, float]]:
+        """The slowest and the fastest that each gait is asked for, m/s."""
+        return GAITS
+
+    def start(self, start: str | None = None, *, characters: int = 1, hold_feet: bool = True) -> "DrivenSession":
+        """A session of figures that stand, whatever the gait. hold_feet: with the foot lock."""
+        return DrivenSession(self.model, characters, hold_feet)
+
+
+class DrivenSession:
+    """Figures that are told what :class:`motet.models.steer_session.SteerSession` is told."""
+
+    def __init__(self, model: TdbnModel, characters: int, hold_feet: bool) -> None:
+        self.session, self.fps = model.start(characters=characters), model.fps
+        self.ground = np.zeros((characters, 3))
+        self.told = np.zeros((3, characters))
+        self.lock = FootLock(characters, 1 / self.fps) if hold_feet else None
+
+    def control(
+        self,
+        *,
+        gait: str | Sequence[str] | None = None,
+        speed: ArrayLike | None = None,
+        direction: ArrayLike | None = None,
+        facing: ArrayLike | None = None,
+    ) -> None:
+        """As a steered figure is told; the gait says nothing to the net."""
+        if speed is not None:
+            self.told[0] = speed
+        for row, angles in ((1, direction), (2, direction if facing is None else facing)):
+            if angles is not None:
+                self.told[row] = np.radians(angles)
+
+    @property
+    def target(self) -> Array:
+        """What the figures were told (B, 3): velocity along x and z, m/s, and facing, radians."""
+        speed, direction, facing = self.told
+        return np.stack([speed * np.sin(direction), speed * np.cos(direction), facing], axis=1)
+
+    def tick(self) -> Pose:
+        """The next pose of all figures."""
+        speed, direction, facing = self.told
+        aside, off = direction - self.ground[:, 2], wrapped(facing - self.ground[:, 2])
+        # it is told to turn by 3 rad/s for each radian that its facing is off
+        velocities = np.stack([speed * np.cos(aside), speed * np.sin(aside), 3.0 * off], axis=-1)
+        self.session.set_control(controls_of(velocities))
+        pose = self.pose(self.session.step())
+        return pose if self.lock is None else self.lock.held(pose)
+
+    def pose(self, frames: Floats) -> Pose:
+        """The pose of frames (B, D), one tick after the last."""
+        values = frames.astype(np.float64)
+        self.ground = moved(self.ground, values[:, : len(ROOT_SIXD) - 1] / self.fps)
+        quats = rotmat_to_quat(sixd_to_rotmat(values[:, len(ROOT_SIXD) :].reshape(len(values), -1, 6)))
+        unknown = np.zeros((len(values), 2), dtype=np.float32)
+        pose = Pose(self.ground, quats.astype(np.float32), frames[:, len(ROOT_SIXD) - 1], unknown)
+        turned, places = (part.astype(np.float64) for part in pose.global_transforms())
+        heights = sole_points(quat_to_rotmat(turned), places)[..., 1].reshape(len(pose), 2, 3).min(axis=2)
+        # the net says nothing of contacts: a foot stands, for the foot lock, by the height of its lowest point
+        contacts = standing(heights, None, ContactSettings(heights=(0.03, 0.03))).astype(np.float32)
+        return replace(pose, contacts=contacts)
+
+
+def moved(ground: Array, steps: Array) -> Array:
+    """Places (B, 3), x, z and facing, after steps (B, 3), forward, to the left and turned, as the figures see them."""
+    forward, left, turn = steps.T
+    sin, cos = np.sin(ground[:, 2]), np.cos(ground[:, 2])
+    found: Array = ground + np.stack([forward * sin + left * cos, forward * cos - left * sin, turn], axis=-1)
+    return found

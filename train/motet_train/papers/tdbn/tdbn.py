@@ -1,25 +1,148 @@
-"""Temporal deep belief net (thesis, chapter 4): a body-part RBM under a conditional RBM over its codes.
+"""Control nets: the temporal deep belief net (thesis, chapter 4), and its baseline straight on the joint angles.
 
 Where the thesis' text and its author's code differ, the default follows what works (docs/control.md shows both):
 control units stay clamped in the reconstruction, binary layers are annealed, and the root's rotation is among the
 channels; :meth:`TDBNConfig.thesis` is the text.
 
-Letters in shapes: B rows, T frames, D channels, H codes, K taps, L labels, C control units, F free hidden units.
+Letters in shapes: B rows, T frames, D channels, H codes, K taps, L labels, C control units, F free hidden units, N
+numbers of noise for the codes of a frame.
 """
 
+import math
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from typing import Any
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
-from motet_train.models.net import tuples
-from motet_train.papers.tdbn.contrastive import Learning, Stage, balanced
-from motet_train.papers.tdbn.control_net import ControlNet, Sequences, binary
-from motet_train.papers.tdbn.crbm import CRBM, Past
-from motet_train.papers.tdbn.rbm import RBM, RBMLayer, block_mask
+from motet.bundle.graph import GraphSpec, TensorSpec
+from motet.representation.contract import Z_LIMIT
+from motet_train.models.net import Net, Part, configured, normalised
+from motet_train.papers.tdbn.crbm import CRBM, CRBMLayer, Past, transitions
+from motet_train.papers.tdbn.rbm import RBM, Learning, RBMLayer, Stage, balanced, block_mask
+
+Sequences = Sequence[Sequence[Tensor]]
+"""For each group, such as a label, its sequences of frames (T, D), or the labels' values (T, L) at these."""
+
+
+class ControlNet(Net):
+    """A CRBM over codes of frames; subclasses say how frames become codes, and codes frames.
+
+    config: sizes and training, see the subclasses. noise_units: N.
+    """
+
+    config: Any
+    expansion: Tensor
+
+    def __init__(self, crbm: CRBM, labels: int, channels: int, taps: int) -> None:
+        super().__init__(channels)
+        self.crbm, self.taps = crbm, taps
+        self.noise_units = len(crbm.visible_bias)
+        # each label has its own control units, which are all 1 or all 0 (thesis 5.4)
+        self.register_buffer("expansion", torch.eye(labels).repeat_interleave(crbm.control_units // labels, dim=1))
+
+    @property
+    def defaults(self) -> dict[str, float]:
+        """How a session runs that is told nothing else."""
+        return {"temperature": self.config.temperature}
+
+    def normalised(self, frames: Tensor) -> Tensor:
+        """Frames (B, D) as Gaussian units of variance 1 see them: over sigma standard deviations."""
+        return normalised(frames, self.mean, self.scale, Z_LIMIT / self.config.sigma)
+
+    @abstractmethod
+    def encode(self, frames: Tensor) -> Tensor:
+        """Frames (B, D) to codes (B, H)."""
+
+    @abstractmethod
+    def decode(self, codes: Tensor) -> Tensor:
+        """Codes (B, H) to frames (B, D)."""
+
+    @abstractmethod
+    def vary(self, mean: Tensor, noise: Tensor, variety: Tensor) -> Tensor:
+        """Codes (B, H) between their means (variety 0) and samples (variety 1), from uniform noise (B, N)."""
+
+    @abstractmethod
+    def to_config(self) -> dict[str, Any]:
+        """Everything that ``from_config`` needs, but for tuples ready for JSON."""
+
+    @abstractmethod
+    def stages(
+        self, sequences: Sequences, controls: Sequences, onsets: Sequence[float], generator: torch.Generator
+    ) -> tuple[list[Stage], Mapping[str, nn.Module]]:
+        """How the net learns, one layer after the other (thesis 3.3), and what else has a state.
+
+        The mean and the scale must be set. onsets: see :func:`motet_train.papers.tdbn.crbm.transitions`.
+        """
+
+    def begin_crbm(self, generator: torch.Generator) -> None:
+        """Set the first weights of the CRBM."""
+        for parameter in self.crbm.parameters():
+            parameter.zero_()
+        for weight in (self.crbm.past_weight, self.crbm.hidden_weight, self.crbm.free_past_weight):
+            if weight is not None:
+                weight.normal_(0.0, self.config.initial, generator=generator)
+
+    def crbm_layer(
+        self,
+        sequences: Sequences,
+        controls: Sequences,
+        onsets: Sequence[float],
+        generator: torch.Generator,
+        past: Past,
+        clamped: bool = True,
+    ) -> CRBMLayer:
+        """The CRBM as what learns, from sequences encoded as they are now."""
+        codes = [[self.encode(frames) for frames in found] for found in sequences]
+        units = [[values @ self.expansion for values in found] for found in controls]
+        data = transitions(codes, units, self.taps, onsets, past.own)
+        return CRBMLayer(self.crbm, data, self.config.crbm, generator, clamped, past)
+
+    def step(
+        self,
+        history: Tensor,
+        control: Tensor,
+        noise: Tensor,
+        variety: Tensor,
+        temperature: Tensor,
+        codes: Tensor | None = None,
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """One Gibbs iteration of the CRBM, and its codes decoded (thesis 4.1, 5.2).
+
+        history (B, K, H) oldest first, control (B, L), noise (B, N+F) uniform in [0, 1), variety (B, 1), temperature
+        (B, 1), and where there are free units codes (B, H) to infer them from -> codes (B, H), frame (B, D), the
+        history with the codes at its end (B, K, H).
+        """
+        crbm, units, past = self.crbm, self.noise_units, history.flatten(1)
+        drive = crbm.drive(past, control @ self.expansion)
+        free = drive[:, :0]
+        if codes is not None:
+            free = _binary(crbm.free(codes, past, temperature), noise[:, units:], variety)
+        new = self.vary(crbm.visible(drive, free, temperature), noise[:, :units], variety)
+        return new, self.decode(new), torch.cat([history[:, 1:], new[:, None]], dim=1)
+
+    def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
+        """The encoder and the step, each with its contract."""
+        codes, channels, free = (len(self.crbm.visible_bias),), (len(self.mean),), self.crbm.free_units
+        history, control, noise = (self.taps, *codes), (len(self.expansion),), (self.noise_units + free,)
+        inputs = {"history": history, "control": control, "noise": noise, "variety": (1,), "temperature": (1,)}
+        outputs = {"next_codes": codes, "frame": channels, "next_history": history}
+
+        def specs(sizes: Mapping[str, tuple[int, ...]]) -> tuple[TensorSpec, ...]:
+            return tuple(TensorSpec(name, ("batch", *size)) for name, size in sizes.items())
+
+        given = specs({**inputs, "codes": codes} if free else inputs)
+        step = GraphSpec(given, specs(outputs), {"history": "next_history"})
+        encoder = GraphSpec(specs({"frames": channels}), specs({"codes": codes}))
+        return {"encoder": (Part(self, self.encode), encoder), "step": (Part(self, self.step), step)}
+
+
+def _binary(mean: Tensor, noise: Tensor, variety: Tensor) -> Tensor:
+    """Between probabilities (variety 0) and binary samples of them (variety 1)."""
+    return mean + variety * ((noise < mean).to(mean.dtype) - mean)
 
 
 @dataclass(frozen=True)
@@ -57,20 +180,9 @@ class TDBNConfig:
     @staticmethod
     def thesis() -> "TDBNConfig":
         """The thesis' text: 56 angles, control units unclamped in the reconstruction, no annealing (5.2 to 5.4)."""
-        flat = (1.0, 1.0)
-        return TDBNConfig(
-            root_rotation=False,
-            control_units=7,
-            clamped=False,
-            sigma=1.0,
-            past_noise=0.0,
-            onset=1.0,
-            temperature=1.0,
-            restarts=1,
-            tries=1,
-            rbm=Learning(epochs=1000, temperature=flat),
-            crbm=Learning(epochs=100, temperature=flat),
-        )
+        rbm, crbm = (Learning(epochs, temperature=(1.0, 1.0)) for epochs in (1000, 100))
+        net = TDBNConfig(root_rotation=False, control_units=7, rbm=rbm, crbm=crbm)
+        return replace(net.unclamped(), sigma=1.0, past_noise=0.0, onset=1.0, temperature=1.0)
 
     def unclamped(self) -> "TDBNConfig":
         """The same recipe with control units inferred in the reconstruction, as the thesis' text has it (5.3)."""
@@ -100,7 +212,7 @@ class TDBN(ControlNet):
 
     def vary(self, mean: Tensor, noise: Tensor, variety: Tensor) -> Tensor:
         """Between the probabilities (variety 0) and binary samples of them (variety 1)."""
-        return binary(mean, noise, variety)
+        return _binary(mean, noise, variety)
 
     def stages(
         self, sequences: Sequences, controls: Sequences, onsets: Sequence[float], generator: torch.Generator
@@ -129,13 +241,94 @@ class TDBN(ControlNet):
         return [first, *tries], {"rbms": rbms}
 
     def to_config(self) -> dict[str, Any]:
-        """As :meth:`motet_train.papers.tdbn.control_net.ControlNet.to_config`."""
+        """As of all."""
         parts = self.rbm.mask[:, :: self.config.hidden_per_part].argmax(dim=1).tolist()
         return {**asdict(self.config), "parts": parts, "labels": len(self.expansion)}
 
+    @classmethod
+    def from_config(cls, config: Mapping[str, Any]) -> "TDBN":
+        """An untrained net of the sizes that :meth:`to_config` wrote."""
+        sizes = {key: value for key, value in config.items() if key not in ("parts", "labels")}
+        return cls(configured(TDBNConfig, sizes), config["parts"], config["labels"])
 
-def from_config(config: Mapping[str, Any]) -> TDBN:
-    """An untrained net of the sizes that :meth:`TDBN.to_config` wrote."""
-    values = tuples(config)
-    parts, labels = values.pop("parts"), values.pop("labels")
-    return TDBN(TDBNConfig(**{**values, **{key: Learning(**values[key]) for key in ("rbm", "crbm")}}), parts, labels)
+
+@dataclass(frozen=True)
+class AngleCRBMConfig:
+    """Sizes of the net and how it is trained.
+
+    Taylor's rates, 1e-3 and 1e-5 for past to visible, are for gradients summed over a mini-batch; ours are means, so
+    that they are 20 times as large here: 2e-2 and 2e-4.
+    """
+
+    fps: float = 40.0
+    root_rotation: bool = True
+    taps: int = 3
+    control_units: int = 1
+    """For each label. More of them act as one whose weights learn that many times as fast."""
+    free_units: int = 60
+    sigma: float = 1.0
+    """Standard deviation of a Gaussian visible unit, in units of its channel's own."""
+    past_noise: float = 1.0
+    past_rate: float = 2e-4
+    """First learning rate of the weights from the past to the visible units."""
+    onset: float = 100.0
+    """See :class:`TDBNConfig`."""
+    temperature: float = 1.0
+    iterations: int = 30
+    """Gibbs iterations for each generated frame."""
+    initial: float = 0.01
+    """Standard deviation of the initial weights."""
+    crbm: Learning = field(
+        default_factory=lambda: Learning(400, 3e-2, final_rate=0.01, decay=2e-4, steps=5, temperature=(1.0, 1.0))
+    )
+
+
+class AngleCRBM(ControlNet):
+    """A conditional RBM straight on the joint angles (Taylor 2007), which the thesis builds on, with its normalisation.
+
+    The visible units, and codes, are the z-scored angles, Gaussian with unit variance; there is no RBM below.
+    channels: how many (D). labels: how many (L).
+    """
+
+    def __init__(self, config: AngleCRBMConfig, channels: int, labels: int) -> None:
+        crbm = CRBM(channels, config.taps, labels * config.control_units, config.free_units, taylor=True)
+        super().__init__(crbm, labels, channels, config.taps)
+        self.config = config
+        self.noise_units = 2 * channels
+
+    def encode(self, frames: Tensor) -> Tensor:
+        """Frames (B, D) to z-scored angles (B, D)."""
+        return self.normalised(frames)
+
+    def decode(self, codes: Tensor) -> Tensor:
+        """Z-scored angles (B, D) to frames (B, D)."""
+        return codes * self.scale + self.mean
+
+    def vary(self, mean: Tensor, noise: Tensor, variety: Tensor) -> Tensor:
+        """Means (variety 0) and normal samples about them (variety 1), by Box and Muller from noise (B, 2 D)."""
+        first, second = noise.chunk(2, dim=1)
+        return mean + variety * torch.sqrt(-2 * torch.log(1 - first)) * torch.cos(2 * math.pi * second)
+
+    @property
+    def defaults(self) -> dict[str, float]:
+        """Also the Gibbs iterations."""
+        return {**super().defaults, "iterations": self.config.iterations}
+
+    def stages(
+        self, sequences: Sequences, controls: Sequences, onsets: Sequence[float], generator: torch.Generator
+    ) -> tuple[list[Stage], dict[str, nn.Module]]:
+        """The CRBM learns; nothing else has a state."""
+        config = self.config
+        past = Past(config.past_noise, config.past_rate / config.crbm.rate)
+        layer = partial(self.crbm_layer, sequences, controls, onsets, generator, past)
+        return [Stage(config.crbm.epochs, partial(self.begin_crbm, generator), layer, whole=True)], {}
+
+    def to_config(self) -> dict[str, Any]:
+        """As of all."""
+        return {**asdict(self.config), "channels": len(self.mean), "labels": len(self.expansion)}
+
+    @classmethod
+    def from_config(cls, config: Mapping[str, Any]) -> "AngleCRBM":
+        """An untrained net of the sizes that :meth:`to_config` wrote."""
+        sizes = {key: value for key, value in config.items() if key not in ("channels", "labels")}
+        return cls(configured(AngleCRBMConfig, sizes), config["channels"], config["labels"])

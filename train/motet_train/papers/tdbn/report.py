@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -9,22 +10,21 @@ import numpy as np
 from motet.models.tdbn_control import TdbnModel
 from motet_train.data.errors import DataError
 from motet_train.evaluate.tables import Goals, Report, gathered, reached
-from motet_train.papers.tdbn.body import BodyParts, body_parts
-from motet_train.papers.tdbn.clips import Clips
-from motet_train.papers.tdbn.experiments.bend import bends, interruptions
-from motet_train.papers.tdbn.experiments.gaits import (
+from motet_train.papers.tdbn.clips import Clips, body_parts, is_periodic
+from motet_train.papers.tdbn.experiments import (
+    bends,
     constant_hysteresis,
     convergence,
     gait_transitions,
+    interruptions,
+    leaps,
     limit_cycle,
     ramp_hysteresis,
     sampled_runs,
+    standing_feet,
     synchronisation,
 )
-from motet_train.papers.tdbn.experiments.measures import Reference
-from motet_train.papers.tdbn.experiments.shown import leaps, standing_feet
-from motet_train.papers.tdbn.experiments.study import ControlStudy, Leg
-from motet_train.papers.tdbn.period import is_periodic
+from motet_train.papers.tdbn.study import ControlStudy, Leg, Reference
 
 GOALS: Goals = {
     "train.seconds": (None, 30),
@@ -56,8 +56,6 @@ GOALS: Goals = {
 }
 """Figure -> (least, most) that the default recipe is to reach; its clips show walk, run and bend."""
 
-ROLES = re.compile(r"(?<![a-z])(?:walk|run|bend)(?![a-z])")
-
 
 def study_of(model: TdbnModel, clips: Clips) -> ControlStudy:
     """A model beside the clips it was trained on; DataError where clips and model do not go together.
@@ -73,43 +71,45 @@ def study_of(model: TdbnModel, clips: Clips) -> ControlStudy:
     if not gaits:
         raise DataError("the experiments need clips of a periodic motion, such as walking")
     run, bend = (next(iter(found), None) for found in (gaits[1:], [label for label in motions if label not in gaits]))
-    return ControlStudy(model, reference, gaits[0], run, bend, _legs(model, parts))
+    # codes are the channels themselves, or as many of each part
+    of_channel = of_code = parts.of_channel
+    if model.codes != len(of_code):
+        of_code = np.repeat(np.arange(len(parts.names)), model.codes // len(parts.names))
+    legs = [Leg(np.flatnonzero(of_channel == part), np.flatnonzero(of_code == part)) for part in parts.legs]
+    return ControlStudy(model, reference, gaits[0], run, bend, (legs[0], legs[1]) if legs else None)
 
 
-def experiments(study: ControlStudy) -> dict[str, list[Callable[[], Mapping[str, float]]]]:
+def experiments_of(study: ControlStudy) -> dict[str, list[Callable[[], Mapping[str, float]]]]:
     """For each group of figures the experiments that give them; names are those of CMU's labels."""
-    found: dict[str, list[Callable[[], Mapping[str, float]]]] = {
-        "cycle": [lambda: limit_cycle(study), lambda: convergence(study)],
-        "sync": [lambda: synchronisation(study)],
-        "feet": [lambda: standing_feet(study)],
-        "random": [lambda: leaps(study)],
+    found: dict[str, list[Callable[..., Mapping[str, float]]]] = {
+        "cycle": [limit_cycle, convergence],
+        "sync": [synchronisation],
+        "feet": [standing_feet],
+        "random": [leaps],
     }
-    if study.run is None:
-        return found
-    found |= {
-        "cycle_run": [lambda: limit_cycle(study, "run")],
-        "gait": [lambda: gait_transitions(study)],
-        "hysteresis": [lambda: ramp_hysteresis(study), lambda: constant_hysteresis(study)],
-        "variety": [lambda: sampled_runs(study)],
-    }
-    if study.bend is not None:
-        found["bend"] = [lambda: bends(study), lambda: interruptions(study)]
-    return found
-
-
-REHEARSED = ("gait", "bend", "sync", "cycle_run", "cycle", "hysteresis")
-"""Groups of experiments with goals, quick ones first."""
+    if study.run is not None:
+        found |= {
+            "cycle_run": [partial(limit_cycle, role="run")],
+            "gait": [gait_transitions],
+            "hysteresis": [ramp_hysteresis, constant_hysteresis],
+            "variety": [sampled_runs],
+        }
+        if study.bend is not None:
+            found["bend"] = [bends, interruptions]
+    return {name: [partial(run, study) for run in group] for name, group in found.items()}
 
 
 def missed_goals(study: ControlStudy, enough: int) -> list[str]:
-    """Goals that a model misses in the :data:`REHEARSED` experiments; stops at ``enough`` of them."""
+    """Goals that a model misses in the experiments that have some, quick ones first; stops at ``enough`` of them."""
     missed: list[str] = []
-    groups = experiments(study)
-    for group, run in ((name, run) for name in REHEARSED for run in groups.get(name, [])):
-        named = {f"{group}.{key}": value for key, value in run().items()}
-        missed += [by_label(study, name) for name in named if name in GOALS and not reached(GOALS, name, named[name])]
-        if len(missed) >= enough:
-            break
+    groups = experiments_of(study)
+    for group in ("gait", "bend", "sync", "cycle_run", "cycle", "hysteresis"):
+        for run in groups.get(group, []):
+            named = {f"{group}.{key}": value for key, value in run().items()}
+            wrong = [name for name in named if name in GOALS and not reached(GOALS, name, named[name])]
+            missed += [by_label(study, name) for name in wrong]
+            if len(missed) >= enough:
+                return missed
     return missed
 
 
@@ -122,24 +122,12 @@ def control_report(study: ControlStudy) -> Report:
     report: Report = {"train": {key: float(training[key]) for key in ("seconds", "reconstruction") if key in training}}
     parts = (
         {by_label(study, name): {by_label(study, key): value for run in group for key, value in run().items()}}
-        for name, group in experiments(study).items()
+        for name, group in experiments_of(study).items()
     )
     return report | gathered(parts, study.model.manifest.name)
 
 
 def by_label(study: ControlStudy, name: str) -> str:
     """The name of a figure, "bend.share_from_run", with the labels of the clips: "wave.share_from_jog"."""
-    return ROLES.sub(lambda role: getattr(study, role[0]) or role[0], name)
-
-
-def _legs(model: TdbnModel, parts: BodyParts) -> tuple[Leg, Leg] | None:
-    if not parts.legs:
-        return None
-    # codes are the channels themselves, or as many of each part
-    of_code = parts.of_channel
-    if model.codes != len(of_code):
-        of_code = np.repeat(np.arange(len(parts.names)), model.codes // len(parts.names))
-    left, right = (
-        Leg(np.flatnonzero(parts.of_channel == part), np.flatnonzero(of_code == part)) for part in parts.legs
-    )
-    return left, right
+    roles = r"(?<![a-z])(?:walk|run|bend)(?![a-z])"
+    return re.sub(roles, lambda role: getattr(study, role[0]) or role[0], name)

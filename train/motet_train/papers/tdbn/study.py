@@ -1,9 +1,10 @@
 """A control model under study: runs from any state, with all their codes, beside the training motions.
 
-Letters in shapes: T frames, B characters, D channels, K taps, H codes, L labels.
+A frame is compared in z units: each channel over its standard deviation in all training frames, channels that are
+constant there left out. Letters in shapes: T frames, B characters, D channels, K taps, H codes, L labels.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -12,15 +13,84 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from motet.models.tdbn_control import TdbnModel, TdbnSession
+from motet.motion.motion import lines
 from motet.motion.rotations import Array
+from motet.representation.contract import LIVING_STD
 from motet_train.evaluate.positions import arrival
-from motet_train.papers.tdbn.experiments.measures import ARRIVED, Reference, upsample
-from motet_train.papers.tdbn.period import period
+from motet_train.papers.tdbn.clips import period
 
 Codes = NDArray[np.floating[Any]]
 
-SETTLE_S, LOOP_S = 10.0, 3.0
-"""A free run is on its loop after this many seconds; so much of the loop is kept, a few cycles."""
+ARRIVED = 0.25
+"""z: a pose nearer to a loop than this is on it. As near as the frames of one recorded cycle of 39_14 are to another of
+its cycles (median .25; 09_07 .30), and a fifth of the distance between the loops of walking and running."""
+
+
+def upsample(frames: Array) -> Array:
+    """Frames (T, D) with three linear ones between each two."""
+    return lines(frames, np.arange((len(frames) - 1) * 4 + 1) / 4)
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """The training motions that a run is measured against.
+
+    motions: label -> sequences (T, D) at the model's frame rate.
+    legs: indices of the leg channels.
+    """
+
+    motions: Mapping[str, Sequence[Array]]
+    fps: float
+    legs: NDArray[np.intp]
+
+    @cached_property
+    def std(self) -> Array:
+        """Standard deviation (D,) over all training frames, infinite where a channel is constant."""
+        std = np.concatenate([clip for clips in self.motions.values() for clip in clips]).std(axis=0)
+        return np.where(std < LIVING_STD["deg"], np.inf, std)
+
+    def z(self, frames: Array) -> Array:
+        """Frames (..., D) in z units, without a mean, of the channels that move."""
+        moving = np.isfinite(self.std)
+        return np.asarray(frames, dtype=np.float64)[..., moving] / self.std[moving]
+
+    def leg_angles(self, frames: Array) -> Array:
+        """The leg channels that move, of frames (..., D)."""
+        legs = np.intersect1d(self.legs, np.flatnonzero(np.isfinite(self.std)))
+        return np.asarray(frames, dtype=np.float64)[..., legs]
+
+    def distance(self, frames: Array, points: Array) -> Array:
+        """RMS z (...) from frames (..., D) to the nearest of points (N, D); infinite for frames that are not finite."""
+        from sklearn.metrics import pairwise_distances_argmin  # for this alone, so that other trainings do not load it
+
+        z = self.z(frames)
+        flat = z.reshape(-1, z.shape[-1])
+        finite = np.isfinite(flat).all(axis=1)
+        distance = np.full(len(flat), np.inf)
+        near = self.z(points)[pairwise_distances_argmin(flat[finite], self.z(points))] if finite.any() else flat[finite]
+        distance[finite] = np.linalg.norm(flat[finite] - near, axis=1) / np.sqrt(flat.shape[1])
+        return distance.reshape(z.shape[:-1])
+
+    def jumps(self, frames: Array) -> Array:
+        """RMS z change (T-1, ...) from each of frames (T, ..., D) to the next."""
+        change: Array = np.sqrt((np.diff(self.z(frames), axis=0) ** 2).mean(axis=-1))
+        return change
+
+    @cached_property
+    def largest_jump(self) -> float:
+        """The largest change from frame to frame in the training motions."""
+        return max(float(self.jumps(clip).max()) for clips in self.motions.values() for clip in clips)
+
+    def period(self, label: str) -> float:
+        """The period of a training motion in frames, the mean over its sequences."""
+        return float(np.mean([period(self.leg_angles(clip)) for clip in self.motions[label]]))
+
+    def energy_ratio(self, frames: Array, label: str) -> float:
+        """Leg energy of frames (T, D) over that of a training motion: mean squared change of the leg angles."""
+        own, *data = (
+            float((np.diff(self.leg_angles(one), axis=0) ** 2).mean()) for one in (frames, *self.motions[label])
+        )
+        return own / float(np.mean(data))
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,22 +169,15 @@ class ControlStudy:
         track = np.repeat(self.control(**{role: 1.0})[None], self.frames(seconds), axis=0)
         return self.play(self.start(history, **options), track)
 
-    def settle(self, session: TdbnSession, control: Array, seconds: float) -> None:
-        """Run under constant control values (B, L), of which nothing is recorded."""
-        session.set_control(control)
-        for _ in range(self.frames(seconds)):
-            session.step()
-
     def training_history(self, role: str, frame: int = 0) -> Codes:
         """The history (1, K, H) of a training motion's frames from the given one on."""
         clip = self.reference.motions[getattr(self, role)][0]
         return self.model.encode(clip[frame : frame + self.model.taps])[None]
 
     def loop(self, role: str) -> Recording:
-        """A noiseless run on a gait's loop."""
+        """A noiseless run on a gait's loop: after 10 s a free run is on it, and 3 s are a few cycles."""
         if role not in self._loops:
-            whole = self.hold(self.training_history(role), role, SETTLE_S + LOOP_S)
-            start = self.frames(SETTLE_S)
+            whole, start = self.hold(self.training_history(role), role, 13.0), self.frames(10.0)
             self._loops[role] = Recording(whole.frames[start:], whole.codes[start:])
         return self._loops[role]
 
@@ -133,11 +196,15 @@ class ControlStudy:
 
     def phases(self, role: str, count: int) -> tuple[Codes, Array]:
         """Histories (count, K, H) at equal phases of a gait's loop, and the frames (count, D) they ended with."""
-        taps = self.model.taps
+        taps, loop = self.model.taps, self.loop(role)
         times = [int(taps + round(i * self.cycle(role) / count)) for i in range(count)]
-        loop = self.loop(role)
         return loop.histories(times, taps), loop.frames[times, 0]
 
     def reaches(self, frames: Array, role: str) -> Array:
         """Seconds (B,) until frames (T, B, D) are on a gait's loop and stay there."""
         return arrival(self.reference.distance(frames, self.loop_points(role)) < ARRIVED, self.fps)
+
+    def nearer_to_run(self, frames: Array) -> NDArray[np.bool_]:
+        """Which of frames (..., D) are nearer to the running loop than to the walking one."""
+        walk, run = (self.reference.distance(frames, self.loop_points(role)) for role in ("walk", "run"))
+        return run < walk
