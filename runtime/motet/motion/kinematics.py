@@ -140,7 +140,7 @@ def with_channels(motion: Motion, names: tuple[str, ...], values: Array, units: 
 def continued(last: Motion, rotations: Mapping[str, Array], translations: Mapping[str, Array]) -> Motion:
     """The frames after a motion's last, in its channels: local rotations (T, 3, 3) and translations (T, 3) of joints.
 
-    Lengths are in the skeleton's unit. Joints without channels are left out, and channels of other joints keep their
+    Lengths are in the skeleton's unit. Joints without channels are left out; channels of other joints keep their
     values.
     """
     last = last[-1:]
@@ -189,18 +189,11 @@ def motion_of(skeleton: Skeleton, turned: Array, moved: dict[int, Array], fps: f
     local = turned.copy(order="K")
     local[:, 1:] = product(inverse(turned[:, skeleton.parents[1:]]), turned[:, 1:])
     angles = np.degrees(eulers_of(local[:, kept], [skeleton.joints[i] for i in kept]))
-    columns = dict(zip(kept, np.moveaxis(angles, 1, 0), strict=True))
-    names: list[str] = []
-    values: list[Array] = []
-    for i, joint in enumerate(skeleton.joints):
-        if i in moved:
-            names += [f"{joint.name}.t{axis}" for axis in AXES]
-            values.append(moved[i])
-        if i in columns:
-            names += [f"{joint.name}.r{axis}" for axis in AXES]
-            values.append(columns[i])
-    units = tuple("deg" if name[-2] == "r" else "length" for name in names)
-    return Motion(np.concatenate(values, axis=1), tuple(names), units, fps, skeleton)
+    found = {"t": moved, "r": dict(zip(kept, np.moveaxis(angles, 1, 0), strict=True))}
+    parts = [(i, kind) for i in range(len(skeleton.joints)) for kind in "tr" if i in found[kind]]
+    names = tuple(f"{skeleton.names[i]}.{kind}{axis}" for i, kind in parts for axis in AXES)
+    units = tuple("deg" if kind == "r" else "length" for _, kind in parts for _ in AXES)
+    return Motion(np.concatenate([found[kind][i] for i, kind in parts], axis=1), names, units, fps, skeleton)
 
 
 def heading(motion: Motion) -> Array:
@@ -216,13 +209,9 @@ def without_heading(motion: Motion) -> Motion:
     root rotation is returned unchanged. The root's translation is not changed.
     """
     joint = skeleton_of(motion).joints[0]
-    names = tuple(f"{joint.name}.r{axis}" for axis in AXES)
-    if not set(names) <= set(motion.channels) or not len(motion):
+    if not {f"{joint.name}.r{axis}" for axis in AXES} <= set(motion.channels) or not len(motion):
         return motion
     time, angle = np.arange(len(motion)), heading(motion)
     line: Array = np.polyval(np.polyfit(time, angle, min(1, len(motion) - 1)), time).astype(np.float64)
     levelled = axis_to_rotmat("y", -line) @ local_rotations(motion, [0])[:, 0]
-    units = tuple(motion.units[motion.channels.index(name)] for name in names)
-    turns = np.array([TURN[unit] for unit in units])
-    angles = euler_of(levelled, joint) * turns / (2 * np.pi)
-    return with_channels(motion, names, angles, units).continuous()
+    return posed(motion, {joint.name: levelled}, {}).continuous()

@@ -87,22 +87,16 @@ def _repetition(motion: Motion, hips: int, shortest: float) -> tuple[int, int]:
     apart = np.where(last - first[:, None] >= least, _apart(seen[first], seen[last]), np.inf)
     i, j = np.unravel_index(apart.argmin(), apart.shape)
     start, stop = int(first[i]), int(last[j])
-    _check(float(np.linalg.norm(seen[start] - seen[stop])), start / motion.fps, stop / motion.fps)
-    return start, stop
-
-
-def _check(off: float, start: float, stop: float) -> None:
-    """Refuse a repetition whose frames, at these seconds, differ by more than a share of the figure's height."""
-    # of 40 recorded walks, on the humanoid at 30 fps, nine in ten repeat within 0.03, steady strides within 0.01 to
-    # 0.02; the best match in a bend, CMU's 02_06, differs by 0.08, and half of the running takes, which are short and
-    # turn or leap, repeat only within 0.06
-    most = 0.04
+    off, most = float(np.linalg.norm(seen[start] - seen[stop])), 0.04
+    # of 40 recorded walks, on the humanoid at 30 fps, nine in ten repeat within 0.03 of the height, steady strides
+    # within 0.01 to 0.02; half of the running takes, which are short and turn or leap, repeat only within 0.06
     if off > most:
         raise MotionError(
-            f"no loop found: the closest pair, {start:.2f} s and {stop:.2f} s, differs by {off:.1%} of the figure's "
-            f"height, more than {most:.0%}; cut the motion to repeating parts, or use a longer one of two strides or "
-            f"more"
+            f"no loop found: the closest pair, {start / motion.fps:.2f} s and {stop / motion.fps:.2f} s, differs by "
+            f"{off:.1%} of the figure's height, more than {most:.0%}; cut the motion to repeating parts, or use a "
+            f"longer one of two strides or more"
         )
+    return start, stop
 
 
 def _apart(one: Array, other: Array) -> Array:
@@ -113,8 +107,9 @@ def _apart(one: Array, other: Array) -> Array:
 
 
 def _seen(motion: Motion, hips: int) -> Array:
-    """Positions and velocities of joints (T, D), relative to the hips without their heading: the distance of two rows
-    is the root mean square over the joints, as a share of the figure's height."""
+    """Rows (T, D) of joints' positions and velocities seen from the hips without their heading: their distance is the
+    root mean square over the joints, as a share of the figure's height.
+    """
     skeleton, (turned, places) = skeleton_of(motion), global_transforms(motion)
     facing = inverse(twist(turned[:, hips], UP))[:, None]
     ground = places[:, [hips]] * (1 - UP)

@@ -17,9 +17,6 @@ from motet.motion.rotations import Array, quat_product, quat_rotated, wrapped
 Floats = NDArray[np.float32]
 Values = NDArray[Any]
 
-LEVELS = [[int(joint) for joint in level] for level in HUMANOID.levels]
-"""Joints of the humanoid except the root, grouped by depth."""
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Pose:
@@ -70,7 +67,7 @@ class Pose:
         places[0] = self.place
         places[0, :, 1] = self.height
         offsets = HUMANOID.offsets.astype(np.float32)[:, None]
-        for level in LEVELS:
+        for level in HUMANOID.levels:
             parents = HUMANOID.parents[level]
             places[level] = places[parents] + quat_rotated(turned[parents], offsets[level])
             turned[level] = quat_product(turned[parents], turned[level])
@@ -98,10 +95,7 @@ def damping_of(half_life: float) -> float:
 
 
 def damped(off: Values, rate: Values, damping: float | Values, seconds: float) -> tuple[Values, Values]:
-    """A distance from rest and its rate, arrays of one shape, ``seconds`` later (exact).
-
-    damping: one for all, or an array that broadcasts.
-    """
+    """A distance from rest and its rate, of one shape, ``seconds`` later (exact); the damping broadcasts."""
     rise, left = (rate + damping * off) * seconds, np.exp(-damping * seconds).astype(off.dtype)
     return (off + rise) * left, (rate - damping * rise) * left
 

@@ -1,13 +1,12 @@
 """Conversions between rotation representations, named ``from_to``, and arithmetic with matrices and quaternions.
 
 Any number of leading dimensions may precede the last one (angles, vectors, quaternions) or the last two (matrices).
-Angles are radians, arrays float64. Matrices rotate column vectors. An Euler ``order`` such as ``"zyx"`` lists the
-factors of the product from left to right, R = Rz Ry Rx, and the angles come in the same order (scipy's intrinsic
-``"ZYX"``). Quaternions are (x, y, z, w), unit length, scalar last.
+Angles are radians, arrays float64. Matrices rotate column vectors. An Euler ``order`` of three different axes lists the
+factors of the product from left to right, as do the angles: "zyx" is R = Rz Ry Rx (scipy's intrinsic ``"ZYX"``).
+Quaternions are (x, y, z, w), unit length, scalar last.
 
-Products are summed along the frames, about four times as fast as by ``@``, which multiplies matrices one by one, if the
-frames are contiguous in memory (:func:`frames_last`). Results and slices of such arrays keep that layout; other arrays
-give the same products, more slowly.
+Products are summed along the frames, about four times as fast as by ``@``, if the frames are contiguous in memory
+(:func:`frames_last`). Results and slices of such arrays keep that layout; others give the same products, more slowly.
 """
 
 from typing import Any
@@ -25,10 +24,7 @@ LOCKED = 1e-9
 
 
 def frames_last(shape: tuple[int, ...]) -> Array:
-    """An uninitialized array of the shape (T, ...) with the frames last in memory.
-
-    Elementwise computations over all frames, as for rotations, then run along contiguous memory.
-    """
+    """An uninitialized array (T, ...) with the frames last in memory, along which elementwise computations then run."""
     return np.empty(shape[::-1]).T
 
 
@@ -53,7 +49,7 @@ def axis_to_rotmat(axis: str, angle: Array) -> Array:
 
 
 def euler_to_rotmat(angles: Array, order: str) -> Array:
-    """Euler angles (..., 3) in ``order``, three different axes, to matrices (..., 3, 3): the product multiplied out."""
+    """Euler angles (..., 3) to matrices (..., 3, 3): the product multiplied out."""
     i, j, k = map("xyz".index, order)
     # cosine and sine from the tangent of the half angle, several times as fast in numpy as both
     tangent = np.tan(angles * (0.5 * _handedness(order)))
@@ -71,10 +67,7 @@ def euler_to_rotmat(angles: Array, order: str) -> Array:
 
 
 def rotmat_to_euler(matrix: Array, order: str) -> Array:
-    """Matrices (..., 3, 3) to Euler angles (..., 3), the middle one within a quarter turn.
-
-    ``order`` must name three different axes. At a gimbal lock the last angle is 0.
-    """
+    """Matrices (..., 3, 3) to Euler angles (..., 3), the middle within a quarter turn, the last 0 at a gimbal lock."""
     i, j, k = map("xyz".index, order)
     sign = _handedness(order)
     cos_middle = np.sqrt(matrix[..., i, i] ** 2 + matrix[..., i, j] ** 2)
@@ -94,11 +87,10 @@ def _handedness(order: str) -> float:
 
 
 def continuous_euler(angles: Array, turn: Array | float = 2 * np.pi) -> Array:
-    """The same rotations with Euler angles (T, ..., 3) that do not jump from frame to frame.
+    """The same rotations with Euler angles (T, ..., 3) that do not jump from frame to frame; the first frame stays.
 
     Of the two solutions (a, b, c) and (a + pi, pi - b, c + pi), each up to whole turns, every frame takes the one
-    nearest to the frame before it; the first frame stays.
-    turn: a whole turn in the angles' unit, or one for each angle.
+    nearest to the frame before it. turn: a whole turn in the angles' unit, or one for each angle.
     """
     turn = turn + np.zeros(angles.shape[1:])
     result = np.array(angles, dtype=np.float64)
@@ -120,8 +112,8 @@ def continuous_euler(angles: Array, turn: Array | float = 2 * np.pi) -> Array:
 def rotmats_to_euler(matrices: Array, order: str, leaps: bool = False) -> Array:
     """Matrices (T, ..., 3, 3) to Euler angles (T, ..., 3) that do not leap from frame to frame, unless ``leaps``.
 
-    At a gimbal lock, where only the sum or difference of the first and the last angle counts, the last one is that of
-    the last frame without one.
+    At a gimbal lock, where only the sum or difference of the outer angles counts, the last is that of the last free
+    frame.
     """
     angles = rotmat_to_euler(matrices, order)
     locked = np.abs(angles[..., 1]) > np.pi / 2 - LOCKED
@@ -268,11 +260,6 @@ def twist(rotations: Array, axis: Array) -> Array:
     quats, along = rotmat_to_quat(rotations), axis / length
     angles = 2 * angle_of(quats[..., :3] @ along, quats[..., 3])
     return rotvec_to_rotmat(angles[..., None] * along)
-
-
-def angle_between(one: Array, other: Array) -> float:
-    """Angle in degrees between two rotations (3, 3)."""
-    return float(np.degrees(np.arccos(np.clip((np.sum(one * other) - 1) / 2, -1, 1))))
 
 
 def quat_product(left: NDArray[Any], right: NDArray[Any]) -> NDArray[Any]:

@@ -3,19 +3,16 @@ translation that follows from it.
 
 A point of a foot stands if it is low and slow. Only the bounds depend on the points and the source of the motion.
 
-A foot that carries weight stays in place, so the root moves against it. Which foot that is has to be found together
-with the velocity. Every point of the feet votes for a velocity; a vote counts more the nearer its point is to the
-ground and the better it agrees with others around it in time: robust regression by iteratively reweighted least squares
-(Beaton and Tukey 1974). Votes that are too slow count less, because the joints of a foot rolling from heel to toe do
-move forward. Between steps of a run nothing agrees, and the velocity of the last and the next step carries through.
+A foot that carries weight stays in place, so the root moves against it. Every point of the feet votes for a velocity; a
+vote counts more the nearer its point is to the ground and the better it agrees with others around it in time: robust
+regression by iteratively reweighted least squares (Beaton and Tukey 1974). Votes that are too slow count less, because
+the joints of a foot rolling from heel to toe do move forward. Between steps of a run nothing agrees, and the velocity
+of the last and the next step carries through. Where the root falls faster than gravity while the lowest point of the
+feet is held at the ground, the figure has jumped, and flies along a parabola until its feet reach the ground again.
 
-The ground pushes but does not pull: where the root falls faster than gravity while the lowest point of the feet is
-held at the ground, the figure has jumped. It then flies along a parabola until its feet reach the ground again.
-
-On level ground with feet that do not slide this is within a few per cent of the true path: in 42 of CMU's trials that
-had no part in the choice of the constants, the end is off by 5 % of the path on average in walking (at most 8)
-and by 6 % in running (at most 15, in a leap), nearly always too near. Stairs, sitting, lying and walking on hands are
-beyond it.
+On level ground with feet that do not slide, in 42 of CMU's trials that had no part in the choice of the constants, the
+end is off by 5 % of the path on average in walking (at most 8) and by 6 % in running (at most 15, in a leap), nearly
+always too near. Stairs, sitting, lying and walking on hands are beyond it.
 """
 
 from collections.abc import Sequence
@@ -38,8 +35,7 @@ ADULT_HEIGHT = 1.7  # m: assumed if the skeleton's length unit is unknown
 
 @dataclass(frozen=True)
 class ContactSettings:
-    """Two bounds each: up to the first a point surely stands, from the second it does not at all; equal bounds are a
-    threshold.
+    """Up to the first bound a point surely stands, from the second it does not at all; equal bounds are a threshold.
 
     heights: metres above the ground. speeds: metres a second over it. calm: seconds, the standard deviation of the
     window that a speed is smoothed by.
@@ -55,10 +51,8 @@ SOLES = ContactSettings()
 
 
 def contacts(heights: Array, speeds: Array | None, settings: ContactSettings) -> Array:
-    """Ground contact of points, from 0 to 1, from their heights in m and speeds in m/s, both of one shape.
-
-    speeds: None if only the height counts.
-    """
+    """Ground contact of points, 0 to 1, from heights in m and speeds in m/s of one shape, None if only heights
+    count."""
     low = 1 - rise(heights, *settings.heights)
     return low if speeds is None else low * (1 - rise(speeds, *settings.speeds))
 
@@ -88,10 +82,7 @@ def rise(values: Array, start: float, end: float) -> Array:
 
 
 def smoothed(points: Array, calm: float, fps: float) -> Array:
-    """Points (T, ..., ...) smoothed by a Gaussian window in time, extrapolated at both ends.
-
-    calm: its standard deviation in seconds.
-    """
+    """Points (T, ..., ...) smoothed by a Gaussian window of ``calm`` seconds deviation, extrapolated at both ends."""
     reach = round(3 * calm * fps)
     if len(points) < 2 or not reach:
         return points

@@ -24,11 +24,11 @@ from motet.motion.rotations import Array, inverse, product, rotated, rotvec_to_r
 class HoldSettings:
     """Seconds, metres and metres per second.
 
-    contact: when a point of the sole stands. lifted: a foot that does not touch the ground for less stays where it
-    stands. blend: in which a shift comes and goes, most of it in half of that. farthest: a foot is shifted by less;
-    what slides farther than twice that in a stance does slide. soft: before and after a foot is in the ground it is
-    being lifted out of it. tremble: what is shorter is no movement, and toes do not follow it. anchor: at the start of
-    a stance, says where the foot stands; None for all of it.
+    contact: when a point of the sole stands. lifted: a foot off the ground for less stays where it stands. blend: in
+    which a shift comes and goes, most of it in half of that. farthest: a foot is shifted by less; what slides farther
+    than twice that in a stance does slide. soft: before and after a foot is in the ground it is being lifted out of it.
+    tremble: what is shorter is no movement. anchor: at the start of a stance, says where the foot stands; None for all
+    of it.
     """
 
     contact: ContactSettings = SOLES
@@ -213,8 +213,7 @@ class Leg:
         possible.
 
         The knee turns about its axis, as far as that is square to the thigh, until the leg is as long as it has to be,
-        bent back, as knees are, even where it was bent forward; then thigh and shin turn together the shortest way.
-        What of the shin stands out of the plane of the bend stays.
+        bent back even where it was bent forward; then thigh and shin turn together the shortest way.
         """
         along, down, upper, lower = self.knee - self.hip, self.ankle - self.knee, self._upper, self._lower
         cosine = (_length(target - self.hip) ** 2 - upper**2 - lower**2) / (2 * upper * lower * self._in_plane)

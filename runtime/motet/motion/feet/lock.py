@@ -35,8 +35,8 @@ class FootLockSettings(Settings):
 LEG_BONES = np.array([[BONES.index(sided(side, part)) for part in LEG] for side in LEFT_RIGHT])
 """Bones (2, 4) of both legs among the humanoid's."""
 
-LEG_OFFSETS = HUMANOID.offsets[[[HUMANOID.index(BONES[bone]) for bone in leg] for leg in LEG_BONES]]
-"""Where they begin in their parents' frames (2, 4, 3), the hips' for the first."""
+LEG_OFFSETS = HUMANOID.offsets[[[HUMANOID.index(BONES[bone]) for bone in leg] for leg in LEG_BONES.T]]
+"""Where they begin in their parents' frames (4, 2, 3), the hips' for the first."""
 
 POINTS = np.array([place for places in SOLE.values() for place in places], dtype=np.float32)
 CARRIERS = [LEG.index(part) for part, places in SOLE.items() for _ in places]
@@ -87,7 +87,7 @@ def _legs(pose: Pose) -> tuple[Floats, Floats, Array]:
     place[..., 1] = pose.height[:, None]
     local, above = pose.rotations[:, LEG_BONES], hips[:, None]
     turned, places = np.empty_like(local), np.empty((*local.shape[:3], 3))
-    for joint, offset in enumerate(np.swapaxes(LEG_OFFSETS, 0, 1).astype(np.float32)):
+    for joint, offset in enumerate(LEG_OFFSETS.astype(np.float32)):
         place = place + quat_rotated(above, offset)
         above = quat_product(above, local[:, :, joint])
         turned[:, :, joint], places[:, :, joint] = above, place

@@ -4,13 +4,11 @@ Two doors: :func:`to_humanoid` and :func:`from_humanoid`, with a :class:`Figure`
 """
 
 from motet.motion.humanoid.bones import (
-    ARM,
     BONES,
     HUMANOID,
     LEFT_RIGHT,
     LEG,
     MIXAMO,
-    PARENTS,
     REQUIRED,
     RIGS,
     SOLE,
@@ -38,14 +36,12 @@ from motet.motion.humanoid.retarget import (
 )
 
 __all__ = [
-    "ARM",
     "BONES",
     "HUMANOID",
     "LEFT_RIGHT",
     "LEG",
     "LENGTH_UNITS",
     "MIXAMO",
-    "PARENTS",
     "REQUIRED",
     "RIGS",
     "SOLE",

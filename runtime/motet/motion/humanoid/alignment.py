@@ -6,11 +6,12 @@ anywhere), A turns the humanoid's T-pose into it: trunk and shoulders as a whole
 turn to where they point, each carried along by the one before it, so that no twist is added; feet by their heading
 alone, as soles are flat in a rest pose whatever the slope of the line from ankle to toes.
 
-Many files rest with all bones in one line instead, each along an axis of its own joint. What the rest pose does not
-tell is then told by what bodies do: legs and arms hang at the sides of the trunk, knees and elbows are hinges. All is
-averaged in the frame of each joint over all frames, and as the axes of joints lie along bones and hinges in such files,
-what comes near those is taken to be just these, so that every take of a skeleton gets the same alignment.
+Many files rest with all bones in one line instead, each along an axis of its own joint. What bodies do then tells: legs
+and arms hang at the sides of the trunk, knees and elbows are hinges. All is averaged in the frame of each joint over
+all frames; what comes near axes is taken to be just these, so that every take of a skeleton gets the same alignment.
 """
+
+from itertools import permutations
 
 import numpy as np
 
@@ -18,9 +19,12 @@ from motet.motion.humanoid.bones import ARM, LEFT_RIGHT, LEG, sided
 from motet.motion.humanoid.joint_map import LIMB_BONES, Body, humanoid_direction
 from motet.motion.rotations import Array, frames_last, product, rotvec_to_rotmat, swing, unit
 
-SIGNED_AXES = [sign * axis for axis in np.eye(3) for sign in (1.0, -1.0)]
 AXES_TURNS = np.array(
-    [np.stack([x, y, np.cross(x, y)], axis=1) for x in SIGNED_AXES for y in SIGNED_AXES if not np.dot(x, y)]
+    [
+        np.stack([x, y, np.cross(x, y)], axis=1)
+        for x, y in permutations(np.kron(np.eye(3), [[1.0], [-1.0]]), 2)
+        if not np.dot(x, y)
+    ]
 )
 """The rotations (24, 3, 3) that turn coordinate axes into coordinate axes."""
 

@@ -83,8 +83,7 @@ class _Tree:
         return first, second
 
     def pair(self, fork: _Fork) -> tuple[list[list[int]], list[float]]:
-        """The paths of two limbs, as long as the shorter of both, and how far down their joints are, the mean of
-        both."""
+        """The paths of two limbs, as long as the shorter, and how far down their joints are, the mean of both."""
         paths = [self.path(limb) for limb in fork.limbs]
         paths = [path[: min(map(len, paths))] for path in paths]
         ends = [[0.0, *np.cumsum(self.lengths[path[1:]]).tolist(), self.reach[path[0]]] for path in paths]
@@ -103,7 +102,8 @@ class _Tree:
     def arms(self, fork: _Fork) -> Limbs:
         """Clavicles, upper arms, forearms and hands: the hand is where fingers fork or begins them; the elbow halves.
 
-        An arm that ends in one long bone has no joint for the hand: its tip is the wrist."""
+        An arm that ends in one long bone has no joint for the hand: its tip is the wrist.
+        """
         paths, places = self.pair(fork)
         forks = [k for k, joint in enumerate(paths[0]) if k >= 2 and len(self.skeleton.children[joint]) >= 2]
         count = len(places) - 1

@@ -55,8 +55,8 @@ class Fitted:
         return self.body.joint_map
 
     def soles(self, bones: dict[str, Array], places: Array) -> Array:
-        """Points (T, P, 3) of the soles, from rotations (T, 3, 3) of the humanoid's feet and toes, and positions
-        (T, J, 3) of joints."""
+        """Points (T, P, 3) of soles from rotations (T, 3, 3) of the humanoid's feet and toes, and positions (T, J,
+        3)."""
         scale, points = self.leg / leg_length(), []
         for bone, height in self.heights.items():
             for x, _, z in SOLE[part_of(bone)]:
@@ -87,7 +87,8 @@ def _fit(body: Body, rotations: Array, places: Array) -> Fitted:
     stands = body_frame(rest, body)
     moving = len(places) > 1 and rests_in_motion(body)
     if stands is not None and not moving:
-        known = joint_map.rest is not None and _rests_as_known(rest, stands, body)
+        points = {bone: unit(np.array(at)) for bone, at in joint_map.points.items()}
+        known = joint_map.rest is not None and _agreement(body, rest, stands, points) > np.cos(np.radians(4))
         body = body if known or joint_map.rest is None else Body(skeleton, replace(joint_map, rest=None))
         aligned = alignments_of_pose(body, np.tile(np.eye(3), (len(rest), 1, 1)), rest, stands)
         notes = ("the rest pose is one that the convention knows, which was made up for",) if known else ()
@@ -96,7 +97,10 @@ def _fit(body: Body, rotations: Array, places: Array) -> Fitted:
     known = bool(len(places)) and axes_agree(body, rotations, places)
     body = body if known or not joint_map.axes else Body(skeleton, replace(joint_map, axes={}))
     first = body_frame(places[0], body, exact=True) if len(places) and not known else None
-    if first is not None and (len(places) == 1 or _is_t_pose(places[0], first, body)):
+    limbs = {bone: humanoid_direction(bone) for limb in LIMB_BONES for bone in limb[:2] if body.aims[bone]}
+    # a T-pose is within 16 degrees of the humanoid's
+    t_pose = first is not None and min(_agreement(body, places[0], first, limbs), float(first[1, 1])) > 0.96
+    if first is not None and (len(places) == 1 or t_pose):
         aligned = alignments_of_pose(body, rotations[0], places[0], first)
         note = "the rest pose is not a standing body: the first frame's pose was used in its place"
         return Fitted(body, aligned, leg, _heights(body, leg, places[0] @ first[:, 1]), None, 0.95, (note,))
@@ -108,32 +112,20 @@ def _fit(body: Body, rotations: Array, places: Array) -> Fitted:
     how, confidence = ("known by the convention", 0.95) if known else ("found from the frames", 0.85)
     note = f"the rest pose is not a standing body: how the joints stand was {how}"
     if moving and not known:
-        note, confidence = OUT_OF_A_MOTION, 0.7
+        note, confidence = (
+            "the rest pose is out of a motion: how the joints stand was guessed from the frames, to 10 or 20 degrees; "
+            "give a file of this figure that rests in a T-pose (rest=, --rest)",
+            0.7,
+        )
     aligned = Calibration(body, rotations, places, along_axes=known or not moving).aligned
     hips, carrier = joint_map.joints["hips"], joint_map.carrier(skeleton)
     aligned[carrier] = rotations[0, carrier].T @ rotations[0, hips] @ aligned[hips]
     return Fitted(body, aligned, leg, _heights(body, leg, None), None, confidence, (note,))
 
 
-OUT_OF_A_MOTION = (
-    "the rest pose is out of a motion: how the joints stand was guessed from the frames, to 10 or 20 degrees; "
-    "give a file of this figure that rests in a T-pose (rest=, --rest)"
-)
-
-
-def _rests_as_known(rest: Array, frame: Array, body: Body) -> bool:
-    """Whether bones point in the rest pose (J, 3) where the convention says, within 4 degrees."""
-    return all(
-        float(body.direction(rest, bone) @ frame @ unit(np.array(points))) > np.cos(np.radians(4))
-        for bone, points in body.joint_map.points.items()
-    )
-
-
-def _is_t_pose(pose: Array, frame: Array, body: Body) -> bool:
-    """Whether the bones of arms and legs point where the humanoid's do in its T-pose, within 16 degrees."""
-    bones = [bone for limb in LIMB_BONES for bone in limb[:2] if body.aims[bone]]
-    along = [float(body.direction(pose, bone) @ frame @ humanoid_direction(bone)) for bone in bones]
-    return min(*along, float(frame[1, 1])) > 0.96
+def _agreement(body: Body, pose: Array, frame: Array, points: dict[str, Array]) -> float:
+    """The least cosine between where bones point in a pose (J, 3), seen in a frame, and where they are said to."""
+    return min((float(body.direction(pose, bone) @ frame @ along) for bone, along in points.items()), default=1.0)
 
 
 def _heights(body: Body, leg: float, rise: Array | None) -> dict[str, float]:
@@ -188,8 +180,7 @@ def unit_of(skeleton: Skeleton, leg: float) -> Unit:
 
 
 def unit_by_legs(motion: Motion) -> Unit:
-    """The unit of a motion's skeleton by the length of its legs at rest; MotionError as :func:`unit_of`, and for what
-    is no human's."""
+    """The unit of a skeleton by the length of its legs at rest; MotionError as :func:`unit_of`, and for no human's."""
     skeleton = skeleton_of(motion)
     return unit_of(skeleton, leg_of(Body(skeleton, map_of(motion)), skeleton.rest_positions))
 
@@ -213,8 +204,7 @@ def height_of(fitted: Fitted) -> float:
 def check_stance(body: Body, positions: Array) -> None:
     """Refuse frames (T, J, 3) of a figure on four legs: asked where its rest pose is not a standing body.
 
-    A human who sits all through a file has the trunk beside the legs, too; names that are known tell one who sits
-    upright from an animal.
+    A human who sits has the trunk beside the legs, too; known names tell one who sits upright from an animal.
     """
     trunk = body.trunk_up(positions)
     beside = np.quantile(np.sum(trunk * body.legs_up(positions), axis=-1), 0.95) < 0.3

@@ -8,7 +8,7 @@ of the legs and laid so that the feet are on the ground.
 
 import logging
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -357,18 +357,14 @@ def relaxed(skeleton: Skeleton, still: Array, joints: Mapping[str, int]) -> Arra
             thumb = finger == "thumb"
             start = pointing[0] if thumb else along
             axis = np.cross(start, palm + across if thumb else palm)
-            for joint, turn in zip(chain, _bends([start, *pointing], axis, FINGER_SHARES[finger]), strict=False):
+            # each bone bends against the one before, by degrees of a hand at rest, about what of the axis is across it
+            bends = (15.0, 25.0, 15.0)
+            for joint, before, bone, bend in zip(chain, [start, *pointing], pointing, bends, strict=False):
+                aside = unit(axis - (axis @ bone) * bone)
+                now = np.arctan2(np.cross(before, bone) @ aside, before @ bone - (before @ aside) * (bone @ aside))
+                turn = max(0.0, np.radians(bend) * FINGER_SHARES[finger] - float(now)) * aside
                 bent[joint] = bent[joint] @ rotvec_to_rotmat(turns[0, joint].T @ turn)
     return bent
-
-
-def _bends(pointing: list[Array], axis: Array, share: float) -> Iterator[Array]:
-    """Rotation vectors (3,) that bend each bone against the one before it, about what of the axis is across it."""
-    # degrees by which the three joints of a finger are bent in a hand at rest
-    for before, bone, degrees in zip(pointing, pointing[1:], (15.0, 25.0, 15.0), strict=False):
-        across = unit(axis - (axis @ bone) * bone)
-        now = np.arctan2(np.cross(before, bone) @ across, before @ bone - (before @ across) * (bone @ across))
-        yield max(0.0, np.radians(degrees) * share - float(now)) * across
 
 
 def _fingers(skeleton: Skeleton, hand: int) -> dict[str, list[int]]:
