@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Callable, Coroutine
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,9 +23,8 @@ pytest.importorskip("websockets", reason="the extra live is not installed")
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from motet.live import server as server_module
-from motet.live.protocol import LARGEST, MOST
-from motet.live.server import BUFFER, MAX_BYTES, MAX_CONTROLS, MAX_MESSAGES, LiveServer
+from motet.live.protocol import LARGEST, MAX_CHARACTERS
+from motet.live.server import LIMITS, LiveServer
 
 Message = dict[str, Any]
 
@@ -169,7 +169,7 @@ def test_clients_do_not_touch_each_other(steer_model: SteerModel) -> None:
         ('{"type": "put", "places": [[1]]}', "places need x, z and facing"),
         ('{"type": "put", "places": [1000001, 0, 0]}', "put, places: expected numbers up to 1e+06"),
         ('{"type": "push", "velocity": [[1]]}', "a velocity needs x and z"),
-        (f'{{"type": "start", "characters": {MOST + 1}}}', f"a whole number from 1 to {MOST}"),
+        (f'{{"type": "start", "characters": {MAX_CHARACTERS + 1}}}', f"a whole number from 1 to {MAX_CHARACTERS}"),
         ('{"type": "start", "positions": 1}', "start, positions: expected true or false"),
         (b"\x00\x01", "must be text, not binary"),
     ],
@@ -185,24 +185,23 @@ def test_junk_is_told_why_and_dropped(steer_model: SteerModel, junk: str | bytes
     serving(steer_model, scenario)
 
 
-def test_what_is_too_much(steer_model: SteerModel, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_too_much(steer_model: SteerModel) -> None:
     async def scenario(server: LiveServer) -> None:
         async with client(server) as connection:
-            await connection.send(" " * (MAX_BYTES + 1))
+            await connection.send(" " * (LIMITS.message_bytes + 1))
             assert (await end_of(connection))[1] == 1009
         async with client(server) as connection:
-            for _ in range(20 * MAX_MESSAGES):
+            for _ in range(20 * LIMITS.messages):
                 try:
                     await connection.send('{"type": "control"}')
                 except ConnectionClosed:
                     break
-            assert f"more than {MAX_MESSAGES} messages" in (await end_of(connection))[0]
-        monkeypatch.setattr(server_module, "MAX_CLIENTS", 1)
+            assert f"more than {LIMITS.messages} messages" in (await end_of(connection))[0]
+        server.limits = replace(LIMITS, clients=1)
         async with client(server) as first, client(server) as second:
             assert (await end_of(second))[1:] == (1013, "there are 1 clients already, of 1 figures")
             assert len(await frames(first, 5)) == 5
-        monkeypatch.undo()
-        monkeypatch.setattr(server_module, "MAX_FIGURES", 3)
+        server.limits = replace(LIMITS, figures=3)
         async with client(server) as first, client(server) as second:
             await frames(second, 1)
             await told(first, "start", characters=2)
@@ -242,7 +241,7 @@ def test_a_flood_of_what_is_no_message_is_cut_off(
             while len(server._clients) < 2:
                 await frames(connection, 1)
             text = b"" if head != b"\x00" else b"\x01\x80\0\0\0\0"  # a message begins
-            await asyncio.get_running_loop().sock_sendall(raw, text + flood * MAX_CONTROLS)
+            await asyncio.get_running_loop().sock_sendall(raw, text + flood * LIMITS.controls)
             await frames(connection, 5)
             assert len(server._clients) == 2
             with suppress(OSError):
@@ -254,12 +253,10 @@ def test_a_flood_of_what_is_no_message_is_cut_off(
 
     serving(steer_model, scenario)
     said = [record.message for record in caplog.records if record.name == "motet.live.server"]
-    assert said == [f"dropped a client: more than {MAX_CONTROLS} pings, pongs and parts of messages in a second"]
+    assert said == [f"dropped a client: more than {LIMITS.controls} pings, pongs and parts of messages in a second"]
 
 
-def test_a_client_that_answers_no_pings_is_dropped(steer_model: SteerModel, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(server_module, "PING", 0.2)
-
+def test_a_client_that_answers_no_pings_is_dropped(steer_model: SteerModel) -> None:
     async def scenario(server: LiveServer) -> None:
         raw = raw_client(server)
         raw.setblocking(False)
@@ -269,7 +266,7 @@ def test_a_client_that_answers_no_pings_is_dropped(steer_model: SteerModel, monk
                 got = await asyncio.get_running_loop().sock_recv(raw, 1 << 16)
         raw.close()
 
-    serving(steer_model, scenario)
+    serving(steer_model, scenario, limits=replace(LIMITS, ping=0.2))
 
 
 def test_what_waits_for_a_client_is_bounded_and_not_packed(steer_model: SteerModel) -> None:
@@ -280,7 +277,7 @@ def test_what_waits_for_a_client_is_bounded_and_not_packed(steer_model: SteerMod
             assert server._server is not None
             (own,) = server._server.connections
             bound = own.transport.get_extra_info("socket").getsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF)
-            assert bound in {BUFFER, 2 * BUFFER}  # Linux doubles what it is told
+            assert bound in {LIMITS.buffer, 2 * LIMITS.buffer}  # Linux doubles what it is told
 
     serving(steer_model, scenario)
 
@@ -317,7 +314,7 @@ def test_a_client_that_stalls_is_dropped_and_others_go_on(steer_model: SteerMode
             assert len(await frames(connection, 30)) == 30
         raw.close()
 
-    serving(steer_model, scenario, characters=MOST, stall=0.2, rate=60)
+    serving(steer_model, scenario, characters=MAX_CHARACTERS, limits=replace(LIMITS, stall=0.2), rate=60)
 
 
 def test_a_speed_out_of_range_is_noted(steer_model: SteerModel) -> None:

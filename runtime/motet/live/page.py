@@ -23,9 +23,6 @@ from motet.motion.feet.hold import Leg
 from motet.motion.humanoid import BONES, HUMANOID
 from motet.settings import checked_int
 
-MOST = 8
-"""Characters of a page at most."""
-
 
 def write_live_page(file: File, model: SteerModel, characters: int = 1, title: str | None = None) -> None:
     """Write the page of :func:`live_page`; the title is the file's name where none is given.
@@ -39,13 +36,14 @@ def write_live_page(file: File, model: SteerModel, characters: int = 1, title: s
 def live_page(model: SteerModel, characters: int = 1, title: str = "motet") -> str:
     """The HTML of a page in which a figure is steered with keys, a gamepad or a finger, and others go with it.
 
-    characters: how many figures there are at first, 1 to :data:`MOST`. ControlError for another number, BundleError for
-    another model.
+    characters: how many figures there are at first, 1 to 8. ControlError for another number, BundleError for another
+    model.
     """
     if not isinstance(model, SteerModel):
         raise BundleError(f"{model} is not steered: a page needs a model such as motet.load('control')")
-    characters = checked_int("characters", characters, 1, MOST, ControlError)
-    data = {"net": net_data(model), "body": body_data(), "characters": characters, "most": MOST}
+    most = 8
+    characters = checked_int("characters", characters, 1, most, ControlError)
+    data = {"net": net_data(model), "body": body_data(), "characters": characters, "most": most}
     scripts = {"LOOP": source("motet.live", "loop.js"), "OTHERS": source("motet.live", "others.js")}
     return filled(source("motet.live", "page.html"), title, data, **scripts)
 
@@ -65,24 +63,20 @@ def net_data(model: SteerModel) -> dict[str, Any]:
         "columns": columns.tolist(),
         "signs": signs.tolist(),
         "featureSteps": FEATURE_STEPS,
-        "figure": figure_data(model),
+        "figure": {
+            "parents": HUMANOID.parents.tolist(),
+            "offsets": HUMANOID.offsets.tolist(),
+            "bones": [HUMANOID.index(bone) for bone in BONES],
+            "legs": [
+                {"joints": [HUMANOID.index(BONES[bone]) for bone in leg], "bones": leg}
+                for leg in foot_lock.LEG_BONES.tolist()
+            ],
+            "soles": list(zip(foot_lock.CARRIERS, foot_lock.POINTS.tolist(), strict=True)),
+            "knee": {"shortest": Leg.SHORTEST, "share": Leg.EASED_SHARE, "gives": list(Leg.GIVES)},
+            "lock": asdict(model.settings(foot_lock.FootLockSettings)),
+        },
         "tables": shapes,
         "bytes": b64encode(gzip.compress(b"".join(map(_shuffled, tables.values())), mtime=0)).decode(),
-    }
-
-
-def figure_data(model: SteerModel) -> dict[str, Any]:
-    """The humanoid, its legs and soles, and how its feet are held."""
-    joints = [[HUMANOID.index(BONES[bone]) for bone in leg] for leg in foot_lock.LEG_BONES]
-    legs = zip(joints, foot_lock.LEG_BONES.tolist(), strict=True)
-    return {
-        "parents": HUMANOID.parents.tolist(),
-        "offsets": HUMANOID.offsets.tolist(),
-        "bones": [HUMANOID.index(bone) for bone in BONES],
-        "legs": [{"joints": joints, "bones": bones} for joints, bones in legs],
-        "soles": list(zip(foot_lock.CARRIERS, foot_lock.POINTS.tolist(), strict=True)),
-        "knee": {"shortest": Leg.SHORTEST, "share": Leg.EASED_SHARE, "gives": list(Leg.GIVES)},
-        "lock": asdict(model.settings(foot_lock.FootLockSettings)),
     }
 
 

@@ -6,7 +6,6 @@ and x at 90.
 
 import json
 import warnings
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -19,15 +18,8 @@ from motet.motion.humanoid import BONES, HUMANOID
 from motet.motion.pose import Pose
 from motet.settings import checked_int
 
-MOST = 16
-"""Characters of a client at most."""
-
-
-DIGITS = 5
-"""Decimals of the numbers in frames: hundredths of millimetres, thousandths of degrees."""
-
-NUMBERS = ("speed", "direction", "facing", "velocity", "places")
-"""What is a number, or a list of numbers or of lists of them."""
+MAX_CHARACTERS = 16
+"""Of a client."""
 
 KEYS = {
     "control": ("gait", "speed", "direction", "facing", "velocity"),
@@ -66,7 +58,7 @@ class ClientSession:
 
     def _start(self, given: dict[str, Any]) -> None:
         characters, positions = given.pop("characters", 1), given.pop("positions", False)
-        checked_int("characters", characters, 1, MOST, ControlError)
+        checked_int("characters", characters, 1, MAX_CHARACTERS, ControlError)
         self.session = self.model.start(given.pop("gait", None), characters=characters, **given)
         self.positions, self.ticks = positions, 0
 
@@ -76,7 +68,7 @@ class ClientSession:
         return self.session.tick()
 
     def frame(self, pose: Pose) -> str:
-        """The message that gives a pose."""
+        """The message that gives a pose: hundredths of millimetres, thousandths of degrees."""
         parts: dict[str, NDArray[Any]] = {
             "position": pose.place,
             "rotation": pose.heading,
@@ -85,67 +77,60 @@ class ClientSession:
             "contacts": pose.contacts,
             **({"positions": pose.positions()} if self.positions else {}),
         }
-        rows = {name: np.round(values.astype(np.float64), DIGITS).tolist() for name, values in parts.items()}
+        rows = {name: np.round(values.astype(np.float64), 5).tolist() for name, values in parts.items()}
         characters = [{name: values[i] for name, values in rows.items()} for i in range(len(pose))]
-        said = {"type": "frame", "tick": self.ticks, "time": round(self.ticks / self.model.fps, DIGITS)}
-        return packed({**said, "heard": self.heard, "characters": characters})
+        time = round(self.ticks / self.model.fps, 5)
+        return message("frame", tick=self.ticks, time=time, heard=self.heard, characters=characters)
 
 
 def hello(model: SteerModel) -> str:
     """The first message: gaits with their speeds in m/s (lowest, usual, highest), the rate, and the figure."""
     speeds = {gait: [low, model.usual[gait], high] for gait, (low, high) in model.speeds.items()}
     joints = [{"name": joint.name, "parent": joint.parent, "offset": list(joint.offset)} for joint in HUMANOID.joints]
-    return packed({"type": "hello", "fps": model.fps, "gaits": speeds, "bones": list(BONES), "joints": joints})
+    return message("hello", fps=model.fps, gaits=speeds, bones=list(BONES), joints=joints)
 
 
-def error(reason: object) -> str:
-    """The last message to a client that is dropped."""
-    return packed({"type": "error", "message": str(reason)})
-
-
-def note(said: str) -> str:
-    """A message about something that was obeyed otherwise than it was told."""
-    return packed({"type": "note", "message": said})
-
-
-def packed(message: Mapping[str, Any]) -> str:
-    """JSON as short as it can be."""
-    return json.dumps(message, separators=(",", ":"), allow_nan=False)
+def message(kind: str, **said: Any) -> str:
+    """A message to a client, as JSON that is as short as it can be."""
+    return json.dumps({"type": kind, **said}, separators=(",", ":"), allow_nan=False)
 
 
 def parsed(text: str | bytes) -> tuple[str, dict[str, Any]]:
     """The type of a client's message and what it says, without what is null; ProtocolError for one that is none."""
+
+    def refuse(constant: str) -> None:
+        raise ValueError(f"{constant} is no number")
+
     if not isinstance(text, str):
         raise ProtocolError("messages must be text, not binary")
     try:
-        message = json.loads(text, parse_constant=_refuse)
+        told = json.loads(text, parse_constant=refuse)
     except (ValueError, RecursionError) as fault:
         raise ProtocolError(f"a message must be JSON: {fault}") from fault
-    kind = message.pop("type", None) if isinstance(message, dict) else None
+    kind = told.pop("type", None) if isinstance(told, dict) else None
     if not isinstance(kind, str) or kind not in KEYS:
         raise ProtocolError(f'a message must be an object whose "type" is one of {", ".join(KEYS)}')
-    given = {name: value for name, value in message.items() if value is not None}
+    given = {name: value for name, value in told.items() if value is not None}
     for name, value in given.items():
-        _check(kind, name, value)
+        if name not in KEYS[kind]:
+            raise ProtocolError(f"{kind}: {quoted(name)} is unknown; expected one of {', '.join(KEYS[kind])}")
+        if wanted := _unfit(kind, name, value):
+            raise ProtocolError(f"{kind}, {name}: expected {wanted}")
     if kind in ("put", "push") and not given:
         raise ProtocolError(f"{kind}: expected {KEYS[kind][0]}")
     return kind, given
 
 
-def _refuse(constant: str) -> None:
-    raise ValueError(f"{constant} is no number")
-
-
-def _check(kind: str, name: str, value: Any) -> None:
-    if name not in KEYS[kind]:
-        raise ProtocolError(f"{kind}: {quoted(name)} is unknown; expected one of {', '.join(KEYS[kind])}")
-    if name in NUMBERS and not _numeric(value, depth=2):
-        raise ProtocolError(f"{kind}, {name}: expected numbers up to {LARGEST:g}, or lists of them")
+def _unfit(kind: str, name: str, value: Any) -> str | None:
+    """What a value should be, where it is not."""
+    if name in ("speed", "direction", "facing", "velocity", "places") and not _numeric(value, depth=2):
+        return f"numbers up to {LARGEST:g}, or lists of them"
     one_for_each = kind == "control" and isinstance(value, list) and all(isinstance(gait, str) for gait in value)
     if name == "gait" and not (isinstance(value, str) or one_for_each):
-        raise ProtocolError(f"{kind}, gait: expected the name of a gait")
+        return "the name of a gait"
     if name in ("hold_feet", "positions") and not isinstance(value, bool):
-        raise ProtocolError(f"{kind}, {name}: expected true or false")
+        return "true or false"
+    return None
 
 
 def _numeric(value: Any, depth: int) -> bool:

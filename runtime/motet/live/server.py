@@ -8,6 +8,7 @@ import logging
 import re
 import socket
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Self
 
 from motet.errors import MotetError, OutputError
@@ -29,35 +30,29 @@ except ImportError as error:
 
 log = logging.getLogger(__name__)
 
-HOST, PORT = "127.0.0.1", 8765
 
-MAX_BYTES = 1 << 14
-"""Of a client's message."""
+@dataclass(frozen=True)
+class Limits:
+    """What a server allows its clients.
 
-MAX_CLIENTS = 32
+    message_bytes: of a message. clients, figures: of all together; about as many figures as one core moves 30 times a
+    second. messages: of a client between two ticks. controls: frames of a client in a second that are no messages:
+    pings, pongs, and parts of messages. ping: seconds after which a client is pinged, and in which it has to answer.
+    buffer: bytes that wait for a client, in this process and again in the system; then it has ``stall`` seconds to take
+    some.
+    """
 
-MAX_FIGURES = 64
-"""Of all clients together: about as many as one core moves 30 times a second."""
+    message_bytes: int = 1 << 14
+    clients: int = 32
+    figures: int = 64
+    messages: int = 50
+    controls: int = 50
+    ping: float = 5
+    buffer: int = 1 << 16
+    stall: float = 2.0
 
-MAX_MESSAGES = 50
-"""Of a client between two ticks."""
 
-MAX_CONTROLS = 50
-"""Frames of a client in a second that are no messages: pings, pongs, and parts of messages."""
-
-READ = 1 << 12
-"""Bytes of a client that are looked at before others have their turn, as far as it breaks a rule with them."""
-
-PING = 5
-"""Seconds after which a client is pinged, and in which it has to answer."""
-
-BUFFER = 1 << 16
-"""Bytes that wait for a client, in this process and again in the system; then it has STALL seconds to take some."""
-
-STALL = 2.0
-
-REFUSED, BUSY = 1008, 1013
-"""Codes with which a connection is closed: a rule was broken; too many clients."""
+LIMITS = Limits()
 
 LOCAL = re.compile(r"https?://(localhost|127\.0\.0\.1|\[::1\])(:\d+)?")
 """Origins of web pages that may connect, next to programs, which have none."""
@@ -69,10 +64,10 @@ class Connection(ServerConnection):
     controls, since = 0, 0.0
 
     def data_received(self, data: bytes) -> None:
-        """See the class."""
-        for start in range(0, len(data), READ):
+        """See the class: only so many bytes are looked at before others have their turn."""
+        for start in range(0, len(data), 1 << 12):
             if not self.transport.is_closing():
-                super().data_received(data[start : start + READ])
+                super().data_received(data[start : start + (1 << 12)])
 
     def process_event(self, event: Event) -> None:
         """See the class."""
@@ -81,8 +76,9 @@ class Connection(ServerConnection):
             return
         now = self.loop.time()
         self.controls, self.since = (self.controls + 1, self.since) if now < self.since + 1 else (1, now)
-        if self.controls > MAX_CONTROLS and not self.transport.is_closing():
-            log.warning("dropped a client: more than %d pings, pongs and parts of messages in a second", MAX_CONTROLS)
+        if self.controls > LIMITS.controls and not self.transport.is_closing():
+            said = "dropped a client: more than %d pings, pongs and parts of messages in a second"
+            log.warning(said, LIMITS.controls)
             self.transport.abort()
 
 
@@ -90,25 +86,25 @@ class LiveServer:
     """Listens while it is entered (``async with``).
 
     characters: that a client has at first. rate: ticks a second, by default the model's, which is life's speed.
-    origins: of further web pages that may connect, such as "null" (a page that was opened as a file). stall: seconds
-    for which a client may take nothing. watch: called with each pose of the client that is here the longest.
+    origins: of further web pages that may connect, such as "null" (a page that was opened as a file). watch:
+    called with each pose of the client that is here the longest.
     OutputError where it cannot listen, ControlError for a number of characters that a client cannot have.
     """
 
     def __init__(  # noqa: PLR0913  settings, each of which has a default
         self,
         model: SteerModel,
-        host: str = HOST,
-        port: int = PORT,
+        host: str = "127.0.0.1",
+        port: int = 8765,
         *,
         characters: int = 1,
         rate: float | None = None,
         origins: Sequence[str] = (),
-        stall: float = STALL,
         watch: Callable[[Pose, float], None] | None = None,
+        limits: Limits = LIMITS,
     ) -> None:
         self.model, self.host, self.port, self.characters = model, host, port, characters
-        self.rate, self.stall, self.watch = rate or model.fps, stall, watch
+        self.rate, self.watch, self.limits = rate or model.fps, watch, limits
         ClientSession(model, characters)  # refuses now what it would refuse every client
         self._origins = [None, LOCAL, *map(Origin, origins)]
         self._clients: list[ClientSession] = []
@@ -123,11 +119,11 @@ class LiveServer:
                 origins=self._origins,
                 logger=log,
                 compression=None,
-                max_size=MAX_BYTES,
+                max_size=self.limits.message_bytes,
                 max_queue=16,
-                write_limit=BUFFER,
-                ping_interval=PING,
-                ping_timeout=PING,
+                write_limit=self.limits.buffer,
+                ping_interval=self.limits.ping,
+                ping_timeout=self.limits.ping,
                 close_timeout=1,
                 create_connection=Connection,
             )
@@ -142,55 +138,47 @@ class LiveServer:
         await self._server.wait_closed()
 
     async def _client(self, connection: ServerConnection) -> None:
-        """All of one client, until it goes or is dropped."""
-        if len(self._clients) >= MAX_CLIENTS or self._figures() + self.characters > MAX_FIGURES:
-            await connection.close(
-                BUSY, f"there are {len(self._clients)} clients already, of {self._figures()} figures"
-            )
+        """All of one client, until it goes or is dropped: ticks and its messages, side by side."""
+        if len(self._clients) >= self.limits.clients or self._figures() + self.characters > self.limits.figures:
+            said = f"there are {len(self._clients)} clients already, of {self._figures()} figures"
+            await connection.close(1013, said)  # try again later
             return
-        _bound(connection)
-        client = ClientSession(self.model, self.characters)
+        # the system holds no more for a client than this, either
+        connection.transport.get_extra_info("socket").setsockopt(
+            socket.SOL_SOCKET, socket.SO_SNDBUF, self.limits.buffer
+        )
+        client, fault = ClientSession(self.model, self.characters), None
         self._clients.append(client)
         try:
             await connection.send(protocol.hello(self.model))
-            reason = await self._until_fault(connection, client)
-        except ConnectionClosed:
-            return
+            async with asyncio.TaskGroup() as both:
+                both.create_task(self._listen(connection, client))
+                both.create_task(self._tick(connection, client))
+        except* ConnectionClosed:
+            pass
+        except* MotetError as faults:
+            fault = faults.exceptions[0]
         finally:
             self._clients.remove(client)
-        if isinstance(reason, MotetError):
-            log.warning("dropped a client: %s", reason)
-            await self._drop(connection, reason)
+        if fault is not None:
+            log.warning("dropped a client: %s", fault)
+            await self._drop(connection, str(fault))
 
     def _figures(self) -> int:
         return sum(client.session.characters for client in self._clients)
 
-    async def _until_fault(self, connection: ServerConnection, client: ClientSession) -> BaseException | None:
-        """Tick and listen side by side; why one of the two came to an end."""
-        both = [asyncio.create_task(run(connection, client)) for run in (self._listen, self._tick)]
-        try:
-            done, _ = await asyncio.wait(both, return_when=asyncio.FIRST_COMPLETED)
-        finally:
-            for task in both:
-                task.cancel()
-            await asyncio.gather(*both, return_exceptions=True)
-        faults = [task.exception() for task in done]
-        for fault in faults:
-            if fault and not isinstance(fault, MotetError | ConnectionClosed):
-                raise fault
-        return next((fault for fault in faults if isinstance(fault, MotetError)), None)
-
     async def _listen(self, connection: ServerConnection, client: ClientSession) -> None:
         tick, count = 0, 0
-        async for text in connection:
+        while True:
+            text = await connection.recv()
             tick, count = client.ticks, (count + 1 if tick == client.ticks else 1)
-            if count > MAX_MESSAGES:
-                raise ProtocolError(f"more than {MAX_MESSAGES} messages between two frames")
+            if count > self.limits.messages:
+                raise ProtocolError(f"more than {self.limits.messages} messages between two frames")
             notes = client.handle(text)
-            if self._figures() > MAX_FIGURES:
-                raise ProtocolError(f"all clients together may have {MAX_FIGURES} figures")
+            if self._figures() > self.limits.figures:
+                raise ProtocolError(f"all clients together may have {self.limits.figures} figures")
             for said in notes:
-                await self._send(connection, protocol.note(said))
+                await self._send(connection, protocol.message("note", message=said))
 
     async def _tick(self, connection: ServerConnection, client: ClientSession) -> None:
         clock = asyncio.get_running_loop().time
@@ -205,26 +193,20 @@ class LiveServer:
 
     async def _send(self, connection: ServerConnection, text: str) -> None:
         try:
-            async with asyncio.timeout(self.stall):
+            async with asyncio.timeout(self.limits.stall):
                 await connection.send(text)
         except TimeoutError:
-            raise ProtocolError(f"took no frames for {self.stall:g} s") from None
+            raise ProtocolError(f"took no frames for {self.limits.stall:g} s") from None
 
-    async def _drop(self, connection: ServerConnection, reason: MotetError) -> None:
-        """Say why, as far as the client still listens, and close."""
-        said = str(reason).encode()[:120].decode(errors="ignore")  # a frame that closes has room for 123 bytes
+    async def _drop(self, connection: ServerConnection, reason: str) -> None:
+        """Say why, as far as the client still listens, and close: it broke a rule (1008)."""
+        short = reason.encode()[:120].decode(errors="ignore")  # a frame that closes has room for 123 bytes
         try:
-            async with asyncio.timeout(self.stall):
-                await connection.send(protocol.error(reason))
-                await connection.close(REFUSED, said)
+            async with asyncio.timeout(self.limits.stall):
+                await connection.send(protocol.message("error", message=reason))
+                await connection.close(1008, short)
         except (TimeoutError, ConnectionClosed):
             connection.transport.abort()
-
-
-def _bound(connection: ServerConnection) -> None:
-    """Let the system hold no more for a client than BUFFER."""
-    raw = connection.transport.get_extra_info("socket")
-    raw.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BUFFER)
 
 
 def run_server(server: LiveServer, ready: Callable[[], None] = lambda: None) -> None:

@@ -28,12 +28,6 @@ except ImportError as error:
 Message = tuple[str, list[str | int | float]]
 """An address and its values."""
 
-IN_BUNDLE = 14
-"""Bones in a datagram, so that it has less than 1,400 bytes."""
-
-UNITY = {bone: bone[0].upper() + bone[1:] for bone in BONES}
-"""The bones' names in Unity (HumanBodyBones)."""
-
 OFFSETS = HUMANOID.offsets[[HUMANOID.index(bone) for bone in BONES]].astype(np.float32)
 """Where the bones are (J, 3) in their parents' frames; that of the hips depends on the pose."""
 
@@ -44,7 +38,8 @@ def messages(pose: Pose, seconds: float) -> list[Message]:
     found: list[Message] = [("/VMC/Ext/OK", [1]), ("/VMC/Ext/T", [float(seconds)]), ("/VMC/Ext/Root/Pos", root)]
     places = [np.array([0, pose.height[0], 0], dtype=np.float32), *OFFSETS[1:]]  # the hips are the first bone
     for bone, place, quat in zip(BONES, places, pose.rotations[0], strict=True):
-        found.append(("/VMC/Ext/Bone/Pos", [UNITY[bone], *_place(place), *_turn(quat)]))
+        name = bone[0].upper() + bone[1:]  # as Unity calls it (HumanBodyBones)
+        found.append(("/VMC/Ext/Bone/Pos", [name, *_place(place), *_turn(quat)]))
     return found
 
 
@@ -67,12 +62,12 @@ class Sender:
             self._client = UDPClient(host, port)
 
     def send(self, pose: Pose, seconds: float) -> None:
-        """Send the messages of a pose at a time, several in a datagram."""
+        """Send the messages of a pose at a time, 14 in a datagram, so that it has less than 1,400 bytes."""
         found = messages(pose, seconds)
         with self._named():
-            for start in range(0, len(found), IN_BUNDLE):
+            for start in range(0, len(found), 14):
                 bundle = OscBundleBuilder(IMMEDIATELY)
-                for address, values in found[start : start + IN_BUNDLE]:
+                for address, values in found[start : start + 14]:
                     bundle.add_content(build_msg(address, values))
                 self._client.send(bundle.build())
 
