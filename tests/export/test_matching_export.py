@@ -22,7 +22,7 @@ from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.matching_rows import Recording, rows_of
 from motet_train.models.kinematics import tree_of
 from motet_train.models.matching import Matching, MatchingConfig
-from motet_train.recipes.matching_table import take
+from motet_train.recipes.matching import take
 from motet_train.runs import Run
 
 

@@ -19,7 +19,7 @@ from motet_train.models.action_net import ActionsConfig
 from motet_train.models.codec import CodecConfig, MotionCodec
 from motet_train.models.kinematics import Tree
 from motet_train.models.motion_codes import CodeModelConfig, MotionCodes, MotionCodesConfig
-from motet_train.recipes.coded import coded, codes_of
+from motet_train.recipes.codes import coded, codes_of
 from motet_train.runs import MODELS, Run
 
 TREE = Tree((-1, 0), ((0.0, 0.0, 0.0), (0.0, 0.4, 0.0)), (0, 1))

@@ -23,7 +23,7 @@ from motet_train.data.matching_rows import MatchingRows, Recording, mirrored_pos
 from motet_train.data.table import Gait, read_gaits
 from motet_train.models.kinematics import tree_of
 from motet_train.models.matching import DTYPES, Matching, MatchingConfig
-from motet_train.recipes.matching_table import take
+from motet_train.recipes.matching import take
 
 CLIPS = CMU_FOLDER
 

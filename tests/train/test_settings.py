@@ -17,7 +17,7 @@ from motet.formats import read_motion, write_motion
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.papers.li2018.recipe import RECIPES as SYSTEMS
 from motet_train.papers.tdbn.recipe import RECIPES as CONTROL
-from motet_train.recipes import codec, codes, describe, predict
+from motet_train.recipes import codec, codes, language, predict
 from motet_train.runs import Run
 from motet_train.settings import SettingsError, changed, read_settings, to_toml
 
@@ -27,7 +27,7 @@ def motet(*arguments: object) -> Result:
 
 
 RECIPES = [
-    *describe.RECIPES.values(),
+    *language.RECIPES.values(),
     *predict.RECIPES.values(),
     *codec.RECIPES.values(),
     *codes.RECIPES.values(),

@@ -20,7 +20,7 @@ from motet_train.models.motion_to_language import MotionToLanguageConfig
 from motet_train.papers.plappert2017 import recipe as generate
 from motet_train.papers.plappert2017.language_to_motion import LanguageToMotionConfig
 from motet_train.progress import Shown
-from motet_train.recipes import describe
+from motet_train.recipes import language
 from motet_train.recipes.language import LanguageVisits, divided, train_language
 from motet_train.recipes.recipe import SETTINGS, Job, Recipe
 from motet_train.runs import About, Run
@@ -42,7 +42,7 @@ def small_nets(monkeypatch: pytest.MonkeyPatch) -> None:
     sizes = {"encoder_units": (4, 4), "decoder_units": (6, 6), "embedding": 4}
     training = Training(epochs=3, batch=16, optimiser="nadam", clip=8.0)
     for module, config in (
-        (describe, MotionToLanguageConfig(0, 0, **sizes)),  # type: ignore[arg-type]
+        (language, MotionToLanguageConfig(0, 0, **sizes)),  # type: ignore[arg-type]
         (generate, LanguageToMotionConfig(0, 0, components=2, loss="likelihood", **sizes)),  # type: ignore[arg-type]
     ):
         recipe = replace(module.RECIPES["default"], config=config, training=training)
@@ -193,7 +193,7 @@ def test_a_corpus_is_prepared_beside_the_run(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("representation", "travelled"), [("root_angles", 2), ("angles", 0)])
 def test_only_channels_that_travel_are_summed(store: Path, tmp_path: Path, representation: str, travelled: int) -> None:
-    recipe = describe.RECIPES["default"]
+    recipe = language.RECIPES["default"]
     config, visits = replace(recipe.config, travelled=2), replace(recipe.visits, mirror=False)
     job = Job(replace(recipe, config=config, visits=visits), About("x", "x"), tmp_path)
     run = train_language(replace(Store.open(store), representation=representation), job)
@@ -207,7 +207,7 @@ def test_either_loss_can_be_trained(store: Path, tmp_path: Path) -> None:
 
 
 PAPER: list[tuple[Recipe, Callable[[int, int], object], float]] = [
-    (describe.PAPER, MotionToLanguageConfig, 8.0),
+    (language.PAPER, MotionToLanguageConfig, 8.0),
     (generate.PAPER, LanguageToMotionConfig, 25.0),
 ]
 

@@ -11,9 +11,8 @@ from motet_train.data.predict_data import store_material
 from motet_train.data.preparation import ALL, preparation
 from motet_train.data.store import Store, part, prepare_parts
 from motet_train.progress import log, preparing
-from motet_train.recipes import actions, codec, codes, describe, fill, matching, predict, search
+from motet_train.recipes import actions, codec, codes, fill, language, matching, predict, search
 from motet_train.recipes.actions import WordVectors
-from motet_train.recipes.language import train_language
 from motet_train.recipes.recipe import Job, Recipe
 from motet_train.run_folder import is_finished, trained
 from motet_train.runs import About, Run, RunError
@@ -62,7 +61,7 @@ STAGES: Mapping[str, Stage] = {
     "sharp": Stage("generate", codec.SHARP, codec.train_codec, {"start": "decoder"}),
     "generate": Stage("generate", codes.DEFAULT, codes.train_codes, {"codec": "sharp", "actions": "actions"}),
     "fill": Stage("fill", fill.DEFAULT, fill.train_fill),
-    "describe": Stage("describe", describe.DEFAULT, train_language),
+    "describe": Stage("describe", language.DEFAULT, language.train_language),
 }
 """By their names, those that take least time first, each after those that it needs."""
 

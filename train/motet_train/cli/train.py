@@ -22,9 +22,8 @@ from motet_train.papers.tdbn import recipe as tdbn
 from motet_train.papers.tdbn import steered
 from motet_train.papers.tdbn.clips import read_clips
 from motet_train.plan import STAGES, VERBS, Plan
-from motet_train.recipes import actions, codec, codes, describe, fill, matching, predict, search
+from motet_train.recipes import actions, codec, codes, fill, language, matching, predict, search
 from motet_train.recipes.actions import WordVectors
-from motet_train.recipes.language import train_language
 from motet_train.recipes.recipe import Job, Recipe
 from motet_train.runs import Run
 from motet_train.settings import read_stages
@@ -228,9 +227,9 @@ parts = with_options(
         "--actions", type=Path, required=True, help="Run of an action net, trained on the same data and split."
     ),
 )
-_on_store("describe", describe.RECIPES, train_language, by_epochs)
+_on_store("describe", language.RECIPES, language.train_language, by_epochs)
 _on_store("search", search.RECIPES, search.train_search, by_epochs)
-_on_store("mixture", plappert2017.RECIPES, train_language, by_epochs, loss)
+_on_store("mixture", plappert2017.RECIPES, language.train_language, by_epochs, loss)
 _on_store("codec", codec.RECIPES, codec.train_codec, by_steps, start)
 _on_store("actions", actions.RECIPES, actions.train_actions, by_steps, word_vectors)
 _on_store("codes", codes.RECIPES, codes.train_codes, by_steps, parts)

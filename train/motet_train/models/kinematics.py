@@ -6,10 +6,12 @@ Letters in shapes: B rows, T frames, D channels, J joints, K of them with rotati
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from motet.motion.humanoid import LEFT_RIGHT, sided
 from motet.motion.kinematics import AXES
 from motet.motion.skeleton import END_SUFFIX
 from motet.representation.contract import MotionContract
@@ -227,3 +229,11 @@ class EulerPlaces(nn.Module):
         """Rotations (..., J, 3, 3) by angles (..., J, 1, 1) about the axis at a place in each joint's order."""
         along = self.along[:, place]
         return along + angles.cos() * (self.unit - along) + angles.sin() * self.across[:, place]
+
+
+def joint_weights(contract: MotionContract, parts: tuple[str, ...], times: float) -> Tensor:
+    """How much each joint counts in a loss (J,), mean 1: those of some parts of both sides so many times the others."""
+    assert contract.skeleton is not None
+    counted = tuple(sided(side, part) for side in LEFT_RIGHT for part in parts)
+    found = np.array([times if name.startswith(counted) else 1.0 for name in contract.skeleton.names])
+    return torch.from_numpy(found / found.mean()).float()

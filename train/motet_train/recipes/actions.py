@@ -1,6 +1,5 @@
 """The recipe of the net that tells which action a sentence asks for, and its training on the sentences of a store."""
 
-from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from motet.models.language import RULES, Vocabulary, padded
+from motet_train.data.batches import Rows
 from motet_train.data.errors import DataError
 from motet_train.data.sentences import Actions, actions_of, principal, read_word_vectors
 from motet_train.data.store import Store
@@ -43,40 +43,26 @@ RECIPES = {"default": DEFAULT}
 
 @dataclass(frozen=True)
 class WordVectors:
-    """A file of vectors of words (:mod:`motet_train.data.sentences`). origin: whose they are, and their licence."""
+    """A file of word vectors (:func:`motet_train.data.sentences.read_word_vectors`). origin: its source and licence."""
 
     file: Path
     origin: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
-class SentenceBatch:
+class SentenceBatch(Rows):
     """S sentences. words: ids (S, W) int64. lengths: (S,). asked: the actions (S,) that they ask for."""
 
     words: Tensor
     lengths: Tensor
     asked: Tensor
 
-    def __len__(self) -> int:
-        """S."""
-        return len(self.asked)
-
-    def __getitem__(self, rows: slice) -> "SentenceBatch":
-        """Some of them."""
-        return SentenceBatch(self.words[rows], self.lengths[rows], self.asked[rows])
-
-    def to(self, device: torch.device | str) -> "SentenceBatch":
-        """The same on a device."""
-        return SentenceBatch(self.words.to(device), self.lengths.to(device), self.asked.to(device))
-
 
 def train_actions(store: Store, job: Job, data: str = "", by: str = "trial", vectors: WordVectors | None = None) -> Run:
     """Train on the sentences of a store's training part, see :meth:`motet_train.recipes.recipe.Job.run`.
 
-    vectors: of words, from which the net starts; those of other words are drawn by chance.
+    vectors: of words, from which the net starts; those of other words are random.
     """
-    training = job.recipe.training
-    assert training is not None
     found = divided(store, mirror=True, by=by)
     actions = spoken(store, found.parts.train)
     words = found.vocabulary.words
@@ -86,19 +72,28 @@ def train_actions(store: Store, job: Job, data: str = "", by: str = "trial", vec
     about = manifest(job, found, asdict(net.config), data, by)
     about["actions"] = described(actions)
     if vectors is not None:
-        about["training"]["word_vectors"] = _started(net, words, vectors)
+        read = read_word_vectors(vectors.file, words)
+        parts, known = principal(read, words, net.config.embedding)
+        net.start_from(torch.from_numpy(parts).float(), torch.from_numpy(known))
+        of = {"file": vectors.file.name, "words": len(read), "numbers": len(next(iter(read.values())))}
+        about["training"]["word_vectors"] = {**of, "origin": vectors.origin}
 
-    def batches(rng: np.random.Generator) -> Iterator[SentenceBatch]:
-        yield said.draw(training.batch, rng)
+    def loss(batch: SentenceBatch) -> Terms:
+        chances = net(batch.words, batch.lengths)
+        return (Term(functional.nll_loss(chances.float(), batch.asked, reduction="none"), len(batch)),)
 
     learner = GradientLearner(
-        net.to(job.device), training, lambda batch: _loss(net, batch), batches, lambda: said.measured(net)
+        net.to(job.device),
+        job.training,
+        loss,
+        lambda rng: (said.draw(job.training.batch, rng),),
+        lambda: said.measured(net),
     )
     return job.run(net, learner, about)
 
 
 def spoken(store: Store, records: tuple[int, ...]) -> Actions:
-    """The actions of some records; DataError where one has no sentence that can be used."""
+    """The actions of some records; DataError where one has no usable sentence."""
     actions = actions_of(store, records)
     if not all(actions.sentences):
         raise DataError("each action needs a sentence that can be used: of 1 to 40 words")
@@ -106,56 +101,38 @@ def spoken(store: Store, records: tuple[int, ...]) -> Actions:
 
 
 def described(actions: Actions) -> list[dict[str, Any]]:
-    """Of each action a sentence and the words of all its sentences, as manifests have them."""
+    """A sentence of each action and the words of all its sentences, for manifests."""
     return [
         {"sentence": sentences[0], "words": sorted({word for s in sentences for word in RULES.words(s)})}
         for sentences in actions.sentences
     ]
 
 
-def _started(net: ActionNet, words: tuple[str, ...], vectors: WordVectors) -> dict[str, Any]:
-    """Let a net start from vectors of words; what the manifest says of them."""
-    read = read_word_vectors(vectors.file, words)
-    found, known = principal(read, words, net.config.embedding)
-    net.start_from(torch.from_numpy(found).float(), torch.from_numpy(known))
-    numbers = len(next(iter(read.values())))
-    return {"file": vectors.file.name, "words": len(read), "numbers": numbers, "origin": vectors.origin}
-
-
-def _loss(net: ActionNet, batch: SentenceBatch) -> Terms:
-    chances = net(batch.words, batch.lengths)
-    return (Term(functional.nll_loss(chances.float(), batch.asked, reduction="none"), len(batch)),)
-
-
 class Said:
     """The sentences of all actions, to draw from and to measure by."""
 
     def __init__(self, actions: Actions, vocabulary: Vocabulary) -> None:
-        self.vocabulary, self.actions = vocabulary, actions
-        self.known = [[self._ids(s) for s in said] for said in actions.sentences]
+        self.known = [[vocabulary.encode(s)[0] for s in said] for said in actions.sentences]
         asking: dict[str, set[int]] = {}
         for action, said in enumerate(actions.unseen):
             for s in said:
                 if not vocabulary.ids.keys().isdisjoint(RULES.words(s)):
                     asking.setdefault(s, set()).add(action)
-        self.unseen = padded([self._ids(s) for s in asking], "int64") if asking else None
+        self.unseen = padded([vocabulary.encode(s)[0] for s in asking], "int64") if asking else None
         self.alike = torch.zeros(len(asking), len(actions), dtype=torch.bool)
         for row, asked in enumerate(asking.values()):
             self.alike[row, list(asked)] = True
 
-    def _ids(self, sentence: str) -> Any:
-        return self.vocabulary.encode(sentence)[0]
-
     def draw(self, count: int, rng: np.random.Generator) -> SentenceBatch:
-        """Sentences of actions drawn by chance, each as often as another."""
+        """Sentences of actions drawn at random, each as often as another."""
         asked = rng.integers(len(self.known), size=count)
         ids, lengths = padded([self.known[a][rng.integers(len(self.known[a]))] for a in asked], "int64")
         return SentenceBatch(torch.from_numpy(ids), torch.from_numpy(lengths), torch.from_numpy(asked))
 
     @torch.no_grad()
     def measured(self, net: ActionNet) -> dict[str, float]:
-        """Of sentences in wordings never seen: how surprising it is that one of the actions is asked for that it was
-        said of (validation), and how often the likeliest action is one of them (understood)."""
+        """For sentences in wordings never seen, the surprise at the actions they were said of (validation), and how
+        often the likeliest action is one of those (understood)."""
         if self.unseen is None:
             return {}
         words, lengths = (torch.from_numpy(part).to(net.mean.device) for part in self.unseen)

@@ -1,24 +1,24 @@
 """Recipes of the model that writes motions as codes, and its training on a codec."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 
-from motet.models.language import Vocabulary
+from motet.representation.base import FrameMirror
 from motet_train.data.batches import frame_mirror
 from motet_train.data.errors import DataError
 from motet_train.data.sentences import Actions
-from motet_train.data.sixd_windows import CodeBatch, CodeWindows, memory_of
+from motet_train.data.sixd_windows import CodeBatch, CodedMotion, Codes, CodeWindows, memory_of, poses_of, with_way
 from motet_train.data.store import Store
 from motet_train.descent import GradientLearner, Term, Terms, Training
 from motet_train.models.action_net import ActionNet
 from motet_train.models.codec import MotionCodec
 from motet_train.models.motion_codes import CodeModelConfig, MotionCodes, MotionCodesConfig
 from motet_train.recipes.actions import described, spoken
-from motet_train.recipes.coded import coded
 from motet_train.recipes.language import divided, manifest
 from motet_train.recipes.recipe import Job, Recipe
 from motet_train.runs import Run
@@ -69,46 +69,41 @@ RECIPES = {"default": DEFAULT}
 
 
 def train_codes(store: Store, job: Job, data: str, by: str, codec: Run, actions: Run) -> Run:
-    """Train a writer on a store, for the runs of a codec and of a net of actions that were trained on the same store,
-    divided alike. DataError where they were not."""
-    recipe, training = job.recipe, job.recipe.training
-    assert training is not None
+    """Train a writer on a store, for the runs of a codec and of a net of actions that were trained on the same store
+    and split. DataError where they were not."""
+    visits = job.recipe.visits
     found = divided(store, mirror=True, by=by)
     mirror = frame_mirror(found.contract)
     shown = spoken(store, found.parts.train)
-    coder, reader = _codec(codec), _reader(actions, found.vocabulary, shown)
+    if not isinstance(codec.model, MotionCodec):
+        raise DataError(f"codes need the run of a codec (motet train codec), not of {codec.manifest['model']}")
+    if not isinstance(actions.model, ActionNet):
+        kind = actions.manifest["model"]
+        raise DataError(f"codes need the run of a net of actions (motet train actions), not of {kind}")
+    known = {"vocabulary": list(found.vocabulary.words), "actions": described(shown)}
+    if any(actions.manifest[key] != value for key, value in known.items()):
+        name = actions.manifest["name"]
+        raise DataError(
+            f"the net of actions {name} was trained on other sentences: train it on the same data and split"
+        )
     torch.manual_seed(job.about.seed)
-    motions = coded(store, found.parts.train, coder.eval(), shown, mirror)
-    net = _untrained(recipe.sized(actions=len(shown)), coder, reader, memory_of(motions))
-    windows = CodeWindows(motions, recipe.visits.window, net.end, recipe.visits.first)
+    motions = coded(store, found.parts.train, codec.model.eval(), shown, mirror)
+    memory, writer = memory_of(motions), job.recipe.sized(actions=len(shown))
+    net = MotionCodes(MotionCodesConfig(codec.model.config, actions.model.config, writer, len(memory)))
+    net.take(codec.model, actions.model)
+    net.memory.copy_(memory)
+    windows = CodeWindows(motions, visits.window, net.end, visits.first)
 
-    def batches(rng: np.random.Generator) -> Iterator[CodeBatch]:
-        yield windows.draw(training.batch, net.config.writer.unsaid, len(shown), rng)
+    def loss(batch: CodeBatch) -> Terms:
+        losses = net.losses(batch.codes, batch.before, batch.action, batch.age)
+        return (Term(losses.mean(dim=-1) * batch.weights / batch.weights.mean(), len(batch)),)
 
-    learner = GradientLearner(net.to(job.device), training, lambda batch: _loss(net, batch), batches)
+    drawn = job.training.batch, writer.unsaid, len(shown)
+    learner = GradientLearner(net.to(job.device), job.training, loss, lambda rng: (windows.draw(*drawn, rng),))
     about = manifest(job, found, asdict(net.config), data, by)
     about["actions"] = actions.manifest["actions"]
     about["training"] |= {"codec": _made(codec.manifest["training"]), "actions": _made(actions.manifest["training"])}
     return job.run(net, learner, about)
-
-
-def _codec(run: Run) -> MotionCodec:
-    if not isinstance(run.model, MotionCodec):
-        raise DataError(f"codes need the run of a codec (motet train codec), not of {run.manifest['model']}")
-    return run.model
-
-
-def _reader(run: Run, vocabulary: Vocabulary, actions: Actions) -> ActionNet:
-    """The net of a run that was trained on the same sentences."""
-    if not isinstance(run.model, ActionNet):
-        raise DataError(f"codes need the run of a net of actions (motet train actions), not of {run.manifest['model']}")
-    known = {"vocabulary": list(vocabulary.words), "actions": described(actions)}
-    if any(run.manifest[key] != value for key, value in known.items()):
-        name = run.manifest["name"]
-        raise DataError(
-            f"the net of actions {name} was trained on other sentences: train it on the same data and split"
-        )
-    return run.model
 
 
 def _made(training: Mapping[str, Any]) -> dict[str, Any]:
@@ -118,14 +113,35 @@ def _made(training: Mapping[str, Any]) -> dict[str, Any]:
     return {**{key: training[key] for key in kept if key in training}, **start}
 
 
-def _untrained(config: CodeModelConfig, codec: MotionCodec, text: ActionNet, memory: torch.Tensor) -> MotionCodes:
-    net = MotionCodes(MotionCodesConfig(codec.config, text.config, config, len(memory)))
-    net.take(codec, text)
-    net.memory.copy_(memory)
-    return net
+@torch.no_grad()
+def coded(
+    store: Store, records: tuple[int, ...], codec: MotionCodec, actions: Actions, mirror: FrameMirror
+) -> list[CodedMotion]:
+    """Every span of some records, as it is and mirrored, by a codec."""
+    found = []
+    for record in records:
+        entry = store.records[record]
+        for start, stop in entry.spans:
+            frames = np.array(store.frames[start:stop], np.float64)
+            for mirrored in (False, True):
+                codes = codes_of(codec, mirror(frames) if mirrored else frames, store.fps)
+                if not len(codes):
+                    continue
+                if entry.ends:
+                    codes = np.pad(codes, ((0, 1), (0, 0)))
+                    codes[-1, 0] = codec.config.moves
+                found.append(CodedMotion(codes, actions.of[record, mirrored], entry.starts, start == entry.spans[0][0]))
+    return found
 
 
-def _loss(net: MotionCodes, batch: CodeBatch) -> Terms:
-    losses = net.losses(batch.codes, batch.before, batch.action, batch.age)
-    weighed = losses.mean(dim=-1) * batch.weights / batch.weights.mean()
-    return (Term(weighed, len(batch)),)
+def codes_of(codec: MotionCodec, frames: NDArray[np.float64], fps: float) -> Codes:
+    """Frames (T, D) to codes (N, P), what is left over of the last step left out."""
+    hop = codec.config.hop
+    frames = frames[: len(frames) // hop * hop]
+    if not len(frames):
+        return np.empty((0, codec.config.groups + 1), dtype=np.int64)
+    poses = poses_of(frames, fps)
+    poses = np.concatenate([poses, 2 * poses[-1:] - poses[-2:-1]])  # the root keeps its pace after the end
+    _, moves, _ = with_way(frames, poses, codec.book.numpy().astype(np.float64), hop)
+    body = codec.to_codes(codec.encode(torch.from_numpy(frames).float()[None]))[0].numpy()
+    return np.concatenate([moves[:, None], body], axis=1)

@@ -1,6 +1,5 @@
 """The recipe of the net that fills gaps, and its training from a store."""
 
-from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -9,8 +8,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, sided
-from motet.motion.rotations import Array
+from motet.motion.humanoid import HUMANOID
 from motet.representation.contract import MotionContract
 from motet.representation.placed import PLACED_CHANNELS
 from motet_train.data.batches import frame_mirror
@@ -19,27 +17,15 @@ from motet_train.data.sixd_windows import GapWindow, GapWindows
 from motet_train.data.store import Store, split
 from motet_train.descent import GradientLearner, Term, Terms, Training
 from motet_train.models.filler import Filler, FillerConfig
-from motet_train.models.kinematics import tree_of
+from motet_train.models.kinematics import joint_weights, tree_of
 from motet_train.recipes.recipe import Job, Recipe
 from motet_train.runs import Run
-
-FEET = tuple(sided(side, part) for side in LEFT_RIGHT for part in ("Foot", "Toes"))
-
-STANDING = 0.2
-"""Metres a second: a joint of the feet that was slower stands."""
-
-ROTATIONS, SPEEDS, SLIDE = 0.05, 0.1, 0.1
-"""Weights of the losses of axes (in standard deviations), of joints' speeds and of feet that slide (m/s), beside that
-of joints' places (m)."""
-
-SEEN = (0.25, 0.5, 1.0)
-"""Of the longest gap: those by which the log tells how good the net is."""
 
 
 @dataclass(frozen=True)
 class FillVisits:
-    """context: the most frames that are seen before and after a gap; least: the fewest; whole: the share of windows in
-    which all are. gaps: the shortest and the longest. feet: how many times their places count."""
+    """context: the most frames seen before and after a gap; least: the fewest; whole: the share of windows with the
+    most. gaps: the shortest and the longest. feet: how many times their places count."""
 
     context: int = 20
     least: int = 4
@@ -76,8 +62,7 @@ RECIPES = {"default": DEFAULT}
 
 def train_fill(store: Store, job: Job, data: str = "", by: str = "subject") -> Run:
     """Train on a store in ``root_sixd``, see :meth:`motet_train.recipes.recipe.Job.run`."""
-    recipe, training, visits = job.recipe, job.recipe.training, job.recipe.visits
-    assert training is not None
+    visits = job.recipe.visits
     if store.representation != "root_sixd":
         raise DataError(f"gaps are filled in root_sixd (motet prepare --for codes), not {store.representation}")
     if store.skeleton != HUMANOID:
@@ -91,20 +76,18 @@ def train_fill(store: Store, job: Job, data: str = "", by: str = "subject") -> R
         GapWindows(store, part, longest, frame_mirror(contract)) for part in (parts.train, parts.validation)
     )
     torch.manual_seed(job.about.seed)
-    net = _untrained(recipe, contract, train).to(job.device)
-    weights = _weights(contract, visits.feet).to(job.device)
-
-    def batches(rng: np.random.Generator) -> Iterator[GapWindow]:
-        yield train.draw(training.batch, _sizes(visits, rng), rng)
-
+    net = _untrained(job.recipe, contract, train).to(job.device)
+    weights = joint_weights(contract, ("Foot", "Toes"), visits.feet).to(job.device)
     rng = np.random.default_rng(0)
-    counts = [max(1, round(part * visits.gaps[1])) for part in SEEN]
-    seen = [validation.draw(256, (visits.context, count, visits.context), rng).to(job.device) for count in counts]
-
-    def validate() -> dict[str, float]:
-        return _measured(kept, seen)
-
-    learner = GradientLearner(net, training, lambda drawn: _loss(net, drawn, weights, store.fps), batches, validate)
+    sizes = [(visits.context, max(1, round(part * visits.gaps[1])), visits.context) for part in (0.25, 0.5, 1.0)]
+    seen = [validation.draw(256, size, rng).to(job.device) for size in sizes]
+    learner = GradientLearner(
+        net,
+        job.training,
+        lambda drawn: _loss(net, drawn, weights, store.fps),
+        lambda rng: (train.draw(job.training.batch, _sizes(visits, rng), rng),),
+        lambda: _measured(kept, seen),
+    )
     assert isinstance(learner.kept, Filler)
     kept: Filler = learner.kept
     about: dict[str, Any] = {
@@ -125,8 +108,7 @@ def _sizes(visits: FillVisits, rng: np.random.Generator) -> tuple[int, int, int]
 
 
 def _untrained(recipe: Recipe, contract: MotionContract, windows: GapWindows) -> Filler:
-    """A net that knows how frames lie about a gap, from some windows."""
-    assert contract.skeleton is not None
+    """A net that has its normalisation of frames around a gap from some windows."""
     net = Filler(recipe.sized(channels=PLACED_CHANNELS, tree=tree_of(contract)))
     context, (_, longest) = recipe.visits.context, recipe.visits.gaps
     some = windows.draw(1024, (context, longest // 2, context), np.random.default_rng(0))
@@ -135,14 +117,9 @@ def _untrained(recipe: Recipe, contract: MotionContract, windows: GapWindows) ->
     return net
 
 
-def _weights(contract: MotionContract, feet: float) -> Tensor:
-    """How much each joint's place counts (J,)."""
-    assert contract.skeleton is not None
-    found: Array = np.array([feet if name.startswith(FEET) else 1.0 for name in contract.skeleton.names])
-    return torch.from_numpy(found / found.mean()).float()
-
-
 def _loss(net: Filler, window: GapWindow, weights: Tensor, fps: float) -> Terms:
+    """Errors of joints' places (m), of frames in standard deviations and of joints' speeds (m/s), and the speeds of
+    feet that stand: those slower than 0.2 m/s."""
     frames = net.once(window.past, window.plain, window.after).float()
     off = functional.smooth_l1_loss(frames / net.scale, window.truth / net.scale, beta=0.2)
     with torch.autocast(frames.device.type, enabled=False):
@@ -154,15 +131,15 @@ def _loss(net: Filler, window: GapWindow, weights: Tensor, fps: float) -> Terms:
         places = ((found - true).square().sum(-1) + 1e-8).sqrt() * weights
         speeds, was = found.diff(dim=1) * fps, true.diff(dim=1) * fps
         unlike = ((speeds - was).square().sum(-1) + 1e-4).sqrt() * weights
-        stands = (was.norm(dim=-1) < STANDING) & (weights > 1)
+        stands = (was.norm(dim=-1) < 0.2) & (weights > 1)
         slide = (speeds.square().sum(-1) + 1e-4).sqrt() * stands
-    total = places.mean() + ROTATIONS * off + SPEEDS * unlike.mean() + SLIDE * slide.mean()
+    total = places.mean() + 0.05 * off + 0.1 * unlike.mean() + 0.1 * slide.mean()
     return (Term(total, len(window)),)
 
 
 @torch.no_grad()
 def _measured(net: Filler, seen: list[GapWindow]) -> dict[str, float]:
-    """Of people never seen: the mean distance in cm of joints from where they were; of the plain way, too."""
+    """On validation windows of each length of gap: the mean error of joints in cm, and that of the plain way."""
     found: dict[str, float] = {}
     counts = [window.truth.shape[1] for window in seen]
     for count, window in zip(counts, seen, strict=True):

@@ -1,7 +1,7 @@
-"""Training between motion and language: from a store and a recipe to a run, the same for both directions."""
+"""Training between motion and language, either way, from a store; and the recipes of the motion-to-language model."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from itertools import chain
 from typing import Any
@@ -17,15 +17,15 @@ from motet.representation.contract import MotionContract, named
 from motet_train.data.batches import Batch, Examples, examples, frame_mirror
 from motet_train.data.sentences import mirror_text, usable
 from motet_train.data.store import Split, Store, split
-from motet_train.descent import GradientLearner, Term, Terms
+from motet_train.descent import GradientLearner, Term, Terms, Training
 from motet_train.evaluate.language.confidence import calibrated, judged
 from motet_train.evaluate.language.split_store import SplitStore
-from motet_train.models.motion_to_language import LanguageNet
-from motet_train.recipes.recipe import Job
+from motet_train.models.motion_to_language import LanguageNet, MotionToLanguageConfig
+from motet_train.recipes.recipe import Job, Recipe
 from motet_train.runs import MODELS, Run
 
 SIZES = ("channels", "words")
-"""Of the configurations of both nets, what the store decides."""
+"""What the store decides in the configurations of both nets."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +41,33 @@ class LanguageVisits:
     mirror: bool = False
 
 
+PAPER = Recipe(
+    "describe",
+    "motion-to-language",
+    "beam",
+    MotionToLanguageConfig(0, 0),
+    SIZES,
+    Training(epochs=100, batch=128, optimiser="nadam", clip=8.0),
+    LanguageVisits(),
+    {"beams": 5, "max_words": 40},
+)
+"""Table 1 of Plappert et al. 2017: encoder 2 x 64, 2 x 64; decoder 128, 128; embedding 64; dropout 0.4."""
+
+DEFAULT = replace(
+    PAPER,
+    config=MotionToLanguageConfig(0, 0, dropout=0.2, frame_noise=0.3, travelled=3, summary=5.0),
+    training=Training(epochs=200, batch=32, optimiser="nadam", learning_rate=2e-3, falling=0.5, clip=8.0, keep="last"),
+    visits=LanguageVisits(offsets=3, mirror=True),
+    defaults={**PAPER.defaults, "draws": 100, "temperature": 0.7},
+)
+"""What is shipped: for a small corpus, whose motions are seen through noise instead of more dropout.
+
+Many wordings share an action, so the most probable sentence says it better than the consensus of draws.
+"""
+
+RECIPES = {"default": DEFAULT, "paper": PAPER}
+
+
 @dataclass(frozen=True, eq=False)
 class Divided:
     """A store, divided, with all that is taken from its training part alone."""
@@ -54,10 +81,6 @@ class Divided:
     def examples(self, records: tuple[int, ...]) -> Examples:
         """The examples of some records."""
         return examples(self.store, records, self.vocabulary, self.mirror)
-
-    def names(self, records: tuple[int, ...]) -> list[str]:
-        """The names of some records."""
-        return [self.store.records[record].name for record in records]
 
 
 def divided(store: Store, mirror: bool, by: str = "trial") -> Divided:
@@ -79,14 +102,33 @@ def train_language(store: Store, job: Job, data: str = "", by: str = "trial") ->
 
     data: its name.
     """
-    recipe = job.recipe
-    found = divided(store, recipe.visits.mirror, by)
-    config = _fitting(asdict(recipe.sized(channels=len(found.contract.channels), words=len(found.vocabulary))), store)
+    recipe, visits, size = job.recipe, job.recipe.visits, job.training.batch
+    found = divided(store, visits.mirror, by)
+    config = asdict(recipe.sized(channels=len(found.contract.channels), words=len(found.vocabulary)))
+    if "travelled" in config and not named(store.representation).required:
+        config["travelled"] = 0  # its channels do not say where the figure goes
     torch.manual_seed(job.about.seed)
     net = MODELS[recipe.model](config)
     assert isinstance(net, LanguageNet)
     net.measure_by(found.contract.mean, found.contract.std)
-    learner = _learner(net.to(job.device), found, job)
+    train, validation = (found.examples(part) for part in (found.parts.train, found.parts.validation))
+
+    def loss(batch: Batch) -> Terms:
+        losses, summary = net.terms(batch)
+        terms = (Term(losses, len(losses)),)
+        return terms if summary is None else (*terms, Term(summary, len(batch)))
+
+    def validated() -> dict[str, Any]:
+        longest = visits.windows and visits.windows[1]
+        return {"validation": round(validation_loss(net, validation, size, longest), 6)}
+
+    learner = GradientLearner(
+        net.to(job.device),
+        job.training,
+        loss,
+        lambda rng: train.epoch(rng, size, visits.offsets, visits.windows),
+        validated,
+    )
     about = manifest(job, found, config, data, by)
     if recipe.verb != "describe":
         return job.run(net, learner, about)
@@ -105,36 +147,18 @@ def _confidence(found: Divided, run: Run) -> tuple[ConfidenceSettings]:
 
 def manifest(job: Job, found: Divided, config: Mapping[str, Any], data: str, by: str) -> dict[str, Any]:
     """The manifest of a run of a model that reads or writes sentences. data: the store's name."""
-    training = {"data": _data(found.store, data), "split": _split(found, by)}
+    parts, records = found.parts, found.store.records
+    about = {
+        "name": data,
+        "motions": len(records),
+        "sentences": sum(len(entry.sentences) for entry in records),
+        "skipped": len(found.store.skipped),
+        "unusable_sentences": sum(not usable(s) for entry in records for s in entry.sentences),
+    }
+    named = {part: [records[record].name for record in getattr(parts, part)] for part in ("validation", "test")}
+    training = {"data": about, "split": {"by": by, "train": len(parts.train), **named}}
     known = {"text": RULES.to_json(), "vocabulary": found.vocabulary.words}
     return job.manifest(found.contract, config, job.recipe.defaults, None, training, **known)
-
-
-def _fitting(config: dict[str, Any], store: Store) -> dict[str, Any]:
-    """The configuration without sums of channels that do not say where the figure goes."""
-    travels = named(store.representation).required
-    return config if travels or "travelled" not in config else {**config, "travelled": 0}
-
-
-def _learner(net: LanguageNet, found: Divided, job: Job) -> GradientLearner:
-    assert job.recipe.training is not None
-    training, visits = job.recipe.training, job.recipe.visits
-    train, validation = (found.examples(part) for part in (found.parts.train, found.parts.validation))
-
-    def batches(rng: np.random.Generator) -> Iterator[Batch]:
-        return train.epoch(rng, training.batch, visits.offsets, visits.windows)
-
-    def validated() -> dict[str, Any]:
-        longest = visits.windows and visits.windows[1]
-        return {"validation": round(validation_loss(net, validation, training.batch, longest), 6)}
-
-    return GradientLearner(net, training, lambda batch: _loss(net, batch), batches, validated)
-
-
-def _loss(net: LanguageNet, batch: Batch) -> Terms:
-    losses, summary = net.terms(batch)
-    terms = (Term(losses, len(losses)),)
-    return terms if summary is None else (*terms, Term(summary, len(batch)))
 
 
 @torch.no_grad()
@@ -145,20 +169,3 @@ def validation_loss(net: LanguageNet, examples: Examples, batch: int, longest: i
         losses, _ = net.terms(rows.to(device))
         total, count = total + float(losses.double().sum()), count + len(losses)
     return total / count
-
-
-def _data(store: Store, name: str) -> dict[str, Any]:
-    records = store.records
-    return {
-        "name": name,
-        "motions": len(records),
-        "sentences": sum(len(entry.sentences) for entry in records),
-        "skipped": len(store.skipped),
-        "unusable_sentences": sum(not usable(s) for entry in records for s in entry.sentences),
-    }
-
-
-def _split(found: Divided, by: str) -> dict[str, Any]:
-    parts = found.parts
-    named = {"validation": found.names(parts.validation), "test": found.names(parts.test)}
-    return {"by": by, "train": len(parts.train), **named}

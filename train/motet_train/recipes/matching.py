@@ -1,6 +1,5 @@
 """The recipe of a figure that is steered by motion matching, and its training from a store."""
 
-from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -10,33 +9,17 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from motet.decode.matching import SteeringSettings
+from motet.models.steer import FEATURE_STEPS
 from motet.motion.feet.lock import FootLockSettings
-from motet.motion.humanoid import LEFT_RIGHT, sided
-from motet.representation.contract import MotionContract
+from motet.motion.rotations import Array
 from motet_train.data.errors import DataError
-from motet_train.data.matching_rows import MatchingRows, gaits_of, recordings, rows_of
+from motet_train.data.matching_rows import MatchingRows, gaits_of, mirrored_poses, recordings, rows_of, scaling
 from motet_train.data.store import Store
 from motet_train.descent import GradientLearner, Term, Terms, Training
-from motet_train.models.kinematics import tree_of
+from motet_train.models.kinematics import Tree, joint_weights, tree_of
 from motet_train.models.matching import Matching, MatchingConfig, Speeds
-from motet_train.recipes.matching_table import take
 from motet_train.recipes.recipe import Job, Recipe
 from motet_train.runs import Run
-
-FEET = tuple(sided(side, part) for side in LEFT_RIGHT for part in ("Foot", "Toes"))
-
-SPEEDS = 0.1
-"""Seconds: how much the error of a joint's speed (m/s) counts beside that of its place (m)."""
-
-TURNS = 0.2
-"""Metres: how much an error of a quaternion's numbers counts, which places of joints do not tell all of."""
-
-RARE = 30
-"""Rows: a second, under which a gait does not go that way."""
-
-SPAN = (30.0, 90.0)
-"""Percentiles of the speeds of a gait's moving rows, from which on and to which it can be asked for; played slower with
-shorter strides, or faster, it has more."""
 
 
 @dataclass(frozen=True)
@@ -65,8 +48,7 @@ RECIPES = {"default": DEFAULT}
 
 def train_matching(store: Store, job: Job, data: str = "") -> Run:
     """Train on the recordings of a store in ``root_sixd`` that show gaits; DataError where a gait has none."""
-    recipe, training = job.recipe, job.recipe.training
-    assert training is not None
+    visits = job.recipe.visits
     if store.representation != "root_sixd":
         raise DataError(f"steering is trained on root_sixd (motet prepare --for codes), not {store.representation}")
     gaits = gaits_of(store)
@@ -75,28 +57,7 @@ def train_matching(store: Store, job: Job, data: str = "") -> Run:
     contract = store.contract(tuple(range(len(store.records))))
     rows = rows_of(found, names, STEERING)
     torch.manual_seed(job.about.seed)
-    net = _untrained(recipe, contract, rows, names).to(job.device)
-    true = Truth.of(net, rows)
-    weights = _weights(contract, recipe.visits.feet).to(job.device)
-    starts = torch.from_numpy(np.flatnonzero(rows.left >= recipe.visits.window))
-
-    def batches(rng: np.random.Generator) -> Iterator[Tensor]:
-        drawn = torch.from_numpy(rng.integers(len(starts), size=training.batch))
-        yield starts[drawn][:, None] + torch.arange(recipe.visits.window)
-
-    learner = GradientLearner(
-        net,
-        training,
-        lambda drawn: _loss(net, drawn, true, weights, contract.fps),
-        batches,
-        lambda: _measured(net, true),
-    )
-    about = {"data": {"name": data, "recordings": len(found), "rows": len(rows)}}
-    return job.run(net, learner, job.manifest(contract, asdict(net.config), {}, None, about))
-
-
-def _untrained(recipe: Recipe, contract: MotionContract, rows: MatchingRows, names: tuple[str, ...]) -> Matching:
-    config = recipe.sized(
+    config = job.recipe.sized(
         channels=len(contract.channels),
         tree=tree_of(contract),
         rows=len(rows),
@@ -107,19 +68,83 @@ def _untrained(recipe: Recipe, contract: MotionContract, rows: MatchingRows, nam
     net = Matching(config)
     net.measure_by(contract.mean, contract.std)
     take(net, rows)
-    return net
+    true = Truth.of(net.to(job.device), rows)
+    weights = joint_weights(contract, ("Foot", "Toes"), visits.feet).to(job.device)
+    starts = torch.from_numpy(np.flatnonzero(rows.left >= visits.window))
+
+    def batch(rng: np.random.Generator) -> tuple[Tensor]:
+        drawn = torch.from_numpy(rng.integers(len(starts), size=job.training.batch))
+        return (starts[drawn][:, None] + torch.arange(visits.window),)
+
+    learner = GradientLearner(
+        net,
+        job.training,
+        lambda drawn: _loss(net, drawn, true, weights, contract.fps),
+        batch,
+        lambda: _measured(net, true),
+    )
+    about = {"data": {"name": data, "recordings": len(found), "rows": len(rows)}}
+    return job.run(net, learner, job.manifest(contract, asdict(net.config), {}, None, about))
+
+
+@torch.no_grad()
+def take(net: Matching, rows: MatchingRows) -> None:
+    """Fill a net with rows: their table, and codes that are the principal components of poses and mirrored poses."""
+    mean, scale = (part.round(6) for part in scaling(rows.features))
+    columns, signs = mirrored_poses()
+    mean_pose = rows.poses.mean(axis=0)
+    pose_mean = (mean_pose + mean_pose[columns] * signs) / 2
+    weights, off = _reach(net.config.tree), rows.poses - pose_mean
+    axes = []
+    for sign, count in ((1, net.config.even), (-1, net.config.odd)):
+        half = (off + sign * off[:, columns] * signs) / 2 * weights
+        axes.append(np.linalg.svd(half[:: max(1, len(half) // 4000)], full_matrices=False)[2][:count])  # of 4000 poses
+    basis = np.concatenate(axes)
+    values = {
+        "codes": off * weights @ basis.T,
+        "moves": np.column_stack([rows.moves, rows.speed, rows.contacts]),
+        "features": np.clip(np.round((rows.features - mean) * scale * FEATURE_STEPS), -127, 127),
+        "shows": rows.gaits,
+        "left": rows.left,
+        "feature_mean": mean,
+        "feature_scale": scale,
+        "pose_mean": pose_mean,
+        "pose_basis": basis / weights,
+    }
+    for name, value in values.items():
+        getattr(net, name).copy_(torch.from_numpy(value))
+
+
+def _reach(tree: Tree) -> Array:
+    """How far each bone carries others, at least 5 cm: by so many metres the numbers (P,) of its quaternion count."""
+    places = np.zeros((len(tree.parents), 3))
+    for joint, parent in enumerate(tree.parents):
+        if parent >= 0:
+            places[joint] = places[parent] + tree.offsets[joint]
+    far = []
+    for bone in tree.bones:
+        carried = [bone]
+        for joint, parent in enumerate(tree.parents):
+            if parent in carried:
+                carried.append(joint)
+        far.append(np.linalg.norm(places[carried] - places[bone], axis=1).max())
+    return np.append(np.repeat(np.maximum(far, 0.05), 4), 1.0)
 
 
 def _speeds(rows: MatchingRows, shown: NDArray[np.bool_], how: SteeringSettings) -> Speeds:
-    """Those of a gait's rows, that can be played slower and faster; all 0 for a gait that is played as it is."""
+    """Those that a gait can be asked for, as its rows can be played slower and faster; all 0 if they cannot.
+
+    They go from the 30th percentile of its moving rows, with shorter strides, to the 90th of each direction; directions
+    with a second of rows or less have none.
+    """
     speed = rows.speed[shown]
     moving = speed > how.idle
     if not moving.any():
         return (0.0,) * 5
     angle = np.abs(np.arctan2(rows.moves[shown, 1], rows.moves[shown, 0]))  # from the facing
-    low = np.percentile(speed[moving], SPAN[0]) * how.slowest * how.shortest
+    low = np.percentile(speed[moving], 30.0) * how.slowest * how.shortest
     sectors = [moving & (np.digitize(angle, (how.aside, how.back), right=True) == sector) for sector in range(3)]
-    fastest = [np.percentile(speed[part], SPAN[1]) * how.fastest if part.sum() > RARE else 0.0 for part in sectors]
+    fastest = [np.percentile(speed[part], 90.0) * how.fastest if part.sum() > 30 else 0.0 for part in sectors]
     forward, aside, back = (round(float(one), 2) for one in fastest)
     return round(float(low), 2), round(float(np.median(speed[sectors[0]])), 2), forward, aside, back
 
@@ -138,19 +163,14 @@ class Truth:
         return Truth(poses, net.points(poses[:, :-1].reshape(len(poses), -1, 4), poses[:, -1:]))
 
 
-def _weights(contract: MotionContract, feet: float) -> Tensor:
-    assert contract.skeleton is not None
-    found = np.array([feet if name.startswith(FEET) else 1.0 for name in contract.skeleton.names])
-    return torch.from_numpy(found / found.mean()).float()
-
-
 def _loss(net: Matching, rows: Tensor, true: Truth, weights: Tensor, fps: float) -> Terms:
-    """Errors of joints' places and speeds, and of quaternions, in windows of rows (B, W)."""
+    """Errors of joints' places (m) and speeds (m/s), and of quaternions, which places do not tell all of, in windows of
+    rows (B, W)."""
     codes = net.codes[rows]
     off = (net.points(*net.poses(codes)) - true.points[rows]) * weights[:, None]
     speeds = off.diff(dim=1) * fps
     turns = (net.values(codes) - true.poses[rows]).abs().mean()
-    return (Term(off.abs().mean() + SPEEDS * speeds.abs().mean() + TURNS * turns, len(rows)),)
+    return (Term(off.abs().mean() + 0.1 * speeds.abs().mean() + 0.2 * turns, len(rows)),)
 
 
 @torch.no_grad()

@@ -1,9 +1,7 @@
 """Training of the small predictor: from sequences to a run."""
 
-from collections.abc import Iterator
 from dataclasses import asdict, replace
 
-import numpy as np
 import torch
 from torch import Tensor
 
@@ -14,16 +12,6 @@ from motet_train.models.kinematics import VectorPlaces
 from motet_train.models.predictor import Predictor, PredictorConfig
 from motet_train.recipes.recipe import AUGMENTED, Job, Recipe, Visits
 from motet_train.runs import Run
-
-HELD_SCALES = (5.0,) * 3 + (0.5,) * 3
-"""Of the root's translation (length units) and rotation (radians) relative to the last frame."""
-
-JOINTS, CHANNELS = 10.0, 0.1
-"""Weights in the loss of a metre that joints are off, and of the channels' units, without which turns about bones'
-own axes would mean nothing."""
-
-APART = 25
-"""Frames from one window of what is held out to the next."""
 
 DEFAULT = Recipe(
     "predict",
@@ -62,37 +50,33 @@ def train_predict(material: Material, job: Job) -> Run:
     """
     visits = possible(job.recipe.visits, material)
     job = replace(job, recipe=replace(job.recipe, visits=visits))
-    training = job.recipe.training
-    assert training is not None
     torch.manual_seed(job.about.seed)
     net = _untrained(material, job.recipe)
-    defaults = {"horizon": net.config.frames}
-    manifest = job.manifest(material.contract, asdict(net.config), defaults, material.licence, {"data": material.about})
+    count = net.config.frames
+    about = {"data": material.about}
+    manifest = job.manifest(material.contract, asdict(net.config), {"horizon": count}, material.licence, about)
     bones = material.contract.skeleton is not None
     seed = net.config.seed_frames if bones else None  # text files are taken as they are
-    windows = Windows(material, net.config.seed_frames + net.config.frames, **asdict(visits), seed=seed)
-    times = _importance(net.config.frames).to(job.device)
+    windows = Windows(material, net.config.seed_frames + count, **asdict(visits), seed=seed)
+    # about the inverse of the error to be expected, mean 1
+    times = 1 / (0.3 + 0.12 * torch.arange(1.0, count + 1) ** 0.8)
+    times = (times / times.mean()).to(job.device)
     places = VectorPlaces(material.contract).to(job.device) if bones else None
-
-    def batches(rng: np.random.Generator) -> Iterator[Tensor]:
-        yield windows.draw(training.batch, rng)
-
-    def validated() -> dict[str, float]:
-        kept = learner.kept
-        assert isinstance(kept, Predictor)
-        return {} if places is None or held is None else _error_head_fitted(kept, places, held)
-
-    held = windows.along(material.validation, APART).to(job.device) if net.config.doubts else None
+    held = windows.along(material.validation, 25).to(job.device) if net.config.doubts else None
     learner = GradientLearner(
-        net.to(job.device), training, lambda drawn: _loss(net, drawn, times, places), batches, validated
+        net.to(job.device),
+        job.training,
+        lambda drawn: _loss(net, drawn, times, places),
+        lambda rng: (windows.draw(job.training.batch, rng),),
+        lambda: {} if places is None or held is None else _error_head_fitted(trained, places, held),
     )
-    trained = learner.kept
-    assert isinstance(trained, Predictor)
+    assert isinstance(learner.kept, Predictor)
+    trained: Predictor = learner.kept
     return job.run(trained, learner, manifest)
 
 
 def possible(visits: Visits, material: Material) -> Visits:
-    """The visits without what the material does not allow: reverse only without velocities, mirror of known sides."""
+    """The visits that the material allows: reverse only without velocities, mirror only with known sides."""
     visits = replace(visits, reverse=0.0) if material.rates else visits
     return visits if material.mirrored else replace(visits, mirror=0.0)
 
@@ -103,33 +87,33 @@ def _untrained(material: Material, recipe: Recipe) -> Predictor:
     doubts = material.contract.skeleton is not None and bool(material.mirrored) and len(material.validation) > 0
     sizes = {"channels": len(material.contract.channels), "kept": material.kept, "held": held, "doubts": doubts}
     net = Predictor(recipe.sized(**sizes, **sides))
-    if held not in (0, len(HELD_SCALES)):
+    if held not in (0, 6):
         raise DataError(f"the root's translation and rotation must vary in the data, but only {held} of 6 columns do")
     net.measure_by(material.contract.mean[kept], material.contract.std[kept])
     net.mean[:held] = 0.0
-    net.scale[:held] = torch.tensor(HELD_SCALES[:held])
+    net.scale[:held] = torch.tensor([5.0] * 3 + [0.5] * 3)[:held]  # length units and radians from the last frame
     return net
 
 
 def _loss(net: Predictor, windows: Tensor, times: Tensor, places: VectorPlaces | None) -> Terms:
     """The mean distance of predicted and true frames, each frame's by its importance: of channels, and of joints where
-    they have places."""
+    they have places, of which a metre counts like 100 units of channels."""
+
+    def length(vectors: Tensor) -> Tensor:
+        """Of vectors (..., K), with gradients at 0: (...)."""
+        return (vectors.square().sum(-1) + 1e-6).sqrt()
+
     seed, truth = windows[:, : net.config.seed_frames], windows[:, net.config.seed_frames :]
     predicted, moved = net.plain(seed), list(net.config.kept[net.config.held :])
-    off = _length((predicted - truth)[..., moved])
-    if places is not None:
-        off = JOINTS * _length(places(predicted) - places(truth)).mean(-1) + CHANNELS * off
+    off = length((predicted - truth)[..., moved])
+    if places is not None:  # without channels, turns about bones' own axes would not count
+        off = 10.0 * length(places(predicted) - places(truth)).mean(-1) + 0.1 * off
     return (Term((off * times).mean(), len(windows)),)
-
-
-def _length(vectors: Tensor) -> Tensor:
-    """Of vectors (..., K), with gradients at 0: (...)."""
-    return (vectors.square().sum(-1) + 1e-6).sqrt()
 
 
 @torch.no_grad()
 def _error_head_fitted(net: Predictor, places: VectorPlaces, held: Tensor) -> dict[str, float]:
-    """Teach a net how far off it is where it was not trained; the mean distance of joints there, in centimetres."""
+    """Teach a net its errors where it was not trained; the mean distance of joints there, in centimetres."""
     net.eval()
     held = torch.cat([held, net.mirror(held)])
     seed, truth = held[:, : net.config.seed_frames], held[:, net.config.seed_frames :]
@@ -138,9 +122,3 @@ def _error_head_fitted(net: Predictor, places: VectorPlaces, held: Tensor) -> di
     assert net.doubt is not None
     net.doubt.fit(net.error_signs(seed, predicted, disagreement), off)
     return {"validation": round(100 * float(off.mean()), 4)}
-
-
-def _importance(frames: int) -> Tensor:
-    """Weights (N,) of the predicted frames, mean 1: about the inverse of the error that one has to expect."""
-    weights = 1 / (0.3 + 0.12 * torch.arange(1.0, frames + 1) ** 0.8)
-    return weights / weights.mean()

@@ -73,6 +73,12 @@ class Job:
     progress: Watcher = SILENT
     settings: str | None = None
 
+    @property
+    def training(self) -> Training:
+        """How its recipe trains by gradients."""
+        assert self.recipe.training is not None
+        return self.recipe.training
+
     def manifest(
         self,
         contract: MotionContract,
@@ -126,7 +132,16 @@ class Job:
             if self.settings is not None:
                 write_whole(self.folder / SETTINGS, self.settings)
         log = train(learner, self.about.seed, self.folder, self.progress)
-        training = {**manifest["training"], **_results(net, learner, log), **more(log), **surroundings(self.device)}
+        best, seconds = kept(log, learner.keep), sum(line["seconds"] for line in log)
+        results: dict[str, Any] = {
+            f"{learner.unit}s": log[-1][learner.unit],
+            f"kept_{learner.unit}": best[learner.unit],
+            **{key: best[key] for key in ("loss", "validation") if key in best},
+            "seconds": round(seconds, 1),
+            "steps_per_second": round(sum(line["seconds"] * line["steps_per_second"] for line in log) / seconds, 3),
+            "parameters": sum(parameter.numel() for parameter in net.parameters()),
+        }
+        training = {**manifest["training"], **results, **more(log), **surroundings(self.device)}
         run = Run({**manifest, "training": training}, net.cpu())
         if distributed.rank() == 0:
             settings = {**manifest["settings"], **_by_feature(tuned(run))}
@@ -137,15 +152,3 @@ class Job:
 
 def _by_feature(settings: Sequence[Settings]) -> dict[str, dict[str, Any]]:
     return {one.FEATURE: asdict(one) for one in settings}
-
-
-def _results(net: Net, learner: Learner, log: Sequence[Line]) -> dict[str, Any]:
-    best, seconds = kept(log, learner.keep), sum(line["seconds"] for line in log)
-    return {
-        f"{learner.unit}s": log[-1][learner.unit],
-        f"kept_{learner.unit}": best[learner.unit],
-        **{key: best[key] for key in ("loss", "validation") if key in best},
-        "seconds": round(seconds, 1),
-        "steps_per_second": round(sum(line["seconds"] * line["steps_per_second"] for line in log) / seconds, 3),
-        "parameters": sum(parameter.numel() for parameter in net.parameters()),
-    }

@@ -3,11 +3,10 @@
 from dataclasses import asdict, dataclass
 
 import torch
-from torch import Tensor
 from torch.nn import functional
 
 from motet.models.language import RULES, padded
-from motet_train.data.batches import Pairs, views
+from motet_train.data.batches import views
 from motet_train.data.sentences import alike, usable
 from motet_train.data.store import Store
 from motet_train.descent import GradientLearner, Term, Training
@@ -20,10 +19,7 @@ from motet_train.runs import Run
 
 @dataclass(frozen=True)
 class SearchVisits:
-    """How motions are seen: so many views of each, of at most a number of frames drawn between the two; mirrored, too.
-
-    See :func:`motet_train.data.batches.views`.
-    """
+    """How motions are seen, see :func:`motet_train.data.batches.views`; mirror: also mirrored."""
 
     views: int = 8
     windows: tuple[int, int] = (25, 120)
@@ -54,35 +50,28 @@ DEFAULT = Recipe(
 
 RECIPES = {"default": DEFAULT}
 
-FIRST = 5
-"""Validation counts how often a motion that shows what a sentence says is among so many."""
-
 
 def train_search(store: Store, job: Job, data: str = "", by: str = "trial") -> Run:
     """Train on a store, see :func:`motet_train.recipes.language.train_language`."""
-    recipe = job.recipe
-    found = divided(store, recipe.visits.mirror, by)
+    visits, training = job.recipe.visits, job.training
+    found = divided(store, visits.mirror, by)
     sizes = {"channels": len(found.contract.channels), "words": len(found.vocabulary)}
-    config = asdict(recipe.sized(**sizes, figure=figure_of(found.contract)))
+    config = job.recipe.sized(**sizes, figure=figure_of(found.contract))
     torch.manual_seed(job.about.seed)
-    net = JointEmbedding.from_config(config)
+    net = JointEmbedding(config)
     net.measure_by(found.contract.mean, found.contract.std)
-    return job.run(net, _learner(net, found, job), manifest(job, found, config, data, by))
-
-
-def _learner(net: JointEmbedding, found: Divided, job: Job) -> GradientLearner:
-    assert job.recipe.training is not None
-    training, visits = job.recipe.training, job.recipe.visits
     asked = _Asked(found, found.parts.validation)
-    seen = views(found.examples(found.parts.train), net.statistics, visits.views, tuple(visits.windows), job.about.seed)
+    examples = found.examples(found.parts.train)
+    seen = views(examples, net.statistics, visits.views, tuple(visits.windows), job.about.seed)
     net.see_by(seen.seen)
-
-    def losses(pairs: Pairs) -> tuple[Term, ...]:
-        return (Term(net.losses(pairs), len(pairs)),)
-
-    return GradientLearner(
-        net.to(job.device), training, losses, lambda rng: seen.epoch(rng, training.batch), lambda: asked.measures(net)
+    learner = GradientLearner(
+        net.to(job.device),
+        training,
+        lambda pairs: (Term(net.losses(pairs), len(pairs)),),
+        lambda rng: seen.epoch(rng, training.batch),
+        lambda: asked.measures(net),
     )
+    return job.run(net, learner, manifest(job, found, asdict(config), data, by))
 
 
 class _Asked:
@@ -102,7 +91,7 @@ class _Asked:
 
     @torch.no_grad()
     def measures(self, net: JointEmbedding) -> dict[str, float]:
-        """The mean surprise at the motions that show what a sentence says, and how often one is among the first."""
+        """The mean surprise at the motions that show what a sentence says, and how often one is among the best 5."""
         device = net.mean.device
         motions = net.embed_motion(*(part.to(device) for part in self.motions)).cpu()
         texts = net.embed_text(*(part.to(device) for part in self.texts)).cpu()
@@ -110,10 +99,6 @@ class _Asked:
         right = self.groups[self.rows][:, None] == self.groups
         chances = functional.log_softmax(scores / net.config.temperature, dim=1)
         surprise = -chances.masked_fill(~right, -torch.inf).logsumexp(dim=1)
-        return {"validation": round(float(surprise.mean()), 6), f"first_{FIRST}": round(_found(scores, right), 4)}
-
-
-def _found(scores: Tensor, right: Tensor) -> float:
-    """The share of rows that have a right column among the FIRST with the highest scores."""
-    best = scores.topk(min(FIRST, scores.shape[1]), dim=1).indices
-    return float(right.gather(1, best).any(dim=1).float().mean())
+        best = scores.topk(min(5, scores.shape[1]), dim=1).indices
+        first = right.gather(1, best).any(dim=1).float().mean()
+        return {"validation": round(float(surprise.mean()), 6), "first_5": round(float(first), 4)}
