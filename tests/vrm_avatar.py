@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.formats.glb import FLOAT, INDICES, UINT16, UINT32, VERTICES, Buffer, container
+from motet.formats.glb import INDICES, VERTICES, Buffer, container
 from motet.motion.humanoid.bones import PARENTS
 from motet.motion.rotations import rotmat_to_quat, swing
 
@@ -111,13 +111,13 @@ def skin(buffer: Buffer) -> dict[str, Any]:
         colours.append(np.tile(colour(name), (len(part), 1)))
     faces = triangles() + AROUND * len(SLOPES) * np.arange(len(parts))[:, None]
     attributes = {
-        "POSITION": buffer.add_bounded(np.concatenate(corners), VERTICES),
-        "NORMAL": buffer.add(np.concatenate(normals), FLOAT, VERTICES),
-        "COLOR_0": buffer.add(np.concatenate(colours), FLOAT, VERTICES),
-        "JOINTS_0": buffer.add(np.where(np.concatenate(weights) > 0, np.concatenate(joints), 0), UINT16, VERTICES),
-        "WEIGHTS_0": buffer.add(np.concatenate(weights), FLOAT, VERTICES),
+        "POSITION": buffer.add(np.concatenate(corners), target=VERTICES, bounded=True),
+        "NORMAL": buffer.add(np.concatenate(normals), target=VERTICES),
+        "COLOR_0": buffer.add(np.concatenate(colours), target=VERTICES),
+        "JOINTS_0": buffer.add(np.where(np.concatenate(weights) > 0, np.concatenate(joints), 0), "<u2", VERTICES),
+        "WEIGHTS_0": buffer.add(np.concatenate(weights), target=VERTICES),
     }
-    return {"attributes": attributes, "indices": buffer.add(faces.reshape(-1), UINT32, INDICES), "material": 0}
+    return {"attributes": attributes, "indices": buffer.add(faces.reshape(-1), "<u4", INDICES), "material": 0}
 
 
 def nodes(turns: dict[str, Array]) -> list[dict[str, Any]]:

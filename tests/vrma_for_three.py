@@ -4,7 +4,7 @@ import json
 import sys
 from pathlib import Path
 
-from motet.formats import read_motion, vrma
+from motet.formats import glb, read_motion
 from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.humanoid.retarget import to_humanoid
 from motet.motion.kinematics import positions
@@ -14,7 +14,7 @@ def main(folder: Path, source: Path) -> None:
     """Write motion.vrma and motion.json."""
     motion = to_humanoid(read_motion(source)).motion
     folder.mkdir(parents=True, exist_ok=True)
-    vrma.write(folder / "motion.vrma", motion)
+    glb.write_vrma(folder / "motion.vrma", motion)
     parents = [HUMANOID.names[joint.parent] if joint.parent >= 0 else None for joint in HUMANOID.joints]
     joints = [
         {"name": joint.name, "parent": parent, "offset": joint.offset}

@@ -10,8 +10,7 @@ from test_retarget import SKELETONS, dancing
 
 import motet
 from motet.errors import FormatError, MotionError
-from motet.formats import read_character
-from motet.formats.character import Character
+from motet.formats import Character, read_character
 from motet.motion import HUMANOID, MIXAMO, positions
 from motet.motion.humanoid.bones import BONES
 

@@ -15,8 +15,8 @@ if find_spec("PIL") is None:
 
 from PIL import Image
 
-from motet.draw.stage import DRAWN_LARGER, Stage
-from motet.formats import gif
+from motet.draw import gif
+from motet.draw.gif import DRAWN_LARGER, Stage
 from motet.motion.motion import resampled
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from motet.errors import FormatError, MotionError
-from motet.formats import glb, gltf, gltf_data, read_character, read_motion, vrma
+from motet.formats import glb, gltf, gltf_data, read_character, read_motion
 from motet.motion.humanoid.bones import BONES, HUMANOID, MIXAMO, T_POSE, ground_under, sole_points
 from motet.motion.humanoid.retarget import from_humanoid, grounded, to_humanoid
 from motet.motion.kinematics import global_transforms, local_rotations, positions, skeleton_of
@@ -60,12 +60,12 @@ def test_what_is_written_as_glb_is_read_again(tmp_path: Path) -> None:
 
 
 def test_vrma_holds_the_bones_of_the_humanoid(tmp_path: Path) -> None:
-    vrma.write(tmp_path / "a.vrma", moving())
+    glb.write_vrma(tmp_path / "a.vrma", moving())
     document, _ = parts(tmp_path / "a.vrma")
     extension = document["extensions"]["VRMC_vrm_animation"]
     assert extension["specVersion"] == "1.0"
     bones = {bone: document["nodes"][place["node"]] for bone, place in extension["humanoid"]["humanBones"].items()}
-    fingers = vrma.VRMA_SKELETON.names[len(HUMANOID.names) :]
+    fingers = glb.VRMA_SKELETON.names[len(HUMANOID.names) :]
     assert len(fingers) == 30
     assert {bone: node["name"] for bone, node in bones.items()} == {bone: bone for bone in (*BONES, *fingers)}
     assert bones["hips"]["translation"] == [0.0, 0.98, 0.0]
@@ -84,11 +84,11 @@ def test_vrma_holds_the_bones_of_the_humanoid(tmp_path: Path) -> None:
 
 def test_vrma_takes_any_human_figure(tmp_path: Path) -> None:
     source = read_motion(SKELETONS / "lafan1.bvh")
-    vrma.write(tmp_path / "a.vrma", source)
+    glb.write_vrma(tmp_path / "a.vrma", source)
     written = gltf.read(tmp_path / "a.vrma")
     np.testing.assert_allclose(in_order(written), in_order(to_humanoid(source).motion), atol=1e-5)
     with pytest.raises(MotionError, match="no frames"):
-        vrma.write(tmp_path / "b.vrma", moving()[:0])
+        glb.write_vrma(tmp_path / "b.vrma", moving()[:0])
     assert not (tmp_path / "b.vrma").exists()
 
 

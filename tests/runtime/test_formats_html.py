@@ -9,10 +9,10 @@ from browser import CHROMIUM, Browser
 from figures import walker
 from test_retarget import SKELETONS
 
-from motet.draw.body import Body
-from motet.draw.figure import figure_of
+from motet.draw import page as html
+from motet.draw.figure import Body, figure_of
 from motet.errors import MotionError, OutputError
-from motet.formats import html, read_motion, write_motion
+from motet.formats import read_motion, write_motion
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
 from motet.motion.skeleton import Joint, Skeleton

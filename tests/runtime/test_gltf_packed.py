@@ -11,9 +11,9 @@ from test_retarget import dancing
 
 import motet
 from motet.errors import FormatError
-from motet.formats import gltf_packed
+from motet.formats import gltf_data
 
-EXT, KHR = gltf_packed.MESHOPT
+EXT, KHR = "EXT_meshopt_compression", "KHR_meshopt_compression"
 
 
 def pack(path: Path, out: Path, extension: str = EXT) -> tuple[dict[str, Any], bytes]:
@@ -96,7 +96,7 @@ def test_without_the_extra_its_remedy_is_named(plain: Path, tmp_path: Path, monk
     for view in document["bufferViews"]:
         view["extensions"] = {EXT: {}}
     find = util.find_spec
-    monkeypatch.setattr(gltf_packed, "find_spec", lambda name: None if name == "meshopt" else find(name))
+    monkeypatch.setattr(gltf_data, "find_spec", lambda name: None if name == "meshopt" else find(name))
     path = write_document(tmp_path / "a.glb", document, binary)
     assert motet.clips(path) == ("Walk", "Run")
     with pytest.raises(FormatError, match=r"pip install 'motet\[meshopt\]', or unpack the file with  npx gltfpack"):

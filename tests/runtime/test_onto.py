@@ -11,7 +11,7 @@ from test_retarget import SKELETONS, dancing
 
 import motet
 from motet.errors import FormatError, MotionError
-from motet.formats.character import Character
+from motet.formats import Character
 from motet.motion.humanoid.bones import HUMANOID, LEFT_RIGHT, MIXAMO
 
 SCALE: Node = {"scale": [0.01] * 3}

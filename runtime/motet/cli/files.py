@@ -18,9 +18,10 @@ from motet.checked import Checked
 from motet.cli.options import Tries
 from motet.cli.reading import Read, Source, read_options
 from motet.cli.writing import Output, places, size, write_options
+from motet.draw.page import write_many
 from motet.errors import FormatError, MotetError
 from motet.files import files_in
-from motet.formats import CLIPPED, MOCAP, READS, WRITES, html, write_motion
+from motet.formats import CLIPPED, MOCAP, READS, WRITES, write_motion
 from motet.formats.lines import MARK
 from motet.motion.feet.contacts import lay_root_path
 from motet.motion.feet.hold import hold_feet as feet_held
@@ -104,7 +105,7 @@ def _row(source: Source, page: Path | None, read: Read) -> Row:
             if found.refused is None:
                 figures["as the humanoid"] = to_humanoid(figures["as in the file"]).motion
             title = Path(found.file).name + (f"{MARK}{found.clip}" if found.clip else "")
-            html.write_many(page, list(figures.values()), list(figures), title)
+            write_many(page, list(figures.values()), list(figures), title)
         return Row(source, found, page=page)
     except MotetError as error:
         return Row(source, None, str(error).removeprefix(f"{source.path}: ").removeprefix(f"{source.path}, "))

@@ -13,9 +13,9 @@ from motet.bundle.graph import SessionOptions
 from motet.cli.options import Tries, bar, bundle_option, naming, noted, session_options
 from motet.cli.reading import Read, read_options
 from motet.cli.writing import Output, out_option, places, size, spare, write_options
+from motet.draw.page import write as write_html
 from motet.errors import ControlError, MotionError, quoted
 from motet.formats import names_motion
-from motet.formats.html import write as write_html
 from motet.models.base import ControlModel
 from motet.models.fill import JOIN_SECONDS, LOOP_SECONDS, FillModel, Gap
 from motet.models.generate_codes import CodesModel

@@ -10,8 +10,7 @@ from typing import Any
 import click
 
 from motet.cli.reading import FPS, Source
-from motet.formats import ONTO, WRITABLE, check_writable, read_character, write_all_on, write_on
-from motet.formats.character import Character, put_onto
+from motet.formats import ONTO, WRITABLE, Character, check_writable, put_onto, read_character, write_all_on, write_on
 from motet.formats.lines import Names
 from motet.motion.humanoid import RIGS
 from motet.motion.motion import Motion

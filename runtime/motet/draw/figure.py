@@ -1,18 +1,134 @@
-"""The figure in pictures of a motion: the points of its body in every frame, standing on the ground."""
+"""The figure in pictures of a motion: the body drawn on its skeleton, and its points in every frame.
+
+A body has round bones with a thickness and a side, and a head. Lengths are in body heights (:attr:`Body.height`), so
+bodies of every skeleton are of one size. Nothing here knows a naming scheme: thickness follows from how much body hangs
+on a joint, sides from mirrored names.
+"""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
-from motet.draw.body import Body, Bone
 from motet.errors import MotionError
 from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
-from motet.motion.skeleton import LEFT, RIGHT, Skeleton
+from motet.motion.skeleton import LEFT, MIDDLE, RIGHT, Skeleton, sides_of
 
-LARGEST_COORDINATE = 1e6
-"""Positions further than this from the origin are refused: such a motion is broken and cannot be drawn."""
+COLOURS = {LEFT: (236, 122, 52), RIGHT: (58, 124, 226), MIDDLE: (176, 182, 196)}
+"""sRGB of 0 to 255; ``player.html`` has the same."""
+
+SAME_SPOT = 1e-6
+"""A joint nearer than this to its parent is on the same spot."""
+
+SKULL = ((-0.024, 0.040), (0.020, 0.050))
+"""Jaw and crown: how far along the head's direction from the middle of the head, and the radius."""
+
+
+class Bone(NamedTuple):
+    """A tapered capsule between two points, with a radius at each, in heights.
+
+    carriers: the joints with which the two ends move when a pose is made by turning a rest pose.
+    """
+
+    start: int
+    end: int
+    start_radius: float
+    end_radius: float
+    side: str
+    carriers: tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Body:
+    """What is drawn for a skeleton of J joints: :attr:`bones` between the J joints, or these and jaw and crown."""
+
+    skeleton: Skeleton
+
+    @cached_property
+    def height(self) -> float:
+        """The height in the skeleton's length unit, even where the rest pose is no body; 1 where there is no extent.
+
+        At least .62 of the longest way along bones from tip to tip, of which people in an A- or a T-pose are .63 to
+        .76 high. Figures that rest with all their bones in a line would be taken for half as high.
+        """
+        lengths = np.linalg.norm(self.skeleton.offsets, axis=1)
+        below, longest = np.zeros(len(lengths)), 0.0
+        for i in range(len(lengths) - 1, 0, -1):
+            parent, reach = self.skeleton.joints[i].parent, lengths[i] + below[i]
+            longest = max(longest, float(below[parent] + reach))
+            below[parent] = max(below[parent], reach)
+        return max(self.skeleton.height, 0.62 * longest) or 1.0
+
+    @cached_property
+    def sides(self) -> tuple[str, ...]:
+        """The side of each joint, told from its name."""
+        return sides_of(self.skeleton.names)
+
+    @cached_property
+    def head(self) -> int:
+        """The joint in the head: the last one called so, else the highest tip that has no side; 0 if none is."""
+        skeleton = self.skeleton
+        middle = [i for i, side in enumerate(self.sides) if i and side == MIDDLE]
+        named = [i for i in middle if "head" in skeleton.names[i].lower()]
+        tips = [i for i in middle if not skeleton.children[i]]
+        return named[-1] if named else max(tips, key=lambda i: float(skeleton.rest_positions[i, 1]), default=0)
+
+    @cached_property
+    def head_is_tip(self) -> bool:
+        """Whether the joint in the head is its crown, and the one before it the neck's upper end."""
+        parent = self.skeleton.joints[self.head].parent
+        return parent >= 0 and "head" in self.skeleton.names[parent].lower()
+
+    @cached_property
+    def bones(self) -> tuple[Bone, ...]:
+        """A bone to each joint apart from its parent, the flanks, and the skull in place of what is inside it."""
+        joints = self.skeleton.joints
+        lengths, rest = np.linalg.norm(self.skeleton.offsets, axis=1) / self.height, self._rest
+        # how much body hangs on each joint: along a limb lengths add up, where limbs meet their squares
+        squares = np.zeros(len(joints))
+        squares[self.head] = 0.15**2  # the length that a head counts for in the thickness of the neck
+        for i in range(len(joints) - 1, 0, -1):
+            squares[joints[i].parent] += (lengths[i] + np.sqrt(squares[i])) ** 2
+        beyond, bones = np.sqrt(squares), []
+        for i, joint in enumerate(joints):
+            parent, side, in_skull = joint.parent, self.sides[i], i == self.head and self.head_is_tip
+            if not i or lengths[i] <= SAME_SPOT or in_skull or (self._in_trunk[i] and side != MIDDLE):
+                continue
+            thick, thin = (float(max(0.014, 0.07 * length**0.65)) for length in (lengths[i] + beyond[i], beyond[i]))
+            on_trunk = self._in_trunk[parent]
+            bones.append(Bone(parent, i, thick, thin, MIDDLE if on_trunk else side, (parent, parent)))
+            # a limb that hangs on the trunk above the root gets a flank down to the root
+            if on_trunk and side != MIDDLE and beyond[i] > 0.2 and np.linalg.norm(rest[parent]) > SAME_SPOT:
+                bones.append(Bone(i, 0, 0.8 * thick, thick, MIDDLE, (parent, 0)))
+        if self.head:
+            jaw, carrier = len(joints), joints[self.head].parent
+            bones.append(Bone(jaw, jaw + 1, SKULL[0][1], SKULL[1][1], MIDDLE, (carrier, carrier)))
+        return tuple(bones) or (Bone(0, 0, 0.07, 0.07, MIDDLE, (0, 0)),)
+
+    @cached_property
+    def _rest(self) -> Array:
+        rest: Array = self.skeleton.rest_positions / self.height
+        return rest
+
+    @cached_property
+    def _in_trunk(self) -> tuple[bool, ...]:
+        """Whether each joint belongs to the trunk: it is in the middle, or rests on the spot of one that is."""
+        middle = self._rest[[side == MIDDLE for side in self.sides]]
+        return tuple(bool(np.any(np.linalg.norm(middle - place, axis=1) <= SAME_SPOT)) for place in self._rest)
+
+    def points(self, joints: Array) -> Array:
+        """The points that bones join (..., P, 3), from positions of the joints (..., J, 3), all in heights."""
+        if not self.head:
+            return joints
+        head, below = (joints[..., i, :] for i in (self.head, self.skeleton.joints[self.head].parent))
+        direction = head - below
+        direction = direction / np.maximum(np.linalg.norm(direction, axis=-1, keepdims=True), 1e-9)
+        middle = (head + below) / 2 if self.head_is_tip else head
+        skull = np.stack([middle + along * direction for along, _ in SKULL], axis=-2)
+        return np.concatenate([joints, skull], axis=-2)
 
 
 @dataclass(frozen=True)
@@ -39,10 +155,17 @@ def figure_of(motion: Motion) -> Figure:
     skeleton, places = _moving_part(motion, skeleton)
     body = Body(skeleton)
     points = places / body.height
-    if not np.abs(points).max() < LARGEST_COORDINATE:
-        raise MotionError(f"joints are over {LARGEST_COORDINATE:g} body heights from the origin: too far to show")
-    points[:, :, 1] -= _ground(points, moves=f"{skeleton.names[0]}.ty" in motion.channels)
-    return Figure(body.points(points), body.bones, _heading(points[0], body.sides), motion.fps)
+    if not np.abs(points).max() < 1e6:
+        raise MotionError("joints are over 1e+06 body heights from the origin: too far to show")
+    lowest = float(points[..., 1].min())
+    # a figure that moves up and down stands on y = 0 if its lowest point is that near
+    stands = f"{skeleton.names[0]}.ty" in motion.channels and abs(lowest) < 0.1
+    points[:, :, 1] -= 0.0 if stands else lowest
+    heading, sides = 0.0, np.array(body.sides)
+    if LEFT in body.sides:
+        to_left = points[0, sides == LEFT].mean(axis=0) - points[0, sides == RIGHT].mean(axis=0)
+        heading = float(np.arctan2(-to_left[2], to_left[0]))
+    return Figure(body.points(points), body.bones, heading, motion.fps)
 
 
 def _moving_part(motion: Motion, skeleton: Skeleton) -> tuple[Skeleton, Array]:
@@ -60,17 +183,3 @@ def _moving_part(motion: Motion, skeleton: Skeleton) -> tuple[Skeleton, Array]:
         first += 1
     joints = (replace(joint, parent=max(joint.parent - first, -1)) for joint in skeleton.joints[first:])
     return replace(skeleton, joints=tuple(joints)), places[:, first:]
-
-
-def _ground(points: Array, moves: bool) -> float:
-    lowest = float(points[..., 1].min())
-    # metres: a lowest point this near y = 0 stands on it
-    return 0.0 if moves and abs(lowest) < 0.1 else lowest
-
-
-def _heading(points: Array, sides: tuple[str, ...]) -> float:
-    if LEFT not in sides:
-        return 0.0
-    left, right = (np.mean([points[i] for i, of in enumerate(sides) if of == side], axis=0) for side in (LEFT, RIGHT))
-    to_left = left - right
-    return float(np.arctan2(-to_left[2], to_left[0]))

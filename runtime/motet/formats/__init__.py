@@ -9,21 +9,25 @@ record to :data:`FORMATS`, which help texts, the table of docs/formats.md and th
 import logging
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from motet.errors import FormatError, MotionError, OutputError
 from motet.files import File, check_place, place_of
-from motet.formats.character import Character, put_onto
 from motet.formats.lines import Clip, split_clip
-from motet.motion.humanoid import rig
+from motet.motion.humanoid import JointMap, from_humanoid, grounded, on_humanoid, rig
 from motet.motion.motion import Motion
+from motet.motion.root_motion import travel_on_root
+from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton, metres
+
+if TYPE_CHECKING:
+    from motet.formats.gltf_character import Nodes
 
 log = logging.getLogger(__name__)
 
@@ -32,9 +36,8 @@ log = logging.getLogger(__name__)
 class Format:
     """One format of motion files.
 
-    keeps: which parts of a motion a file holds, for the docs.
-    reader, writer: the modules in this package with its ``read`` and ``write``, imported on first use; empty if it is
-        not read or not written.
+    reader: the module of motet with its ``read``, imported on first use; empty if it is not read.
+    writer: the function of motet that writes it, imported on first use; empty if it is not written.
     options: the keyword arguments of its ``read``.
     mocap: whether a file holds motion and skeleton, as the files of a corpus must.
     loose: whether its unit of length is a convention that some files ignore.
@@ -43,7 +46,6 @@ class Format:
 
     extension: str
     name: str
-    keeps: str
     reader: str = ""
     writer: str = ""
     options: tuple[str, ...] = ()
@@ -51,53 +53,53 @@ class Format:
     loose: bool = False
     needs: str = ""
 
-    def read(self) -> Callable[..., Motion]:
-        """The module's ``read``."""
-        found: Callable[..., Motion] = import_module(f"motet.formats.{self.reader}").read
-        return found
+    @property
+    def keeps(self) -> str:
+        """Which parts of a motion a file holds, for the docs."""
+        return _KEEPS[self.extension]
 
-    def clips(self) -> Callable[[File], tuple[str, ...]]:
-        """The module's ``clips``."""
-        found: Callable[[File], tuple[str, ...]] = import_module(f"motet.formats.{self.reader}").clips
-        return found
+    def module(self) -> Any:
+        """The module that reads it."""
+        return import_module(f"motet.{self.reader}")
 
     def write(self) -> Callable[[File, Motion], None]:
-        """The module's ``write``."""
-        found: Callable[[File, Motion], None] = import_module(f"motet.formats.{self.writer}").write
+        """The function that writes it."""
+        module, _, name = self.writer.rpartition(".")
+        found: Callable[[File, Motion], None] = getattr(import_module(f"motet.{module}"), name)
         return found
 
 
-_AMC = "everything; AMC has no frame rate: 120 unless `fps=` or a comment written by motet gives another"
-_GIF = "an animated picture; needs Pillow: `pip install 'motet[plot]'`"
-_NPZ = "everything, bit for bit; from AMASS, the body joints"
-_GLB = "a skeleton and its animations, each a clip; written with a body, for viewers and engines"
 _CHARACTER = "a skeleton and its animations, each a clip, or its rest pose"
-_AVATAR = f"{_CHARACTER}; written by `--onto`, the avatar itself ([humanoid.md](humanoid.md#characters))"
-_FBX = "a skeleton and its takes, each a clip; needs ufbx: `pip install 'motet[fbx]'`"
-_VRMA = "the humanoid: motions of other human figures are retargeted ([humanoid.md](humanoid.md))"
+_KEEPS = {
+    ".amc": "everything; AMC has no frame rate: 120 unless `fps=` or a comment written by motet gives another",
+    ".bvh": "everything but the unit of length",
+    ".npz": "everything, bit for bit; from AMASS, the body joints",
+    ".csv": "values, units and frame rate, no skeleton",
+    ".xml": "angles and root; the skeleton is not in the file",
+    ".glb": "a skeleton and its animations, each a clip; written with a body, for viewers and engines",
+    ".gltf": _CHARACTER,
+    ".vrm": f"{_CHARACTER}; written by `--onto`, the avatar itself ([humanoid.md](humanoid.md#characters))",
+    ".vrma": "the humanoid: motions of other human figures are retargeted ([humanoid.md](humanoid.md))",
+    ".fbx": "a skeleton and its takes, each a clip; needs ufbx: `pip install 'motet[fbx]'`",
+    ".html": "a page with a player: orbit, play, scrub, no network",
+    ".gif": "an animated picture; needs Pillow: `pip install 'motet[plot]'`",
+}
+_NODES = ("clip", "rest")
 
 FORMATS = (
-    Format(".amc", "Acclaim, with its .asf", _AMC, "amc", "amc", options=("asf", "fps", "partial"), mocap=True),
-    Format(".bvh", "Biovision", "everything but the unit of length", "bvh", "bvh", options=("partial",), mocap=True),
-    Format(".npz", "motet's own; AMASS", _NPZ, "npz", "npz", mocap=True),
-    Format(".csv", "table", "values, units and frame rate, no skeleton", "csv", "csv"),
-    Format(".xml", "MMM of KIT", "angles and root; the skeleton is not in the file", "mmm"),
-    Format(".glb", "glTF 2.0", _GLB, "gltf", "glb", options=("clip", "rest"), mocap=True, loose=True),
-    Format(".gltf", "glTF 2.0, as text", _CHARACTER, "gltf", options=("clip", "rest"), loose=True),
-    Format(".vrm", "VRM avatar", _AVATAR, "gltf", options=("clip", "rest"), loose=True),
-    Format(".vrma", "VRM Animation", _VRMA, "gltf", "vrma", options=("clip", "rest"), mocap=True, loose=True),
-    Format(".fbx", "FBX", _FBX, "fbx", options=("clip", "rest"), mocap=True, loose=True),
-    Format(".html", "web page", "a page with a player: orbit, play, scrub, no network", writer="html"),
-    Format(".gif", "picture", _GIF, writer="gif", needs="PIL"),
+    Format(".amc", "Acclaim, with its .asf", "formats.amc", "formats.amc.write", ("asf", "fps", "partial"), mocap=True),
+    Format(".bvh", "Biovision", "formats.bvh", "formats.bvh.write", ("partial",), mocap=True),
+    Format(".npz", "motet's own; AMASS", "formats.npz", "formats.npz.write", mocap=True),
+    Format(".csv", "table", "formats.csv", "formats.csv.write"),
+    Format(".xml", "MMM of KIT", "formats.mmm"),
+    Format(".glb", "glTF 2.0", "formats.gltf", "formats.glb.write", _NODES, mocap=True, loose=True),
+    Format(".gltf", "glTF 2.0, as text", "formats.gltf", options=_NODES, loose=True),
+    Format(".vrm", "VRM avatar", "formats.gltf", options=_NODES, loose=True),
+    Format(".vrma", "VRM Animation", "formats.gltf", "formats.glb.write_vrma", _NODES, mocap=True, loose=True),
+    Format(".fbx", "FBX", "formats.fbx", options=_NODES, mocap=True, loose=True),
+    Format(".html", "web page", writer="draw.page.write"),
+    Format(".gif", "picture", writer="draw.gif.write", needs="PIL"),
 )
-
-CHARACTER_READERS = {"gltf": "gltf_character", "fbx": "fbx"}
-"""Reader -> the module whose ``read_character`` reads a skeleton with the axes of its nodes."""
-
-NO_MOTIONS = {
-    ".c3d": ", which hold markers without a skeleton: first solve for one in the program that recorded them",
-}
-"""Extensions of other motion files -> what to add when refusing them."""
 
 READABLE = tuple(kind.extension for kind in FORMATS if kind.reader)
 WRITABLE = tuple(kind.extension for kind in FORMATS if kind.writer)
@@ -111,8 +113,20 @@ ONTO = (".glb", ".vrm")
 """Extensions for a character written with its mesh and new animations."""
 
 
-HUMAN_HEIGHT = (0.5, 3.0)
-"""Plausible sizes of a human figure in metres, sole to crown or hand to hand."""
+@dataclass(frozen=True)
+class Character:
+    """A character's skeleton from its file, to put motions onto.
+
+    rest: a motion of it; for a glTF file one frame, the rest pose of its nodes, in metres, with every angle 0.
+    joint_map: its bones if the file names them, as VRM does, else None.
+    nodes: for a glTF file, the nodes of the joints, used to write a motion for exactly these nodes.
+    skin: joint -> points (P, 3) of the mesh attached to it, relative to the joint, at rest; empty without a mesh.
+    """
+
+    rest: Motion
+    joint_map: JointMap | None = None
+    nodes: "Nodes | None" = None
+    skin: Mapping[int, Array] = field(default_factory=dict)
 
 
 def read_motion(  # noqa: PLR0913  options, each of which has a default
@@ -143,27 +157,31 @@ def read_motion(  # noqa: PLR0913  options, each of which has a default
     """
     file, named = split_clip(file, READABLE)
     kind, path = _format(file, format, READABLE, "read"), place_of(file)
-    clip = named if clip is None else clip
-    given = {"fps": fps, "asf": asf, "partial": partial or None, "clip": clip, "rest": rest}
-    options = _taken(path, kind, given)
-    try:
-        with np.errstate(over="ignore", invalid="ignore"):  # Motion refuses infinite values
-            motion = kind.read()(file, **options)
-        log.debug("read %s: %r", path, motion)
-        return motion if unit is None else _in_unit(path, motion, metres(unit), kind.loose)
-    except FormatError:
-        raise
-    except MotionError as error:
-        raise FormatError(path, str(error)) from error
-
-
-def _taken(path: Path, kind: Format, given: Mapping[str, Any]) -> dict[str, Any]:
-    """The options that were given; FormatError if the format does not take one of them."""
+    given = {"fps": fps, "asf": asf, "partial": partial or None, "clip": named if clip is None else clip, "rest": rest}
     options = {name: value for name, value in given.items() if value is not None}
     for name in options.keys() - set(kind.options):
         takers = " ".join(known.extension for known in FORMATS if name in known.options)
         raise FormatError(path, f"{name!r} is an option for {takers} files only")
-    return options
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):  # Motion refuses infinite values
+            motion: Motion = kind.module().read(file, **options)
+        log.debug("read %s: %r", path, motion)
+        return motion if unit is None else _in_unit(path, motion, metres(unit), kind.loose)
+    except MotionError as error:
+        raise error if isinstance(error, FormatError) else FormatError(path, str(error)) from error
+
+
+def _in_unit(path: Path, motion: Motion, unit: float, loose: bool) -> Motion:
+    """The motion with the length unit that its file leaves out or, if ``loose``, states only by convention."""
+    if motion.skeleton is None:
+        raise FormatError(path, "a file without a skeleton has no length unit")
+    said, height = motion.skeleton.metres_per_unit, motion.skeleton.height
+    # human figures, sole to crown or hand to hand, are .5 to 3 m high
+    if said is None or (loose and (0.5 <= height * unit <= 3.0 or not 0.5 <= height * said <= 3.0)):
+        return motion.with_unit(unit)
+    if not math.isclose(said, unit, rel_tol=1e-6):
+        log.info("%s: the file states a length unit of %.6g m, so the given %.6g m is ignored", path, said, unit)
+    return motion
 
 
 def clips(file: File, *, format: str | None = None) -> tuple[str, ...]:
@@ -173,7 +191,8 @@ def clips(file: File, *, format: str | None = None) -> tuple[str, ...]:
     :func:`read_motion`. FormatError for an unknown extension, or for a damaged file of a format with clips.
     """
     kind = _format(file, format, READABLE, "read")
-    return kind.clips()(file) if "clip" in kind.options else ()
+    found: tuple[str, ...] = kind.module().clips(file) if "clip" in kind.options else ()
+    return found
 
 
 def names_motion(text: str) -> bool:
@@ -188,13 +207,42 @@ def read_character(file: File) -> Character:
     name exists. FormatError like :func:`read_motion`.
     """
     if isinstance(file, str | Path) and not Path(file).suffix and not Path(file).exists():
-        return _character(_rig(Path(file)))
-    reader = _format(file, None, READABLE, "read").reader
-    if reader not in CHARACTER_READERS:
+        try:
+            return _character(rig(str(file)))
+        except MotionError as error:
+            raise FormatError(file, f"no such file, and {error}") from error
+    kind = _format(file, None, READABLE, "read")
+    if "rest" not in kind.options:
         return Character(read_motion(file))
+    from motet.formats import fbx, gltf_character
+
     with np.errstate(over="ignore", invalid="ignore"):  # Skeleton refuses infinite values
-        found: Character = import_module(f"motet.formats.{CHARACTER_READERS[reader]}").read_character(file)
-    return found
+        return gltf_character.read_character(fbx.as_gltf(file) if kind.reader == "formats.fbx" else file)
+
+
+def _character(like: File | Character | Motion | Skeleton) -> Character:
+    if isinstance(like, Skeleton):
+        like = Motion(np.zeros((1, 0)), (), (), 1.0, like)
+    if isinstance(like, Motion):
+        return Character(like)
+    return like if isinstance(like, Character) else read_character(like)
+
+
+def put_onto(motion: Motion, character: Character) -> Motion:
+    """A motion of any human figure on a character's skeleton; unchanged if it already is on that skeleton.
+
+    A character from a glTF file stands on the ground, and z becomes its facing direction at rest. MotionError, with the
+    reason, if the motion's figure or the character is not human.
+    """
+    if motion.skeleton == character.rest.skeleton:
+        return motion
+    found, joint_map, has_nodes = on_humanoid(motion), character.joint_map, character.nodes is not None
+    try:
+        found = grounded(found) if has_nodes else found
+        put = from_humanoid(found, character.rest, joint_map, skin=character.skin, ahead=has_nodes)
+    except MotionError as error:
+        raise MotionError(f"the character cannot take a motion: {error}") from error
+    return travel_on_root(put, joint_map)
 
 
 def write_motion(
@@ -214,14 +262,18 @@ def write_motion(
 
     FormatError, MotionError or OutputError if that is impossible; then nothing is written.
     """
-    if onto is not None:
-        write_onto(file, motion if isinstance(motion, Mapping) else {"motion": motion}, onto, format=format)
-    elif isinstance(motion, Mapping):
-        raise MotionError("writing several motions into one file requires onto= and a character's .glb or .vrm")
-    else:
+    if onto is None:
+        if isinstance(motion, Mapping):
+            raise MotionError("writing several motions into one file requires onto= and a character's .glb or .vrm")
         check_writable(file, format)
         character = None if like is None else _character(like)
-        write_on(file, motion if character is None else put_onto(motion, character), character, format=format)
+        return write_on(file, motion if character is None else put_onto(motion, character), character, format=format)
+    check_writable(file, format, ONTO)
+    if not isinstance(onto, Character):
+        _format(onto, None, ONTO, "write onto")
+        onto = read_character(onto)
+    motions = motion if isinstance(motion, Mapping) else {"motion": motion}
+    return write_all_on(file, {name: put_onto(each, onto) for name, each in motions.items()}, onto)
 
 
 def write_on(file: File, motion: Motion, character: Character | None, *, format: str | None = None) -> None:
@@ -229,45 +281,30 @@ def write_on(file: File, motion: Motion, character: Character | None, *, format:
     check_writable(file, format)
     kind = _format(file, format, WRITABLE, "write")
     with np.errstate(over="ignore", invalid="ignore"):  # writers refuse values that are too large
-        if character and character.nodes and kind.writer == "glb":
-            from motet.formats import gltf_onto
+        if character and character.nodes and kind.writer == "formats.glb.write":
+            from motet.formats import gltf_character
 
-            gltf_onto.write_clip(file, _metres(motion), character.nodes)
+            gltf_character.write_clip(file, motion, character.nodes)
         else:
             kind.write()(file, motion)
-
-
-def write_onto(file: File, motions: Mapping[str, Motion], onto: File | Character, *, format: str | None = None) -> None:
-    """Write a character with named motions, like :func:`write_motion`."""
-    check_writable(file, format, ONTO)
-    if not isinstance(onto, Character):
-        _format(onto, None, ONTO, "write onto")
-    character = onto if isinstance(onto, Character) else read_character(onto)
-    write_all_on(file, {name: put_onto(motion, character) for name, motion in motions.items()}, character)
 
 
 def write_all_on(file: File, motions: Mapping[str, Motion], character: Character) -> None:
     """Write a character with motions that are on its skeleton already."""
     if character.nodes is None:
         raise MotionError(f"the character has no mesh to write: expected a file of it, one of {' '.join(ONTO)}")
-    from motet.formats import gltf_onto
+    from motet.formats import gltf_character
 
     with np.errstate(over="ignore", invalid="ignore"):
-        gltf_onto.write_onto(file, {name: _metres(motion) for name, motion in motions.items()}, character.nodes)
-
-
-def _metres(motion: Motion) -> Motion:
-    return motion if motion.skeleton is None or motion.skeleton.metres_per_unit == 1 else motion.scaled(1.0)
+        gltf_character.write_onto(file, motions, character.nodes)
 
 
 def check_writable(file: File, format: str | None = None, allowed: tuple[str, ...] = WRITABLE) -> None:
     """Refuse an unwritable path or a disallowed extension before long work starts."""
     kind = _format(file, format, allowed, "write")
     if kind.needs and find_spec(kind.needs) is None:
-        reason = (
-            f"{kind.extension} files need the package {kind.needs}: install the extra with  pip install 'motet[plot]'"
-        )
-        raise OutputError(f"cannot write {place_of(file)}: {reason}")
+        remedy = f"files need the package {kind.needs}: install the extra with  pip install 'motet[plot]'"
+        raise OutputError(f"cannot write {place_of(file)}: {kind.extension} {remedy}")
     if isinstance(file, str | Path):
         check_place(file)
 
@@ -277,36 +314,6 @@ def _format(file: File, format: str | None, allowed: tuple[str, ...], verb: str)
     if extension in allowed:
         return next(kind for kind in FORMATS if kind.extension == extension)
     what = f"files of type {extension!r}" if extension else "a file without an extension"
-    why = NO_MOTIONS.get(extension, "")
-    raise FormatError(place_of(file), f"cannot {verb} {what}{why}; expected one of {' '.join(allowed)}")
-
-
-def _character(like: File | Character | Motion | Skeleton) -> Character:
-    if isinstance(like, Skeleton):
-        return Character(Motion(np.zeros((1, 0)), (), (), 1.0, like))
-    if isinstance(like, Motion):
-        return Character(like)
-    return like if isinstance(like, Character) else read_character(like)
-
-
-def _rig(name: Path) -> Skeleton:
-    try:
-        return rig(str(name))
-    except MotionError as error:
-        raise FormatError(name, f"no such file, and {error}") from error
-
-
-def _in_unit(path: Path, motion: Motion, unit: float, loose: bool) -> Motion:
-    """The motion with the length unit that its file leaves out or, if ``loose``, states only by convention."""
-    if motion.skeleton is None:
-        raise FormatError(path, "a file without a skeleton has no length unit")
-    said, height = motion.skeleton.metres_per_unit, motion.skeleton.height
-    if said is None or (loose and (_human(height * unit) or not _human(height * said))):
-        return motion.with_unit(unit)
-    if not math.isclose(said, unit, rel_tol=1e-6):
-        log.info("%s: the file states a length unit of %.6g m, so the given %.6g m is ignored", path, said, unit)
-    return motion
-
-
-def _human(height: float) -> bool:
-    return HUMAN_HEIGHT[0] <= height <= HUMAN_HEIGHT[1]
+    if extension == ".c3d":
+        what += ", which hold markers without a skeleton: first solve for one in the program that recorded them"
+    raise FormatError(place_of(file), f"cannot {verb} {what}; expected one of {' '.join(allowed)}")

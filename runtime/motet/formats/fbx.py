@@ -13,18 +13,14 @@ from pathlib import Path
 
 from motet.errors import FormatError
 from motet.files import File, place_of
-from motet.formats import gltf, gltf_character
-from motet.formats.character import Character
+from motet.formats import gltf
 from motet.formats.lines import Clip, chosen, clip_names, read_bytes
 from motet.motion.motion import Motion
 
 PROGRAM = Path(__file__).with_name("fbx_to_gltf.py")
 
-FBX_MAX_BYTES = 2**29
-"""The largest file read."""
-
-FBX_SECONDS = 600
-"""How long reading may take."""
+FBX_MAX_BYTES, FBX_SECONDS = 2**29, 600
+"""The largest file read, and how long reading may take."""
 
 
 def read(file: File, clip: Clip = None, rest: File | None = None) -> Motion:
@@ -34,44 +30,38 @@ def read(file: File, clip: Clip = None, rest: File | None = None) -> Motion:
     joints in "length". FormatError names what the file lacks, and the extra if ufbx is not installed.
     rest: see :func:`motet.formats.gltf.read`; or an FBX file, for its rest pose.
     """
-    path, content = place_of(file), read_bytes(file, FBX_MAX_BYTES)
-    found = _gltf(path, content, 0 if clip is None else None)
+    path, content = place_of(file), BytesIO(read_bytes(file, FBX_MAX_BYTES))
+    content.name = str(path)  # used in error messages
+    found = as_gltf(content, 0 if clip is None else None)
     names = _takes(found)
     if clip is not None:
-        found = _gltf(path, content, chosen(path, names, clip))
+        content.seek(0)
+        found = as_gltf(content, chosen(path, names, clip))
     elif names:
         chosen(path, names, None)  # logs that there are others
     if rest is not None and place_of(rest).suffix.lower() == ".fbx":
-        rest = _gltf(place_of(rest), read_bytes(rest, FBX_MAX_BYTES), None)
+        rest = as_gltf(rest)
     return gltf.read(found, rest=rest)
 
 
 def clips(file: File) -> tuple[str, ...]:
     """The names of the takes that move a bone, in the file's order; FormatError like :func:`read`."""
-    return _takes(_gltf(place_of(file), read_bytes(file, FBX_MAX_BYTES), None))
-
-
-def read_character(file: File) -> Character:
-    """Read a character's skeleton to put motions onto; FormatError like :func:`read`."""
-    return gltf_character.read_character(_gltf(place_of(file), read_bytes(file, FBX_MAX_BYTES), None))
+    return _takes(as_gltf(file))
 
 
 def _takes(found: BytesIO) -> tuple[str, ...]:
     return clip_names(json.loads(found.getvalue())["extras"]["takes"])
 
 
-def _gltf(path: Path, content: bytes, take: int | None) -> BytesIO:
-    """The skeleton with a take, by its index among those that move a bone; at rest for None or if there is none."""
-    found = BytesIO(_run(path, content, "-1" if take is None else str(take)))
-    found.name = str(path)  # used in error messages
-    return found
+def as_gltf(file: File, take: int | None = None) -> BytesIO:
+    """The skeleton with a take, by its index among those that move a bone; at rest for None or if there is none.
 
-
-def _run(path: Path, content: bytes, number: str) -> bytes:
-    """The program's output for a file; FormatError with its reason for refusing it, or if ufbx crashes."""
+    FormatError with the program's reason for refusing a file, or if ufbx crashes.
+    """
+    path, content = place_of(file), read_bytes(file, FBX_MAX_BYTES)
     if find_spec("ufbx") is None:
         raise FormatError(path, "FBX files need the package ufbx: install the extra with  pip install 'motet[fbx]'")
-    command = [sys.executable, "-P", str(PROGRAM), number]
+    command = [sys.executable, "-P", str(PROGRAM), "-1" if take is None else str(take)]
     try:
         done = subprocess.run(command, input=content, capture_output=True, timeout=FBX_SECONDS, check=False)
     except subprocess.TimeoutExpired as error:
@@ -81,4 +71,6 @@ def _run(path: Path, content: bytes, number: str) -> bytes:
     if done.returncode:
         reason = done.stderr.decode(errors="replace")[:200] if done.returncode == 1 else "ufbx crashes on it"
         raise FormatError(path, f"broken FBX file: {reason}")
-    return done.stdout
+    found = BytesIO(done.stdout)
+    found.name = str(path)
+    return found

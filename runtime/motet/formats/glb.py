@@ -4,34 +4,35 @@ Axes are glTF's and motet's own: y up, right-handed. Lengths are metres if the s
 unit. Times are seconds from 0. A joint is animated if it turns or moves, the root always. The rest pose of the file is
 the skeleton's (every angle 0). The body makes the file visible in any viewer and puts the joints in a skin, so that
 viewers and Blender recognize them as bones.
+
+VRM Animation (.vrma) is a GLB whose nodes are the humanoid in a VRM T-pose, with the extension VRMC_vrm_animation 1.0.
+Every bone has a rotation, only the hips a translation; players adapt both to their avatar's rest pose and scale the
+path by its hip height. The fingers form a relaxed hand.
 """
 
 import json
 import struct
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.draw.body import COLOURS, Body, Bone
+from motet.draw.figure import COLOURS, Body, Bone
 from motet.errors import MotionError
 from motet.files import File, write_whole
+from motet.formats.gltf_data import COMPONENTS
+from motet.motion.humanoid import BONES, HUMANOID, LEFT_RIGHT, grounded, on_humanoid, relaxed, sided
 from motet.motion.kinematics import local_rotations, local_translations, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, rotmat_to_quat
-from motet.motion.skeleton import Skeleton
-
-FLOAT, UINT8, UINT16, UINT32 = 5126, 5121, 5123, 5125
-"""glTF's component types."""
-
-GLB_TYPES: dict[tuple[int, ...], str] = {(): "SCALAR", (3,): "VEC3", (4,): "VEC4", (4, 4): "MAT4"}
+from motet.motion.skeleton import Joint, Skeleton
 
 VERTICES, INDICES = 34962, 34963
 """glTF's buffer targets."""
 
-LIMB_CORNERS = 10
-"""Corners around a bone of the body."""
+Track = tuple[int, str, Array]
+"""A node's index, "rotation" or "translation", and quaternions (T, 4) or positions (T, 3); T = 1 if constant."""
 
 
 class Buffer:
@@ -43,72 +44,72 @@ class Buffer:
         self.views: list[dict[str, Any]] = list(document.get("bufferViews", []))
         self.accessors: list[dict[str, Any]] = list(document.get("accessors", []))
 
-    def add(self, values: NDArray[Any], kind: int = FLOAT, target: int = 0, **more: Any) -> int:
-        """Index of the new accessor of values (N, ...) of a component type, for a use in a mesh or none."""
-        types = {FLOAT: "<f4", UINT8: "<u1", UINT16: "<u2", UINT32: "<u4"}
-        content = np.ascontiguousarray(values, dtype=types[kind])
+    def add(self, values: NDArray[Any], dtype: str = "<f4", target: int = 0, bounded: bool = False) -> int:
+        """Index of the new accessor of values (N, ...), for a use in a mesh or none.
+
+        bounded: with their minimum and maximum, required for times and corners.
+        """
+        content = np.ascontiguousarray(values, dtype=dtype)
         if not np.isfinite(content).all():
             raise MotionError("values of this motion exceed glTF's 32-bit numbers")
         view = {"buffer": 0, "byteOffset": len(self.content), "byteLength": content.nbytes}
         self.views.append(view | ({"target": target} if target else {}))
         self.content += content.tobytes() + bytes(-content.nbytes % 4)
-        shape = GLB_TYPES[content.shape[1:]]
+        kind = next(kind for kind, known in COMPONENTS.items() if known == dtype)
+        shape = {(): "SCALAR", (3,): "VEC3", (4,): "VEC4", (4, 4): "MAT4"}[content.shape[1:]]
         accessor = {"bufferView": len(self.views) - 1, "componentType": kind, "count": len(content), "type": shape}
-        self.accessors.append(accessor | more)
+        if bounded:
+            rows = content.reshape(len(content), -1)
+            accessor |= {"min": rows.min(axis=0).tolist(), "max": rows.max(axis=0).tolist()}
+        self.accessors.append(accessor)
         return len(self.accessors) - 1
-
-    def add_bounded(self, values: NDArray[Any], target: int = 0) -> int:
-        """The same for floats (N, ...) with their minimum and maximum, required for times and corners."""
-        single = np.asarray(values, dtype="<f4").reshape(len(values), -1)
-        least, greatest = single.min(axis=0).tolist(), single.max(axis=0).tolist()
-        return self.add(values, FLOAT, target, min=least, max=greatest)
 
     def parts(self) -> dict[str, Any]:
         """The document's entries for its binary part."""
-        return {
-            "bufferViews": self.views,
-            "accessors": self.accessors,
-            "buffers": [{"byteLength": len(self.content)}],
-        }
+        length = len(self.content)
+        return {"bufferViews": self.views, "accessors": self.accessors, "buffers": [{"byteLength": length}]}
 
 
 def write(file: File, motion: Motion) -> None:
     """Write a motion; MotionError for one without skeleton or frames, OutputError if the file cannot be written."""
-    skeleton = skeleton_of(motion)
-    if not len(motion):
-        raise MotionError("this motion has no frames, and glTF cannot hold an empty animation")
-    if skeleton.metres_per_unit is not None:
+    if skeleton_of(motion).metres_per_unit is not None:
         motion = motion.scaled(1.0)
-        skeleton = skeleton_of(motion)
-    buffer = Buffer()
-    joints = len(skeleton.joints)
-    document = {
-        "asset": {"version": "2.0", "generator": "motet", "extras": facts(motion, skeleton)},
-        "scene": 0,
-        "scenes": [{"nodes": [0, joints]}],
-        "nodes": [*joint_nodes(skeleton), {"name": "body", "mesh": 0, "skin": 0}],
-        "animations": [animation(buffer, "motion", motion, joint_tracks(motion, skeleton))],
-        "skins": [_skin(buffer, skeleton)],
-        **drawn(buffer, skeleton),
-        **buffer.parts(),
-    }
+    buffer, skeleton = Buffer(), skeleton_of(motion)
+    made = animation(buffer, "motion", motion, joint_tracks(motion, skeleton))
+    inverse = np.tile(np.eye(4), (len(skeleton.joints), 1, 1))
+    inverse[:, :3, 3] = -_rest(skeleton)
+    skin = {"joints": list(range(len(skeleton.joints))), "skeleton": 0}
+    document = with_body(buffer, motion, skeleton, joint_nodes(skeleton), made, skin, inverse)
     write_whole(file, container(document, bytes(buffer.content)))
 
 
-def drawn(buffer: Buffer, skeleton: Skeleton) -> dict[str, Any]:
-    """The mesh of a body, for the file's first skin, and its material."""
+def with_body(
+    buffer: Buffer,
+    motion: Motion,
+    skeleton: Skeleton,
+    nodes: Sequence[Mapping[str, Any]],
+    made: Mapping[str, Any],
+    skin: Mapping[str, Any],
+    inverse_bind: Array,
+) -> dict[str, Any]:
+    """The document of an animation of nodes, with a body that a skin with matrices (J, 4, 4) moves."""
+    unit = "m" if skeleton.metres_per_unit else "unknown"
+    facts = {"fps": motion.fps, "frames": len(motion), "length_unit": unit}
+    matrices = buffer.add(np.swapaxes(inverse_bind, 1, 2))  # glTF keeps columns
     return {
+        "asset": {"version": "2.0", "generator": "motet", "extras": facts},
+        "scene": 0,
+        "scenes": [{"nodes": [0, len(nodes)]}],
+        "nodes": [*nodes, {"name": "body", "mesh": 0, "skin": 0}],
+        "animations": [made],
+        "skins": [{**skin, "inverseBindMatrices": matrices}],
         "meshes": [{"name": "body", "primitives": [_body(buffer, skeleton)]}],
         "materials": [{"name": "body", "pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 0.6}}],
+        **buffer.parts(),
     }
 
 
-def facts(motion: Motion, skeleton: Skeleton) -> dict[str, Any]:
-    """Properties of the motion that glTF has no field for."""
-    return {"fps": motion.fps, "frames": len(motion), "length_unit": "m" if skeleton.metres_per_unit else "unknown"}
-
-
-def container(document: dict[str, Any], content: bytes) -> bytes:
+def container(document: Mapping[str, Any], content: bytes) -> bytes:
     """A GLB file of a JSON object and the binary part."""
     text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
     text += b" " * (-len(text) % 4)
@@ -118,15 +119,10 @@ def container(document: dict[str, Any], content: bytes) -> bytes:
 
 def joint_nodes(skeleton: Skeleton) -> list[dict[str, Any]]:
     """A node for each joint, at rest, in their order."""
-    nodes: list[dict[str, Any]] = []
-    for joint, children in zip(skeleton.joints, skeleton.children, strict=True):
-        node: dict[str, Any] = {"name": joint.name, "translation": list(joint.offset)}
-        nodes.append(node | ({"children": list(children)} if children else {}))
-    return nodes
-
-
-Track = tuple[int, str, Array]
-"""A node's index, "rotation" or "translation", and quaternions (T, 4) or positions (T, 3); T = 1 if constant."""
+    return [
+        {"name": joint.name, "translation": list(joint.offset), **({"children": list(children)} if children else {})}
+        for joint, children in zip(skeleton.joints, skeleton.children, strict=True)
+    ]
 
 
 def joint_tracks(motion: Motion, skeleton: Skeleton) -> Iterator[Track]:
@@ -139,29 +135,21 @@ def joint_tracks(motion: Motion, skeleton: Skeleton) -> Iterator[Track]:
 
 def animation(buffer: Buffer, name: str, motion: Motion, tracks: Iterable[Track]) -> dict[str, Any]:
     """The animation of tracks from the motion's first frame; its arrays go into the buffer."""
-    times = {len(motion): buffer.add_bounded(np.arange(len(motion)) / motion.fps)}
+    if not len(motion):
+        raise MotionError("this motion has no frames, and glTF cannot hold an empty animation")
+    times = {len(motion): buffer.add(np.arange(len(motion)) / motion.fps, bounded=True)}
     samplers: list[dict[str, Any]] = []
     channels: list[dict[str, Any]] = []
-    for node, path, track in tracks:
+    for node, path, values in tracks:
+        track = values
         channels.append({"sampler": len(samplers), "target": {"node": node, "path": path}})
-        values = _continuous(track) if path == "rotation" else track
+        if path == "rotation":  # signs that keep each quaternion near its predecessor
+            flips = np.sum(values[1:] * values[:-1], axis=-1, keepdims=True) < 0
+            track = np.concatenate([values[:1], values[1:] * np.cumprod(np.where(flips, -1.0, 1.0), axis=0)])
         if len(track) not in times:
-            times[len(track)] = buffer.add_bounded(np.arange(len(track)) / motion.fps)
-        samplers.append({"input": times[len(track)], "output": buffer.add(values), "interpolation": "LINEAR"})
+            times[len(track)] = buffer.add(np.arange(len(track)) / motion.fps, bounded=True)
+        samplers.append({"input": times[len(track)], "output": buffer.add(track), "interpolation": "LINEAR"})
     return {"name": name, "channels": channels, "samplers": samplers}
-
-
-def _continuous(quats: Array) -> Array:
-    """The same rotations (T, ..., 4) with signs that keep each quaternion near its predecessor."""
-    flips = np.sum(quats[1:] * quats[:-1], axis=-1, keepdims=True) < 0
-    signs = np.cumprod(np.where(flips, -1.0, 1.0), axis=0)
-    return np.concatenate([quats[:1], quats[1:] * signs])
-
-
-def _skin(buffer: Buffer, skeleton: Skeleton) -> dict[str, Any]:
-    inverse = np.tile(np.eye(4), (len(skeleton.joints), 1, 1))
-    inverse[:, 3, :3] = -_rest(skeleton)  # glTF keeps columns, so the translation is the last row here
-    return {"joints": list(range(len(skeleton.joints))), "skeleton": 0, "inverseBindMatrices": buffer.add(inverse)}
 
 
 def _rest(skeleton: Skeleton) -> Array:
@@ -170,52 +158,93 @@ def _rest(skeleton: Skeleton) -> Array:
     return rest
 
 
-def _body(buffer: Buffer, skeleton: Skeleton) -> dict[str, Any]:
-    """The primitive of the body: a tapered prism for each bone, its ends moving with the bone's carriers."""
+def _body(buffer: Buffer, skeleton: Skeleton, corners: int = 10) -> dict[str, Any]:
+    """The primitive of the body: a tapered prism for each bone, its ends moving with the bone's carriers.
+
+    corners: how many each prism has around its bone.
+    """
     body = Body(skeleton)
     points = body.points(_rest(skeleton) / body.height)
-    prisms = [_prism(bone, points[bone.start], points[bone.end]) for bone in body.bones]
-    corners, normals = (np.concatenate(arrays) for arrays in zip(*prisms, strict=True))
-    joints = np.zeros((len(corners), 4))
-    joints[:, 0] = np.repeat([bone.carriers for bone in body.bones], LIMB_CORNERS + 1)
-    colours = np.repeat([COLOURS[bone.side] for bone in body.bones], 2 * LIMB_CORNERS + 2, axis=0)
-    triangles = _triangles() + (2 * LIMB_CORNERS + 2) * np.arange(len(body.bones))[:, None]
+    prisms = [_prism(bone, points[bone.start], points[bone.end], corners) for bone in body.bones]
+    places, normals = (np.concatenate(arrays) for arrays in zip(*prisms, strict=True))
+    joints = np.zeros((len(places), 4))
+    joints[:, 0] = np.repeat([bone.carriers for bone in body.bones], corners + 1)
+    colours = np.repeat([COLOURS[bone.side] for bone in body.bones], 2 * corners + 2, axis=0)
+    # triangles of a prism, counterclockwise from outside
+    now, after, tip = np.arange(1, corners + 1), np.arange(1, corners + 1) % corners + 1, 2 * corners + 1
+    parts = [(0 * now, after, now), (now, after, now + corners), (after, after + corners, now + corners)]
+    parts.append((0 * now + tip, now + corners, after + corners))
+    prism = np.concatenate([np.stack(part, axis=1).reshape(-1) for part in parts])
+    triangles = prism + (2 * corners + 2) * np.arange(len(body.bones))[:, None]
     attributes = {
-        "POSITION": buffer.add_bounded(corners * body.height, VERTICES),
-        "NORMAL": buffer.add(normals, FLOAT, VERTICES),
-        "COLOR_0": buffer.add(_linear(colours), FLOAT, VERTICES),
-        "JOINTS_0": buffer.add(joints, UINT16, VERTICES),
-        "WEIGHTS_0": buffer.add(np.tile([1.0, 0, 0, 0], (len(corners), 1)), FLOAT, VERTICES),
+        "POSITION": buffer.add(places * body.height, target=VERTICES, bounded=True),
+        "NORMAL": buffer.add(normals, target=VERTICES),
+        "COLOR_0": buffer.add((colours / 255) ** 2.2, target=VERTICES),  # from sRGB to linear
+        "JOINTS_0": buffer.add(joints, "<u2", VERTICES),
+        "WEIGHTS_0": buffer.add(np.tile([1.0, 0, 0, 0], (len(places), 1)), target=VERTICES),
     }
-    return {"attributes": attributes, "indices": buffer.add(triangles.reshape(-1), UINT32, INDICES), "material": 0}
+    return {"attributes": attributes, "indices": buffer.add(triangles.reshape(-1), "<u4", INDICES), "material": 0}
 
 
-def _linear(colours: NDArray[Any]) -> Array:
-    """sRGB colours (N, 3) of 0 to 255 as glTF's linear ones."""
-    linear: Array = (colours / 255) ** 2.2
-    return linear
-
-
-def _prism(bone: Bone, start: Array, end: Array) -> tuple[Array, Array]:
-    """Corners and normals (2 * LIMB_CORNERS + 2, 3): tip and ring at the start, ring and tip at the end."""
+def _prism(bone: Bone, start: Array, end: Array, corners: int) -> tuple[Array, Array]:
+    """Corners and normals (2 * corners + 2, 3): tip and ring at the start, ring and tip at the end."""
     axis = end - start
     length = float(np.linalg.norm(axis))
     axis = axis / length if length else np.array([0.0, 1.0, 0.0])
     side = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     side /= np.linalg.norm(side)
-    angles = np.arange(LIMB_CORNERS)[:, None] * 2 * np.pi / LIMB_CORNERS
+    angles = np.arange(corners)[:, None] * 2 * np.pi / corners
     ring = np.cos(angles) * side + np.sin(angles) * np.cross(axis, side)
     thick, thin = bone.start_radius, bone.end_radius
-    corners = [start - 0.7 * thick * axis, *(start + thick * ring), *(end + thin * ring), end + 0.7 * thin * axis]
-    return np.array(corners), np.array([-axis, *ring, *ring, axis])
+    places = [start - 0.7 * thick * axis, *(start + thick * ring), *(end + thin * ring), end + 0.7 * thin * axis]
+    return np.array(places), np.array([-axis, *ring, *ring, axis])
 
 
-def _triangles() -> NDArray[np.int64]:
-    """Corners of the triangles of a prism, counterclockwise from outside."""
-    now = np.arange(LIMB_CORNERS)
-    after = (now + 1) % LIMB_CORNERS
-    low, high, tip = now + 1, now + 1 + LIMB_CORNERS, 2 * LIMB_CORNERS + 1
-    low_after, high_after = after + 1, after + 1 + LIMB_CORNERS
-    cap, lid = np.stack([0 * now, low_after, low]), np.stack([0 * now + tip, high, high_after])
-    wall = [np.stack([low, low_after, high]), np.stack([low_after, high_after, high])]
-    return np.concatenate([part.T.reshape(-1) for part in (cap, *wall, lid)])
+def _with_fingers() -> Skeleton:
+    """The humanoid with VRM's fingers: offsets from the parents, in metres, in the left hand; the right mirrors it."""
+    thumb, finger = ("Metacarpal", "Proximal", "Distal"), ("Proximal", "Intermediate", "Distal")
+    bones = {
+        "Thumb": (thumb, (0.025, -0.01, 0.025), (0.035, -0.005, 0.02), (0.025, -0.005, 0.015)),
+        "Index": (finger, (0.09, 0.0, 0.03), (0.04, 0.0, 0.0), (0.025, 0.0, 0.0)),
+        "Middle": (finger, (0.09, 0.0, 0.01), (0.045, 0.0, 0.0), (0.03, 0.0, 0.0)),
+        "Ring": (finger, (0.09, 0.0, -0.01), (0.04, 0.0, 0.0), (0.025, 0.0, 0.0)),
+        "Little": (finger, (0.09, 0.0, -0.03), (0.03, 0.0, 0.0), (0.02, 0.0, 0.0)),
+    }
+    joints = list(HUMANOID.joints)
+    for side, sign in zip(LEFT_RIGHT, (1.0, -1.0), strict=True):
+        for name, (parts, *offsets) in bones.items():
+            parent = HUMANOID.index(sided(side, "Hand"))
+            for part, (x, y, z) in zip(parts, offsets, strict=True):
+                joints.append(Joint(sided(side, name + part), parent, (sign * x, y, z)))
+                parent = len(joints) - 1
+    return Skeleton(tuple(joints), metres_per_unit=1.0)
+
+
+VRMA_SKELETON = _with_fingers()
+
+
+def write_vrma(file: File, motion: Motion) -> None:
+    """Write a VRM animation; a motion of another skeleton is retargeted to the humanoid first.
+
+    MotionError for a motion without frames or of a figure that is not human, OutputError if it cannot be written.
+    """
+    if not len(motion):
+        raise MotionError("this motion has no frames, and a VRM animation cannot be empty")
+    motion, buffer, extension = grounded(on_humanoid(motion)), Buffer(), "VRMC_vrm_animation"
+    fingers = range(len(HUMANOID.names), len(VRMA_SKELETON.names))
+    still = np.broadcast_to(np.eye(3), (len(VRMA_SKELETON.names), 3, 3))
+    turned = relaxed(VRMA_SKELETON, still, VRMA_SKELETON.places)
+    hands = ((joint, "rotation", rotmat_to_quat(turned[joint : joint + 1])) for joint in fingers)
+    named = (*BONES, *(VRMA_SKELETON.names[joint] for joint in fingers))
+    bones = {bone: {"node": VRMA_SKELETON.index(bone)} for bone in named}
+    document: dict[str, Any] = {
+        "asset": {"version": "2.0", "generator": "motet"},
+        "extensionsUsed": [extension],
+        "extensions": {extension: {"specVersion": "1.0", "humanoid": {"humanBones": bones}}},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": joint_nodes(VRMA_SKELETON),
+        "animations": [animation(buffer, "motion", motion, (*joint_tracks(motion, HUMANOID), *hands))],
+        **buffer.parts(),
+    }
+    write_whole(file, container(document, bytes(buffer.content)))

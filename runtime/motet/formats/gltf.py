@@ -1,27 +1,40 @@
 """Reading glTF 2.0 (.gltf, .glb) and VRM (.vrm, .vrma): the skeleton, and its animations as clips.
 
-Lengths include the scales of nodes and the transforms of nodes above the skeleton.
+Joints are those of the skins and the humanoid bones of a VRM file, with all nodes between them. In a file with neither,
+such as an animation exported alone, they are the nodes that its animations move, and the descendants of these.
+
+Lengths include the scales of nodes and the transforms of nodes above the skeleton. The motion's skeleton has the rest
+pose of the file's nodes, with all rotations removed: every angle 0 is that pose, whatever the nodes' own axes.
 """
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+import logging
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from motet.errors import FormatError, MotionError
-from motet.files import File, place_of
-from motet.formats.gltf_data import Gltf, parse
-from motet.formats.gltf_figures import Figure, above, figure_of, figures, likeliest
-from motet.formats.gltf_tracks import GLTF_FPS, moved, tracks
-from motet.formats.lines import Clip, Names, chosen, clip_names, split_clip
-from motet.formats.nodes import Poses, motion_of_nodes, rested
-from motet.motion.humanoid import BONES
-from motet.motion.motion import Motion
-from motet.motion.rotations import Array
+import numpy as np
 
-GLTF_EXTENSIONS = (".glb", ".gltf", ".vrm", ".vrma")
-"""The extensions of these files."""
+from motet.errors import FormatError, MotionError, listed, quoted
+from motet.files import File, place_of
+from motet.formats.gltf_data import Gltf, broken, parse
+from motet.formats.lines import Clip, Names, chosen, clip_names, split_clip
+from motet.motion.humanoid import BONES
+from motet.motion.kinematics import motion_of
+from motet.motion.motion import Motion
+from motet.motion.rotations import Array, inverse, product, rotated
+from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
+
+log = logging.getLogger(__name__)
+
+GLTF_FPS = 30.0
+"""The frame rate of a file without animation, or with keys too sparse to tell."""
+
+PATHS = {"rotation": 4, "translation": 3, "scale": 3}
+"""The animated properties of a node, and how many numbers each has; mesh weights are left out."""
+
+Tracks = Mapping[tuple[int, str], Array]
+"""(Node, property) -> values (T, 3 or 4)."""
 
 
 def read(file: File, clip: Clip = None, rest: File | None = None) -> Motion:
@@ -34,24 +47,25 @@ def read(file: File, clip: Clip = None, rest: File | None = None) -> Motion:
     the translation of the root and of moving joints in "length". FormatError names what the file lacks.
     """
     with broken(place_of(file)):
-        return _read(_parsed(file), clip, {} if rest is None else _stance(rest))
+        scene = _scene(file)
+        gltf, stance = scene.gltf, {} if rest is None else _stance(rest)
+        take = _take(scene, chosen(gltf.path, scene.names, clip) if scene.names or clip is not None else None)
+        figure = take.figure
+        if stance and not stance.keys() & set(figure.names):
+            raise FormatError(gltf.path, "the file of the rest pose shares no joint name with this figure")
+        bones = {node: bone for bone, node in gltf.humanoid().items() if bone in BONES}
+        given = Names(bones.values())  # other joints with such a name are renamed
+        names = [bones.get(node) or given.unique(name) for node, name in zip(figure.nodes, figure.names, strict=True)]
+        turns, places = _rested(take, stance)
+        skeleton = skeleton_at(gltf.path, names, figure.parents, places)
+        turned = product(take.turns, inverse(turns))
+        return motion_of(skeleton, turned, _moving(skeleton, turned, take.places), take.fps)
 
 
 def clips(file: File) -> tuple[str, ...]:
     """The names of the animations that move a figure, in the file's order; FormatError like :func:`read`."""
     with broken(place_of(file)):
-        return _parsed(file).names
-
-
-@contextmanager
-def broken(path: Path) -> Iterator[None]:
-    """Turn errors from misplaced or mistyped content into FormatError."""
-    try:
-        yield
-    except MotionError as error:
-        raise error if isinstance(error, FormatError) else FormatError(path, str(error)) from error
-    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
-        raise FormatError(path, f"broken glTF file: {type(error).__name__}: {str(error)[:200]}") from error
+        return _scene(file).names
 
 
 @dataclass(frozen=True)
@@ -64,7 +78,7 @@ class _Scene:
     names: tuple[str, ...]
 
 
-def _parsed(file: File) -> _Scene:
+def _scene(file: File) -> _Scene:
     gltf = parse(file)
     animations = gltf.objects("animations")
     found = figures(gltf, set().union(*map(moved, animations)))
@@ -75,54 +89,238 @@ def _parsed(file: File) -> _Scene:
     return _Scene(gltf, found, moving, clip_names(str(animation.get("name", "")) for animation in moving))
 
 
+def _stance(file: File) -> dict[str, Array]:
+    """The rotations (3, 3) of a file's joints in the world, by name: at rest, or at the start of a named clip."""
+    extensions = (".glb", ".gltf", ".vrm", ".vrma")
+    file, clip = split_clip(file, extensions)
+    if isinstance(file, str | Path) and Path(file).suffix.lower() not in extensions:
+        raise FormatError(place_of(file), f"a rest pose must come from a file of {' '.join(extensions)}")
+    with broken(place_of(file)):
+        scene = _scene(file)
+        take = _take(scene, None if clip is None else chosen(scene.gltf.path, scene.names, clip))
+        return dict(zip(take.figure.names, take.rest_turns if clip is None else take.turns[0], strict=True))
+
+
+@dataclass(frozen=True)
+class Figure:
+    """The joints of one skeleton, parents first: their nodes in the file, parents (-1: none) and names."""
+
+    nodes: tuple[int, ...]
+    parents: tuple[int, ...]
+    names: tuple[str, ...]
+
+
 @dataclass(frozen=True)
 class _Take:
-    """A figure at rest, in one frame, and in the frames of an animation."""
+    """A figure's joints in the world: rotations without scale (T, J, 3, 3), positions (T, J, 3), and both at rest."""
 
     figure: Figure
-    rest: Poses
-    poses: Poses
+    turns: Array
+    places: Array
+    rest_turns: Array
+    rest_places: Array
     fps: float
 
 
-def _read(scene: _Scene, clip: Clip, turns: Mapping[str, Array]) -> Motion:
-    """turns: rest rotations (3, 3) of joints in the world, to use instead of the file's."""
-    named = scene.names or clip is not None
-    take = _take(scene, chosen(scene.gltf.path, scene.names, clip) if named else None)
-    names, parents = take.figure.names, take.figure.parents
-    if turns and not turns.keys() & set(names):
-        raise FormatError(scene.gltf.path, "the file of the rest pose shares no joint name with this figure")
-    rest = rested(take.rest, names, parents, turns)
-    return motion_of_nodes(
-        scene.gltf.path, _named(scene.gltf, take.figure), parents, rest, take.poses, take.fps, metres=1.0
-    )
-
-
-def _stance(file: File) -> dict[str, Array]:
-    """The rotations (3, 3) of a file's joints in the world, by name: at rest, or at the start of a named clip."""
-    file, clip = split_clip(file, GLTF_EXTENSIONS)
-    if isinstance(file, str | Path) and Path(file).suffix.lower() not in GLTF_EXTENSIONS:
-        raise FormatError(place_of(file), f"a rest pose must come from a file of {' '.join(GLTF_EXTENSIONS)}")
-    with broken(place_of(file)):
-        scene = _parsed(file)
-        take = _take(scene, None if clip is None else chosen(scene.gltf.path, scene.names, clip))
-        return dict(zip(take.figure.names, (take.rest if clip is None else take.poses).turns[0], strict=True))
-
-
 def _take(scene: _Scene, index: int | None) -> _Take:
-    gltf = scene.gltf
-    animation = {} if index is None else scene.animations[index]
+    """A figure in the frames of an animation, or at rest."""
+    gltf, animation = scene.gltf, {} if index is None else scene.animations[index]
     figure = figure_of(gltf, likeliest(gltf, scene.figures, moved(animation)))
     near = above(gltf, figure.nodes)
-    values, fps = ({}, GLTF_FPS) if index is None else tracks(gltf, animation, scene.names[index], near)
-    rest = poses = Poses(*gltf.world(near)[1:]).of(figure.nodes)
-    if values:
-        poses = Poses(*gltf.world(near, values)[1:]).of(figure.nodes)
-    return _Take(figure, rest, poses, fps)
+    values, fps = ({}, GLTF_FPS) if index is None else _tracks(gltf, animation, scene.names[index], near)
+    rest, poses = ([part[:, list(figure.nodes)] for part in gltf.world(near, each)[1:]] for each in ({}, values))
+    return _Take(figure, poses[0], poses[1], rest[0][0], rest[1][0], fps)
 
 
-def _named(gltf: Gltf, joints: Figure) -> list[str]:
-    """The joints' names, VRM's for the bones of its humanoid; other joints with such a name are renamed."""
-    bones = {node: bone for bone, node in gltf.humanoid().items() if bone in BONES}
-    given = Names(bones.values())
-    return [bones.get(node) or given.unique(name) for node, name in zip(joints.nodes, joints.names, strict=True)]
+def _rested(take: _Take, stance: Mapping[str, Array]) -> tuple[Array, Array]:
+    """Rotations (J, 3, 3) and positions (J, 3) at rest, with bones turned like those of the same names in ``stance``.
+
+    Bones keep their lengths; other joints keep their rotation relative to their parent.
+    """
+    turned, places = take.rest_turns.copy(), take.rest_places.copy()
+    for i, (name, parent) in enumerate(zip(take.figure.names, take.figure.parents, strict=True)):
+        if parent >= 0:
+            back = turned[parent] @ take.rest_turns[parent].T
+            turned[i] = back @ take.rest_turns[i]
+            places[i] = places[parent] + back @ (take.rest_places[i] - take.rest_places[parent])
+        turned[i] = stance.get(name, turned[i])
+    return turned, places
+
+
+def skeleton_at(path: Path, names: Sequence[str], parents: Sequence[int], places: Array) -> Skeleton:
+    """The skeleton in metres of joints at places (J, 3) at rest; FormatError if they do not form one."""
+    above = [places[parent] if parent >= 0 else np.zeros(3) for parent in parents]
+    offsets = [(float(x), float(y), float(z)) for x, y, z in places - above]
+    joints = tuple(Joint(*joint) for joint in zip(names, parents, offsets, strict=True))
+    try:
+        return Skeleton(joints, metres_per_unit=1.0)
+    except MotionError as error:
+        raise FormatError(path, str(error)) from error
+
+
+def _moving(skeleton: Skeleton, turned: Array, places: Array) -> dict[int, Array]:
+    """Translations (T, 3) in their parents' frames: of the root, and of joints that leave their offset."""
+    moving = {0: places[:, 0]}
+    for i, joint in enumerate(skeleton.joints[1:], start=1):
+        local = rotated(inverse(turned[:, joint.parent]), places[:, i] - places[:, joint.parent])
+        # share of the figure's height: a joint that stays within this of its offset does not move
+        if np.abs(local - joint.offset).max(initial=0.0) > 1e-4 * max(skeleton.height, 1e-9):
+            moving[i] = local
+    return moving
+
+
+def figures(gltf: Gltf, moved: set[int]) -> list[set[int]]:
+    """The joints of each figure of a file, by node; of a VRM file only the humanoid's; FormatError if none.
+
+    moved: the nodes that its animations move. Skins belong to one figure if one is below the other, or both are below a
+    moved node.
+    """
+    skins, bones = gltf.objects("skins"), set(gltf.humanoid().values())
+    if len(skins) > 500:  # a figure has one for each of its meshes
+        raise FormatError(gltf.path, f"it has {len(skins)} skins: expected at most 500")
+    given = [bones, *(set(skin.get("joints", [])) for skin in skins)]
+    if strange := set().union(*given) - set(range(len(gltf.parents))):
+        raise FormatError(gltf.path, f"joints that are not nodes: {listed(sorted(map(str, strange)))}")
+    roots = _heads(gltf, {node for node, parent in enumerate(gltf.parents) if parent < 0})
+    parts: dict[tuple[int, int], set[int]] = {}
+    for i, joints in enumerate(given if any(given) else [_animated(gltf, moved, roots)]):
+        for node in joints:
+            parts.setdefault((i, roots[node]), set()).add(node)
+    tops = [_top(gltf, part) for part in parts.values()]
+    heads = _heads(gltf, moved | set(tops))
+    found: dict[int, set[int]] = {}
+    for part, top in zip(parts.values(), tops, strict=True):
+        found.setdefault(heads[top], set()).update(part)
+    return [joints for joints in found.values() if not bones or joints & bones]
+
+
+def _animated(gltf: Gltf, moved: set[int], roots: Mapping[int, int]) -> set[int]:
+    """In each tree the moved nodes and the bones below them, if some are below others."""
+
+    def is_thing(node: int, *kinds: str) -> bool:
+        found = gltf.objects("nodes")[node]
+        return any(kind in found for kind in kinds) or "KHR_lights_punctual" in found.get("extensions", {})
+
+    bones = {node for node in moved if not is_thing(node, "camera")}
+    hanging: set[int] = set()
+    for node in gltf.order:
+        held = gltf.parents[node] in bones or gltf.parents[node] in hanging
+        if held and (node in bones or not is_thing(node, "mesh", "camera")):
+            hanging.add(node)
+    trees = {roots[node] for node in bones & hanging}
+    if not trees:
+        names = listed([quoted(gltf.name(node)) for node in sorted(moved)])
+        reason = f"its animations move only {names}, and nothing below"
+        reason = reason if moved else "expected a skin with joints or a VRM humanoid"
+        raise FormatError(gltf.path, f"no skeleton: {reason}; export the armature, too")
+    return {node for node in bones | hanging if roots[node] in trees}
+
+
+def _heads(gltf: Gltf, among: set[int]) -> dict[int, int]:
+    """The highest of ``among`` that each node is or is below."""
+    heads: dict[int, int] = {}
+    for node in gltf.order:
+        if gltf.parents[node] in heads:
+            heads[node] = heads[gltf.parents[node]]
+        elif node in among:
+            heads[node] = node
+    return heads
+
+
+def _top(gltf: Gltf, part: set[int]) -> int:
+    """The lowest common ancestor of a part: that of its first and last node in branch order."""
+    first, last = (pick(part, key=gltf.order.__getitem__) for pick in (min, max))
+    line = above(gltf, [first])
+    while last not in line:
+        last = gltf.parents[last]
+    return last
+
+
+def above(gltf: Gltf, nodes: Iterable[int]) -> set[int]:
+    """The nodes and all their ancestors."""
+    found: set[int] = set()
+    for node in nodes:
+        at = node
+        while at >= 0 and at not in found:
+            found.add(at)
+            at = gltf.parents[at]
+    return found
+
+
+def likeliest(gltf: Gltf, found: list[set[int]], moved: set[int]) -> set[int]:
+    """The figure with the most moving nodes, counting its ancestors, or else with the most joints."""
+    best = max(found, key=lambda joints: (len(above(gltf, joints) & moved), len(joints)))
+    if len(found) > 1:
+        name = quoted(gltf.name(_top(gltf, best)))
+        log.warning("%s: of %d skeletons, reading that of %s, which moves the most", gltf.path, len(found), name)
+    return best
+
+
+def figure_of(gltf: Gltf, joints: set[int]) -> Figure:
+    """The joints and the nodes between them, with the ends attached to them, by motet's and Blender's naming."""
+    inside, nodes = above(gltf, joints) - above(gltf, [gltf.parents[_top(gltf, joints)]]), gltf.objects("nodes")
+    ends = {node for node, found in enumerate(nodes) if str(found.get("name", "")).endswith(END_SUFFIX)}
+    ends = {node for node in ends if gltf.parents[node] in inside and not nodes[node].get("children")}
+    kept = tuple(node for node in gltf.order if node in inside or node in ends)
+    if len(kept) > 3000:  # one with a detailed facial rig has a thousand
+        raise FormatError(gltf.path, f"its skeleton has {len(kept)} joints: expected at most 3000")
+    at, given = {node: i for i, node in enumerate(kept)}, Names()
+    names = tuple(given.unique(gltf.name(node)) for node in kept)
+    return Figure(kept, tuple(at.get(gltf.parents[node], -1) for node in kept), names)
+
+
+def moved(animation: Mapping[str, Any]) -> set[int]:
+    """The nodes that an animation moves."""
+    targets = [channel["target"] for channel in animation.get("channels", [])]
+    return {target["node"] for target in targets if target.get("path") in PATHS and target.get("node") is not None}
+
+
+def _tracks(gltf: Gltf, animation: Mapping[str, Any], name: str, nodes: set[int]) -> tuple[Tracks, float]:
+    """The values of some nodes at every frame of the animation ``name``, and its frame rate."""
+    samplers, keys = animation.get("samplers", []), {}
+    for channel in animation.get("channels", []):
+        node, path = channel["target"].get("node"), channel["target"].get("path")
+        if node in nodes and path in PATHS:
+            sampler = samplers[channel["sampler"]]
+            at, values = gltf.array(sampler["input"]), gltf.array(sampler["output"])
+            keys[node, path] = at.reshape(-1), values, sampler.get("interpolation", "LINEAR")
+    times = [at for at, _, _ in keys.values()]
+    if not all(map(len, times)):
+        raise FormatError(gltf.path, f"its animation {quoted(name)} has tracks without keys")
+    start, end = min(at[0] for at in times), max(at[-1] for at in times)
+    step = min((float(np.median(np.diff(at))) for at in times if len(at) > 1), default=0.0)
+    rate = 1 / step if 0 < step < 0.1 else GLTF_FPS
+    fps = float(round(rate)) if abs(rate - round(rate)) < 0.01 * rate else rate
+    count = (end - start) * fps + 1
+    # an hour of 90 nodes at 30 fps; for a small file a million, plus one per byte
+    if not count * len(gltf.objects("nodes")) < min(10**7, 10**6 + gltf.size):
+        raise FormatError(gltf.path, f"{end - start:g} s at {fps:g} fps is too many frames")
+    frames = start + np.arange(round(count)) / fps
+    return {place: _sampled(*key, frames, place[1]) for place, key in keys.items()}, fps
+
+
+def _sampled(times: Array, values: Array, kind: str, frames: Array, name: str) -> Array:
+    """Values (T, 3 or 4) at given times: linear (turns the shortest way), in steps, or by the tangents of splines."""
+    values = values.reshape(len(times), -1, PATHS[name])
+    before = np.clip(np.searchsorted(times, frames + 1e-6, side="right") - 1, 0, max(len(times) - 2, 0))
+    after = np.minimum(before + 1, len(times) - 1)
+    span = np.maximum(times[after] - times[before], 1e-9)
+    part = np.clip((frames - times[before]) / span, 0, 1)[:, None]
+    low, high = values[before, 0], values[after, 0]
+    mixed: Array
+    if kind == "CUBICSPLINE":
+        t, u, p, q = part, 1 - part, values[before, 1], values[after, 1]
+        m0, m1 = values[before, 2] * span[:, None], high * span[:, None]
+        mixed = (1 + 2 * t) * u**2 * p + t * u**2 * m0 + t**2 * (3 - 2 * t) * q - t**2 * u * m1
+    elif kind == "STEP":
+        mixed = np.where(part < 1 - 1e-4, low, high)
+    elif name != "rotation":
+        mixed = low + part * (high - low)
+    else:  # the shortest way at constant speed
+        low, high = (quats / np.linalg.norm(quats, axis=-1, keepdims=True) for quats in (low, high))
+        cosine = np.sum(low * high, axis=-1, keepdims=True)
+        high, angle = np.where(cosine < 0, -high, high), np.arccos(np.clip(np.abs(cosine), -1, 1))
+        near, sine = angle < 1e-4, np.where(angle < 1e-4, 1.0, np.sin(angle))
+        one, other = (np.where(near, share, np.sin(share * angle) / sine) for share in (1 - part, part))
+        mixed = one * low + other * high
+    return mixed

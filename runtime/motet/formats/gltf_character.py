@@ -1,77 +1,82 @@
-"""Characters of glTF and VRM files: their skeleton, and a motion on it as tracks of the file's own nodes.
+"""Characters of glTF and VRM files: their skeleton, and motions on it for the file's own nodes.
 
 Nodes have their own rest poses, axes and scales, and so may the skeleton's ancestors: in every Mixamo export the hips
-are below a node with scale .01. A track is in the frame of the node's parent, so these all affect it.
+are below a node with scale .01. A track is in the frame of the node's parent, so these all affect it. Motions are
+written into the character's file, with mesh and materials, or as a clip without them, which plays by node names.
 """
 
-from collections.abc import Iterator
+import logging
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from motet.errors import FormatError, MotionError
-from motet.files import File, place_of
-from motet.formats.character import Character
-from motet.formats.glb import Track
-from motet.formats.gltf import broken
-from motet.formats.gltf_data import Gltf, parse
-from motet.formats.gltf_figures import Rest, at_rest
-from motet.formats.gltf_skin import skin_of
-from motet.formats.gltf_tracks import GLTF_FPS
+from motet.errors import FormatError
+from motet.files import File, place_of, write_whole
+from motet.formats import Character
+from motet.formats.glb import Buffer, Track, animation, container, with_body
+from motet.formats.gltf import GLTF_FPS, figure_of, figures, likeliest, moved, skeleton_at
+from motet.formats.gltf_data import Gltf, broken, parse
 from motet.motion.humanoid import BONES, REQUIRED, JointMap, check_map
 from motet.motion.kinematics import local_rotations, local_translations
 from motet.motion.motion import Motion
-from motet.motion.rotations import Array, product, quat_to_rotmat, rotmat_to_quat
+from motet.motion.rotations import Array, product, quat_to_rotmat, rotated, rotmat_to_quat
 from motet.motion.skeleton import Skeleton
 
-STAYS_WITHIN = 1e-6
-"""A joint that stays within this of its rest, in radians and heights, has no track."""
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
 class Nodes:
-    """The nodes of a character's file, and their rest pose."""
+    """A character's file, and the node of each joint of its skeleton, whose rest pose is the nodes' pose, in metres.
+
+    linear: the linear maps (N, 3, 3), with scales, of all nodes of the file, joints or not, in the world; places
+    (N, 3): their positions.
+    """
 
     gltf: Gltf
-    rest: Rest
+    joints: tuple[int, ...]
+    skeleton: Skeleton
+    linear: Array
+    places: Array
 
     def tracks(self, motion: Motion) -> Iterator[Track]:
-        """The tracks of a motion on the character's skeleton, in metres, for the file's nodes.
+        """The tracks of a motion on the character's skeleton for the file's nodes.
 
-        The root has both tracks, other joints only those in which they leave their rest. Exact for uniform or mirroring
-        scales; under stretched parents the rotation is the nearest one.
+        The root has both tracks, other joints only those in which they leave their rest by over 1e-6, in radians or
+        heights. Exact for uniform or mirroring scales; under stretched parents the rotation is the nearest one.
         """
-        skeleton, still = self.rest.skeleton, STAYS_WITHIN * self.rest.skeleton.height
+        if motion.skeleton and motion.skeleton.metres_per_unit != 1:
+            motion = motion.scaled(1.0)
         turns, moves = local_rotations(motion), local_translations(motion)
-        for i, node in enumerate(self.rest.nodes):
-            to_parent, origin = self._above(node)
-            frame, turn = _orthogonal(to_parent), self.gltf.local(node)[1]
-            if not i or np.abs(turns[:, i] - np.eye(3)).max() > STAYS_WITHIN:
+        for i, node in enumerate(self.joints):
+            parent = self.gltf.parents[node]
+            to_parent = self.linear[parent] if parent >= 0 else np.eye(3)
+            origin = self.places[parent] if parent >= 0 else np.zeros(3)
+            left, _, right = np.linalg.svd(to_parent)
+            frame, turn = left @ right, self.gltf.local(node)["rotation"]
+            if not i or np.abs(turns[:, i] - np.eye(3)).max() > 1e-6:
                 at_rest = frame @ quat_to_rotmat(turn / np.linalg.norm(turn))
                 yield node, "rotation", rotmat_to_quat(product(product(frame.T, turns[:, i]), at_rest))
-            if not i or np.abs(moves[:, i] - skeleton.offsets[i]).max() > still:
+            if not i or np.abs(moves[:, i] - self.skeleton.offsets[i]).max() > 1e-6 * self.skeleton.height:
                 from_parent: Array = moves[:, i] - (origin if not i else 0.0)
                 yield node, "translation", from_parent @ np.linalg.inv(to_parent).T
 
-    def above(self) -> tuple[int, ...]:
-        """The skeleton's ancestor nodes, from the top."""
-        found = [self.rest.nodes[0]]
-        while self.gltf.parents[found[0]] >= 0:
-            found.insert(0, self.gltf.parents[found[0]])
-        return tuple(found[:-1])
+    def carrier(self, node: int) -> int:
+        """The joint that a node is or is attached to, -1 for none."""
+        while node >= 0 and node not in self.joints:
+            node = self.gltf.parents[node]
+        return self.joints.index(node) if node >= 0 else -1
 
-    def _above(self, node: int) -> tuple[Array, Array]:
-        """The linear map (3, 3) and the position (3) of a node's parent in the world."""
-        parent = self.gltf.parents[node]
-        return (self.rest.linear[parent], self.rest.places[parent]) if parent >= 0 else (np.eye(3), np.zeros(3))
-
-
-def _orthogonal(linear: Array) -> Array:
-    """The rotation (3, 3), or rotation with mirroring, nearest to a linear map."""
-    left, _, right = np.linalg.svd(linear)
-    nearest: Array = left @ right
-    return nearest
+    def turnable(self, node: int) -> dict[str, Any]:
+        """A node as animation requires it: with translation, rotation and scale instead of a matrix."""
+        found = self.gltf.objects("nodes")[node]
+        if "matrix" not in found:
+            return found
+        kept = {key: value for key, value in found.items() if key != "matrix"}
+        return kept | {name: part.tolist() for name, part in self.gltf.local(node).items()}
 
 
 def read_character(file: File) -> Character:
@@ -79,30 +84,132 @@ def read_character(file: File) -> Character:
     path = place_of(file)
     with broken(path):
         gltf = parse(file)
-        rest = at_rest(gltf)
-        scales = np.abs(np.linalg.det(rest.linear[list(rest.nodes)]))
-        if not scales.min() > 0:
+        all_moved = set().union(*map(moved, gltf.objects("animations")))
+        figure = figure_of(gltf, likeliest(gltf, figures(gltf, all_moved), all_moved))
+        linear, _, places = (found[0] for found in gltf.world())
+        joints = list(figure.nodes)
+        skeleton = skeleton_at(path, figure.names, figure.parents, places[joints])
+        if not np.abs(np.linalg.det(linear[joints])).min() > 0:
             raise FormatError(path, "nodes of its skeleton have scale 0: apply scales when exporting")
-        still = Motion(np.zeros((1, 0)), (), (), GLTF_FPS, rest.skeleton)
-        return Character(still, _map(path, gltf, rest), Nodes(gltf, rest), skin_of(gltf, rest))
+        nodes, still = Nodes(gltf, figure.nodes, skeleton, linear, places), np.zeros((1, 0))
+        return Character(Motion(still, (), (), GLTF_FPS, skeleton), _joint_map(nodes), nodes, _skin(nodes))
 
 
-def _map(path: Path, gltf: Gltf, rest: Rest) -> JointMap | None:
+def _joint_map(nodes: Nodes) -> JointMap | None:
     """The bones of a VRM humanoid."""
-    humanoid = {bone: rest.nodes.index(node) for bone, node in gltf.humanoid().items() if node in rest.nodes}
-    if not humanoid:
+    bones = {bone: nodes.joints.index(node) for bone, node in nodes.gltf.humanoid().items() if node in nodes.joints}
+    if not bones:
         return None
-    missing = [bone for bone in REQUIRED if bone not in humanoid]
-    if missing:
-        raise FormatError(path, f"its VRM humanoid lacks bones that VRM requires: {', '.join(missing)}")
-    return _checked(path, rest.skeleton, humanoid)
+    if missing := [bone for bone in REQUIRED if bone not in bones]:
+        raise FormatError(nodes.gltf.path, f"its VRM humanoid lacks bones that VRM requires: {', '.join(missing)}")
+    spine = tuple(bones[bone] for bone in ("spine", "chest", "upperChest") if bone in bones)
+    neck = (bones["neck"],) if "neck" in bones else ()
+    joints = {bone: bones[bone] for bone in BONES if bone in bones and bones[bone] not in (*spine, *neck)}
+    return check_map(nodes.skeleton, JointMap(joints, spine, neck, "VRM humanoid", 1.0))
 
 
-def _checked(path: Path, skeleton: Skeleton, humanoid: dict[str, int]) -> JointMap:
-    spine = tuple(humanoid[bone] for bone in ("spine", "chest", "upperChest") if bone in humanoid)
-    neck = tuple(humanoid[bone] for bone in ("neck",) if bone in humanoid)
-    joints = {bone: humanoid[bone] for bone in BONES if bone in humanoid and humanoid[bone] not in (*spine, *neck)}
+def _skin(nodes: Nodes) -> dict[int, Array]:
+    """Hull points (P, 3) of the mesh on each joint that has some, relative to the joint, at rest, in metres: soles.
+
+    A point belongs to the joint that moves it most. Empty, with a line in the log, if meshes cannot be read.
+    """
     try:
-        return check_map(skeleton, JointMap(joints, spine, neck, "VRM humanoid", 1.0))
-    except MotionError as error:
-        raise FormatError(path, str(error)) from error
+        parts = [part for node in nodes.gltf.order for part in _meshes(nodes, node)]
+    except FormatError as error:
+        log.info("estimating soles from the joints instead of the mesh: %s", error)
+        return {}
+    if not parts:
+        return {}
+    points, owners = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    # 200 directions, spread evenly by the golden angle; the outermost point in each is kept
+    height = 1 - (2 * np.arange(200) + 1) / 200
+    angle, radius = np.arange(200) * np.pi * (3 - 5**0.5), np.sqrt(1 - height**2)
+    directions = np.stack([radius * np.cos(angle), height, radius * np.sin(angle)], axis=-1)
+    found = {}
+    for joint in np.unique(owners[owners >= 0]).tolist():
+        own = points[owners == joint] - nodes.places[nodes.joints[joint]]
+        found[joint] = own[np.unique(np.argmax(own @ directions.T, axis=0))]
+    return found
+
+
+def _meshes(nodes: Nodes, node: int) -> Iterator[tuple[Array, NDArray[np.intp]]]:
+    """The points (P, 3) of a node's mesh in the world at rest, and the joint of each, -1 for none."""
+    gltf, found = nodes.gltf, nodes.gltf.objects("nodes")[node]
+    for primitive in gltf.objects("meshes")[found["mesh"]]["primitives"] if "mesh" in found else []:
+        attributes = primitive["attributes"]
+        points = gltf.array(attributes["POSITION"])
+        if "skin" in found and "JOINTS_0" in attributes:
+            joints, weights = gltf.array(attributes["JOINTS_0"]).astype(np.intp), gltf.array(attributes["WEIGHTS_0"])
+            yield _skinned(nodes, gltf.objects("skins")[found["skin"]], points, joints, weights)
+        else:
+            yield points @ nodes.linear[node].T + nodes.places[node], np.full(len(points), nodes.carrier(node))
+
+
+def _skinned(
+    nodes: Nodes, skin: dict[str, Any], points: Array, joints: NDArray[np.intp], weights: Array
+) -> tuple[Array, NDArray[np.intp]]:
+    """The points (P, 3) moved by joints of a skin (P, K) with weights (P, K), and the heaviest joint of each."""
+    linear, places = nodes.linear[skin["joints"]], nodes.places[skin["joints"]]
+    if "inverseBindMatrices" in skin:
+        bind = np.swapaxes(nodes.gltf.array(skin["inverseBindMatrices"]).reshape(-1, 4, 4), 1, 2)[: len(linear)]
+        linear, places = linear @ bind[:, :3, :3], rotated(linear, bind[:, :3, 3]) + places
+    moved = np.zeros(points.shape)
+    for joint, weight in zip(joints.T, weights.T, strict=True):
+        moved += weight[:, None] * (rotated(linear[joint], points) + places[joint])
+    moved /= np.maximum(weights.sum(axis=1), 1e-9)[:, None]
+    owners = np.array([nodes.carrier(node) for node in skin["joints"]])
+    return moved, owners[joints[np.arange(len(joints)), np.argmax(weights, axis=1)]]
+
+
+def write_onto(file: File, clips: Mapping[str, Motion], nodes: Nodes) -> None:
+    """Write a character's file with an animation for each named motion; the motions are on its skeleton.
+
+    Everything else in the file is kept; its own animations follow the new ones, except those of the same names.
+    FormatError for a character in several files, or a .vrm of one that is not a VRM avatar; MotionError for a motion
+    without frames, OutputError if the file cannot be written.
+    """
+    gltf = nodes.gltf
+    if place_of(file).suffix.lower() == ".vrm" and not gltf.humanoid():
+        raise FormatError(gltf.path, "not a VRM avatar: write it to a .glb")
+    with broken(gltf.path):
+        buffers = gltf.objects("buffers")
+        uris = [part.get("uri", "data:") for part in (*buffers, *gltf.objects("images"))]
+        if not all(uri.startswith("data:") for uri in uris) or any("uri" in buffer for buffer in buffers[:1]):
+            raise FormatError(gltf.path, "parts of this character are in other files or text: export one .glb or .vrm")
+        buffer = Buffer(gltf.document, gltf.buffers[0] if buffers else b"")
+        made = [animation(buffer, name, motion, nodes.tracks(motion)) for name, motion in clips.items()]
+        kept = [old for old in gltf.objects("animations") if old.get("name") not in clips]
+        targets = {channel["target"]["node"] for each in made for channel in each["channels"]}
+        all_nodes = [nodes.turnable(i) if i in targets else node for i, node in enumerate(gltf.objects("nodes"))]
+        sizes = [{**(buffers[0] if buffers else {}), "byteLength": len(buffer.content)}, *buffers[1:]]
+        document = {**gltf.document, "nodes": all_nodes, "animations": made + kept, **buffer.parts(), "buffers": sizes}
+        content = container(document, bytes(buffer.content))
+    write_whole(file, content)
+
+
+def write_clip(file: File, motion: Motion, nodes: Nodes) -> None:
+    """Write a motion on a character's skeleton with its nodes, and a simple body instead of its mesh.
+
+    MotionError and OutputError like :func:`write_onto`.
+    """
+    gltf, buffer = nodes.gltf, Buffer()
+    kept = list(nodes.joints)
+    while gltf.parents[kept[0]] >= 0:
+        kept.insert(0, gltf.parents[kept[0]])
+    at = {node: i for i, node in enumerate(kept)}
+    made = animation(buffer, "motion", motion, nodes.tracks(motion))
+    for channel in made["channels"]:
+        channel["target"]["node"] = at[channel["target"]["node"]]
+    bare: list[dict[str, Any]] = []
+    for node in kept:
+        found = nodes.turnable(node)
+        parts: dict[str, Any] = {key: found[key] for key in ("translation", "rotation", "scale") if key in found}
+        children = [at[child] for child in found.get("children", []) if child in at]
+        parts |= {"children": children} if children else {}
+        bare.append({"name": gltf.name(node), **parts})
+    joints = list(nodes.joints)
+    bind = np.zeros((len(joints), 4, 4))
+    bind[:, :3, :3], bind[:, :3, 3], bind[:, 3, 3] = nodes.linear[joints], nodes.places[joints], 1
+    skin = {"joints": [at[node] for node in joints]}
+    document = with_body(buffer, motion, nodes.skeleton, bare, made, skin, np.asarray(np.linalg.inv(bind), np.float64))
+    write_whole(file, container(document, bytes(buffer.content)))

@@ -3,31 +3,42 @@
 import base64
 import json
 import struct
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
 
-from motet.errors import FormatError, quoted
+from motet.errors import FormatError, MotionError, quoted
 from motet.files import File, place_of
-from motet.formats.gltf_packed import MAX_UNPACKED, packing, unpacked
 from motet.formats.lines import read_bytes
 from motet.motion.rotations import Array, frames_last, product, quat_to_rotmat, rotated, rotmat_to_quat
 
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 """glTF's component types."""
 
-TYPE_SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
-
-MAX_NODES = 20_000
-"""Nodes per file; a figure has a few hundred."""
-
 GLTF_MAX_BYTES = 2**29
 """Total bytes of a file's buffers."""
+
+MAX_UNPACKED = 2**25
+"""Total bytes of all unpacked parts: 12 minutes of a figure of 90 joints with 60 keys per second."""
+
+
+@contextmanager
+def broken(path: Path) -> Iterator[None]:
+    """Turn errors from misplaced or mistyped content into FormatError."""
+    try:
+        yield
+    except MotionError as error:
+        raise error if isinstance(error, FormatError) else FormatError(path, str(error)) from error
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        raise FormatError(path, f"broken glTF file: {type(error).__name__}: {str(error)[:200]}") from error
 
 
 @dataclass(frozen=True)
@@ -63,38 +74,17 @@ class Gltf:
         return tuple(parents)
 
     @cached_property
-    def order(self) -> tuple[int, ...]:
-        """All nodes, parents first, branch by branch."""
-        order: list[int] = []
+    def order(self) -> dict[int, int]:
+        """Each node's place in an order of all, parents first, branch by branch; iterating gives that order."""
+        order: dict[int, int] = {}
         waiting = [node for node, parent in enumerate(self.parents) if parent == -1][::-1]
         while waiting:
-            order.append(waiting.pop())
-            waiting.extend(reversed(self.objects("nodes")[order[-1]].get("children", [])))
+            node = waiting.pop()
+            order[node] = len(order)
+            waiting.extend(reversed(self.objects("nodes")[node].get("children", [])))
         if len(order) < len(self.parents):
             raise FormatError(self.path, "its nodes are not a tree: some of them form a cycle")
-        return tuple(order)
-
-    @cached_property
-    def places(self) -> dict[int, int]:
-        """Each node's index in :attr:`order`."""
-        return {node: place for place, node in enumerate(self.order)}
-
-    @cached_property
-    def roots(self) -> dict[int, int]:
-        """The root of each node's tree."""
-        roots: dict[int, int] = {}
-        for node in self.order:
-            roots[node] = roots.get(self.parents[node], node)
-        return roots
-
-    def branch(self, wanted: set[int]) -> tuple[int, ...]:
-        """Nodes of one tree and the nodes between them, parents first; the first is their lowest common ancestor."""
-        below = [int(node in wanted) for node in range(len(self.parents))]
-        for node in reversed(self.order):
-            if self.parents[node] >= 0:
-                below[self.parents[node]] += below[node]
-        top = [node for node in self.order if below[node] == len(wanted)][-1]
-        return (top, *(node for node in self.order if 0 < below[node] < len(wanted) or node in wanted))
+        return order
 
     def humanoid(self) -> dict[str, int]:
         """The bones named by VRM 0, VRM 1 or VRM Animation, with their nodes; empty if none."""
@@ -115,16 +105,16 @@ class Gltf:
             raise FormatError(self.path, f"the name of node {node} is not text")
         return name
 
-    def local(self, node: int) -> tuple[Array, Array, Array]:
-        """Translation (3), rotation as a quaternion (4) with the scalar last, and scale (3) of a node at rest."""
+    def local(self, node: int) -> dict[str, Array]:
+        """A node's translation (3), rotation as a quaternion (4), scalar last, and scale (3) at rest, each by name."""
         found = self.objects("nodes")[node]
         if "matrix" in found:
             matrix = np.array(found["matrix"], np.float64).reshape(4, 4).T
             scale = np.linalg.norm(matrix[:3, :3], axis=0)
-            return matrix[:3, 3], rotmat_to_quat(matrix[:3, :3] / np.where(scale > 0, scale, 1.0)), scale
-        parts = (("translation", (0.0, 0.0, 0.0)), ("rotation", (0.0, 0.0, 0.0, 1.0)), ("scale", (1.0, 1.0, 1.0)))
-        move, turn, scale = (np.array(found.get(name, rest), np.float64) for name, rest in parts)
-        return move, turn, scale
+            turn = rotmat_to_quat(matrix[:3, :3] / np.where(scale > 0, scale, 1.0))
+            return {"translation": matrix[:3, 3], "rotation": turn, "scale": scale}
+        rest = {"translation": (0.0, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0, 1.0), "scale": (1.0, 1.0, 1.0)}
+        return {name: np.array(found.get(name, values), np.float64) for name, values in rest.items()}
 
     def world(
         self, nodes: Iterable[int] | None = None, tracks: Mapping[tuple[int, str], Array] | None = None
@@ -139,8 +129,7 @@ class Gltf:
         linear, turns = (frames_last((count, len(self.parents), 3, 3)) for _ in range(2))
         places = frames_last((count, len(self.parents), 3))
         for node in (node for node in self.order if node in wanted):
-            rest = dict(zip(("translation", "rotation", "scale"), self.local(node), strict=True))
-            move, quat, scale = (tracks.get((node, name), value) for name, value in rest.items())
+            move, quat, scale = (tracks.get((node, name), rest) for name, rest in self.local(node).items())
             turn = quat_to_rotmat(quat / np.linalg.norm(quat, axis=-1, keepdims=True))
             linear[:, node], turns[:, node], places[:, node] = turn * scale[..., None, :], turn, move
             if (parent := self.parents[node]) >= 0:
@@ -152,53 +141,74 @@ class Gltf:
     def array(self, index: int) -> Array:
         """The numbers (N, ...) of an accessor, not to be modified; FormatError if it is not in the file."""
         if index not in self._arrays:
-            values = self._decoded(index)
-            values.setflags(write=False)
+            try:
+                values = self._decoded(index)
+            except (KeyError, IndexError, TypeError, ValueError) as error:
+                if isinstance(error, FormatError):
+                    raise
+                raise FormatError(self.path, f"accessor {index} is broken: {str(error)[:200]}") from error
+            if not np.isfinite(values).all():
+                raise FormatError(self.path, f"accessor {index} holds numbers that are not finite")
             if sum(array.size for array in self._arrays.values()) + values.size > self.size:
                 raise FormatError(self.path, "its arrays overlap: they hold more numbers than the file has bytes")
+            values.setflags(write=False)
             self._arrays[index] = values
         return self._arrays[index]
 
     def _decoded(self, index: int) -> Array:
-        try:
-            accessor = self.objects("accessors")[index]
-            kind, width, count = COMPONENTS[accessor["componentType"]], TYPE_SIZES[accessor["type"]], accessor["count"]
-            if "bufferView" not in accessor or "sparse" in accessor:
-                raise FormatError(self.path, f"accessor {index} is sparse: export it without compression")
-            size = np.dtype(kind).itemsize * width
-            content, start, stride = self._view(accessor["bufferView"])
-            start, stride = start + accessor.get("byteOffset", 0), stride or size
-            if (
-                count < 0
-                or start < 0
-                or stride < size
-                or (start + stride * (count - 1) + size > len(content) and count)
-            ):
-                raise FormatError(self.path, f"accessor {index} extends beyond its buffer: the file is truncated")
-            rows = np.lib.stride_tricks.as_strided(
-                np.frombuffer(content, np.uint8, offset=start), (count, size), (stride, 1), writeable=False
-            )
-            values = np.ascontiguousarray(rows).view(kind).astype(np.float64)
-        except FormatError:
-            raise
-        except (KeyError, IndexError, TypeError, ValueError) as error:
-            raise FormatError(self.path, f"accessor {index} is broken: {str(error)[:200]}") from error
-        if accessor.get("normalized"):
-            values = np.maximum(values / np.iinfo(np.dtype(kind)).max, -1.0)
-        if not np.isfinite(values).all():
-            raise FormatError(self.path, f"accessor {index} holds numbers that are not finite")
-        return values
+        accessor = self.objects("accessors")[index]
+        width = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}[accessor["type"]]
+        kind, count = np.dtype(COMPONENTS[accessor["componentType"]]), accessor["count"]
+        if "bufferView" not in accessor or "sparse" in accessor:
+            raise FormatError(self.path, f"accessor {index} is sparse: export it without compression")
+        size = kind.itemsize * width
+        content, start, stride = self._view(accessor["bufferView"])
+        start, stride = start + accessor.get("byteOffset", 0), stride or size
+        beyond = count and start + stride * (count - 1) + size > len(content)
+        if count < 0 or start < 0 or stride < size or beyond:
+            raise FormatError(self.path, f"accessor {index} extends beyond its buffer: the file is truncated")
+        rows = np.lib.stride_tricks.as_strided(
+            np.frombuffer(content, np.uint8, offset=start), (count, size), (stride, 1), writeable=False
+        )
+        values = np.ascontiguousarray(rows).view(kind).astype(np.float64)
+        return np.maximum(values / np.iinfo(kind).max, -1.0) if accessor.get("normalized") else values
 
     def _view(self, index: int) -> tuple[bytes, int, int]:
         """A buffer, the start of a view of it, and the stride in bytes; 0 if dense."""
         view = self.objects("bufferViews")[index]
-        packed = packing(view)
+        extensions = view.get("extensions", {})
+        packings = (f"{maker}_meshopt_compression" for maker in ("EXT", "KHR"))
+        packed = next((extensions[name] for name in packings if name in extensions), None)
         if packed is None:
             return self.buffers[view["buffer"]], view.get("byteOffset", 0), view.get("byteStride", 0)
         if index not in self._unpacked:
-            room = MAX_UNPACKED - sum(map(len, self._unpacked.values()))
-            self._unpacked[index] = unpacked(self.path, packed, self.buffers, room)
+            self._unpacked[index] = self._unpack(packed)
         return self._unpacked[index], 0, packed["byteStride"]
+
+    def _unpack(self, packed: Mapping[str, Any]) -> bytes:
+        """The bytes of a view packed by meshoptimizer."""
+        if find_spec("meshopt") is None:
+            reason = (
+                "its animations are packed by meshoptimizer: install the extra with  pip install 'motet[meshopt]', or "
+                "unpack the file with  npx gltfpack -i IN.glb -o OUT.glb -noq -kn -ac"
+            )
+            raise FormatError(self.path, reason)
+        start, length = packed.get("byteOffset", 0), packed["byteLength"]
+        count, stride = packed["count"], packed["byteStride"]
+        content = self.buffers[packed["buffer"]][start : start + length]
+        if not 0 <= start <= start + length or len(content) < length:
+            raise FormatError(self.path, "a packed part extends beyond its buffer: the file is truncated")
+        room = MAX_UNPACKED - sum(map(len, self._unpacked.values()))
+        # bytes that one packed byte can expand to: a block of 256 equal bytes takes two bits
+        if not (count > 0 and stride > 0 and count * stride <= min(room, 1024 * length)):
+            reason = f"a packed part of {length} bytes cannot hold {count} elements of {stride} bytes"
+            raise FormatError(self.path, reason)
+        decode = import_module("meshopt").decode_gltf_buffer
+        try:
+            found: bytes = decode(content, count, stride, packed["mode"], packed.get("filter")).tobytes()
+        except (ValueError, TypeError) as error:
+            raise FormatError(self.path, f"a packed part is broken: {str(error)[:200]}") from error
+        return found
 
 
 def parse(file: File) -> Gltf:
@@ -212,10 +222,14 @@ def parse(file: File) -> Gltf:
         raise FormatError(path, f"not a glTF file: {str(error)[:200]}") from error
     if not str(version).startswith("2."):
         raise FormatError(path, f"glTF version {str(version)[:20]}: expected 2.0")
-    if len(document.get("nodes", [])) > MAX_NODES:
-        raise FormatError(path, f"it has {len(document['nodes'])} nodes: expected at most {MAX_NODES}")
+    if len(document.get("nodes", [])) > 20_000:  # a figure has a few hundred
+        raise FormatError(path, f"it has {len(document['nodes'])} nodes: expected at most 20000")
+    buffers = document.get("buffers", [])
+    sizes = [buffer["byteLength"] for buffer in buffers]
+    if not all(isinstance(size, int) and size >= 0 for size in sizes) or sum(sizes) > GLTF_MAX_BYTES:
+        raise FormatError(path, f"its buffers declare invalid sizes, or over {GLTF_MAX_BYTES} bytes in total")
     beside = path.parent if isinstance(file, str | Path) and content[:4] != b"glTF" else None
-    return Gltf(path, document, _buffers(path, document.get("buffers", []), binary, beside))
+    return Gltf(path, document, tuple(_buffer(path, buffer, binary, beside) for buffer in buffers))
 
 
 def _chunks(path: Path, content: bytes) -> tuple[bytes, bytes]:
@@ -233,31 +247,20 @@ def _chunks(path: Path, content: bytes) -> tuple[bytes, bytes]:
     return found[b"JSON"], found.get(b"BIN\0", b"")
 
 
-def _buffers(path: Path, buffers: list[dict[str, Any]], binary: bytes, beside: Path | None) -> tuple[bytes, ...]:
-    """The content of each buffer, up to its declared size; files in the folder ``beside`` only if given."""
-    sizes = [buffer["byteLength"] for buffer in buffers]
-    if not all(isinstance(size, int) and size >= 0 for size in sizes) or sum(sizes) > GLTF_MAX_BYTES:
-        raise FormatError(path, f"its buffers declare invalid sizes, or over {GLTF_MAX_BYTES} bytes in total")
-    return tuple(_buffer(path, buffer, binary, beside)[:size] for buffer, size in zip(buffers, sizes, strict=True))
-
-
-def _buffer(path: Path, buffer: dict[str, Any], binary: bytes, beside: Path | None) -> bytes:
-    uri = buffer.get("uri")
+def _buffer(path: Path, buffer: Mapping[str, Any], binary: bytes, beside: Path | None) -> bytes:
+    """The content of a buffer, up to its declared size; files in the folder ``beside`` only if given."""
+    uri, size = buffer.get("uri"), buffer["byteLength"]
     if uri is None:
-        return binary
+        return binary[:size]
     if uri.startswith("data:"):
-        return base64.b64decode(uri.partition(",")[2])
+        return base64.b64decode(uri.partition(",")[2])[:size]
     if beside is None:
         raise FormatError(path, f"its buffer {quoted(uri)} is a separate file, which requires a .gltf given by path")
     place = beside / unquote(uri)
     try:
-        if not place.resolve().is_relative_to(beside.resolve()) or place.is_symlink() or not place.is_file():
-            raise FormatError(path, f"its buffer {quoted(uri)} is not a file in its folder")
-        with place.open("rb") as opened:
-            return opened.read(buffer["byteLength"])
+        if place.resolve().is_relative_to(beside.resolve()) and not place.is_symlink() and place.is_file():
+            with place.open("rb") as opened:
+                return opened.read(size)
     except (OSError, ValueError) as error:
-        raise (
-            error
-            if isinstance(error, FormatError)
-            else FormatError(path, f"its buffer {quoted(uri)} cannot be read: {error}")
-        ) from error
+        raise FormatError(path, f"its buffer {quoted(uri)} cannot be read: {error}") from error
+    raise FormatError(path, f"its buffer {quoted(uri)} is not a file in its folder")

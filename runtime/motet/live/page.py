@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.decode.matching import SteeringSettings, mirrored_features
-from motet.draw.body import Body
+from motet.draw.figure import Body
 from motet.draw.page import bone_data, filled, source
 from motet.errors import BundleError, ControlError
 from motet.files import File, place_of, write_whole

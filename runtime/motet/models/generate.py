@@ -16,8 +16,7 @@ from motet.decode.loop import Noise, Recorded, Sample
 from motet.decode.mixture import score_frames
 from motet.errors import DecodingError, TextError, TextWarning
 from motet.files import File
-from motet.formats import write_motion
-from motet.formats.character import Character
+from motet.formats import Character, write_motion
 from motet.models.language import LanguageModel
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array

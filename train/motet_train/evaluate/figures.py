@@ -10,8 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from motet.draw.body import COLOURS
-from motet.draw.figure import figure_of
+from motet.draw.figure import COLOURS, figure_of
 from motet.errors import OutputError
 from motet.files import write_whole
 from motet.motion.motion import Motion
