@@ -32,26 +32,19 @@ def export(run: Path, out: Path, int8: bool, half: bool) -> None:
             click.echo(f"half {name:<20} {value:.3g}")
         click.echo(str(out))
         return
-    if (run / MANIFEST).is_file() or not (runs := _models_in(run)):
-        _export(Run.load(run), out, int8, half)
-        return
-    out.mkdir(parents=True, exist_ok=True)
-    for name, one in runs.items():
-        _export(one, out / f"{name}.zip", int8, half)
-
-
-def _models_in(folder: Path) -> dict[str, Run]:
-    """The runs in a folder that are models by themselves, by name."""
-    runs = {path.parent.name: Run.load(path.parent) for path in sorted(folder.glob(f"*/{MANIFEST}"))}
-    return {name: run for name, run in runs.items() if run.manifest["verb"] in {kind.VERB for kind in KINDS}}
-
-
-def _export(run: Run, out: Path, int8: bool, half: bool) -> None:
-    report = export_run(run, out, int8, half)
-    click.echo(_lines(report))
-    for name, value in report.get("int8", {}).items():
-        click.echo(f"int8 {name:<20} {value:.3g}")
-    click.echo(str(out))
+    found = {one.parent.name: Run.load(one.parent) for one in sorted(run.glob(f"*/{MANIFEST}"))}
+    verbs = {kind.VERB for kind in KINDS}
+    runs = {out / f"{name}.zip": one for name, one in found.items() if one.manifest["verb"] in verbs}
+    if (run / MANIFEST).is_file() or not runs:
+        runs = {out: Run.load(run)}
+    else:
+        out.mkdir(parents=True, exist_ok=True)
+    for path, one in runs.items():
+        report = export_run(one, path, int8, half)
+        click.echo(_lines(report))
+        for name, value in report.get("int8", {}).items():
+            click.echo(f"int8 {name:<20} {value:.3g}")
+        click.echo(str(path))
 
 
 @click.command()

@@ -14,15 +14,6 @@ from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
 from motet.representation.placed import placed_by_way
 
-LONGEST = 12
-"""Of an axis other than the batch."""
-
-PACE = 0.1
-"""Of a random walk from frame to frame, in standard deviations of the training data."""
-
-_LIKE_DATA = ("frames", "frame", "history")
-"""Inputs that are drawn as the training data is."""
-
 Examples = Callable[[np.random.Generator, int], Arrays]
 """Draws all inputs of a graph for so many rows."""
 
@@ -33,11 +24,11 @@ def examples(manifest: Manifest, torch: Mapping[str, Graph]) -> dict[str, Exampl
     A history of codes is what the encoder makes of such frames in torch; and a predictor's other graphs get what its
     encoder gives: from numbers far from any frames a net that feeds its frames back can make much of a rounding.
     """
-    contract = manifest.motion
+    contract, like_data = manifest.motion, ("frames", "frame", "history")
 
     def draw(spec: GraphSpec, rng: np.random.Generator, rows: int) -> Arrays:
         found = example(spec, rng, rows, _below(manifest))
-        return {**found, **{name: _like(value, name, rng) for name, value in found.items() if name in _LIKE_DATA}}
+        return {**found, **{name: _like(value, name, rng) for name, value in found.items() if name in like_data}}
 
     def _like(value: NDArray[Any], name: str, rng: np.random.Generator) -> NDArray[Any]:
         if name == "history":
@@ -67,10 +58,10 @@ def example(
 ) -> dict[str, NDArray[Any]]:
     """All inputs of ``spec`` for ``batch`` rows: numbers uniform in [0.05, 1), ids 0, or ``below`` a limit by name.
 
-    Every dynamic axis but "batch" gets a random size of up to :data:`LONGEST`, the same for all inputs.
+    Every dynamic axis but "batch" gets a random size of up to 12, the same for all inputs.
     """
     axes = [axis for tensor in spec.inputs for axis in tensor.shape[1:] if isinstance(axis, str)]
-    sizes = {axis: int(rng.integers(1, LONGEST + 1)) for axis in dict.fromkeys(axes)}
+    sizes = {axis: int(rng.integers(1, 13)) for axis in dict.fromkeys(axes)}
     sizes["batch"] = batch
     found: dict[str, NDArray[Any]] = {}
     for tensor in spec.inputs:
@@ -97,7 +88,7 @@ def _below(manifest: Manifest) -> dict[str, int]:
 
 def walks(contract: MotionContract, rng: np.random.Generator, rows: int, frames: int) -> NDArray[np.float32]:
     """Random walks (rows, frames, C) float32 from near the mean of the training data, in the contract's units."""
-    steps = PACE * rng.normal(size=(rows, frames, len(contract.mean)))
+    steps = 0.1 * rng.normal(size=(rows, frames, len(contract.mean)))
     found: Array = contract.mean + contract.std * steps.cumsum(axis=1)
     return found.astype(np.float32)
 

@@ -8,7 +8,7 @@ from onnx.reference import ReferenceEvaluator
 
 from motet.bundle.bundle import Bundle
 from motet.bundle.graph import OnnxGraph
-from motet_export.weights import quantised
+from motet_export.exporter import quantised
 
 
 def rounded(values: np.ndarray) -> np.ndarray:

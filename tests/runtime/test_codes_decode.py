@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from motet.decode.codes import (
     PAST,
-    Drawing,
+    CodesSettings,
     Memory,
     Source,
     Writer,
@@ -23,11 +23,11 @@ from motet.decode.codes import (
 )
 
 Array = NDArray[Any]
-PLAIN = Drawing(temperature=1.0, first=1.0, top_p=1.0, guidance=1.0)
+PLAIN = CodesSettings()
 DRAWINGS = [
     PLAIN,
-    Drawing(temperature=0.8, first=0.3, top_p=0.7, guidance=2.5),
-    Drawing(temperature=1.5, first=2.0, top_p=0.95, guidance=0.0),
+    CodesSettings(temperature=0.8, first_temperature=0.3, top_p=0.7, guidance=2.5),
+    CodesSettings(temperature=1.5, first_temperature=2.0, top_p=0.95, guidance=0.0),
 ]
 
 
@@ -163,7 +163,7 @@ def test_a_memory_goes_on_where_the_past_resembles_the_present(age: int, ends: b
 
 
 def naive_row(
-    given: Source, action: int, seed: int, drawing: Drawing, longest: int, exactly: bool = False
+    given: Source, action: int, seed: int, drawing: CodesSettings, longest: int, exactly: bool = False
 ) -> list[list[int]]:
     """One motion, drawn number by number, without a memory: told and not told what it shows, each by itself."""
     rng, last, age, steps = np.random.default_rng(seed), [given.nothing, 0, 0], 0, list[list[int]]()
@@ -174,7 +174,8 @@ def naive_row(
             feeds = {"codes": np.array([last]), "action": np.array([who]), "age": np.array([age])}
             out = given.step({**feeds, "state": states[who]})
             known[who], states[who] = out["known"], out["next_state"]
-        uniform, temperature = rng.random((PARTS + 2,), np.float32)[2:], drawing.temperature if age else drawing.first
+        uniform = rng.random((PARTS + 2,), np.float32)[2:]
+        temperature = drawing.temperature if age else drawing.first_temperature
         codes, again = [0] * PARTS, False
         for part in range(PARTS):
             told, untold = (
@@ -198,7 +199,7 @@ def naive_row(
 
 @pytest.mark.parametrize("drawing", DRAWINGS)
 @pytest.mark.parametrize("exactly", [False, True])
-def test_codes_are_drawn_as_by_a_naive_twin(drawing: Drawing, exactly: bool) -> None:
+def test_codes_are_drawn_as_by_a_naive_twin(drawing: CodesSettings, exactly: bool) -> None:
     given, actions = source(ending=1.5), np.array([0, 1, 2, 0, 1, 2])
     found = draw_codes(Writer(given, rngs(*range(6)), drawing), actions, 15, exactly)
     expected = [naive_row(given, int(action), row, drawing, 15, exactly) for row, action in enumerate(actions)]
@@ -228,7 +229,7 @@ def test_a_row_of_a_batch_gets_what_it_gets_alone(memory: float, exactly: bool) 
     given, actions, drawing = (
         source(ending=1.0),
         np.array([2, 0, 1, 1, 0, 2, 2, 0, 1]),
-        DRAWINGS[0]._replace(memory=memory),
+        replace(DRAWINGS[0], memory=memory),
     )
     together = draw_codes(Writer(given, rngs(*range(9)), drawing), actions, 20, exactly)
     for row, codes in enumerate(together):
@@ -242,7 +243,7 @@ def test_a_row_of_a_batch_gets_what_it_gets_alone(memory: float, exactly: bool) 
 def test_a_motion_is_as_long_as_is_asked_and_never_empty() -> None:
     given, actions = source(ending=30.0), np.array([0, 1, 2])  # it would always end
     for memory in (0.0, 1.0):
-        drawing = PLAIN._replace(memory=memory)
+        drawing = replace(PLAIN, memory=memory)
         for codes in draw_codes(Writer(given, rngs(0, 1, 2), drawing), actions, 23, exactly=True):
             assert codes.shape == (23, PARTS)
             assert (codes[:, 0] != END).all()
@@ -252,7 +253,7 @@ def test_a_motion_is_as_long_as_is_asked_and_never_empty() -> None:
 def test_all_from_memory_is_a_remembered_motion_to_its_end() -> None:
     given, actions = source(), np.repeat(np.arange(ACTIONS), 5)
     calls = given.part.calls  # type: ignore[attr-defined]
-    found = draw_codes(Writer(given, rngs(*range(15)), PLAIN._replace(memory=1.0)), actions, 50)
+    found = draw_codes(Writer(given, rngs(*range(15)), replace(PLAIN, memory=1.0)), actions, 50)
     assert given.part.calls == calls  # type: ignore[attr-defined]  # the net is not asked
     played = set()
     for action, codes in zip(actions, found, strict=True):
@@ -264,7 +265,7 @@ def test_all_from_memory_is_a_remembered_motion_to_its_end() -> None:
 
 def test_a_share_of_steps_is_remembered() -> None:
     given = source(ending=-50.0)
-    found = draw_codes(Writer(given, rngs(*range(200)), PLAIN._replace(memory=0.25)), np.full(200, 1), 1)
+    found = draw_codes(Writer(given, rngs(*range(200)), replace(PLAIN, memory=0.25)), np.full(200, 1), 1)
     starts = [row[0].tolist() for of, row in MOTIONS if of == 1]
     by_net = draw_codes(Writer(given, rngs(*range(200)), PLAIN), np.full(200, 1), 1)
     drawn = np.array([np.random.default_rng(seed).random((PARTS + 2,), np.float32)[0] for seed in range(200)])
@@ -303,7 +304,7 @@ def _seen(given: Source, steps: list[Array], ages: list[int]) -> dict[str, Array
 
 def test_what_was_done_before_is_gone_on_with() -> None:
     given, (action, codes) = source(), MOTIONS[2]
-    writer = Writer(given, rngs(0), PLAIN._replace(memory=1.0))
+    writer = Writer(given, rngs(0), replace(PLAIN, memory=1.0))
     early = math.ceil(0.3 * len(codes)) - 1
     writer.see(codes[:early])
     # the age says that the action has just begun, but the past decides where in its early part

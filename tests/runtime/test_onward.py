@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from fake_codes import ACTIONS, END, MOVES, numbers_of, remembered, source
 
-from motet.decode.codes import Drawing
+from motet.decode.codes import CodesSettings
 from motet.decode.continue_codes import ContinuationSettings, Continuer, Pace
 from motet.decode.continue_codes import numbers_of as asked_numbers
 
 MOTIONS, RULES = remembered(), ContinuationSettings()
-DRAWING = Drawing(temperature=1.0, first=1.0, top_p=1.0, guidance=1.0, memory=0.5)
+DRAWING = CodesSettings(memory=0.5)
 SECONDS = 0.2
 BOOK = np.array([[0.1 * move, 0.0, 0.0] for move in range(MOVES)])
 """Each move goes .5 m/s faster than the one before it, straight on."""
@@ -22,7 +22,7 @@ BOOK = np.array([[0.1 * move, 0.0, 0.0] for move in range(MOVES)])
 TURNING = np.array([[0.2, 0.0, turn] for turn in (-0.4, -0.2, 0.0, 0.2, 0.4)])
 
 
-def continuer(book: Any = BOOK, drawing: Drawing = DRAWING) -> Continuer:
+def continuer(book: Any = BOOK, drawing: CodesSettings = DRAWING) -> Continuer:
     codec: Any = SimpleNamespace(book=book, seconds=SECONDS)
     return Continuer(source(), codec, drawing, RULES)
 
@@ -101,7 +101,7 @@ def test_a_seed_gives_the_same_again_and_more_steps_begin_with_the_fewer() -> No
 
 def test_steps_that_were_guessed_do_not_say_what_is_shown() -> None:
     shown, wrong = MOTIONS[2][1][:5], MOTIONS[3][1][:3]
-    steps = continuer(drawing=DRAWING._replace(memory=1.0)).steps(np.concatenate([shown, wrong]), 5, Pace(1.0, 0.0), 0)
+    steps = continuer(drawing=CodesSettings(memory=1.0)).steps(np.concatenate([shown, wrong]), 5, Pace(1.0, 0.0), 0)
     found = list(islice(steps, 30))
     known = [codes[:-1].tolist() for action, codes in MOTIONS if action == MOTIONS[2][0]]
     own = sum(step.tolist() in [one for codes in known for one in codes] for step in found)

@@ -18,7 +18,7 @@ from motet.motion.kinematics import local_rotations, positions
 from motet.motion.motion import Motion
 from motet.motion.rotations import axis_to_rotmat
 from motet.representation.contract import MotionContract
-from motet.representation.root_vectors import carry_on, joints_of, to_joint_vectors
+from motet.representation.root_block import carry_on, joints_of, to_joint_vectors
 
 SEED, HORIZON = 4, 3
 FPS = 30.0

@@ -9,7 +9,7 @@ import pytest
 from command_line import run
 
 import motet
-from motet.decode.codes import WINDOW, Drawing, Writer, drawn_steps
+from motet.decode.codes import WINDOW, CodesSettings, Writer, drawn_steps
 from motet.errors import DecodingError, MotionError, TextError, TextWarning
 from motet.models.generate_codes import CodesModel
 from motet.motion.kinematics import positions
@@ -80,7 +80,7 @@ def test_every_passage_is_within_a_step_of_what_was_asked(model: CodesModel, see
 def test_a_writer_looks_back_at_a_window_of_steps(model: CodesModel) -> None:
     """What it has seen is what it sees: the twin gives the graph the last steps' keys and values, and no others."""
     assert model.manifest.training["recipe"]["window"] == WINDOW
-    drawing, noise = Drawing(1.0, 1.0, 0.9, 1.5), [np.random.default_rng(3)]
+    drawing, noise = CodesSettings(top_p=0.9, guidance=1.5), [np.random.default_rng(3)]
     writer = Writer(model.source, noise, drawing)
     past, last = np.zeros((2, 3, 6, 0, 64), np.float32), [[model.codec.moves + 1, 0, 0, 0]] * 2
     for age in range(WINDOW + 20):
@@ -94,7 +94,7 @@ def test_a_writer_looks_back_at_a_window_of_steps(model: CodesModel) -> None:
 def test_a_stream_may_last(model: CodesModel) -> None:
     """It keeps no more after a while than at first."""
     noise = [np.random.Generator(np.random.PCG64(1))]
-    decoder, writer = model.decoder(), Writer(model.source, noise, Drawing.of(model.defaults))
+    decoder, writer = model.decoder(), Writer(model.source, noise, CodesSettings(**model.defaults))
     pieces, steps, kept = list[Any](), list[Any](), list[int]()
     for _, step in drawn_steps(writer, np.array([7]), 160, True):
         steps.append(step)

@@ -100,11 +100,12 @@ class Manifest:
         """Read the manifest of a bundle or of a training run; BundleError names the key that is wrong."""
         top = Fields(data)
         motion = read_contract(top.fields("motion"))
+        texts: dict[str, Any] = {key: top.text(key) for key in ("name", "verb", "model", "loop")}
+        records = ("config", "licence", "training", "quality", "parity")
+        others: dict[str, Any] = {key: top.mapping(key) for key in records}
         return Manifest(
-            name=top.text("name"),
-            verb=top.text("verb"),
-            model=top.text("model"),
-            loop=top.text("loop"),
+            **texts,
+            **others,
             version=top.text("version") if "version" in top else "",
             motion=motion,
             defaults=top.fields("defaults").data,
@@ -112,11 +113,6 @@ class Manifest:
             text=top.mapping("text") if "text" in top else None,
             vocabulary=top.texts("vocabulary") if "vocabulary" in top else (),
             control=_control(top.fields("control"), len(motion.channels)) if "control" in top else None,
-            config=top.mapping("config"),
-            licence=top.mapping("licence"),
-            training=top.mapping("training"),
-            quality=top.mapping("quality"),
-            parity=top.mapping("parity"),
             graphs={role: GraphEntry(one.text("file"), GraphSpec.read(one)) for role, one in top.entries("graphs")},
             tables={name: _table(one) for name, one in top.entries("tables")},
             files={name: _file(name, one) for name, one in top.entries("files")},

@@ -9,9 +9,9 @@ model does with words (Khandelwal et al. 2020): the distribution of the next ste
 steps of remembered places whose past resembles the present.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,23 +93,21 @@ class Memory:
         return int(rows[np.searchsorted(shares, uniform * shares[-1], side="right")])
 
 
-class Drawing(NamedTuple):
-    """How codes are drawn. first: the temperature of the first step, which decides how an action is done.
+@dataclass(frozen=True)
+class CodesSettings(Settings):
+    """hypotheses: motions that are given. first_temperature: of the first step, which decides how an action is done.
+    memory: the share of steps that are taken from what is remembered. certainty: of the action. seconds: 0 lets the
+    model end a motion, after max_seconds at most."""
 
-    memory: the share of steps that are taken from what is remembered.
-    """
-
-    temperature: float
-    first: float
-    top_p: float
-    guidance: float
-    memory: float = 0.0
-
-    @staticmethod
-    def of(settings: Mapping[str, Any]) -> "Drawing":
-        """From a loop's settings."""
-        names = ("temperature", "first_temperature", "top_p", "guidance", "memory")
-        return Drawing(*(settings[name] for name in names))
+    hypotheses: Annotated[int, Range(1, 100)] = 1
+    temperature: Annotated[float, Range(0.01, 100)] = 1.0
+    first_temperature: Annotated[float, Range(0.01, 100)] = 1.0
+    top_p: Annotated[float, Range(0.01, 1)] = 1.0
+    guidance: Annotated[float, Range(0, 10)] = 1.0
+    memory: Annotated[float, Range(0, 1)] = 0.0
+    certainty: Annotated[float, Range(0.01, 100)] = 1.0
+    seconds: Annotated[float, Range(0, 600, "s")] = 0.0
+    max_seconds: Annotated[float, Range(0, 600, "s")] = 30.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +145,7 @@ class Writer:
     age: (B,) int64 steps since the action began.
     """
 
-    def __init__(self, source: Source, noise: Sequence[Noise], drawing: Drawing) -> None:
+    def __init__(self, source: Source, noise: Sequence[Noise], drawing: CodesSettings) -> None:
         self.source, self.noise, self.drawing = source, list(noise), drawing
         rows = 2 * len(self.noise)  # told the action, and not told
         self.age = np.zeros(len(self.noise), dtype=np.int64)
@@ -204,7 +202,7 @@ class Writer:
         again: NDArray[np.bool_] = (codes[:, 0] == end) & (not ends)
         rows = np.flatnonzero((codes[:, 0] < 0) | again)
         told = known[np.concatenate([rows, rows + len(codes)])]
-        temperature = np.where(self.age == 0, drawing.first, drawing.temperature)[rows]
+        temperature = np.where(self.age == 0, drawing.first_temperature, drawing.temperature)[rows]
         codes[rows] = 0
         for part in range(self.source.parts) if len(rows) else ():
             asked = {"known": told, "codes": np.tile(codes[rows], (2, 1))}
@@ -277,19 +275,3 @@ def drawn_steps(writer: Writer, actions: Ids, longest: int, exactly: bool = Fals
             writer.keep(np.flatnonzero(going))
         rows = rows[going]
         yield rows, codes[going]
-
-
-@dataclass(frozen=True)
-class CodesSettings(Settings):
-    """hypotheses: motions that are given. The others are those of :class:`Drawing`; certainty: of the action; seconds:
-    0 lets the model end a motion, after max_seconds at most."""
-
-    hypotheses: Annotated[int, Range(1, 100)] = 1
-    temperature: Annotated[float, Range(0.01, 100)] = 1.0
-    first_temperature: Annotated[float, Range(0.01, 100)] = 1.0
-    top_p: Annotated[float, Range(0.01, 1)] = 1.0
-    guidance: Annotated[float, Range(0, 10)] = 1.0
-    memory: Annotated[float, Range(0, 1)] = 0.0
-    certainty: Annotated[float, Range(0.01, 100)] = 1.0
-    seconds: Annotated[float, Range(0, 600, "s")] = 0.0
-    max_seconds: Annotated[float, Range(0, 600, "s")] = 30.0

@@ -14,7 +14,7 @@ from typing import Annotated, ClassVar, NamedTuple
 import numpy as np
 
 from motet.decode.codec import Codec
-from motet.decode.codes import Drawing, Source, Writer, nucleus
+from motet.decode.codes import CodesSettings, Source, Writer, nucleus
 from motet.decode.loop import Ids, Scores, zero_state
 from motet.motion.rotations import Array
 from motet.settings import Range, Settings
@@ -89,7 +89,7 @@ class Continuer(NamedTuple):
 
     source: Source
     codec: Codec
-    drawing: Drawing
+    drawing: CodesSettings
     settings: ContinuationSettings
 
     def steps(self, codes: Ids, known: int, pace: Pace, seed: int) -> Iterator[Ids]:

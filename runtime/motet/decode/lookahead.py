@@ -41,26 +41,20 @@ Run = Callable[[Floats, int], tuple[Floats, Floats]]
 """From a history (B, K, H) and how many ticks from now it is, the next frame (B, D) and the next history."""
 
 
-class Fade(NamedTuple):
-    """What is left of a difference, and how fast it changes: (B, D) each, in units of the channel, and of them a
-    second."""
-
-    offset: Floats
-    speed: Floats
-
-
 class Ahead(NamedTuple):
     """Where a run is. Nothing in it is changed in place.
 
     frames: (2R + 1, B, D) of the net, those before, at and after the one that is shown. histories: (B, K, H) after that
         one and after each of those to come. control: (B, L) that those to come know. shown: what is shown, (B, D).
+    offset, speed: what is left of a difference, and how fast it changes a second: (B, D), in units of the channel.
     """
 
     frames: Floats
     histories: tuple[Floats, ...]
     control: Floats
     shown: Floats
-    fade: Fade
+    offset: Floats
+    speed: Floats
 
 
 class Lookahead:
@@ -80,44 +74,33 @@ class Lookahead:
         before = past[np.maximum(np.arange(-self.reach - 1, 0), -len(past))]
         frames, histories = _run_on(run, before, (history,), self.reach)
         shown = self._mean(frames)
-        return Ahead(frames, histories, control, shown, Fade(np.zeros_like(shown), np.zeros_like(shown)))
+        return Ahead(frames, histories, control, shown, np.zeros_like(shown), np.zeros_like(shown))
 
     def ticked(self, now: Ahead, run: Run, control: Floats) -> Ahead:
-        """One tick later; ``run`` counts from the tick that is now."""
-        reach, fade = self.reach, self._faded(now.fade)
+        """One tick later; ``run`` counts from now. Each character moves as it would alone, to the bit."""
+        reach, settings = self.reach, self.settings
+        offset, speed = damped(now.offset, now.speed, settings.fading, self.seconds)
+        moving = (np.maximum(np.abs(offset), np.abs(speed)) > settings.faded).any(axis=1, keepdims=True)
+        offset, speed = np.where(moving, offset, 0), np.where(moving, speed, 0)
         if control is now.control or np.array_equal(control, now.control):
             frames, histories = _run_on(run, now.frames[1:], now.histories, 1)
         else:
             frames, histories = _run_on(run, now.frames[1 : reach + 1], now.histories[:1], reach + 1)
             # what is farthest ahead was not run before: it is taken to differ as what is before it does
             apart = now.frames[reach + 1 :] - frames[reach:-1]
-            offset = self._mean(np.concatenate([np.zeros_like(apart), apart, apart[-1:]]))
-            fade = Fade(fade.offset + offset, fade.speed)
-        return self._held_back(now.shown, Ahead(frames, histories[1:], control, self._mean(frames), fade))
-
-    def _held_back(self, before: Floats, after: Ahead) -> Ahead:
-        """What is shown (B, D) after a frame: with what fades, and no faster than allowed; what is too fast fades.
-
-        Each character by itself: it moves as it would alone, to the bit.
-        """
-        wanted = after.shown + after.fade.offset
-        step = wanted - before
-        fast = (np.abs(step) > self.most).any(axis=1, keepdims=True)
-        shown = np.where(fast, before + np.clip(step, -self.most, self.most), wanted)
-        offset = np.where(fast, shown - after.shown, after.fade.offset)
-        return after._replace(shown=shown, fade=Fade(offset, after.fade.speed))
+            offset = offset + self._mean(np.concatenate([np.zeros_like(apart), apart, apart[-1:]]))
+        mean = self._mean(frames)
+        wanted = mean + offset
+        step = wanted - now.shown
+        fast = (np.abs(step) > self.most).any(axis=1, keepdims=True)  # what is too fast fades, too
+        shown = np.where(fast, now.shown + np.clip(step, -self.most, self.most), wanted)
+        return Ahead(frames, histories[1:], control, shown, np.where(fast, shown - mean, offset), speed)
 
     def _mean(self, frames: Floats) -> Floats:
         """The mean (B, D) of frames (2R + 1, B, D) by the window."""
         # not as a product of matrices, which rounds a character by how many there are
         mean: Floats = (self.window * frames).sum(axis=0)
         return mean
-
-    def _faded(self, fade: Fade) -> Fade:
-        """A critically damped spring at rest at 0, a tick later (exact), for each character that is not there."""
-        offset, speed = damped(fade.offset, fade.speed, self.settings.fading, self.seconds)
-        moving = (np.maximum(np.abs(offset), np.abs(speed)) > self.settings.faded).any(axis=1, keepdims=True)
-        return Fade(np.where(moving, offset, 0), np.where(moving, speed, 0))
 
 
 def _run_on(run: Run, frames: Floats, histories: tuple[Floats, ...], count: int) -> tuple[Floats, tuple[Floats, ...]]:

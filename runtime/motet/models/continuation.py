@@ -7,7 +7,7 @@ from itertools import islice
 
 import numpy as np
 
-from motet.decode.codes import Drawing
+from motet.decode.codes import CodesSettings
 from motet.decode.continue_codes import ContinuationSettings, Continuer, Pace
 from motet.errors import DecodingError, MotionError
 from motet.models.generate import SETTLED, GenerateModel
@@ -68,7 +68,8 @@ class Continuation:
     def _drawn(self, count: int, seed: int) -> Array:
         """Frames (count, D) after those of the context, at its pace and without a jump."""
         model, rules, context = self.model, self.rules, self.context
-        continuer = Continuer(model.source, model.codec, Drawing.of(model.defaults), rules)
+        drawing = CodesSettings.read(model.defaults, "defaults")
+        continuer = Continuer(model.source, model.codec, drawing, rules)
         known = len(context.codes) - math.ceil((len(context.frames) - self.given) / model.codec.field.hop)
         steps = continuer.steps(context.codes, max(1, known), self.pace, seed)
         decoder, frames = model.decoder(context), context.frames[-1:]

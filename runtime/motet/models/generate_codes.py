@@ -14,7 +14,7 @@ from motet.bundle.fields import Fields
 from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
 from motet.decode.codec import Codec, Context, ReceptiveField, StreamingDecoder
-from motet.decode.codes import Drawing, Memory, Source, Writer, draw_codes, drawn_actions, drawn_steps
+from motet.decode.codes import CodesSettings, Memory, Source, Writer, draw_codes, drawn_actions, drawn_steps
 from motet.decode.continue_codes import ContinuationSettings
 from motet.decode.loop import Noise, Sample, apart
 from motet.errors import BundleError, DecodingError, MotionError, TextError, TextWarning, warn
@@ -179,7 +179,7 @@ class CodesModel(GenerateModel):
         each = [one for own in noise for one in apart(own, count)]
         actions = drawn_actions(self.source, np.repeat(contexts, count, axis=0), each, settings["certainty"])
         longest = max(1, self.codec.steps(seconds or settings["max_seconds"]))
-        writer = Writer(self.source, each, Drawing.of(settings))
+        writer = Writer(self.source, each, CodesSettings(**settings))
         found = draw_codes(writer, actions, longest, exactly=seconds > 0)
         last = max(1, round(seconds * self.fps)) if seconds else None
         samples = [Sample(self.codec.frames_of(codes)[:last], None) for codes in found]
@@ -265,7 +265,7 @@ class CodesModel(GenerateModel):
         """For each step of codes, the number of its sentence and the frames (T, D) that become final with it; then the
         remaining frames. seconds: of each sentence, 0 where it ends by itself."""
         context = None if after is None else self.context(after)
-        writer, decoder = Writer(self.source, noise, Drawing.of(settings)), self.decoder(context)
+        writer, decoder = Writer(self.source, noise, CodesSettings(**settings)), self.decoder(context)
         if context is not None:
             writer.see(context.codes)
         done, given, end, limit = 0, 0, 0.0, None

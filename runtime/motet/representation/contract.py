@@ -15,9 +15,8 @@ from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
 from motet.representation.base import FrameMirror, Representation, phases
 from motet.representation.retargeting import foreign, in_joints_of, in_known_unit, to_model_figure
-from motet.representation.root_block import Angles, RootAngles
+from motet.representation.root_block import Angles, RootAngles, RootVectors
 from motet.representation.root_sixd import RootSixd
-from motet.representation.root_vectors import RootVectors
 
 REPRESENTATIONS: dict[str, Representation] = {
     "angles": Angles(),

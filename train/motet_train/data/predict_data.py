@@ -12,7 +12,7 @@ from torch import Tensor
 from motet.errors import MotionError
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
-from motet.representation.root_vectors import VECTOR_KINDS, joints_of
+from motet.representation.root_block import VECTOR_KINDS, joints_of
 from motet_train.data.errors import DataError
 from motet_train.data.preparation import VECTORS
 from motet_train.data.store import Store, split

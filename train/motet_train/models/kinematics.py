@@ -15,9 +15,8 @@ from motet.motion.humanoid import LEFT_RIGHT, sided
 from motet.motion.kinematics import AXES
 from motet.motion.skeleton import END_SUFFIX
 from motet.representation.contract import MotionContract
-from motet.representation.root_block import ROOT_BLOCK
+from motet.representation.root_block import ROOT_BLOCK, VECTOR_KINDS, joints_of
 from motet.representation.root_sixd import SIXD_KINDS
-from motet.representation.root_vectors import VECTOR_KINDS, joints_of
 
 
 def forward_kinematics(
