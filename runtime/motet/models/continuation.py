@@ -25,8 +25,7 @@ from motet.representation.root_block import last_place
 from motet.representation.root_sixd import facing, in_world
 from motet.settings import Progress, silent
 
-RATES = 3
-"""Number of root-rate channels; they scale with the tempo."""
+RATES = 3  # channels of the root that scale with the tempo
 
 
 class Continuation:

@@ -78,7 +78,7 @@ class Part(Description):
 
 
 class _Options(TypedDict, total=False):
-    """What a call of :meth:`DescribeModel.describe` takes by name only."""
+    """What :meth:`DescribeModel.describe` takes by name only."""
 
     decoding: Decoding | None
     seed: SupportsIndex
@@ -88,7 +88,6 @@ class _Options(TypedDict, total=False):
 class DescribeModel(LanguageModel):
     """A motion captioning model.
 
-    graphs: "encoder" (frames, lengths -> context) and "step" (word, context, states -> log_probabilities, next states).
     Its loops (:mod:`motet.decode.loops`) take the step, contexts (B, C), limits and their settings by name, and return
     up to ``beams`` hypotheses for each row, best first.
     """
@@ -163,8 +162,8 @@ class DescribeModel(LanguageModel):
         spans = windows(len(motion), motion.fps, settings)
         contexts = self.embed([motion[start:stop] for start, stop in spans])
         likeliest = self._hypotheses(beam, contexts, beam.defaults(self.manifest.defaults))
-        start, end = (self.vocabulary.ids[word] for word in (SOS, EOS))
-        said = [(start, *best.ids, end) for best, *_ in likeliest]
+        ids = self.vocabulary.ids
+        said = [(ids[SOS], *best.ids, ids[EOS]) for best, *_ in likeliest]
         scores = near_scores(self.graphs["step"], contexts, said, round(settings.near / settings.hop), progress)
         return self._parts(motion, edges(spans, best_path(scores, settings.change)))
 
@@ -207,7 +206,7 @@ class DescribeModel(LanguageModel):
 
     def limits(self, settings: Mapping[str, Any]) -> Limits:
         """The limits of a sentence, in ids of the vocabulary, with "max_words" of the settings."""
-        start, end, *banned = (self.vocabulary.ids[word] for word in (SOS, EOS, PAD, UNK))
+        start, end, *banned = map(self.vocabulary.ids.__getitem__, (SOS, EOS, PAD, UNK))
         return Limits(start, end, int(settings["max_words"]), [start, *banned])
 
     def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:

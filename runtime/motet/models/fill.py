@@ -27,19 +27,16 @@ log = logging.getLogger(__name__)
 Gap = tuple[float, float]
 """Times in seconds of the first missing frame and of the first frame after the gap."""
 
-SEEN = 5.0
-"""Seconds before and after a gap from which a figure is retargeted onto the humanoid: its ground, its stance."""
-
-JOIN_SECONDS, LOOP_SECONDS = 1.0, 0.5
-"""Default seconds of a transition between two motions, and from the end of one to its start."""
+SEEN = 5.0  # seconds around a gap from which a figure is retargeted onto the humanoid: its ground, its stance
+JOIN_SECONDS, LOOP_SECONDS = 1.0, 0.5  # of a transition between two motions, and from the end of one to its start
 
 
 class FillModel(BundleModel):
     """A model that fills gaps in motions; threads can share it.
 
-    graphs: "filler" (past, plain, after -> filled), of placed frames (:mod:`motet.representation.placed`) of the
-        humanoid. Its loop's defaults are "context", the frames it sees before and after a gap, "least", the frames
-        it needs there, and "longest", the frames of the longest gap, all at the model's frame rate.
+    Its graph "filler" takes placed frames (:mod:`motet.representation.placed`) of the humanoid. Its loop's defaults are
+    "context", the frames it sees before and after a gap, "least", those it needs there, and "longest", those of the
+    longest gap, all at the model's frame rate.
     """
 
     VERB = "fill"
@@ -131,15 +128,15 @@ class FillModel(BundleModel):
         if start < 0 or stop > motion.duration + 0.5 / motion.fps:
             raise MotionError(f"{text} is not within {whole}")
         first, last = round(start * motion.fps), round(stop * motion.fps)
-        if first == last:
-            raise MotionError(f"{text} has no frame at {motion.fps:g} fps: make it longer")
-        if first == 0:
-            raise MotionError(f"{text} is at the very start of {whole}: a gap needs frames before it")
-        if last >= len(motion):
-            then = "a gap needs frames after it (motet predict continues)"
-            raise MotionError(f"{text} is at the very end of {whole}: {then}")
-        if stop - start > self.seconds + 1e-9:
-            raise MotionError(f"{text} is too long: at most {self.seconds:g} s can be filled")
+        after = "a gap needs frames after it (motet predict continues)"
+        for wrong, reason in (
+            (first == last, f"has no frame at {motion.fps:g} fps: make it longer"),
+            (first == 0, f"is at the very start of {whole}: a gap needs frames before it"),
+            (last >= len(motion), f"is at the very end of {whole}: {after}"),
+            (stop - start > self.seconds + 1e-9, f"is too long: at most {self.seconds:g} s can be filled"),
+        ):
+            if wrong:
+                raise MotionError(f"{text} {reason}")
         return first, last
 
     def join(self, first: Motion, second: Motion, *, seconds: float = JOIN_SECONDS) -> Motion:

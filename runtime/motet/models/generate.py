@@ -24,15 +24,12 @@ from motet.motion.skeleton import Skeleton
 from motet.representation.contract import MotionContract
 from motet.settings import Progress, Seed, seeds_of, silent
 
-SETTLED = 0.3
-"""Blend-in time of foot planting, in seconds."""
-
-PLAYED = 30.0
-"""Default frame rate of generated motions, whatever the model's own rate."""
+SETTLED = 0.3  # seconds in which the planting of feet blends in
+PLAYED = 30.0  # frames a second of generated motions by default, whatever the model's own rate
 
 
 class LoopSettings(TypedDict, total=False):
-    """Settings of a call, as far as the model's loop has them: :meth:`GenerateModel.generate`. None: the bundle's."""
+    """Settings as far as the model's loop has them: :meth:`GenerateModel.generate`. None: the bundle's."""
 
     candidates: int | None
     certainty: float | None
@@ -115,8 +112,8 @@ class Generated:
 
 
 class GenerateModel(LanguageModel):
-    """A text-to-motion model: :class:`MixtureModel` or
-    :class:`motet.models.generate_codes.CodesModel`, depending on the bundle's loop."""
+    """A text-to-motion model, by the bundle's loop :class:`MixtureModel` or
+    :class:`motet.models.generate_codes.CodesModel`."""
 
     VERB = "generate"
 
@@ -223,10 +220,8 @@ class GenerateModel(LanguageModel):
 
 
 class MixtureModel(GenerateModel):
-    """A model whose step outputs a mixture, or frames.
+    """A model whose step outputs a mixture, or frames: normalised, with the active flag last.
 
-    graphs: "encoder" (words, lengths -> context), "step" (frame, context, states -> log_weights, means, stds,
-        active, next states), with frames normalised and the active flag last.
     Its loops (:mod:`motet.decode.loops`) take the step, contexts (B, C), a generator of noise for each row, the largest
     number of frames and their settings by name, and return samples for each row, best first.
     """

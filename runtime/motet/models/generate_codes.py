@@ -19,7 +19,6 @@ from motet.decode.continue_codes import ContinuationSettings
 from motet.decode.loop import Noise, Sample, apart
 from motet.errors import BundleError, DecodingError, MotionError, TextError, TextWarning, warn
 from motet.models.generate import Generated, GenerateModel, LoopSettings
-from motet.models.language import TextRules
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.representation.root_sixd import in_world
@@ -80,43 +79,9 @@ class Understood:
     confident: bool
 
 
-class Known:
-    """The actions that a model knows: the key "actions" of its manifest; BundleError unless it has ``count`` entries.
-
-    sentences: one of each. rare: the weight of a word: the logarithm of the number of actions divided by the number
-    that it describes.
-    """
-
-    def __init__(self, manifest: Fields, count: int, rules: TextRules, settings: FamiliaritySettings) -> None:
-        entries = manifest.list_of_fields("actions")
-        if len(entries) != count:
-            raise BundleError(f"manifest, actions: {len(entries)} entries, expected {count}")
-        said = Counter(word for entry in entries for word in set(entry.texts("words")))
-        self.sentences = [entry.text("sentence") for entry in entries]
-        self.rare = {word: math.log((1 + count) / times) for word, times in said.items()}
-        self.rules, self.settings = rules, settings
-
-    def understood(self, sentence: str, context: Floats) -> Understood:
-        """How a sentence is understood, by the log-probabilities (A,) of actions; BundleError for other numbers."""
-        asked, unheard = set(self.rules.words(sentence)), math.log(1 + len(self.sentences))
-        heard = sum(self.rare.get(word, 0.0) for word in asked)
-        share = heard / (sum(self.rare.get(word, unheard) for word in asked) or 1.0)
-        order = np.argsort(-context, kind="stable")
-        nearest = dict.fromkeys(self.sentences[action] for action in order)
-        likeliest = float(context[order[0]])
-        if likeliest > 0.01:  # more than rounding
-            raise BundleError(f"graph encoder: its context holds {likeliest:g}, which is no log-probability")
-        confidence = share * math.exp(likeliest) ** self.settings.doubt
-        return Understood(confidence, tuple(nearest)[:3], confidence >= self.settings.confident)
-
-
 class CodesModel(GenerateModel):
-    """A model that generates motion codes.
-
-    graphs: "encoder" (words, lengths -> context: log-probabilities of actions), "step" (codes, action, age, states ->
-        known, numbers, next states), "part" (known, codes -> log_probabilities), "decoder" (codes -> frames, moves),
-        "tokens" (frames -> codes of the body). tables: "memory", "moves" and "body", see docs/bundle.md.
-    """
+    """A model that generates motion codes; docs/bundle.md has its graphs and tables. A context is the log-probabilities
+    of actions."""
 
     SETTINGS = (FamiliaritySettings, ContinuationSettings)
     LOOPS = ("codes",)
@@ -133,8 +98,8 @@ class CodesModel(GenerateModel):
         self.sizes |= {"T": hop, "M": moves}
         memory = self._bound()
         self.source = Source(graphs["step"], graphs["part"], moves, self.sizes["A"], memory)
-        self.continuation, familiarity = self.settings(ContinuationSettings), self.settings(FamiliaritySettings)
-        self.known = Known(Fields(manifest.source), self.sizes["A"], self.vocabulary.rules, familiarity)
+        self.continuation = self.settings(ContinuationSettings)
+        self._read_actions(Fields(manifest.source).list_of_fields("actions"))
 
     def _bound(self) -> Memory:
         """The memory, once graphs and tables are found to fit each other."""
@@ -158,13 +123,33 @@ class CodesModel(GenerateModel):
         alone = [super(CodesModel, self).contexts([sequence], role) for sequence in sequences]
         return np.concatenate([np.empty((0, self.sizes["A"]), dtype=np.float32), *alone])
 
+    def _read_actions(self, entries: Sequence[Fields]) -> None:
+        """The known actions: a sentence of each, and the weights of words, more of one that describes few actions."""
+        if len(entries) != self.sizes["A"]:
+            raise BundleError(f"manifest, actions: {len(entries)} entries, expected {self.sizes['A']}")
+        said = Counter(word for entry in entries for word in set(entry.texts("words")))
+        self._sentences = [entry.text("sentence") for entry in entries]
+        self._rare = {word: math.log((1 + len(entries)) / times) for word, times in said.items()}
+
     def understood(self, sentence: str) -> Understood:
         """How well a sentence is known, and the nearest known sentences; errors like :meth:`ids`."""
-        return self.known.understood(sentence, self.embed(sentence))
+        return self._understood(sentence, self.embed(sentence))
+
+    def _understood(self, sentence: str, context: Floats) -> Understood:
+        asked, unheard = set(self.vocabulary.rules.words(sentence)), math.log(1 + len(self._sentences))
+        heard = sum(self._rare.get(word, 0.0) for word in asked)
+        share = heard / (sum(self._rare.get(word, unheard) for word in asked) or 1.0)
+        order, how = np.argsort(-context, kind="stable"), self.settings(FamiliaritySettings)
+        nearest = dict.fromkeys(self._sentences[action] for action in order)
+        likeliest = float(context[order[0]])
+        if likeliest > 0.01:  # more than rounding
+            raise BundleError(f"graph encoder: its context holds {likeliest:g}, which is no log-probability")
+        confidence = share * math.exp(likeliest) ** how.doubt
+        return Understood(confidence, tuple(nearest)[:3], confidence >= how.confident)
 
     def note(self, sentence: str, context: Floats, strict: bool) -> None:
         """See :meth:`GenerateModel.note`."""
-        found = self.known.understood(sentence, context)
+        found = self._understood(sentence, context)
         if found.confident:
             return
         near = ", ".join(f"'{one}'" for one in found.nearest)

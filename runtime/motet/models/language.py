@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
-from itertools import pairwise
+from itertools import filterfalse, pairwise
 from typing import Any
 
 import numpy as np
@@ -28,11 +28,8 @@ from motet.motion.rotations import Array
 PAD, SOS, EOS, UNK = SPECIALS = ("PAD", "SOS", "EOS", "UNK")
 """Padding, start and end of a sentence, unknown word: ids 0 to 3. Upper case, so that no normal word is one."""
 
-MAX_WORDS = 40
-"""Most words of a sentence."""
-
-MAX_SECONDS = 30.0
-"""The longest motion that a model takes, as in the paper's training data."""
+MAX_WORDS = 40  # of a sentence
+MAX_SECONDS = 30.0  # of a motion that a model takes, as in the paper's training data
 
 # fmt: off
 SPELLING = {
@@ -86,21 +83,15 @@ class TextRules:
         spelling, numbers = top.fields("spelling"), top.fields("numbers")
         if (count := len(spelling.data) + len(numbers.data)) > 2000:
             raise top.fault("at most 2000 words in its tables", count)
-        return TextRules(
-            top.text("dropped"),
-            {wrong: spelling.text(wrong) for wrong in spelling.data},
-            {word: numbers.whole(word, 0, 99) for word in numbers.data},
-            top.text("hundred"),
-            top.text("conjunction"),
-            top.text("point"),
-            top.whole("spelled", 0, 99),
-        )
+        right = {wrong: spelling.text(wrong) for wrong in spelling.data}
+        values = {word: numbers.whole(word, 0, 99) for word in numbers.data}
+        words = {name: top.text(name) for name in ("dropped", "hundred", "conjunction", "point")}
+        return TextRules(spelling=right, numbers=values, spelled=top.whole("spelled", 0, 99), **words)
 
     def normalise(self, sentence: str) -> str:
         """Lower case without accents and punctuation, spelling corrected, number words as digits: "90 degrees"."""
         plain = sentence.translate(dict.fromkeys(map(ord, self.dropped)))
-        plain = unicodedata.normalize("NFKD", plain).lower()
-        plain = "".join(letter for letter in plain if not unicodedata.combining(letter))
+        plain = "".join(filterfalse(unicodedata.combining, unicodedata.normalize("NFKD", plain).lower()))
         plain = re.sub(r"(?<=\d)\.(?=\d)", f" {self.point} ", plain)
         plain = " ".join(re.sub(r"[\W_]+", " ", plain).split())
         tokens = self._misspelt.sub(lambda match: self.spelling[match[0]], plain).split()
@@ -141,7 +132,7 @@ class TextRules:
         return (value + more, used + skipped + length) if length else (value, used)
 
     def _below_hundred(self, tokens: list[str]) -> tuple[int, int]:
-        first, second = (self.numbers.get(token) for token in (*tokens[:2], "", "")[:2])
+        first, second = map(self.numbers.get, (*tokens[:2], "", "")[:2])
         if first is not None and first >= 20 and second is not None and 0 < second < 10:
             return first + second, 2
         return (0, 0) if first is None else (first, 1)
@@ -153,11 +144,8 @@ RULES = TextRules()
 
 @dataclass(frozen=True)
 class Vocabulary:
-    """The words a model knows; a word's place is its id.
-
-    words: all of them, PAD, SOS, EOS and UNK first. TextError otherwise, or for a duplicate word.
-    rules: how sentences become words.
-    """
+    """The words a model knows: a word's place is its id. TextError unless PAD, SOS, EOS and UNK are the first, and each
+    word is there once. rules: how sentences become words."""
 
     words: tuple[str, ...]
     rules: TextRules = field(default=RULES, hash=False)
@@ -221,7 +209,7 @@ class LanguageModel(BundleModel):
         self.sizes["V"] = len(self.vocabulary)
 
     def unknown(self, sentence: str) -> list[str]:
-        """The words of a sentence that the model does not know; TextError as in :meth:`ids`."""
+        """The words of a sentence that the model does not know; TextError like :meth:`ids`."""
         return self.vocabulary.encode(sentence)[1]
 
     def ids(self, sentence: str) -> NDArray[np.int64]:
@@ -268,7 +256,7 @@ class LanguageModel(BundleModel):
         encoder = self.graphs[role]
         given, context = encoder.spec.inputs[0], encoder.spec.outputs[0]
         found = np.empty((len(sequences), context.size(1)), dtype=np.float32)
-        order = np.argsort([len(sequence) for sequence in sequences], kind="stable")  # similar lengths together
+        order = np.argsort(list(map(len, sequences)), kind="stable")  # similar lengths together
         for start in range(0, len(order), 32):  # 47 motions take 28 ms on one thread, and in batches of 64 they take 75
             rows = two_rows(order[start : start + 32])
             values, lengths = padded([sequences[row] for row in rows], given.dtype)
@@ -278,7 +266,7 @@ class LanguageModel(BundleModel):
 
 def padded(sequences: Sequence[NDArray[Any]], dtype: str) -> tuple[NDArray[Any], NDArray[np.int64]]:
     """Sequences (T_i, ...) as one array (B, T, ...), zeros on the right, and their lengths (B,) int64."""
-    lengths = np.array([len(sequence) for sequence in sequences], dtype=np.int64)
+    lengths = np.array(list(map(len, sequences)), dtype=np.int64)
     result = np.zeros((len(sequences), int(lengths.max()), *sequences[0].shape[1:]), dtype=dtype)
     for row, sequence in zip(result, sequences, strict=True):
         row[: len(sequence)] = sequence

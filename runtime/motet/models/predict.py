@@ -21,19 +21,14 @@ from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.settings import Progress, Seed, checked_int, is_number, seeds_of, silent
 
-MAX_FRAMES = 100_000
-"""Most frames of a prediction, which is held in memory as a whole."""
-
+MAX_FRAMES = 100_000  # of a prediction, which is held in memory as a whole
+MAX_SAMPLES = 100  # futures of one call
 SURE = 0.5
-"""Seconds taken from the predictor where a code model continues beyond the horizon; later predictions regress to the
-mean."""
-
-MAX_SAMPLES = 100
-"""Most futures of one call."""
+"""Seconds taken from the predictor where a code model continues beyond the horizon; later ones regress to the mean."""
 
 
 class _Options(TypedDict, total=False):
-    """What a call of :meth:`PredictModel.predict` takes by name."""
+    """What :meth:`PredictModel.predict` takes by name."""
 
     seconds: float | None
     frames: int | None
@@ -46,10 +41,8 @@ class _Options(TypedDict, total=False):
 class PredictModel(BundleModel):
     """A model that continues motions; sessions and threads can share it.
 
-    graphs: "encoder" (frames (B, L, C) -> first inputs of the step) and "step" (-> frame (B, C), and its next
-        inputs). After ``horizon`` frames, its default, a prediction continues from its own last frames. A third one,
-        "error", is optional: from the frames and the encoder's outputs to the expected error of each frame of a
-        horizon, "error" (B, N) in metres.
+    After ``horizon`` frames, its default, a prediction continues from its own last frames. A graph "error" may be there
+    as well, from frames and the encoder's outputs to the expected error (B, N) in metres of each frame of a horizon.
     """
 
     VERB = "predict"
@@ -82,9 +75,8 @@ class PredictModel(BundleModel):
         """Number of frames of a prediction; DecodingError for both, or for a length out of range."""
         if seconds is None:
             return checked_int("frames", self.horizon if frames is None else frames, 1, MAX_FRAMES, DecodingError)
-        longest = MAX_FRAMES / self.fps
-        if frames is not None or not is_number(seconds) or not 0 < seconds <= longest:
-            limits = f"more than 0 and at most {longest:g}"
+        if frames is not None or not is_number(seconds) or not 0 < seconds <= MAX_FRAMES / self.fps:
+            limits = f"more than 0 and at most {MAX_FRAMES / self.fps:g}"
             raise DecodingError(f"give seconds, {limits}, or frames; not {seconds} and {frames}")
         return max(1, round(seconds * self.fps))
 

@@ -21,14 +21,9 @@ from numpy.typing import NDArray
 
 from motet.errors import ControlError, ScriptError, quoted
 
-LONGEST_SCRIPT = 3600.0
-"""Seconds. A script is laid out in memory before it runs; longer ones are for a loop over a session's ticks."""
-
-WAYS = {"forward": 0.0, "left": 90.0, "backwards": 180.0, "right": -90.0}
-"""Degrees from the facing, positive to the left."""
-
+LONGEST_SCRIPT = 3600.0  # seconds: it is laid out in memory before it runs
+WAYS = {"forward": 0.0, "left": 90.0, "backwards": 180.0, "right": -90.0}  # degrees from the facing to the left
 NUMBER = r"\d+\.?\d*|\.\d+"
-
 TOKEN = re.compile(
     r"\s*+(?:(?P<number>\d++\.?\d*+|\.\d++)(?![\w.])|(?P<seconds>\d++\.?\d*+s|\.\d++s)\b"
     r"|(?P<label>[^\W\d][\w-]*+)|(?P<sign>[,>+*])|(?P<end>\Z))"

@@ -35,11 +35,8 @@ log = logging.getLogger(__name__)
 Query = str | Motion
 """A sentence, or a motion to find similar ones."""
 
-NAME = ".motet-search.npz"
-"""Name of the index file in its folder."""
-
-VERSION = 2
-"""Version of the file's format."""
+NAME = ".motet-search.npz"  # of the index file in its folder
+VERSION = 2  # of its format
 
 
 @dataclass(frozen=True)
@@ -53,7 +50,6 @@ class IndexSettings(Settings):
 class SearchModel(LanguageModel):
     """A model that embeds motions and sentences in one space; their similarity is the product of their vectors.
 
-    graphs: "motion" (frames, lengths -> vector) and "text" (words, lengths -> vector).
     Its loop takes scores (Q, N) and the number of best ones wanted, and returns their columns.
     """
 
@@ -132,6 +128,7 @@ class Member:
         return f"{self.path}{MARK}{self.clip}" if self.clip else self.path
 
 
+@dataclass(frozen=True, eq=False, repr=False)
 class Index:
     """The searchable motions of a folder; :meth:`open` makes one.
 
@@ -139,18 +136,12 @@ class Index:
     longer exist. unit: length unit with which :func:`motet.read` read them.
     """
 
-    def __init__(
-        self,
-        model: SearchModel,
-        folder: Path,
-        members: Sequence[Member],
-        vectors: Floats,
-        vanished: Sequence[Path] = (),
-        unit: str | float | None = None,
-    ) -> None:
-        self.model, self.folder, self.members, self.vectors = model, folder, tuple(members), vectors
-        self.vanished, self.unit = tuple(vanished), unit
-        self._windows = [(member, *window) for member in members for window in member.windows]
+    model: SearchModel
+    folder: Path
+    members: tuple[Member, ...]
+    vectors: Floats
+    vanished: tuple[Path, ...] = ()
+    unit: str | float | None = None
 
     @staticmethod
     def open(
@@ -163,9 +154,8 @@ class Index:
     ) -> "Index":
         """The index of all motion files in a folder and its subfolders; or of the folder of an index file.
 
-        An existing index is reused; new and changed motion files are read and embedded, and the index file is rewritten
-        as a whole. Motion files that cannot be read or used are listed in :attr:`failed`, vanished ones in
-        :attr:`vanished`.
+        An existing index is reused; only new and changed motion files are read and embedded. Motion files that cannot
+        be read or used are listed in :attr:`failed`, vanished ones in :attr:`vanished`.
         file: the index file, by default ".motet-search.npz" in the folder, if that is writable.
         unit: the length unit of files that do not state theirs, like in :func:`motet.read`; an index made with another
         unit is rebuilt.
@@ -212,6 +202,10 @@ class Index:
             return self._nearest(queries, wanted)
         return [self._nearest(query, wanted) for query in queries]
 
+    @cached_property
+    def _windows(self) -> list[tuple[Member, float, float]]:
+        return [(member, *window) for member in self.members for window in member.windows]
+
     def _nearest(self, query: Query, wanted: int) -> list[Hit]:
         vector = self.model.embed_text(query) if isinstance(query, str) else direction(self.model, query)
         scores = self.vectors @ vector
@@ -255,10 +249,9 @@ def _renewed(
         same = before is not None and before.unit == unit and known.get((file.path, file.size, file.changed))
         found += same or _embedded(path, file, model, unit)
         progress(done, len(paths))
-    members = [member for member, _ in found]
+    members, vectors = zip(*found, strict=True)
     gone = sorted({path for path, _, _ in known} - {member.path for member in members})
-    vectors = np.concatenate([rows for _, rows in found])
-    return Index(model, folder, members, vectors, [folder / path for path in gone], unit)
+    return Index(model, folder, members, np.concatenate(vectors), tuple(folder / path for path in gone), unit)
 
 
 def _embedded(path: Path, file: Member, model: SearchModel, unit: str | float | None) -> list[tuple[Member, Floats]]:
@@ -309,7 +302,7 @@ def _read(file: Path, model: SearchModel) -> Index:
         data = json.loads(text.tobytes())
         version, made = int(data["version"]), str(data["model"])
         folder, unit = Path(data["folder"]), data.get("unit")
-        members = [_member(**entry) for entry in data["members"]] if version == VERSION else []
+        members = tuple(_member(**entry) for entry in data["members"]) if version == VERSION else ()
     # a damaged archive makes zipfile, its unpackers, numpy and json raise errors of a dozen types
     except Exception as error:
         reason = str(error)[:200]

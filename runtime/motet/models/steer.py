@@ -23,8 +23,7 @@ from motet.motion.rotations import rotmat_to_quat
 from motet.representation.root_sixd import ROOT_SIXD, SIXD_KINDS, joint_rotations
 from motet.settings import checked_int
 
-FEATURE_STEPS = 16
-"""Quantisation steps of a feature per scaled unit: tables hold them in 8 bits."""
+FEATURE_STEPS = 16  # in which tables hold a scaled unit of a feature, in 8 bits
 
 
 class SteerModel(ControlModel):

@@ -21,8 +21,7 @@ from motet.motion.rotations import Array, quat_to_rotmat, wrapped
 if TYPE_CHECKING:
     from motet.models.steer import SteerModel
 
-LARGEST = 1e6
-"""Largest number of a command: metres, m/s, degrees."""
+LARGEST = 1e6  # number of a command: metres, m/s, degrees
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,9 +24,7 @@ from motet.settings import Seed, checked_int, seeds_of
 class TdbnModel(ControlModel):
     """A model of labelled motions that runs live; sessions and threads can share it.
 
-    manifest: of a control bundle, or of a training run with the same keys.
-    graphs: "encoder" (frames -> codes) and "step" (history, control, noise, variety, temperature -> codes, frame,
-        next history), and for models with free hidden units also codes -> step.
+    The step of a model with free hidden units also takes codes.
     """
 
     LOOPS = ("session",)
@@ -215,11 +213,9 @@ class TdbnSession:
             raise ControlError(f"a control needs one value for each of {', '.join(self.model.labels)}")
         if not ((wanted >= 0) & (wanted <= 1)).all():
             raise ControlError("control values must be between 0 and 1")
-        shape = (self.characters, len(self.model.labels))
-        try:
-            self._inputs["control"] = np.array(np.broadcast_to(wanted, shape))  # a copy: the caller's may change
-        except ValueError as error:
-            raise ControlError(f"a control of shape {wanted.shape} does not fit {shape[0]} characters") from error
+        if wanted.shape[:-1] not in ((), (1,), (self.characters,)):
+            raise ControlError(f"a control of shape {wanted.shape} does not fit {self.characters} characters")
+        self._inputs["control"] = np.array(np.broadcast_to(wanted, (self.characters, wanted.shape[-1])))
 
     def step(self) -> Floats:
         """One tick: the next frame (characters, D) float32, in the units of ``model.contract``."""
@@ -264,8 +260,7 @@ class TdbnSession:
 
     def snapshot(self) -> TdbnSnapshot:
         """Frames, control and tick, without the noise: a session that continues from it uses its own seeds."""
-        control = self._inputs["control"].copy()
-        return TdbnSnapshot(self._first, self._history.copy(), control, self._tick, self._ahead)
+        return TdbnSnapshot(self._first, self._history.copy(), self._inputs["control"].copy(), self._tick, self._ahead)
 
     def restore(self, snapshot: TdbnSnapshot) -> None:
         """Go back to a snapshot of this session or of one with as many characters of the same model.

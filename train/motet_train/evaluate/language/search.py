@@ -102,4 +102,4 @@ def _index(model: SearchModel, corpus: SplitStore, records: Sequence[int]) -> In
         windows = tuple((start, start + part.duration) for start, part in parts)
         members.append(Member(str(place), 0, 0, windows))
         vectors.append(model.embed([part for _, part in parts]))
-    return Index(model, Path(), members, np.concatenate(vectors))
+    return Index(model, Path(), tuple(members), np.concatenate(vectors))
