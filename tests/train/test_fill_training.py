@@ -26,7 +26,7 @@ from motet_train.data.corpus import Record
 from motet_train.data.errors import DataError
 from motet_train.data.sixd_windows import GapWindow, GapWindows, gap_window
 from motet_train.data.store import Store, prepare, split
-from motet_train.evaluate.fill.report import FILL_GOALS, fill_report
+from motet_train.evaluate.fill import FILL_GOALS, fill_report
 from motet_train.evaluate.tables import reached
 from motet_train.models.filler import Filler, FillerConfig
 from motet_train.models.kinematics import tree_of

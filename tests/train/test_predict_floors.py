@@ -16,9 +16,23 @@ from motet_train.data.corpus import Record
 from motet_train.data.errors import DataError
 from motet_train.data.preparation import VECTORS
 from motet_train.data.store import prepare
-from motet_train.evaluate.predict import mocap_floors
-from motet_train.evaluate.predict.floors import CONSTANT, DAMPED, FLOORS, OF_JOINTS, ZERO, best, gone_on, key, reach
-from motet_train.evaluate.predict.mocap_floors import Windows, apart, chosen, floors, places
+from motet_train.evaluate.predict import floors as predict_floors
+from motet_train.evaluate.predict.floors import (
+    CONSTANT,
+    DAMPED,
+    FLOORS,
+    OF_JOINTS,
+    ZERO,
+    Windows,
+    apart,
+    best,
+    chosen,
+    floors,
+    gone_on,
+    key,
+    places,
+    reach,
+)
 from motet_train.papers.li2018.expmap import OUTPUT_FRAMES, ExpmapCorpus, read_expmap
 from motet_train.papers.li2018.protocol import (
     chosen_decays,
@@ -146,7 +160,7 @@ def test_decays_of_recorded_motions_are_chosen_on_those_not_held_out(tmp_path: P
     assert path.min() > 0.8  # the root of a walk goes on
     assert rest.min() < path.min()  # its limbs turn back
     assert not np.any(list(chosen(store, names[:2], 30.0, 10).values()))  # of who stands still nothing goes on
-    windows = mocap_floors.training_windows(store, names[1:], 30.0, 10)
+    windows = predict_floors.training_windows(store, names[1:], 30.0, 10)
     assert all(len(window) == 12 for window in windows)
     measured = Windows.of(windows, 10)
     everything = floors(measured, found)

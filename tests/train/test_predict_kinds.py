@@ -11,10 +11,22 @@ from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet_train.data.errors import DataError
 from motet_train.data.store import Entry
-from motet_train.evaluate.predict.calibration import QUARTERS, calibration, calibration_rows
 from motet_train.evaluate.predict.floors import FLOORS
-from motet_train.evaluate.predict.kinds import KINDS, REST, by_kind, kind_of
-from motet_train.evaluate.predict.mocap import PLACE, POSE, Measured, held_out, mocap_report, mocap_text
+from motet_train.evaluate.predict.mocap import (
+    KINDS,
+    PLACE,
+    POSE,
+    QUARTERS,
+    REST,
+    Measured,
+    by_kind,
+    calibration,
+    calibration_rows,
+    held_out,
+    kind_of,
+    mocap_report,
+    mocap_text,
+)
 from motet_train.evaluate.tables import json_ready
 
 

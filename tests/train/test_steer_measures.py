@@ -18,8 +18,7 @@ from motet.representation.contract import named
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.matching_rows import Recording, rows_of
 from motet_train.evaluate.steer.following import PACES, aside_errors, speed_errors, turn_errors
-from motet_train.evaluate.steer.standing import standing, stretches
-from motet_train.evaluate.steer.track import Track, tracks_of
+from motet_train.evaluate.steer.track import Track, standing, stretches, tracks_of
 from motet_train.evaluate.steer.wandering import Limits, Watch, broken, frozen, leaps, turns, wandering, watched
 
 
@@ -170,10 +169,9 @@ def test_figures_that_do_not_go_freeze() -> None:
     assert frozen(watched(puppets(gain=0.5), still_limits(), 60.0, 4), FPS).sum() == 4
 
 
-def test_watching_in_chunks_is_watching_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_watching_in_chunks_is_watching_at_once() -> None:
     first = watched(puppets(bend=kicks), still_limits(), 5.0, 3)
-    monkeypatch.setattr("motet_train.evaluate.steer.wandering.CHUNK", 7)
-    second = watched(puppets(bend=kicks), still_limits(), 5.0, 3)
+    second = watched(puppets(bend=kicks), still_limits(), 5.0, 3, chunk=7)
     for name in Watch.__dataclass_fields__:
         np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
     assert first.ground.shape == (150, 3, 3)

@@ -26,7 +26,7 @@ from motet_train.data.corpus import Record
 from motet_train.data.errors import DataError
 from motet_train.data.matching_rows import gaits_of, recordings
 from motet_train.data.store import Store, prepare
-from motet_train.evaluate.steer import following, standing
+from motet_train.evaluate.steer import following
 from motet_train.evaluate.steer.report import Recorded, seldom, steer_report, steer_text
 from motet_train.evaluate.tables import report_table
 from motet_train.runs import Run
@@ -73,8 +73,7 @@ def report(model: SteerModel, store: Store) -> Any:
         warnings.simplefilter("error")
         patch.setattr(following, "PHASES", 1)
         patch.setattr(following, "SETTLE", 0.2)
-        patch.setattr(standing, "STRAIGHT_SETTLE", 0.2)
-        patch.setattr(standing, "STRAIGHT_MEASURED", 2.0)
+        patch.setattr(following, "STRAIGHT", 2.0)
         return steer_report(model, Recorded.of(store), minutes=0.02, characters=3)
 
 

@@ -21,9 +21,8 @@ from motet.motion.kinematics import heading, local_rotations, positions
 from motet.motion.rotations import axis_to_rotmat, rotmat_to_rotvec, rotvec_to_rotmat
 from motet_train.cli.suites import Given, suite_of
 from motet_train.data.cmu_trials import CMU_FOLDER
-from motet_train.evaluate.figures import save
+from motet_train.evaluate.figures import looks_of, save
 from motet_train.evaluate.predict.floors import CONSTANT, DAMPED, ZERO
-from motet_train.evaluate.predict.plots import _looks
 from motet_train.papers.li2018 import from_config, published
 from motet_train.papers.li2018.convseq2seq import Config
 from motet_train.papers.li2018.expmap import (
@@ -219,7 +218,7 @@ def test_the_mean_is_that_of_the_actions_with_all_their_files() -> None:
 
 
 def test_twenty_systems_look_different() -> None:
-    looks = _looks([ZERO, CONSTANT, DAMPED, *(str(n) for n in range(20))])
+    looks = looks_of([ZERO, CONSTANT, DAMPED, *(str(n) for n in range(20))])
     assert len({(look["color"], look.get("linestyle")) for look in looks.values()}) == 23
     assert {looks[floor]["color"] for floor in (ZERO, CONSTANT, DAMPED)} == {"0.6"}
 

@@ -26,7 +26,7 @@ from motet_train.data.corpus import Record
 from motet_train.data.errors import DataError
 from motet_train.data.matching_rows import gaits_of, recordings
 from motet_train.data.store import Store, prepare
-from motet_train.evaluate.steer import following, standing
+from motet_train.evaluate.steer import following
 from motet_train.evaluate.steer.report import Recorded, steer_report
 from motet_train.papers.tdbn.clips import TRUNK_PART, body_parts
 from motet_train.papers.tdbn.steered import (
@@ -162,8 +162,7 @@ def test_it_is_measured_as_a_steered_figure_without_a_rival(model: TdbnModel, st
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(following, "PHASES", 1)
         patch.setattr(following, "SETTLE", 0.2)
-        patch.setattr(standing, "STRAIGHT_SETTLE", 0.2)
-        patch.setattr(standing, "STRAIGHT_MEASURED", 2.0)
+        patch.setattr(following, "STRAIGHT", 2.0)
         report = steer_report(steered, Recorded.of(store), minutes=0.02, characters=3)
     groups = ["walk", "run", "speed", "turn_walk", "turn_run", "aside", "random"]
     beside = [f"{gait}_{kind}" for gait in ("walk", "run") for kind in ("recorded", "held")]

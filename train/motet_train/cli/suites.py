@@ -22,14 +22,13 @@ from motet.models.tdbn_control import TdbnModel
 from motet_train.cli.train import read_expmap_files
 from motet_train.data.errors import DataError
 from motet_train.data.store import Store
-from motet_train.evaluate.figures import Drawings, strips
-from motet_train.evaluate.fill.report import FILL_GOALS, fill_report
+from motet_train.evaluate.figures import Drawings, error_over_time, strips
+from motet_train.evaluate.fill import FILL_GOALS, fill_report
 from motet_train.evaluate.language.describe import describe_report
 from motet_train.evaluate.language.generate import ASKED, LANGUAGE_GOALS, generate_report
 from motet_train.evaluate.language.search import SEARCH_GOALS, search_report
 from motet_train.evaluate.language.split_store import SplitStore, split_as
 from motet_train.evaluate.predict import liveliness, mocap
-from motet_train.evaluate.predict.plots import error_over_time
 from motet_train.evaluate.steer.report import Recorded, steer_report, steer_text
 from motet_train.evaluate.tables import Goals, Report, json_ready, report_table
 from motet_train.evaluate.text_adherence.prompts import outside, prompts, read_trials, trained_on

@@ -16,6 +16,7 @@ from motet.files import write_whole
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
+from motet_train.evaluate.predict.floors import CONSTANT, FLOORS
 
 SPACING = 0.6
 """Body heights from one stick figure to the next."""
@@ -94,3 +95,37 @@ def strips(motions: Sequence[Motion], titles: Sequence[str], title: str, count: 
         axes.set(xlim=(-SPACING, SPACING * count), ylim=(-0.05, 1.25))
         axes.set_title(text, fontsize=8, loc="left")
     return picture
+
+
+def error_over_time(errors: Mapping[str, Mapping[str, Array]], fps: float, unit: str) -> Figure:
+    """Errors (N,) of systems, a panel for each action or measure, against the true time at ``fps`` (as figures 3 and 4
+    of Li et al. 2018).
+
+    A panel ends a little above the largest error of what is not constant velocity, which soon leaves it.
+    """
+    columns = min(3, len(errors))
+    rows = -(-len(errors) // columns)
+    looks = looks_of(list(next(iter(errors.values()))))
+    beside = len(looks) > 4  # whose names have no room in a panel
+    figure, axes = panels(rows, columns, (4.2 * columns + 2.6 * beside, 3.2 * rows))
+    for axis in axes[len(errors) :]:
+        axis.remove()
+    for axis, (title, systems) in zip(axes, errors.items(), strict=False):
+        for name, error in systems.items():
+            axis.plot((np.arange(len(error)) + 1) / fps * 1000, error, label=name, **looks[name])
+        shown = [error for name, error in systems.items() if not name.startswith(CONSTANT)] or list(systems.values())
+        top = 1.1 * max(float(error.max()) for error in shown)
+        axis.set(title=title, xlabel="ms", ylabel=unit, ylim=(0, top))
+    if beside:
+        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside right upper")
+    else:
+        axes[0].legend()
+    return figure
+
+
+def looks_of(names: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """Colour and style of each system's line: floors are grey; other styles where the ten colours begin again."""
+    styles = ("-", "--", ":", "-.", (0, (1, 3)))
+    floors, others = ([name for name in names if (name in FLOORS) == is_floor] for is_floor in (True, False))
+    greys = {name: {"color": "0.6", "linewidth": 1.8, "linestyle": styles[n]} for n, name in enumerate(floors)}
+    return greys | {name: {"color": f"C{n % 10}", "linestyle": styles[n // 10 % 4]} for n, name in enumerate(others)}

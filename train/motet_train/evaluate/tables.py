@@ -1,6 +1,7 @@
 """The one writer of figures: reports, groups of figures with stable keys, as JSON and as text; tables of cells."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,6 @@ Report = dict[str, dict[str, float]]
 
 Goals = Mapping[str, tuple[float | None, float | None]]
 """Name of a figure, "GROUP.KEY" -> (least, most) that is to be reached."""
-
-GAP = "   "
 
 
 def gathered(parts: Iterable[Report], name: str) -> Report:
@@ -40,13 +39,12 @@ def aligned(rows: Sequence[Sequence[str]], left: Sequence[int] = (0,)) -> str:
 
     left: the columns that stand to the left; the others stand to the right.
     """
-    several = [row for row in rows if len(row) > 1]
-    widths = [max(len(row[i]) for row in several if i < len(row)) for i in range(max(map(len, several), default=0))]
+    columns = zip_longest(*(row for row in rows if len(row) > 1), fillvalue="")
+    pads = [(str.ljust if i in left else str.rjust, max(map(len, cells))) for i, cells in enumerate(columns)]
 
     def line(row: Sequence[str]) -> str:
-        cells = zip(row, widths, strict=False)
-        padded = [cell.ljust(width) if i in left else cell.rjust(width) for i, (cell, width) in enumerate(cells)]
-        return GAP.join(padded).rstrip() if len(row) > 1 else "".join(row)
+        padded = [pad(cell, width) for cell, (pad, width) in zip(row, pads, strict=False)]
+        return "   ".join(padded).rstrip() if len(row) > 1 else "".join(row)
 
     return "\n".join(map(line, rows))
 
@@ -57,16 +55,14 @@ def report_table(reports: Mapping[str, Report], goals: Goals, beside: Mapping[st
     beside: further columns, which need not reach goals.
     """
     columns = [*reports.values(), *(beside or {}).values()]
-    groups: dict[str, dict[str, None]] = {}
-    for report in reports.values():
-        for group, figures in report.items():
-            groups.setdefault(group, {}).update(dict.fromkeys(figures))
     rows = [["", *short_names(list(reports)), *(beside or {}), ""]]
-    for group, key in ((group, key) for group, keys in groups.items() for key in keys):
-        values = [report.get(group, {}).get(key) for report in columns]
-        shown = ["" if value is None else f"{value:.4g}" for value in values]
-        own = [value for value in values[: len(reports)] if value is not None]
-        rows.append([f"{group}.{key}", *shown, _goal(goals, f"{group}.{key}", own)])
+    groups = dict.fromkeys(group for report in reports.values() for group in report)
+    for group in groups:
+        for key in dict.fromkeys(key for report in reports.values() for key in report.get(group, {})):
+            values = [report.get(group, {}).get(key) for report in columns]
+            shown = ["" if value is None else f"{value:.4g}" for value in values]
+            own = [value for value in values[: len(reports)] if value is not None]
+            rows.append([f"{group}.{key}", *shown, _goal(goals, f"{group}.{key}", own)])
     return aligned(rows, left=(0, len(columns) + 1))
 
 
@@ -86,7 +82,5 @@ def _goal(goals: Goals, name: str, values: Sequence[float]) -> str:
     if name not in goals:
         return ""
     least, most = goals[name]
-    text = (
-        f"{least:g} to {most:g}" if None not in (least, most) else f">= {least:g}" if most is None else f"<= {most:g}"
-    )
+    text = f">= {least:g}" if most is None else f"<= {most:g}" if least is None else f"{least:g} to {most:g}"
     return f"{text:<12}" + ("" if all(reached(goals, name, value) for value in values) else "  NOT REACHED")

@@ -24,11 +24,8 @@ from motet.motion.humanoid import HUMANOID, on_humanoid
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
-from motet_train.evaluate.positions import BALLS, slide, stances
+from motet_train.evaluate.positions import BALLS, length, slide, stances
 from motet_train.evaluate.tables import Report, aligned, short_names
-
-GIVEN_SECONDS = 2.0
-"""Seconds of a recording's end by which its pace is known; or all of it, where it is shorter."""
 
 SPANS = ((0, 1), (1, 5), (5, 30))
 """Seconds after the recording's end."""
@@ -57,26 +54,24 @@ class Seen:
         first, last = round(start * self.fps), round(stop * self.fps)
         return Seen(self.points[max(0, first - 1) : last], self.fps)
 
+    def end(self) -> "Seen":
+        """The last two seconds, by which the pace is known; or all of it, where it is shorter."""
+        return Seen(self.points[-round(2 * self.fps) - 1 :], self.fps)
+
     @property
     def paces(self) -> Array:
         """The root's speeds (T - 1,) over the ground, m/s."""
-        speeds: Array = np.linalg.norm(np.diff(self.points[:, 0][:, [0, 2]], axis=0), axis=-1) * self.fps
-        return speeds
+        return length(np.diff(self.points[:, 0][:, [0, 2]], axis=0)) * self.fps
 
     @property
     def energy(self) -> float:
         """The mean speed of all joints as seen from the root, m/s."""
-        moved = np.diff(self.points - self.points[:, :1], axis=0)
-        return float(np.linalg.norm(moved, axis=-1).mean() * self.fps)
-
-    def last(self, seconds: float) -> "Seen":
-        """The last seconds."""
-        return Seen(self.points[-round(seconds * self.fps) - 1 :], self.fps)
+        return float(length(np.diff(self.points - self.points[:, :1], axis=0)).mean() * self.fps)
 
 
 def gait(seen: Seen) -> str | None:
     """ "walks" or "runs" for a recording of a second at least whose end goes, else None."""
-    paces = seen.last(GIVEN_SECONDS).paces
+    paces = seen.end().paces
     if len(paces) < round(seen.fps) - 1:
         return None
     halves = np.array_split(paces, max(1, round(2 * len(paces) / seen.fps)))
@@ -127,7 +122,7 @@ def figures(pairs: Sequence[tuple[Seen, Seen]]) -> dict[str, float]:
     of each span, the share of motions that keep their speed, and slides."""
     found = {}
     for start, stop in SPANS:
-        parts = [(given.last(GIVEN_SECONDS), following.part(start, stop)) for given, following in pairs]
+        parts = [(given.end(), following.part(start, stop)) for given, following in pairs]
         speeds = np.array([part.paces.mean() / given.paces.mean() for given, part in parts])
         key = f"{start}_{stop}_s"
         found[f"speed_{key}"] = float(np.median(speeds))
@@ -146,14 +141,12 @@ def _slide(parts: Iterable[Seen]) -> float:
 def _apart(model: PredictModel, writer: CodesModel, motion: Motion) -> dict[str, float]:
     """How far apart joints of three futures are, centimetres, at the end of the first two spans: in the world ("place")
     and as seen from the root ("pose")."""
-    frames = round(SPANS[1][1] * model.fps)
+    frames, found = round(SPANS[1][1] * model.fps), {}
     futures = [Seen.of(one).points for one in model.futures(motion, frames=frames, beyond=writer, samples=3)]
-    found = {}
     for _, stop in SPANS[:2]:
         poses = [points[round(stop * model.fps) - 1] for points in futures]
         for key, seen in (("place", poses), ("pose", [pose - pose[:1] for pose in poses])):
-            far = [np.linalg.norm(one - other, axis=-1).mean() for one, other in combinations(seen, 2)]
-            found[f"{key}_cm_{stop}_s"] = 100 * float(np.mean(far))
+            found[f"{key}_cm_{stop}_s"] = 100 * float(np.mean([length(a - b).mean() for a, b in combinations(seen, 2)]))
     return found
 
 
@@ -169,19 +162,16 @@ def alive_table(found: Mapping[str, Figures]) -> str:
 
 def _rows(kind: str, reports: Mapping[str, Report]) -> list[Sequence[str]]:
     written = {"speed": ".2f", "kept": "4.0%", "energy": ".2f", "slide_cm": "4.1f"}
-    spans = [f"{start}_{stop}_s" for start, stop in SPANS]
     recorded = next(iter(reports.values()))["recorded"]
-    said = ", ".join(span.removesuffix("_s").replace("_", "-") for span in spans)
     rows: list[Sequence[str]] = [
-        [f"{recorded['recordings']:.0f} {kind} continued; after {said} s"],
+        [f"{recorded['recordings']:.0f} {kind} continued; after {', '.join(f'{a}-{b}' for a, b in SPANS)} s"],
         ["", "speed / given", "within 15%", "energy / given", "slide, cm"],
         ["  the recordings", "", "", "", f"{recorded['slide_cm']:.1f}"],
     ]
     for number, (name, report) in enumerate(reports.items()):
         for system in list(CONTINUED)[min(number, 1) :]:
-            cells = [
-                "  ".join(f"{report[system][f'{key}_{span}']:{how}}" for span in spans) for key, how in written.items()
-            ]
+            own = report[system]
+            cells = ["  ".join(f"{own[f'{key}_{a}_{b}_s']:{how}}" for a, b in SPANS) for key, how in written.items()]
             rows.append([f"  {CONTINUED[system].format(name=name)}", *cells])
     rows.append(["  joints of different futures apart, cm: in the world, seen from the root"])
     for name, report in reports.items():

@@ -5,51 +5,54 @@ All changes are measured from several phases of the stride: each figure goes on 
 place over the ground and its facing.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from motet.models.steer import SteerModel
-from motet.models.steer_session import SteerSession
 from motet.motion.rotations import Array, wrapped
-from motet_train.evaluate.positions import arrival
-from motet_train.evaluate.steer.standing import standing
-from motet_train.evaluate.steer.track import Track
+from motet_train.evaluate.positions import arrival, length
+from motet_train.evaluate.steer.track import Track, standing
 
 PHASES = 8
 """Times of a change, four ticks apart."""
 
-SETTLE = 3.0
-"""Seconds before a change."""
+SETTLE, STRAIGHT = 3.0, 10.0
+"""Seconds before a change or a measurement, and of going straight on that are measured."""
+
+MEASURED_SPEEDS = {"walk": 1.4, "run": 3.0}
+"""m/s at which a gait is measured."""
 
 PACES = (0.0, 0.6, 1.0, 1.4, 1.8, 2.0, 2.5, 3.0, 3.5, 4.0)
 """Speeds in m/s between which is changed."""
 
 
-@dataclass(frozen=True)
-class Asked:
-    """What N figures are told: gaits, speeds in m/s, directions and facings in degrees."""
+Asked = dict[str, Any]
+"""What N figures are told: all that :meth:`SteerSession.control` takes of them."""
 
-    gait: tuple[str, ...]
-    speed: ArrayLike = 0.0
-    direction: ArrayLike = 0.0
-    facing: ArrayLike = 0.0
+AHEAD: Asked = {"direction": 0.0, "facing": 0.0}
 
-    def tell(self, session: SteerSession) -> None:
-        """Tell it to all characters of a session."""
-        session.control(gait=self.gait, speed=self.speed, direction=self.direction, facing=self.facing)
+
+def straight_on(model: SteerModel, gait: str, hold_feet: bool) -> Track:
+    """Six figures that go straight on, in different directions, at the speed of :data:`MEASURED_SPEEDS`."""
+    session = model.start(gait, characters=6, hold_feet=hold_feet)
+    session.control(speed=MEASURED_SPEEDS[gait], direction=np.arange(6) * 60.0)
+    poses = [session.tick() for _ in range(round((SETTLE + STRAIGHT) * model.fps))]
+    return Track.of(poses, model.fps)[round(SETTLE * model.fps) :]
 
 
 def responses(model: SteerModel, before: Asked, after: Asked, seconds: float, hold_feet: bool = False) -> list[Track]:
     """What N figures do from the tick of a change on, for each phase."""
     tracks = []
     for phase in range(PHASES):
-        session = model.start(characters=len(before.gait), hold_feet=hold_feet)
-        before.tell(session)
+        session = model.start(characters=len(before["gait"]), hold_feet=hold_feet)
+        session.control(**before)
         poses = [session.tick() for _ in range(round(SETTLE * model.fps) + 4 * phase)][-1:]
-        after.tell(session)
+        session.control(**after)
         poses += [session.tick() for _ in range(round(seconds * model.fps))]
         tracks.append(Track.of(poses, model.fps))
     return tracks
@@ -70,13 +73,11 @@ class Ground:
     def gone(self, start: float, stop: float) -> Array:
         """The mean velocity (B, 2) over the ground between two times."""
         first, last = round(start * self.fps), round(stop * self.fps)
-        found: Array = (self.places[last, :, :2] - self.places[first, :, :2]) * self.fps / (last - first)
-        return found
+        return (self.places[last, :, :2] - self.places[first, :, :2]) * self.fps / (last - first)
 
     def pace(self, start: float, stop: float) -> Array:
         """The mean speed (B,) between two times."""
-        found: Array = np.linalg.norm(self.gone(start, stop), axis=1)
-        return found
+        return length(self.gone(start, stop))
 
     def way_off(self, asked: Array, start: float, stop: float) -> Array:
         """By how many degrees (B,) figures go elsewhere than asked (B,), between two times; 180 for none that goes."""
@@ -93,8 +94,7 @@ class Ground:
         asked (B,), in degrees, and stays so to the end; infinite where it does not."""
         half = round(calm * self.fps / 2)
         steps = self.places[2 * half :, :, :2] - self.places[: -2 * half, :, :2]  # around ticks half, half + 1, ...
-        there = np.abs(_off(steps, asked)) <= 10
-        return arrival(there, self.fps) + half / self.fps
+        return arrival(np.abs(_off(steps, asked)) <= 10, self.fps) + half / self.fps
 
 
 def _off(velocity: Array, asked: Array) -> Array:
@@ -103,17 +103,25 @@ def _off(velocity: Array, asked: Array) -> Array:
     return found
 
 
+def gait_figures(model: SteerModel, gait: str) -> dict[str, float]:
+    """How a gait stands, see :func:`standing`, with the foot lock, and without ("free")."""
+    free = standing([straight_on(model, gait, False)])
+    return standing([straight_on(model, gait, True)]) | {f"free_{name}": value for name, value in free.items()}
+
+
 def speed_errors(model: SteerModel) -> dict[str, float]:
     """How far the speed is off, as a share of what was asked: the mean velocity from 1 to 2 s after a change between
     all pairs of :data:`PACES`, straight on; up to 1.8 m/s it is a walk, above a run. Mean, worst, the mean for each new
     speed; rest: m/s where 0 was asked.
     """
-    pairs = [(a, b) for a, b in product(PACES, PACES) if a != b]
-    old, new = np.array(pairs).T
+    old, new = np.array([(a, b) for a, b in product(PACES, PACES) if a != b]).T
     # who stands, stands in the gait that comes, and stops in the gait that was
     gaits = (np.where(own > 0, own, other) for own, other in ((old, new), (new, old)))
-    before, after = (tuple("walk" if pace <= 1.8 else "run" for pace in paces) for paces in gaits)
-    ground = Ground.of(responses(model, Asked(before, old), Asked(after, new), 2.0))
+    before, after = (
+        {**AHEAD, "gait": tuple("walk" if pace <= 1.8 else "run" for pace in own), "speed": speed}
+        for own, speed in zip(gaits, (old, new), strict=True)
+    )
+    ground = Ground.of(responses(model, before, after, 2.0))
     off = np.abs(ground.pace(1.0, 2.0).reshape(PHASES, -1) - new) / np.where(new > 0, new, 1)
     moving, rest = off[:, new > 0], off[:, new == 0]
     found = {"mean": moving.mean(), "worst": moving.max(), "rest": rest.mean(), "rest_worst": rest.max()}
@@ -129,8 +137,8 @@ def turn_errors(model: SteerModel, gait: str, pace: float) -> dict[str, float]:
     """
     turns, calm = (45, 90, 135, 180), 0.5
     angles = np.array([side * turn for turn in turns for side in (1, -1)], dtype=np.float64)
-    before = Asked((gait,) * len(angles), pace)
-    tracks = responses(model, before, replace(before, direction=angles, facing=angles), 4.0 + calm, hold_feet=True)
+    before = {**AHEAD, "gait": (gait,) * len(angles), "speed": pace}
+    tracks = responses(model, before, {**before, "direction": angles, "facing": angles}, 4.0 + calm, hold_feet=True)
     ground, asked = Ground.of(tracks), np.tile(angles, PHASES)
     seconds = ground.seconds(asked, calm)
     way, facing = ground.way_off(asked, 2.0, 3.0), ground.facing_off(asked, 2.0, 3.0)
@@ -147,19 +155,18 @@ def aside_errors(model: SteerModel) -> dict[str, float]:
     are off, and the error of the speed as a share, from 2 to 4 s after the change."""
     ways, slowly = {"left": 90.0, "right": -90.0, "back": 180.0}, 0.8
     asked = np.repeat(list(ways.values()), 2)
-    before = Asked(("walk",) * len(asked), np.tile([0.0, 1.4], len(ways)))
-    ground = Ground.of(responses(model, before, replace(before, speed=slowly, direction=asked), 4.0))
+    before = {**AHEAD, "gait": ("walk",) * len(asked), "speed": np.tile([0.0, 1.4], len(ways))}
+    ground = Ground.of(responses(model, before, {**before, "speed": slowly, "direction": asked}, 4.0))
     asked = np.tile(asked, PHASES)
-    way, facing = ground.way_off(asked, 2.0, 4.0), ground.facing_off(np.zeros_like(asked), 2.0, 4.0)
-    speed = np.abs(ground.pace(2.0, 4.0) / slowly - 1)
+    off = {
+        "direction": ground.way_off(asked, 2.0, 4.0),
+        "facing": ground.facing_off(np.zeros_like(asked), 2.0, 4.0),
+        "speed": np.abs(ground.pace(2.0, 4.0) / slowly - 1),
+    }
     return _floats(
-        {
-            f"{name}_{key}": values[asked == angle].mean()
-            for name, angle in ways.items()
-            for key, values in (("direction", way), ("facing", facing), ("speed", speed))
-        }
+        {f"{name}_{key}": of[asked == angle].mean() for name, angle in ways.items() for key, of in off.items()}
     )
 
 
-def _floats(found: dict[str, float]) -> dict[str, float]:
+def _floats(found: Mapping[str, float]) -> dict[str, float]:
     return {name: float(value) for name, value in found.items()}

@@ -3,7 +3,7 @@
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
-from functools import partial, singledispatch
+from functools import partial
 
 from motet.decode.matching import SteeringSettings
 from motet.errors import ControlWarning
@@ -11,9 +11,14 @@ from motet.models.steer import SteerModel
 from motet_train.data.errors import DataError
 from motet_train.data.matching_rows import Recording, gaits_of, recordings, rows_of
 from motet_train.data.store import Store
-from motet_train.evaluate.steer.following import aside_errors, speed_errors, turn_errors
-from motet_train.evaluate.steer.standing import MEASURED_SPEEDS, held_on, standing, stretches
-from motet_train.evaluate.steer.track import Track, tracks_of
+from motet_train.evaluate.steer.following import (
+    MEASURED_SPEEDS,
+    aside_errors,
+    gait_figures,
+    speed_errors,
+    turn_errors,
+)
+from motet_train.evaluate.steer.track import Track, standing, stretches, tracks_of
 from motet_train.evaluate.steer.wandering import Limits, wandering
 from motet_train.evaluate.tables import Goals, Report, gathered, report_table
 
@@ -51,23 +56,17 @@ class Recorded:
         if store.representation != "root_sixd":
             what = f"in root_sixd (motet prepare --for codes), not {store.representation}"
             raise DataError(f"figures that are steered are measured beside a store {what}")
-        return Recorded(_shown(store, True), _shown(store, False))
-
-    def limits(self) -> Limits:
-        """The most that they do."""
-        return Limits.of([track for _, track in self.held])
+        gaits, shown = gaits_of(store), []
+        for held in (True, False):
+            found = recordings(store, gaits, held)
+            rows = rows_of(found, tuple(gait.name for gait in gaits), SteeringSettings())
+            shown.append(list(zip(found, tracks_of(found, rows), strict=True)))
+        return Recorded(*shown)
 
     def standing(self, gait: str, held: bool) -> dict[str, float]:
         """The figures of :func:`standing`, of stretches of a gait's recordings."""
         own = [track for one, track in (self.held if held else self.plain) if gait in one.gaits]
         return standing([part for track in own for part in stretches(track, MEASURED_SPEEDS[gait])])
-
-
-def _shown(store: Store, held: bool) -> list[tuple[Recording, Track]]:
-    gaits = gaits_of(store)
-    found = recordings(store, gaits, held)
-    rows = rows_of(found, tuple(gait.name for gait in gaits), SteeringSettings())
-    return list(zip(found, tracks_of(found, rows), strict=True))
 
 
 def steer_report(model: SteerModel, recorded: Recorded, minutes: float = 10.0, characters: int = 100) -> Report:
@@ -85,30 +84,20 @@ def steer_report(model: SteerModel, recorded: Recorded, minutes: float = 10.0, c
 
 
 def _parts(model: SteerModel, recorded: Recorded, minutes: float, characters: int) -> Iterator[Report]:
-    limits = recorded.limits()
+    limits = Limits.of([track for _, track in recorded.held])
     measures: dict[str, Callable[[SteerModel], dict[str, float]]] = {
-        **{gait: partial(_standing, gait=gait) for gait in MEASURED_SPEEDS},
+        **{gait: partial(gait_figures, gait=gait) for gait in MEASURED_SPEEDS},
         "speed": speed_errors,
         **{f"turn_{gait}": partial(turn_errors, gait=gait, pace=pace) for gait, pace in MEASURED_SPEEDS.items()},
         "aside": aside_errors,
         "random": partial(wandering, limits=limits, seconds=60 * minutes, characters=characters),
     }
-    for ending, one in {"": model, **rivals(model)}.items():
+    rivals = {"_seldom": seldom(model)} if isinstance(model, SteerModel) else {}
+    for ending, one in {"": model, **rivals}.items():
         yield from ({f"{name}{ending}": measure(one)} for name, measure in measures.items())
     for gait in MEASURED_SPEEDS:
         yield {f"{gait}_recorded": recorded.standing(gait, False), f"{gait}_held": recorded.standing(gait, True)}
     yield {"random_held": {"largest_turn": float(limits.turn.max()), "largest_leap": 1.0}}
-
-
-@singledispatch
-def rivals(_: object) -> dict[str, SteerModel]:
-    """What a model is measured beside, by the ends of the groups' names: nothing where it does not search."""
-    return {}
-
-
-@rivals.register
-def _(model: SteerModel) -> dict[str, SteerModel]:
-    return {"_seldom": seldom(model)}
 
 
 def seldom(model: SteerModel, every: int = 30) -> SteerModel:
@@ -117,12 +106,6 @@ def seldom(model: SteerModel, every: int = 30) -> SteerModel:
     own = {**asdict(model.settings(SteeringSettings)), "search_every": every}
     manifest = replace(model.manifest, settings={**model.manifest.settings, SteeringSettings.FEATURE: own})
     return SteerModel(manifest, {}, model.tables)
-
-
-def _standing(model: SteerModel, gait: str) -> dict[str, float]:
-    """With the foot lock, and without ("free")."""
-    free = standing([held_on(model, gait, False)])
-    return standing([held_on(model, gait, True)]) | {f"free_{name}": value for name, value in free.items()}
 
 
 def steer_text(reports: Mapping[str, Report]) -> str:

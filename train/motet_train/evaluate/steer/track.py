@@ -1,4 +1,4 @@
-"""What figures did, steered or recorded, as all measures see it."""
+"""What figures did, steered or recorded, as all measures see it, and how well they stand and how calmly they move."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,6 +15,7 @@ from motet.motion.rotations import Array, quat_to_rotmat
 from motet.representation.root_sixd import ROOT_SIXD
 from motet_train.data.matching_rows import MatchingRows, Recording
 from motet_train.data.sixd_windows import poses_of
+from motet_train.evaluate.positions import BALLS, acceleration, length, running_mean, slide, speed, spells, stances
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,22 +63,56 @@ class Track:
     def soles(self) -> Array:
         """Points (T, B, 6, 3): heel, ball and tip of the left sole, then of the right one."""
         turned, places = (_flat(part).astype(np.float64) for part in self.transforms)
-        found = sole_points(quat_to_rotmat(turned), places)
-        return found.reshape(*self.height.shape, -1, 3)
+        return sole_points(quat_to_rotmat(turned), places).reshape(*self.height.shape, -1, 3)
 
 
 def tracks_of(found: Sequence[Recording], rows: MatchingRows) -> list[Track]:
     """What recordings show, each as one figure; ``rows`` are those of all of them."""
     tracks, start = [], 0
     for one in found:
-        part = slice(start, start := start + len(one.features))
-        way = poses_of(one.features.select(ROOT_SIXD).values, one.features.fps)
-        parts = (way[:, None], rows.poses[part, :-1].reshape(len(way), 1, -1, 4), rows.poses[part, -1:])
-        ground, rotations, height = parts
-        tracks.append(Track(ground, rotations.astype(np.float32), height.astype(np.float32), one.features.fps))
+        own = rows.poses[start : (start := start + len(one.features))].astype(np.float32)
+        ground = poses_of(one.features.select(ROOT_SIXD).values, one.features.fps)[:, None]
+        tracks.append(Track(ground, own[:, :-1].reshape(len(own), 1, -1, 4), own[:, -1:], one.features.fps))
     return tracks
 
 
 def _flat(values: NDArray[Any]) -> NDArray[Any]:
     """Values (T, B, ...) as (T B, ...)."""
     return values.reshape(-1, *values.shape[2:])
+
+
+def stretches(track: Track, pace: float) -> list[Track]:
+    """The parts of a recording, of a second at least, whose mean speed over half a second is within a fifth of
+    ``pace``, m/s."""
+    steps = length(np.gradient(track.ground[:, 0, :2], axis=0)).astype(np.float64) * track.fps
+    paces = running_mean(steps, min(round(0.5 * track.fps), len(steps)))
+    inside = spells(np.abs(paces - pace) <= 0.2 * pace)
+    return [track[start:stop] for start, stop in inside if stop - start >= track.fps]
+
+
+def standing(tracks: Sequence[Track]) -> dict[str, float]:
+    """By the measures of :mod:`motet_train.evaluate.positions`: how far the balls of the feet and the points of the
+    soles slide in a stance, cm; how fast the balls are while they stand, m/s; and the acceleration of all joints,
+    m/s^2. Means over stances or frames."""
+    stood, soles_stood, speeds, calm, frames = list[Array](), list[Array](), list[float](), list[float](), list[int]()
+    for track in tracks:
+        for figure in range(track.height.shape[1]):
+            places, soles = (of[:, figure].astype(np.float64) for of in (track.places, track.soles))
+            root = places[:, 0]
+            stood += stances(places[:, BALLS], root, track.fps)
+            soles_stood += stances(soles, root, track.fps)
+            speeds.append(speed(places[:, BALLS], root, track.fps))
+            calm.append(acceleration(places, root, track.fps))
+            frames.append(len(places))
+    return {
+        "slide_cm": 100 * slide(stood),
+        "sole_slide_cm": 100 * slide(soles_stood),
+        "toe_speed": _mean(speeds, frames),
+        "acceleration": _mean(calm, frames),
+    }
+
+
+def _mean(values: Sequence[float], weights: Sequence[int]) -> float:
+    """The weighed mean of the values that are numbers; NaN where none is."""
+    known = np.array([pair for pair in zip(values, weights, strict=True) if np.isfinite(pair[0]) and pair[1]])
+    return float(np.average(known[:, 0], weights=known[:, 1])) if len(known) else np.nan

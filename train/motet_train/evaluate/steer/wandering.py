@@ -3,23 +3,19 @@
 What its joints do from tick to tick is held against what they do in the recordings that it plays (:class:`Limits`).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from motet.bundle.graph import Floats
 from motet.models.steer import SteerModel
 from motet.motion.humanoid import BONES, HUMANOID
 from motet.motion.rotations import Array
 from motet.motion.skeleton import partners_of
+from motet_train.evaluate.positions import Flags, length
 from motet_train.evaluate.steer.track import Track
-
-CHUNK = 30
-"""Ticks whose joints are looked at together."""
-
-Flags = NDArray[np.bool_]
-Numbers = NDArray[Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,30 +32,27 @@ class Limits:
     @staticmethod
     def of(tracks: list[Track]) -> "Limits":
         """Those of recordings."""
-        turn = _either(np.max([turns(track).max(axis=(0, 1)) for track in tracks], axis=0), BONES)
-        leap = _either(np.max([leaps(track).max(axis=(0, 1)) for track in tracks], axis=0), HUMANOID.names)
+
+        def most(of: Callable[[Track], Array], names: tuple[str, ...]) -> Array:
+            values = np.max([of(track).max(axis=(0, 1)) for track in tracks], axis=0)
+            found: Array = np.maximum(values, values[list(partners_of(names))])
+            return found
+
         heights = np.concatenate([track.height[:, 0] for track in tracks])
-        return Limits(turn, leap, float(heights.min()), float(heights.max()))
-
-
-def _either(values: Array, names: tuple[str, ...]) -> Array:
-    found: Array = np.maximum(values, values[list(partners_of(names))])
-    return found
+        return Limits(most(turns, BONES), most(leaps, HUMANOID.names), float(heights.min()), float(heights.max()))
 
 
 def turns(track: Track) -> Array:
     """Degrees (T - 1, B, J) by which bones turn from frame to frame, seen from their parents."""
     a, b = track.rotations[:-1].astype(np.float64), track.rotations[1:]
     signs = np.where((a * b).sum(axis=-1, keepdims=True) < 0, -1, 1)
-    chord = np.linalg.norm(a - signs * b, axis=-1)
-    found: Array = np.degrees(4 * np.arcsin(np.minimum(chord / 2, 1)))
+    found: Array = np.degrees(4 * np.arcsin(np.minimum(length(a - signs * b) / 2, 1)))
     return found
 
 
 def leaps(track: Track) -> Array:
     """Metres (T - 1, B, J') by which joints move from frame to frame, as the figures see it."""
-    found: Array = np.linalg.norm(np.diff(track.seen().places, axis=0), axis=-1)
-    return found
+    return length(np.diff(track.seen().places, axis=0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,14 +64,14 @@ class Watch:
     share of that. height: of the hips. lowest: of the soles.
     """
 
-    ground: Numbers
-    asked: Numbers
-    since: Numbers
+    ground: Array
+    asked: Floats
+    since: NDArray[np.int32]
     finite: Flags
-    turn: Numbers
-    leap: Numbers
-    height: Numbers
-    lowest: Numbers
+    turn: Floats
+    leap: Floats
+    height: Floats
+    lowest: Array
 
 
 class _Teller:
@@ -112,35 +105,33 @@ class _Teller:
         self.speed = np.hypot(*self.session.target[:, :2].T)  # within what gaits can do that way
 
 
-def watched(model: SteerModel, limits: Limits, seconds: float, characters: int, seed: int = 1) -> Watch:
-    """What figures do that are told anything at random, with the foot lock."""
-    teller, fps = _Teller(model, characters, seed), model.fps
+def watched(
+    model: SteerModel, limits: Limits, seconds: float, characters: int, seed: int = 1, chunk: int = 30
+) -> Watch:
+    """What figures do that are told anything at random, with the foot lock. chunk: ticks looked at together."""
+    teller, ticks = _Teller(model, characters, seed), round(seconds * model.fps)
     last, parts = [teller.session.tick()], []
-    for start in range(0, round(seconds * fps), CHUNK):
-        poses, asked = [], []
-        for _ in range(min(CHUNK, round(seconds * fps) - start)):
+    for start in range(0, ticks, chunk):
+        poses, asked, since = [], [], []
+        for _ in range(min(chunk, ticks - start)):
             teller.tell()
             poses.append(teller.session.tick())
-            asked.append((teller.speed.copy(), teller.since.copy()))
-        parts.append(_seen(Track.of([*last, *poses], fps), limits, *map(np.stack, zip(*asked, strict=True))))
-        last = poses[-1:]
+            asked.append(teller.speed.astype(np.float32))
+            since.append(teller.since.astype(np.int32))
+        track = Track.of([*last, *poses], model.fps)
+        now, last = track[1:], poses[-1:]
+        part = Watch(
+            ground=now.ground,
+            asked=np.stack(asked),
+            since=np.stack(since),
+            finite=np.asarray(np.isfinite(now.places).all(axis=(2, 3)) & np.isfinite(now.ground).all(axis=2)),
+            turn=turns(track).max(axis=2).astype(np.float32),
+            leap=(leaps(track) / np.maximum(limits.leap, 1e-3)).max(axis=2).astype(np.float32),
+            height=now.height,
+            lowest=now.soles[..., 1].min(axis=2),
+        )
+        parts.append(part)
     return Watch(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Watch)))
-
-
-def _seen(track: Track, limits: Limits, asked: Array, since: Array) -> Watch:
-    """The watch of all frames of a track but the first."""
-    turned, moved, now = turns(track), leaps(track) / np.maximum(limits.leap, 1e-3), track[1:]
-    finite = np.isfinite(now.places).all(axis=(2, 3)) & np.isfinite(now.ground).all(axis=2)
-    return Watch(
-        ground=now.ground,
-        asked=asked.astype(np.float32),
-        since=since.astype(np.int32),
-        finite=np.asarray(finite),
-        turn=turned.max(axis=2).astype(np.float32),
-        leap=moved.max(axis=2).astype(np.float32),
-        height=now.height,
-        lowest=now.soles[..., 1].min(axis=2),
-    )
 
 
 def broken(watch: Watch, limits: Limits) -> Flags:

@@ -20,8 +20,7 @@ from motet.motion.kinematics import skeleton_of
 from motet.motion.rotations import Array, axis_to_rotmat, rotvec_to_rotmat
 from motet.motion.skeleton import Skeleton
 from motet_train.data.cmu_trials import cmu_trial
-from motet_train.evaluate.figures import SPACING, Drawings, bones_of, in_profile, panels, stick_figures
-from motet_train.evaluate.predict.plots import error_over_time
+from motet_train.evaluate.figures import SPACING, Drawings, bones_of, error_over_time, in_profile, panels, stick_figures
 from motet_train.papers.li2018.expmap import CMU_LAYOUT, OUTPUT_FRAMES, SEED_FRAMES, STRIDE, ExpmapCorpus
 from motet_train.papers.li2018.protocol import predictor, windows
 from motet_train.papers.li2018.report import MANY, Results

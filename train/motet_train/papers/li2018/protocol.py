@@ -11,8 +11,17 @@ from numpy.typing import NDArray
 from motet.models.predict import PredictModel
 from motet.motion.rotations import Array, rotmat_to_rotvec, rotvec_to_rotmat
 from motet_train.data.errors import DataError
-from motet_train.evaluate.predict.floors import CONSTANT, DAMPED, DECAYS, ZERO, best, gone_on, reach, turned_on
-from motet_train.evaluate.predict.frames import REPORTED
+from motet_train.evaluate.predict.floors import (
+    CONSTANT,
+    DAMPED,
+    DECAYS,
+    REPORTED,
+    ZERO,
+    best,
+    gone_on,
+    reach,
+    turned_on,
+)
 from motet_train.papers.li2018.expmap import (
     CONSTANT_STD,
     OUTPUT_FRAMES,

@@ -16,8 +16,7 @@ from tqdm import tqdm
 from motet.models.predict import PredictModel
 from motet.motion.rotations import Array
 from motet_train.data.errors import DataError
-from motet_train.evaluate.predict.floors import FLOORS, key
-from motet_train.evaluate.predict.frames import REPORTED, by_frame
+from motet_train.evaluate.predict.floors import FLOORS, REPORTED, by_frame, key
 from motet_train.evaluate.tables import aligned, short_names
 from motet_train.papers.li2018.expmap import ExpmapCorpus, scaling_of
 from motet_train.papers.li2018.protocol import errors, predictions, predictor, rotation_errors, text_floors, true_times

@@ -2,11 +2,10 @@
 sharply joints move, of a model and of plain ways through."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from motet.models.fill import FillModel
 from motet.motion.feet.contacts import ContactSettings, ground_speeds, standing
@@ -15,19 +14,11 @@ from motet.motion.rotations import Array
 from motet.representation.placed import ROOT_PLACE, bridge, placed_by_way, straight
 from motet_train.data.errors import DataError
 from motet_train.data.store import Store, split
+from motet_train.evaluate.positions import jerk, length
 from motet_train.evaluate.tables import Goals, Report, gathered
 from motet_train.models.kinematics import SixdPlaces, tree_of
 
-GAP_SECONDS = (0.5, 1.0, 2.0)
-"""Of the gaps."""
-
 FOOT_JOINTS = [HUMANOID.index(sided(side, part)) for side in LEFT_RIGHT for part in ("Foot", "Toes")]
-
-FEET_STAND = ContactSettings(heights=(0.15, 0.15), speeds=(0.2, 0.2))
-"""Joints of feet: the ankle of a foot that stands is 8 cm above the ground."""
-
-GOING = 0.5
-"""Metres a second that the hips go over the ground, from one end of a gap to the other, of a figure on its way."""
 
 MARGIN = 3
 """Frames before and after a gap whose joints are looked at with it, so that joins count."""
@@ -45,8 +36,7 @@ PLAIN_WAYS: Mapping[str, "Fill"] = {
 Fill = Callable[[Array, Array, int], Array]
 
 
-@dataclass(frozen=True)
-class Window:
+class Window(NamedTuple):
     """Placed frames before a gap, in it and after it: (P, E), (N, E), (A, E)."""
 
     past: Array
@@ -58,8 +48,8 @@ def fill_report(model: FillModel, store: Store) -> Report:
     """The figures of a model on the test part of a store in ``root_sixd``; DataError for another store.
 
     Of each gap, "gap_0.5" and so on: joints' mean distance in the world "cm", and in gaps where the figure is on its
-    way (:data:`GOING`) "cm_going", the speed of feet that stood "slide" in cm a second, "jerk" over the recorded; each
-    of the model as it is, of :data:`PLAIN_WAYS` with their names behind, and of the recording.
+    way, .5 m/s from one end to the other, "cm_going"; the speed of feet that stood "slide" in cm a second, "jerk" over
+    the recorded; each of the model as it is, of :data:`PLAIN_WAYS` with their names behind, and of the recording.
     """
     if store.representation != "root_sixd":
         raise DataError(f"gaps are measured in root_sixd (motet prepare --for codes), not in {store.representation}")
@@ -68,7 +58,7 @@ def fill_report(model: FillModel, store: Store) -> Report:
 
 def _parts(model: FillModel, store: Store) -> Iterator[Report]:
     joints = SixdPlaces(tree_of(store.contract((0,))))
-    for seconds in GAP_SECONDS:
+    for seconds in (0.5, 1.0, 2.0):
         windows = list(_windows(model, store, round(seconds * model.fps)))
         if not windows:
             raise DataError(f"no test trial is long enough for a gap of {seconds:g} s")
@@ -91,24 +81,27 @@ def _windows(model: FillModel, store: Store, frames: int) -> Iterator[Window]:
 def _figures(joints: SixdPlaces, systems: Mapping[str, Fill], windows: list[Window], fps: float) -> dict[str, float]:
     true = _places(joints, windows, [one.truth for one in windows])
     feet = true[:, :, FOOT_JOINTS]
-    speeds = np.linalg.norm(np.diff(feet, axis=1), axis=-1) * fps
-    stands = standing(feet[:, 1:, :, 1], speeds, FEET_STAND)
-    ways = np.array([np.linalg.norm((one.after[0] - one.past[-1])[[0, 2]]) for one in windows])
-    going = ways * fps / (len(windows[0].truth) + 1) > GOING
-    found: dict[str, float] = {
-        "gaps": float(len(windows)),
-        "gaps_going": float(going.sum()),
-        "jerk_recorded": _jerk(true) * fps**3,
-    }
+    # the ankle of a foot that stands is 8 cm above the ground
+    low_and_slow = ContactSettings(heights=(0.15, 0.15), speeds=(0.2, 0.2))
+    stands = standing(feet[:, 1:, :, 1], length(np.diff(feet, axis=1)) * fps, low_and_slow)
+
+    def slide(places: Array) -> float:
+        """Centimetres a second over the ground of feet while those recorded stand."""
+        over = ground_speeds(places[:, :, FOOT_JOINTS], fps)
+        return 100 * float(over[stands].mean()) if stands.any() else np.nan
+
+    ways = length(np.array([(one.after[0] - one.past[-1])[[0, 2]] for one in windows]))
+    going = ways * fps / (len(windows[0].truth) + 1) > 0.5
+    found = {"gaps": float(len(windows)), "gaps_going": float(going.sum()), "jerk_recorded": jerk(true, fps)}
     for name, fill in systems.items():
         places = _places(joints, windows, [fill(one.past, one.after, len(one.truth)) for one in windows])
-        off = np.linalg.norm(places - true, axis=-1)[:, MARGIN:-MARGIN]
+        off = length(places - true)[:, MARGIN:-MARGIN]
         tail = f"_{name}" if name else ""
         found[f"cm{tail}"] = 100 * float(off.mean())
-        found[f"cm_going{tail}"] = 100 * float(off[going].mean()) if going.any() else float("nan")
-        found[f"slide{tail}"] = _slide(places, stands, fps)
-        found[f"jerk{tail}"] = _jerk(places) / _jerk(true)
-    found["slide_recorded"] = _slide(true, stands, fps)
+        found[f"cm_going{tail}"] = 100 * float(off[going].mean()) if going.any() else np.nan
+        found[f"slide{tail}"] = slide(places)
+        found[f"jerk{tail}"] = jerk(places, fps) / found["jerk_recorded"]
+    found["slide_recorded"] = slide(true)
     found["of_interpolation"] = found["cm"] / found["cm_interpolation"]
     found["of_interpolation_going"] = found["cm_going"] / found["cm_going_interpolation"]
     return found
@@ -123,14 +116,3 @@ def _places(joints: SixdPlaces, windows: list[Window], filled: list[Array]) -> A
     with torch.inference_mode():
         found: Array = (joints(frames[..., ROOT_PLACE:]) + frames[..., None, :ROOT_PLACE]).numpy().astype(np.float64)
     return found
-
-
-def _slide(places: Array, stands: NDArray[np.bool_], fps: float) -> float:
-    """Centimetres a second over the ground of feet while those recorded stand."""
-    over = ground_speeds(places[:, :, FOOT_JOINTS], fps)
-    return 100 * float(over[stands].mean()) if stands.any() else float("nan")
-
-
-def _jerk(places: Array) -> float:
-    """The mean length of the third difference of joints, metres per frame cubed."""
-    return float(np.linalg.norm(np.diff(places, n=3, axis=1), axis=-1).mean())

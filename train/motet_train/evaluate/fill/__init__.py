@@ -1,1 +1,0 @@
-"""How well gaps of motions are filled."""
