@@ -1,12 +1,13 @@
 """The path over the ground: removed, moved to a root at the floor, or led on from the end of another motion."""
 
 import logging
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
 from motet.errors import MotionError
-from motet.motion.humanoid import Figure, JointMap, from_humanoid, map_of, on_humanoid
+from motet.motion.humanoid import HUMANOID, Figure, JointMap, from_humanoid, map_of, on_humanoid
 from motet.motion.kinematics import (
     AXES,
     continued,
@@ -31,11 +32,11 @@ def in_place(motion: Motion) -> Motion:
     unchanged. MotionError for one without skeleton.
     """
     skeleton = skeleton_of(motion)
-    try:
-        figure = Figure.of(motion)
-        carrier, up = figure.fitted.joint_map.carrier(skeleton), figure.turn.T @ UP
-    except MotionError:  # the figure is not human
-        carrier, up = 0, UP
+    carrier, up = 0, UP  # of the humanoid, or of a figure that is not human
+    if skeleton != HUMANOID:
+        with suppress(MotionError):
+            figure = Figure.of(motion)
+            carrier, up = figure.fitted.joint_map.carrier(skeleton), figure.turn.T @ UP
     for joint in reversed(skeleton.ancestors(carrier)):
         name, above = skeleton.names[joint], skeleton.joints[joint].parent
         if any(f"{name}.t{axis}" in motion.channels for axis in AXES):

@@ -29,19 +29,11 @@ AXES_TURNS = np.array(
 """The rotations (24, 3, 3) that turn coordinate axes into coordinate axes."""
 
 
-def frame(left: Array, up: Array) -> Array:
-    """Rotations (..., 3, 3) whose columns are left, up and forward: up as it is given, left at right angles to it."""
-    up = unit(up)
-    return _with_columns(unit(left - np.sum(left * up, axis=-1, keepdims=True) * up), up)
-
-
-def _arm_frame(left: Array, up: Array) -> Array:
-    """The same with left as it is given."""
-    left = unit(left)
-    return _with_columns(left, unit(up - np.sum(up * left, axis=-1, keepdims=True) * left))
-
-
-def _with_columns(left: Array, up: Array) -> Array:
+def frame(left: Array, up: Array, upright: bool = True) -> Array:
+    """Rotations (..., 3, 3) whose columns are left, up and forward: up as given, or left, the other square to it."""
+    given, other = (unit(up), left) if upright else (unit(left), up)
+    other = unit(other - np.sum(other * given, axis=-1, keepdims=True) * given)
+    left, up = (other, given) if upright else (given, other)
     rotations = frames_last((*up.shape, 3))
     rotations[..., 0], rotations[..., 1], rotations[..., 2] = left, up, np.cross(left, up)
     return rotations
@@ -244,12 +236,12 @@ class Calibration:
         lower = body.direction(self.positions, bones[2]) if body.aims[bones[2]] else upper
         plain = swing(chest @ humanoid_direction(bones[1]), upper) @ chest
         up = -sign * np.cross(upper, lower) + self.HINGE * plain[:, :, 1]
-        self._settle_limb(bones[1], upper, _arm_frame(sign * upper, up))
-        self._settle_limb(bones[2], lower, _arm_frame(sign * lower, up))
+        self._settle_limb(bones[1], upper, frame(sign * upper, up, upright=False))
+        self._settle_limb(bones[2], lower, frame(sign * lower, up, upright=False))
         if bones[3] in joints:
             forearm = self._turns(joints[bones[2]])
             if body.aims[bones[3]]:
                 along = body.direction(self.positions, bones[3])
-                self._settle_limb(bones[3], along, _arm_frame(sign * along, forearm[:, :, 1]))
+                self._settle_limb(bones[3], along, frame(sign * along, forearm[:, :, 1], upright=False))
             else:
                 self._settle(joints[bones[3]], forearm)

@@ -325,7 +325,13 @@ def map_by_names(skeleton: Skeleton) -> JointMap | None:
 def _match(convention: Convention, skeleton: Skeleton) -> tuple[tuple[int, int], JointMap]:
     """The map that a convention makes of a skeleton's names, and how well it fits: how many joints the convention has
     names for, and less how many of its bones are absent."""
-    names = _plain_names(skeleton.names, convention.prefixes)
+    # without the prefixes of the convention, or the first word where nearly all names begin with it
+    first = [re.match(r"[A-Za-z]+[0-9]*[ _:.-]+(?=.)", name) for name in skeleton.names]
+    words = [match[0] for match in first if match]
+    common = max(words, key=words.count, default="")
+    shared = [re.escape(common)] if words.count(common) > 0.8 * len(skeleton.names) else []
+    pattern = "|".join(f"(?:{prefix})[ _:.-]*" for prefix in (*convention.prefixes, *shared)) or "(?!)"
+    names = [_plain(re.sub(f"^(?:{pattern})(?=.)", "", name, flags=re.IGNORECASE)) for name in skeleton.names]
     hips = [i for i, name in enumerate(names) if name == convention.names["hips"][0] and len(skeleton.children[i]) >= 3]
     if len(hips) > 1:
         both = " and ".join(repr(skeleton.names[i]) for i in hips)
@@ -345,13 +351,3 @@ def _match(convention: Convention, skeleton: Skeleton) -> tuple[tuple[int, int],
     confidence = round(1.0 - 0.3 * absent / (absent + count), 2)
     found_map = JointMap(joints, spine, neck, convention.title, confidence, rest, convention.points, axes)
     return (count, -absent), found_map
-
-
-def _plain_names(names: Sequence[str], prefixes: Sequence[str]) -> list[str]:
-    """Plain names without the prefixes given, or without the first word where nearly all names begin with it."""
-    first = [re.match(r"[A-Za-z]+[0-9]*[ _:.-]+(?=.)", name) for name in names]
-    words = [match[0] for match in first if match]
-    common = max(words, key=words.count, default="")
-    alternatives = [*prefixes, re.escape(common)] if words.count(common) > 0.8 * len(names) else prefixes
-    pattern = "|".join(f"(?:{prefix})[ _:.-]*" for prefix in alternatives) or "(?!)"
-    return [_plain(re.sub(f"^(?:{pattern})(?=.)", "", name, flags=re.IGNORECASE)) for name in names]

@@ -18,6 +18,8 @@ from motet.motion.motion import Motion
 from motet.motion.rotations import Array, unit
 from motet.motion.skeleton import END_SUFFIX, LEFT, RIGHT, Skeleton, partners_of, sides_of
 
+NO_HUMAN = "this skeleton is no human's: expected hips with two legs, and a back with two arms"
+
 Limbs = list[dict[str, int]]
 """Of both limbs of a pair the joint of each part."""
 
@@ -92,12 +94,12 @@ class _Tree:
     def legs(self, fork: _Fork) -> Limbs:
         """Thighs, shins, feet and toes: the ankle leaves the foot's length, the knee halves what is above it."""
         paths, places = self.pair(fork)
-        count = len(places) - 1
+        last = len(places) - 2
         # what comes after the ankle is within these parts of a leg
-        feet = [k for k in range(2, count) if 0.08 <= 1 - places[k] / places[-1] <= 0.35] or [count - 1]
-        start, knee, foot = _two_bones(places, feet)
-        parts = {"UpperLeg": start, "LowerLeg": knee, "Foot": foot} | ({"Toes": foot + 1} if foot + 1 < count else {})
-        return [{part: path[k] for part, k in parts.items()} for path in paths]
+        feet = [k for k in range(2, last + 1) if 0.08 <= 1 - places[k] / places[-1] <= 0.35] or [last]
+        thigh, shin, foot = _two_bones(places, feet)
+        parts = {"UpperLeg": thigh, "LowerLeg": shin, "Foot": foot, "Toes": foot + 1}
+        return [{part: path[k] for part, k in parts.items() if k <= last} for path in paths]
 
     def arms(self, fork: _Fork) -> Limbs:
         """Clavicles, upper arms, forearms and hands: the hand is where fingers fork or begins them; the elbow halves.
@@ -105,14 +107,13 @@ class _Tree:
         An arm that ends in one long bone has no joint for the hand: its tip is the wrist.
         """
         paths, places = self.pair(fork)
+        last = len(places) - 2
         forks = [k for k, joint in enumerate(paths[0]) if k >= 2 and len(self.skeleton.children[joint]) >= 2]
-        count = len(places) - 1
         # what comes after the wrist is within this part of an arm
-        hands = forks[:1] or [k for k in range(2, count) if 1 - places[k] / places[-1] <= 0.35] or [count]
-        start, elbow, hand = _two_bones(places, hands)
-        parts = {"UpperArm": start, "LowerArm": elbow} | ({"Shoulder": 0} if start else {})
-        parts |= {"Hand": hand} if hand < count else {}
-        return [{part: path[k] for part, k in parts.items()} for path in paths]
+        near = [k for k in range(2, last + 1) if 1 - places[k] / places[-1] <= 0.35]
+        start, elbow, hand = _two_bones(places, forks[:1] or near or [last + 1])
+        parts = {"UpperArm": start, "LowerArm": elbow, "Hand": hand} | ({"Shoulder": 0} if start else {})
+        return [{part: path[k] for part, k in parts.items() if k <= last} for path in paths]
 
     def neck(self, arms: _Fork) -> tuple[tuple[int, ...], int | None]:
         """The joints between the arms and the head, and the head's, where there are."""
@@ -124,9 +125,6 @@ class _Tree:
         named = [k for k, joint in enumerate(path) if "head" in self.skeleton.names[joint].lower()]
         head = named[0] if named else min(1, len(path) - 1)
         return tuple(path[:head]), path[head]
-
-
-NO_HUMAN = "this skeleton is no human's: expected hips with two legs, and a back with two arms"
 
 
 def map_of(motion: Motion) -> JointMap:
