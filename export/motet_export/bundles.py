@@ -91,7 +91,6 @@ def halve_bundle(bundle: Bundle, out: str | Path) -> dict[str, Any]:
 
 
 def _served(model: BundleModel, files: Mapping[str, bytes]) -> BundleModel:
-    """The model with its graphs run by ONNX Runtime."""
     graphs = {role: OnnxGraph(files[f"{role}.onnx"], graph.spec) for role, graph in model.graphs.items()}
     return build(model.manifest, graphs, model.tables)
 

@@ -40,17 +40,15 @@ def examples(manifest: Manifest, torch: Mapping[str, Graph]) -> dict[str, Exampl
         flags = np.ones((*value.shape[:-1], 1), dtype=np.float32)  # of frames as generators take them
         return np.concatenate([contract.normalised(frames).astype(np.float32), flags], axis=-1)
 
+    def from_encoder(spec: GraphSpec, rng: np.random.Generator, rows: int) -> Arrays:
+        given = draw(torch["encoder"].spec, rng, rows)
+        return {name: value for name, value in {**given, **torch["encoder"](given)}.items() if spec.takes(name)}
+
     draws: dict[str, Examples] = {role: partial(draw, graph.spec) for role, graph in torch.items()}
     if manifest.verb == "predict":
         for role in draws.keys() - {"encoder"}:
-            draws[role] = partial(_from_encoder, torch["encoder"], torch[role].spec, draws["encoder"])
+            draws[role] = partial(from_encoder, torch[role].spec)
     return draws
-
-
-def _from_encoder(encoder: Graph, spec: GraphSpec, draw: Examples, rng: np.random.Generator, rows: int) -> Arrays:
-    """What a graph takes of the encoder's inputs and outputs."""
-    given = draw(rng, rows)
-    return {name: value for name, value in {**given, **encoder(given)}.items() if spec.takes(name)}
 
 
 def example(

@@ -166,7 +166,7 @@ def naive_row(
     given: Source, action: int, seed: int, drawing: CodesSettings, longest: int, exactly: bool = False
 ) -> list[list[int]]:
     """One motion, drawn number by number, without a memory: told and not told what it shows, each by itself."""
-    rng, last, age, steps = np.random.default_rng(seed), [given.nothing, 0, 0], 0, list[list[int]]()
+    rng, last, age, steps = np.random.default_rng(seed), [given.end + 1, 0, 0], 0, list[list[int]]()
     states = {who: np.zeros((1, KNOWN), np.float32) for who in (action, NULL_ACTION)}
     for length in range(longest):
         known = {}
@@ -212,7 +212,7 @@ def test_plain_drawing_is_ancestral_sampling() -> None:
     """With guidance 1 what is not told makes no difference: first steps come by the chain rule."""
     given, count = source(ending=-50.0), 3000
     found = draw_codes(Writer(given, rngs(*range(count)), PLAIN), np.full(count, 1), 1)
-    start = {"codes": np.array([[given.nothing, 0, 0]]), "action": np.array([1]), "age": np.array([0])}
+    start = {"codes": np.array([[given.end + 1, 0, 0]]), "action": np.array([1]), "age": np.array([0])}
     known = given.step({**start, "state": np.zeros((1, KNOWN), np.float32)})["known"]
     seen: dict[tuple[int, ...], int] = {}
     for codes in found:
@@ -295,7 +295,7 @@ def test_an_action_takes_over_where_the_last_one_ends(seed: int) -> None:
 
 def _seen(given: Source, steps: list[Array], ages: list[int]) -> dict[str, Array]:
     """States of a writer that drew some steps for action 0, before the last of them is seen."""
-    last, state = np.array([[given.nothing, 0, 0]] * 2), np.zeros((2, KNOWN), np.float32)
+    last, state = np.array([[given.end + 1, 0, 0]] * 2), np.zeros((2, KNOWN), np.float32)
     for age, following in zip(ages, steps, strict=False):
         feeds = {"codes": last, "action": np.array([0, NULL_ACTION]), "age": np.full(2, age), "state": state}
         state, last = given.step(feeds)["next_state"], np.tile(following, (2, 1))
@@ -313,7 +313,7 @@ def test_what_was_done_before_is_gone_on_with() -> None:
     fed = Writer(given, rngs(0), PLAIN)
     fed.see(codes[:2])
     state = np.zeros((2, KNOWN), np.float32)
-    for before in ([given.nothing, 0, 0], codes[0]):
+    for before in ([given.end + 1, 0, 0], codes[0]):
         feeds = {"codes": np.tile(before, (2, 1)), "action": np.full(2, NULL_ACTION), "age": np.zeros(2, np.int64)}
         state = given.step({**feeds, "state": state})["next_state"]
     np.testing.assert_array_equal(fed.state["state"], state)

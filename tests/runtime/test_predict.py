@@ -18,7 +18,7 @@ from motet.motion.kinematics import local_rotations, positions
 from motet.motion.motion import Motion
 from motet.motion.rotations import axis_to_rotmat
 from motet.representation.contract import MotionContract
-from motet.representation.root_block import carry_on, joints_of, to_joint_vectors
+from motet.representation.root_block import RootVectors, joints_of, to_joint_vectors
 
 SEED, HORIZON = 4, 3
 FPS = 30.0
@@ -98,7 +98,7 @@ def test_a_figure_and_back_is_the_motion_whatever_its_channels(scale: float) -> 
     figure = to_joint_vectors(whole)
     assert joints_of(figure.channels) == ("left_leg", "left_shin", "right_leg", "right_shin", "spine", "left_arm",
                                           "right_arm", "head")  # fmt: skip
-    back = carry_on(whole[:25], figure[25:])
+    back = RootVectors().motion(figure[25:], whole[:25])
     np.testing.assert_allclose(local_rotations(back), local_rotations(whole[25:]), atol=1e-9)
     np.testing.assert_allclose(positions(back), positions(whole[25:]), atol=1e-9)
 

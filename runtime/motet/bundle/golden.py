@@ -20,11 +20,6 @@ from motet.errors import BundleError
 TOLERANCE = 1e-3
 """On :func:`difference`, for graphs in float32: processors round differently, and a run carries that on."""
 
-MAX_GOLDEN = 16 << 20
-"""Bytes of all arrays together."""
-
-DTYPES = ("float32", "float64", "int64")
-
 
 class Replayable(Protocol):
     """A model that can compute its golden vectors again."""
@@ -37,13 +32,13 @@ class Replayable(Protocol):
 
 def vectors(model: Replayable, feeds: Mapping[str, Arrays], given: Arrays, settings: Mapping[str, Any]) -> bytes:
     """The golden vectors of a model: of its graphs from the ``feeds`` of each role, and of a run."""
-    arrays = {}
+    arrays: dict[str, Arrays] = {}
     for role, inputs in feeds.items():
-        arrays.update({f"{role}.in.{name}": value for name, value in inputs.items()})
-        arrays.update({f"{role}.out.{name}": value for name, value in model.graphs[role](inputs).items()})
-    arrays.update({f"run.in.{name}": value for name, value in given.items()})
-    arrays.update({f"run.out.{name}": value for name, value in model.replay(given, settings).items()})
-    return archive_bytes({f"{name}.npy": array_bytes(value) for name, value in arrays.items()})
+        arrays |= {f"{role}.in": inputs, f"{role}.out": model.graphs[role](inputs)}
+    arrays |= {"run.in": given, "run.out": model.replay(given, settings)}
+    return archive_bytes(
+        {f"{a}.{b}.npy": array_bytes(value) for a, part in arrays.items() for b, value in part.items()}
+    )
 
 
 def replay(model: Replayable, data: bytes, golden: Golden) -> dict[str, float]:
@@ -87,13 +82,13 @@ def difference(found: Arrays, expected: Arrays) -> float:
 
 def read(data: bytes) -> dict[str, NDArray[Any]]:
     """The arrays of an .npz by name; BundleError where it is damaged, too large, or holds anything but numbers."""
-    archive, left, found = Archive(data), MAX_GOLDEN, {}
+    archive, left, found, dtypes = Archive(data), 16 << 20, {}, ("float32", "float64", "int64")
     for member in sorted(archive.names):
         content = archive.read(member, left)
         left -= len(content)
         if left < 0:
-            raise BundleError(f"the golden vectors are larger than {MAX_GOLDEN} bytes")
-        found[member.removesuffix(".npy")] = array_of(content, f"golden vectors, {member}", DTYPES)
+            raise BundleError(f"the golden vectors are larger than {16 << 20} bytes")
+        found[member.removesuffix(".npy")] = array_of(content, f"golden vectors, {member}", dtypes)
     return found
 
 

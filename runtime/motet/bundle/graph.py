@@ -81,13 +81,9 @@ class TensorSpec:
     shape: tuple[int | str, ...]
     dtype: str = "float32"
 
-    def to_json(self) -> dict[str, Any]:
-        """A JSON object; :meth:`read` is the inverse."""
-        return {"name": self.name, "dtype": self.dtype, "shape": list(self.shape)}
-
     @staticmethod
     def read(data: Fields) -> "TensorSpec":
-        """The inverse of :meth:`to_json`; BundleError for anything else."""
+        """Of a manifest; BundleError for anything else."""
         shape = data.items("shape")
         fixed = [axis for axis in shape if not isinstance(axis, str)]
         if any(isinstance(axis, bool) or not isinstance(axis, int) or not 1 <= axis <= MAX_AXIS for axis in fixed):
@@ -141,11 +137,11 @@ class GraphSpec:
 
     def to_json(self) -> dict[str, Any]:
         """A JSON object; :meth:`read` is the inverse."""
-        found: dict[str, Any] = {
-            "inputs": [spec.to_json() for spec in self.inputs],
-            "outputs": [spec.to_json() for spec in self.outputs],
-            "feedback": dict(self.feedback),
-        }
+        inputs, outputs = (
+            [{"name": one.name, "dtype": one.dtype, "shape": list(one.shape)} for one in tensors]
+            for tensors in (self.inputs, self.outputs)
+        )
+        found: dict[str, Any] = {"inputs": inputs, "outputs": outputs, "feedback": dict(self.feedback)}
         return {**found, "start": {name: list(sizes) for name, sizes in self.start.items()}} if self.start else found
 
     @staticmethod

@@ -68,9 +68,9 @@ class Golden(NamedTuple):
 class Manifest:
     """All that is known about a model.
 
-    A training run has no graphs, tables, files and golden vectors. text, vocabulary and control are those of the verbs
-    that need them. settings: of each feature the values that are not its code's. ``source`` is the JSON object that the
-    rest was read from.
+    A training run has no graphs, tables, files and golden vectors; text, vocabulary and control are of verbs that need
+    them. settings: of each feature the values that are not its code's. source: the JSON object that the rest was read
+    from.
     """
 
     name: str
@@ -100,6 +100,10 @@ class Manifest:
         """Read the manifest of a bundle or of a training run; BundleError names the key that is wrong."""
         top = Fields(data)
         motion = read_contract(top.fields("motion"))
+        golden = None
+        if "golden" in top:
+            given = top.fields("golden")
+            golden = Golden(given.text("file"), given.number("tolerance", 0.0, 1.0), given.mapping("run"))
         texts: dict[str, Any] = {key: top.text(key) for key in ("name", "verb", "model", "loop")}
         records = ("config", "licence", "training", "quality", "parity")
         others: dict[str, Any] = {key: top.mapping(key) for key in records}
@@ -116,7 +120,7 @@ class Manifest:
             graphs={role: GraphEntry(one.text("file"), GraphSpec.read(one)) for role, one in top.entries("graphs")},
             tables={name: _table(one) for name, one in top.entries("tables")},
             files={name: _file(name, one) for name, one in top.entries("files")},
-            golden=_golden(top.fields("golden")) if "golden" in top else None,
+            golden=golden,
             source=top.data,
         )
 
@@ -197,7 +201,3 @@ def _file(name: str, data: Fields) -> FileEntry:
     if not NAME.fullmatch(name):
         raise BundleError(f"manifest, files: {name[:80]!r} is not a plain file name")
     return FileEntry(data.whole("size", 0, MAX_SIZE), data.text("sha256"))
-
-
-def _golden(data: Fields) -> Golden:
-    return Golden(data.text("file"), data.number("tolerance", 0.0, 1.0), data.mapping("run"))

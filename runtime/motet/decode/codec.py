@@ -182,18 +182,15 @@ class StreamingDecoder:
         frames = found["frames"][0, self.count - start : until - start].astype(np.float64)
         way = way_of(self.way[-1], moves[self.count - start : until - start])
         self.way, self.count = way[-1:], until
-        frames = self._rated(frames, way[:-1])
+        # the root, seen from the way, as rates
+        poses = moved(way[:-1, None], frames[..., :PATH]).reshape(-1, PATH)
+        earlier = self.pose if len(self.pose) else poses[:1]
+        rates = seen_from(np.concatenate([earlier, poses[:-1]]), poses) * codec.fps
+        if not len(self.pose):
+            rates[:1] = rates[1:2]
+        self.pose = poses[-1:]
+        frames = np.concatenate([rates, frames.reshape(len(poses), -1)[:, PATH:]], axis=1)
         if self.given is not None:
             self.join = Inertialization(self.given, frames[hop - 2 : hop], codec.fps, self.half_life)
             self.given, frames = None, frames[hop:]
         return frames if self.join is None else self.join(frames)
-
-    def _rated(self, frames: Array, way: Array) -> Array:
-        """Frames (N, H, D), the root seen from the way (N, 3), as frames (N H, D) with rates."""
-        poses = moved(way[:, None], frames[..., :PATH]).reshape(-1, PATH)
-        before = self.pose if len(self.pose) else poses[:1]
-        rates = seen_from(np.concatenate([before, poses[:-1]]), poses) * self.codec.fps
-        if not len(self.pose):
-            rates[:1] = rates[1:2]
-        self.pose = poses[-1:]
-        return np.concatenate([rates, frames.reshape(len(poses), -1)[:, PATH:]], axis=1)

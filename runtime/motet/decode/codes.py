@@ -114,7 +114,7 @@ class CodesSettings(Settings):
 class Source:
     """What writers draw from: the graphs "step" and "part", and a memory.
 
-    end: the move that ends a motion; the one after it, ``nothing``, stands for what comes before the first step.
+    end: the move that ends a motion; the one after it stands for what comes before the first step.
     null_action: the action that says nothing, for guidance.
     """
 
@@ -123,11 +123,6 @@ class Source:
     end: int
     null_action: int
     memory: Memory
-
-    @property
-    def nothing(self) -> int:
-        """See the class."""
-        return self.end + 1
 
     @property
     def parts(self) -> int:
@@ -151,7 +146,7 @@ class Writer:
         self.age = np.zeros(len(self.noise), dtype=np.int64)
         self.state = zero_state(source.step, rows)
         self.last = np.zeros((rows, source.parts), dtype=np.int64)
-        self.last[:, 0] = source.nothing
+        self.last[:, 0] = source.end + 1
         self.recent: list[Floats] = []  # numbers (B, L) of the last steps, the latest first
         self._before = self.last, self.state, self.recent, self.age
 
@@ -191,7 +186,7 @@ class Writer:
             sizes = self.source.step.spec.start_shape(name)
             if 0 in sizes and array.shape[axis := 1 + sizes.index(0)] > WINDOW:
                 self.state[name] = np.ascontiguousarray(np.take(array, range(-WINDOW, 0), axis))
-        if self.last[0, 0] != self.source.nothing:
+        if self.last[0, 0] != self.source.end + 1:
             self.recent = [outputs["numbers"][: len(actions)], *self.recent][: len(PAST)]
         known: Floats = outputs["known"]
         return known

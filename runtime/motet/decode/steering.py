@@ -1,9 +1,8 @@
 """The loop of a steered figure: recorded frames are played in turn and matched with the target.
 
 What is asked, a velocity and a facing, is approached by critically damped springs. Recordings are played a little
-slower or faster, with shorter or longer strides, and turned a little, to go as fast and where the springs are. The
-letters are those of :mod:`motet.decode.matching`, which says what is played; and J bones, and P = 4 J + 1 numbers of
-a pose.
+slower or faster, with shorter or longer strides, and turned a little, to go as fast and where the springs are. Letters
+as in :mod:`motet.decode.matching`, which says what is played; and J bones, P = 4 J + 1 numbers of a pose.
 """
 
 from dataclasses import dataclass

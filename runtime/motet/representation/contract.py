@@ -57,9 +57,8 @@ have up to .12 degrees; the stillest channel that means something, the bend of t
 class MotionContract:
     """What the frames (T, D) of a model mean.
 
-    representation: a name of ``REPRESENTATIONS``. channels, units: D each. fps: frames per
-    second. mean, std: (D,) of the training data; a channel of std 0 is dead: always at its mean. skeleton: the figure
-    that the frames move, or None.
+    representation: a name of ``REPRESENTATIONS``. channels, units: D each. fps: frames per second. mean, std: (D,) of
+    the training data; a channel of std 0 is dead: always at its mean. skeleton: the figure that the frames move.
     """
 
     representation: str
@@ -113,7 +112,8 @@ class MotionContract:
         if named(self.representation).required and not any(channel.endswith(".tx") for channel in motion.channels):
             raise MotionError("this motion lacks the root's tx, ty and tz, the path of the figure")
         slower = motion.continuous().resample(self.fps) if motion.fps > self.fps else motion
-        return to_model_figure(slower, self._average, reason, figure)
+        average = self.motion(self.mean[None], plant=False)
+        return to_model_figure(slower, average, reason, figure)
 
     def measured(self, motion: Motion) -> Figure | None:
         """The figure of a motion that :meth:`on_figure` brings to the humanoid, measured for more of it; None of one
@@ -126,11 +126,6 @@ class MotionContract:
         """Whether a motion is of the contract's own figure, in a known unit, or features."""
         known = self.skeleton is not None and self.skeleton.metres_per_unit is not None
         return (known and motion.skeleton == self.skeleton) or set(self.channels) <= set(motion.channels)
-
-    @cached_property
-    def _average(self) -> Motion:
-        """One frame: the pose of the mean."""
-        return self.motion(self.mean[None], plant=False)
 
     @cached_property
     def _joints(self) -> tuple[str, ...]:

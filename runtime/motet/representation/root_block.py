@@ -248,10 +248,19 @@ class RootVectors(Representation):
         return motion.select(like.channels, like.units).continuous()
 
     def motion(self, features: Motion, after: Motion | None = None) -> Motion:
-        """In the channels of ``after``, which may be features too; from the origin in Euler angles of the skeleton."""
+        """In the channels of ``after``, which may be features too; from the origin in Euler angles of the skeleton.
+
+        Channels of which the features know nothing stay as they are in the last frame of ``after``.
+        """
         if after is not None and set(features.channels) <= set(after.channels):
             return features
-        return carry_on(after, features)
+        name, joints = skeleton_of(features if after is None else after).names[0], joints_of(features.channels)
+        last = at_rest(features, (name, *joints)) if after is None else after[-1]
+        root, places = root_in_world(features, after)
+        vectors = features.select(tuple(f"{joint}.{kind}" for joint in joints for kind in VECTOR_KINDS)).values
+        matrices = rotvec_to_rotmat(vectors.reshape(len(features), len(joints), 3))
+        rotations = {joint: matrices[:, n] for n, joint in enumerate(joints)}
+        return continued(last, {name: root, **rotations}, {name: places / skeleton_of(last).unit_factor(1.0)})
 
     def mirror(self, features: Motion) -> FrameMirror:
         """As :func:`motet.motion.mirroring.mirror` does it, for exponential maps in the parent joint's axes."""
@@ -283,18 +292,3 @@ def to_joint_vectors(motion: Motion, joints: Sequence[str] | None = None) -> Mot
     units = (*root_units, *["rad"] * (3 * len(joints)))
     values = np.concatenate([block.values, vectors.reshape(len(motion), 3 * len(joints))], axis=1)
     return replace(motion, values=values, channels=channels, units=units)
-
-
-def carry_on(after: Motion | None, features: Motion) -> Motion:
-    """Features that follow a motion, as that motion's own channels, units and skeleton; None: from the origin.
-
-    They start where the motion ends and face as it does there; both have the same frame rate. Channels of which the
-    features know nothing stay as they are in the motion's last frame.
-    """
-    name, joints = skeleton_of(features if after is None else after).names[0], joints_of(features.channels)
-    last = at_rest(features, (name, *joints)) if after is None else after[-1]
-    root, places = root_in_world(features, after)
-    vectors = features.select(tuple(f"{joint}.{kind}" for joint in joints for kind in VECTOR_KINDS)).values
-    matrices = rotvec_to_rotmat(vectors.reshape(len(features), len(joints), 3))
-    rotations = {joint: matrices[:, n] for n, joint in enumerate(joints)}
-    return continued(last, {name: root, **rotations}, {name: places / skeleton_of(last).unit_factor(1.0)})
