@@ -93,10 +93,8 @@ def figures(model: BundleModel, seconds: float, file: Path | None = None) -> Fig
 
 @figures.register
 def tdbn_figures(model: TdbnModel, seconds: float, _: Path | None = None) -> Figures:
-    """One character's tick (median and 99th percentile) and the frame rate at the best batch, plain and sampled.
-
-    Of the net alone; and of a smooth session whose control stays, and of one whose control changes at every tick.
-    """
+    """One character's tick (median and 99th percentile) and the frame rate at the best batch, plain and sampled. Of the
+    net alone; and of a smooth session whose control stays, and of one whose control changes at every tick."""
     tick = durations(model.start(smooth=False).step, seconds) * SCALE["us"]
     smooth, changing = model.start(), model.start()
     controls = itertools.cycle([np.ones(len(model.labels)), np.zeros(len(model.labels))])
@@ -152,10 +150,8 @@ def _(model: DescribeModel, seconds: float, file: Path | None = None) -> Figures
 
 
 def describe_figures(model: DescribeModel, seconds: float) -> Figures:
-    """Descriptions of :data:`WORDS` words a second, many at once and one alone; encoder and step of one alone.
-
-    By beam search; and one by consensus of 100 draws.
-    """
+    """Descriptions of :data:`WORDS` words a second, many at once and one alone; encoder and step of one alone. By beam
+    search; and one by consensus of 100 draws."""
     end, motion = model.vocabulary.ids[EOS], _noise(model.contract, model.fps)
     never = {"log_probabilities": lambda found: np.where(np.arange(found.shape[1]) == end, np.float32(-1e9), found)}
     manifest = replace(model.manifest, defaults={"beams": BEAMS, "max_words": WORDS}, loop="beam")

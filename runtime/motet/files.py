@@ -44,9 +44,7 @@ def check_place(path: str | Path) -> Path:
 
 def write_whole(file: File, content: str | bytes) -> None:
     """Write atomically: to a temporary sibling, then rename. A link is followed, the mode of a replaced file is kept.
-
-    OutputError if the file cannot be written. A file object just gets the content.
-    """
+    OutputError if the file cannot be written. A file object just gets the content."""
     try:
         data = content.encode() if isinstance(content, str) else content
         if not isinstance(file, str | Path):
@@ -68,10 +66,8 @@ def write_whole(file: File, content: str | bytes) -> None:
 
 @contextmanager
 def new_folder(path: str | Path) -> Iterator[Path]:
-    """A new folder to write into, which becomes ``path`` in the end; after an exception nothing is left of it.
-
-    Missing parents are made. OutputError if there is something at ``path``, or it cannot be written.
-    """
+    """A new folder to write into, which becomes ``path`` in the end; after an exception nothing is left of it. Missing
+    parents are made. OutputError if there is something at ``path``, or it cannot be written."""
     path = Path(path)
     temporary = temporary_beside(path)
     try:
@@ -87,10 +83,8 @@ def new_folder(path: str | Path) -> Iterator[Path]:
 
 
 def temporary_beside(path: Path) -> Path:
-    """A new name in the same folder, ``.NAME.HEX.partial``, short enough where the name itself is long.
-
-    A killed program may leave such a file behind; nothing reads it.
-    """
+    """A new name in the same folder, ``.NAME.HEX.partial``, short enough where the name itself is long. A killed
+    program may leave such a file behind; nothing reads it."""
     stem = path.name.encode(errors="replace")[:200].decode(errors="ignore")
     return path.with_name(f".{stem}.{uuid.uuid4().hex}.partial")
 

@@ -38,10 +38,8 @@ class Range(NamedTuple):
 
 @dataclass(frozen=True)
 class Settings:
-    """Base of every feature's settings, whose fields are ``Annotated[float or int, Range(...)]``.
-
-    SettingError where a value is out of range, or not whole where its type is int.
-    """
+    """Base of every feature's settings, whose fields are ``Annotated[float or int, Range(...)]``. SettingError where a
+    value is out of range, or not whole where its type is int."""
 
     FEATURE: ClassVar[str] = ""
     RANGES: ClassVar[Mapping[str, tuple[bool, Range]]] = {}
@@ -58,10 +56,8 @@ class Settings:
 
     @classmethod
     def read(cls, given: Mapping[str, Any], path: str) -> Self:
-        """The settings of a manifest's object at ``path``, and defaults for those that it does not name.
-
-        BundleError with the key of one that is unknown, missing, or out of range.
-        """
+        """The settings of a manifest's object at ``path``, and defaults for those that it does not name. BundleError
+        with the key of one that is unknown, missing, or out of range."""
         for name in given:
             if name not in cls.RANGES:
                 raise BundleError(f"manifest, {path}.{name}: is unknown; expected one of {', '.join(cls.RANGES)}")

@@ -9,7 +9,7 @@ from command_line import check_refused, run
 from fake_models import moving, search_model
 
 from motet.formats import read_motion, write_motion
-from motet.models.search import NAME, Index
+from motet.models.search import INDEX_FILE, Index
 
 
 @pytest.fixture(autouse=True)
@@ -78,4 +78,4 @@ def test_refusals(folder: Path, tmp_path: Path) -> None:
     check_refused(run("search", "walks", empty), "no motion files", empty)
     check_refused(run("search", empty / "gone.bvh", folder), "gone.bvh", empty)
     check_refused(run("search", "walks", folder, "--index", empty / "no" / "x.npz"), "does not exist", empty)
-    assert not (folder / NAME).exists()
+    assert not (folder / INDEX_FILE).exists()

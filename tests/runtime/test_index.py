@@ -12,7 +12,7 @@ from fake_models import moving, search_model
 from motet.errors import DecodingError, FormatError, MotionError, OutputError, TextError
 from motet.formats import read_motion, write_motion
 from motet.models import search as searching
-from motet.models.search import NAME, Hit, Index, SearchModel
+from motet.models.search import INDEX_FILE, Hit, Index, SearchModel
 
 FILES = ("a.npz", "b.npz", "inner/c.npz", "d.npz")
 
@@ -137,10 +137,10 @@ def test_another_unit_is_read_anew(tmp_path: Path, model: SearchModel, reads: li
 
 def test_an_index_of_before_there_were_units_is_taken(folder: Path, model: SearchModel, reads: list[str]) -> None:
     Index.open(folder, model)
-    with np.load(folder / NAME) as arrays:
+    with np.load(folder / INDEX_FILE) as arrays:
         text, vectors = json.loads(arrays["index"].tobytes()), arrays["vectors"]
     del text["unit"]
-    np.savez(folder / NAME, index=np.frombuffer(json.dumps(text).encode(), np.uint8), vectors=vectors)
+    np.savez(folder / INDEX_FILE, index=np.frombuffer(json.dumps(text).encode(), np.uint8), vectors=vectors)
     reads.clear()
     Index.open(folder, model)
     assert reads == []
@@ -149,7 +149,7 @@ def test_an_index_of_before_there_were_units_is_taken(folder: Path, model: Searc
 def test_an_index_file_elsewhere_finds_its_folder(folder: Path, model: SearchModel, tmp_path: Path) -> None:
     file = tmp_path / "kept.npz"
     hits = Index.open(folder, model, file).search("walks")
-    assert not (folder / NAME).exists()
+    assert not (folder / INDEX_FILE).exists()
     assert Index.open(file, model).search("walks") == hits
 
 
@@ -162,7 +162,7 @@ def test_a_folder_that_cannot_be_written_to_is_searched_all_the_same(
     monkeypatch.setattr(searching, "write_whole", refuse)
     with caplog.at_level(logging.WARNING, "motet"):
         assert len(Index.open(folder, model).search("walks", 9)) == 4
-    assert caplog.messages == [f"the index is not kept: cannot write {folder / NAME}: Read-only file system"]
+    assert caplog.messages == [f"the index is not kept: cannot write {folder / INDEX_FILE}: Read-only file system"]
     with pytest.raises(OutputError, match="Read-only"):
         Index.open(folder, model, folder / "own.npz")
 
@@ -175,7 +175,7 @@ def test_an_index_of_another_model_is_refused(folder: Path, model: SearchModel) 
 
 @pytest.mark.parametrize("content", [b"", b"PK\x03\x04", b"no zip at all"])
 def test_what_is_no_index_is_refused(folder: Path, model: SearchModel, content: bytes) -> None:
-    (folder / NAME).write_bytes(content)
+    (folder / INDEX_FILE).write_bytes(content)
     with pytest.raises(FormatError, match="not an index of motions"):
         Index.open(folder, model)
 
@@ -187,9 +187,9 @@ def test_a_motion_is_no_index(folder: Path, model: SearchModel) -> None:
 
 def test_vectors_that_are_not_those_of_the_windows_are_refused(folder: Path, model: SearchModel) -> None:
     Index.open(folder, model)
-    with np.load(folder / NAME) as arrays:
+    with np.load(folder / INDEX_FILE) as arrays:
         text, vectors = arrays["index"], arrays["vectors"]
-    np.savez(folder / NAME, index=text, vectors=vectors[:-1])
+    np.savez(folder / INDEX_FILE, index=text, vectors=vectors[:-1])
     with pytest.raises(FormatError, match="damaged"):
         Index.open(folder, model)
 

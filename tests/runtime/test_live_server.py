@@ -23,7 +23,7 @@ pytest.importorskip("websockets", reason="the extra live is not installed")
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from motet.live.protocol import LARGEST, MAX_CHARACTERS
+from motet.live.protocol import LARGEST_COMMAND, MAX_CHARACTERS
 from motet.live.server import LIMITS, LiveServer
 
 Message = dict[str, Any]
@@ -320,7 +320,7 @@ def test_a_client_that_stalls_is_dropped_and_others_go_on(steer_model: SteerMode
 def test_a_speed_out_of_range_is_noted(steer_model: SteerModel) -> None:
     async def scenario(server: LiveServer) -> None:
         async with client(server) as connection:
-            await told(connection, "control", gait="walk", speed=LARGEST)
+            await told(connection, "control", gait="walk", speed=LARGEST_COMMAND)
             note = await next_of(connection, "note")
             assert "'walk' allows 0 or 0.67-1.92 m/s in this direction, not 1e+06" in note["message"]
             await frames(connection, 2)

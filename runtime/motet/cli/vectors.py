@@ -19,7 +19,7 @@ from motet.formats import names_motion, read_motion
 from motet.models.describe import DescribeModel
 from motet.models.generate import GenerateModel
 from motet.models.load import load_as
-from motet.models.search import NAME, Index, SearchModel
+from motet.models.search import INDEX_FILE, Index, SearchModel
 
 
 @click.command()
@@ -72,7 +72,7 @@ def embed(
 @click.argument("folder", type=Path)
 @click.option("--count", type=click.IntRange(1, 1000), help="Motions to print. [default: the bundle's]")
 @bundle_option("search")
-@click.option("--index", "file", type=Path, help=f"File for the vectors. [default: {NAME} in FOLDER]")
+@click.option("--index", "file", type=Path, help=f"File for the vectors. [default: {INDEX_FILE} in FOLDER]")
 @unit_option
 @session_options
 @click.option("--json", "as_json", is_flag=True, help="Print a list with path, clip, start, stop and score of each.")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from motet.errors import ControlError, ControlWarning, MotetError, quoted
 from motet.models.steer import SteerModel
-from motet.models.steer_session import LARGEST
+from motet.models.steer_session import LARGEST_COMMAND
 from motet.motion.humanoid import BONES, HUMANOID
 from motet.motion.pose import Pose
 from motet.settings import checked_int
@@ -124,7 +124,7 @@ def parsed(text: str | bytes) -> tuple[str, dict[str, Any]]:
 def _unfit(kind: str, name: str, value: Any) -> str | None:
     """What a value should be, where it is not."""
     if name in ("speed", "direction", "facing", "velocity", "places") and not _numeric(value, depth=2):
-        return f"numbers up to {LARGEST:g}, or lists of them"
+        return f"numbers up to {LARGEST_COMMAND:g}, or lists of them"
     one_for_each = kind == "control" and isinstance(value, list) and all(isinstance(gait, str) for gait in value)
     if name == "gait" and not (isinstance(value, str) or one_for_each):
         return "the name of a gait"
@@ -136,4 +136,4 @@ def _unfit(kind: str, name: str, value: Any) -> str | None:
 def _numeric(value: Any, depth: int) -> bool:
     if isinstance(value, list):
         return depth > 0 and all(_numeric(part, depth - 1) for part in value)
-    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= LARGEST
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= LARGEST_COMMAND

@@ -48,18 +48,15 @@ class BundleModel(ABC):
         for role in self.ROLES:
             if role not in graphs:
                 raise BundleError(f"manifest, graphs: there is no graph for the role {role!r}")
-        self.manifest = manifest
-        self.contract = manifest.motion
+        self.manifest, self.contract, self.loop = manifest, manifest.motion, LOOPS[manifest.loop]
         self.graphs, self.tables = graphs, tables or {}
-        self.loop = LOOPS[manifest.loop]
         self.defaults = self.loop.defaults(manifest.defaults)
         known = {kind.FEATURE: kind for kind in self.SETTINGS}
         if unknown := sorted(manifest.settings.keys() - known.keys()):
             expected = ", ".join(known) or "none"
             raise BundleError(f"manifest, settings.{unknown[0]}: is unknown; expected {expected}")
-        self._tuned = {
-            kind: kind.read(manifest.settings.get(name, {}), f"settings.{name}") for name, kind in known.items()
-        }
+        given = manifest.settings
+        self._tuned = {kind: kind.read(given.get(name, {}), f"settings.{name}") for name, kind in known.items()}
         self.sizes: Sizes = {"D": len(self.contract.channels)}
 
     def bind(self, role: str, inputs: Mapping[str, str], outputs: Mapping[str, str]) -> None:

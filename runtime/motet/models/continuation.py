@@ -93,10 +93,8 @@ class Continuation:
 
 
 def levelled(contract: MotionContract, frames: Array, given: int, rules: ContinuationSettings) -> Array:
-    """Frames (T, D) shifted so that the feet touch the same ground as in the first ``given`` frames.
-
-    The recordings in memory were made on other floors, and on mounds and steps.
-    """
+    """Frames (T, D) shifted so that the feet touch the same ground as in the first ``given`` frames. The recordings in
+    memory were made on other floors, and on mounds and steps."""
     soles = positions(contract.motion(frames, plant=False))[:, feet_of(HUMANOID), 1].min(axis=1)
     reach = round(rules.ground_reach * contract.fps)
     grounds = np.percentile(windows(soles, reach), GROUND_PERCENT, axis=1)
@@ -116,10 +114,8 @@ def averaged(values: Array, reach: int) -> Array:
 
 
 def paced(frames: Array, pace: Pace, fps: float, rules: ContinuationSettings) -> Array:
-    """Frames after the first of (T, D), played faster or slower where they deviate from a pace.
-
-    A standing figure keeps standing. The last frames are left out: their speed is not known yet.
-    """
+    """Frames after the first of (T, D), played faster or slower where they deviate from a pace. A standing figure keeps
+    standing. The last frames are left out: their speed is not known yet."""
     reach, times = round(rules.tempo_reach * fps), np.arange(len(frames))
     if pace.turn is None:
         return frames[1:]

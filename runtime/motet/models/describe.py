@@ -86,11 +86,8 @@ class _Options(TypedDict, total=False):
 
 
 class DescribeModel(LanguageModel):
-    """A motion captioning model.
-
-    Its loops (:mod:`motet.decode.loops`) take the step, contexts (B, C), limits and their settings by name, and return
-    up to ``beams`` hypotheses for each row, best first.
-    """
+    """A motion captioning model. Its loops (:mod:`motet.decode.loops`) take the step, contexts (B, C), limits and their
+    settings by name, and return up to ``beams`` hypotheses for each row, best first."""
 
     VERB = "describe"
     SETTINGS = (ConfidenceSettings, TimelineSettings)

@@ -47,8 +47,7 @@ class FillModel(BundleModel):
         super().__init__(manifest, graphs, tables)
         if self.contract.skeleton != HUMANOID:
             raise BundleError("manifest, motion.skeleton: a model that fills gaps needs motet's humanoid")
-        self.sizes["E"] = PLACED_CHANNELS
-        filled = "batch gap E"
+        self.sizes["E"], filled = PLACED_CHANNELS, "batch gap E"
         self.bind("filler", {"past": "batch before E", "plain": filled, "after": "batch behind E"}, {"filled": filled})
         self.context, self.least, self.longest = (int(self.defaults[key]) for key in ("context", "least", "longest"))
 
@@ -98,9 +97,7 @@ class FillModel(BundleModel):
             new = self._between(result[:start], result[stop:end], stop - start)
             if new is None:
                 return self._filled(self._elsewhere(motion)[0], gaps)
-            values = np.array(result.values)
-            values[start:stop] = new.values
-            result = replace(result, values=values)
+            result = replace(result, values=np.concatenate([result.values[:start], new.values, result.values[stop:]]))
         return result
 
     def _spans(self, motion: Motion, gaps: Sequence[Gap]) -> list[tuple[int, int]]:

@@ -73,10 +73,8 @@ class Generated:
 
     @cached_property
     def features(self) -> Motion:
-        """The motion in the contract's channels and at its frame rate, its feet planted: for measuring.
-
-        The continuation of a motion whose feet are not planted is planted gradually.
-        """
+        """The motion in the contract's channels and at its frame rate, its feet planted: for measuring. The
+        continuation of a motion whose feet are not planted is planted gradually."""
         planted = self.contract.features(self.frames, plant=True)
         if self.after is None:
             return planted
@@ -203,16 +201,12 @@ class GenerateModel(LanguageModel):
 
     def score(self, sentence: str, motion: Motion) -> float:
         """Log-likelihood of a motion, and of its end, given a sentence; a TextWarning names the words taken as UNK.
-
-        DecodingError for a model whose loop has no likelihoods.
-        """
+        DecodingError for a model whose loop has no likelihoods."""
         raise DecodingError(f"models of the loop {self.manifest.loop!r} cannot score motions")
 
     def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
         """A sentence ("text" of the settings) and its noise to ids (words,) int64 and the frames of the best motion.
-
-        The noise of each kind is (calls, ...), the frames (T, D) are normalised.
-        """
+        The noise of each kind is (calls, ...), the frames (T, D) are normalised."""
         ids, _ = self.vocabulary.encode(str(settings["text"]))
         chosen = self.loop.settled(self.defaults, {k: v for k, v in settings.items() if k != "text"})
         (row,) = self.decode(self.contexts([ids]), [Recorded(given)], chosen)

@@ -107,10 +107,8 @@ class TextRules:
         return re.findall(r"\d|[^\W\d]+", self.normalise(sentence))
 
     def sentence(self, words: Iterable[str]) -> str:
-        """The sentence of words: consecutive digits become one number, and small numbers words.
-
-        A word "" stands between its neighbours, and vanishes.
-        """
+        """The sentence of words: consecutive digits become one number, and small numbers words. A word "" stands
+        between its neighbours, and vanishes."""
         joined = re.sub(r"(?<=\d) (?=\d)", "", " ".join(words))
         joined = re.sub(rf"(?<=\d) {re.escape(self.point)} (?=\d)", ".", joined)
         spelled = {str(value): word for word, value in self.numbers.items() if value <= self.spelled}
@@ -213,10 +211,8 @@ class LanguageModel(BundleModel):
         return self.vocabulary.encode(sentence)[1]
 
     def ids(self, sentence: str) -> NDArray[np.int64]:
-        """Ids (words,) int64 of a sentence, UNK for unknown words, which a TextWarning names.
-
-        TextError for a sentence that is empty, too long, or of unknown words only.
-        """
+        """Ids (words,) int64 of a sentence, UNK for unknown words, which a TextWarning names. TextError for a sentence
+        that is empty, too long, or of unknown words only."""
         ids, unknown = self.vocabulary.encode(sentence)
         if unknown:
             warn(f"the model does not know {', '.join(unknown)} (in {sentence!r})", TextWarning)
@@ -242,9 +238,7 @@ class LanguageModel(BundleModel):
 
     def windows(self, motion: Motion, longest: float = MAX_SECONDS) -> list[tuple[float, Motion]]:
         """A motion of any length in the fewest equal parts of at most ``longest`` seconds, each with its start time.
-
-        One of another human figure is first retargeted as a whole onto the model's, like in :meth:`frames`.
-        """
+        One of another human figure is first retargeted as a whole onto the model's, like in :meth:`frames`."""
         motion = self.contract.on_figure(motion)
         most = max(1, math.floor(longest * motion.fps + 1e-9))  # parts are of whole frames
         count = max(1, math.ceil(len(motion) / most))

@@ -212,10 +212,8 @@ class _Tokens:
 
 
 def control_track(segments: Sequence[Segment], labels: Sequence[str], fps: float) -> NDArray[np.float32]:
-    """The control values (T, labels) float32 of segments, frame by frame; no frame is lost to rounding.
-
-    ControlError for a script of less than one frame.
-    """
+    """The control values (T, labels) float32 of segments, frame by frame; no frame is lost to rounding. ControlError
+    for a script of less than one frame."""
     ends = np.round(np.cumsum([segment.seconds for segment in segments]) * fps).astype(int)
     if not ends[-1]:
         raise ControlError(f"the script lasts less than one frame at {fps:g} fps")

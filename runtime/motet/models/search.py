@@ -35,7 +35,7 @@ log = logging.getLogger(__name__)
 Query = str | Motion
 """A sentence, or a motion to find similar ones."""
 
-NAME = ".motet-search.npz"  # of the index file in its folder
+INDEX_FILE = ".motet-search.npz"  # of the index file in its folder
 VERSION = 2  # of its format
 
 
@@ -48,10 +48,8 @@ class IndexSettings(Settings):
 
 
 class SearchModel(LanguageModel):
-    """A model that embeds motions and sentences in one space; their similarity is the product of their vectors.
-
-    Its loop takes scores (Q, N) and the number of best ones wanted, and returns their columns.
-    """
+    """A model that embeds motions and sentences in one space; their similarity is the product of their vectors. Its
+    loop takes scores (Q, N) and the number of best ones wanted, and returns their columns."""
 
     VERB = "search"
     SETTINGS = (IndexSettings,)
@@ -166,7 +164,7 @@ class Index:
         if unit is not None:
             metres(unit)
         place = Path(place)
-        kept = place if place.is_file() else Path(file or place / NAME)
+        kept = place if place.is_file() else Path(file or place / INDEX_FILE)
         before = _read(kept, model) if kept.is_file() else None
         folder = before.folder if before is not None and kept == place else place
         found = _renewed(folder, model, before, unit, progress)

@@ -21,7 +21,7 @@ from motet.motion.rotations import Array, quat_to_rotmat, wrapped
 if TYPE_CHECKING:
     from motet.models.steer import SteerModel
 
-LARGEST = 1e6  # number of a command: metres, m/s, degrees
+LARGEST_COMMAND = 1e6  # number of a command: metres, m/s, degrees
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,10 +106,8 @@ class SteerSnapshot:
 
 
 class SteerSession:
-    """Characters that move in one batch, each steered separately; holds their whole state.
-
-    A tick is 1 / ``model.fps`` seconds. Angles are degrees about the vertical: 0 along z, positive to the left.
-    """
+    """Characters that move in one batch, each steered separately; holds their whole state. A tick is 1 / ``model.fps``
+    seconds. Angles are degrees about the vertical: 0 along z, positive to the left."""
 
     def __init__(self, model: "SteerModel", playback: Playback, gait: int, hold_feet: bool, strict: bool) -> None:
         self.model, self.characters, self.strict = model, len(playback.row), strict
@@ -186,8 +184,10 @@ class SteerSession:
         except (TypeError, ValueError) as error:
             one = ", for all or" if columns else " or one"
             raise ControlError(f"{needed}{one} for each of {self.characters} characters") from error
-        if not (np.abs(found) <= LARGEST).all():
-            raise ControlError(f"{needed.partition(' need')[0]} must be finite numbers, no larger than {LARGEST:g}")
+        if not (np.abs(found) <= LARGEST_COMMAND).all():
+            raise ControlError(
+                f"{needed.partition(' need')[0]} must be finite numbers, no larger than {LARGEST_COMMAND:g}"
+            )
         return np.array(np.broadcast_to(found, (self.characters, *columns)))
 
     def _gaits(self, names: str | Sequence[str]) -> Rows:
@@ -206,10 +206,8 @@ class SteerSession:
         return pose if self._lock is None else self._lock.held(pose)
 
     def advance(self, seconds: float) -> Pose:
-        """The pose ``seconds`` later, for a display of any frame rate: interpolated between two ticks.
-
-        A command shows within a tick. ControlError unless 0 <= seconds <= 1.
-        """
+        """The pose ``seconds`` later, for a display of any frame rate: interpolated between two ticks. A command shows
+        within a tick. ControlError unless 0 <= seconds <= 1."""
         if not 0 <= seconds <= 1:
             raise ControlError(f"a session advances by 0 to 1 s, not {seconds}")
         if self._poses is None:
@@ -240,10 +238,8 @@ class SteerSession:
             self._lock = self._new_lock()
 
     def take(self, pose: Pose) -> None:
-        """Continue from a changed pose: its rotations and height, one for all characters or one for each.
-
-        Their positions and velocities stay. ControlError for a pose that does not fit.
-        """
+        """Continue from a changed pose: its rotations and height, one for all characters or one for each. Their
+        positions and velocities stay. ControlError for a pose that does not fit."""
         if len(pose) not in (1, self.characters) or pose.rotations.shape[1:] != (len(BONES), 4):
             raise ControlError(f"a pose of {pose.rotations.shape} does not fit {self.characters} characters")
         if not (np.isfinite(pose.rotations).all() and np.isfinite(pose.height).all()):

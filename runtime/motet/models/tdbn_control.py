@@ -22,10 +22,8 @@ from motet.settings import Seed, checked_int, seeds_of
 
 
 class TdbnModel(ControlModel):
-    """A model of labelled motions that runs live; sessions and threads can share it.
-
-    The step of a model with free hidden units also takes codes.
-    """
+    """A model of labelled motions that runs live; sessions and threads can share it. The step of a model with free
+    hidden units also takes codes."""
 
     LOOPS = ("session",)
     SETTINGS = (LookaheadSettings,)
@@ -100,9 +98,7 @@ class TdbnModel(ControlModel):
         smooth: bool = True,
     ) -> Motion:
         """The motion of one figure that runs a control script, starting from its first label unless ``start`` is given.
-
-        The parameters are those of :meth:`start` and :meth:`TdbnSession.run`.
-        """
+        The parameters are those of :meth:`start` and :meth:`TdbnSession.run`."""
         first = parse_segments(script, self.labels)[0].start
         begin = max(first, key=first.__getitem__) if start is None else start
         session = self.start(begin, seed=seed, variety=variety, temperature=temperature, smooth=smooth)
@@ -113,10 +109,8 @@ class TdbnModel(ControlModel):
         return captions(parse_segments(script, self.labels))
 
     def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
-        """From the start of the first label, at variety 1: a track (T, labels) and noise (T, N) to frames (T, D).
-
-        With several iterations a tick (of the settings), each tick has that many rows of noise.
-        """
+        """From the start of the first label, at variety 1: a track (T, labels) and noise (T, N) to frames (T, D). With
+        several iterations a tick (of the settings), each tick has that many rows of noise."""
         session = self.start(variety=1.0, iterations=settings.get("iterations"), smooth=False)
         session.noise = RowsOfNoise(given["noise"])
         return {"frames": session.frames(given["track"])[0]}
@@ -189,11 +183,8 @@ class TdbnSession:
         return f"TdbnSession({self.characters} characters, tick {self._tick}, {self.model!r})"
 
     def control(self, **values: ArrayLike) -> None:
-        """Set the control from now on: labels to numbers, or arrays (characters,), between 0 and 1.
-
-        Labels not named become 0. ControlError for an unknown label or a value out of range; the control is unchanged
-        then.
-        """
+        """Set the control from now on: labels to numbers, or arrays (characters,), between 0 and 1. Labels not named
+        become 0. ControlError for an unknown label or a value out of range; the control is unchanged then."""
         unknown = sorted(values.keys() - set(self.model.labels))
         if unknown:
             raise ControlError(f"unknown control {', '.join(unknown)}; expected one of {', '.join(self.model.labels)}")
@@ -241,10 +232,8 @@ class TdbnSession:
         return tick(self.model.stepper, history, inputs, self.iterations)
 
     def run(self, script: str, in_place: bool = False) -> list[Motion]:
-        """Run a control script (:mod:`motet.models.scripts`) for all characters; one motion for each.
-
-        The root's path follows from the feet on the ground; ``in_place`` leaves it out.
-        """
+        """Run a control script (:mod:`motet.models.scripts`) for all characters; one motion for each. The root's path
+        follows from the feet on the ground; ``in_place`` leaves it out."""
         segments = parse_segments(script, self.model.labels)
         frames = self.frames(control_track(segments, self.model.labels, self.model.fps))
         return [self.model.contract.motion(character, plant=not in_place) for character in frames]
@@ -263,10 +252,8 @@ class TdbnSession:
         return TdbnSnapshot(self._first, self._history.copy(), self._inputs["control"].copy(), self._tick, self._ahead)
 
     def restore(self, snapshot: TdbnSnapshot) -> None:
-        """Go back to a snapshot of this session or of one with as many characters of the same model.
-
-        The same frames follow, except for random draws in a session of other seeds.
-        """
+        """Go back to a snapshot of this session or of one with as many characters of the same model. The same frames
+        follow, except for random draws in a session of other seeds."""
         if snapshot.history.shape != self._history.shape:
             raise ControlError(f"a snapshot of history {snapshot.history.shape} does not fit {self._history.shape}")
         if self.smooth and snapshot.tick and snapshot.ahead is None:
