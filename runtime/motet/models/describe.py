@@ -78,8 +78,6 @@ class Part(Description):
 
 
 class _Options(TypedDict, total=False):
-    """What :meth:`DescribeModel.describe` takes by name only."""
-
     decoding: Decoding | None
     seed: SupportsIndex
     progress: Progress

@@ -48,8 +48,6 @@ class GenerateSettings(LoopSettings, total=False):
 
 
 class _Options(GenerateSettings, total=False):
-    """All that a call of :meth:`GenerateModel.generate` takes by name."""
-
     seed: Seed
     strict: bool
     progress: Progress

@@ -20,18 +20,12 @@ from motet.models.search import SearchModel
 from motet.models.steer import SteerModel
 from motet.models.tdbn_control import TdbnModel
 
+# fmt: off
 KINDS: tuple[type[BundleModel], ...] = (
-    CodesModel,
-    DescribeModel,
-    FillModel,
-    MixtureModel,
-    PredictModel,
-    SearchModel,
-    SteerModel,
-    TdbnModel,
+    CodesModel, DescribeModel, FillModel, MixtureModel, PredictModel, SearchModel, SteerModel, TdbnModel,
 )
-"""All kinds of models, each with its verb, its decoding loops and the replay of its golden run. Benchmarks and
-comparisons register a function for each kind."""
+# fmt: on
+"""All kinds of models; benchmarks and comparisons register a function for each."""
 
 Kind = TypeVar("Kind", bound=BundleModel)
 

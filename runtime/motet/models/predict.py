@@ -28,8 +28,6 @@ SURE = 0.5
 
 
 class _Options(TypedDict, total=False):
-    """What :meth:`PredictModel.predict` takes by name."""
-
     seconds: float | None
     frames: int | None
     append: bool
@@ -195,8 +193,8 @@ class PredictModel(BundleModel):
             raise MotionError(f"seeds of shape {given.shape} do not fit: {takes}")
         if not np.isfinite(given).all():
             raise MotionError("seeds must be finite numbers")
-        rows = two_rows(np.arange(len(given)))
-        found: Floats = self.loop.run(self.graphs["encoder"], self.graphs["step"], given[rows], count, self.horizon)
+        rows = given[two_rows(np.arange(len(given)))]
+        found: Floats = self.loop.run(self.graphs["encoder"], self.graphs["step"], rows, count, self.horizon)
         return found[: len(given)]
 
     def expected_errors(self, motions: Motion | Sequence[Motion]) -> Floats:
