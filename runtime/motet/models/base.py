@@ -122,7 +122,7 @@ class BundleModel(ABC):
         """The complete run of the golden vectors (docs/bundle.md): outputs from its inputs and settings."""
 
 
-MAX_CHARACTERS = 100_000  # of one session, whose state is in memory
+LARGEST_CROWD = 100_000  # characters of one session, whose state is in memory
 
 
 class ControlModel(BundleModel):

@@ -12,7 +12,7 @@ from motet.bundle.manifest import Manifest
 from motet.decode.matching import FEATURES, Matcher, Playback, SteeringSettings, Table
 from motet.decode.steering import PoseCodes
 from motet.errors import BundleError, ControlError
-from motet.models.base import MAX_CHARACTERS, ControlModel
+from motet.models.base import LARGEST_CROWD, ControlModel
 from motet.models.scripts import captions, parse_orders
 from motet.models.steer_session import Gaits, SteerSession
 from motet.motion.feet.lock import FootLockSettings
@@ -97,7 +97,7 @@ class SteerModel(ControlModel):
             instead of clamping it.
         ControlError for values out of range, MotionError for a motion that does not fit.
         """
-        characters = checked_int("characters", characters, 1, MAX_CHARACTERS, ControlError)
+        characters = checked_int("characters", characters, 1, LARGEST_CROWD, ControlError)
         gait = self.gaits[0] if start is None or isinstance(start, Motion) else start
         number = self.abilities.number(gait)
         playback = Playback.at(self.matcher.stillest(number), characters, self.sizes["K"])

@@ -14,7 +14,7 @@ from motet.decode.lookahead import Ahead, Lookahead, LookaheadSettings
 from motet.decode.loop import RowNoise, RowsOfNoise
 from motet.decode.loops import tick
 from motet.errors import BundleError, ControlError, DecodingError, MotionError
-from motet.models.base import MAX_CHARACTERS, ControlModel
+from motet.models.base import LARGEST_CROWD, ControlModel
 from motet.models.scripts import captions, control_track, parse_segments
 from motet.motion.kinematics import without_heading
 from motet.motion.motion import TURN, Motion
@@ -77,7 +77,7 @@ class TdbnModel(ControlModel):
             the net itself. The net runs the same.
         Raises ControlError for values out of range, MotionError for a motion that does not fit.
         """
-        characters = checked_int("characters", characters, 1, MAX_CHARACTERS, ControlError)
+        characters = checked_int("characters", characters, 1, LARGEST_CROWD, ControlError)
         seeds = seeds_of(seed, characters, ControlError)
         first, label = self._begun(start)
         settings = self._settings(variety, temperature, iterations)
