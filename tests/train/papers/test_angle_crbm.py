@@ -14,9 +14,8 @@ from motet.models.tdbn_control import TdbnModel
 from motet_export.bundles import export_run
 from motet_train.models.net import tuples
 from motet_train.papers.tdbn.clips import read_clips
-from motet_train.papers.tdbn.crbm import CRBM
 from motet_train.papers.tdbn.experiments import limit_cycle, switch
-from motet_train.papers.tdbn.rbm import DivergedError, Learning
+from motet_train.papers.tdbn.rbm import CRBM, DivergedError, Learning
 from motet_train.papers.tdbn.report import experiments_of, study_of
 from motet_train.papers.tdbn.tdbn import AngleCRBM, AngleCRBMConfig
 from motet_train.runs import Run

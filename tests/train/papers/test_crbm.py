@@ -5,8 +5,7 @@ import pytest
 import torch
 from torch.nn.functional import binary_cross_entropy_with_logits
 
-from motet_train.papers.tdbn.crbm import CRBM, CRBMLayer, Past, transitions
-from motet_train.papers.tdbn.rbm import Learning
+from motet_train.papers.tdbn.rbm import CRBM, CRBMLayer, Learning, Past, transitions
 
 
 def small_crbm(free: int = 0) -> CRBM:

@@ -88,8 +88,7 @@ def windows(motion: Array, count: int = 8) -> Array:
 
 
 def _cut(frames: Array, starts: NDArray[np.int64]) -> Array:
-    cut: Array = frames[starts[:, None] + np.arange(PROTOCOL_WINDOW)]
-    return cut
+    return np.asarray(frames[starts[:, None] + np.arange(PROTOCOL_WINDOW)])
 
 
 def window_errors(predicted: Array, truth: Array) -> Array:
@@ -100,8 +99,7 @@ def window_errors(predicted: Array, truth: Array) -> Array:
 def _euler_errors(predicted: Array, angles: Array) -> Array:
     counted = angles.std(axis=1, keepdims=True) > CONSTANT_STD
     difference = np.where(counted, euler_frames(predicted) - angles[:, SEED_FRAMES:], 0.0)
-    error: Array = np.linalg.norm(difference, axis=-1)
-    return error
+    return np.asarray(np.linalg.norm(difference, axis=-1))
 
 
 def rotation_errors(predicted: Array, truth: Array) -> Array:
@@ -115,8 +113,7 @@ def rotation_errors(predicted: Array, truth: Array) -> Array:
     apart = rotvec_to_rotmat(said) - rotvec_to_rotmat(vectors[:, SEED_FRAMES:])
     half_sin = np.linalg.norm(apart, axis=(-2, -1)) / np.sqrt(8)
     angles = 2 * np.degrees(np.arcsin(np.minimum(half_sin, 1.0)))
-    error: Array = (angles * moving).sum(axis=-1) / np.maximum(moving.sum(axis=-1), 1)
-    return error
+    return np.asarray((angles * moving).sum(axis=-1) / np.maximum(moving.sum(axis=-1), 1))
 
 
 def predictions(

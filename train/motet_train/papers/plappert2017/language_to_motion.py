@@ -141,7 +141,14 @@ LOSSES = {"surrogate": Mixture.surrogate_loss, "likelihood": lambda *given: -Mix
 
 @dataclass(frozen=True)
 class LanguageToMotionConfig:
-    """Sizes; the defaults are the paper's (table 1). channels: D, without the flag. words: V, with special words."""
+    """Sizes; the defaults are the paper's (table 1). channels: D, without the flag. words: V, with special words.
+
+    variance_floor: in normalised units, as the standard deviation feed_noise of what training adds to the frames that
+    are fed back: a free run feeds back frames that are a little off, and must find its way back. frame_dropout: mean
+    share of these frames that training feeds back as zeros, from none to twice as many in a sequence: what the frame
+    before does not tell, the context must. summary: weight of the training-only loss of
+    :class:`motet_train.models.motion_to_language.SummaryHead`; 0 leaves its head out.
+    """
 
     channels: int
     words: int
@@ -153,15 +160,9 @@ class LanguageToMotionConfig:
     gates: str = "sigmoid"
     loss: str = "surrogate"
     variance_floor: float = 1e-4
-    """In normalised units."""
     feed_noise: float = 0.0
-    """Standard deviation of what training adds to the frames that are fed back, in normalised units: a free run feeds
-    back frames that are a little off, and must find its way back."""
     frame_dropout: float = 0.0
-    """Mean share of the frames that are fed back as zeros in training, from none to twice as many in a sequence: what
-    the frame before does not tell, the context must."""
     summary: float = 0.0
-    """Weight of the training-only loss of :mod:`motet_train.models.motion_to_language`; 0 leaves its head out."""
 
 
 class LanguageToMotion(LanguageNet):

@@ -92,8 +92,7 @@ def _leg_phase(reference: Reference, frames: Array, loop: Array, leg: NDArray[np
     windows = fine[np.arange(points)[:, None] + 4 * np.arange(3)].reshape(points, -1)
     seen = np.concatenate([seen[:-2], seen[1:-1], seen[2:]], axis=-1)
     square = ((seen[..., None, :] - windows) ** 2).sum(axis=-1)
-    phase: Array = square.argmin(axis=-1) / (cycle * 4)
-    return phase
+    return np.asarray(square.argmin(axis=-1) / (cycle * 4))
 
 
 def switch(study: ControlStudy, start: str, end: str, count: int) -> tuple[Array, Array]:

@@ -36,7 +36,7 @@ BASELINES = {"default": Recipe("control", "angle-crbm", "session", AngleCRBMConf
 @dataclass(frozen=True, eq=False)
 class Lessons:
     """For each group, such as the clips of a label, sequences (T, D), control values (T, L) of their frames, and
-    onsets: see :func:`motet_train.papers.tdbn.crbm.transitions`."""
+    onsets: see :func:`motet_train.papers.tdbn.rbm.transitions`."""
 
     sequences: Sequence[Sequence[Array]]
     controls: Sequence[Sequence[Array]]
@@ -49,14 +49,14 @@ def train_control(clips: Clips, job: Job) -> Run:
     found = clips.frames(config.fps)
     for label, group in found.items():
         if (shortest := min(map(len, group))) < 4 * config.taps:
-            need = f"it needs {4 * config.taps}"
-            raise DataError(f"a clip of {label!r} has {shortest} frames at the model's rate; {need}")
+            have = f"a clip of {label!r} has {shortest} frames at the model's rate"
+            raise DataError(f"{have}; it needs {4 * config.taps}")
     net = untrained(config, clips.skeleton, clips.channels, len(found))
     units, every = ("deg",) * len(clips.channels), np.concatenate([s for group in found.values() for s in group])
     mean, std = every.mean(axis=0), living(every.std(axis=0), units)
     contract = MotionContract("angles", clips.channels, units, config.fps, mean, std, clips.skeleton)
     net.measure_by(mean, std * config.sigma)
-    starts = {label: np.round(group[0][: net.taps], 6).tolist() for label, group in found.items()}
+    starts = {label: np.round(group[0][: config.taps], 6).tolist() for label, group in found.items()}
     control = {"labels": list(found), "starts": starts}
     manifest = job.manifest(contract, net.to_config(), net.defaults, clips.licence, control=control)
     labels = zip(np.eye(len(found)), found.values(), strict=True)
@@ -71,7 +71,11 @@ def train_control(clips: Clips, job: Job) -> Run:
     def more(log: Sequence[Line]) -> dict[str, Any]:
         tried = sum("missed" in line for line in log)
         chosen = {"candidates": tried, "missed": kept(log, "best")["missed"]} if tried else {}
-        return {"reconstruction": round(reconstruction(net.cpu(), every, std), 6), **chosen}
+        given, moving = torch.tensor(every, dtype=torch.float32), std > 0
+        with torch.no_grad():
+            error = (net.cpu().decode(net.encode(given)) - given).numpy()[:, moving] / std[moving]
+        # RMS in z units of frames encoded and decoded
+        return {"reconstruction": round(float(np.sqrt(np.mean(error**2))), 6), **chosen}
 
     # clips that show no gait have none to try a candidate with
     return train_lessons(net, job, manifest, lessons, missed if any(periodic) else None, more)
@@ -108,14 +112,6 @@ def train_lessons(
 
     choose = missed is not None and sum(stage.whole for stage in stages) > 1
     return job.run(net, DivergenceLearner(net, stages, generator, misses if choose else None, others), manifest, more)
-
-
-def reconstruction(net: ControlNet, frames: Array, std: Array) -> float:
-    """RMS error in z units of frames (N, D) encoded and decoded, over the channels that are not constant."""
-    given = torch.tensor(frames, dtype=torch.float32)
-    with torch.no_grad():
-        error = (net.decode(net.encode(given)) - given).numpy()[:, std > 0] / std[std > 0]
-    return float(np.sqrt(np.mean(error**2)))
 
 
 EPOCHS_A_CHUNK = 200

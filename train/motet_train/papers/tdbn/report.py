@@ -10,50 +10,26 @@ import numpy as np
 from motet.models.tdbn_control import TdbnModel
 from motet_train.data.errors import DataError
 from motet_train.evaluate.tables import Goals, Report, gathered, reached
+from motet_train.papers.tdbn import experiments
 from motet_train.papers.tdbn.clips import Clips, body_parts, is_periodic
-from motet_train.papers.tdbn.experiments import (
-    bends,
-    constant_hysteresis,
-    convergence,
-    gait_transitions,
-    interruptions,
-    leaps,
-    limit_cycle,
-    ramp_hysteresis,
-    sampled_runs,
-    standing_feet,
-    synchronisation,
-)
 from motet_train.papers.tdbn.study import ControlStudy, Leg, Reference
 
+# fmt: off
 GOALS: Goals = {
-    "train.seconds": (None, 30),
-    "train.reconstruction": (None, 0.25),
-    "cycle.period_error": (None, 0.02),
-    "cycle.drift": (None, 0.005),
-    "cycle.energy": (0.7, 1.1),
-    "cycle.converged": (99, None),
-    "cycle.median_s": (None, 1.2),
+    "train.seconds": (None, 30), "train.reconstruction": (None, 0.25),
+    "cycle.period_error": (None, 0.02), "cycle.drift": (None, 0.005), "cycle.energy": (0.7, 1.1),
+    "cycle.converged": (99, None), "cycle.median_s": (None, 1.2),
     "cycle_run.energy": (0.7, 1.1),
-    "sync.share": (1, None),
-    "sync.max_s": (None, 1),
-    "gait.share": (1, None),
-    "gait.median_s": (None, 0.45),
-    "gait.under_half": (0.8, None),
+    "sync.share": (1, None), "sync.max_s": (None, 1),
+    "gait.share": (1, None), "gait.median_s": (None, 0.45), "gait.under_half": (0.8, None),
     "gait.jump_ratio": (None, 1),
-    "hysteresis.ramp_width": (0.4, None),
-    "hysteresis.constant_width": (0.25, None),
-    "bend.share": (0.95, None),
-    "bend.share_from_run": (0.95, None),
-    "bend.interrupt_s": (None, 0.8),
-    "feet.slide_walk": (None, 0.025),
-    "feet.speed_walk": (None, 0.15),
-    "feet.acceleration_walk": (None, 6),
-    "feet.slide_run": (None, 0.06),
-    "feet.speed_run": (None, 0.15),
-    "feet.acceleration_run": (None, 11),
+    "hysteresis.ramp_width": (0.4, None), "hysteresis.constant_width": (0.25, None),
+    "bend.share": (0.95, None), "bend.share_from_run": (0.95, None), "bend.interrupt_s": (None, 0.8),
+    "feet.slide_walk": (None, 0.025), "feet.speed_walk": (None, 0.15), "feet.acceleration_walk": (None, 6),
+    "feet.slide_run": (None, 0.06), "feet.speed_run": (None, 0.15), "feet.acceleration_run": (None, 11),
     "random.leap": (None, 26),
 }
+# fmt: on
 """Figure -> (least, most) that the default recipe is to reach; its clips show walk, run and bend."""
 
 
@@ -82,20 +58,20 @@ def study_of(model: TdbnModel, clips: Clips) -> ControlStudy:
 def experiments_of(study: ControlStudy) -> dict[str, list[Callable[[], Mapping[str, float]]]]:
     """For each group of figures the experiments that give them; names are those of CMU's labels."""
     found: dict[str, list[Callable[..., Mapping[str, float]]]] = {
-        "cycle": [limit_cycle, convergence],
-        "sync": [synchronisation],
-        "feet": [standing_feet],
-        "random": [leaps],
+        "cycle": [experiments.limit_cycle, experiments.convergence],
+        "sync": [experiments.synchronisation],
+        "feet": [experiments.standing_feet],
+        "random": [experiments.leaps],
     }
     if study.run is not None:
         found |= {
-            "cycle_run": [partial(limit_cycle, role="run")],
-            "gait": [gait_transitions],
-            "hysteresis": [ramp_hysteresis, constant_hysteresis],
-            "variety": [sampled_runs],
+            "cycle_run": [partial(experiments.limit_cycle, role="run")],
+            "gait": [experiments.gait_transitions],
+            "hysteresis": [experiments.ramp_hysteresis, experiments.constant_hysteresis],
+            "variety": [experiments.sampled_runs],
         }
         if study.bend is not None:
-            found["bend"] = [bends, interruptions]
+            found["bend"] = [experiments.bends, experiments.interruptions]
     return {name: [partial(run, study) for run in group] for name, group in found.items()}
 
 

@@ -42,8 +42,7 @@ def controls_of(velocities: ArrayLike) -> Array:
     """Velocities (..., 3), forward, to the left (m/s) and turning to the left (rad/s), as control values (..., 6)."""
     shares = np.asarray(velocities, dtype=np.float64) / FULL_CONTROL
     both = np.stack([shares, -shares], axis=-1)
-    values: Array = np.clip(both, 0, 1).reshape(*shares.shape[:-1], len(LABELS))
-    return values
+    return np.asarray(np.clip(both, 0, 1).reshape(*shares.shape[:-1], len(LABELS)))
 
 
 def course(features: Motion) -> Array:
@@ -52,8 +51,7 @@ def course(features: Motion) -> Array:
     total = np.concatenate([np.zeros((1, 3)), np.cumsum(values, axis=0)])
     start = np.arange(len(values))
     stop = np.minimum(start + max(1, round(0.5 * features.fps)), len(values))
-    found: Array = (total[stop] - total[start]) / (stop - start)[:, None]
-    return found
+    return np.asarray((total[stop] - total[start]) / (stop - start)[:, None])
 
 
 GAITS = {"walk": (0.3, 1.8), "run": (1.8, 4.0)}
@@ -103,7 +101,9 @@ def train_steered(store: Store, job: Job, data: str = "") -> Run:
     config = replace(job.recipe.config, fps=store.fps)
     net = untrained(config, contract.skeleton, contract.channels, len(LABELS))
     net.measure_by(contract.mean, contract.std * config.sigma)
-    control = {"labels": LABELS, "starts": dict.fromkeys(LABELS, _stillest(found, net.taps).round(6).tolist())}
+    beginnings = [one.features.values[: config.taps] for one in found if len(one.features) >= config.taps]
+    stillest = min(beginnings, key=lambda frames: float(np.abs(frames[:, : len(ROOT_SIXD) - 1]).sum()))
+    control = {"labels": LABELS, "starts": dict.fromkeys(LABELS, stillest.round(6).tolist())}
     about = {"data": {"name": data, "recordings": len(found), "frames": sum(map(len, motions))}}
     manifest = job.manifest(contract, net.to_config(), net.defaults, None, about, control=control)
     return train_lessons(net, job, manifest, Lessons([[motion.values for motion in motions]], [controls], [1.0]))
@@ -117,12 +117,6 @@ def mirrored_too(store: Store, found: Sequence[Recording]) -> tuple[MotionContra
     motions += [replace(motion, values=contract.mirror(motion.values)) for motion in motions]
     every = np.concatenate([motion.values for motion in motions])
     return replace(contract, mean=every.mean(axis=0), std=living(every.std(axis=0), store.units)), motions
-
-
-def _stillest(found: Sequence[Recording], taps: int) -> Array:
-    """The frames (K, D) at the start of the recording in which the root moves least there."""
-    starts = [one.features.values[:taps] for one in found if len(one.features) >= taps]
-    return min(starts, key=lambda frames: float(np.abs(frames[:, : len(ROOT_SIXD) - 1]).sum()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,5 +205,4 @@ def moved(ground: Array, steps: Array) -> Array:
     """Places (B, 3), x, z and facing, after steps (B, 3), forward, to the left and turned, as the figures see them."""
     forward, left, turn = steps.T
     sin, cos = np.sin(ground[:, 2]), np.cos(ground[:, 2])
-    found: Array = ground + np.stack([forward * sin + left * cos, forward * cos - left * sin, turn], axis=-1)
-    return found
+    return np.asarray(ground + np.stack([forward * sin + left * cos, forward * cos - left * sin, turn], axis=-1))

@@ -73,8 +73,7 @@ class Reference:
 
     def jumps(self, frames: Array) -> Array:
         """RMS z change (T-1, ...) from each of frames (T, ..., D) to the next."""
-        change: Array = np.sqrt((np.diff(self.z(frames), axis=0) ** 2).mean(axis=-1))
-        return change
+        return np.asarray(np.sqrt((np.diff(self.z(frames), axis=0) ** 2).mean(axis=-1)))
 
     @cached_property
     def largest_jump(self) -> float:

@@ -13,7 +13,7 @@ from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
-from typing import Any
+from typing import Any, Self, get_type_hints
 
 import torch
 from torch import Tensor, nn
@@ -21,8 +21,18 @@ from torch import Tensor, nn
 from motet.bundle.graph import GraphSpec, TensorSpec
 from motet.representation.contract import Z_LIMIT
 from motet_train.models.net import Net, Part, configured, normalised
-from motet_train.papers.tdbn.crbm import CRBM, CRBMLayer, Past, transitions
-from motet_train.papers.tdbn.rbm import RBM, Learning, RBMLayer, Stage, balanced, block_mask
+from motet_train.papers.tdbn.rbm import (
+    CRBM,
+    RBM,
+    CRBMLayer,
+    Learning,
+    Past,
+    RBMLayer,
+    Stage,
+    balanced,
+    block_mask,
+    transitions,
+)
 
 Sequences = Sequence[Sequence[Tensor]]
 """For each group, such as a label, its sequences of frames (T, D), or the labels' values (T, L) at these."""
@@ -31,16 +41,16 @@ Sequences = Sequence[Sequence[Tensor]]
 class ControlNet(Net):
     """A CRBM over codes of frames; subclasses say how frames become codes, and codes frames.
 
-    config: sizes and training, see the subclasses. noise_units: N.
+    config: sizes and training, see the subclasses. given: what they are made with beside it, ``labels`` too.
+    noise_units: N.
     """
 
-    config: Any
     expansion: Tensor
 
-    def __init__(self, crbm: CRBM, labels: int, channels: int, taps: int) -> None:
-        super().__init__(channels)
-        self.crbm, self.taps = crbm, taps
-        self.noise_units = len(crbm.visible_bias)
+    def __init__(self, config: Any, crbm: CRBM, width: int, **given: Any) -> None:
+        super().__init__(width)
+        self.config, self.crbm, self.given = config, crbm, given
+        self.noise_units, labels = len(crbm.visible_bias), given["labels"]
         # each label has its own control units, which are all 1 or all 0 (thesis 5.4)
         self.register_buffer("expansion", torch.eye(labels).repeat_interleave(crbm.control_units // labels, dim=1))
 
@@ -61,13 +71,19 @@ class ControlNet(Net):
     def decode(self, codes: Tensor) -> Tensor:
         """Codes (B, H) to frames (B, D)."""
 
-    @abstractmethod
     def vary(self, mean: Tensor, noise: Tensor, variety: Tensor) -> Tensor:
-        """Codes (B, H) between their means (variety 0) and samples (variety 1), from uniform noise (B, N)."""
+        """Codes (B, H) between their means (variety 0) and samples, here binary (variety 1), by noise (B, N)."""
+        return mean + variety * ((noise < mean).to(mean.dtype) - mean)
 
-    @abstractmethod
     def to_config(self) -> dict[str, Any]:
-        """Everything that ``from_config`` needs, but for tuples ready for JSON."""
+        """Everything that :meth:`from_config` needs, but for tuples ready for JSON."""
+        return {**asdict(self.config), **self.given}
+
+    @classmethod
+    def from_config(cls, config: Mapping[str, Any]) -> Self:
+        """An untrained net of the sizes that :meth:`to_config` wrote."""
+        own = {key: config[key] for key in config if key in get_type_hints(cls.CONFIG)}
+        return cls(configured(cls.CONFIG, own), **{key: config[key] for key in config if key not in own})
 
     @abstractmethod
     def stages(
@@ -75,7 +91,7 @@ class ControlNet(Net):
     ) -> tuple[list[Stage], Mapping[str, nn.Module]]:
         """How the net learns, one layer after the other (thesis 3.3), and what else has a state.
 
-        The mean and the scale must be set. onsets: see :func:`motet_train.papers.tdbn.crbm.transitions`.
+        The mean and the scale must be set. onsets: see :func:`motet_train.papers.tdbn.rbm.transitions`.
         """
 
     def begin_crbm(self, generator: torch.Generator) -> None:
@@ -98,7 +114,7 @@ class ControlNet(Net):
         """The CRBM as what learns, from sequences encoded as they are now."""
         codes = [[self.encode(frames) for frames in found] for found in sequences]
         units = [[values @ self.expansion for values in found] for found in controls]
-        data = transitions(codes, units, self.taps, onsets, past.own)
+        data = transitions(codes, units, self.config.taps, onsets, past.own)
         return CRBMLayer(self.crbm, data, self.config.crbm, generator, clamped, past)
 
     def step(
@@ -120,14 +136,14 @@ class ControlNet(Net):
         drive = crbm.drive(past, control @ self.expansion)
         free = drive[:, :0]
         if codes is not None:
-            free = _binary(crbm.free(codes, past, temperature), noise[:, units:], variety)
+            free = ControlNet.vary(self, crbm.free(codes, past, temperature), noise[:, units:], variety)
         new = self.vary(crbm.visible(drive, free, temperature), noise[:, :units], variety)
         return new, self.decode(new), torch.cat([history[:, 1:], new[:, None]], dim=1)
 
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """The encoder and the step, each with its contract."""
         codes, channels, free = (len(self.crbm.visible_bias),), (len(self.mean),), self.crbm.free_units
-        history, control, noise = (self.taps, *codes), (len(self.expansion),), (self.noise_units + free,)
+        history, control, noise = (self.config.taps, *codes), (len(self.expansion),), (self.noise_units + free,)
         inputs = {"history": history, "control": control, "noise": noise, "variety": (1,), "temperature": (1,)}
         outputs = {"next_codes": codes, "frame": channels, "next_history": history}
 
@@ -140,40 +156,34 @@ class ControlNet(Net):
         return {"encoder": (Part(self, self.encode), encoder), "step": (Part(self, self.step), step)}
 
 
-def _binary(mean: Tensor, noise: Tensor, variety: Tensor) -> Tensor:
-    """Between probabilities (variety 0) and binary samples of them (variety 1)."""
-    return mean + variety * ((noise < mean).to(mean.dtype) - mean)
-
-
 @dataclass(frozen=True)
 class TDBNConfig:
-    """Sizes of the net and how it is trained; the defaults are the recipe of the shipped bundle."""
+    """Sizes of the net and how it is trained; the defaults are the recipe of the shipped bundle.
+
+    root_rotation: whether it is among the channels: 59 of CMU's skeleton, else the thesis' 56. control_units: for each
+    label. clamped: whether they keep their values in the reconstruction. sigma: standard deviation of a visible unit,
+    in units of its channel's own: smaller codes say more. past_noise, own: see :class:`Past`. onset: how many times as
+    often the first window of a motion that ends is drawn as its last. temperature: of the codes and of generation;
+    learning anneals from 1 to it. initial: standard deviation of the first weights. restarts: RBMs that learn side by
+    side: which features they find decides how the net moves. tries: CRBMs learned on each of them at the most, while
+    none satisfies.
+    """
 
     fps: float = 40.0
     root_rotation: bool = True
-    """Whether the root's rotation is among the channels: 59 of CMU's skeleton, else the thesis' 56."""
     hidden_per_part: int = 30
     taps: int = 3
     control_units: int = 24
-    """For each label."""
     free_units: int = 0
     clamped: bool = True
-    """Whether control units keep their values in the reconstruction."""
     sigma: float = 0.38
-    """Standard deviation of a Gaussian visible unit, in units of its channel's own: smaller codes say more."""
     past_noise: float = 0.3
     own: int = 0
-    """See :class:`motet_train.papers.tdbn.crbm.Past`."""
     onset: float = 100.0
-    """How many times as often the first window of a motion that ends is drawn as its last."""
     temperature: float = 0.38
-    """Of the codes and of generation; learning anneals from 1 to it."""
     initial: float = 0.01
-    """Standard deviation of the initial weights."""
     restarts: int = 2
-    """RBMs that learn side by side: which features they find decides how the net moves."""
     tries: int = 3
-    """CRBMs learned on each of them at the most, while none satisfies."""
     rbm: Learning = field(default_factory=lambda: Learning(2000, rate=1e-2, final_rate=0.03, temperature=(1.0, 0.38)))
     crbm: Learning = field(default_factory=lambda: Learning(80, rate=6e-3, final_rate=0.3, temperature=(1.0, 0.38)))
 
@@ -195,11 +205,13 @@ class TDBN(ControlNet):
     parts: the body part of each channel (D). labels: how many (L).
     """
 
+    CONFIG = TDBNConfig
+
     def __init__(self, config: TDBNConfig, parts: Sequence[int], labels: int) -> None:
         mask = block_mask(parts, config.hidden_per_part)
         control = labels * config.control_units
-        super().__init__(CRBM(mask.shape[1], config.taps, control, config.free_units), labels, len(parts), config.taps)
-        self.config = config
+        crbm = CRBM(mask.shape[1], config.taps, control, config.free_units)
+        super().__init__(config, crbm, len(parts), parts=parts, labels=labels)
         self.rbm = RBM(mask)
 
     def encode(self, frames: Tensor) -> Tensor:
@@ -209,10 +221,6 @@ class TDBN(ControlNet):
     def decode(self, codes: Tensor) -> Tensor:
         """Codes (B, H) to frames (B, D)."""
         return self.rbm.decode(codes) * self.scale + self.mean
-
-    def vary(self, mean: Tensor, noise: Tensor, variety: Tensor) -> Tensor:
-        """Between the probabilities (variety 0) and binary samples of them (variety 1)."""
-        return _binary(mean, noise, variety)
 
     def stages(
         self, sequences: Sequences, controls: Sequences, onsets: Sequence[float], generator: torch.Generator
@@ -232,52 +240,34 @@ class TDBN(ControlNet):
             self.rbm.take(rbms, number)
             self.begin_crbm(generator)
 
-        first = Stage(
-            config.rbm.epochs, lower, lambda: RBMLayer(rbms, frames, uniform, config.rbm, generator), whole=False
-        )
+        rbm = partial(RBMLayer, rbms, frames, uniform, config.rbm, generator)
         crbm = partial(self.crbm_layer, sequences, controls, onsets, generator, past, config.clamped)
         numbers = list(range(config.restarts)) * config.tries
         tries = [Stage(config.crbm.epochs, partial(upper, number), crbm, whole=True) for number in numbers]
-        return [first, *tries], {"rbms": rbms}
-
-    def to_config(self) -> dict[str, Any]:
-        """As of all."""
-        parts = self.rbm.mask[:, :: self.config.hidden_per_part].argmax(dim=1).tolist()
-        return {**asdict(self.config), "parts": parts, "labels": len(self.expansion)}
-
-    @classmethod
-    def from_config(cls, config: Mapping[str, Any]) -> "TDBN":
-        """An untrained net of the sizes that :meth:`to_config` wrote."""
-        sizes = {key: value for key, value in config.items() if key not in ("parts", "labels")}
-        return cls(configured(TDBNConfig, sizes), config["parts"], config["labels"])
+        return [Stage(config.rbm.epochs, lower, rbm, whole=False), *tries], {"rbms": rbms}
 
 
 @dataclass(frozen=True)
 class AngleCRBMConfig:
-    """Sizes of the net and how it is trained.
+    """Sizes of the net and how it is trained, as of :class:`TDBNConfig`.
 
-    Taylor's rates, 1e-3 and 1e-5 for past to visible, are for gradients summed over a mini-batch; ours are means, so
-    that they are 20 times as large here: 2e-2 and 2e-4.
+    Several control units act as one whose weights learn that many times as fast. past_rate: the first one of the
+    weights from the past to the visible units. Taylor's rates, 1e-3 and 1e-5 for these, are for gradients summed over a
+    mini-batch; ours are means, so that they are 20 times as large here: 2e-2 and 2e-4. iterations: of Gibbs, a frame.
     """
 
     fps: float = 40.0
     root_rotation: bool = True
     taps: int = 3
     control_units: int = 1
-    """For each label. More of them act as one whose weights learn that many times as fast."""
     free_units: int = 60
     sigma: float = 1.0
-    """Standard deviation of a Gaussian visible unit, in units of its channel's own."""
     past_noise: float = 1.0
     past_rate: float = 2e-4
-    """First learning rate of the weights from the past to the visible units."""
     onset: float = 100.0
-    """See :class:`TDBNConfig`."""
     temperature: float = 1.0
     iterations: int = 30
-    """Gibbs iterations for each generated frame."""
     initial: float = 0.01
-    """Standard deviation of the initial weights."""
     crbm: Learning = field(
         default_factory=lambda: Learning(400, 3e-2, final_rate=0.01, decay=2e-4, steps=5, temperature=(1.0, 1.0))
     )
@@ -290,10 +280,11 @@ class AngleCRBM(ControlNet):
     channels: how many (D). labels: how many (L).
     """
 
+    CONFIG = AngleCRBMConfig
+
     def __init__(self, config: AngleCRBMConfig, channels: int, labels: int) -> None:
         crbm = CRBM(channels, config.taps, labels * config.control_units, config.free_units, taylor=True)
-        super().__init__(crbm, labels, channels, config.taps)
-        self.config = config
+        super().__init__(config, crbm, channels, channels=channels, labels=labels)
         self.noise_units = 2 * channels
 
     def encode(self, frames: Tensor) -> Tensor:
@@ -322,13 +313,3 @@ class AngleCRBM(ControlNet):
         past = Past(config.past_noise, config.past_rate / config.crbm.rate)
         layer = partial(self.crbm_layer, sequences, controls, onsets, generator, past)
         return [Stage(config.crbm.epochs, partial(self.begin_crbm, generator), layer, whole=True)], {}
-
-    def to_config(self) -> dict[str, Any]:
-        """As of all."""
-        return {**asdict(self.config), "channels": len(self.mean), "labels": len(self.expansion)}
-
-    @classmethod
-    def from_config(cls, config: Mapping[str, Any]) -> "AngleCRBM":
-        """An untrained net of the sizes that :meth:`to_config` wrote."""
-        sizes = {key: value for key, value in config.items() if key not in ("channels", "labels")}
-        return cls(configured(AngleCRBMConfig, sizes), config["channels"], config["labels"])
