@@ -22,7 +22,7 @@ from motet_train.papers.li2018.stepwise import Stepwise
 from motet_train.papers.tdbn.clips import body_parts, read_clips
 from motet_train.papers.tdbn.rbm import Learning
 from motet_train.papers.tdbn.recipe import DivergenceLearner
-from motet_train.papers.tdbn.tdbn import TDBN, AngleCRBM, AngleCRBMConfig, TDBNConfig
+from motet_train.papers.tdbn.tdbn import TDBN, AngleCRBM, AngleCRBMConfig, Lessons, TDBNConfig
 from motet_train.progress import Shown
 from motet_train.runs import WEIGHTS, RunError
 from motet_train.trainer import CHECKPOINT, LOG, Learner, kept, train
@@ -89,7 +89,7 @@ def control(restarts: int = 2, missed: Callable[[int], list[str]] | None = None)
     controls = [
         [label.expand(len(one), -1) for one in group] for label, group in zip(torch.eye(3), frames, strict=True)
     ]
-    stages, others = net.stages(frames, controls, (1.0, 1.0, 1.0), generator)
+    stages, others = net.stages(Lessons(frames, controls, (1.0, 1.0, 1.0)), generator)
     return DivergenceLearner(net, stages, generator, missed or (lambda enough: ["a", "b"]), others)
 
 
@@ -101,7 +101,7 @@ def baseline() -> DivergenceLearner:
 
 
 def _baseline(net: AngleCRBM, frames: list[list[Tensor]], generator: torch.Generator) -> Any:
-    stages, others = net.stages(frames, [[torch.ones(40, 1)]], (1.0,), generator)
+    stages, others = net.stages(Lessons(frames, [[torch.ones(40, 1)]], (1.0,)), generator)
     return stages, generator, None, others
 
 

@@ -14,7 +14,7 @@ def wave(frames: int, cycle: float, phase: float = 0.0) -> np.ndarray:
 
 @pytest.fixture
 def reference() -> Reference:
-    return Reference({"walk": [wave(133, 42.3), wave(133, 42.3, 0.1)]}, fps=40.0, legs=np.array([0, 2]))
+    return Reference({"walk": [wave(133, 42.3), wave(133, 42.3, 0.1)]}, legs=np.array([0, 2]))
 
 
 @pytest.mark.parametrize("cycle", [12.5, 29.6, 42.3])
@@ -67,7 +67,7 @@ def test_a_pose_has_arrived_when_it_is_as_near_as_the_recorded_cycles_are_to_eac
     clips = read_clips()
     motions = clips.frames(40)
     parts = body_parts(clips.skeleton, clips.channels)
-    reference = Reference(motions, 40, np.flatnonzero(np.isin(parts.of_channel, parts.legs)))
+    reference = Reference(motions, np.flatnonzero(np.isin(parts.of_channel, parts.legs)))
     walk, half = motions["walk"][0], reference.period("walk") / 2
     fine, time = upsample(walk), np.arange(4 * (len(walk) - 1) + 1) / 4
     apart = [reference.distance(walk[[i]], fine[np.abs(time - i) > half])[0] for i in range(len(walk))]

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import deepcopy
-from dataclasses import dataclass
 from itertools import accumulate, pairwise
 from typing import Any, Literal
 
@@ -12,7 +11,6 @@ from torch import nn
 
 from motet.bundle.manifest import Manifest
 from motet.models.tdbn_control import TdbnModel
-from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
 from motet.representation.contract import MotionContract, living
 from motet_train import distributed
@@ -20,7 +18,7 @@ from motet_train.data.errors import DataError
 from motet_train.papers.tdbn.clips import Clips, body_parts, is_periodic
 from motet_train.papers.tdbn.rbm import Layer, Stage
 from motet_train.papers.tdbn.report import missed_goals, study_of
-from motet_train.papers.tdbn.tdbn import TDBN, AngleCRBM, AngleCRBMConfig, ControlNet, TDBNConfig
+from motet_train.papers.tdbn.tdbn import TDBN, AngleCRBM, AngleCRBMConfig, ControlNet, Lessons, TDBNConfig
 from motet_train.recipes.recipe import Job, Recipe
 from motet_train.runs import Run, RunError
 from motet_train.trainer import Line, Part, kept
@@ -31,16 +29,6 @@ RECIPES = {
     "thesis": Recipe("control", "tdbn", "session", TDBNConfig.thesis()),
 }
 BASELINES = {"default": Recipe("control", "angle-crbm", "session", AngleCRBMConfig())}
-
-
-@dataclass(frozen=True, eq=False)
-class Lessons:
-    """For each group, such as the clips of a label, sequences (T, D), control values (T, L) of their frames, and
-    onsets: see :func:`motet_train.papers.tdbn.rbm.transitions`."""
-
-    sequences: Sequence[Sequence[Array]]
-    controls: Sequence[Sequence[Array]]
-    onsets: Sequence[float]
 
 
 def train_control(clips: Clips, job: Job) -> Run:
@@ -104,7 +92,7 @@ def train_lessons(
         [[torch.tensor(rows, dtype=torch.float32, device=job.device) for rows in group] for group in part]
         for part in (lessons.sequences, lessons.controls)
     )
-    stages, others = net.to(job.device).stages(given, told, lessons.onsets, generator)
+    stages, others = net.to(job.device).stages(Lessons(given, told, lessons.onsets), generator)
 
     def misses(enough: int) -> list[str]:
         assert missed is not None

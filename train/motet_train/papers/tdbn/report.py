@@ -41,7 +41,7 @@ def study_of(model: TdbnModel, clips: Clips) -> ControlStudy:
     """
     channels = model.contract.channels
     motions, parts = clips.only(model.labels).frames(model.fps, channels), body_parts(clips.skeleton, channels)
-    reference = Reference(motions, model.fps, np.flatnonzero(np.isin(parts.of_channel, parts.legs)))
+    reference = Reference(motions, np.flatnonzero(np.isin(parts.of_channel, parts.legs)))
     by_name = sorted(motions, key=lambda label: ("walk", "run").index(label) if label in ("walk", "run") else 2)
     gaits = [label for label in by_name if is_periodic(motions[label])]
     if not gaits:

@@ -27,8 +27,8 @@ from motet_train.data.matching_rows import Recording, gaits_of, recordings
 from motet_train.data.store import Store
 from motet_train.data.table import Gait
 from motet_train.papers.tdbn.rbm import Learning
-from motet_train.papers.tdbn.recipe import Lessons, train_lessons, untrained
-from motet_train.papers.tdbn.tdbn import AngleCRBMConfig, TDBNConfig
+from motet_train.papers.tdbn.recipe import train_lessons, untrained
+from motet_train.papers.tdbn.tdbn import AngleCRBMConfig, Lessons, TDBNConfig
 from motet_train.recipes.recipe import Job, Recipe
 from motet_train.runs import Run
 

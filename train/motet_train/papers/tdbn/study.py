@@ -40,7 +40,6 @@ class Reference:
     """
 
     motions: Mapping[str, Sequence[Array]]
-    fps: float
     legs: NDArray[np.intp]
 
     @cached_property

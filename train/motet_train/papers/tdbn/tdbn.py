@@ -34,8 +34,15 @@ from motet_train.papers.tdbn.rbm import (
     transitions,
 )
 
-Sequences = Sequence[Sequence[Tensor]]
-"""For each group, such as a label, its sequences of frames (T, D), or the labels' values (T, L) at these."""
+
+@dataclass(frozen=True, eq=False)
+class Lessons:
+    """For each group, such as the clips of a label, sequences (T, D), control values (T, L) of their frames, and
+    onsets: see :func:`motet_train.papers.tdbn.rbm.transitions`. Arrays; tensors for the net's stages."""
+
+    sequences: Sequence[Sequence[Any]]
+    controls: Sequence[Sequence[Any]]
+    onsets: Sequence[float]
 
 
 class ControlNet(Net):
@@ -86,13 +93,8 @@ class ControlNet(Net):
         return cls(configured(cls.CONFIG, own), **{key: config[key] for key in config if key not in own})
 
     @abstractmethod
-    def stages(
-        self, sequences: Sequences, controls: Sequences, onsets: Sequence[float], generator: torch.Generator
-    ) -> tuple[list[Stage], Mapping[str, nn.Module]]:
-        """How the net learns, one layer after the other (thesis 3.3), and what else has a state.
-
-        The mean and the scale must be set. onsets: see :func:`motet_train.papers.tdbn.rbm.transitions`.
-        """
+    def stages(self, lessons: Lessons, generator: torch.Generator) -> tuple[list[Stage], Mapping[str, nn.Module]]:
+        """How the net, with its mean and scale, learns layer after layer (thesis 3.3), and what else has a state."""
 
     def begin_crbm(self, generator: torch.Generator) -> None:
         """Set the first weights of the CRBM."""
@@ -102,19 +104,11 @@ class ControlNet(Net):
             if weight is not None:
                 weight.normal_(0.0, self.config.initial, generator=generator)
 
-    def crbm_layer(
-        self,
-        sequences: Sequences,
-        controls: Sequences,
-        onsets: Sequence[float],
-        generator: torch.Generator,
-        past: Past,
-        clamped: bool = True,
-    ) -> CRBMLayer:
+    def crbm_layer(self, lessons: Lessons, generator: torch.Generator, past: Past, clamped: bool = True) -> CRBMLayer:
         """The CRBM as what learns, from sequences encoded as they are now."""
-        codes = [[self.encode(frames) for frames in found] for found in sequences]
-        units = [[values @ self.expansion for values in found] for found in controls]
-        data = transitions(codes, units, self.config.taps, onsets, past.own)
+        codes = [[self.encode(frames) for frames in found] for found in lessons.sequences]
+        units = [[values @ self.expansion for values in found] for found in lessons.controls]
+        data = transitions(codes, units, self.config.taps, lessons.onsets, past.own)
         return CRBMLayer(self.crbm, data, self.config.crbm, generator, clamped, past)
 
     def step(
@@ -222,15 +216,13 @@ class TDBN(ControlNet):
         """Codes (B, H) to frames (B, D)."""
         return self.rbm.decode(codes) * self.scale + self.mean
 
-    def stages(
-        self, sequences: Sequences, controls: Sequences, onsets: Sequence[float], generator: torch.Generator
-    ) -> tuple[list[Stage], dict[str, RBM]]:
+    def stages(self, lessons: Lessons, generator: torch.Generator) -> tuple[list[Stage], dict[str, RBM]]:
         """The RBM, then the CRBM again and again with other random numbers: ``tries`` times on each of the
         ``restarts`` of the RBM, which are what else has a state."""
         config = self.config
         rbms = RBM(self.rbm.mask, config.restarts).to(self.mean.device)
-        frames = self.normalised(torch.cat([frames for found in sequences for frames in found]))
-        uniform = balanced([torch.ones(sum(map(len, found))) for found in sequences]).to(self.mean.device)
+        frames = self.normalised(torch.cat([frames for found in lessons.sequences for frames in found]))
+        uniform = balanced([torch.ones(sum(map(len, found))) for found in lessons.sequences]).to(self.mean.device)
         past = Past(config.past_noise, own=config.own)
 
         def lower() -> None:
@@ -241,7 +233,7 @@ class TDBN(ControlNet):
             self.begin_crbm(generator)
 
         rbm = partial(RBMLayer, rbms, frames, uniform, config.rbm, generator)
-        crbm = partial(self.crbm_layer, sequences, controls, onsets, generator, past, config.clamped)
+        crbm = partial(self.crbm_layer, lessons, generator, past, config.clamped)
         numbers = list(range(config.restarts)) * config.tries
         tries = [Stage(config.crbm.epochs, partial(upper, number), crbm, whole=True) for number in numbers]
         return [Stage(config.rbm.epochs, lower, rbm, whole=False), *tries], {"rbms": rbms}
@@ -305,11 +297,9 @@ class AngleCRBM(ControlNet):
         """Also the Gibbs iterations."""
         return {**super().defaults, "iterations": self.config.iterations}
 
-    def stages(
-        self, sequences: Sequences, controls: Sequences, onsets: Sequence[float], generator: torch.Generator
-    ) -> tuple[list[Stage], dict[str, nn.Module]]:
+    def stages(self, lessons: Lessons, generator: torch.Generator) -> tuple[list[Stage], dict[str, nn.Module]]:
         """The CRBM learns; nothing else has a state."""
         config = self.config
         past = Past(config.past_noise, config.past_rate / config.crbm.rate)
-        layer = partial(self.crbm_layer, sequences, controls, onsets, generator, past)
+        layer = partial(self.crbm_layer, lessons, generator, past)
         return [Stage(config.crbm.epochs, partial(self.begin_crbm, generator), layer, whole=True)], {}
