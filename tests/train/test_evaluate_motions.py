@@ -29,8 +29,7 @@ from motet.models.language import RULES, Vocabulary
 from motet.motion.motion import Motion
 from motet_train.data.store import FRAMES as FRAMES_FILE
 from motet_train.data.store import INDEX, Store
-from motet_train.evaluate.language.bleu import bleu, copied_bleu, nearest_motions
-from motet_train.evaluate.language.describe import describe_report
+from motet_train.evaluate.language.describe import bleu, copied_bleu, describe_report, nearest_motions
 from motet_train.evaluate.language.generate import (
     LANGUAGE_GOALS,
     answers,
@@ -105,7 +104,7 @@ def test_a_motion_that_freezes_is_counted(corpus: SplitStore) -> None:
 
 def test_thresholds_lie_between_the_training_motions(corpus: SplitStore) -> None:
     limits = thresholds(kinds(corpus))
-    assert (limits.slow, limits.run, limits.turn, limits.rise) == pytest.approx((0.5, 2.0, 45, 0.25))
+    assert limits == pytest.approx({"slow": 0.5, "run": 2.0, "turn": 45, "rise": 0.25})
     assert recognised(kinds(corpus), limits) == dict.fromkeys(("walks", "runs", "left", "right", "jumps"), 1.0)
     assert measurable(thresholds(kinds(SplitStore(replace(STORE, channels=tuple("abcdefgh")), corpus.parts)))) == {}
 
@@ -113,7 +112,7 @@ def test_thresholds_lie_between_the_training_motions(corpus: SplitStore) -> None
 def test_what_the_training_motions_do_not_show_is_not_measured(corpus: SplitStore) -> None:
     found = kinds(corpus) | {"jumps": [], "left": []}
     limits, asked = thresholds(found), ("walks", "runs", "left", "right")
-    assert (limits.run, limits.turn, np.isnan(limits.rise)) == pytest.approx((2.0, 45, True))
+    assert limits == pytest.approx({"slow": 0.5, "run": 2.0, "turn": 45})
     assert tuple(prompted(FakeGenerate(STORE), limits, 2)) == asked  # type: ignore[arg-type]
     shares = recognised(found, limits)
     assert tuple(shares) == asked
@@ -135,7 +134,7 @@ def test_the_chain_of_perfect_models(corpus: SplitStore) -> None:
     describe: Any = FakeDescribe(STORE)
     found = answers(generate, corpus, corpus.parts.test)
     assert len(found.rows) == 3 * len(corpus.parts.test)
-    assert found.records[:4] == (*[corpus.parts.test[0]] * 3, corpus.parts.test[1])
+    assert found.records[:4] == [*[corpus.parts.test[0]] * 3, corpus.parts.test[1]]
     assert chained(describe, found, corpus) == dict.fromkeys("12345", 1.0)
     assert bounds_chained(describe, found, corpus) == {"retrieval": 1.0, "data": 1.0}
     assert best_descriptions(describe, [moving(1, 0, 0)[:1], moving(9, 9, 9)]) == ["", "somebody dances"]

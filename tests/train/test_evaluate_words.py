@@ -8,7 +8,7 @@ from language_models import small_store, told
 
 from motet_train.data.errors import DataError
 from motet_train.evaluate.language.attributes import VERBS, common_side, common_turning, said, side, words_right
-from motet_train.evaluate.language.bleu import (
+from motet_train.evaluate.language.describe import (
     agreement,
     bleu,
     copied_bleu,

@@ -26,7 +26,7 @@ class Walks:
 
 def test_prompts_are_drawn_that_are_done_and_those_passed_over_are_counted(tmp_path: Path) -> None:
     walks = Walks(motet.read(CMU_FOLDER / "39_14.amc"))
-    drawings = says_drawings(walks)
+    drawings = says_drawings(walks.generate)
     figure = drawings["says"]()
     titles = [axes.get_title(loc="left") for axes in figure.axes]
     done = [prompt.text for prompt in prompts() if prompt.passes(track_of(walks.walk))]

@@ -15,8 +15,15 @@ from motet.models.search import IndexSettings
 from motet.motion.motion import Motion
 from motet_train.evaluate.text_adherence import table
 from motet_train.evaluate.text_adherence.prompts import Trial, prompts
-from motet_train.evaluate.text_adherence.space import CHOICES, embedded, frechet, r_precision, rivals, space_report
-from motet_train.evaluate.text_adherence.table import says_table
+from motet_train.evaluate.text_adherence.table import (
+    CHOICES,
+    embedded,
+    frechet,
+    r_precision,
+    rivals,
+    says_table,
+    space_report,
+)
 
 Array = NDArray[np.float64]
 STAND, LIE = gliding(), gliding(tip=90)
@@ -123,7 +130,7 @@ def test_who_does_what_is_asked_is_found_and_near(monkeypatch: pytest.MonkeyPatc
     assert set(space_report(model, asked, {"": made}, ())) == {"r_precision"}  # type: ignore[arg-type]
 
     monkeypatch.setattr(table, "prompts", lambda: only(STILL, LYING, LEFT, ZOMBIE))
-    report = says_table(Half(), TRIALS, seeds=2, search=model)  # type: ignore[arg-type]
+    report = says_table(Half().generate, TRIALS, seeds=2, search=model)  # type: ignore[arg-type]
     assert report["r_precision"]["1"] == 0.25  # never lies, refuses the zombie, and turning is seen as standing
     assert report["r_precision_lookup"]["1"] == 0.5
     assert report["frechet"]["lookup_motions"] == 2

@@ -71,7 +71,7 @@ def few(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("few")
 def test_shares_of_a_generator_that_does_it_half_of_the_times() -> None:
-    report = says_table(Half(), TRIALS, training=[trial.name for trial in TRIALS[:4]], seeds=4)
+    report = says_table(Half().generate, TRIALS, training=[trial.name for trial in TRIALS[:4]], seeds=4)
     assert report["prompt"][STILL] == 0.5
     assert report["prompt"][ZOMBIE] == 0
     assert report["turn"][LEFT] == pytest.approx(90 * 0.9, abs=1)  # 0.3 s at each end are averaged
@@ -80,7 +80,7 @@ def test_shares_of_a_generator_that_does_it_half_of_the_times() -> None:
 
 @pytest.mark.usefixtures("few")
 def test_the_columns_of_trials() -> None:
-    report = says_table(Half(), TRIALS, training=[trial.name for trial in TRIALS[:4]], seeds=2)
+    report = says_table(Half().generate, TRIALS, training=[trial.name for trial in TRIALS[:4]], seeds=2)
     assert report["prompt_real"][STILL] == 0.5  # of two who stand one moves
     assert report["prompt_real"][LYING] == 1
     assert np.isnan(report["prompt_real"][LEFT])  # no trial shows it
@@ -92,17 +92,17 @@ def test_the_columns_of_trials() -> None:
 
 @pytest.mark.usefixtures("few")
 def test_without_trials_there_are_no_other_columns() -> None:
-    report = says_table(Half(), seeds=1)
+    report = says_table(Half().generate, seeds=1)
     assert set(report) == {"says", "quality", "turn", "prompt"}
     assert set(report["says"]) == {"all", "locomotion", "rest"}
     assert "real" not in says_text({"half": report})
     with pytest.raises(DataError, match="none of the trials is one of the training motions"):
-        says_table(Half(), TRIALS, training=["05_01"], seeds=1)
+        says_table(Half().generate, TRIALS, training=["05_01"], seeds=1)
 
 
 def test_the_text_has_a_column_for_each_generator(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(table, "prompts", lambda: only(STILL, LEFT))
-    report = says_table(Half(), TRIALS, seeds=2)
+    report = says_table(Half().generate, TRIALS, seeds=2)
     lines = says_text({"runs/a": report, "runs/b": report}).splitlines()
     assert lines[0].split() == ["%", "a", "b", "lookup", "real", "others"]
     assert lines[2].split("   ")[0] == STILL

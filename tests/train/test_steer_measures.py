@@ -17,9 +17,17 @@ from motet.motion.pose import Pose
 from motet.representation.contract import named
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.matching_rows import Recording, rows_of
-from motet_train.evaluate.steer.following import PACES, aside_errors, speed_errors, turn_errors
-from motet_train.evaluate.steer.track import Track, standing, stretches, tracks_of
-from motet_train.evaluate.steer.wandering import Limits, Watch, broken, frozen, leaps, turns, wandering, watched
+from motet_train.evaluate.steer.following import (
+    PACES,
+    Track,
+    aside_errors,
+    speed_errors,
+    standing,
+    stretches,
+    tracks_of,
+    turn_errors,
+)
+from motet_train.evaluate.steer.report import Limits, Watch, broken, frozen, leaps, turns, wandering, watched
 
 
 def puppets(**how: Any) -> Any:

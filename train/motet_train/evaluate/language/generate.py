@@ -2,7 +2,6 @@
 (Plappert et al. 2017, section 5.4.3, tables 3 and 4), and whether motions do what was asked: walk, run, turn, jump."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +12,7 @@ from motet.models.generate import Generated, GenerateModel
 from motet.motion.motion import Motion
 from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS
 from motet_train.evaluate.language.attributes import common_side, common_turning, common_verbs
-from motet_train.evaluate.language.bleu import RANKS, bleu, ranks, retrieved
+from motet_train.evaluate.language.describe import RANKS, bleu, ranks, retrieved
 from motet_train.evaluate.language.motions import measures, quiet_energy
 from motet_train.evaluate.language.split_store import SplitStore, unknown_words_allowed
 from motet_train.evaluate.tables import Goals, Report, gathered
@@ -52,27 +51,20 @@ def _generated(model: GenerateModel, corpus: SplitStore, describe: DescribeModel
         yield _chain(describe, corpus, {"train": answers(model, corpus, train), "test": found})
     known = kinds(corpus)
     limits, quiet = thresholds(known), quiet_energy(corpus.motions(corpus.parts.train), corpus.contract)
-    kept = {key: value for key, value in asdict(limits).items() if np.isfinite(value)}
-    yield {"threshold": {"quiet": quiet, **kept}}
+    yield {"threshold": {"quiet": quiet, **limits}}
     if measurable(limits):
         yield {"asked": prompted(model, limits), "asked_data": recognised(known, limits)}
-    motions = {"motion": found.best, "motion_data": corpus.motions(found.records)}
+    motions = {"motion": [row[0].features for row in found.rows], "motion_data": corpus.motions(found.records)}
     yield {key: measures(shown, corpus.contract, quiet) for key, shown in motions.items()}
     yield {"likelihood": {"train": _likelihood(model, corpus, train), "test": _likelihood(model, corpus, test)}}
 
 
-@dataclass(frozen=True, eq=False)
-class Answers:
+class Answers(NamedTuple):
     """Motions for sentences. records: for each sentence the one it describes. rows: ranked motions."""
 
-    records: tuple[int, ...]
-    sentences: tuple[str, ...]
-    rows: tuple[list[Generated], ...]
-
-    @property
-    def best(self) -> list[Motion]:
-        """The likeliest motion for each sentence."""
-        return [row[0].features for row in self.rows]
+    records: Sequence[int]
+    sentences: Sequence[str]
+    rows: Sequence[list[Generated]]
 
 
 def answers(model: GenerateModel, corpus: SplitStore, records: Sequence[int]) -> Answers:
@@ -84,7 +76,7 @@ def answers(model: GenerateModel, corpus: SplitStore, records: Sequence[int]) ->
     asked = known_sentences(model, corpus, records)
     with unknown_words_allowed():
         rows = model.generate([sentence for _, sentence in asked])
-    return Answers(tuple(r for r, _ in asked), tuple(s for _, s in asked), tuple(rows))
+    return Answers([record for record, _ in asked], [sentence for _, sentence in asked], rows)
 
 
 def known_sentences(model: GenerateModel, corpus: SplitStore, records: Sequence[int]) -> list[tuple[int, str]]:
@@ -170,19 +162,8 @@ class Travel(NamedTuple):
     rise: float
 
 
-@dataclass(frozen=True)
-class Thresholds:
-    """What counts as what.
-
-    slow: m/s, half of the speed that nine of ten training walks exceed. run: m/s, between the median speeds of walks
-    and of runs. turn: degrees, between the median turns of straight and of turning ones. rise: m, between the median
-    rises of walks and of jumps. NaN where there are no training motions of a kind.
-    """
-
-    slow: float
-    run: float
-    turn: float
-    rise: float
+Thresholds = Mapping[str, float]
+"""What counts as what, see :func:`thresholds`."""
 
 
 class Asked(NamedTuple):
@@ -194,11 +175,11 @@ class Asked(NamedTuple):
 
 
 ASKED: Mapping[str, Asked] = {
-    "walks": Asked("a person walks", lambda travel, than: than.slow <= travel.speed < than.run, ("slow", "run")),
-    "runs": Asked("a person runs", lambda travel, than: travel.speed >= than.run, ("run",)),
-    "left": Asked("a person walks and turns left", lambda travel, than: travel.turn >= than.turn, ("turn",)),
-    "right": Asked("a person walks and turns right", lambda travel, than: travel.turn <= -than.turn, ("turn",)),
-    "jumps": Asked("a person jumps", lambda travel, than: travel.rise >= than.rise, ("rise",)),
+    "walks": Asked("a person walks", lambda travel, than: than["slow"] <= travel.speed < than["run"], ("slow", "run")),
+    "runs": Asked("a person runs", lambda travel, than: travel.speed >= than["run"], ("run",)),
+    "left": Asked("a person walks and turns left", lambda travel, than: travel.turn >= than["turn"], ("turn",)),
+    "right": Asked("a person walks and turns right", lambda travel, than: travel.turn <= -than["turn"], ("turn",)),
+    "jumps": Asked("a person jumps", lambda travel, than: travel.rise >= than["rise"], ("rise",)),
 }
 
 
@@ -231,27 +212,27 @@ def kinds(corpus: SplitStore) -> dict[str, list[Travel]]:
     return found
 
 
-def thresholds(found: Mapping[str, Sequence[Travel]]) -> Thresholds:
-    """The thresholds between :func:`kinds`."""
+def thresholds(found: Mapping[str, Sequence[Travel]]) -> dict[str, float]:
+    """The thresholds between :func:`kinds`, but for those without training motions of a kind.
 
-    def between(*samples: Sequence[float]) -> float:
-        return float(np.mean([np.median(sample) for sample in samples])) if all(samples) else np.nan
-
-    speeds, rises = ({key: [getattr(t, name) for t in found[key]] for key in found} for name in ("speed", "rise"))
-    turns = {key: [abs(t.turn) for t in found[key]] for key in found}
-    return Thresholds(
-        slow=float(np.percentile(speeds["walks"], 10)) / 2 if speeds["walks"] else np.nan,
-        run=between(speeds["walks"], speeds["runs"]),
-        turn=between(turns["straight"], turns["left"] + turns["right"]),
-        rise=between(rises["walks"], rises["jumps"]),
-    )
+    slow: m/s, half of the speed that nine of ten training walks exceed. run: m/s, between the median speeds of walks
+    and of runs. turn: degrees, between the median turns of straight and of turning ones. rise: m, between the median
+    rises of walks and of jumps.
+    """
+    walks, runs, jumps = (found[key] for key in ("walks", "runs", "jumps"))
+    limits = {"slow": np.percentile([t.speed for t in walks], 10) / 2 if walks else np.nan}
+    samples = {
+        "run": ([t.speed for t in walks], [t.speed for t in runs]),
+        "turn": ([abs(t.turn) for t in found["straight"]], [abs(t.turn) for t in (*found["left"], *found["right"])]),
+        "rise": ([t.rise for t in walks], [t.rise for t in jumps]),
+    }
+    limits |= {key: np.mean([np.median(one) for one in pair]) for key, pair in samples.items() if all(pair)}
+    return {key: float(limit) for key, limit in limits.items() if np.isfinite(limit)}
 
 
 def measurable(limits: Thresholds) -> dict[str, Asked]:
     """Those of ASKED whose thresholds exist."""
-    return {
-        key: asked for key, asked in ASKED.items() if all(np.isfinite(getattr(limits, name)) for name in asked.needs)
-    }
+    return {key: asked for key, asked in ASKED.items() if all(name in limits for name in asked.needs)}
 
 
 def recognised(found: Mapping[str, Sequence[Travel]], limits: Thresholds) -> dict[str, float]:

@@ -11,7 +11,7 @@ from motet.models.describe import DescribeModel
 from motet.models.language import RULES
 from motet.models.search import Index, IndexSettings, Member, SearchModel
 from motet_train.data.sentences import alike
-from motet_train.evaluate.language.bleu import retrieved
+from motet_train.evaluate.language.describe import retrieved
 from motet_train.evaluate.language.motions import Looks
 from motet_train.evaluate.language.split_store import SplitStore, unknown_words_allowed
 from motet_train.evaluate.tables import Goals, Report, gathered

@@ -1,25 +1,39 @@
-"""All figures of a model that is steered, beside recordings and beside the same model that seldom searches."""
+"""All figures of a model that is steered, beside recordings and beside the same model that seldom searches.
+
+Some figures are told anything at random, for minutes: whether their poses stay whole, and whether they go. What joints
+do from tick to tick is held against what they do in the recordings that are played (:class:`Limits`).
+"""
 
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from functools import partial
 
+import numpy as np
+from numpy.typing import NDArray
+
+from motet.bundle.graph import Floats
 from motet.decode.matching import SteeringSettings
 from motet.errors import ControlWarning
 from motet.models.steer import SteerModel
+from motet.motion.humanoid import BONES, HUMANOID
+from motet.motion.rotations import Array
+from motet.motion.skeleton import partners_of
 from motet_train.data.errors import DataError
 from motet_train.data.matching_rows import Recording, gaits_of, recordings, rows_of
 from motet_train.data.store import Store
+from motet_train.evaluate.positions import Flags, length
 from motet_train.evaluate.steer.following import (
     MEASURED_SPEEDS,
+    Track,
     aside_errors,
     gait_figures,
     speed_errors,
+    standing,
+    stretches,
+    tracks_of,
     turn_errors,
 )
-from motet_train.evaluate.steer.track import Track, standing, stretches, tracks_of
-from motet_train.evaluate.steer.wandering import Limits, wandering
 from motet_train.evaluate.tables import Goals, Report, gathered, report_table
 
 STEER_GOALS: Goals = {
@@ -41,6 +55,162 @@ STEER_GOALS: Goals = {
 BESIDE_COLUMNS = {"recorded": "as recorded", "held": "feet held", "seldom": "seldom searched"}
 """What stands beside a model's figures, GROUP_NAME in a report, and the heads of their columns: recordings as they are
 and with their feet held, as they are played; and the rival."""
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """The most of recordings, and of their mirror images. turn: (J,) degrees that bones turn by in a frame, the hips
+    seen from the facing. leap: (J',) metres that joints move in a frame, seen from the figure. low, high: of the hips.
+    """
+
+    turn: Array
+    leap: Array
+    low: float
+    high: float
+
+    @staticmethod
+    def of(tracks: list[Track]) -> "Limits":
+        """Those of recordings."""
+
+        def most(of: Callable[[Track], Array], names: tuple[str, ...]) -> Array:
+            values = np.max([of(track).max(axis=(0, 1)) for track in tracks], axis=0)
+            found: Array = np.maximum(values, values[list(partners_of(names))])
+            return found
+
+        heights = np.concatenate([track.height[:, 0] for track in tracks])
+        return Limits(most(turns, BONES), most(leaps, HUMANOID.names), float(heights.min()), float(heights.max()))
+
+
+def turns(track: Track) -> Array:
+    """Degrees (T - 1, B, J) by which bones turn from frame to frame, seen from their parents."""
+    a, b = track.rotations[:-1].astype(np.float64), track.rotations[1:]
+    signs = np.where((a * b).sum(axis=-1, keepdims=True) < 0, -1, 1)
+    found: Array = np.degrees(4 * np.arcsin(np.minimum(length(a - signs * b) / 2, 1)))
+    return found
+
+
+def leaps(track: Track) -> Array:
+    """Metres (T - 1, B, J') by which joints move from frame to frame, as the figures see it."""
+    return length(np.diff(track.seen().places, axis=0))
+
+
+@dataclass(frozen=True, eq=False)
+class Watch:
+    """What T ticks of B figures were: each array is (T, B) but ``ground`` (T, B, 3).
+
+    asked: m/s. since: ticks since the last change, 0 at the tick that follows it. finite: whether all is. turn: degrees
+    that the bone turned which turned most. leap: how far the joint moved that went the farthest beside its limit, as a
+    share of that. height: of the hips. lowest: of the soles.
+    """
+
+    ground: Array
+    asked: Floats
+    since: NDArray[np.int32]
+    finite: Flags
+    turn: Floats
+    leap: Floats
+    height: Floats
+    lowest: Array
+
+
+class _Teller:
+    """Tells B figures something else after 0.2 to 3 s each: to stand in 15 of 100 changes, and to face where they go in
+    half of them."""
+
+    def __init__(self, model: SteerModel, characters: int, seed: int) -> None:
+        self.rng, self.fps, self.names = np.random.default_rng(seed), model.fps, np.array(model.gaits)
+        self.ranges = np.array([model.speeds[name] for name in model.gaits])
+        self.session = model.start(characters=characters)
+        self.left, self.since, self.gait = (np.zeros(characters, dtype=np.int64) for _ in range(3))
+        self.speed, self.direction, self.facing = (np.zeros(characters) for _ in range(3))
+
+    def tell(self) -> None:
+        """Before each tick."""
+        self.left -= 1
+        self.since += 1
+        who = np.flatnonzero(self.left < 0)
+        if not len(who):
+            return
+        rng, count = self.rng, len(who)
+        self.left[who], self.since[who] = np.round(rng.uniform(0.2, 3.0, count) * self.fps) - 1, 0
+        self.gait[who] = rng.integers(len(self.names), size=count)
+        low, high = self.ranges[self.gait[who]].T
+        self.speed[who] = np.where(rng.random(count) < 0.15, 0.0, rng.uniform(low, high))
+        self.direction[who] = rng.uniform(-180, 180, count)
+        facing = rng.uniform(-180, 180, count)
+        self.facing[who] = np.where(rng.random(count) < 0.5, self.direction[who], facing)
+        gaits = self.names[self.gait].tolist()
+        self.session.control(gait=gaits, speed=self.speed, direction=self.direction, facing=self.facing)
+        self.speed = np.hypot(*self.session.target[:, :2].T)  # within what gaits can do that way
+
+
+def watched(
+    model: SteerModel, limits: Limits, seconds: float, characters: int, seed: int = 1, chunk: int = 30
+) -> Watch:
+    """What figures do that are told anything at random, with the foot lock. chunk: ticks looked at together."""
+    teller, ticks = _Teller(model, characters, seed), round(seconds * model.fps)
+    last, parts = [teller.session.tick()], []
+    for start in range(0, ticks, chunk):
+        poses, asked, since = [], [], []
+        for _ in range(min(chunk, ticks - start)):
+            teller.tell()
+            poses.append(teller.session.tick())
+            asked.append(teller.speed.astype(np.float32))
+            since.append(teller.since.astype(np.int32))
+        track = Track.of([*last, *poses], model.fps)
+        now, last = track[1:], poses[-1:]
+        part = Watch(
+            ground=now.ground,
+            asked=np.stack(asked),
+            since=np.stack(since),
+            finite=np.asarray(np.isfinite(now.places).all(axis=(2, 3)) & np.isfinite(now.ground).all(axis=2)),
+            turn=turns(track).max(axis=2).astype(np.float32),
+            leap=(leaps(track) / np.maximum(limits.leap, 1e-3)).max(axis=2).astype(np.float32),
+            height=now.height,
+            lowest=now.soles[..., 1].min(axis=2),
+        )
+        parts.append(part)
+    return Watch(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Watch)))
+
+
+def broken(watch: Watch, limits: Limits) -> Flags:
+    """Poses (T, B) that are not finite, or where a bone turned more in a tick than any does in a recording, or whose
+    hips are lower or higher than in any by 5 cm."""
+    inside = (watch.height >= limits.low - 0.05) & (watch.height <= limits.high + 0.05)
+    found: Flags = ~(watch.finite & (watch.turn <= limits.turn.max()) & inside)
+    return found
+
+
+def frozen(watch: Watch, fps: float) -> Flags:
+    """Ticks (T, B) at which a figure turns out to be frozen.
+
+    It was told the same for 2 s until then, to go at more than 0.4 m/s, and went less than a third as far along its
+    path; or for the first time none of its joints has turned by 0.01 degrees a tick for half a second.
+    """
+    ticks, stiff_for = round(2.0 * fps), round(0.5 * fps)
+    steps = np.linalg.norm(np.diff(watch.ground[..., :2], axis=0, prepend=watch.ground[:1, :, :2]), axis=2)
+    path, stiff = np.cumsum(steps, axis=0, dtype=np.float64), np.cumsum(watch.turn < 0.01, axis=0)
+    went, still = np.zeros_like(path), np.zeros(path.shape, dtype=bool)
+    went[ticks:] = path[ticks:] - path[:-ticks]
+    still[stiff_for:] = stiff[stiff_for:] - stiff[:-stiff_for] == stiff_for
+    still[1:] &= ~still[:-1]
+    found: Flags = still | ((watch.since == ticks) & (watch.asked > 0.4) & (went / 2.0 < watch.asked / 3))
+    return found
+
+
+def wandering(model: SteerModel, limits: Limits, seconds: float, characters: int) -> dict[str, float]:
+    """Counts, all ticks of all figures: broken poses, freezes, leaps (a joint goes a tenth farther in a tick, seen from
+    the figure, than in any recording), soles 3 cm or more under the ground; and the most of each."""
+    watch = watched(model, limits, seconds, characters)
+    return {
+        "broken": float(broken(watch, limits).sum()),
+        "frozen": float(frozen(watch, model.fps).sum()),
+        "leaps": float((watch.leap > 1.1).sum()),
+        "under_ground": float((watch.lowest < -0.03).sum()),
+        "largest_turn": float(watch.turn.max()),
+        "largest_leap": float(watch.leap.max()),
+        "deepest_cm": 100 * float(max(0.0, -watch.lowest.min())),
+    }
 
 
 @dataclass(frozen=True, eq=False)
