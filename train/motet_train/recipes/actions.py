@@ -1,6 +1,6 @@
 """The recipe of the net that tells which action a sentence asks for, and its training on the sentences of a store."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +14,10 @@ from motet_train.data.batches import Rows
 from motet_train.data.errors import DataError
 from motet_train.data.sentences import Actions, actions_of, principal, read_word_vectors
 from motet_train.data.store import Store
-from motet_train.descent import GradientLearner, Term, Terms, Training
+from motet_train.descent import GradientLearner, Term, Terms
 from motet_train.models.action_net import ActionNet, ActionsConfig, stems_of
 from motet_train.recipes.language import divided, manifest
-from motet_train.recipes.recipe import Job, Recipe
+from motet_train.recipes.recipe import ADAMW, Job, Recipe
 from motet_train.runs import Run
 
 DEFAULT = Recipe(
@@ -26,16 +26,7 @@ DEFAULT = Recipe(
     "codes",
     ActionsConfig(0, 0),
     ("words", "actions", "stems"),
-    Training(
-        steps=5000,
-        every=500,
-        batch=128,
-        optimiser="adamw",
-        learning_rate=2e-3,
-        weight_decay=0.05,
-        falling=0.5,
-        keep="last",
-    ),
+    replace(ADAMW, steps=5000, every=500, batch=128, weight_decay=0.05, falling=0.5),
 )
 
 RECIPES = {"default": DEFAULT}

@@ -14,10 +14,10 @@ from motet_train.data.batches import frame_mirror
 from motet_train.data.errors import DataError
 from motet_train.data.sixd_windows import SixdWindows, Window
 from motet_train.data.store import Store, split
-from motet_train.descent import GradientLearner, Term, Terms, Training
+from motet_train.descent import GradientLearner, Term, Terms
 from motet_train.models.codec import CodecConfig, MotionCodec, places_in_world
 from motet_train.models.kinematics import joint_weights, tree_of
-from motet_train.recipes.recipe import Job, Recipe
+from motet_train.recipes.recipe import MUON, Job, Recipe
 from motet_train.runs import Run
 
 
@@ -31,19 +31,7 @@ class CodecVisits:
     sharp: float = 0.2
 
 
-TRAINING = Training(
-    steps=9000,
-    every=250,
-    batch=32,
-    optimiser="muon",
-    learning_rate=2e-3,
-    weight_decay=0.01,
-    warm_up=200,
-    cosine=True,
-    clip=1.0,
-    keep="last",
-    precision="bfloat16",
-)
+TRAINING = replace(MUON, steps=9000, every=250, warm_up=200, cosine=True)
 
 DEFAULT = Recipe("codec", "motion-codec", "codes", CodecConfig(0), ("channels", "tree"), TRAINING, CodecVisits())
 

@@ -1,7 +1,7 @@
 """Recipes of the model that writes motions as codes, and its training on a codec."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,13 +14,13 @@ from motet_train.data.errors import DataError
 from motet_train.data.sentences import Actions
 from motet_train.data.sixd_windows import CodeBatch, CodedMotion, Codes, CodeWindows, memory_of, poses_of, with_way
 from motet_train.data.store import Store
-from motet_train.descent import GradientLearner, Term, Terms, Training
+from motet_train.descent import GradientLearner, Term, Terms
 from motet_train.models.action_net import ActionNet
 from motet_train.models.codec import MotionCodec
 from motet_train.models.motion_codes import CodeModelConfig, MotionCodes, MotionCodesConfig
 from motet_train.recipes.actions import described, spoken
 from motet_train.recipes.language import divided, manifest
-from motet_train.recipes.recipe import Job, Recipe
+from motet_train.recipes.recipe import MUON, Job, Recipe
 from motet_train.runs import Run
 
 DRAWING: dict[str, Any] = {
@@ -48,19 +48,7 @@ DEFAULT = Recipe(
     "codes",
     CodeModelConfig(0),
     ("actions",),
-    Training(
-        steps=4500,
-        every=300,
-        batch=16,
-        optimiser="muon",
-        learning_rate=2e-3,
-        weight_decay=0.05,
-        warm_up=100,
-        falling=0.5,
-        clip=1.0,
-        keep="last",
-        precision="bfloat16",
-    ),
+    replace(MUON, steps=4500, every=300, batch=16, weight_decay=0.05, warm_up=100, falling=0.5),
     CodeVisits(),
     DRAWING,
 )

@@ -1,6 +1,7 @@
 """The recipe of the net that fills gaps, and its training from a store."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,10 +16,10 @@ from motet_train.data.batches import frame_mirror
 from motet_train.data.errors import DataError
 from motet_train.data.sixd_windows import GapWindow, GapWindows
 from motet_train.data.store import Store, split
-from motet_train.descent import GradientLearner, Term, Terms, Training
+from motet_train.descent import GradientLearner, Term, Terms
 from motet_train.models.filler import Filler, FillerConfig
 from motet_train.models.kinematics import joint_weights, tree_of
-from motet_train.recipes.recipe import Job, Recipe
+from motet_train.recipes.recipe import MUON, Job, Recipe
 from motet_train.runs import Run
 
 
@@ -40,20 +41,7 @@ DEFAULT = Recipe(
     "between",
     FillerConfig(0),
     ("channels", "tree"),
-    Training(
-        steps=6000,
-        every=250,
-        batch=32,
-        optimiser="muon",
-        learning_rate=4e-3,
-        weight_decay=0.01,
-        warm_up=100,
-        cosine=True,
-        clip=1.0,
-        average=0.998,
-        keep="last",
-        precision="bfloat16",
-    ),
+    replace(MUON, steps=6000, every=250, learning_rate=4e-3, warm_up=100, cosine=True, average=0.998),
     FillVisits(),
 )
 
@@ -81,13 +69,12 @@ def train_fill(store: Store, job: Job, data: str = "", by: str = "subject") -> R
     rng = np.random.default_rng(0)
     sizes = [(visits.context, max(1, round(part * visits.gaps[1])), visits.context) for part in (0.25, 0.5, 1.0)]
     seen = [validation.draw(256, size, rng).to(job.device) for size in sizes]
-    learner = GradientLearner(
-        net,
-        job.training,
-        lambda drawn: _loss(net, drawn, weights, store.fps),
-        lambda rng: (train.draw(job.training.batch, _sizes(visits, rng), rng),),
-        lambda: _measured(kept, seen),
-    )
+
+    def loss(window: GapWindow) -> Terms:
+        return _loss(net, window, weights, store.fps)
+
+    drawn = partial(_batches, train, visits, job.training.batch)
+    learner = GradientLearner(net, job.training, loss, drawn, lambda: _measured(kept, seen))
     assert isinstance(learner.kept, Filler)
     kept: Filler = learner.kept
     about: dict[str, Any] = {
@@ -98,13 +85,12 @@ def train_fill(store: Store, job: Job, data: str = "", by: str = "subject") -> R
     return job.run(kept, learner, job.manifest(contract, asdict(net.config), defaults, None, about))
 
 
-def _sizes(visits: FillVisits, rng: np.random.Generator) -> tuple[int, int, int]:
-    """Frames before, in and after the gap of the next batch."""
+def _batches(windows: GapWindows, visits: FillVisits, size: int, rng: np.random.Generator) -> tuple[GapWindow]:
+    before = after = visits.context
     count = int(rng.integers(visits.gaps[0], visits.gaps[1] + 1))
-    if rng.random() < visits.whole:
-        return visits.context, count, visits.context
-    before, after = rng.integers(visits.least, visits.context + 1, size=2).tolist()
-    return before, count, after
+    if rng.random() >= visits.whole:
+        before, after = rng.integers(visits.least, visits.context + 1, size=2).tolist()
+    return (windows.draw(size, (before, count, after), rng),)
 
 
 def _untrained(recipe: Recipe, contract: MotionContract, windows: GapWindows) -> Filler:

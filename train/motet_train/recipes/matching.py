@@ -1,6 +1,6 @@
 """The recipe of a figure that is steered by motion matching, and its training from a store."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,10 +15,10 @@ from motet.motion.rotations import Array
 from motet_train.data.errors import DataError
 from motet_train.data.matching_rows import MatchingRows, gaits_of, mirrored_poses, recordings, rows_of, scaling
 from motet_train.data.store import Store
-from motet_train.descent import GradientLearner, Term, Terms, Training
+from motet_train.descent import GradientLearner, Term, Terms
 from motet_train.models.kinematics import Tree, joint_weights, tree_of
 from motet_train.models.matching import Matching, MatchingConfig, Speeds
-from motet_train.recipes.recipe import Job, Recipe
+from motet_train.recipes.recipe import ADAMW, Job, Recipe
 from motet_train.runs import Run
 
 
@@ -38,7 +38,7 @@ DEFAULT = Recipe(
     "matching",
     MatchingConfig(0),
     ("channels", "tree", "rows", "features", "gaits", "speeds"),
-    Training(steps=4000, every=250, batch=64, optimiser="adamw", learning_rate=2e-3, cosine=True, keep="last"),
+    replace(ADAMW, steps=4000, every=250, batch=64, cosine=True),
     MatchingVisits(),
     settings=(STEERING, FootLockSettings()),
 )
@@ -68,7 +68,8 @@ def train_matching(store: Store, job: Job, data: str = "") -> Run:
     net = Matching(config)
     net.measure_by(contract.mean, contract.std)
     take(net, rows)
-    true = Truth.of(net.to(job.device), rows)
+    poses = torch.from_numpy(rows.poses).float().to(job.device)
+    true = poses, net.to(job.device).points(poses[:, :-1].reshape(len(poses), -1, 4), poses[:, -1:])
     weights = joint_weights(contract, ("Foot", "Toes"), visits.feet).to(job.device)
     starts = torch.from_numpy(np.flatnonzero(rows.left >= visits.window))
 
@@ -149,35 +150,21 @@ def _speeds(rows: MatchingRows, shown: NDArray[np.bool_], how: SteeringSettings)
     return round(float(low), 2), round(float(np.median(speed[sectors[0]])), 2), forward, aside, back
 
 
-@dataclass(frozen=True)
-class Truth:
-    """What is recorded: poses (N, P), quaternions and the height of the hips; points (N, J', 3) in metres."""
-
-    poses: Tensor
-    points: Tensor
-
-    @staticmethod
-    def of(net: Matching, rows: MatchingRows) -> "Truth":
-        """That of rows, on the device of a net."""
-        poses = torch.from_numpy(rows.poses).float().to(net.mean.device)
-        return Truth(poses, net.points(poses[:, :-1].reshape(len(poses), -1, 4), poses[:, -1:]))
-
-
-def _loss(net: Matching, rows: Tensor, true: Truth, weights: Tensor, fps: float) -> Terms:
+def _loss(net: Matching, rows: Tensor, true: tuple[Tensor, Tensor], weights: Tensor, fps: float) -> Terms:
     """Errors of joints' places (m) and speeds (m/s), and of quaternions, which places do not tell all of, in windows of
-    rows (B, W)."""
-    codes = net.codes[rows]
-    off = (net.points(*net.poses(codes)) - true.points[rows]) * weights[:, None]
+    rows (B, W). true: poses (N, P) and the points (N, J', 3) of their joints."""
+    codes, (poses, points) = net.codes[rows], true
+    off = (net.points(*net.poses(codes)) - points[rows]) * weights[:, None]
     speeds = off.diff(dim=1) * fps
-    turns = (net.values(codes) - true.poses[rows]).abs().mean()
+    turns = (net.values(codes) - poses[rows]).abs().mean()
     return (Term(off.abs().mean() + 0.1 * speeds.abs().mean() + 0.2 * turns, len(rows)),)
 
 
 @torch.no_grad()
-def _measured(net: Matching, true: Truth) -> dict[str, Any]:
+def _measured(net: Matching, true: tuple[Tensor, Tensor]) -> dict[str, Any]:
     """The mean error of joints' places in centimetres, and of bones' rotations in degrees."""
-    quats, height = net.poses(net.codes)
-    off = (net.points(quats, height) - true.points).norm(dim=-1)
-    same = (quats * true.poses[:, :-1].reshape(quats.shape)).sum(dim=-1).abs().clamp(max=1)
+    (quats, height), (poses, points) = net.poses(net.codes), true
+    off = (net.points(quats, height) - points).norm(dim=-1)
+    same = (quats * poses[:, :-1].reshape(quats.shape)).sum(dim=-1).abs().clamp(max=1)
     degrees = torch.rad2deg(2 * torch.acos(same))
     return {"joints_cm": round(100 * float(off.mean()), 3), "degrees": round(float(degrees.mean()), 3)}

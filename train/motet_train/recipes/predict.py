@@ -7,11 +7,15 @@ from torch import Tensor
 
 from motet_train.data.errors import DataError
 from motet_train.data.predict_data import Material, Windows
-from motet_train.descent import GradientLearner, Term, Terms, Training
+from motet_train.descent import GradientLearner, Term, Terms
 from motet_train.models.kinematics import VectorPlaces
 from motet_train.models.predictor import Predictor, PredictorConfig
-from motet_train.recipes.recipe import AUGMENTED, Job, Recipe, Visits
+from motet_train.recipes.recipe import ADAMW, AUGMENTED, Job, Recipe, Visits
 from motet_train.runs import Run
+
+TRAINING = replace(
+    ADAMW, steps=5600, every=200, batch=64, weight_decay=0.01, warm_up=100, cosine=True, clip=1.0, average=0.998
+)
 
 DEFAULT = Recipe(
     "predict",
@@ -19,24 +23,11 @@ DEFAULT = Recipe(
     "free_run",
     PredictorConfig(0, ()),
     ("channels", "kept", "held", "mirrored", "signs", "doubts"),
-    Training(
-        steps=5600,
-        every=200,
-        batch=64,
-        optimiser="adamw",
-        learning_rate=2e-3,
-        weight_decay=0.01,
-        warm_up=100,
-        cosine=True,
-        clip=1.0,
-        average=0.998,
-        keep="last",
-    ),
+    TRAINING,
     AUGMENTED,
 )
 
-assert DEFAULT.training is not None
-FILES = replace(DEFAULT, config=replace(DEFAULT.config, hidden=96), training=replace(DEFAULT.training, steps=12_000))
+FILES = replace(DEFAULT, config=replace(DEFAULT.config, hidden=96), training=replace(TRAINING, steps=12_000))
 """Of motion files, of more people: on those held out, nets of two and four times the width are worse."""
 
 RECIPES = {"default": DEFAULT, "files": FILES}

@@ -32,6 +32,13 @@ AUGMENTED = Visits(warp=0.15, reverse=0.3, mirror=0.5)
 """Of every predictor that is trained on poses, motet's own and those it is compared with."""
 
 
+ADAMW = Training(optimiser="adamw", learning_rate=2e-3, keep="last")
+MUON = Training(
+    batch=32, optimiser="muon", learning_rate=2e-3, weight_decay=0.01, clip=1.0, keep="last", precision="bfloat16"
+)
+"""What trainings of motet's own nets share."""
+
+
 @dataclass(frozen=True)
 class Recipe:
     """What is trained, and how.

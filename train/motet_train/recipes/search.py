@@ -1,6 +1,6 @@
 """The recipe of the joint embedding of motions and sentences, and its training from a store."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import torch
 from torch.nn import functional
@@ -9,11 +9,11 @@ from motet.models.language import RULES, padded
 from motet_train.data.batches import views
 from motet_train.data.sentences import alike, usable
 from motet_train.data.store import Store
-from motet_train.descent import GradientLearner, Term, Training
+from motet_train.descent import GradientLearner, Term
 from motet_train.models.joint_embedding import JointEmbedding, JointEmbeddingConfig
 from motet_train.models.kinematics import figure_of
 from motet_train.recipes.language import Divided, divided, manifest
-from motet_train.recipes.recipe import Job, Recipe
+from motet_train.recipes.recipe import ADAMW, Job, Recipe
 from motet_train.runs import Run
 
 
@@ -32,17 +32,7 @@ DEFAULT = Recipe(
     "nearest",
     JointEmbeddingConfig(0, 0),
     ("channels", "words", "figure"),
-    Training(
-        epochs=250,
-        every=10,
-        batch=256,
-        optimiser="adamw",
-        learning_rate=2e-3,
-        warm_up=10,
-        cosine=True,
-        weight_decay=0.05,
-        keep="last",
-    ),
+    replace(ADAMW, epochs=250, every=10, batch=256, warm_up=10, cosine=True, weight_decay=0.05),
     SearchVisits(),
     {"count": 5},
 )
