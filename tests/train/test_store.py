@@ -16,7 +16,7 @@ from motet.motion.humanoid.bones import HUMANOID, MIXAMO
 from motet.motion.humanoid.retarget import from_humanoid, to_humanoid
 from motet.motion.kinematics import euler_of, local_rotations, positions, with_channels
 from motet.motion.motion import Motion
-from motet.representation.contract import LIVING_STD
+from motet.representation.contract import LIVING_STD, sequences
 from motet.representation.root_block import ROOT_BLOCK, from_root_block
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.corpus import Record, Skipped, read_corpus
@@ -323,7 +323,7 @@ def test_a_long_motion_is_cut_into_pieces_that_share_what_is_said(tmp_path: Path
     lengths = [stop - start for entry in found.records[:3] for start, stop in entry.spans]
     assert (sum(lengths), max(lengths) - min(lengths)) == (len(long), 1)
     assert max(lengths) < 10 * PLAIN.longest
-    whole = next(PLAIN.sequences(long)).values
+    whole = next(sequences(PLAIN.representation, long, PLAIN.fps)).values
     np.testing.assert_allclose(found.sequence(0)[:-2], whole[: len(found.sequence(0)) - 2], atol=1e-3)
 
 

@@ -7,8 +7,6 @@ import zlib
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path, PurePosixPath
-from types import TracebackType
-from typing import Self
 
 from motet.errors import MotionError
 from motet_train.data.errors import DataError
@@ -17,7 +15,7 @@ BROKEN = (MotionError, DataError, OSError, zipfile.BadZipFile, zlib.error, Runti
 """What reading a damaged file can raise; RuntimeError is zipfile's for an encrypted one."""
 
 
-class Archive:
+class Archive(ExitStack):
     """The files of folders and zips by name, such as "amc/01_02.amc", as if they were one; a context manager.
 
     Of two files of one name the one in the later place counts. Hidden files are left out. DataError for a place that is
@@ -25,6 +23,7 @@ class Archive:
     """
 
     def __init__(self, *paths: Path) -> None:
+        super().__init__()
         self._sources: dict[str, tuple[Path, zipfile.ZipFile | None]] = {}
         with ExitStack() as stack:
             for path in paths:
@@ -39,7 +38,7 @@ class Archive:
             self._folder = paths[0]
             if not self._borrowed:
                 self._folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="motet-")))
-            self._stack = stack.pop_all()
+            self.enter_context(stack.pop_all())
         hidden = (".", "__MACOSX")
         shown = (n for n in self._sources if not any(part.startswith(hidden) for part in PurePosixPath(n).parts))
         self.names = tuple(sorted(shown))
@@ -47,14 +46,6 @@ class Archive:
     def origin(self, name: str) -> Path:
         """A file's path for errors, with its folder or zip."""
         return self._sources[name][0] / name
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._stack.close()
 
     def place(self, name: str) -> Path:
         """Where a file lies; one of a zip or of several places is copied to one folder, and stays until the end.

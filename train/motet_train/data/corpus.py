@@ -72,12 +72,13 @@ class Corpus:
             else:
                 said = None if self.table is None else read_table(self.table)
                 found = recordings(archive, self.unit, said, self.people)
-            yield from (self._moving(item) if isinstance(item, Record) else item for item in found)
-
-    def _moving(self, record: Record) -> Record:
-        action = record.action or record.take or record.name
-        shown = (gait.name for gait in self.gaits if gait.shown(action, record.subject))
-        return replace(record, gaits=tuple(dict.fromkeys((*record.gaits, *shown))))
+            for item in found:
+                if isinstance(item, Record):
+                    action = item.action or item.take or item.name
+                    shown = (gait.name for gait in self.gaits if gait.shown(action, item.subject))
+                    yield replace(item, gaits=tuple(dict.fromkeys((*item.gaits, *shown))))
+                else:
+                    yield item
 
 
 def read_corpus(

@@ -1,7 +1,6 @@
 """How the motions of a corpus become sequences to train on: which representation, frame rate, and part of a motion."""
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
@@ -14,7 +13,6 @@ from motet.motion.humanoid import on_humanoid
 from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
-from motet.representation.contract import sequences
 
 SHORTEST = 0.5
 """Seconds: less shows no action, and gives less than five frames at 10 fps."""
@@ -45,13 +43,6 @@ class Preparation:
         count = math.floor(motion.duration / self.longest) + 1
         bounds = np.linspace(0, len(motion), count + 1).round().astype(int).tolist()
         return [motion[start:stop] for start, stop in pairwise(bounds)]
-
-    def sequences(self, piece: Motion, like: Motion | None = None) -> Iterator[Motion]:
-        """The features of a piece in all phases, in the channels of ``like`` where that is given.
-
-        MotionError where it lacks what the representation needs.
-        """
-        return sequences(self.representation, piece, self.fps, like)
 
 
 @lru_cache(maxsize=1)  # the parts of a store retarget each motion once

@@ -19,7 +19,7 @@ from motet.errors import MotetError, MotionError
 from motet.files import new_folder
 from motet.motion.motion import Motion
 from motet.motion.skeleton import Skeleton
-from motet.representation.contract import MotionContract, living
+from motet.representation.contract import MotionContract, living, sequences
 from motet_train.data.corpus import Record, Skipped
 from motet_train.data.errors import DataError
 from motet_train.data.preparation import Preparation
@@ -196,8 +196,9 @@ class _Writer:
         return item
 
     def _write(self, record: Record) -> None:
-        pieces = self.preparation.pieces(record.motion)
-        found = [list(self.preparation.sequences(piece, self.first)) for piece in pieces]
+        how = self.preparation
+        pieces = how.pieces(record.motion)
+        found = [list(sequences(how.representation, piece, how.fps, self.first)) for piece in pieces]
         for number, phases in enumerate(found, start=1):
             spans = []
             for features in phases:

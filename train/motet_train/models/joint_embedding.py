@@ -143,8 +143,12 @@ def of_frames(x: Tensor, lengths: Tensor) -> Tensor:
     mean = torch.where(active, x, 0.0).sum(dim=1) / count
     square = torch.where(active, (x - mean[:, None]).square(), 0.0).sum(dim=1) / count
     least, most = torch.where(active, x, torch.inf).amin(dim=1), torch.where(active, x, -torch.inf).amax(dim=1)
-    part = 3 * torch.arange(x.shape[1], device=x.device) // count
-    parts = [_mean_where(x, mean, part == number) for number in range(3)]  # sitting down is not standing up
+    place, parts = 3 * torch.arange(x.shape[1], device=x.device) // count, []
+    for third in range(3):  # sitting down is not standing up
+        chosen = place == third
+        frames = chosen.sum(dim=1)[:, None]
+        total = torch.where(chosen[..., None], x, 0.0).sum(dim=1)
+        parts.append(torch.where(frames > 0, total / frames.clamp(min=1), mean))
     return torch.cat([mean, (square + SMALLEST**2).sqrt(), least, most, *parts], dim=1)
 
 
@@ -155,10 +159,3 @@ def of_speeds(places: Tensor, lengths: Tensor) -> Tensor:
         before(lengths, places.shape[1])[..., None], (steps.square().sum(dim=-1) + SMALLEST**2).sqrt(), 0.0
     )
     return torch.cat([speed.sum(dim=1) / lengths[:, None], speed.amax(dim=1)], dim=1).sqrt()
-
-
-def _mean_where(x: Tensor, otherwise: Tensor, chosen: Tensor) -> Tensor:
-    """The mean (B, C) of the chosen (B, T) of x (B, T, C); where there are none, the other mean (B, C)."""
-    count = chosen.sum(dim=1)[:, None]
-    total = torch.where(chosen[..., None], x, 0.0).sum(dim=1)
-    return torch.where(count > 0, total / count.clamp(min=1), otherwise)
