@@ -17,7 +17,7 @@ from motet_train import run_folder
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.corpus import read_corpus
 from motet_train.data.store import Store
-from motet_train.plan import STAGES, VERBS, Plan
+from motet_train.plan import PLANNED_VERBS, STAGES, Plan
 from motet_train.progress import Shown
 from motet_train.runs import Run, RunError
 from motet_train.settings import SettingsError, read_stages
@@ -185,7 +185,7 @@ def test_bundles_are_exported_and_run(outputs: list[Result], recordings: Path) -
     shutil.copytree(recordings.parent / "runs", chosen, ignore=shutil.ignore_patterns("store"))
     exported = command("export", chosen, "-o", bundles)
     assert exported.exit_code == 0, exported.output
-    verbs = sorted(VERBS)
+    verbs = sorted(PLANNED_VERBS)
     assert sorted(path.stem for path in bundles.iterdir()) == verbs
     models = {verb: motet.load(bundles / f"{verb}.zip") for verb in verbs}
     assert all(model.manifest.licence["weights"] == "CC0-1.0" for model in models.values())

@@ -23,7 +23,7 @@ pytest.importorskip("websockets", reason="the extra live is not installed")
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from motet.live.protocol import LARGEST_COMMAND, MAX_CHARACTERS
+from motet.live.protocol import CLIENT_FIGURES, LARGEST_COMMAND
 from motet.live.server import LIMITS, LiveServer
 
 Message = dict[str, Any]
@@ -169,7 +169,10 @@ def test_clients_do_not_touch_each_other(steer_model: SteerModel) -> None:
         ('{"type": "put", "places": [[1]]}', "places need x, z and facing"),
         ('{"type": "put", "places": [1000001, 0, 0]}', "put, places: expected numbers up to 1e+06"),
         ('{"type": "push", "velocity": [[1]]}', "a velocity needs x and z"),
-        (f'{{"type": "start", "characters": {MAX_CHARACTERS + 1}}}', f"a whole number from 1 to {MAX_CHARACTERS}"),
+        (
+            f'{{"type": "start", "characters": {CLIENT_FIGURES + 1}}}',
+            f"a whole number from 1 to {CLIENT_FIGURES}",
+        ),
         ('{"type": "start", "positions": 1}', "start, positions: expected true or false"),
         (b"\x00\x01", "must be text, not binary"),
     ],
@@ -314,7 +317,7 @@ def test_a_client_that_stalls_is_dropped_and_others_go_on(steer_model: SteerMode
             assert len(await frames(connection, 30)) == 30
         raw.close()
 
-    serving(steer_model, scenario, characters=MAX_CHARACTERS, limits=replace(LIMITS, stall=0.2), rate=60)
+    serving(steer_model, scenario, characters=CLIENT_FIGURES, limits=replace(LIMITS, stall=0.2), rate=60)
 
 
 def test_a_speed_out_of_range_is_noted(steer_model: SteerModel) -> None:

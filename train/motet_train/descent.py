@@ -11,6 +11,7 @@ from typing import Any, Literal, NamedTuple, Protocol
 import numpy as np
 import torch
 from torch import Tensor, nn
+from torch.nn.parallel import DistributedDataParallel
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
 from motet_train import distributed
@@ -173,9 +174,11 @@ class Descent:
             {"params": [one for one in trained if one.ndim > 1 and one not in matrices], "weight_decay": decay},
             {"params": [one for one in trained if one.ndim <= 1], "weight_decay": 0.0},
         ]
-        groups = [group for group in groups if group["params"]]
-        self.optimiser = OPTIMISERS[training.optimiser](groups, lr=training.learning_rate)
-        self._called = distributed.wrapped(_Called(net, loss))
+        made = OPTIMISERS[training.optimiser]
+        self.optimiser = made([group for group in groups if group["params"]], lr=training.learning_rate)
+        self._called: nn.Module = _Called(net, loss)
+        if distributed.count() > 1:
+            self._called = DistributedDataParallel(self._called)
 
     def step(self, batch: Any, clip: float | None = None, real: bool = True) -> tuple[float, float]:
         """One step on this process' rows of a batch; its share of the mean loss, and how many things that is of.

@@ -11,8 +11,7 @@ from typing import TypeVar
 
 import torch
 import torch.distributed as dist
-from torch import Tensor, nn
-from torch.nn.parallel import DistributedDataParallel
+from torch import Tensor
 
 Value = TypeVar("Value")
 
@@ -48,19 +47,13 @@ def count() -> int:
     return dist.get_world_size() if dist.is_available() and dist.is_initialized() else 1
 
 
-def wrapped(module: nn.Module) -> nn.Module:
-    """The module, whose gradients are means over all processes where there are several."""
-    return module if count() == 1 else DistributedDataParallel(module)
-
-
 def summed(values: Sequence[float], device: torch.device) -> list[float]:
     """The sums over all processes."""
     if count() == 1:
         return list(values)
     total: Tensor = torch.tensor(values, dtype=torch.float64, device=device)
     dist.all_reduce(total)
-    found: list[float] = total.tolist()
-    return found
+    return list(map(float, total.tolist()))
 
 
 def from_first(make: Callable[[], Value]) -> Value:

@@ -43,18 +43,16 @@ class Stage:
     needs: Mapping[str, str] = field(default_factory=dict)
 
 
-def _control(store: Store, job: Job, data: str, by: str) -> Run:
-    return matching.train_matching(store, job, data)
-
-
-def _predict(store: Store, job: Job, data: str, by: str) -> Run:
-    return predict.train_predict(store_material(store, data, by), job)
-
-
 STAGES: Mapping[str, Stage] = {
-    "control": Stage("control", matching.DEFAULT, _control),
+    "control": Stage(
+        "control", matching.DEFAULT, lambda store, job, data, by: matching.train_matching(store, job, data)
+    ),
     "search": Stage("search", search.DEFAULT, search.train_search),
-    "predict": Stage("predict", predict.FILES, _predict),
+    "predict": Stage(
+        "predict",
+        predict.FILES,
+        lambda store, job, data, by: predict.train_predict(store_material(store, data, by), job),
+    ),
     "actions": Stage("generate", actions.DEFAULT, actions.train_actions),
     "codec": Stage("generate", codec.DEFAULT, codec.train_codec),
     "decoder": Stage("generate", codec.DECODER, codec.train_codec, {"start": "codec"}),
@@ -65,11 +63,7 @@ STAGES: Mapping[str, Stage] = {
 }
 """By their names, those that take least time first, each after those that it needs."""
 
-VERBS = tuple(dict.fromkeys(stage.verb for stage in STAGES.values()))
-
-
-UNSTATED = About("", "motet_train.plan")
-"""Of runs with seed 0 for which nobody stated a licence."""
+PLANNED_VERBS = tuple(dict.fromkeys(stage.verb for stage in STAGES.values()))
 
 
 @dataclass(frozen=True)
@@ -84,12 +78,12 @@ class Plan:
 
     data: Corpus | Path
     out: Path
-    verbs: tuple[str, ...] = VERBS
+    verbs: tuple[str, ...] = PLANNED_VERBS
     by: str = "trial"
     device: str = "cpu"
     vectors: WordVectors | None = None
     changes: Mapping[str, Mapping[str, Mapping[str, Any]]] = field(default_factory=dict)
-    about: About = UNSTATED
+    about: About = field(default_factory=lambda: About("", "motet_train.plan"))
 
     def train(self) -> None:
         """Train all that is not trained yet, each from its checkpoint if it has one; one that fails stops no other.
@@ -136,16 +130,11 @@ class Plan:
         store = Store.open(store_for(place, stage.recipe))
         needs = {key: self.out / need for key, need in stage.needs.items()}
         given: dict[str, Any] = {key: Run.load(folder) for key, folder in needs.items()}
+        vectors = self.vectors if name == "actions" else None
         if name == "actions":
-            given["vectors"] = self.vectors
-        job = Job(stage.recipe, replace(self.about, name=name), self.out / name, self.device)
-        options = self._options(name, place, needs)
-        trained(job, lambda job: stage.train(store, job, place.name, self.by, **given), options, resume=True)
-
-    def _options(self, name: str, place: Path, needs: Mapping[str, Path]) -> dict[str, Any]:
-        """What the command of a stage alone is given, by the names of its options."""
-        about, vectors = self.about, self.vectors if name == "actions" else None
-        return {
+            given["vectors"] = vectors
+        about = replace(self.about, name=name)
+        options = {  # of the command of this stage alone
             "data": place,
             "split": None if name == "control" else self.by,
             **needs,
@@ -156,3 +145,5 @@ class Plan:
             "licence": about.licence,
             "data-licence": about.data_licence,
         }
+        job = Job(stage.recipe, about, self.out / name, self.device)
+        trained(job, lambda job: stage.train(store, job, place.name, self.by, **given), options, resume=True)

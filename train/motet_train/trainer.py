@@ -71,23 +71,21 @@ def train(learner: Learner, seed: int, folder: Path, progress: Watcher = SILENT)
     while not _done(log, learner):
         start, number = log[-1][learner.unit] if log else 0, learner.first + len(log)
         stop = min(end for end in learner.ends if end > start)
-        seed_torch(seed, number)
+        # torch's random numbers depend on the seed, the number of the chunk and the process alone
+        entropy = (seed, number, distributed.rank()) if distributed.rank() else (seed, number)
+        torch.manual_seed(int(np.random.SeedSequence(entropy).generate_state(1, np.uint64)[0]))
         rng = np.random.default_rng((seed, number))
         began, losses = time.perf_counter(), []
         for done, loss, weight in learner.chunk(start, stop, rng):
             losses.append((loss, weight))
             progress.step(done, learner.ends[-1], learner.unit, loss)
         seconds = time.perf_counter() - began
-        mean = _mean(losses, learner)
-        log.append(
-            {
-                learner.unit: stop,
-                "loss": round(mean, 6),
-                **distributed.from_first(learner.validate),
-                "seconds": round(seconds, 3),
-                "steps_per_second": round(len(losses) / seconds, 3),
-            }
-        )
+        mean = np.average([loss for loss, _ in losses], weights=[weight for _, weight in losses])
+        # each process has its share of every loss
+        (total,) = distributed.summed([float(mean)], next(learner.kept.parameters()).device)
+        found = {"loss": round(total, 6), **distributed.from_first(learner.validate)}
+        speed = {"seconds": round(seconds, 3), "steps_per_second": round(len(losses) / seconds, 3)}
+        log.append({learner.unit: stop, **found, **speed})
         if distributed.rank() == 0:
             _write(folder, learner, log)
         progress.chunk(log[-1], learner.ends[-1], learner.unit)
@@ -99,35 +97,18 @@ def train(learner: Learner, seed: int, folder: Path, progress: Watcher = SILENT)
 
 def kept(log: Sequence[Line], keep: Literal["best", "last"]) -> Line:
     """The line of the chunk whose weights are kept: of the best validation, the first of equals."""
-    validated = [line for line in log if "validation" in line]
-    if keep == "last" or not validated:
-        return log[-1]
-    best: Line = min(validated, key=lambda line: line["validation"])
-    return best
-
-
-def seed_torch(seed: int, number: int) -> None:
-    """Let torch's random numbers depend on the seed, the number of the chunk and the process alone."""
-    entropy = (seed, number, distributed.rank()) if distributed.rank() else (seed, number)
-    torch.manual_seed(int(np.random.SeedSequence(entropy).generate_state(1, np.uint64)[0]))
-
-
-def _mean(losses: Sequence[tuple[float, float]], learner: Learner) -> float:
-    """The mean of the losses by their weights, which is that of all processes: each has its share of every loss."""
-    values, weights = np.transpose(losses)
-    device = next(learner.kept.parameters()).device
-    return distributed.summed([float(np.average(values, weights=weights))], device)[0]
+    validated = [line for line in log if "validation" in line and keep == "best"]
+    return min(validated, key=lambda line: float(line["validation"]), default=log[-1])
 
 
 def _done(log: Sequence[Line], learner: Learner) -> bool:
-    if not log:
+    if not log or log[-1][learner.unit] >= learner.ends[-1]:
+        return bool(log)
+    found = [line["validation"] for line in log if "validation" in line]
+    if not found:
         return False
-    validated = [line for line in log if "validation" in line]
-    best = kept(log, "best")
-    waited = len(validated) - 1 - validated.index(best) if validated else 0
-    reached = bool(validated) and best["validation"] <= learner.target
-    late = learner.patience is not None and waited >= learner.patience
-    return bool(log[-1][learner.unit] >= learner.ends[-1]) or reached or late
+    waited = len(found) - 1 - found.index(min(found))
+    return bool(min(found) <= learner.target) or (learner.patience is not None and waited >= learner.patience)
 
 
 def _write(folder: Path, learner: Learner, log: Sequence[Line]) -> None:

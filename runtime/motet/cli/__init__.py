@@ -14,27 +14,27 @@ from motet.cli.options import StderrHandler, log
 from motet.errors import MotetError
 
 COMMANDS = {
-    "describe": ("motet.cli.language:describe", "", "Describe motions in ranked sentences."),
-    "generate": ("motet.cli.language:generate", "", "Generate motions from sentences."),
-    "predict": ("motet.cli.motions:predict", "", "Predict how motions continue."),
-    "fill": ("motet.cli.motions:fill", "", "Fill gaps of motions, and close loops."),
-    "join": ("motet.cli.motions:join", "", "Join two motions by a transition."),
-    "control": ("motet.cli.motions:control", "", "Run a script such as 'walk 3s, run 3s'."),
-    "live": ("motet.cli.live:live", "", "Steer figures live: in a page, by a server, onto an avatar."),
-    "search": ("motet.cli.vectors:search", "", "Find motions in a folder by a sentence or a motion."),
-    "embed": ("motet.cli.vectors:embed", "", "Write context vectors of motions or sentences."),
-    "check": ("motet.cli.files:check", "", "Say what motion files hold and how they are understood."),
-    "convert": ("motet.cli.files:convert", "", "Convert motion files to other formats, rates, units."),
-    "view": ("motet.cli.files:view", "", "Write a web page that plays a motion."),
-    "bundle": ("motet.cli.bundles:bundle", "", "List, inspect, verify and pack models (bundles)."),
-    "bench": ("motet.cli.bundles:bench", "", "Measure how fast a model runs here."),
-    "prepare": ("motet_train.cli.prepare:prepare", "train", "Turn motions and sentences into a store to train on."),
-    "train": ("motet_train.cli.train:train", "train", "Train a model."),
-    "evaluate": ("motet_train.cli.evaluate:evaluate", "evaluate", "Measure a trained run or a bundle."),
-    "export": ("motet_export.cli:export", "export", "Export a trained run as a bundle."),
-    "parity": ("motet_export.cli:parity", "export", "Compare a bundle with the trained run it came from."),
+    "describe": ("motet.cli.language", "", "Describe motions in ranked sentences."),
+    "generate": ("motet.cli.language", "", "Generate motions from sentences."),
+    "predict": ("motet.cli.motions", "", "Predict how motions continue."),
+    "fill": ("motet.cli.motions", "", "Fill gaps of motions, and close loops."),
+    "join": ("motet.cli.motions", "", "Join two motions by a transition."),
+    "control": ("motet.cli.motions", "", "Run a script such as 'walk 3s, run 3s'."),
+    "live": ("motet.cli.live", "", "Steer figures live: in a page, by a server, onto an avatar."),
+    "search": ("motet.cli.vectors", "", "Find motions in a folder by a sentence or a motion."),
+    "embed": ("motet.cli.vectors", "", "Write context vectors of motions or sentences."),
+    "check": ("motet.cli.files", "", "Say what motion files hold and how they are understood."),
+    "convert": ("motet.cli.files", "", "Convert motion files to other formats, rates, units."),
+    "view": ("motet.cli.files", "", "Write a web page that plays a motion."),
+    "bundle": ("motet.cli.bundles", "", "List, inspect, verify and pack models (bundles)."),
+    "bench": ("motet.cli.bundles", "", "Measure how fast a model runs here."),
+    "prepare": ("motet_train.cli.prepare", "train", "Turn motions and sentences into a store to train on."),
+    "train": ("motet_train.cli.train", "train", "Train a model."),
+    "evaluate": ("motet_train.cli.evaluate", "evaluate", "Measure a trained run or a bundle."),
+    "export": ("motet_export.cli", "export", "Export a trained run as a bundle."),
+    "parity": ("motet_export.cli", "export", "Compare a bundle with the trained run it came from."),
 }
-"""Command -> where it is, the extra that it needs, and what it does."""
+"""Command -> the module that has it, the extra that it needs, and what it does."""
 
 NEEDS = {
     "live": ("websockets", "pythonosc"),
@@ -75,13 +75,12 @@ class Commands(click.Group):
         """Import one command; a clear refusal where its extra is not installed."""
         if cmd_name not in COMMANDS:
             return None
-        place, extra, _ = COMMANDS[cmd_name]
+        module, extra, _ = COMMANDS[cmd_name]
         if lacking := missing(extra):
             raise click.UsageError(
                 f"motet {cmd_name} needs {', '.join(lacking)}: install the extra with  pip install 'motet[{extra}]'"
             )
-        module, _, name = place.partition(":")
-        command: click.Command = getattr(importlib.import_module(module), name)
+        command: click.Command = getattr(importlib.import_module(module), cmd_name)
         return command
 
     def invoke(self, ctx: click.Context) -> Any:

@@ -9,7 +9,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain, groupby, islice
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -37,11 +36,11 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Row:
-    """What was found of a file or clip, or why nothing was."""
+    """What was found of a file or clip, or None. reason: why it is unreadable or refused."""
 
     source: Source
     found: Checked | None
-    fault: str | None = None
+    reason: str | None
     page: Path | None = None
 
     @property
@@ -49,18 +48,7 @@ class Row:
         """One word."""
         if self.found is None:
             return "unreadable"
-        return "refused" if self.found.refused else "understood" if self.found.sure else "unsure"
-
-    @property
-    def reason(self) -> str | None:
-        """Why it is unreadable or refused."""
-        return self.fault if self.found is None else self.found.refused
-
-    def to_json(self) -> dict[str, Any]:
-        """What was found, or "file", "clip" and "error"."""
-        if self.found is None:
-            return {"file": str(self.source.path), "clip": self.source.clip, "error": self.fault}
-        return self.found.to_json()
+        return "refused" if self.reason else "understood" if self.found.sure else "unsure"
 
 
 @click.command(
@@ -106,7 +94,7 @@ def _row(source: Source, page: Path | None, read: Read) -> Row:
                 figures["as the humanoid"] = to_humanoid(figures["as in the file"]).motion
             title = Path(found.file).name + (f"{MARK}{found.clip}" if found.clip else "")
             write_many(page, list(figures.values()), list(figures), title)
-        return Row(source, found, page=page)
+        return Row(source, found, found.refused, page)
     except MotetError as error:
         return Row(source, None, str(error).removeprefix(f"{source.path}: ").removeprefix(f"{source.path}, "))
 
@@ -115,7 +103,9 @@ def _print_json(rows: Iterator[Row]) -> Counter[str]:
     """The list, one line for each row as it is found."""
     counts: Counter[str] = Counter()
     for row in rows:
-        click.echo(("," if counts.total() else "[") + json.dumps(row.to_json()))
+        unread = {"file": str(row.source.path), "clip": row.source.clip, "error": row.reason}
+        said = json.dumps(row.found.to_json() if row.found else unread)
+        click.echo(("," if counts.total() else "[") + said)
         counts[row.verdict] += 1
     click.echo("]" if counts else "[]")
     return counts
@@ -172,7 +162,7 @@ def _report(row: Row) -> Iterator[str]:
     """All that was found of one motion, as lines."""
     found = row.found
     if found is None:
-        return iter((str(row.source), f"  {row.verdict:<9} {row.fault}"))
+        return iter((str(row.source), f"  {row.verdict:<9} {row.reason}"))
     said: list[tuple[str, str]] = []
     if found.clips:
         said.append(("clip", f"{found.clip}, {found.clips.index(found.clip or '') + 1} of {len(found.clips)}"))

@@ -1,6 +1,7 @@
 """``motet live``: a steered figure, as a page, by a server, or as messages for an avatar."""
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -57,7 +58,7 @@ def live(
     target = None if osc is None else _address(osc)
     model = load_as(SteerModel, bundle, session)
     if port is not None:
-        _serve(model, target, host, port, characters, origins)
+        _serve(model, target, host, port=port, characters=characters, origins=origins)
     elif target is not None and script is not None:
         _follow(model, target, script)
 
@@ -91,18 +92,11 @@ def _follow(model: SteerModel, target: tuple[str, int], script: str) -> None:
         click.echo("stopped", err=True)
 
 
-def _serve(
-    model: SteerModel,
-    target: tuple[str, int] | None,
-    host: str,
-    port: int,
-    characters: int,
-    origins: tuple[str, ...],
-) -> None:
+def _serve(model: SteerModel, target: tuple[str, int] | None, host: str, **settings: Any) -> None:
     from motet.live.server import LiveServer, run_server
     from motet.live.vmc import Sender
 
     watch = None if target is None else Sender(*target).send
-    server = LiveServer(model, host, port, characters=characters, origins=origins, watch=watch)
+    server = LiveServer(model, host, watch=watch, **settings)
     run_server(server, lambda: click.echo(f"listening on ws://{host}:{server.port}; stop with Ctrl-C", err=True))
     click.echo("stopped", err=True)

@@ -120,16 +120,8 @@ def read_options(command: Callable[..., None]) -> Callable[..., None]:
         "--rest", type=Path, metavar="FILE", help=f"File with the same joints in a T-pose ({takers('rest')})."
     )
     @functools.wraps(command)
-    def with_read(
-        unit_in: str | None,
-        fps_in: float | None,
-        asf: Path | None,
-        partial: bool,
-        clip: str | None,
-        rest: Path | None,
-        **options: Any,
-    ) -> None:
-        given = {"unit": unit_in, "fps": fps_in, "asf": asf, "partial": partial, "rest": rest}
+    def with_read(unit_in: str | None, fps_in: float | None, clip: str | None, **options: Any) -> None:
+        given = {"unit": unit_in, "fps": fps_in, **{name: options.pop(name) for name in ("asf", "partial", "rest")}}
         command(read=Read(given, clip), **options)
 
     return with_read

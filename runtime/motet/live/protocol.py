@@ -18,7 +18,7 @@ from motet.motion.humanoid import BONES, HUMANOID
 from motet.motion.pose import Pose
 from motet.settings import checked_int
 
-MAX_CHARACTERS = 16
+CLIENT_FIGURES = 16
 """Of a client."""
 
 KEYS = {
@@ -58,7 +58,7 @@ class ClientSession:
 
     def _start(self, given: dict[str, Any]) -> None:
         characters, positions = given.pop("characters", 1), given.pop("positions", False)
-        checked_int("characters", characters, 1, MAX_CHARACTERS, ControlError)
+        checked_int("characters", characters, 1, CLIENT_FIGURES, ControlError)
         self.session = self.model.start(given.pop("gait", None), characters=characters, **given)
         self.positions, self.ticks = positions, 0
 

@@ -59,10 +59,6 @@ class Given:
         """The first existing data, on which all models are measured; for a suite that needs data."""
         return next(found for found in self.data.values() if found is not None)
 
-    def store(self) -> Store:
-        """The store there; DataError if there is none."""
-        return Store.open(self.first)
-
 
 @dataclass(frozen=True)
 class Results:
@@ -96,9 +92,9 @@ def as_steered(model: BundleModel) -> SteerModel | None:
 
 
 def _steered(models: Mapping[str, BundleModel], given: Given) -> Results:
-    recorded = Recorded.of(given.store())
-    steered = {name: one for name, model in models.items() if (one := as_steered(model))}
-    reports = {name: steer_report(model, recorded) for name, model in steered.items()}
+    recorded = Recorded.of(Store.open(given.first))
+    steered = ((name, as_steered(model)) for name, model in models.items())
+    reports = {name: steer_report(model, recorded) for name, model in steered if model}
     return Results(json_ready(reports), steer_text(reports))
 
 
@@ -109,19 +105,20 @@ def _control(models: Mapping[str, TdbnModel], given: Given) -> Results:
 
 
 def _filled(models: Mapping[str, FillModel], given: Given) -> Results:
-    store = given.store()
+    store = Store.open(given.first)
     return Results.of({name: fill_report(model, store) for name, model in models.items()}, FILL_GOALS)
 
 
 def _language(models: Mapping[str, LanguageModel], given: Given) -> Results:
     """Others are compared with the first describe model of the same split."""
-    store = given.store()
+    store = Store.open(given.first)
     corpora = {name: split_as(model.manifest, store) for name, model in models.items()}
     reports = {name: _language_report(name, models, corpora) for name in models}
     found = Results.of(reports, {**LANGUAGE_GOALS, **SEARCH_GOALS})
-    unseen = {models[key].VERB: key for key in reversed([*models]) if _divided_by(models[key]) == "subject"}
+    by = {name: model.manifest.training["split"]["by"] for name, model in models.items()}
+    unseen = {models[name].VERB: name for name in reversed([*models]) if by[name] == "subject"}
     for name, model in models.items():  # how one divided by trial would do with people it has never seen
-        if _divided_by(model) != "subject" and model.VERB in unseen:
+        if by[name] != "subject" and model.VERB in unseen:
             found.figures[name]["people_unseen"] = json_ready(reports[unseen[model.VERB]])
     return Results(found.figures, found.text, lambda: _language_drawings(models, corpora))
 
@@ -143,10 +140,6 @@ def _language_report(name: str, models: Mapping[str, Any], corpora: Mapping[str,
     return report
 
 
-def _divided_by(model: LanguageModel) -> str:
-    return str(model.manifest.training["split"]["by"])
-
-
 def _language_drawings(models: Mapping[str, LanguageModel], corpora: Mapping[str, SplitStore]) -> dict[str, Drawings]:
     draw: dict[str, Callable[..., Drawings]] = {"describe": describe_drawings, "generate": generate_drawings}
     logged = {name: Path(name) if (Path(name) / LOG).is_file() else None for name in models}
@@ -157,7 +150,7 @@ def _language_drawings(models: Mapping[str, LanguageModel], corpora: Mapping[str
 def _predict(models: Mapping[str, PredictModel], given: Given) -> Results:
     """By the protocol if its text files are given, else the joints' distances in held-out trials."""
     if not is_expmap(given.first):
-        return _in_mocap(models, given.store())
+        return _in_mocap(models, Store.open(given.first))
     found = protocol_results(models, read_expmap_files(given.first))
     return Results(json_ready(found.to_json()), found.text(), lambda: {"": protocol_drawings(found)})
 

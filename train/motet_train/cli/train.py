@@ -21,7 +21,7 @@ from motet_train.papers.plappert2017.language_to_motion import LOSSES
 from motet_train.papers.tdbn import recipe as tdbn
 from motet_train.papers.tdbn import steered
 from motet_train.papers.tdbn.clips import read_clips
-from motet_train.plan import STAGES, VERBS, Plan
+from motet_train.plan import PLANNED_VERBS, STAGES, Plan
 from motet_train.recipes import actions, codec, codes, fill, language, matching, predict, search
 from motet_train.recipes.actions import WordVectors
 from motet_train.recipes.recipe import Job, Recipe
@@ -52,7 +52,7 @@ of_plan = with_options(
 
 @train.command("all", short_help="Train all shipped kinds on your own recordings: one command, resumable.")
 @click.argument("data", type=Path, nargs=-1, required=True)
-@click.option("--only", "verbs", type=click.Choice(VERBS), multiple=True, help="Only these. [default: all]")
+@click.option("--only", "verbs", type=click.Choice(PLANNED_VERBS), multiple=True, help="Only these. [default: all]")
 @of_plan
 def everything(verbs: tuple[str, ...], **given: Any) -> None:
     """Train all shipped kinds on DATA: folders or zips of motion files with a table of sentences, or their store.
@@ -60,7 +60,7 @@ def everything(verbs: tuple[str, ...], **given: Any) -> None:
     Motions are prepared once, into OUT/store; then one run per verb is trained, of the kind that ships with motet.
     Repeat the command to continue: finished runs are skipped, interrupted ones resume.
     """
-    _train_plan(verbs or VERBS, **given)
+    _train_plan(verbs or PLANNED_VERBS, **given)
 
 
 @train.command(short_help="Train the shipped kind of generate, in five stages.")
