@@ -16,9 +16,8 @@ from motet.files import check_place
 from motet.models.base import BundleModel
 from motet.models.load import build, kind_of
 from motet_export.decoded import differences, golden_vectors, whole_runs
-from motet_export.examples import Examples, examples
 from motet_export.exporter import ExportError, export_graph, halved, quantised, round_weights
-from motet_export.parity import check_carried, check_one_step, check_runs
+from motet_export.parity import Examples, check_carried, check_one_step, check_runs, examples
 from motet_train.runs import Run
 
 log = logging.getLogger("motet.export")

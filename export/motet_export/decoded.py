@@ -23,7 +23,7 @@ from motet.models.search import SearchModel
 from motet.models.steer import SteerModel
 from motet.models.tdbn_control import TdbnModel
 from motet.motion.motion import Motion
-from motet_export.examples import Examples, sides, walks
+from motet_export.parity import Examples, sides, walks
 
 Decoded = dict[str, NDArray[Any]]
 Runs = dict[str, Callable[[], Decoded]]

@@ -20,7 +20,7 @@ from motet.motion.skeleton import END_SUFFIX
 from motet.representation.contract import MotionContract
 from motet.representation.root_sixd import ROOT_SIXD, ROOT_SIXD_UNITS, SIXD_KINDS
 from motet_export.bundles import export_run, parity_of
-from motet_export.examples import example, walks
+from motet_export.parity import example, walks
 from motet_train.models.action_net import ActionsConfig, stems_of
 from motet_train.models.codec import CodecConfig
 from motet_train.models.kinematics import tree_of

@@ -10,9 +10,8 @@ from motet.bundle.graph import Arrays, Graph, GraphSpec, TensorSpec
 from motet.bundle.manifest import Manifest, read_contract
 from motet.models.load import KINDS
 from motet_export.decoded import golden_run, runs_of
-from motet_export.examples import examples, walks
 from motet_export.exporter import ExportError
-from motet_export.parity import check_carried
+from motet_export.parity import check_carried, examples, walks
 
 MOTION = {
     "representation": "angles",

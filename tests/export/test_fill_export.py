@@ -15,7 +15,7 @@ from motet.representation.contract import MotionContract
 from motet.representation.placed import PLACED_CHANNELS
 from motet.representation.root_sixd import ROOT_SIXD, ROOT_SIXD_UNITS, SIXD_KINDS
 from motet_export.bundles import export_run, parity_of
-from motet_export.examples import sides
+from motet_export.parity import sides
 from motet_train.models.filler import Filler, FillerConfig
 from motet_train.models.kinematics import tree_of
 from motet_train.runs import Run

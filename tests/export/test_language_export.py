@@ -16,8 +16,8 @@ from motet.models.language import RULES, SPECIALS
 from motet.models.load import load, verify
 from motet.representation.contract import Z_LIMIT
 from motet_export.bundles import export_run, parity_of
-from motet_export.examples import example
 from motet_export.exporter import ExportError
+from motet_export.parity import example
 from motet_train.models.motion_to_language import MotionToLanguage, MotionToLanguageConfig
 from motet_train.papers.plappert2017.language_to_motion import LanguageToMotion, LanguageToMotionConfig
 from motet_train.runs import Run

@@ -15,7 +15,7 @@ from motet.motion.humanoid.bones import HUMANOID
 from motet.representation.contract import MotionContract
 from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS
 from motet_export.bundles import export_run, parity_of
-from motet_export.examples import example, walks
+from motet_export.parity import example, walks
 from motet_train.models.joint_embedding import JointEmbedding, JointEmbeddingConfig
 from motet_train.models.kinematics import figure_of
 from motet_train.runs import Run
