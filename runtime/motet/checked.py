@@ -10,7 +10,7 @@ import numpy as np
 from motet.errors import MotionError
 from motet.files import place_of
 from motet.formats import READABLE, clips, read_motion
-from motet.formats.lines import Clip, chosen, split_clip
+from motet.formats.text import Clip, chosen, split_clip
 from motet.motion.humanoid import (
     HUMANOID,
     SURE_OF_JOINTS,

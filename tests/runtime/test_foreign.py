@@ -14,7 +14,7 @@ from test_retarget import SKELETONS, angles_between
 
 import motet
 from motet.errors import MotionError
-from motet.formats.lines import with_names
+from motet.formats.text import with_names
 from motet.models.describe import DescribeModel
 from motet.models.predict import PredictModel
 from motet.models.tdbn_control import TdbnModel

@@ -7,7 +7,7 @@ from figures import walker
 
 from motet.errors import FormatError, MotionError, OutputError
 from motet.formats import amc, bvh, read_motion, write_motion
-from motet.formats.asf import CMU_METRES, read_skeleton, words_of
+from motet.formats.asf import CMU_METRES
 from motet.motion.kinematics import local_rotations, positions, with_channels
 from motet.motion.motion import Motion
 from motet.motion.rotations import axis_to_rotmat
@@ -286,15 +286,6 @@ def test_what_the_format_cannot_hold_is_refused_and_nothing_is_written(tmp_path)
     with pytest.raises(OutputError, match="does not exist"):
         write_motion(tmp_path / "nowhere" / "w.amc", motion)
     assert not list(tmp_path.iterdir())
-
-
-def test_the_slow_reader_gives_what_the_fast_one_gives(clips):
-    path = clips / "09_07.amc"
-    lines, skeleton = path.read_text().split("\n"), read_skeleton(path.with_suffix(".asf"))
-    header, _, _ = amc._header(path, lines, skeleton)
-    layout = amc._layout(path, words_of(lines, header), skeleton.dofs)
-    fast = amc._values_at_once(lines[header:], layout)
-    np.testing.assert_array_equal(amc._values_by_line(path, words_of(lines, header), layout), fast)
 
 
 BROKEN_OFF = {"07_12": 244}

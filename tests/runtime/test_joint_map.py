@@ -6,7 +6,7 @@ import pytest
 
 from motet.errors import FormatError
 from motet.formats import read_motion
-from motet.formats.lines import with_names
+from motet.formats.text import with_names
 from motet.motion.humanoid.joint_map import conventions, map_by_names, read_map
 from motet.motion.humanoid.retarget import to_humanoid
 from motet.motion.kinematics import positions, skeleton_of

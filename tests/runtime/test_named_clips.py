@@ -10,7 +10,7 @@ from gltf_files import node_places, read_document, write_clips, write_document
 
 import motet
 from motet.errors import FormatError
-from motet.formats.lines import clip_names
+from motet.formats.text import clip_names
 from motet.motion.humanoid.bones import BONES, HUMANOID
 from motet.motion.kinematics import skeleton_of
 from motet.motion.motion import Motion

@@ -10,7 +10,7 @@ from test_retarget import SKELETONS, angles_between, dancing, limbless, skeleton
 
 from motet.errors import FormatError, MotionError
 from motet.formats import read_motion
-from motet.formats.lines import with_names
+from motet.formats.text import with_names
 from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.humanoid.retarget import SURE_OF_JOINTS, from_humanoid, to_humanoid
 from motet.motion.kinematics import global_transforms, motion_of, skeleton_of

@@ -6,7 +6,7 @@ import pytest
 
 from motet.errors import MotionError
 from motet.formats import read_motion, write_motion
-from motet.formats.lines import with_names
+from motet.formats.text import with_names
 from motet.motion.humanoid.bones import BONES, HUMANOID, T_POSE, sole_points
 from motet.motion.humanoid.joint_tree import map_by_tree
 from motet.motion.humanoid.retarget import Humanoid, from_humanoid, to_humanoid

@@ -21,7 +21,7 @@ from motet.draw.page import write_many
 from motet.errors import FormatError, MotetError
 from motet.files import files_in
 from motet.formats import CLIPPED, MOCAP, READS, WRITES, write_motion
-from motet.formats.lines import MARK
+from motet.formats.text import MARK
 from motet.motion.feet.contacts import lay_root_path
 from motet.motion.feet.hold import hold_feet as feet_held
 from motet.motion.humanoid import LENGTH_UNITS, read_map, to_humanoid

@@ -12,7 +12,7 @@ import click
 from motet.errors import MotetError
 from motet.files import place_of
 from motet.formats import FORMATS, READABLE, clips, read_motion
-from motet.formats.lines import MARK, chosen, plain_names, split_clip
+from motet.formats.text import MARK, chosen, plain_names, split_clip
 from motet.motion.motion import Motion
 from motet.motion.skeleton import METRES
 

@@ -11,7 +11,7 @@ import click
 
 from motet.cli.reading import FPS, Source
 from motet.formats import ONTO, WRITABLE, Character, check_writable, put_onto, read_character, write_all_on, write_on
-from motet.formats.lines import Names
+from motet.formats.text import Names
 from motet.motion.humanoid import RIGS
 from motet.motion.motion import Motion
 from motet.motion.root_motion import in_place

@@ -19,7 +19,7 @@ import numpy as np
 
 from motet.errors import FormatError, MotionError, OutputError
 from motet.files import File, check_place, place_of
-from motet.formats.lines import Clip, split_clip
+from motet.formats.text import Clip, split_clip
 from motet.motion.humanoid import JointMap, from_humanoid, grounded, on_humanoid, rig
 from motet.motion.motion import Motion
 from motet.motion.root_motion import travel_on_root

@@ -9,17 +9,8 @@ import numpy as np
 
 from motet.errors import FormatError, quoted
 from motet.files import File, check_place, place_of, write_whole
+from motet.formats import text
 from motet.formats.asf import CMU_METRES, Asf, asf_text, read_skeleton, words_of
-from motet.formats.lines import (
-    finite,
-    frame_rate,
-    number,
-    numbers,
-    plain_names,
-    read_text,
-    with_names,
-    with_still_offsets,
-)
 from motet.motion.kinematics import skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
@@ -42,7 +33,7 @@ def read(file: File, asf: str | Path | None = None, fps: float | None = None, pa
     Channels come in the file's order of bones, units "length" for translations, "deg" or "rad" as in the file.
     FormatError names the file, and the line where it is cut or wrong.
     """
-    path, lines = place_of(file), read_text(file).split("\n")
+    path, lines = place_of(file), text.read_text(file).split("\n")
     if asf is None and not isinstance(file, str | Path):
         raise FormatError(path, "a file object has no folder to find the skeleton in: pass it as asf")
     skeleton = read_skeleton(asf if asf is not None else _find_asf(path))
@@ -50,12 +41,18 @@ def read(file: File, asf: str | Path | None = None, fps: float | None = None, pa
     if said is not None and fps is not None and abs(said - fps) > 1e-6 * said:
         raise FormatError(path, f"the file states {said:g} fps, but {fps:g} was given")
     layout = _layout(path, words_of(lines, header), skeleton.dofs)
-    values = _values(path, lines, header, layout, partial)
+    try:
+        values = _values(path, lines, header, layout)
+    except FormatError:
+        last = max((n for n, line in enumerate(lines) if line.rstrip().isdecimal()), default=None)
+        if last is None or not partial:
+            raise
+        values = _values(path, lines[:last], header, layout)
+        log.info("%s: the last frame is truncated and was left out", path)
     channels = [(bone, dof) for bone, _ in layout for dof in skeleton.dofs[bone]]
-    names = tuple(f"{bone}.{dof}" for bone, dof in channels)
     units = tuple("length" if dof[0] == "t" else unit for _, dof in channels)
-    rate = next((rate for rate in (said, fps) if rate is not None), 120.0)
-    return Motion(values, names, units, frame_rate(rate, path), skeleton.skeleton)
+    fps = text.frame_rate(next((rate for rate in (said, fps) if rate is not None), 120.0), path)
+    return Motion(values, tuple(map(".".join, channels)), units, fps, skeleton.skeleton)
 
 
 def _find_asf(path: Path) -> Path:
@@ -81,7 +78,7 @@ def _header(path: Path, lines: list[str], asf: Asf) -> tuple[int, str, float | N
         if word in (":degrees", ":radians"):
             unit = word[1:4]
         elif word.startswith("# fps "):
-            fps = frame_rate(number(word.removeprefix("# fps "), path, line + 1), path, line + 1)
+            fps = text.frame_rate(text.number(word.removeprefix("# fps "), path, line + 1), path, line + 1)
         elif word and word[0] not in "#:":
             return line, unit, fps
     return len(lines), unit, fps
@@ -110,63 +107,30 @@ def _is_frame_number(words: list[str]) -> bool:
     return len(words) == 1 and words[0].isdigit()
 
 
-def _values(path: Path, lines: list[str], header: int, layout: Layout, partial: bool) -> Array:
-    values = _values_at_once(lines[header:], layout)
-    if values is not None:
-        return values
-    try:
-        return _values_by_line(path, words_of(lines, header), layout)
-    except FormatError:
-        last = max((n for n, line in enumerate(lines) if line.rstrip().isdecimal()), default=None)
-        if last is None or not partial:
-            raise
-    log.info("%s: the last frame is truncated and was left out", path)
-    return _values_by_line(path, words_of(lines[:last], header), layout)
-
-
-def _values_at_once(lines: list[str], layout: Layout) -> Array | None:
-    """All values (T, D) if all frames have the same layout, else None: several times faster than line by line."""
-    words = "\n".join(lines).split()
-    places = np.cumsum([1, *(1 + count for _, count in layout)]).tolist()
-    width = places.pop()
-    frames, rest = divmod(len(words), width)
-    for place, (bone, _) in reversed(list(zip(places, layout, strict=True))):
-        if rest or not set(words[place::width]) <= {bone}:
-            return None
-        del words[place::width]
-        width -= 1
-    if rest or not all(map(str.isdigit, words[::width])):
-        return None
-    del words[::width]
-    values = finite(words)
-    return None if values is None else values.reshape(frames, width - 1)
-
-
-def _values_by_line(path: Path, lines: Iterator[tuple[int, list[str]]], layout: Layout) -> Array:
+def _values(path: Path, lines: list[str], header: int, layout: Layout) -> Array:
     """All values (T, D), with every line checked against the first frame."""
-    rows: list[list[float]] = []
-    expected: Layout = []
-    line = 0
-    for line, words in lines:
-        if _is_frame_number(words):
-            _refuse_rest(path, expected, line)
-            expected = layout[::-1]
-            rows.append([])
-            continue
-        if not expected or words[0] != expected[-1][0]:
-            wanted = f"bone {expected[-1][0]!r}" if expected else "a frame number"
+    frame = [("", 0), *layout]
+    found: list[str] = []
+    at = line = frames = 0
+    for line, words in words_of(lines, header):
+        (bone, count), is_number = frame[at], _is_frame_number(words)
+        if at and is_number:
+            break
+        if (words[0] != bone) if at else not is_number:
+            wanted = f"bone {bone!r}" if at else "a frame number"
             raise FormatError(path, f"expected {wanted}, as in the first frame, not {quoted(words[0])}", line)
-        bone, count = expected.pop()
         if len(words) - 1 != count:
             raise FormatError(path, f"bone {bone!r} needs {count} values, not {len(words) - 1}", line)
-        rows[-1].extend(numbers(words[1:], path, line))
-    _refuse_rest(path, expected, line)
-    return np.array(rows).reshape(len(rows), sum(count for _, count in layout))
-
-
-def _refuse_rest(path: Path, expected: Layout, line: int) -> None:
-    if expected:
-        raise FormatError(path, f"truncated frame: bone {expected[-1][0]!r} is missing", line)
+        found += words[1:]
+        at, frames = (at + 1) % len(frame), frames + (at == 0)
+    if at:
+        raise FormatError(path, f"truncated frame: bone {frame[at][0]!r} is missing", line)
+    values = text.finite(found)
+    if values is None:  # the line at fault is found
+        values = np.array(
+            [value for line, words in words_of(lines, header) for value in text.numbers(words[1:], path, line)]
+        )
+    return values.reshape(frames, sum(count for _, count in layout))
 
 
 def write(file: File, motion: Motion) -> None:
@@ -183,17 +147,17 @@ def write(file: File, motion: Motion) -> None:
     if not isinstance(file, str | Path):
         raise FormatError(place_of(file), "AMC consists of two files, so it cannot be written to one file object")
     path = check_place(file)
-    motion, moving = with_still_offsets(path, motion)
+    motion, moving = text.with_still_offsets(path, motion)
     if moving:
         raise FormatError(path, f"only the root can move in an AMC file, not {', '.join(moving)}")
     if skeleton_of(motion).metres_per_unit not in (None, CMU_METRES):
         motion = motion.scaled(CMU_METRES)
     # a bone's name has no blanks or comments, and is neither a number nor a keyword
-    motion = with_names(motion, plain_names(["root", *skeleton_of(motion).names[1:]], r"[\s#]|^(?=\d+$)|^(?=:)"))
-    joints = skeleton_of(motion).joints
-    asf = Asf(skeleton_of(motion), {joint.name: dofs for joint in joints if (dofs := _dofs_of(motion, joint))}, "deg")
-    frames = _frames(motion, asf.dofs)
-    write_whole(path.with_suffix(".asf"), asf_text(asf))
+    names = text.plain_names(["root", *skeleton_of(motion).names[1:]], r"[\s#]|^(?=\d+$)|^(?=:)")
+    motion = text.with_names(motion, names)
+    dofs = {joint.name: dofs for joint in skeleton_of(motion).joints if (dofs := _dofs_of(motion, joint))}
+    frames = _frames(motion, dofs)
+    write_whole(path.with_suffix(".asf"), asf_text(Asf(skeleton_of(motion), dofs, "deg")))
     write_whole(path, frames)
 
 

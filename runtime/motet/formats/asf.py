@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from motet.errors import FormatError, MotionError, quoted
-from motet.formats.lines import Names, Triple, complete_order, number, read_text, spaced, triple
+from motet.formats.text import Names, Triple, complete_order, number, read_text, spaced, triple
 from motet.motion.rotations import euler_to_rotmat, rotmat_to_euler
 from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
 
@@ -110,16 +110,12 @@ def _blocks(path: Path, lines: Lines) -> Iterator[tuple[int, Lines]]:
 
 def _root(path: Path, lines: Lines, factor: float) -> _Bone:
     """The root, with its position in place of its reach."""
-    root, said = _Bone("root"), {words[0].lower(): (line, words) for line, words in lines}
-    if "order" in said:
-        root.dofs = _dofs(path, *said["order"], known=("tx", "ty", "tz", "rx", "ry", "rz"))
-    if "position" in said:
-        line, words = said["position"]
-        root.reach = triple(words[1:], path, line)
-    line, words = said.get("orientation", (0, ["", "0", "0", "0"]))
-    order = said["axis"][1][-1] if "axis" in said else "XYZ"
-    root.axis = _axis(path, line, [*words, order], factor)
-    return root
+    rest: dict[str, tuple[int, list[str]]] = dict.fromkeys(("position", "orientation"), (0, ["", "0", "0", "0"]))
+    said = rest | {"axis": (0, ["XYZ"]), "order": (0, [])} | {words[0].lower(): (n, words) for n, words in lines}
+    (at, place), (line, angles) = said["position"], said["orientation"]
+    axis = _axis(path, line, [*angles, said["axis"][1][-1]], factor)
+    dofs = _dofs(path, *said["order"], known=("tx", "ty", "tz", "rx", "ry", "rz"))
+    return _Bone("root", triple(place[1:], path, at), axis, dofs)
 
 
 def _bone(path: Path, begin: int, lines: Lines, factor: float) -> _Bone:
@@ -129,10 +125,9 @@ def _bone(path: Path, begin: int, lines: Lines, factor: float) -> _Bone:
     (at, direction), (line, words) = said["direction"], said["length"]
     length = number((*words, "")[1], path, line)
     reach = [repr(value * length) for value in triple(direction[1:], path, at)]
-    bone = _Bone(said.get("name", (0, [""]))[1][-1], triple(reach, path, begin), _axis(path, *said["axis"], factor))
-    if "dof" in said:
-        bone.dofs = _dofs(path, *said["dof"], known=("rx", "ry", "rz"))
-    return bone
+    dofs = _dofs(path, *said.get("dof", (0, [])), known=("rx", "ry", "rz"))
+    name = said.get("name", (0, [""]))[1][-1]
+    return _Bone(name, triple(reach, path, begin), _axis(path, *said["axis"], factor), dofs)
 
 
 def _axis(path: Path, line: int, words: list[str], factor: float) -> Triple:

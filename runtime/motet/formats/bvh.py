@@ -16,21 +16,7 @@ import numpy as np
 
 from motet.errors import FormatError, MotionError, quoted
 from motet.files import File, place_of, write_whole
-from motet.formats.lines import (
-    Names,
-    Triple,
-    complete_order,
-    finite,
-    frame_rate,
-    number,
-    numbers,
-    plain_names,
-    read_text,
-    spaced,
-    triple,
-    with_names,
-    with_still_offsets,
-)
+from motet.formats import text
 from motet.motion.kinematics import local_rotations, local_translations, skeleton_of
 from motet.motion.motion import TURN, Motion
 from motet.motion.rotations import Array, rotmats_to_euler
@@ -48,7 +34,7 @@ def read(file: File, partial: bool = False) -> Motion:
         it. If it holds more, all are read, with a warning in the log.
     FormatError names file and line.
     """
-    path, lines = place_of(file), read_text(file).split("\n")
+    path, lines = place_of(file), text.read_text(file).split("\n")
     nodes, motion_line = _hierarchy(path, lines)
     start, declared, fps = _motion_header(path, lines, motion_line)
     channels = [f"{node.name}.{kind}" for node in nodes for kind in node.channels]
@@ -76,7 +62,7 @@ class _Node:
     name: str
     parent: int
     line: int
-    offset: Triple | None = None
+    offset: text.Triple | None = None
     channels: tuple[str, ...] = ()
 
 
@@ -84,16 +70,16 @@ def _joint(path: Path, node: _Node) -> Joint:
     if node.offset is None:
         raise FormatError(path, f"joint {quoted(node.name)} has no OFFSET", node.line)
     turns = "".join(kind[1] for kind in node.channels if kind[0] == "r")
-    return Joint(node.name, node.parent, node.offset, complete_order(turns))
+    return Joint(node.name, node.parent, node.offset, text.complete_order(turns))
 
 
 def _hierarchy(path: Path, lines: list[str]) -> tuple[list[_Node], int]:
     """The joints, and the number of the line MOTION after them."""
     nodes: list[_Node] = []
     open_nodes: list[int] = []
-    names = Names()
+    names = text.Names()
     declared = False  # a joint has been named and its brace must follow
-    pieces = ((line, piece.strip()) for line, text in enumerate(lines, 1) for piece in re.split("([{}])", text))
+    pieces = ((line, piece.strip()) for line, content in enumerate(lines, 1) for piece in re.split("([{}])", content))
     for line, statement in ((line, piece) for line, piece in pieces if piece):
         keyword, _, rest = statement.replace("\t", " ").partition(" ")
         match keyword.lower():
@@ -109,7 +95,7 @@ def _hierarchy(path: Path, lines: list[str]) -> tuple[list[_Node], int]:
             case "}" if open_nodes and not declared:
                 open_nodes.pop()
             case "offset" if open_nodes and not declared:
-                nodes[open_nodes[-1]].offset = triple(rest.split(), path, line)
+                nodes[open_nodes[-1]].offset = text.triple(rest.split(), path, line)
             case "channels" if open_nodes and not declared:
                 nodes[open_nodes[-1]].channels = _channels(path, rest.split(), line)
             case "motion" if nodes and not open_nodes and not declared:
@@ -138,14 +124,14 @@ def _channels(path: Path, words: list[str], line: int) -> tuple[str, ...]:
 def _motion_header(path: Path, lines: list[str], motion_line: int) -> tuple[int, int, float]:
     """The number of lines before the first frame, the declared number of frames and the frame rate."""
     frames, fps = None, None
-    for line, text in enumerate(lines[motion_line:], start=motion_line + 1):
-        found = re.fullmatch(r"\s*(frames|frame\s+time)\s*:\s*(\S+)\s*", text, re.IGNORECASE)
+    for line, content in enumerate(lines[motion_line:], start=motion_line + 1):
+        found = re.fullmatch(r"\s*(frames|frame\s+time)\s*:\s*(\S+)\s*", content, re.IGNORECASE)
         if found and found[1].lower() == "frames" and re.fullmatch("[0-9]{1,15}", found[2]):
             frames = int(found[2])
         elif found and found[1].lower() != "frames":
             fps = _fps(path, found[2], line)
-        elif text.strip():
-            reason = f"expected 'Frames: N' and 'Frame Time: SECONDS', not {quoted(text.strip())}"
+        elif content.strip():
+            reason = f"expected 'Frames: N' and 'Frame Time: SECONDS', not {quoted(content.strip())}"
             raise FormatError(path, reason, line)
         if frames is not None and fps is not None:
             return line, frames, fps
@@ -153,10 +139,10 @@ def _motion_header(path: Path, lines: list[str], motion_line: int) -> tuple[int,
 
 
 def _fps(path: Path, word: str, line: int) -> float:
-    seconds = number(word, path, line)
+    seconds = text.number(word, path, line)
     if not seconds > 0:
         raise FormatError(path, f"frame time {word} s is out of range", line)
-    fps = frame_rate(1 / seconds, path, line)
+    fps = text.frame_rate(1 / seconds, path, line)
     precision = 0.51 * 10.0 ** int(Decimal(word).as_tuple().exponent)
     near = [rate for rate in (round(fps) - 1, round(fps), round(fps) + 1) if rate > 0]
     whole = [rate for rate in near if abs(1 / rate - seconds) <= precision]
@@ -166,11 +152,11 @@ def _fps(path: Path, word: str, line: int) -> float:
 def _values(path: Path, lines: list[str], start: int, width: int) -> Array:
     """The frames (T, width) after the header, one per line or not; FormatError if one is truncated."""
     words = "\n".join(lines[start:]).split()
-    values = finite(words)
+    values = text.finite(words)
     if values is not None and len(words) % width == 0:
         return values.reshape(-1, width)
     for line, content in enumerate(lines[start:], start=start + 1):
-        row = numbers(content.split(), path, line)
+        row = text.numbers(content.split(), path, line)
         if len(words) % width and len(row) not in (0, width):
             raise FormatError(path, f"truncated frame: a frame has {width} values, this line has {len(row)}", line)
     raise FormatError(path, f"{len(words)} values do not make complete frames of {width}")
@@ -185,11 +171,11 @@ def write(file: File, motion: Motion) -> None:
     origin.
     FormatError for channels other than Euler angles and translations; MotionError for a motion without skeleton.
     """
-    motion, moving = with_still_offsets(place_of(file), motion)
+    motion, moving = text.with_still_offsets(place_of(file), motion)
     # some readers fail on blanks and colons in names
-    names = plain_names(skeleton_of(motion).names, r"[^\w.-]")
+    names = text.plain_names(skeleton_of(motion).names, r"[^\w.-]")
     translated = {0, *(skeleton_of(motion).index(name) for name in moving)}
-    motion = with_names(motion, names)
+    motion = text.with_names(motion, names)
     lines, joints = _tree(motion, translated)
     translations, angles = local_translations(motion), _zyx_degrees(motion)
     blocks = [block[:, i] for i in joints for block in ((translations, angles) if i in translated else (angles,))]
@@ -218,11 +204,12 @@ def _tree(motion: Motion, translated: set[int]) -> tuple[list[str], list[int]]:
         is_last = not children or (len(children) == len(lone) == 1 and not skeleton.children[skeleton.children[i][0]])
         offset = skeleton.joints[i].offset if i else (0.0, 0.0, 0.0)
         kinds = "6 Xposition Yposition Zposition" if i in translated else "3"
-        lines += [f"{indent}{'JOINT' if i else 'ROOT'} {skeleton.joints[i].name}", indent + "{"]
-        lines += [f"{indent}\tOFFSET {spaced(offset)}", f"{indent}\tCHANNELS {kinds} Zrotation Yrotation Xrotation"]
+        kind, channels = "JOINT" if i else "ROOT", f"\tCHANNELS {kinds} Zrotation Yrotation Xrotation"
+        start = (f"{kind} {skeleton.joints[i].name}", "{", f"\tOFFSET {text.spaced(offset)}", channels)
+        lines += [indent + line for line in start]
         if is_last:
             tip = children[0].offset if children else (0.0, 0.0, 0.0)
-            lines += [f"{indent}\t{line}" for line in ("End Site", "{", f"\tOFFSET {spaced(tip)}", "}")]
+            lines += [f"{indent}\t{line}" for line in ("End Site", "{", f"\tOFFSET {text.spaced(tip)}", "}")]
         waiting.append((None, depth))
         waiting += [(child, depth + 1) for child in reversed(skeleton.children[i]) if not is_last]
     return lines, joints

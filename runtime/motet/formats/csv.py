@@ -12,7 +12,7 @@ import numpy as np
 
 from motet.errors import FormatError
 from motet.files import File, place_of, write_whole
-from motet.formats.lines import frame_rate, number, numbers, read_text
+from motet.formats.text import frame_rate, number, numbers, read_text
 from motet.motion.motion import Motion
 
 COMMENT = "# motet motion, fps "

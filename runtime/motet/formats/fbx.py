@@ -14,7 +14,7 @@ from pathlib import Path
 from motet.errors import FormatError
 from motet.files import File, place_of
 from motet.formats import gltf
-from motet.formats.lines import Clip, chosen, clip_names, read_bytes
+from motet.formats.text import Clip, chosen, clip_names, read_bytes
 from motet.motion.motion import Motion
 
 PROGRAM = Path(__file__).with_name("fbx_to_gltf.py")

@@ -24,15 +24,6 @@ from typing import Any, TypeVar
 
 import ufbx
 
-MEMORY, MEMORY_PER_BYTE = 2**28, 32
-"""Memory limit in bytes: a base, plus this many per byte of the file."""
-
-FBX_FREE_VALUES = 10**5
-"""Frames times nodes allowed at any file size; beyond it four bytes of file for each, so small files stay cheap."""
-
-FBX_FPS, FBX_MAX_FPS = 30.0, 1000.0
-"""The frame rate of a file that states none, and the highest."""
-
 TRACK_TYPES = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3"}
 """The parts of a node's transform, as named by both glTF and ufbx, and their glTF types."""
 
@@ -41,12 +32,13 @@ Matrix = Sequence[Vector]
 """Four columns of three numbers: the axes and the origin of one space in another."""
 
 Thing = TypeVar("Thing")
-_KEPT: list[Any] = []
+
+KEPT: list[Any] = []
 
 
 def keep(thing: Thing) -> Thing:
     """An object of ufbx, which must not be freed."""
-    _KEPT.append(thing)
+    KEPT.append(thing)
     return thing
 
 
@@ -65,16 +57,15 @@ def product(a: Matrix, b: Matrix) -> Matrix:
 def inverse(matrix: Matrix) -> Matrix:
     """The inverse; ValueError if singular."""
     x, y, z, origin = matrix
-    rows = [_cross(y, z), _cross(z, x), _cross(x, y)]
+    rows = [
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+        for a, b in ((y, z), (z, x), (x, y))
+    ]
     volume = sum(a * b for a, b in zip(x, rows[0], strict=True))
     if not volume:
         raise ValueError("a bone's parent has a singular bind pose")
     axes = [[row[i] / volume for row in rows] for i in range(3)]
     return product([*axes, [0.0, 0.0, 0.0]], [*ufbx.identity_matrix[:3], [-number for number in origin]])
-
-
-def _cross(a: Vector, b: Vector) -> Vector:
-    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
 def matrix_of(transform: Any) -> Matrix:
@@ -85,10 +76,8 @@ def matrix_of(transform: Any) -> Matrix:
         (2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)),
         (2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)),
     )
-    return [
-        *([size * number for number in axis] for axis, size in zip(turn, transform.scale, strict=True)),
-        transform.translation,
-    ]
+    axes = [[size * number for number in axis] for axis, size in zip(turn, transform.scale, strict=True)]
+    return [*axes, transform.translation]
 
 
 class Scene:
@@ -118,7 +107,11 @@ class Scene:
         self.bound: dict[int, Any] = {}
         self.skins = [self._skin(skin) for skin in each(self.scene.skin_deformers)]
         self.skins += self._bare(set().union(*self.skins))
-        self.near = self._above(set().union(*self.skins)) or set(self.at.values())
+        self.near: set[int] = set().union(*self.skins)
+        for i in reversed(range(len(self.parents))):
+            if i in self.near and self.parents[i] >= 0:
+                self.near.add(self.parents[i])
+        self.near = self.near or set(self.at.values())
 
     def _skin(self, skin: Any) -> set[int]:
         bones = set()
@@ -138,13 +131,6 @@ class Scene:
                 tops[i] = tops.get(self.parents[i], i)
                 groups.setdefault(tops[i], set()).update({i} - skinned)
         yield from filter(None, groups.values())
-
-    def _above(self, nodes: set[int]) -> set[int]:
-        found = set(nodes)
-        for i in reversed(range(len(self.parents))):
-            if i in found and self.parents[i] >= 0:
-                found.add(self.parents[i])
-        return found
 
     def rest(self) -> list[Matrix]:
         """Each node's rest pose in its parent: for bones of skins, the bind pose."""
@@ -168,47 +154,43 @@ class Take:
 
 def takes(scene: Scene) -> list[Take]:
     """The takes that move a bone or its ancestor; in a file without bones any node."""
-    found = (_take(scene, stack) for stack in each(scene.scene.anim_stacks))
+    found = []
+    for stack in each(scene.scene.anim_stacks):
+        take = Take(stack, [], set())
+        for animated in (prop for layer in each(stack.layers) for prop in layer.anim_props):
+            node = keep(animated.element)
+            if isinstance(node, ufbx.Node) and node.typed_id in scene.at and animated.prop_name.startswith("Lcl "):
+                take.moved.add(scene.at[node.typed_id])
+                take.curves.extend(curve for curve in keep(keep(animated.anim_value).curves) if curve is not None)
+        found.append(take)
     return [take for take in found if take.moved & scene.near]
 
 
-def _take(scene: Scene, stack: Any) -> Take:
-    curves, moved = [], set()
-    for animated in (found for layer in each(stack.layers) for found in layer.anim_props):
-        node = keep(animated.element)
-        if isinstance(node, ufbx.Node) and node.typed_id in scene.at and animated.prop_name.startswith("Lcl "):
-            moved.add(scene.at[node.typed_id])
-            curves += [curve for curve in keep(keep(animated.anim_value).curves) if curve is not None]
-    return Take(stack, curves, moved)
-
-
 def frame_times(scene: Scene, take: Take) -> list[float]:
-    """When a take's frames are, in seconds; ValueError for more of them than a file of its size may have."""
-    begin, end = span(take)
+    """When a take's frames are, in seconds: from its first key to its last, within its time range if that is not empty.
+
+    ValueError for over 100,000 frames times nodes and one more for every four bytes of file, so small files stay cheap.
+    """
+    first = min((curve.min_time for curve in take.curves), default=0.0)
+    last = max((curve.max_time for curve in take.curves), default=0.0)
+    begin, end = max(first, take.stack.time_begin), min(last, take.stack.time_end)
+    begin, end = (begin, end) if begin < end else (first, max(first, last))
     fps = frame_rate(scene, take)
-    if not (end - begin) * fps * len(scene.near) < FBX_FREE_VALUES + scene.size / 4:
+    if not (end - begin) * fps * len(scene.near) < 10**5 + scene.size / 4:
         raise ValueError(f"{end - begin:g} s at {fps:g} fps is too many frames")
     return [begin + i / fps for i in range(round((end - begin) * fps) + 1)]
 
 
-def span(take: Take) -> tuple[float, float]:
-    """The times of a take's keys, within the take's time range if that is not empty."""
-    first = min((curve.min_time for curve in take.curves), default=0.0)
-    last = max((curve.max_time for curve in take.curves), default=0.0)
-    begin, end = max(first, take.stack.time_begin), min(last, take.stack.time_end)
-    return (begin, end) if begin < end else (first, max(first, last))
-
-
-def frame_rate(scene: Scene, take: Take) -> float:
-    """The file's, or that of the take's keys if they are denser."""
+def frame_rate(scene: Scene, take: Take, highest: float = 1000.0) -> float:
+    """The file's, or that of the take's keys if they are denser; 30 if neither is known."""
     said = scene.scene.settings.frames_per_second
     keys = max((curve.keyframes for curve in take.curves), key=len, default=())
     times = [key.time for key in keys]
     steps = sorted(later - time for time, later in pairwise(times))
     step = steps[len(steps) // 2] if len(steps) > 1 else 0.0
-    keyed = 1 / step if step * FBX_MAX_FPS >= 1 else 0.0
+    keyed = 1 / step if step * highest >= 1 else 0.0
     fps = keyed if keyed > 1.01 * said else said
-    return fps if 0 < fps <= FBX_MAX_FPS else FBX_FPS
+    return fps if 0 < fps <= highest else 30.0
 
 
 def as_gltf(scene: Scene, take: Take | None) -> dict[str, Any]:
@@ -216,8 +198,11 @@ def as_gltf(scene: Scene, take: Take | None) -> dict[str, Any]:
     rest = scene.rest()
     nodes: list[dict[str, Any]] = [{"name": node.name} for node in scene.nodes]
     for i, node in enumerate(scene.nodes):
-        parts = {name: getattr(node.local_transform, name) for name in TRACK_TYPES}
-        nodes[i] |= {"matrix": _columns(rest[i])} if i in scene.bound else parts
+        if i in scene.bound:
+            columns = zip(rest[i], (0, 0, 0, 1), strict=True)
+            nodes[i]["matrix"] = [number for column, last in columns for number in (*column, last)]
+        else:
+            nodes[i] |= {name: getattr(node.local_transform, name) for name in TRACK_TYPES}
     for i, parent in enumerate(scene.parents):
         if parent >= 0:
             nodes[parent].setdefault("children", []).append(i)
@@ -225,10 +210,6 @@ def as_gltf(scene: Scene, take: Take | None) -> dict[str, Any]:
     if any(scene.skins):
         document["skins"] = [{"joints": sorted(bones)} for bones in scene.skins if bones]
     return document if take is None else document | _animation(scene, take, rest)
-
-
-def _columns(matrix: Matrix) -> list[float]:
-    return [number for column, last in zip(matrix, (0, 0, 0, 1), strict=True) for number in (*column, last)]
 
 
 def _animation(scene: Scene, take: Take, rest: list[Matrix]) -> dict[str, Any]:
@@ -262,19 +243,14 @@ def _differ(a: Matrix, b: Matrix) -> bool:
     return any(abs(x - y) > 1e-5 * max(1.0, abs(y)) for x, y in pairs)
 
 
-def limit_memory(size: int) -> None:
-    """Limit this process to the memory that a file of this size needs, if the system can."""
-    with suppress(ImportError, ValueError, OSError):
-        import resource
-
-        most = MEMORY + MEMORY_PER_BYTE * size
-        resource.setrlimit(resource.RLIMIT_AS, (most, resource.getrlimit(resource.RLIMIT_AS)[1]))
-
-
 def main(number: int) -> dict[str, Any]:
     """The glTF document of the file on standard input."""
     content = sys.stdin.buffer.read()
-    limit_memory(len(content))
+    with suppress(ImportError, ValueError, OSError):  # limits memory by the file's size, if the system can
+        import resource
+
+        most = 2**28 + 32 * len(content)
+        resource.setrlimit(resource.RLIMIT_AS, (most, resource.getrlimit(resource.RLIMIT_AS)[1]))
     scene = Scene(content)
     found = takes(scene)
     document = as_gltf(scene, found[number] if 0 <= number < len(found) else None)

@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from motet.errors import FormatError, MotionError, listed, quoted
+from motet.errors import FormatError, listed, quoted
 from motet.files import File, place_of
 from motet.formats.gltf_data import Gltf, broken, parse
-from motet.formats.lines import Clip, Names, chosen, clip_names, split_clip
+from motet.formats.text import Clip, Names, chosen, clip_names, split_clip
 from motet.motion.humanoid import BONES
 from motet.motion.kinematics import motion_of
 from motet.motion.motion import Motion
@@ -26,9 +26,6 @@ from motet.motion.rotations import Array, inverse, product, rotated
 from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
 
 log = logging.getLogger(__name__)
-
-GLTF_FPS = 30.0
-"""The frame rate of a file without animation, or with keys too sparse to tell."""
 
 PATHS = {"rotation": 4, "translation": 3, "scale": 3}
 """The animated properties of a node, and how many numbers each has; mesh weights are left out."""
@@ -57,7 +54,7 @@ def read(file: File, clip: Clip = None, rest: File | None = None) -> Motion:
         given = Names(bones.values())  # other joints with such a name are renamed
         names = [bones.get(node) or given.unique(name) for node, name in zip(figure.nodes, figure.names, strict=True)]
         turns, places = _rested(take, stance)
-        skeleton = skeleton_at(gltf.path, names, figure.parents, places)
+        skeleton = skeleton_at(names, figure.parents, places)
         turned = product(take.turns, inverse(turns))
         return motion_of(skeleton, turned, _moving(skeleton, turned, take.places), take.fps)
 
@@ -127,7 +124,7 @@ def _take(scene: _Scene, index: int | None) -> _Take:
     gltf, animation = scene.gltf, {} if index is None else scene.animations[index]
     figure = figure_of(gltf, likeliest(gltf, scene.figures, moved(animation)))
     near = above(gltf, figure.nodes)
-    values, fps = ({}, GLTF_FPS) if index is None else _tracks(gltf, animation, scene.names[index], near)
+    values, fps = ({}, 30.0) if index is None else _tracks(gltf, animation, scene.names[index], near)
     rest, poses = ([part[:, list(figure.nodes)] for part in gltf.world(near, each)[1:]] for each in ({}, values))
     return _Take(figure, poses[0], poses[1], rest[0][0], rest[1][0], fps)
 
@@ -147,15 +144,12 @@ def _rested(take: _Take, stance: Mapping[str, Array]) -> tuple[Array, Array]:
     return turned, places
 
 
-def skeleton_at(path: Path, names: Sequence[str], parents: Sequence[int], places: Array) -> Skeleton:
-    """The skeleton in metres of joints at places (J, 3) at rest; FormatError if they do not form one."""
+def skeleton_at(names: Sequence[str], parents: Sequence[int], places: Array) -> Skeleton:
+    """The skeleton in metres of joints at places (J, 3) at rest; MotionError if they do not form one."""
     above = [places[parent] if parent >= 0 else np.zeros(3) for parent in parents]
     offsets = [(float(x), float(y), float(z)) for x, y, z in places - above]
     joints = tuple(Joint(*joint) for joint in zip(names, parents, offsets, strict=True))
-    try:
-        return Skeleton(joints, metres_per_unit=1.0)
-    except MotionError as error:
-        raise FormatError(path, str(error)) from error
+    return Skeleton(joints, metres_per_unit=1.0)
 
 
 def _moving(skeleton: Skeleton, turned: Array, places: Array) -> dict[int, Array]:
@@ -289,7 +283,7 @@ def _tracks(gltf: Gltf, animation: Mapping[str, Any], name: str, nodes: set[int]
         raise FormatError(gltf.path, f"its animation {quoted(name)} has tracks without keys")
     start, end = min(at[0] for at in times), max(at[-1] for at in times)
     step = min((float(np.median(np.diff(at))) for at in times if len(at) > 1), default=0.0)
-    rate = 1 / step if 0 < step < 0.1 else GLTF_FPS
+    rate = 1 / step if 0 < step < 0.1 else 30.0  # keys further apart do not tell a frame rate
     fps = float(round(rate)) if abs(rate - round(rate)) < 0.01 * rate else rate
     count = (end - start) * fps + 1
     # an hour of 90 nodes at 30 fps; for a small file a million, plus one per byte

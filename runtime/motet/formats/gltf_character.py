@@ -17,7 +17,7 @@ from motet.errors import FormatError
 from motet.files import File, place_of, write_whole
 from motet.formats import Character
 from motet.formats.glb import Buffer, Track, animation, container, with_body
-from motet.formats.gltf import GLTF_FPS, figure_of, figures, likeliest, moved, skeleton_at
+from motet.formats.gltf import figure_of, figures, likeliest, moved, skeleton_at
 from motet.formats.gltf_data import Gltf, broken, parse
 from motet.motion.humanoid import BONES, REQUIRED, JointMap, check_map
 from motet.motion.kinematics import local_rotations, local_translations
@@ -88,11 +88,11 @@ def read_character(file: File) -> Character:
         figure = figure_of(gltf, likeliest(gltf, figures(gltf, all_moved), all_moved))
         linear, _, places = (found[0] for found in gltf.world())
         joints = list(figure.nodes)
-        skeleton = skeleton_at(path, figure.names, figure.parents, places[joints])
+        skeleton = skeleton_at(figure.names, figure.parents, places[joints])
         if not np.abs(np.linalg.det(linear[joints])).min() > 0:
             raise FormatError(path, "nodes of its skeleton have scale 0: apply scales when exporting")
-        nodes, still = Nodes(gltf, figure.nodes, skeleton, linear, places), np.zeros((1, 0))
-        return Character(Motion(still, (), (), GLTF_FPS, skeleton), _joint_map(nodes), nodes, _skin(nodes))
+        nodes = Nodes(gltf, figure.nodes, skeleton, linear, places)
+        return Character(Motion(np.zeros((1, 0)), (), (), 30.0, skeleton), _joint_map(nodes), nodes, _skin(nodes))
 
 
 def _joint_map(nodes: Nodes) -> JointMap | None:

@@ -17,17 +17,14 @@ import numpy as np
 
 from motet.errors import FormatError, MotionError, quoted
 from motet.files import File, place_of
-from motet.formats.lines import read_bytes
+from motet.formats.text import read_bytes
 from motet.motion.rotations import Array, frames_last, product, quat_to_rotmat, rotated, rotmat_to_quat
 
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 """glTF's component types."""
 
-GLTF_MAX_BYTES = 2**29
-"""Total bytes of a file's buffers."""
-
-MAX_UNPACKED = 2**25
-"""Total bytes of all unpacked parts: 12 minutes of a figure of 90 joints with 60 keys per second."""
+GLTF_MAX_BYTES, MAX_UNPACKED = 2**29, 2**25
+"""Total bytes of a file's buffers, and of parts unpacked: 12 minutes of a figure of 90 joints at 60 keys per second."""
 
 
 @contextmanager
@@ -92,11 +89,10 @@ class Gltf:
         if "VRM" in extensions:
             old = extensions["VRM"].get("humanoid", {}).get("humanBones", [])
             return {bone["bone"]: bone["node"] for bone in old}
-        for name in ("VRMC_vrm", "VRMC_vrm_animation"):
-            if name in extensions:
-                bones = extensions[name].get("humanoid", {}).get("humanBones", {})
-                return {bone: value["node"] for bone, value in bones.items()}
-        return {}
+        found: dict[str, Any] = next(
+            (extensions[name] for name in ("VRMC_vrm", "VRMC_vrm_animation") if name in extensions), {}
+        )
+        return {bone: value["node"] for bone, value in found.get("humanoid", {}).get("humanBones", {}).items()}
 
     def name(self, node: int) -> str:
         """A node's name, or one made from its number; FormatError if it is not text."""
@@ -188,11 +184,9 @@ class Gltf:
     def _unpack(self, packed: Mapping[str, Any]) -> bytes:
         """The bytes of a view packed by meshoptimizer."""
         if find_spec("meshopt") is None:
-            reason = (
-                "its animations are packed by meshoptimizer: install the extra with  pip install 'motet[meshopt]', or "
-                "unpack the file with  npx gltfpack -i IN.glb -o OUT.glb -noq -kn -ac"
-            )
-            raise FormatError(self.path, reason)
+            remedy = "install the extra with  pip install 'motet[meshopt]', or unpack the file with"
+            command = "npx gltfpack -i IN.glb -o OUT.glb -noq -kn -ac"
+            raise FormatError(self.path, f"its animations are packed by meshoptimizer: {remedy}  {command}")
         start, length = packed.get("byteOffset", 0), packed["byteLength"]
         count, stride = packed["count"], packed["byteStride"]
         content = self.buffers[packed["buffer"]][start : start + length]

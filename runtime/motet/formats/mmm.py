@@ -13,7 +13,7 @@ import numpy as np
 
 from motet.errors import FormatError
 from motet.files import File, place_of
-from motet.formats.lines import frame_rate, numbers, read_bytes
+from motet.formats.text import frame_rate, numbers, read_bytes
 from motet.motion.motion import Motion
 
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from motet.errors import FormatError
 from motet.files import File, place_of, write_whole
-from motet.formats.lines import frame_rate, read_bytes
+from motet.formats.text import frame_rate, read_bytes
 from motet.motion.kinematics import motion_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import product, rotvec_to_rotmat

@@ -23,8 +23,8 @@ from motet.bundle.manifest import Manifest
 from motet.errors import FormatError, MotetError, MotionError, OutputError, UnitError
 from motet.files import files_in, write_whole
 from motet.formats import MOCAP, clips, read_motion
-from motet.formats.lines import MARK
 from motet.formats.npz import array
+from motet.formats.text import MARK
 from motet.models.language import MAX_SECONDS, LanguageModel
 from motet.motion.motion import Motion
 from motet.motion.skeleton import metres

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from motet.formats import CLIPPED, MOCAP, clips, mmm, read_motion
-from motet.formats.lines import MARK
+from motet.formats.text import MARK
 from motet.motion.motion import Motion
 from motet_train.data.archive import BROKEN, Archive
 from motet_train.data.errors import DataError

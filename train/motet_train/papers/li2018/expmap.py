@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.errors import FormatError
-from motet.formats.lines import numbers
+from motet.formats.text import numbers
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
 from motet_train.data.archive import Archive

@@ -27,7 +27,6 @@ Clip = str | int | None
 """One of a file's clips: its name, its number from 1, or None for the first."""
 
 MARK = "#"
-"""Separates a file from its clip."""
 
 
 def read_bytes(file: File, most: int | None = None) -> bytes:
@@ -61,7 +60,7 @@ def read_text(file: File) -> str:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
         text = content.decode("latin-1")
-    return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
+    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def finite(words: Sequence[str]) -> Array | None:
