@@ -36,7 +36,7 @@ class Continuation:
     """
 
     def __init__(self, model: CodesModel, motion: Motion, predicted: float = 0.0) -> None:
-        self.model, self.rules = model, model.settings(ContinuationSettings)
+        self.model, self.rules = model, model.continuation
         whole = model.at_own_rate(motion)
         figure = model.contract.on_figure(whole)
         self.context = model.context(figure)

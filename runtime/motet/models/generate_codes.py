@@ -98,7 +98,7 @@ class CodesModel(GenerateModel):
         self.sizes |= {"T": hop, "M": moves}
         memory = self._bound()
         self.source = Source(graphs["step"], graphs["part"], moves, self.sizes["A"], memory)
-        self.continuation = self.settings(ContinuationSettings)
+        self.continuation, self._familiar = self.settings(ContinuationSettings), self.settings(FamiliaritySettings)
         self._read_actions(Fields(manifest.source).list_of_fields("actions"))
 
     def _bound(self) -> Memory:
@@ -139,7 +139,7 @@ class CodesModel(GenerateModel):
         asked, unheard = set(self.vocabulary.rules.words(sentence)), math.log(1 + len(self._sentences))
         heard = sum(self._rare.get(word, 0.0) for word in asked)
         share = heard / (sum(self._rare.get(word, unheard) for word in asked) or 1.0)
-        order, how = np.argsort(-context, kind="stable"), self.settings(FamiliaritySettings)
+        order, how = np.argsort(-context, kind="stable"), self._familiar
         nearest = dict.fromkeys(self._sentences[action] for action in order)
         likeliest = float(context[order[0]])
         if likeliest > 0.01:  # more than rounding
