@@ -2,7 +2,8 @@
 
 import logging
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -38,10 +39,8 @@ def export_graph(module: nn.Module, spec: GraphSpec, metadata: Mapping[str, str]
     example = {tensor.name: torch.from_numpy(tensor.example(rng, batch=2)) for tensor in spec.inputs}
     dims = {name: torch.export.Dim(name) for one in spec.inputs for name in one.shape if isinstance(name, str)}
     shapes = {one.name: {n: dims[name] for n, name in enumerate(one.shape) if name in dims} for one in spec.inputs}
-    log_level = logging.root.manager.disable
-    logging.disable(logging.WARNING)
     # gradients off: torch does not export a scan over weights that ask for them
-    with warnings.catch_warnings(), torch.no_grad():
+    with warnings.catch_warnings(), _log_silenced(), torch.no_grad():
         warnings.simplefilter("ignore")
         program = torch.onnx.export(
             module.eval(),
@@ -55,10 +54,23 @@ def export_graph(module: nn.Module, spec: GraphSpec, metadata: Mapping[str, str]
             opset_version=18,
             verbose=False,
         )
-    logging.disable(log_level)
     if program is None:
         raise ExportError("torch gave no ONNX program")
     return self_contained(program.model_proto, metadata)
+
+
+@contextmanager
+def _log_silenced() -> Iterator[None]:
+    """Only errors of the exporter are logged."""
+    loggers = [logging.getLogger(name) for name in ("torch.onnx", "onnxscript", "onnx_ir")]
+    levels = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.setLevel(level)
 
 
 def self_contained(model: onnx.ModelProto, metadata: Mapping[str, str]) -> bytes:
