@@ -13,7 +13,7 @@ from motet_train.data.errors import DataError
 from motet_train.data.store import Entry
 from motet_train.evaluate.predict.floors import FLOORS
 from motet_train.evaluate.predict.mocap import (
-    KINDS,
+    MOTION_KINDS,
     PLACE,
     POSE,
     QUARTERS,
@@ -60,7 +60,7 @@ def test_kinds_are_listed_in_their_order() -> None:
     entries = [entry("a", "walk"), entry("b", "wave"), entry("c", "boxing"), entry("d", "run")]
     found = {kind: [one.name for one in members] for kind, members in by_kind(entries).items()}
     assert found == {"boxing": ["c"], "walks and runs": ["a", "d"], REST: ["b"]}
-    assert list(found) == [kind for kind in (*KINDS, REST) if kind in found]
+    assert list(found) == [kind for kind in (*MOTION_KINDS, REST) if kind in found]
 
 
 def measured(**systems: float) -> Measured:

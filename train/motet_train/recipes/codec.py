@@ -31,14 +31,14 @@ class CodecVisits:
     sharp: float = 0.2
 
 
-TRAINING = replace(MUON, steps=9000, every=250, warm_up=200, cosine=True)
+CODEC_STEPS = replace(MUON, steps=9000, every=250, warm_up=200, cosine=True)
 
-DEFAULT = Recipe("codec", "motion-codec", "codes", CodecConfig(0), ("channels", "tree"), TRAINING, CodecVisits())
+DEFAULT = Recipe("codec", "motion-codec", "codes", CodecConfig(0), ("channels", "tree"), CODEC_STEPS, CodecVisits())
 
-DECODER = replace(DEFAULT, training=replace(TRAINING, steps=4000, learning_rate=1e-3), visits=CodecVisits(sharp=1.0))
+DECODER = replace(DEFAULT, training=replace(CODEC_STEPS, steps=4000, learning_rate=1e-3), visits=CodecVisits(sharp=1.0))
 """Further training of the decoder of a codec whose codes are settled."""
 
-SHARP = replace(DECODER, training=replace(TRAINING, steps=1000, learning_rate=1e-3, precision="float32"))
+SHARP = replace(DECODER, training=replace(CODEC_STEPS, steps=1000, learning_rate=1e-3, precision="float32"))
 """The last training of the decoder: rounding to bfloat16 adds jerk, from which it learns to be too smooth."""
 
 RECIPES = {"default": DEFAULT, "decoder": DECODER, "sharp": SHARP}

@@ -13,7 +13,7 @@ from motet_train.models.predictor import Predictor, PredictorConfig
 from motet_train.recipes.recipe import ADAMW, AUGMENTED, Job, Recipe, Visits
 from motet_train.runs import Run
 
-TRAINING = replace(
+PREDICTOR_TRAINING = replace(
     ADAMW, steps=5600, every=200, batch=64, weight_decay=0.01, warm_up=100, cosine=True, clip=1.0, average=0.998
 )
 
@@ -23,11 +23,11 @@ DEFAULT = Recipe(
     "free_run",
     PredictorConfig(0, ()),
     ("channels", "kept", "held", "mirrored", "signs", "doubts"),
-    TRAINING,
+    PREDICTOR_TRAINING,
     AUGMENTED,
 )
 
-FILES = replace(DEFAULT, config=replace(DEFAULT.config, hidden=96), training=replace(TRAINING, steps=12_000))
+FILES = replace(DEFAULT, config=replace(DEFAULT.config, hidden=96), training=replace(PREDICTOR_TRAINING, steps=12_000))
 """Of motion files, of more people: on those held out, nets of two and four times the width are worse."""
 
 RECIPES = {"default": DEFAULT, "files": FILES}

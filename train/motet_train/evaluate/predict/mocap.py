@@ -44,7 +44,7 @@ COUNTS = ("people", "recordings", "windows")
 QUARTERS = ("least expected", "second", "third", "most expected")
 """Of the windows, by what is expected at a frame."""
 
-KINDS: Mapping[str, str] = {
+MOTION_KINDS: Mapping[str, str] = {
     "boxing": "boxing|boxers?|punch|punches|punching|jabs?",
     "dance": "dance|dances|dancing|dancer|charleston|salsa|lambada|macarena|ballet",
     "climbing": "climb|climbs|climbing|climber|ladder",
@@ -61,15 +61,15 @@ def kind_of(entry: Entry) -> str:
     """The kind of a record of a store, :data:`REST` where no word fits."""
     texts = [entry.action.partition(",")[0]] if entry.action else entry.sentences
     words = [re.findall(r"[a-z]+", text.lower()) for text in texts]
-    for kind, pattern in KINDS.items():
+    for kind, pattern in MOTION_KINDS.items():
         if texts and 2 * sum(any(re.fullmatch(pattern, word) for word in own) for own in words) >= len(texts):
             return kind
     return REST
 
 
 def by_kind(entries: Sequence[Entry]) -> dict[str, list[Entry]]:
-    """The records of each kind that has some, in the order of :data:`KINDS`, everything else last."""
-    found = {kind: [entry for entry in entries if kind_of(entry) == kind] for kind in (*KINDS, REST)}
+    """The records of each kind that has some, in the order of :data:`MOTION_KINDS`, everything else last."""
+    found = {kind: [entry for entry in entries if kind_of(entry) == kind] for kind in (*MOTION_KINDS, REST)}
     return {kind: members for kind, members in found.items() if members}
 
 

@@ -30,7 +30,7 @@ KINDS = {
 """As many windows of each action as papers take; enough for a figure without much noise; and of those, not the Euler
 error but :func:`motet_train.papers.li2018.protocol.rotation_errors`."""
 
-FEW, MANY, ANGLES = KINDS
+FEW, MANY, ANGLE_ERRORS = KINDS
 
 MEAN, EVERY = "mean", "every"
 """In place of an action: the mean of those with all their files, and that of all, which only papers measured."""
@@ -40,7 +40,7 @@ Groups = Mapping[str, Sequence[str]]
 """Title of a group of runs that differ in their seed alone -> the names they were given by."""
 
 Errors = Mapping[str, Mapping[tuple[str, str], Array]]
-"""System -> FEW, MANY or ANGLES, and an action or MEAN -> error (25,)."""
+"""System -> FEW, MANY or ANGLE_ERRORS, and an action or MEAN -> error (25,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +104,7 @@ def protocol_results(models: Models, corpus: ExpmapCorpus) -> Results:
     with tqdm(systems.items(), unit=" systems", disable=None, leave=False) as bar:
         for name, system in bar:
             few, many = (predictions(system, test, scaling, count) for count in (8, 256))
-            found = {FEW: errors(few), MANY: errors(many), ANGLES: errors(many, rotation_errors)}
+            found = {FEW: errors(few), MANY: errors(many), ANGLE_ERRORS: errors(many, rotation_errors)}
             for parts in found.values():
                 parts[MEAN] = np.mean([parts[action] for action in complete(corpus)], axis=0)
             measured[name] = {(kind, action): parts[action] for kind, parts in found.items() for action in parts}
