@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import click
 
@@ -164,8 +164,8 @@ def generate(
     settings = {key: value for key, value in settings.items() if value is not None}
     tries, model = Tries(), load_as(CodesModel if told else GenerateModel, bundle, session)
     asked = tries.usable(dict(enumerate(texts)), model.unknown)
-    if isinstance(model, CodesModel) and told:
-        found = _stories(tries, model, asked, story, after, **settings)
+    if told:
+        found = _stories(tries, cast(CodesModel, model), asked, story, after, **settings)
     else:
         found = _motions(tries, model, asked, **settings)
     count = max((len(results) for *_, results in found), default=1) if every else 1

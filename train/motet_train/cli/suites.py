@@ -86,9 +86,9 @@ class Suite:
 
 def as_steered(model: BundleModel) -> SteerModel | None:
     """A steered figure to measure: a model of one, or its stand-in; None for all others."""
-    if isinstance(model, TdbnModel) and Driven.fits(model):
-        return cast(SteerModel, Driven(model))
-    return model if isinstance(model, SteerModel) else None
+    if model.manifest.loop == "session" and Driven.fits(cast(TdbnModel, model)):
+        return cast(SteerModel, Driven(cast(TdbnModel, model)))
+    return cast(SteerModel, model) if model.manifest.loop == "matching" else None
 
 
 def _steered(models: Mapping[str, BundleModel], given: Given) -> Results:

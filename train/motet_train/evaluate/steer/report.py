@@ -262,7 +262,7 @@ def _parts(model: SteerModel, recorded: Recorded, minutes: float, characters: in
         "aside": aside_errors,
         "random": partial(wandering, limits=limits, seconds=60 * minutes, characters=characters),
     }
-    rivals = {"_seldom": seldom(model)} if isinstance(model, SteerModel) else {}
+    rivals = {"_seldom": seldom(model)} if hasattr(model, "matcher") else {}  # what stands for one does not search
     for ending, one in {"": model, **rivals}.items():
         yield from ({f"{name}{ending}": measure(one)} for name, measure in measures.items())
     for gait in MEASURED_SPEEDS:
