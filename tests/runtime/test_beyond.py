@@ -203,7 +203,7 @@ def test_a_bundle_has_settings_of_its_own(walk: Motion) -> None:
     source = {**model.manifest.source, "settings": {"continuation": {"tempo": 1.0, "half_life": 0.3}}}
     own = CodesModel(Manifest.from_json(source), model.graphs, model.tables)
     assert own.settings(ContinuationSettings) == replace(RULES, tempo=1.0, half_life=0.3)
-    assert own.decoder().half_life == 0.3
+    assert own.codec.half_life == 0.3
     rules = Continuation(own, walk.resample(30.0)).rules
     assert (rules.tempo, rules.rows) == (1.0, 12)
 

@@ -89,6 +89,8 @@ class Codec:
     field: ReceptiveField
     moves: int
     fps: float
+    half_life: float
+    """Seconds of the spring by which decoded frames continue a motion."""
 
     @property
     def seconds(self) -> float:
@@ -147,12 +149,11 @@ class StreamingDecoder:
     """Frames (T, D) of steps of codes (N, P) that are pushed as they come; holds all state of one request.
 
     The root's forward, left and turn come as rates a second, from each frame to the next, so that adding them up gives
-    the way. context: the end of a motion, which the frames continue without a leap, by a spring of
-    ``half_life`` seconds.
+    the way. context: the end of a motion, which the frames continue without a leap.
     """
 
-    def __init__(self, codec: Codec, context: Context | None = None, half_life: float = 0.1) -> None:
-        self.codec, self.half_life = codec, half_life
+    def __init__(self, codec: Codec, context: Context | None = None) -> None:
+        self.codec = codec
         self.codes = [] if context is None else list(context.codes)
         self.given = None if context is None else context.frames[-2:]
         self.count = max(0, len(self.codes) - 1)  # steps of which frames were given; the last is decoded to be joined
@@ -191,6 +192,6 @@ class StreamingDecoder:
         self.pose = poses[-1:]
         frames = np.concatenate([rates, frames.reshape(len(poses), -1)[:, PATH:]], axis=1)
         if self.given is not None:
-            self.join = Inertialization(self.given, frames[hop - 2 : hop], codec.fps, self.half_life)
+            self.join = Inertialization(self.given, frames[hop - 2 : hop], codec.fps, codec.half_life)
             self.given, frames = None, frames[hop:]
         return frames if self.join is None else self.join(frames)

@@ -94,7 +94,9 @@ class CodesModel(GenerateModel):
         if len(ahead) > 100 or any(one not in (0, 1) for one in ahead):
             raise codec.fault("0 or 1 for each of at most 100 layers", ahead, "ahead")
         back = sum(2 - one for one in ahead) + math.ceil(4 / hop)  # the layers at the frame rate look back 4 frames
-        self.codec = Codec(graphs["decoder"], graphs["tokens"], ReceptiveField(back, sum(ahead), hop), moves, self.fps)
+        self.continuation, field = self.settings(ContinuationSettings), ReceptiveField(back, sum(ahead), hop)
+        joined = self.continuation.half_life
+        self.codec = Codec(graphs["decoder"], graphs["tokens"], field, moves, self.fps, joined)
         self.sizes |= {"T": hop, "M": moves}
         memory = self._bound()
         self.source = Source(graphs["step"], graphs["part"], moves, self.sizes["A"], memory)
@@ -269,7 +271,7 @@ class CodesModel(GenerateModel):
 
     def decoder(self, context: Context | None = None) -> StreamingDecoder:
         """A decoder of codes to frames, from the origin or after the end of a motion."""
-        return StreamingDecoder(self.codec, context, self.continuation.half_life)
+        return StreamingDecoder(self.codec, context)
 
     def context(self, figure: Motion) -> Context:
         """The last seconds, whole steps of codes, of a motion on the model's figure; MotionError where it is too short
