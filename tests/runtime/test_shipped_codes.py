@@ -212,6 +212,7 @@ def test_refusals_of_the_command_line_say_which_file_or_text(tmp_path: Path, wal
         ([WALK, "--after", short], 1, "short.npz"),
         ([WALK, "--after", tmp_path / "none.bvh"], 2, "no such file"),
         ([WALK, "--story", "--hypotheses", 3], 2, "leave --hypotheses out"),
+        ([WALK, "--seconds", 0], 2, "'--seconds'"),
     ):
         result = run("generate", *given, "-o", out)
         assert (result.exit_code, said in result.stderr) == (code, True), (given, result.stderr)

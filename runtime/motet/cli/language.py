@@ -124,7 +124,9 @@ def _told(description: Description) -> str:
 @click.option(
     "--top-p", type=click.FloatRange(0.01, 1), help="Nucleus sampling: draw from the likeliest codes up to this mass."
 )
-@click.option("--seconds", type=click.FloatRange(0, 600), help="Length for each text; 0: it ends by itself.")
+@click.option(
+    "--seconds", type=click.FloatRange(0, 600, min_open=True), help="Length for each text. [default: it ends by itself]"
+)
 @click.option("--max-seconds", type=click.FloatRange(0, 600), help="Maximum length in seconds. [default: the bundle's]")
 @click.option(
     "--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed; later texts use seed + 1, ..."
@@ -160,7 +162,6 @@ def generate(
     """
     output.check(out)
     told = story or after is not None or settings["stand"] is not None
-    settings["seconds"] = settings["seconds"] or None
     settings = {key: value for key, value in settings.items() if value is not None}
     tries, model = Tries(), load_as(CodesModel if told else GenerateModel, bundle, session)
     asked = tries.usable(dict(enumerate(texts)), model.unknown)
