@@ -35,7 +35,9 @@ export class Memory {
       const all = [...take(moves, Math.min(move, end - 1)), ...step.slice(1, -2).flatMap((code) => take(body, code))];
       this.numbers.push(Float32Array.from(all, (number) => (move < end ? number : 0)));
       this.ages.push(age);
-      this.rows.set(action, [...(this.rows.get(action) ?? []), row]);
+      const rows = this.rows.get(action);
+      if (rows) rows.push(row);
+      else this.rows.set(action, [row]);
     });
     for (let start = 0; start < this.steps; ) {
       let stop = start + 1;

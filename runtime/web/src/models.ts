@@ -14,6 +14,28 @@ import { Vocabulary } from "./text.js";
 /** Frames in the channels and units of a model's contract (`manifest.motion`), one row each. */
 export type Frames = ArrayLike<number>[];
 
+/** Of each setting the least and the most, and whether it is a whole number. */
+const RANGES: Record<string, [number, number, boolean]> = {
+  max_words: [1, 1000, true],
+  beams: [1, 100, true],
+  seed: [0, Number.MAX_SAFE_INTEGER, true],
+  hypotheses: [1, 100, true],
+  seconds: [1e-3, 600, false],
+  max_seconds: [0, 600, false],
+  temperature: [0.01, 100, false],
+  first_temperature: [0.01, 100, false],
+  top_p: [0.01, 1, false],
+  guidance: [0, 10, false],
+  memory: [0, 1, false],
+  certainty: [0.01, 100, false],
+  frames: [1, 100_000, true],
+  horizon: [1, 1000, true],
+  context: [1, 1000, true],
+  least: [1, 1000, true],
+  longest: [1, 1000, true],
+  count: [1, 1_000_000, true],
+};
+
 abstract class Model {
   constructor(readonly manifest: Manifest) {}
 
@@ -28,9 +50,13 @@ abstract class Model {
     return frames;
   }
 
+  /** A setting that is given, or else the bundle's default; DecodingError where it is out of range. */
   protected setting(name: string, given?: number): number {
     const value = given ?? this.manifest.defaults[name];
-    if (value === undefined || !Number.isFinite(value) || value < 0) throw new DecodingError(`${name} cannot be ${value}`);
+    const [least, most, whole] = RANGES[name]!;
+    if (value === undefined || !(value >= least && value <= most) || (whole && !Number.isInteger(value))) {
+      throw new DecodingError(`${name} must be ${whole ? "a whole number " : ""}from ${least} to ${most}, not ${value}`);
+    }
     return value;
   }
 }
@@ -101,9 +127,8 @@ export class GenerateModel extends LanguageModel {
 
   /** Motions as frames (T, D) of `root_sixd`: those that Python draws with the same seed, before feet are held. */
   async generate(text: string, settings: GenerateSettings = {}): Promise<Float32Array[][]> {
-    const seed = settings.seed ?? 0;
-    if (!Number.isSafeInteger(seed) || seed < 0) throw new DecodingError(`a seed is a whole number of at least 0, not ${seed}`);
-    const count = settings.hypotheses ?? 1;
+    const seed = this.setting("seed", settings.seed ?? 0);
+    const count = this.setting("hypotheses", settings.hypotheses ?? 1);
     const noise = Array.from({ length: count }, (_, at) => (at ? new Pcg64(seed, at - 1) : new Pcg64(seed)));
     return this.drawn(text, noise, settings);
   }
@@ -118,7 +143,7 @@ export class GenerateModel extends LanguageModel {
       memory: this.setting("memory", given.memory),
       certainty: this.setting("certainty", given.certainty),
     };
-    const seconds = given.seconds ?? 0;
+    const seconds = given.seconds === undefined ? 0 : this.setting("seconds", given.seconds);
     const { shape } = this.graphs.decoder!.spec.outputs.find((output) => output.name === "frames")!;
     const steps = Math.ceil(((seconds || this.setting("max_seconds", given.max_seconds)) * this.fps) / Number(shape[2]) - 1e-9);
     const { context } = await this.graphs.encoder!.run(this.words(text));
@@ -143,7 +168,7 @@ export class PredictModel extends Model {
   async predict(frames: Frames, count = this.setting("horizon")): Promise<Float32Array[]> {
     const { shape } = this.graphs.encoder!.spec.inputs[0]!;
     const seed = this.checked(frames, Number(shape[2]), Number(shape[1])).slice(-Number(shape[1]));
-    return freeRun(this.graphs.encoder!, this.graphs.step!, seed, count, this.setting("horizon"));
+    return freeRun(this.graphs.encoder!, this.graphs.step!, seed, this.setting("frames", count), this.setting("horizon"));
   }
 }
 
@@ -182,7 +207,7 @@ export class SearchModel extends LanguageModel {
   /** The indices of the vectors nearest to one, and their scores, best first. */
   nearest(vector: Float32Array, vectors: Float32Array[], count = this.setting("count")): { index: number; score: number }[] {
     const scores = vectors.map((one, index) => ({ index, score: one.reduce((sum, value, i) => sum + value * vector[i]!, 0) }));
-    return scores.sort((a, b) => b.score - a.score || a.index - b.index).slice(0, count);
+    return scores.sort((a, b) => b.score - a.score || a.index - b.index).slice(0, this.setting("count", count));
   }
 }
 

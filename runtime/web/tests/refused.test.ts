@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
 import test from "node:test";
-import { Bundle, BundleError, DecodingError, load, type PredictModel, type SearchModel, TextError } from "../src/index.js";
+import { Bundle, BundleError, DecodingError, type GenerateModel, load, type PredictModel, type SearchModel, TextError } from "../src/index.js";
 import { checkGraph } from "../src/graphSafety.js";
 import { Pcg64 } from "../src/random.js";
 
@@ -59,10 +59,15 @@ test("sentences and frames that a model cannot read are refused", async () => {
     await assert.rejects(search.embedText(text), TextError, `${text.slice(0, 20)} is refused`);
   }
   assert.equal(search.vocabulary.decode(search.vocabulary.encode("Walks one hundred and five steps, wlaks!").ids), "walks 105 steps walks");
+  const generate = (await load(await bytes("generate"))) as GenerateModel;
+  for (const settings of [{ seconds: 0 }, { seconds: -1 }, { seconds: NaN }, { temperature: 0 }, { seed: 1.5 }, { hypotheses: 0 }]) {
+    await assert.rejects(generate.generate("walk", settings), DecodingError, JSON.stringify(settings));
+  }
   const predict = (await load(await bytes("predict"))) as PredictModel;
   for (const frames of [[], [[1, 2]], Array(10).fill(Array(69).fill(NaN))]) {
     await assert.rejects(predict.predict(frames), DecodingError);
   }
+  for (const count of [0, 2.5, Infinity]) await assert.rejects(predict.predict(Array(10).fill(Array(69).fill(0)), count), DecodingError);
 });
 
 test("noise is numpy's: default_rng(seed).random(3, float32), and what it spawns", () => {
