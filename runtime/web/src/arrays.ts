@@ -41,12 +41,16 @@ export const DTYPES: Record<string, string> = {
   int64: "<i8",
 };
 
+/** "\x93NUMPY" and the version 1.0. */
+const MAGIC = [0x93, 0x4e, 0x55, 0x4d, 0x50, 0x59, 1, 0];
+/** Bytes of a header at most. */
+const LONGEST = 1000;
+
 /** A .npy file of version 1.0 in C order, little-endian; float16 becomes float32. BundleError for any other. */
 export function readNpy(name: string, bytes: Uint8Array): NumberArray & { descr: string } {
-  const head = new TextDecoder("latin1").decode(bytes.subarray(0, 10));
-  if (!head.startsWith("\x93NUMPY\x01\x00")) throw new BundleError(`${name} is not a .npy file of version 1.0`);
+  if (MAGIC.some((byte, at) => bytes[at] !== byte)) throw new BundleError(`${name} is not a .npy file of version 1.0`);
   const start = 10 + bytes[8]! + 256 * bytes[9]!;
-  const text = new TextDecoder("latin1").decode(bytes.subarray(10, start));
+  const text = String.fromCharCode(...bytes.subarray(10, Math.min(start, 10 + LONGEST)));
   const found = /^\{'descr': '([^']+)', 'fortran_order': False, 'shape': \(([0-9, ]*)\), \}\s*$/.exec(text);
   if (!found) throw new BundleError(`${name}: its header is not one that motet writes`);
   const descr = found[1]!;

@@ -29,13 +29,13 @@ export class Graph {
     readonly role: string,
     readonly spec: GraphSpec,
     private readonly session: InferenceSession,
-    private readonly runtime: typeof import("onnxruntime-web"),
+    private readonly runtime: typeof import("onnxruntime-web/wasm"),
   ) {}
 
   /** Load a graph that is safe and keeps the contract of the manifest; BundleError otherwise. */
   static async load(role: string, model: Uint8Array, spec: GraphSpec, settings: SessionSettings = {}): Promise<Graph> {
     checkGraph(model);
-    const runtime = await import("onnxruntime-web");
+    const runtime = await import("onnxruntime-web/wasm");
     const session = await runtime.InferenceSession.create(model, settings).catch((error: unknown) => {
       throw new BundleError(`graph ${role}: ONNX Runtime cannot load it: ${String(error)}`);
     });
@@ -60,14 +60,13 @@ export class Graph {
       }
       feeds[name] = given.data instanceof BigInt64Array
         ? new this.runtime.Tensor("int64", given.data, given.shape)
-        : new this.runtime.Tensor("float32", Float32Array.from(given.data as Float32Array), given.shape);
+        : new this.runtime.Tensor("float32", singles(given.data), given.shape);
     }
     const found: Record<string, NumberArray<Float32Array>> = {};
     for (const [name, tensor] of Object.entries(await this.session.run(feeds))) {
-      const data = tensor.data as Float32Array;
-      // codes are int64, and small
-      found[name] = { data: tensor.type === "int64" ? Float32Array.from(data as ArrayLike<unknown>, Number) : data, shape: [...tensor.dims] };
-      if (!found[name].data.every(Number.isFinite)) throw new BundleError(`graph ${this.role}: ${name} is not finite`);
+      const data = tensor.data as Float32Array | BigInt64Array;
+      found[name] = { data: singles(data), shape: [...tensor.dims] }; // codes are int64, and small
+      if (!finite(found[name].data)) throw new BundleError(`graph ${this.role}: ${name} is not finite`);
     }
     return found;
   }
@@ -93,10 +92,26 @@ export class Graph {
   }
 }
 
+function singles(data: NumberArray["data"]): Float32Array {
+  return data instanceof Float32Array ? data : Float32Array.from(data as ArrayLike<unknown>, Number);
+}
+
+/** Whether all numbers are finite: a state has a hundred thousand at every step. */
+function finite(data: Float32Array): boolean {
+  let sum = 0;
+  for (let at = 0; at < data.length; at++) sum += data[at]! * 0;
+  return sum === 0;
+}
+
 /** Rows of all states, in a new order, with any repeated or left out. */
 export function taken(states: Record<string, NumberArray<Float32Array>>, order: number[]) {
   const found: Record<string, NumberArray<Float32Array>> = {};
-  for (const [name, { data, shape }] of Object.entries(states)) {
+  for (const [name, array] of Object.entries(states)) {
+    const { data, shape } = array;
+    if (order.length === shape[0] && order.every((row, at) => row === at)) {
+      found[name] = array;
+      continue;
+    }
     const width = data.length / shape[0]!;
     const picked = new Float32Array(order.length * width);
     order.forEach((row, at) => picked.set(data.subarray(row * width, (row + 1) * width), at * width));

@@ -1,6 +1,10 @@
 export { Bundle, type Manifest } from "./bundle.js";
 export { BundleError, DecodingError, TextError } from "./errors.js";
-export {
-  type AnyModel, DescribeModel, FillModel, type Frames, GenerateModel, type GenerateSettings, load, PredictModel, SearchModel,
-} from "./models.js";
+export { DescribeModel } from "./describe.js";
+export { FillModel } from "./fill.js";
+export { GenerateModel, type GenerateSettings } from "./generate.js";
+export type { Frames } from "./model.js";
+export { type AnyModel, load } from "./models.js";
+export { PredictModel } from "./predict.js";
+export { SearchModel } from "./search.js";
 export { type Pose, posesOf } from "./poses.js";

@@ -1,6 +1,6 @@
 import type { Manifest } from "./bundle.js";
 import { DecodingError } from "./errors.js";
-import type { Frames } from "./models.js";
+import type { Frames } from "./model.js";
 import { moved, type Pose as Ground } from "./planar.js";
 import { product, type Quaternion, quaternionOf, rotationOf } from "./rotations.js";
 

@@ -1,0 +1,100 @@
+/* What every runtime has to give, in Node and in a browser: the golden vectors that Python's runtime gave. */
+import { type NumberArray, rows } from "../src/arrays.js";
+import { Bundle } from "../src/bundle.js";
+import { DescribeModel, FillModel, GenerateModel, load, PredictModel, SearchModel } from "../src/index.js";
+import { Recorded } from "../src/random.js";
+
+/** Reads the zip of a shipped bundle. */
+export type Read = (name: string) => Promise<Uint8Array>;
+export interface Case {
+  name: string;
+  /** Throws where an answer is not the wanted one. */
+  run: (read: Read) => Promise<void>;
+}
+
+export function equal(found: unknown, wanted: unknown, what: string): void {
+  const [one, other] = [JSON.stringify(found), JSON.stringify(wanted)];
+  if (one !== other) throw new Error(`${what}: ${one}, not ${other}`);
+}
+
+/** Within a ten-thousandth of the wanted numbers, as docs/bundle.md compares them. */
+export function close(found: ArrayLike<number>, given: ArrayLike<number | bigint>, what: string): void {
+  const wanted = Array.from(given, Number);
+  equal(found.length, wanted.length, `${what}, how many`);
+  const size = Math.sqrt(wanted.reduce((sum, value) => sum + value ** 2, 0) / wanted.length);
+  wanted.forEach((value, at) => {
+    const off = Math.abs(found[at]! - value) / Math.max(1, size, Math.abs(value));
+    if (!(off <= 1e-4)) throw new Error(`${what}: ${found[at]} at ${at}, not ${value}`);
+  });
+}
+
+export const flat = (frames: ArrayLike<number>[]) => frames.flatMap((frame) => Array.from(frame));
+
+async function loaded<T>(read: Read, name: string, kind: new (...given: never[]) => T) {
+  const data = await read(name);
+  const model = await load(data);
+  if (!(model instanceof kind)) throw new Error(`${name} is no ${kind.name}`);
+  const golden = await (await Bundle.open(data)).golden();
+  const frames = (key: string) => rows(golden.get(`run.in.${key}`) as NumberArray<Float32Array>);
+  const wanted = (key: string) => golden.get(`run.out.${key}`)!;
+  return { model: model as T, frames, wanted, run: model.manifest.golden.run, golden };
+}
+
+const graphs = ["describe", "generate", "predict", "fill", "search"].map((name) => ({
+  name: `graphs of ${name}`,
+  run: async (read: Read) => {
+    const bundle = await Bundle.open(await read(name));
+    const golden = await bundle.golden();
+    for (const [role, spec] of Object.entries(bundle.manifest.graphs)) {
+      const inputs = Object.fromEntries(spec.inputs.map((input) => [input.name, golden.get(`${role}.in.${input.name}`)!]));
+      const outputs = await (await bundle.graph(role)).run(inputs);
+      for (const output of spec.outputs) close(outputs[output.name]!.data, golden.get(`${role}.out.${output.name}`)!.data, `${role} ${output.name}`);
+    }
+  },
+}));
+
+async function describe(read: Read): Promise<void> {
+  const { model, frames, wanted } = await loaded(read, "describe", DescribeModel);
+  const found = await model.hypotheses(frames("frames"));
+  const { data, shape } = wanted("ids");
+  const ids = found.map((one) => [...one.ids, ...Array<number>(shape[1]! - one.ids.length).fill(0)]);
+  equal(ids.flat(), Array.from(data, Number), "ids");
+  close(found.map((one) => one.logProbability), wanted("log_probabilities").data, "log-probabilities");
+}
+
+async function generate(read: Read): Promise<void> {
+  const { model, wanted, run, golden } = await loaded(read, "generate", GenerateModel);
+  equal(model.vocabulary.encode(String(run.text)).ids, Array.from(wanted("ids").data, Number), "ids");
+  const noise = new Recorded(rows(golden.get("run.in.uniform") as NumberArray<Float32Array>)[Symbol.iterator]());
+  const [best] = await model.drawn(String(run.text), Array(Number(run.hypotheses)).fill(noise), { seconds: Number(run.seconds) });
+  const { mean, std } = model.manifest.motion;
+  const normalised = best!.map((frame) => frame.map((value, at) => (std[at] ? Math.max(-50, Math.min(50, (value - mean[at]!) / std[at]!)) : 0)));
+  close(flat(normalised), wanted("frames").data, "frames");
+}
+
+async function predict(read: Read): Promise<void> {
+  const { model, frames, wanted, run } = await loaded(read, "predict", PredictModel);
+  close(flat(await model.predict(frames("frames"), Number(run.frames))), wanted("frames").data, "frames");
+}
+
+async function fill(read: Read): Promise<void> {
+  const { model, frames, wanted, run } = await loaded(read, "fill", FillModel);
+  close(flat(await model.fill(frames("past"), frames("after"), Number(run.frames))), wanted("filled").data, "filled");
+}
+
+async function search(read: Read): Promise<void> {
+  const { model, frames, wanted, run } = await loaded(read, "search", SearchModel);
+  close(await model.embedMotion(frames("frames")), wanted("motion").data, "motion");
+  const vector = await model.embedText(String(run.text));
+  close(vector, wanted("text").data, "text");
+  equal(model.nearest(vector, [await model.embedMotion(frames("frames")), vector], 1)[0]!.index, 1, "nearest");
+}
+
+export const cases: Case[] = [
+  ...graphs,
+  { name: "describe says what Python says", run: describe },
+  { name: "generate draws what Python draws", run: generate },
+  { name: "predict continues as Python does", run: predict },
+  { name: "fill fills as Python does", run: fill },
+  { name: "search embeds as Python does", run: search },
+];
