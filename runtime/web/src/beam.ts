@@ -1,10 +1,11 @@
 import { integers, type NumberArray } from "./arrays.js";
 import { type Graph, taken } from "./graph.js";
 
-/** A finished sequence of ids, without its end, and the sum of its log-probabilities, with it. */
+/** A finished sequence of ids, without its end, and the sum of its log-probabilities, with it. score: its rank. */
 export interface Hypothesis {
   ids: number[];
   logProbability: number;
+  score: number;
 }
 
 interface Open {
@@ -13,18 +14,17 @@ interface Open {
   ended: boolean;
 }
 
-/** Ids of start and end, ids that are never chosen, the longest sequence, and how many hypotheses are kept. */
-export interface BeamSettings {
+/** Ids of start and end, ids that are never chosen, and the longest sequence. */
+export interface Limits {
   start: number;
   end: number;
   banned: number[];
   longest: number;
-  beams: number;
 }
 
 /** The most probable sequences for a context (1, C), best first: docs/bundle.md, the loop `beam`. */
-export async function beamSearch(step: Graph, context: NumberArray<Float32Array>, settings: BeamSettings): Promise<Hypothesis[]> {
-  const { start, end, banned, longest, beams } = settings;
+export async function beamSearch(step: Graph, context: NumberArray<Float32Array>, limits: Limits, beams: number): Promise<Hypothesis[]> {
+  const { start, end, banned, longest } = limits;
   let kept: Open[] = [{ ids: [], score: 0, ended: false }];
   let states = step.zeroState(1);
   for (let length = 0; length <= longest && kept.some((one) => !one.ended); length++) {
@@ -54,7 +54,19 @@ export async function beamSearch(step: Graph, context: NumberArray<Float32Array>
     states = taken(next, parents);
     kept = winners;
   }
-  return kept.map(({ ids, score }) => ({ ids, logProbability: score }));
+  return kept.map(({ ids, score }) => ({ ids, logProbability: score, score }));
+}
+
+/** The log-probability of a sequence of ids, and of its end, for a context (1, C). */
+export async function scoreWords(step: Graph, context: NumberArray<Float32Array>, { start, end }: Limits, ids: number[]): Promise<number> {
+  let states = step.zeroState(1);
+  let sum = 0;
+  for (const [at, id] of [...ids, end].entries()) {
+    const next = await step.step({ word: integers([ids[at - 1] ?? start]), context }, states);
+    sum += next.outputs.log_probabilities!.data[id]!;
+    states = next.states;
+  }
+  return sum;
 }
 
 /** The ids of the highest values, highest first. */

@@ -1,6 +1,6 @@
 /* Motions drawn code by code: docs/bundle.md, the loop `codes`. */
 import { integers, type NumberArray } from "./arrays.js";
-import { type Arrays, type Graph, taken } from "./graph.js";
+import { type Graph, taken } from "./graph.js";
 import type { Memory } from "./memory.js";
 import type { Noise } from "./random.js";
 
@@ -30,84 +30,163 @@ export interface Source {
 }
 
 /** An action for log-probabilities (A), by the first number of a block of noise. */
-export function drawnAction(source: Source, context: Float32Array, noise: Noise, certainty: number): number {
+export function drawnAction(source: Source, context: ArrayLike<number>, noise: Noise, certainty: number): number {
   const uniform = noise.uniform(source.parts + 2)[0]!;
   return nucleus(Array.from(context, (value) => certainty * value), uniform, 1, 1);
 }
 
-/** Steps of codes for each row, of its own action and noise: to its end, or of `longest` steps. */
-export async function drawCodes(
-  source: Source, actions: number[], noise: Noise[], drawing: Drawing, longest: number, exactly: boolean,
-): Promise<number[][][]> {
-  const found: number[][][] = actions.map(() => []);
-  let rows = actions.map((_, row) => row);
-  let last = [...rows, ...rows].map(() => [source.end + 1, ...Array<number>(source.parts - 1).fill(0)]);
-  let age = rows.map(() => 0);
-  let recent: Float32Array[][] = rows.map(() => []);
-  let states = source.step.zeroState(2 * rows.length); // told the action, and not told
-  for (let length = 0; length < longest && rows.length; length++) {
-    const told = [...rows.map((row) => actions[row]!), ...rows.map(() => source.nullAction)];
-    const inputs: Arrays = {
-      codes: integers(last.flat(), last.length, source.parts),
-      action: integers(told),
+/** What a writer knows of its rows before a step; `last` and `states` twice, told the action and not told. */
+interface Known {
+  age: number[];
+  last: number[][];
+  states: Record<string, NumberArray<Float32Array>>;
+  /** Of each row the numbers of its last steps, the latest first. */
+  recent: Float32Array[][];
+}
+
+/** Draws codes for rows, each of its own action and noise: all state of one request. */
+export class Writer {
+  private now: Known;
+  private before: Known;
+
+  constructor(readonly source: Source, private noise: Noise[], private readonly drawing: Drawing) {
+    const first = [source.end + 1, ...Array<number>(source.parts - 1).fill(0)];
+    const rows = noise.length;
+    const last = Array<number[]>(2 * rows).fill(first);
+    this.now = { age: noise.map(() => 0), last, states: source.step.zeroState(2 * rows), recent: noise.map(() => []) };
+    this.before = this.now;
+  }
+
+  /** Take steps (N, P) as what every row did before, whatever action it was. */
+  async see(codes: number[][]): Promise<void> {
+    for (const step of codes) {
+      await this.known(this.noise.map(() => this.source.nullAction));
+      this.now = { ...this.now, last: this.now.last.map(() => step) };
+    }
+  }
+
+  /** Other actions begin. */
+  begin(): void {
+    this.now = { ...this.now, age: this.now.age.map(() => 0) };
+  }
+
+  /** The next step (B, P) of rows with the given actions; an action that would end begins again unless it may end. */
+  async draw(actions: number[], ends: boolean): Promise<number[][]> {
+    const known = await this.known(actions);
+    const { age, recent } = this.now;
+    const uniform = this.noise.map((one) => one.uniform(this.source.parts + 2));
+    const given = actions.map((action, row) => this.remembered(action, recent[row]!, age[row]!, ends, uniform[row]!));
+    const { codes, again } = await this.drawn(known, uniform.map((block) => block.slice(2)), given, ends);
+    this.now = { ...this.now, last: [...codes, ...codes], age: age.map((one, row) => (again[row] ? 0 : one + 1)) };
+    return codes;
+  }
+
+  /** Undo the last draw, such as that of an end. */
+  takeBack(): void {
+    this.now = this.before;
+  }
+
+  /** Go on with some of the rows only. */
+  keep(rows: number[]): void {
+    const { age, last, states, recent } = this.now;
+    const both = [...rows, ...rows.map((row) => row + this.noise.length)];
+    this.noise = rows.map((row) => this.noise[row]!);
+    this.now = {
+      age: rows.map((row) => age[row]!),
+      last: both.map((row) => last[row]!),
+      states: taken(states, both),
+      recent: rows.map((row) => recent[row]!),
+    };
+  }
+
+  /** What the step makes of the last codes, and of all before: (2 B, H). */
+  private async known(actions: number[]): Promise<NumberArray<Float32Array>> {
+    const { age, last, states, recent } = (this.before = this.now);
+    const inputs = {
+      codes: integers(last.flat(), last.length, this.source.parts),
+      action: integers([...actions, ...actions.map(() => this.source.nullAction)]),
       age: integers([...age, ...age]),
     };
-    const { outputs, states: next } = await source.step.step(inputs, states);
-    const numbers = outputs.numbers!;
-    const width = numbers.shape[1]!;
-    if (length) recent = recent.map((before, row) => [numbers.data.slice(row * width, (row + 1) * width), ...before].slice(0, RECENT));
-    const uniform = rows.map((row) => noise[row]!.uniform(source.parts + 2));
-    const ends = !exactly && length > 0;
-    const given = rows.map((row, at) => remembered(source, actions[row]!, recent[at]!, age[at]!, ends, uniform[at]!, drawing));
-    const { codes, again } = await parts(source, outputs.known!, uniform.map((block) => block.slice(2)), given, age, ends, drawing);
-    const going = codes.flatMap((step, at) => (step[0] === source.end ? [] : [at]));
-    states = taken(lately(next), [...going, ...going.map((at) => at + rows.length)]);
-    age = going.map((at) => (again[at] ? 0 : age[at]! + 1));
-    recent = going.map((at) => recent[at]!);
-    for (const at of going) found[rows[at]!]!.push(codes[at]!);
-    last = [...going, ...going].map((at) => codes[at]!);
-    rows = going.map((at) => rows[at]!);
+    const { outputs, states: next } = await this.source.step.step(inputs, states);
+    const { data, shape } = outputs.numbers!;
+    const row = (at: number) => data.slice(at * shape[1]!, (at + 1) * shape[1]!);
+    const started = last[0]![0] !== this.source.end + 1;
+    const latest = started ? recent.map((before, at) => [row(at), ...before].slice(0, RECENT)) : recent;
+    this.now = { age, last, states: lately(next), recent: latest };
+    return outputs.known!;
   }
-  return found;
-}
 
-/** A step from memory, or none where the net draws it. */
-function remembered(
-  { memory }: Source, action: number, recent: Float32Array[], age: number, ends: boolean, uniform: number[], drawing: Drawing,
-): number[] | undefined {
-  if (uniform[0]! >= drawing.memory || !memory.knows(action)) return undefined;
-  return memory.codes(memory.next(action, recent, age, ends, uniform[1]!));
-}
+  /** A step from memory, or none where the net draws it. */
+  private remembered(action: number, recent: Float32Array[], age: number, ends: boolean, uniform: number[]): number[] | undefined {
+    const { memory } = this.source;
+    if (uniform[0]! >= this.drawing.memory || !memory.knows(action)) return undefined;
+    return memory.codes(memory.next(action, recent, age, ends, uniform[1]!));
+  }
 
-/** The codes of rows, one after the other where they are not given; and which rows begin their action again. */
-async function parts(
-  source: Source, known: NumberArray<Float32Array>, uniform: number[][], given: (number[] | undefined)[], age: number[],
-  ends: boolean, drawing: Drawing,
-): Promise<{ codes: number[][]; again: boolean[] }> {
-  const again = given.map((step) => step?.[0] === source.end && !ends);
-  const drawn = given.flatMap((step, row) => (step && !again[row] ? [] : [row]));
-  const codes = given.map((step, row) => (step && !again[row] ? step : Array<number>(source.parts).fill(0)));
-  for (let part = 0; drawn.length && part < source.parts; part++) {
-    const rows = [...drawn, ...drawn.map((row) => row + given.length)];
-    const asked = integers([...drawn, ...drawn].flatMap((row) => codes[row]!), rows.length, source.parts);
-    const found = (await source.part.run({ known: taken({ known }, rows).known!, codes: asked })).log_probabilities!;
-    const width = found.shape[2]!;
-    const row = (at: number) => found.data.subarray((at * source.parts + part) * width, (at * source.parts + part + 1) * width);
-    drawn.forEach((own, at) => {
-      const [told, plain] = [row(at), row(at + drawn.length)];
-      const chances = Array.from(told, (value, id) => plain[id]! + drawing.guidance * (value - plain[id]!));
-      const temperature = age[own] === 0 ? drawing.first_temperature : drawing.temperature;
-      let number = uniform[own]![part]!;
-      if (part === 0 && !ends) {
-        again[own] ||= nucleus(chances, number, temperature, drawing.top_p) === source.end;
-        chances[source.end] = -Infinity;
-        // the same number would give a neighbour of the end
-        if (again[own]) number = (number * 1024) % 1;
-      }
-      codes[own]![part] = nucleus(chances, number, temperature, drawing.top_p);
+  /** The codes of rows, one after the other where they are not given; and which rows begin their action again. */
+  private async drawn(
+    known: NumberArray<Float32Array>, uniform: number[][], given: (number[] | undefined)[], ends: boolean,
+  ): Promise<{ codes: number[][]; again: boolean[] }> {
+    const { source, drawing } = this;
+    const again = given.map((step) => step?.[0] === source.end && !ends);
+    const drawn = given.flatMap((step, row) => (step && !again[row] ? [] : [row]));
+    const codes = given.map((step, row) => (step && !again[row] ? step : Array<number>(source.parts).fill(0)));
+    for (let part = 0; drawn.length && part < source.parts; part++) {
+      const chances = await this.chances(known, codes, drawn, part);
+      drawn.forEach((row, at) => {
+        const temperature = this.now.age[row] === 0 ? drawing.first_temperature : drawing.temperature;
+        const own = chances[at]!;
+        let number = uniform[row]![part]!;
+        if (part === 0 && !ends) {
+          again[row] ||= nucleus(own, number, temperature, drawing.top_p) === source.end;
+          own[source.end] = -Infinity;
+          // the same number would give a neighbour of the end
+          if (again[row]) number = (number * 1024) % 1;
+        }
+        codes[row]![part] = nucleus(own, number, temperature, drawing.top_p);
+      });
+    }
+    return { codes, again };
+  }
+
+  /** Of some rows the log-weights of a part, the action followed as far as `guidance` says. */
+  private async chances(known: NumberArray<Float32Array>, codes: number[][], rows: number[], part: number): Promise<number[][]> {
+    const { part: graph, parts } = this.source;
+    const both = [...rows, ...rows.map((row) => row + codes.length)];
+    const asked = integers([...rows, ...rows].flatMap((row) => codes[row]!), both.length, parts);
+    const { data, shape } = (await graph.run({ known: taken({ known }, both).known!, codes: asked })).log_probabilities!;
+    const of = (at: number) => data.subarray((at * parts + part) * shape[2]!, (at * parts + part + 1) * shape[2]!);
+    return rows.map((_, at) => {
+      const [told, plain] = [of(at), of(at + rows.length)];
+      return Array.from(told, (value, id) => plain[id]! + this.drawing.guidance * (value - plain[id]!));
     });
   }
-  return { codes, again };
+}
+
+/**
+ * Step by step the rows that have not ended, and their codes (R, P), up to `longest` steps. exactly: none ends before.
+ * A writer whose rows have all ended can draw other actions from there.
+ */
+export async function* drawnSteps(writer: Writer, actions: number[], longest: number, exactly: boolean) {
+  let rows = actions.map((_, row) => row);
+  writer.begin();
+  for (let length = 0; length < longest; length++) {
+    const codes = await writer.draw(rows.map((row) => actions[row]!), !exactly && length > 0);
+    const going = codes.flatMap((step, at) => (step[0] === writer.source.end ? [] : [at]));
+    if (!going.length) return writer.takeBack();
+    if (going.length < rows.length) writer.keep(going);
+    rows = going.map((at) => rows[at]!);
+    yield { rows, codes: going.map((at) => codes[at]!) };
+  }
+}
+
+/** Steps of codes for each row, of its own action: to its end, or of `longest` steps. */
+export async function drawCodes(writer: Writer, actions: number[], longest: number, exactly: boolean): Promise<number[][][]> {
+  const found: number[][][] = actions.map(() => []);
+  for await (const { rows, codes } of drawnSteps(writer, actions, longest, exactly)) {
+    rows.forEach((row, at) => found[row]!.push(codes[at]!));
+  }
+  return found;
 }
 
 /** One of the likeliest things that make up `topP` together, by a uniform number. */

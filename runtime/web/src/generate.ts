@@ -1,25 +1,68 @@
 import type { Bundle, Manifest } from "./bundle.js";
-import { drawCodes, drawnAction, type Drawing, type Source } from "./codes.js";
-import { framesOf } from "./decodeCodes.js";
+import { type Codec, codesOf, type Context, StreamingDecoder } from "./codec.js";
+import { drawCodes, drawnAction, drawnSteps, type Drawing, type Source, Writer } from "./codes.js";
+import { BundleError, DecodingError, TextError } from "./errors.js";
 import type { Graph } from "./graph.js";
 import { Memory } from "./memory.js";
-import { LanguageModel } from "./model.js";
+import { type Frames, LanguageModel } from "./model.js";
 import { type Noise, Pcg64 } from "./random.js";
 
+/** How motions are drawn: by default as the bundle says. */
 export interface GenerateSettings extends Partial<Drawing> {
+  /** Of the random numbers, 0 by default: a seed gives the motion that it gives in Python. */
   seed?: number;
+  /** How many motions, 1 by default. */
   hypotheses?: number;
   /** The exact length; by default a motion ends by itself. */
   seconds?: number;
+  /** The most seconds of a motion that ends by itself. */
   max_seconds?: number;
 }
+
+/** How a story is drawn: by default as the bundle says. */
+export interface StorySettings extends Partial<Drawing> {
+  seed?: number;
+  /** Of each sentence, or one value for all; null for a sentence that ends by itself, as all do by default. */
+  seconds?: number | (number | null)[];
+  max_seconds?: number;
+  /** Where the figure is to stand briefly. */
+  stand?: "start" | "end" | "both";
+  /** The frames (T, D) that the story continues, such as those of an earlier one. */
+  after?: Frames;
+}
+
+/** A sentence of a story, shown from `start` to `stop` in seconds. */
+export interface Passage {
+  text: string;
+  start: number;
+  stop: number;
+}
+
+/** How well a sentence is known, from 0 to 1, whether that is enough, and sentences of the likeliest actions. */
+export interface Understood {
+  confidence: number;
+  confident: boolean;
+  nearest: string[];
+}
+
+/** Sentences of a story, for each its seconds (0 where it ends by itself), and how it is drawn. */
+interface Told {
+  texts: string[];
+  seconds: number[];
+  longest: number;
+  drawing: Drawing;
+  noise: Noise;
+}
+
+const STANDING = { text: "a person stands still", seconds: 0.8 };
 
 /** Motions for a sentence, drawn as codes. */
 export class GenerateModel extends LanguageModel {
   constructor(
     manifest: Manifest,
-    private readonly graphs: Record<string, Graph>,
+    private readonly encoder: Graph,
     private readonly source: Source,
+    private readonly codec: Codec,
   ) {
     super(manifest);
   }
@@ -34,7 +77,72 @@ export class GenerateModel extends LanguageModel {
 
   /** The same by noise that is given for each motion. */
   async drawn(text: string, noise: Noise[], given: GenerateSettings): Promise<Float32Array[][]> {
-    const drawing: Drawing = {
+    const drawing = this.drawing(given);
+    const seconds = given.seconds === undefined ? 0 : this.setting("seconds", given.seconds);
+    const longest = Math.max(1, this.steps(seconds || this.setting("max_seconds", given.max_seconds)));
+    const context = await this.context(text);
+    const actions = noise.map((one) => drawnAction(this.source, context, one, drawing.certainty));
+    const codes = await drawCodes(new Writer(this.source, noise, drawing), actions, longest, seconds > 0);
+    const motions: Float32Array[][] = [];
+    for (const one of codes) {
+      const frames = await new StreamingDecoder(this.codec).push(one, true);
+      motions.push(seconds ? frames.slice(0, Math.max(1, Math.round(seconds * this.fps))) : frames);
+    }
+    return motions;
+  }
+
+  /** One motion for several sentences, each from where the last one ends, and when each is shown. */
+  async story(sentences: string | string[], settings: StorySettings = {}): Promise<{ frames: Float32Array[]; passages: Passage[] }> {
+    const told = this.told(sentences, settings);
+    const steps = told.texts.map(() => 0);
+    const frames: Float32Array[] = [];
+    for await (const piece of this.pieces(told, settings.after)) {
+      frames.push(...piece.frames);
+      if (!piece.last) steps[piece.sentence]!++;
+    }
+    let start = 0;
+    let shown = 0;
+    const passages = told.texts.map((text, at) => {
+      shown += steps[at]! * this.codec.hop;
+      const passage = { text, start, stop: Math.min(shown, frames.length) / this.fps };
+      start = passage.stop;
+      return passage;
+    });
+    return { frames, passages };
+  }
+
+  /** The frames of `story` in pieces, as they are drawn; what cannot be told is refused before the first one. */
+  stream(sentences: string | string[], settings: StorySettings = {}): AsyncGenerator<Float32Array[], void> {
+    const pieces = this.pieces(this.told(sentences, settings), settings.after);
+    return (async function* () {
+      for await (const { frames } of pieces) if (frames.length) yield frames;
+    })();
+  }
+
+  /** How well a sentence is known, and the nearest known sentences: docs/bundle.md, the loop `codes`. */
+  async understood(text: string): Promise<Understood> {
+    const context = await this.context(text);
+    const actions = this.manifest.actions!;
+    const said = new Map<string, number>();
+    for (const { words } of actions) for (const word of new Set(words)) said.set(word, (said.get(word) ?? 0) + 1);
+    const rare = (word: string) => Math.log((1 + actions.length) / said.get(word)!);
+    const unheard = Math.log(1 + actions.length);
+    const asked = [...new Set(this.vocabulary.split(text))];
+    const heard = asked.reduce((sum, word) => sum + (said.has(word) ? rare(word) : 0), 0);
+    const all = asked.reduce((sum, word) => sum + (said.has(word) ? rare(word) : unheard), 0);
+    const order = Array.from(context.keys()).sort((a, b) => context[b]! - context[a]! || a - b);
+    const { confident = 0.4, doubt = 0.25 } = this.manifest.settings.familiarity ?? {};
+    const confidence = (heard / (all || 1)) * Math.exp(context[order[0]!]!) ** doubt;
+    const nearest = [...new Set(order.map((action) => actions[action]!.sentence))].slice(0, 3);
+    return { confidence, confident: confidence >= confident, nearest };
+  }
+
+  private async context(text: string): Promise<Float32Array> {
+    return (await this.encoder.run(this.words(text))).context!.data;
+  }
+
+  private drawing(given: Partial<Drawing>): Drawing {
+    return {
       temperature: this.setting("temperature", given.temperature),
       first_temperature: this.setting("first_temperature", given.first_temperature),
       top_p: this.setting("top_p", given.top_p),
@@ -42,26 +150,83 @@ export class GenerateModel extends LanguageModel {
       memory: this.setting("memory", given.memory),
       certainty: this.setting("certainty", given.certainty),
     };
-    const seconds = given.seconds === undefined ? 0 : this.setting("seconds", given.seconds);
-    const { shape } = this.graphs.decoder!.spec.outputs.find((output) => output.name === "frames")!;
-    const steps = Math.ceil(((seconds || this.setting("max_seconds", given.max_seconds)) * this.fps) / Number(shape[2]) - 1e-9);
-    const { context } = await this.graphs.encoder!.run(this.words(text));
-    const actions = noise.map((one) => drawnAction(this.source, context!.data, one, drawing.certainty));
-    const codes = await drawCodes(this.source, actions, noise, drawing, Math.max(1, steps), seconds > 0);
-    const motions: Float32Array[][] = [];
-    for (const one of codes) {
-      const frames = await framesOf(this.graphs.decoder!, one, this.fps);
-      motions.push(seconds ? frames.slice(0, Math.max(1, Math.round(seconds * this.fps))) : frames);
+  }
+
+  /** How many steps cover a time. */
+  private steps(seconds: number): number {
+    return Math.ceil((seconds * this.fps) / this.codec.hop - 1e-9);
+  }
+
+  private told(sentences: string | string[], given: StorySettings): Told {
+    const texts = typeof sentences === "string" ? [sentences] : [...sentences];
+    const each = Array.isArray(given.seconds) ? given.seconds : texts.map(() => (given.seconds as number | undefined) ?? null);
+    if (!texts.length) throw new TextError("a story needs a sentence");
+    if (each.length !== texts.length) throw new DecodingError(`${texts.length} sentences have ${each.length} lengths`);
+    if (![undefined, "start", "end", "both"].includes(given.stand)) throw new DecodingError(`stand is start, end or both, not ${given.stand}`);
+    const seconds = each.map((one) => (one === null ? 0 : this.setting("seconds", one)));
+    for (const end of ["start", "end"] as const) {
+      if (given.stand !== end && given.stand !== "both") continue;
+      texts[end === "start" ? "unshift" : "push"](STANDING.text);
+      seconds[end === "start" ? "unshift" : "push"](STANDING.seconds);
     }
-    return motions;
+    texts.forEach((text) => this.words(text));
+    const longest = this.steps(this.setting("max_seconds", given.max_seconds));
+    return { texts, seconds, longest, drawing: this.drawing(given), noise: new Pcg64(this.setting("seed", given.seed ?? 0)) };
+  }
+
+  /** For each step of codes the frames that become final with it, and its sentence; then the remaining frames. */
+  private async *pieces({ texts, seconds, longest, drawing, noise }: Told, after?: Frames) {
+    const writer = new Writer(this.source, [noise], drawing);
+    const before = after && (await this.continued(after));
+    if (before) await writer.see(before.codes);
+    const decoder = new StreamingDecoder(this.codec, before);
+    let [done, given, end, limit] = [0, 0, 0, Infinity];
+    for (const [sentence, text] of texts.entries()) {
+      const action = drawnAction(this.source, await this.context(text), noise, drawing.certainty);
+      const length = seconds[sentence]!;
+      end += length;
+      limit = length ? Math.max(1, Math.round(end * this.fps)) : Infinity;
+      for await (const { codes } of drawnSteps(writer, [action], length ? this.steps(end) - done : longest, length > 0)) {
+        done++;
+        const frames = (await decoder.push(codes)).slice(0, limit - given);
+        given += frames.length;
+        yield { sentence, frames, last: false };
+      }
+      if (!length) end = (done * this.codec.hop) / this.fps;
+    }
+    yield { sentence: texts.length - 1, frames: (await decoder.push([], true)).slice(0, limit - given), last: true };
+  }
+
+  /** The last seconds, whole steps of codes, of a motion. */
+  private async continued(after: Frames): Promise<Context> {
+    const { hop } = this.codec;
+    const seconds = this.manifest.settings.continuation?.context ?? 4;
+    const frames = this.checked(after, this.manifest.motion.channels.length, 2 * hop).slice(-this.steps(seconds) * hop);
+    const whole = frames.slice(frames.length % hop);
+    return { frames: whole, codes: await codesOf(this.codec, whole) };
   }
 }
 
-/** What a bundle's codes are drawn from. */
-export async function sourceOf(bundle: Bundle, { step, part }: Record<string, Graph>): Promise<Source> {
-  const tables = await Promise.all(["memory", "moves", "body"].map((name) => bundle.table(name)));
-  const [memory, moves, body] = tables as [typeof tables[0], typeof tables[0], typeof tables[0]];
-  const actions = bundle.manifest.actions?.length ?? 0;
+/** What a bundle of the loop `codes` makes. */
+export async function generateModel(bundle: Bundle, graphs: Record<string, Graph>): Promise<GenerateModel> {
+  const { manifest } = bundle;
+  const [memory, moves, body] = await Promise.all([bundle.table("memory"), bundle.table("moves"), bundle.table("body")]);
+  const { step, part, encoder, decoder, tokens } = graphs as Record<string, Graph>;
+  const { ahead, hop } = manifest.config.codec as { ahead: number[]; hop: number };
+  const shape = decoder!.spec.outputs.find((output) => output.name === "frames")!.shape;
+  if (!Array.isArray(ahead) || hop !== shape[2]) throw new BundleError(`the bundle ${manifest.name} does not say what its decoder looks at`);
+  const [actions, end] = [manifest.actions?.length ?? 0, moves.shape[0]!];
   const parts = Number(part!.spec.inputs.find((input) => input.name === "codes")!.shape[1]);
-  return { step: step!, part: part!, end: moves.shape[0]!, nullAction: actions, parts, memory: new Memory(memory, moves, body, actions) };
+  const source: Source = { step: step!, part: part!, end, nullAction: actions, parts, memory: new Memory(memory, moves, body, actions) };
+  const codec: Codec = {
+    decoder: decoder!,
+    tokens: tokens!,
+    moves: end,
+    back: ahead.reduce((sum, one) => sum + 2 - one, 0) + Math.ceil(4 / hop),
+    ahead: ahead.reduce((sum, one) => sum + one, 0),
+    hop,
+    fps: manifest.motion.fps,
+    halfLife: manifest.settings.continuation?.half_life ?? 0.1,
+  };
+  return new GenerateModel(manifest, encoder!, source, codec);
 }

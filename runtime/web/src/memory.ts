@@ -14,36 +14,40 @@ const EARLY = 0.3;
 /** Remembered steps of codes: docs/bundle.md, the loop `codes`. */
 export class Memory {
   readonly steps: number;
-  private readonly numbers: Float32Array[] = [];
-  private readonly ages: number[] = [];
-  private readonly parts: number[] = [];
+  private readonly ages: Int32Array;
+  private readonly parts: Float64Array;
+  /** Numbers of the codes of all steps, and how many a step has. */
+  private readonly numbers: Float32Array;
+  private readonly width: number;
   private readonly rows = new Map<number, number[]>();
-  private readonly table: number[][];
 
-  /** memory: (M, P + 2) codes, action, age. moves: (E, 3). body: (V, L). actions: how many there are. */
-  constructor(memory: NumberArray, moves: NumberArray, body: NumberArray, actions: number) {
-    const width = memory.shape[1]!;
-    this.steps = memory.shape[0]!;
-    this.table = Array.from({ length: this.steps }, (_, row) => Array.from(memory.data.subarray(row * width, (row + 1) * width), Number));
+  /** table: (M, P + 2) codes, action, age. moves: (E, 3). body: (V, L). actions: how many there are. */
+  constructor(private readonly table: NumberArray, moves: NumberArray, body: NumberArray, actions: number) {
+    const [steps, columns] = [table.shape[0]!, table.shape[1]!];
+    this.steps = steps;
+    this.width = moves.shape[1]! + (columns - 3) * body.shape[1]!;
+    this.numbers = new Float32Array(steps * this.width);
+    this.ages = Int32Array.from({ length: steps }, (_, row) => Number(table.data[(row + 1) * columns - 1]));
+    for (let row = 0; row < steps; row++) this.remember(row, moves, body, actions);
+    this.parts = partsOf(this.ages);
+  }
+
+  private remember(row: number, moves: NumberArray, body: NumberArray, actions: number): void {
+    const columns = this.table.shape[1]!;
+    const at = (column: number) => Number(this.table.data[row * columns + column]);
     const [end, values] = [moves.shape[0]!, body.shape[0]!];
-    const take = (table: NumberArray, row: number) =>
-      Array.from(table.data.subarray(row * table.shape[1]!, (row + 1) * table.shape[1]!), Number);
-    this.table.forEach((step, row) => {
-      const [move, action, age] = [step[0]!, step.at(-2)!, step.at(-1)!];
-      const fits = move >= 0 && move <= end && step.slice(1, -2).every((code) => code >= 0 && code < values);
-      if (!fits || action < 0 || action >= actions || age < 0 || age > row) throw new BundleError("table memory is out of range");
-      const all = [...take(moves, Math.min(move, end - 1)), ...step.slice(1, -2).flatMap((code) => take(body, code))];
-      this.numbers.push(Float32Array.from(all, (number) => (move < end ? number : 0)));
-      this.ages.push(age);
-      const rows = this.rows.get(action);
-      if (rows) rows.push(row);
-      else this.rows.set(action, [row]);
-    });
-    for (let start = 0; start < this.steps; ) {
-      let stop = start + 1;
-      while (stop < this.steps && this.ages[stop] === this.ages[stop - 1]! + 1) stop++;
-      for (let row = start; row < stop; row++) this.parts.push((this.ages[row]! - this.ages[start]!) / (stop - start));
-      start = stop;
+    const [move, action, age] = [at(0), at(columns - 2), this.ages[row]!];
+    let fits = move >= 0 && move <= end && action >= 0 && action < actions && age >= 0 && age <= row;
+    for (let column = 1; column < columns - 2; column++) fits &&= at(column) >= 0 && at(column) < values;
+    if (!fits) throw new BundleError("table memory is out of range");
+    const rows = this.rows.get(action);
+    if (rows) rows.push(row);
+    else this.rows.set(action, [row]);
+    if (move === end) return; // its numbers are zeros
+    let place = row * this.width;
+    for (let column = 0; column < columns - 2; column++) {
+      const { data, shape } = column ? body : moves;
+      for (let i = 0; i < shape[1]!; i++) this.numbers[place++] = Number(data[at(column) * shape[1]! + i]);
     }
   }
 
@@ -54,7 +58,8 @@ export class Memory {
 
   /** The codes (P) of a step. */
   codes(row: number): number[] {
-    return this.table[row]!.slice(0, -2);
+    const columns = this.table.shape[1]!;
+    return Array.from(this.table.data.subarray(row * columns, (row + 1) * columns - 2), Number);
   }
 
   /**
@@ -62,18 +67,19 @@ export class Memory {
    * where remembered motions do.
    */
   next(action: number, recent: Float32Array[], age: number, ends: boolean, uniform: number): number {
-    let rows = this.rows.get(action)!;
+    const all = this.rows.get(action)!;
     if (!recent.length) {
-      const least = Math.min(...rows.map((row) => this.ages[row]!));
-      const starts = rows.filter((row) => this.ages[row] === least);
+      const least = all.reduce((found, row) => Math.min(found, this.ages[row]!), Infinity);
+      const starts = all.filter((row) => this.ages[row] === least);
       return starts[Math.floor(uniform * starts.length)]!;
     }
-    const fitting = rows.filter((row) => (age ? this.ages[row]! > 0 : this.parts[row]! < EARLY));
-    if (fitting.length) rows = fitting;
-    const off = rows.map((row) => {
-      const later = LATER * (this.ages[row]! - age) ** 2;
-      return this.distance(row, recent) + (ends ? later : Math.min(later, LATEST));
-    });
+    const fitting = all.filter((row) => (age ? this.ages[row]! > 0 : this.parts[row]! < EARLY));
+    const rows = fitting.length ? fitting : all;
+    const off = new Float64Array(rows.length);
+    for (let at = 0; at < rows.length; at++) {
+      const later = LATER * (this.ages[rows[at]!]! - age) ** 2;
+      off[at] = this.distance(rows[at]!, recent) + (ends ? later : Math.min(later, LATEST));
+    }
     const least = off.reduce((a, b) => Math.min(a, b));
     let sum = 0;
     const shares = off.map((value) => (sum += Math.exp((least - value) / NEAR)));
@@ -82,11 +88,27 @@ export class Memory {
 
   private distance(row: number, recent: Float32Array[]): number {
     let sum = 0;
-    PAST.forEach((weight, back) => {
+    for (let back = 0; back < PAST.length; back++) {
       const seen = recent[Math.min(back, recent.length - 1)]!;
-      const kept = this.numbers[row - Math.min(this.ages[row]!, back + 1)]!;
-      for (let at = 0; at < kept.length; at++) sum += weight * (kept[at]! - seen[at]!) ** 2;
-    });
+      const start = (row - Math.min(this.ages[row]!, back + 1)) * this.width;
+      let apart = 0;
+      for (let at = 0; at < this.width; at++) {
+        const off = this.numbers[start + at]! - seen[at]!;
+        apart += off * off;
+      }
+      sum += PAST[back]! * apart;
+    }
     return sum;
   }
+}
+
+/** Which part of its motion was over at each step, 0 to 1, by the steps' ages. */
+function partsOf(ages: Int32Array): Float64Array {
+  const parts = new Float64Array(ages.length);
+  for (let start = 0, stop = 0; start < ages.length; start = stop) {
+    do stop++;
+    while (stop < ages.length && ages[stop] === ages[stop - 1]! + 1);
+    for (let row = start; row < stop; row++) parts[row] = (ages[row]! - ages[start]!) / (stop - start);
+  }
+  return parts;
 }

@@ -7,10 +7,14 @@ import { Vocabulary } from "./text.js";
 /** Frames in the channels and units of a model's contract (`manifest.motion`), one row each. */
 export type Frames = ArrayLike<number>[];
 
+/** The longest motion that is described. */
+const MAX_SECONDS = 30;
+
 /** Of each setting the least and the most, and whether it is a whole number. */
 const RANGES: Record<string, [number, number, boolean]> = {
   max_words: [1, 1000, true],
   beams: [1, 100, true],
+  draws: [1, 1000, true],
   seed: [0, Number.MAX_SAFE_INTEGER, true],
   hypotheses: [1, 100, true],
   seconds: [1e-3, 600, false],
@@ -70,6 +74,8 @@ export abstract class LanguageModel extends Model {
 
   protected motion(frames: Frames) {
     const given = this.checked(frames, this.manifest.motion.channels.length, 2);
+    const most = Math.floor(MAX_SECONDS * this.fps + 1e-9) + 1;
+    if (given.length > most) throw new DecodingError(`the motion has ${given.length} frames, but the model takes at most ${most}: cut it`);
     return { frames: stacked(given, 1, given.length, given[0]!.length), lengths: integers([given.length]) };
   }
 }

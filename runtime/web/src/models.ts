@@ -2,7 +2,7 @@ import { Bundle } from "./bundle.js";
 import { DescribeModel } from "./describe.js";
 import { BundleError } from "./errors.js";
 import { FillModel } from "./fill.js";
-import { GenerateModel, sourceOf } from "./generate.js";
+import { type GenerateModel, generateModel } from "./generate.js";
 import type { Graph, SessionSettings } from "./graph.js";
 import { PredictModel } from "./predict.js";
 import { SearchModel } from "./search.js";
@@ -17,9 +17,10 @@ export async function load(source: string | URL | Uint8Array, settings?: Session
   for (const role of Object.keys(manifest.graphs)) graphs[role] = await bundle.graph(role, settings);
   switch (manifest.loop) {
     case "beam":
+    case "consensus":
       return new DescribeModel(manifest, graphs);
     case "codes":
-      return new GenerateModel(manifest, graphs, await sourceOf(bundle, graphs));
+      return generateModel(bundle, graphs);
     case "free_run":
       return new PredictModel(manifest, graphs);
     case "between":

@@ -8,10 +8,22 @@ export class SearchModel extends LanguageModel {
     super(manifest);
   }
 
+  /** The vector (E) of frames (T, D); one of more than ten seconds has the direction of the sum of its windows' vectors. */
   async embedMotion(frames: Frames): Promise<Float32Array> {
-    return (await this.graphs.motion!.run(this.motion(frames))).vector!.data;
+    const most = Math.floor((this.manifest.settings.index?.window ?? 10) * this.fps + 1e-9);
+    const count = Math.max(1, Math.ceil(frames.length / most));
+    const edges = Array.from({ length: count + 1 }, (_, at) => toEven((at * frames.length) / count));
+    const vectors: Float32Array[] = [];
+    for (const [at, edge] of edges.slice(1).entries()) {
+      vectors.push((await this.graphs.motion!.run(this.motion(frames.slice(edges[at]!, edge)))).vector!.data);
+    }
+    if (count === 1) return vectors[0]!;
+    const sum = vectors[0]!.map((_, i) => vectors.reduce((all, one) => all + one[i]!, 0));
+    const length = Math.hypot(...sum);
+    return sum.map((value) => value / length);
   }
 
+  /** The vector (E) of a sentence. */
   async embedText(text: string): Promise<Float32Array> {
     return (await this.graphs.text!.run(this.words(text))).vector!.data;
   }
@@ -21,4 +33,9 @@ export class SearchModel extends LanguageModel {
     const scores = vectors.map((one, index) => ({ index, score: one.reduce((sum, value, i) => sum + value * vector[i]!, 0) }));
     return scores.sort((a, b) => b.score - a.score || a.index - b.index).slice(0, this.setting("count", count));
   }
+}
+
+/** Rounded, a half to the even number. */
+function toEven(value: number): number {
+  return value % 1 === 0.5 ? 2 * Math.round(value / 2) : Math.round(value);
 }

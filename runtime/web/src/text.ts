@@ -29,7 +29,7 @@ export class Vocabulary {
     if (sentence.length > MAX_LETTERS) {
       throw new TextError(`the sentence has ${sentence.length} letters, but at most ${MAX_LETTERS} are allowed`);
     }
-    const words = this.normalise(sentence).match(/\d|\p{L}+/gu) ?? [];
+    const words = this.split(sentence);
     if (!words.length) throw new TextError(`the sentence ${JSON.stringify(sentence)} has no words`);
     if (words.length > MAX_WORDS) {
       throw new TextError(`the sentence has ${words.length} words, but at most ${MAX_WORDS} are allowed`);
@@ -37,6 +37,11 @@ export class Vocabulary {
     const unknown = words.filter((word) => !this.ids.has(word));
     if (unknown.length === words.length) throw new TextError(`the model knows no word of ${JSON.stringify(sentence)}`);
     return { ids: words.map((word) => this.ids.get(word) ?? UNK!), unknown };
+  }
+
+  /** The words of a sentence, known or not; each digit is one of its own. */
+  split(sentence: string): string[] {
+    return this.normalise(sentence).match(/\d|\p{L}+/gu) ?? [];
   }
 
   /** The sentence of ids, without PAD, SOS, EOS and UNK. */

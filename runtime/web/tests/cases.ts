@@ -1,8 +1,9 @@
-/* What every runtime has to give, in Node and in a browser: the golden vectors that Python's runtime gave. */
+/* What every runtime has to give, in Node and in a browser: golden vectors, and answers that Python gave (python.json). */
 import { type NumberArray, rows } from "../src/arrays.js";
 import { Bundle } from "../src/bundle.js";
 import { DescribeModel, FillModel, GenerateModel, load, PredictModel, SearchModel } from "../src/index.js";
 import { Recorded } from "../src/random.js";
+import python from "./python.json";
 
 /** Reads the zip of a shipped bundle. */
 export type Read = (name: string) => Promise<Uint8Array>;
@@ -90,6 +91,59 @@ async function search(read: Read): Promise<void> {
   equal(model.nearest(vector, [await model.embedMotion(frames("frames")), vector], 1)[0]!.index, 1, "nearest");
 }
 
+/** Some of the frames, as python.json has them. */
+function shown(frames: ArrayLike<number>[], wanted: { count: number; every: number; frames: number[][] }, what: string): void {
+  equal(frames.length, wanted.count, `${what}, how many frames`);
+  close(flat(frames.filter((_, at) => at % wanted.every === 0)), wanted.frames.flat(), what);
+}
+
+async function seeds(read: Read): Promise<void> {
+  const { model } = await loaded(read, "generate", GenerateModel);
+  const [walk] = await model.generate("a person walks forward", { seed: 3, seconds: 2.5 });
+  shown(walk!, python.walk, "walk");
+  const jumps = await model.generate("someone jumps twice, then sits", { seed: 11, hypotheses: 2 });
+  jumps.forEach((one, at) => shown(one, python.jumps[at]!, `jump ${at}`));
+  shown((await model.story("a person runs", { after: walk!, seed: 2, seconds: 1.5 })).frames, python.after, "after");
+  for (const { text, confidence, ...rest } of python.understood) {
+    const { confidence: found, ...other } = await model.understood(text);
+    equal(other, { confident: rest.confident, nearest: rest.nearest }, text);
+    close([found], [confidence], text);
+  }
+}
+
+async function story(read: Read): Promise<void> {
+  const { model } = await loaded(read, "generate", GenerateModel);
+  const texts = ["a person walks forward", "someone waves"];
+  const settings = { seed: 5, seconds: [1.3, null], stand: "both" as const };
+  const { frames, passages } = await model.story(texts, settings);
+  shown(frames, python.story, "story");
+  equal(passages.map(({ text }) => text), python.story.passages.map(({ text }) => text), "passages");
+  close(passages.flatMap(({ start, stop }) => [start, stop]), python.story.passages.flatMap(({ start, stop }) => [start, stop]), "passages");
+  const pieces: Float32Array[][] = [];
+  for await (const piece of model.stream(texts, settings)) pieces.push(piece);
+  if (pieces.length < 10) throw new Error(`a stream of ${pieces.length} pieces`);
+  equal(pieces.flat().map((frame) => [...frame]), frames.map((frame) => [...frame]), "stream");
+}
+
+async function agreed(read: Read): Promise<void> {
+  const { model, frames } = await loaded(read, "describe", DescribeModel);
+  const found = await model.describe(frames("frames"), { draws: 60, seed: 4 });
+  equal(found.map(({ text }) => text), python.draws.map(({ text }) => text), "texts");
+  close(found.flatMap((one) => [one.logProbability, one.score]), python.draws.flatMap((one) => [one.logProbability, one.score]), "scores");
+  close([await model.score(frames("frames"), "a person walks")], [python.score], "score");
+}
+
+async function expected(read: Read): Promise<void> {
+  const { model, frames } = await loaded(read, "predict", PredictModel);
+  close(await model.expectedErrors(frames("frames")), python.expected.map((metres) => 100 * metres), "centimetres");
+}
+
+async function long(read: Read): Promise<void> {
+  const { model, frames } = await loaded(read, "search", SearchModel);
+  const many = Array(8).fill(frames("frames")).flat().slice(0, 25 * model.fps + 1);
+  close(await model.embedMotion(many), python.long, "vector");
+}
+
 export const cases: Case[] = [
   ...graphs,
   { name: "describe says what Python says", run: describe },
@@ -97,4 +151,9 @@ export const cases: Case[] = [
   { name: "predict continues as Python does", run: predict },
   { name: "fill fills as Python does", run: fill },
   { name: "search embeds as Python does", run: search },
+  { name: "a seed generates the motion that it does in Python", run: seeds },
+  { name: "a story, and its stream, are those of Python", run: story },
+  { name: "draws agree on what they do in Python", run: agreed },
+  { name: "errors are expected as in Python", run: expected },
+  { name: "long motions are embedded as in Python", run: long },
 ];

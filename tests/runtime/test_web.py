@@ -1,0 +1,152 @@
+"""What runtime/web is held to beside the bundles' golden runs: Python's answers, kept in its tests as python.json.
+
+`python tests/runtime/test_web.py` writes them anew.
+"""
+
+import json
+import warnings
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import motet
+from motet.bundle.bundle import Bundle
+from motet.bundle.golden import read
+from motet.decode.codec import Context
+from motet.decode.loops import LOOPS
+from motet.decode.words import noise_of, score_words
+from motet.errors import TextWarning
+from motet.models.describe import DescribeModel
+from motet.models.generate_codes import CodesModel
+from motet.models.language import EOS, SOS
+from motet.models.predict import PredictModel
+from motet.models.search import SearchModel
+from motet.motion.motion import Motion
+
+KEPT = Path(__file__).parents[2] / "runtime/web/tests/python.json"
+EVERY = 30  # frames of which one is kept
+
+
+def shown(frames: Any) -> dict[str, Any]:
+    """How many frames there are, and some of them."""
+    return {"count": len(frames), "every": EVERY, "frames": np.round(frames[::EVERY], 5).tolist()}
+
+
+def golden(name: str) -> NDArray[Any]:
+    """The frames of a bundle's golden run."""
+    bundle = Bundle.open(name)
+    return read(bundle.read(bundle.manifest.golden.file))["run.in.frames"]
+
+
+def generated(model: CodesModel) -> dict[str, Any]:
+    (walk,) = model.generate("a person walks forward", seed=3, seconds=2.5)
+    jumps = model.generate("someone jumps twice, then sits", 2, seed=11)
+    return {"walk": shown(walk.frames), "jumps": [shown(one.frames) for one in jumps]}
+
+
+def told(model: CodesModel) -> dict[str, Any]:
+    texts = ["a person walks forward", "someone waves"]
+    story = model.story(texts, seed=5, seconds=[1.3, None], stand="both")
+    passages = [{"text": one.text, "start": one.start, "stop": one.stop} for one in story.passages]
+    return {**shown(story.frames), "passages": passages}
+
+
+def continued(model: CodesModel) -> dict[str, Any]:
+    """A story after frames, which are taken as they are: a motion made of them is turned by its own facing."""
+    (walk,) = model.generate("a person walks forward", seed=3, seconds=2.5)
+
+    class AfterFrames(CodesModel):
+        def context(self, figure: Motion) -> Context:
+            frames = np.float32(walk.frames)[len(walk.frames) % self.codec.field.hop :]
+            return Context(frames, self.codec.codes_of(frames))
+
+    other = AfterFrames(model.manifest, model.graphs, model.tables)
+    return shown(other.story("a person runs", after=walk.motion, seed=2, seconds=1.5).frames)
+
+
+def understood(model: CodesModel) -> list[dict[str, Any]]:
+    texts = ["a person walks forward", "the elephant trumpets in a circle"]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", TextWarning)
+        found = [(text, model.understood(text)) for text in texts]
+    return [
+        {"text": text, "confidence": one.confidence, "confident": one.confident, "nearest": one.nearest}
+        for text, one in found
+    ]
+
+
+def described(model: DescribeModel) -> dict[str, Any]:
+    """By the agreement of 60 draws."""
+    loop, context = LOOPS["consensus"], model.contexts([golden("describe")])
+    settings = loop.settled(loop.defaults(model.manifest.defaults), {"draws": 60, "beams": 5})
+    settings["noise"] = noise_of(model.limits(settings), 60, 4)  # type: ignore[assignment]  # as describe passes it on
+    (row,) = model._hypotheses(loop, context, settings)
+    return {
+        "draws": [
+            {"text": model.vocabulary.decode(one.ids), "logProbability": one.log_probability, "score": one.score}
+            for one in row
+        ]
+    }
+
+
+def scored(model: DescribeModel) -> float:
+    """The log-probability of a sentence given the frames of the golden run."""
+    ids = model.vocabulary.ids
+    words = np.concatenate([[ids[SOS]], model.ids("a person walks"), [ids[EOS]]])[None]
+    context = model.contexts([golden("describe")])
+    return float(score_words(model.graphs["step"], context, np.zeros(1, np.int64), words)[0])
+
+
+def expected(model: PredictModel) -> list[float]:
+    """The expected errors after the frames of the golden run, in metres."""
+    known = {"frames": np.repeat(golden("predict")[None], 2, axis=0)}
+    known |= model.graphs["encoder"](known)
+    error = model.graphs["error"]
+    found: list[float] = error({one.name: known[one.name] for one in error.spec.inputs})["error"][0].tolist()
+    return found
+
+
+def long(model: SearchModel) -> list[float]:
+    """The direction of a motion of several windows: the frames of the golden run, time and again."""
+    frames = np.tile(golden("search"), (8, 1))[: 25 * round(model.fps) + 1]
+    motion = replace(model.contract.features(frames), fps=model.fps)
+    vectors = [model.contexts([part.values], "motion")[0] for _, part in model.windows(motion, 10.0)]
+    found = np.mean(vectors, axis=0)
+    return (found / np.linalg.norm(found)).tolist()
+
+
+def answers() -> dict[str, Any]:
+    generate, describe = motet.load("generate"), motet.load("describe")
+    return {
+        **generated(generate),
+        "story": told(generate),
+        "after": continued(generate),
+        "understood": understood(generate),
+        **described(describe),
+        "score": scored(describe),
+        "expected": expected(motet.load("predict")),
+        "long": long(motet.load("search")),
+    }
+
+
+def same(found: Any, kept: Any) -> bool:
+    if isinstance(kept, float | int) and not isinstance(kept, bool):
+        return abs(found - kept) < 1e-4 * max(1, abs(kept))
+    if isinstance(kept, list):
+        return len(found) == len(kept) and all(map(same, found, kept))
+    if isinstance(kept, dict):
+        return found.keys() == kept.keys() and all(same(found[name], kept[name]) for name in kept)
+    return bool(found == kept)
+
+
+def test_what_the_runtime_in_javascript_is_held_to_is_what_python_answers() -> None:
+    found = json.loads(json.dumps(answers()))
+    kept = json.loads(KEPT.read_text(encoding="utf-8"))
+    assert [name for name in found if not same(found[name], kept.get(name))] == []
+
+
+if __name__ == "__main__":
+    KEPT.write_text(json.dumps(answers(), separators=(",", ":")) + "\n", encoding="utf-8")
