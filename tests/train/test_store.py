@@ -12,6 +12,7 @@ from language_data import walker
 from motet.cli import main
 from motet.errors import OutputError
 from motet.formats import read_motion, write_motion
+from motet.motion.humanoid import on_humanoid
 from motet.motion.humanoid.bones import HUMANOID, MIXAMO
 from motet.motion.humanoid.retarget import from_humanoid, to_humanoid
 from motet.motion.kinematics import euler_of, local_rotations, positions, with_channels
@@ -226,14 +227,32 @@ def test_a_split_is_a_partition_of_about_80_10_10(by: str) -> None:
     assert split(everything, 0, by) != split(everything, 1, by)
 
 
+def test_a_split_by_none_trains_on_everything() -> None:
+    everything = entries([20, 5, 10])
+    found, usual = split(everything, 0, "none"), split(everything, 0)
+    assert found.train == tuple(range(35))
+    assert (found.validation, found.test) == (usual.validation, usual.test)
+
+
 def test_a_split_of_too_little_is_refused() -> None:
     with pytest.raises(DataError, match="2 motions of 2 trials are too few"):
         split(entries([2]), 0)
     with pytest.raises(DataError, match="100 motions of 2 subjects are too few"):
         split(entries([50, 50]), 0, "subject")
     assert [len(part) for part in (split(entries([3]), 0).validation, split(entries([3]), 0).test)] == [1, 1]
-    with pytest.raises(DataError, match="by trial or by subject"):
+    with pytest.raises(DataError, match="by trial, by subject or by none"):
         split(entries([30]), 0, "day")
+
+
+def test_codes_are_made_of_what_is_above_the_floor() -> None:
+    standing = on_humanoid(cmu().motion)
+    values = standing.values - 0.3 * np.array([name == "hips.ty" for name in standing.channels])
+    lowest = []
+    for how in (SIXD, replace(SIXD, floor=False)):
+        (piece,) = how.pieces(replace(standing, values=values))
+        lowest.append(positions(piece)[..., 1].min())
+    assert lowest[0] > -0.02
+    assert lowest[1] < -0.2
 
 
 def still(motion: Motion, before: int, after: int) -> Motion:

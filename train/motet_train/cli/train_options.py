@@ -12,6 +12,7 @@ import torch
 
 from motet.motion.skeleton import METRES
 from motet_train import distributed
+from motet_train.data.store import SPLITS
 from motet_train.progress import log
 from motet_train.recipes.recipe import Job, Recipe
 from motet_train.run_folder import trained
@@ -73,7 +74,7 @@ every_training = with_options(
     click.option("--name", help="Bundle name. [default: the run's folder]"),
 )
 
-split = click.option("--split", "by", type=click.Choice(["trial", "subject"]), default="trial", show_default=True)
+split = click.option("--split", "by", type=click.Choice(SPLITS), default="trial", show_default=True)
 unit_in = click.option("--unit-in", type=click.Choice(list(METRES)), help="Length unit of files that do not state it.")
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from motet.errors import MotionError
 from motet.motion.feet.contacts import ADULT_HEIGHT
+from motet.motion.floor import above_floor
 from motet.motion.humanoid import on_humanoid
 from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
@@ -22,7 +23,8 @@ SHORTEST = 0.5
 class Preparation:
     """representation: its name. humanoid: retarget every figure to the humanoid, instead of keeping one figure.
 
-    trim: cut off idle frames and T-poses at both ends (:func:`trim`). fps: of the frames.
+    trim: cut off idle frames and T-poses at both ends (:func:`trim`). floor: nothing is under the floor
+    (:func:`motet.motion.floor.above_floor`). fps: of the frames.
     longest: seconds from which on a motion is cut into pieces where ``cut`` is set, and else refused
     (Plappert et al. 2017, section 5.1).
     """
@@ -31,12 +33,13 @@ class Preparation:
     humanoid: bool
     trim: bool
     cut: bool
+    floor: bool = False
     fps: float = 10.0
     longest: float = 30.0
 
     def pieces(self, motion: Motion) -> list[Motion]:
         """The motion to train on, in equal pieces shorter than ``longest``; MotionError where it is unfit."""
-        motion = _brought(motion, self.humanoid, self.trim)
+        motion = _brought(motion, self.humanoid, self.trim, self.floor)
         if motion.duration < SHORTEST or not (self.cut or motion.duration < self.longest):
             limits = f"at least {SHORTEST:g} s" + ("" if self.cut else f" and less than {self.longest:g} s")
             raise MotionError(f"{motion.duration:.3g} s ({len(motion)} frames): a training motion has {limits}")
@@ -46,8 +49,9 @@ class Preparation:
 
 
 @lru_cache(maxsize=1)  # the parts of a store retarget each motion once
-def _brought(motion: Motion, humanoid: bool, trimmed: bool) -> Motion:
+def _brought(motion: Motion, humanoid: bool, trimmed: bool, floor: bool) -> Motion:
     motion = on_humanoid(motion) if humanoid else motion
+    motion = above_floor(motion) if floor else motion
     return trim(motion) if trimmed else motion
 
 
@@ -86,7 +90,7 @@ ANGLES = Preparation("angles", humanoid=False, trim=False, cut=False)
 FULL = Preparation("root_angles", humanoid=True, trim=True, cut=True)
 """Joint angles and the root block of the humanoid, so that any figure can be used, and generated ones travel."""
 
-SIXD = Preparation("root_sixd", humanoid=True, trim=True, cut=True, fps=30.0)
+SIXD = Preparation("root_sixd", humanoid=True, trim=True, cut=True, floor=True, fps=30.0)
 """Smooth root paths and the axes of joints, at a rate that shows feet standing: for motion codes."""
 
 VECTORS = Preparation("root_vectors", humanoid=True, trim=True, cut=False, fps=30.0, longest=math.inf)

@@ -8,7 +8,7 @@ representations, by their names.
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -242,6 +242,10 @@ class _Writer:
         }
 
 
+SPLITS = ("trial", "subject", "none")
+"""How motions are divided, see :func:`split`."""
+
+
 @dataclass(frozen=True)
 class Split:
     """Indices into the entries of a store, sorted."""
@@ -255,11 +259,13 @@ def split(entries: Sequence[Entry], seed: int, by: str = "trial") -> Split:
     """Divide motions .8/.1/.1 by chance (Plappert et al. 2017, section 5.1), the same for the same seed.
 
     by: "trial", which keeps the pieces of a take together, or "subject" to keep all motions of a person together, so
-    that validation and test show people never seen in training; these parts then have at most .1 each. DataError where
-    a part would be empty.
+    that validation and test show people never seen in training; these parts then have at most .1 each. "none" trains on
+    everything, the validation and test motions of "trial" as well. DataError where a part would be empty.
     """
-    if by not in ("trial", "subject"):
-        raise DataError(f"motions are split by trial or by subject, not by {by!r}")
+    if by not in SPLITS:
+        raise DataError(f"motions are split by trial, by subject or by none, not by {by!r}")
+    if by == "none":
+        return replace(split(entries, seed), train=tuple(range(len(entries))))
     groups: dict[str, list[int]] = {}
     for index, entry in enumerate(entries):
         groups.setdefault(entry.subject if by == "subject" else entry.take or entry.name, []).append(index)

@@ -112,12 +112,7 @@ def _target(leg: "Leg", points: Array, fps: float, settings: HoldSettings) -> Ar
     """The ankle's target (T, 3), from points (T, K, 3) of the sole over ground at 0."""
     target = leg.eased(leg.ankle + np.insert(_shift(points, fps, settings), 1, 0.0, axis=1))
     depth = -(points[..., 1].min(axis=1) + target[:, 1] - leg.ankle[:, 1])
-    # what is under the ground comes out of it in ``soft`` seconds, without kinks: a mean over the window in which each
-    # is the deepest is as high as the one in the middle
-    reach = max(1, round(settings.soft * fps))
-    deepest = np.max(windows(np.maximum(depth, 0), reach), axis=1)
-    bell = np.hanning(2 * reach + 3)[1:-1]
-    target[:, 1] += np.minimum(windows(deepest, reach) @ (bell / bell.sum()), settings.farthest)
+    target[:, 1] += np.minimum(lift(depth, settings.soft * fps), settings.farthest)
     return target
 
 
@@ -163,6 +158,17 @@ def _between(times: list[NDArray[np.intp]], values: list[Array], frames: int, bl
     after = np.clip(np.searchsorted(at, frame, side="right"), 1, len(at) - 1)
     part = rise((frame - at[after - 1]) / (at[after] - at[after - 1]), 0, 1)[:, None]
     return of[after - 1] + part * (of[after] - of[after - 1])
+
+
+def lift(depth: Array, soft: float) -> Array:
+    """Heights (T,), without kinks, by which what is ``depth`` (T,) under the ground comes out of it in ``soft``
+    frames."""
+    reach = max(1, round(soft))
+    # a mean over the window in which each is the deepest is as high as the one in the middle
+    deepest = np.max(windows(np.maximum(depth, 0), reach), axis=1)
+    bell = np.hanning(2 * reach + 3)[1:-1]
+    found: Array = windows(deepest, reach) @ (bell / bell.sum())
+    return found
 
 
 def windows(values: Array, reach: int) -> Array:
