@@ -3,6 +3,7 @@
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
@@ -137,6 +138,7 @@ def _told(description: Description) -> str:
 @click.option("--after", type=Path, metavar="MOTION", help="Continue from the end of this motion file.")
 @click.option("--stand", type=click.Choice(["start", "end", "both"]), help="Start or end in standing.")
 @click.option("--loop", is_flag=True, help="Write only a seamless loop.")
+@click.option("--whole", is_flag=True, help="Do not split texts that ask for several things in a row.")
 @click.option("--strict", is_flag=True, help="Fail on a text that the model knows only in part.")
 @write_options
 @session_options
@@ -157,6 +159,7 @@ def generate(
 ) -> None:
     """Generate a motion for each TEXT, such as "a person walks and turns left", and write it to OUT.
 
+    A text that asks for several things in a row ("walk to the table, then sit down") becomes a story of its parts.
     With several texts, or --all, the files are numbered: out-1.bvh, out-2.bvh, ... A text that cannot be used has none.
     With --story the texts become one motion, each taking over from the one before.
     """
@@ -188,14 +191,16 @@ Found = tuple[int, str, list[Generated]]
 
 @noted()
 def _motions(
-    tries: Tries, model: GenerateModel, asked: dict[int, str], seed: int, strict: bool, **settings: Any
+    tries: Tries, model: GenerateModel, asked: dict[int, str], seed: int, strict: bool, whole: bool, **settings: Any
 ) -> list[Found]:
     """The motions of each text by itself, of all of them in one batch."""
     if strict:  # one text that is refused leaves the others
-        asked = tries.usable(asked, model.check)
+        asked = tries.usable(asked, partial(model.check, whole=whole))
     with bar("generating") as progress:
         seeds = [seed + index for index in asked]
-        found = model.generate(list(asked.values()), seed=seeds, strict=strict, progress=progress, **settings)
+        found = model.generate(
+            list(asked.values()), seed=seeds, strict=strict, whole=whole, progress=progress, **settings
+        )
     return [(index, text, results) for (index, text), results in zip(asked.items(), found, strict=True)]
 
 

@@ -3,7 +3,7 @@ Gaussians (section 4.3 of Plappert et al. 2017)."""
 
 import warnings
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, TypedDict, Unpack, cast, overload
@@ -48,6 +48,7 @@ class GenerateSettings(LoopSettings, total=False):
 
 
 class _Options(GenerateSettings, total=False):
+    whole: bool
     seed: Seed
     strict: bool
     progress: Progress
@@ -126,6 +127,7 @@ class GenerateModel(LanguageModel):
         sentences: str | Sequence[str],
         hypotheses: int | None = None,
         *,
+        whole: bool = False,
         seed: Seed = 0,
         strict: bool = False,
         progress: Progress = silent,
@@ -135,6 +137,8 @@ class GenerateModel(LanguageModel):
 
         A mixture model ranks them, the likeliest per frame first. Those of a motion-code model are independent, and the
         first does not depend on their number.
+        whole: take a sentence that asks for several things in a row (:meth:`parts`) as one; else each of its motions is
+            a story of its parts, and seconds is what they last together.
         seed: sentence i uses seed + i (or seed[i]), and gets the same motions as alone with that seed.
         progress: called with the number of sentences done and in total.
         strict: fail on unknown words instead of warning.
@@ -148,15 +152,34 @@ class GenerateModel(LanguageModel):
         """
         texts = [sentences] if isinstance(sentences, str) else list(sentences)
         own = {"hypotheses": hypotheses, **cast(Mapping[str, float | None], settings)}
-        contexts, noise, chosen = self.asked(texts, len(texts), seed, strict, own)
-        found: list[list[Generated]] = []
+        seeds = seeds_of(seed, len(texts), DecodingError)
+        composed = {i for i, text in enumerate(texts) if not whole and len(self.parts(text)) > 1}
+        single = [i for i in range(len(texts)) if i not in composed]
+        drawn = self._drawn([texts[i] for i in single], [seeds[i] for i in single], strict, own)
+        found: dict[int, list[Generated]] = {}
+        for i in (*single, *sorted(composed)):
+            found[i] = self.composed(texts[i], seeds[i], strict, own) if i in composed else next(drawn)
+            progress(len(found), len(texts))
+        return found[0] if isinstance(sentences, str) else [found[i] for i in range(len(texts))]
+
+    def _drawn(
+        self, texts: Sequence[str], seeds: Sequence[int], strict: bool, settings: Mapping[str, float | None]
+    ) -> Iterator[list[Generated]]:
+        """The motions of each sentence as a whole, drawn in batches."""
+        contexts, noise, chosen = self.asked(texts, len(texts), seeds, strict, settings)
         for start in range(0, len(texts), self.loop.batch):
             batch = slice(start, start + self.loop.batch)
             for text, row in zip(texts[batch], self.decode(contexts[batch], noise[batch], chosen), strict=True):
                 unknown = tuple(self.unknown(text))
-                found.append([Generated(self.contract, one.frames, one.log_likelihood, unknown) for one in row])
-            progress(len(found), len(texts))
-        return found[0] if isinstance(sentences, str) else found
+                yield [Generated(self.contract, one.frames, one.log_likelihood, unknown) for one in row]
+
+    def parts(self, sentence: str) -> list[str]:
+        """What a sentence asks for one after another: itself alone, where the model knows it as one thing."""
+        return [sentence]
+
+    def composed(self, sentence: str, seed: int, strict: bool, settings: Mapping[str, float | None]) -> list[Generated]:
+        """Motions that show the parts of a sentence, as many as the setting hypotheses says; see :meth:`generate`."""
+        raise DecodingError(f"models of the loop {self.manifest.loop!r} show one sentence at a time")
 
     def asked(
         self, texts: Sequence[str], rows: int, seed: Seed, strict: bool, settings: Mapping[str, float | None]
@@ -174,11 +197,12 @@ class GenerateModel(LanguageModel):
             raise DecodingError("seconds must be more than 0; omit them to let a motion end by itself")
         return self.loop.settled(self.defaults, settings)
 
-    def check(self, sentence: str) -> None:
-        """TextError where the model does not know all of a sentence; see :meth:`note`."""
+    def check(self, sentence: str, whole: bool = False) -> None:
+        """TextError where the model does not know all of a sentence, or of its parts; see :meth:`note`."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", TextWarning)
-            self.note(sentence, self.embed(sentence), strict=True)
+            for part in [sentence] if whole else self.parts(sentence):
+                self.note(part, self.embed(part), strict=True)
 
     def note(self, sentence: str, context: Floats, strict: bool) -> None:
         """Warn where the model knows a sentence with this context (C,) only in part, beyond its unknown words.

@@ -18,7 +18,9 @@ from motet.decode.codes import CodesSettings, Memory, Source, Writer, draw_codes
 from motet.decode.continue_codes import ContinuationSettings
 from motet.decode.loop import Noise, Sample, apart
 from motet.errors import BundleError, DecodingError, MotionError, TextError, TextWarning, warn
+from motet.models.composition import FUNCTION_WORDS, parts_of, sentences_of, stem, verbs_of
 from motet.models.generate import Generated, GenerateModel, LoopSettings
+from motet.models.language import SPECIALS
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.representation.root_sixd import in_world
@@ -36,6 +38,7 @@ class StorySettings(LoopSettings, total=False):
     stand: Stand | None
     seed: Seed
     strict: bool
+    whole: bool
 
 
 @dataclass(frozen=True)
@@ -132,6 +135,34 @@ class CodesModel(GenerateModel):
         said = Counter(word for entry in entries for word in set(entry.texts("words")))
         self._sentences = [entry.text("sentence") for entry in entries]
         self._rare = {word: math.log((1 + len(entries)) / times) for word, times in said.items()}
+        self._stems = [frozenset(map(stem, entry.texts("words"))) for entry in entries]
+        self._verbs = verbs_of(said)
+
+    def parts(self, sentence: str) -> list[str]:
+        """What a text asks for one after another: its sentences, and those parts of a sentence
+        (:func:`motet.models.composition.parts_of`) of which the likeliest action lacks something; errors like
+        :meth:`ids`."""
+        self.vocabulary.encode(sentence)
+        found = []
+        for one in sentences_of(sentence):
+            parts = parts_of(one, self._verbs)
+            found += parts if len(parts) > 1 and self.lacking(one) else [one]
+        return found if len(found) > 1 else [sentence]
+
+    def lacking(self, sentence: str) -> list[str]:
+        """The known words of a sentence, but for function words, of which no sentence of the likeliest action has any
+        form."""
+        ids, _ = self.vocabulary.encode(sentence)
+        have = self._stems[int(self.contexts([ids])[0].argmax())]
+        words = {self.vocabulary.words[one] for one in ids.tolist()} - FUNCTION_WORDS - set(SPECIALS)
+        return sorted(word for word in words if stem(word) not in have)
+
+    def composed(self, sentence: str, seed: int, strict: bool, settings: Mapping[str, float | None]) -> list[Generated]:
+        """See :meth:`GenerateModel.composed`; the first motion is the :meth:`story` of this seed."""
+        count = int(self._settled(settings)["hypotheses"])
+        own = {name: value for name, value in settings.items() if name != "hypotheses"}
+        seeds = [seed, *np.random.SeedSequence(seed).generate_state(count - 1).tolist()]
+        return [self.story(sentence, **cast(StorySettings, {**own, "seed": one, "strict": strict})) for one in seeds]
 
     def understood(self, sentence: str) -> Understood:
         """How well a sentence is known, and the nearest known sentences; errors like :meth:`ids`."""
@@ -176,8 +207,9 @@ class CodesModel(GenerateModel):
         """One continuous motion for several sentences, each starting where the last one ends.
 
         after: a motion to continue, of any human figure, from its last seconds. seconds: of each sentence, or one value
-        for all, to within one code; by default each ends by itself. stand: where the figure is to stand briefly. Others
-        like :meth:`generate`; a story of one sentence is the motion that it returns.
+        for all, to within one code; by default each ends by itself. whole: take a sentence that asks for several things
+        in a row as one; else its parts, each of the same length, are passages. stand: where it is to stand briefly.
+        Others like :meth:`generate`; a story of one sentence is the motion that it returns.
         DecodingError for seconds, a seed or a setting out of range, and for several ``hypotheses``; MotionError for a
         motion that is too short to continue or not of a human figure; TextError like :meth:`generate`.
         """
@@ -217,27 +249,31 @@ class CodesModel(GenerateModel):
         stand: Stand | None = None,
         seed: Seed = 0,
         strict: bool = False,
+        whole: bool = False,
         **settings: Unpack[LoopSettings],
     ) -> tuple[list[str], Motion | None, Iterator[tuple[int, Array]]]:
         """The sentences of a story with those of standing, the motion on the model's figure that it continues, and its
         pieces as they are drawn."""
         texts = [sentences] if isinstance(sentences, str) else list(sentences)
-        own = cast(Mapping[str, float | None], settings)
+        drawn = cast(Mapping[str, float | None], settings)
         if not texts:
             raise TextError("a story needs a sentence")
         if stand not in (None, *get_args(Stand)):
             raise DecodingError(f"stand is one of {', '.join(get_args(Stand))}, not {stand!r}")
-        if own.get("hypotheses") not in (None, 1):
-            raise DecodingError(f"a story is one motion: hypotheses must be 1, not {own['hypotheses']}")
+        if drawn.get("hypotheses") not in (None, 1):
+            raise DecodingError(f"a story is one motion: hypotheses must be 1, not {drawn['hypotheses']}")
         given: list[Any] = [seconds] * len(texts) if np.ndim(cast(Any, seconds)) == 0 else list(cast(Any, seconds))
         if len(given) != len(texts):
             raise DecodingError(f"seconds must be a number, or one for each of {len(texts)} sentences, not {seconds}")
-        each = [self._settled({"seconds": one})["seconds"] for one in given]
+        lengths = [self._settled({"seconds": one})["seconds"] for one in given]
+        parts = [[text] if whole else self.parts(text) for text in texts]
+        each = [length / len(own) for own, length in zip(parts, lengths, strict=True) for _ in own]
+        texts = [part for own in parts for part in own]
         for end, place in (("start", 0), ("end", len(texts) + 1)):
             if stand in (end, "both"):
                 texts.insert(place, "a person stands still")
                 each.insert(place, 0.8)
-        contexts, noise, chosen = self.asked(texts, 1, seed, strict, own)
+        contexts, noise, chosen = self.asked(texts, 1, seed, strict, drawn)
         figure = None if after is None else self.contract.on_figure(self.at_own_rate(after))
         return texts, figure, self._pieces(figure, contexts, each, noise, chosen)
 

@@ -1,0 +1,95 @@
+"""Sentences that ask for several things in a row become stories of their parts."""
+
+import numpy as np
+import pytest
+
+from motet.errors import TextError, TextWarning
+from motet.models.composition import parts_of, sentences_of, stem, verbs_of
+from motet.models.generate_codes import CodesModel, Story
+from motet.models.load import load_as
+
+VERBS = verbs_of(
+    ["walking", "turning", "running", "jumping", "sitting", "drinking", "dancing", "bowing", "boxing", "something"]
+)
+COMPOSED = "he drinks, then he does a cartwheel"
+
+
+@pytest.fixture(scope="module")
+def model() -> CodesModel:
+    return load_as(CodesModel, "generate")
+
+
+@pytest.mark.parametrize(
+    "words", ["dance dances dancing danced", "run runs running", "carry carries carrying", "punch punches punching"]
+)
+def test_forms_of_a_word_share_a_stem(words: str) -> None:
+    assert len(set(map(stem, words.split()))) == 1
+
+
+@pytest.mark.parametrize(
+    ("sentence", "parts"),
+    [
+        ("walk to the table, drink, turn around and walk away", 4),
+        ("First she runs, and then the woman slowly sits down", 2),
+        ("a jab, then a hook", 2),
+        ("he jumps up and down", 1),
+        ("he walks with the left and the right hand raised", 1),
+        ("a tall, thin man walks", 1),
+        ("a boxer and a dancing man", 1),
+        ("he sits next to the table", 1),
+        ("then he bows", 1),
+    ],
+)
+def test_a_sentence_is_cut_before_its_verbs(sentence: str, parts: int) -> None:
+    found = parts_of(sentence, VERBS)
+    assert len(found) == parts
+    assert all(part in sentence for part in found)
+
+
+def test_texts_are_cut_into_sentences_but_not_numbers() -> None:
+    assert sentences_of("He walks 1.5 metres. He turns;\nhe sits!") == ["He walks 1.5 metres", "He turns", "he sits"]
+
+
+def test_what_one_action_shows_stays_whole(model: CodesModel) -> None:
+    known = "a person is walking, then stops"
+    assert model.parts(known) == [known]
+    assert model.parts(COMPOSED) == ["he drinks", "he does a cartwheel"]
+
+
+def test_a_composed_sentence_is_the_story_of_its_parts(model: CodesModel) -> None:
+    (made,) = model.generate(COMPOSED, seed=4)
+    told = model.story(["he drinks", "he does a cartwheel"], seed=4)
+    assert isinstance(made, Story)
+    assert [one.text for one in made.passages] == ["he drinks", "he does a cartwheel"]
+    np.testing.assert_array_equal(made.frames, told.frames)
+    np.testing.assert_array_equal(made.frames, model.story(COMPOSED, seed=4).frames)
+
+
+def test_composed_sentences_among_others_are_what_they_are_alone(model: CodesModel) -> None:
+    found = model.generate(["he jumps", COMPOSED, "he bows"], 2, seed=7)
+    for i, text in enumerate(["he jumps", COMPOSED, "he bows"]):
+        for one, alone in zip(found[i], model.generate(text, 2, seed=7 + i), strict=True):
+            np.testing.assert_array_equal(one.frames, alone.frames)
+    assert not np.array_equal(found[1][0].frames[:20], found[1][1].frames[:20])
+
+
+def test_whole_takes_it_as_one_action(model: CodesModel) -> None:
+    (made,) = model.generate(COMPOSED, whole=True)
+    assert not isinstance(made, Story)
+    assert len(model.story(COMPOSED, whole=True).passages) == 1
+
+
+def test_seconds_are_those_of_all_parts(model: CodesModel) -> None:
+    (made,) = model.generate(COMPOSED, seconds=5)
+    assert len(made.frames) == round(5 * model.fps)
+    assert isinstance(made, Story)
+    assert made.passages[0].stop == pytest.approx(2.5, abs=model.codec.seconds)
+
+
+def test_strict_refuses_the_part_that_is_unknown(model: CodesModel) -> None:
+    with pytest.raises(TextError, match="plays the violin"):
+        model.check("he drinks. he plays the violin.")
+    with pytest.warns(TextWarning, match="plays the violin"):
+        model.generate("he drinks. he plays the violin.")
+    with pytest.raises(TextError, match="knows no word of 'xyzzy'"):
+        model.generate("he drinks. xyzzy.")
