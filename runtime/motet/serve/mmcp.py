@@ -1,0 +1,278 @@
+"""motet as a server of the Motion Model Context Protocol (MMCP), which Blender's add-on Proscenium and others speak.
+
+The protocol's own SDK, which the extra ``mmcp`` installs, checks requests and writes glTF. Here a time line of prompts
+becomes a story, and constraints become keys that the motion passes through (docs/blender.md).
+"""
+
+import asyncio
+import secrets
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from motet.errors import DecodingError, MotetError, MotionError
+from motet.models.fill import LOOP_SECONDS, FillModel
+from motet.models.generate_codes import CodesModel
+from motet.motion import heading
+from motet.motion.humanoid import HUMANOID, Figure, from_humanoid
+from motet.motion.keys import Key, Moves
+from motet.motion.kinematics import chained, local_rotations, local_translations, motion_of
+from motet.motion.motion import Motion, spline
+from motet.motion.rotations import Array, quat_to_rotmat, rotmat_to_quat
+from motet.motion.skeleton import Joint, Skeleton
+from motet.representation.placed import placed, unplaced
+
+try:
+    from fastapi import FastAPI
+    from motionmcp import Backbone, GenerateRequest, ModelSpec, MotionResult, build_app, schemas
+    from motionmcp.backbone import Limits
+    from motionmcp.errors import ProtocolError
+except ImportError as error:
+    raise ImportError("motet.serve.mmcp needs motionmcp: install the extra with  pip install 'motet[mmcp]'") from error
+
+IDLE = "a person stands still"
+"""What is shown where a segment has no prompt."""
+
+REACH = 0.5
+"""Seconds within which a figure comes to a key pose and leaves it."""
+
+SLOWEST, FASTEST = 1.0, 240.0
+"""Frames a second."""
+
+LARGEST = 4_000_000
+"""Rotations of a response: frames, times joints, times samples."""
+
+Keys = Mapping[int, Key]
+"""Frame -> what the figure is to be there."""
+
+
+def mmcp_app(model: CodesModel, fill: FillModel) -> FastAPI:
+    """The ASGI application of an MMCP server whose prompts ``model`` shows, and where ``fill`` goes between key poses.
+
+    ImportError with the remedy where the SDK is missing.
+    """
+    application: FastAPI = build_app(MotetBackbone(model, fill), title="motet")
+    return application
+
+
+class MotetBackbone(Backbone):  # type: ignore[misc]  # the SDK has no types
+    """What the SDK asks: what this server can do, and a motion for a request."""
+
+    model_id = "motet"
+
+    def __init__(self, model: CodesModel, fill: FillModel) -> None:
+        self.model, self.fill = model, fill
+
+    def capabilities(self) -> ModelSpec:
+        """See the SDK: no end effectors, no ground but a flat one, one seed for a whole time line."""
+        return self._spec
+
+    @cached_property
+    def _spec(self) -> ModelSpec:
+        joints = [_joint(HUMANOID, i) for i in range(len(HUMANOID.joints))]
+        return ModelSpec(
+            id=self.model_id,
+            fps=self.fill.fps,
+            canonical_skeleton=schemas.Skeleton(joints=joints),
+            supports_retargeting=True,
+            supports_loop=True,
+            supported_constraints=["root_path", "pose_keyframe"],
+            supported_guidance_types=["nocfg"],
+            recommended_max_duration_seconds=30.0,
+            limits=Limits(max_duration_seconds=60.0, max_num_samples=8),
+        )
+
+    async def generate(self, request: GenerateRequest) -> MotionResult:
+        """A motion for a request, in a thread; ProtocolError for one that cannot be answered."""
+        return await asyncio.to_thread(self.answer, request)
+
+    def answer(self, request: GenerateRequest) -> MotionResult:
+        """See :meth:`generate`."""
+        fps, options = request.fps(self.fill.fps), request.options or schemas.Options()
+        _check(request, fps, options)
+        with _refused("invalid_skeleton"):
+            figure = _figure(request.skeleton)
+        with _refused("invalid_request"):
+            keys = _keys(request, figure.posture[0])
+            seed = secrets.randbits(32) if options.seed is None else options.seed
+            takes = [self._take(request, fps, figure, keys, seed + i) for i in range(options.num_samples)]
+        turns, roots = (np.stack(part) for part in zip(*takes, strict=True))
+        return MotionResult(
+            rotations=rotmat_to_quat(turns).astype(np.float32),
+            root_translations=roots.astype(np.float32),
+            notes=self._notes(request, seed),
+        )
+
+    def _take(self, request: GenerateRequest, fps: float, figure: Figure, keys: Keys, seed: int) -> tuple[Array, Array]:
+        """A sample: rotations (T, J, 3, 3) of the figure's joints and places (T, 3) of its root."""
+        if not request.segments:
+            motion = self._between(figure, keys, request.total_frames, fps)
+        elif request.options and request.options.loop:
+            motion = self._loop(request.segments[0], request.total_frames, fps, seed)
+        else:
+            texts = [getattr(segment, "prompt", IDLE) for segment in request.segments]
+            seconds = [segment.duration_frames / fps for segment in request.segments]
+            seconds[-1] += 2 / self.model.fps  # what the last frame is interpolated from
+            plant = request.options is None or request.options.post_processing
+            story = self.model.story(texts, seconds=seconds, seed=seed)
+            motion = story.playable(fps, plant)[: request.total_frames]
+        moves = _on_figure(motion, figure).through(keys, round(REACH * fps))
+        return moves.turns, moves.root
+
+    def _loop(self, segment: schemas.TextSegment, frames: int, fps: float, seed: int) -> Motion:
+        """A cycle that ends as it began, at another place: the last half second leads back."""
+        whole = max(2, round((frames - 1) / fps * self.fill.fps))
+        gap = min(round(LOOP_SECONDS * self.fill.fps), whole // 3)
+        drawn = whole - gap
+        prompt, seconds = getattr(segment, "prompt", IDLE), (drawn + 2) / self.fill.fps
+        motion = self.model.story(prompt, seconds=seconds, seed=seed).playable(self.fill.fps)[:drawn]
+        known = placed(motion)
+        steps = np.diff(known[:, [0, 2]], axis=0)
+        pace = (steps[-5:].mean(axis=0) + steps[:5].mean(axis=0)) / 2  # metres a frame
+        again = known[: self.fill.context].copy()
+        again[:, [0, 2]] += known[-1, [0, 2]] + (gap + 1) * pace - known[0, [0, 2]]
+        cycle = np.concatenate([known, self.fill.frames_between(known, again, gap), again[:1]])
+        return unplaced(spline(cycle, np.linspace(0, whole, frames)), replace(motion[:1], fps=fps))
+
+    def _between(self, figure: Figure, keys: Keys, frames: int, fps: float) -> Motion:
+        """A way from key pose to key pose; before the first and after the last the figure holds it."""
+        posed = {frame: key for frame, key in sorted(keys.items()) if key.turns}
+        if len(posed) < 2:
+            raise MotionError("without a prompt, motet goes from key pose to key pose: give two, or a prompt")
+        motion = _humanoid(figure, posed, fps)
+        poses = [np.repeat(one[None], self.fill.least, axis=0) for one in placed(motion)]
+        pieces = [np.repeat(poses[0][:1], min(posed), axis=0)]
+        for (one, two), (before, after) in zip(pairwise(posed), pairwise(poses), strict=True):
+            if (two - one) / fps > self.fill.seconds:
+                far = f"the key poses of frames {one} and {two} are {(two - one) / fps:.2g} s apart"
+                raise MotionError(f"{far}, and at most {self.fill.seconds:g} s are filled: add one, or a prompt")
+            span = (two - one) / fps * self.fill.fps
+            count = max(0, round(span) - 1)
+            way = [before[:1], self.fill.frames_between(before, after, count, span / (count + 1)), after[:1]]
+            pieces.append(spline(np.concatenate(way), np.arange(two - one) / (two - one) * (count + 1)))
+        pieces.append(np.repeat(poses[-1][:1], frames - max(posed), axis=0))
+        return unplaced(np.concatenate(pieces), motion[:1])
+
+    def _notes(self, request: GenerateRequest, seed: int) -> list[dict[str, str]]:
+        """What the client cannot see: the seed that was drawn, and what was not understood."""
+        said = [("seed", "info", f"drawn with the seed {seed}")]
+        for text in dict.fromkeys(getattr(segment, "prompt", IDLE) for segment in request.segments):
+            found, unknown = self.model.understood(text), self.model.unknown(text)
+            if unknown:
+                said.append(("unknown_words", "warning", f"{text!r}: unknown words: {', '.join(unknown)}"))
+            if not found.confident:
+                near = ", ".join(map(repr, found.nearest))
+                said.append(("unfamiliar", "warning", f"{text!r} is outside the training data; nearest: {near}"))
+        if request.options and request.options.guidance and request.options.guidance.type != "nocfg":
+            said.append(("guidance", "info", "guidance is the model's own: the request's is not used"))
+        return [dict(zip(("code", "severity", "message"), one, strict=True)) for one in said]
+
+
+def _check(request: GenerateRequest, fps: float, options: schemas.Options) -> None:
+    """ProtocolError for what the SDK does not check."""
+    size = request.total_frames * len(request.skeleton.joints) * options.num_samples
+    for wrong, code, said in (
+        (not SLOWEST <= fps <= FASTEST, "invalid_options", f"timing.fps must be from {SLOWEST:g} to {FASTEST:g}"),
+        (size > LARGEST, "invalid_options", f"frames x joints x samples must be at most {LARGEST:,}, not {size:,}"),
+        (
+            any(segment.seed is not None for segment in request.segments),
+            "invalid_options",
+            "a time line is drawn from one seed: give options.seed, and none to segments",
+        ),
+        (
+            options.loop and (bool(request.constraints) or request.total_frames < SLOWEST * fps),
+            "invalid_options",
+            "a loop takes a second or more, and no constraints",
+        ),
+        (
+            any(abs(abs(joint.rest_rotation[3]) - 1) > 1e-4 for joint in request.skeleton.joints),
+            "invalid_skeleton",
+            "rest_rotation must be [0, 0, 0, 1]: the rest pose is that of the rest_translations",
+        ),
+    ):
+        if wrong:
+            raise ProtocolError(code, said)
+
+
+@contextmanager
+def _refused(code: str) -> Iterator[None]:
+    """motet's errors as the protocol's."""
+    try:
+        yield
+    except DecodingError as error:
+        raise ProtocolError("invalid_options", str(error)) from error
+    except MotetError as error:
+        raise ProtocolError(code, str(error)) from error
+
+
+def _joint(skeleton: Skeleton, index: int) -> schemas.Joint:
+    joint = skeleton.joints[index]
+    parent = None if index == 0 else skeleton.names[joint.parent]
+    return schemas.Joint(name=joint.name, parent=parent, rest_translation=joint.offset, rest_rotation=(0, 0, 0, 1))
+
+
+def _figure(given: schemas.Skeleton) -> Figure:
+    """The client's figure; MotionError where it is no human's."""
+    at = {joint.name: place for place, joint in enumerate(given.joints)}
+    joints = [Joint(one.name, at.get(one.parent, -1), one.rest_translation) for one in given.joints]
+    return replace(Figure.of(Skeleton(tuple(joints), 1.0)), ground=0.0)
+
+
+def _keys(request: GenerateRequest, skeleton: Skeleton) -> Keys:
+    """What the constraints ask for, by frame; MotionError where they contradict each other or hold no number."""
+    keys: dict[int, Key] = {}
+
+    def add(frame: int, key: Key) -> None:
+        keys[frame] = key.joined(keys[frame]) if frame in keys else key
+
+    for one in request.constraints:
+        if one.type == "pose_keyframe":
+            add(one.frame, _pose(one, skeleton))
+            continue
+        facing = one.heading_radians or [np.nan] * len(one.frames)
+        if not np.isfinite([*np.ravel(one.positions_xz), *(one.heading_radians or ())]).all():
+            raise MotionError("root_path: positions and headings must be finite numbers")
+        for frame, (x, z), angle in zip(one.frames, one.positions_xz, facing, strict=True):
+            add(frame, Key(place=np.array([x, np.nan, z]), facing=angle))
+    return keys
+
+
+def _pose(given: schemas.PoseKeyframeConstraint, skeleton: Skeleton) -> Key:
+    """A key pose; MotionError for a rotation or a place that is none."""
+    where = f"pose_keyframe of frame {given.frame}"
+    turns = {} if given.fill_mode == "generate" else dict.fromkeys(range(len(skeleton.joints)), np.eye(3))
+    for name, quat in given.joint_rotations.items():
+        length = float(np.linalg.norm(quat))
+        if not 1e-3 < length < 1e3:  # NaN is neither
+            raise MotionError(f"{where}: {name!r}: {list(quat)} is no rotation")
+        turns[skeleton.index(name)] = quat_to_rotmat(np.array(quat) / length)
+    place = np.full(3, np.nan) if given.root_position is None else np.array(given.root_position)
+    if given.root_position is not None and not np.isfinite(place).all():
+        raise MotionError(f"{where}: root_position must be finite numbers")
+    return Key(turns, place)
+
+
+def _humanoid(figure: Figure, keys: Keys, fps: float) -> Motion:
+    """Key poses of the client's figure, one after the other, as a motion of the humanoid; joints that are not given
+    are at rest, and a root that is not stays where it was."""
+    skeleton, at = figure.posture[0], figure.posture[0].offsets[0]
+    turns = np.tile(np.eye(3), (len(keys), len(skeleton.joints), 1, 1))
+    places = np.tile(skeleton.offsets, (len(keys), 1, 1))
+    for number, key in enumerate(keys.values()):
+        for joint, turn in key.turns.items():
+            turns[number, joint] = turn
+        at = np.where(np.isnan(key.place), at, key.place)
+        places[number, 0] = at
+    turned, places = chained(skeleton, turns, places)
+    return figure.to_humanoid(motion_of(skeleton, turned, {0: places[:, 0]}, fps))
+
+
+def _on_figure(motion: Motion, figure: Figure) -> Moves:
+    """A motion of the humanoid on the client's figure, whose root alone moves: joints above the hips do not turn."""
+    found, skeleton = from_humanoid(motion, figure), figure.posture[0]
+    root = skeleton.offsets[0] + (local_translations(found) - skeleton.offsets).sum(axis=1)
+    return Moves(local_rotations(found), root, heading(motion))

@@ -1,0 +1,266 @@
+"""The MMCP server, by the protocol's own client over HTTP; motions against those of the library."""
+
+import json
+import threading
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+import motet
+from motet.motion import HUMANOID, Motion, from_humanoid, global_transforms, rig
+from motet.motion.rotations import Array
+
+pytest.importorskip("motionmcp")
+uvicorn = pytest.importorskip("uvicorn")
+
+WALK = {"type": "text", "prompt": "a person walks forward", "duration_frames": 60}
+QUARTER = [0.0, 0.0, 0.5**0.5, 0.5**0.5]
+"""A quarter turn about z."""
+
+
+@pytest.fixture(scope="module")
+def url() -> Iterator[str]:
+    from motet.serve.mmcp import mmcp_app
+
+    config = uvicorn.Config(mmcp_app(motet.load("generate"), motet.load("fill")), port=0, log_level="error")
+    server = uvicorn.Server(config)
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    while not server.started:
+        time.sleep(0.01)
+    yield f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"
+    server.should_exit = True
+    thread.join()
+
+
+@pytest.fixture(scope="module")
+def skeleton(url: str) -> Any:
+    from motionmcp import client
+
+    (model,) = client.get_capabilities(url)["models"]
+    return model["canonical_skeleton"]
+
+
+def ask(url: str, skeleton: Any, **request: Any) -> list[dict[str, Any]]:
+    """The samples of an answer."""
+    from motionmcp import client
+
+    request = {"segments": [WALK], "options": {"seed": 5}, **request}
+    document = client.generate(url, {"protocol_version": "1.0", "model": "motet", "skeleton": skeleton, **request})
+    samples: list[dict[str, Any]] = client.parse_gltf_samples(document)
+    return samples
+
+
+def sent(skeleton: Any) -> dict[str, Any]:
+    """A skeleton of motet's as the protocol has it."""
+    joints = [
+        {
+            "name": joint.name,
+            "parent": None if joint.parent < 0 else skeleton.names[joint.parent],
+            "rest_translation": [one * skeleton.metres_per_unit for one in joint.offset],
+            "rest_rotation": [0, 0, 0, 1],
+        }
+        for joint in skeleton.joints
+    ]
+    return {"joints": joints}
+
+
+def positions(sample: dict[str, Any]) -> Array:
+    """Positions (T, J, 3) of a sample's joints, by going down its tree."""
+    places, turns = {}, {}
+    for joint, (name, parent) in enumerate(sample["hierarchy"]):
+        own, at = sample["local_rot_mats"][:, joint], sample["local_translations"][:, joint]
+        if parent is None:
+            turns[name], places[name] = own, at
+        else:
+            turns[name] = turns[parent] @ own
+            places[name] = places[parent] + np.einsum("tij,tj->ti", turns[parent], at)
+    return np.stack(list(places.values()), axis=1)
+
+
+def told(seed: int, *texts: str, frames: int = 60) -> Motion:
+    story = motet.load("generate").story(
+        texts, seconds=[frames / 30] * (len(texts) - 1) + [(frames + 2) / 30], seed=seed
+    )
+    return story.motion[: frames * len(texts)]
+
+
+def test_capabilities_say_what_it_can(url: str) -> None:
+    from motionmcp import client
+
+    (model,) = client.get_capabilities(url)["models"]
+    assert [joint["name"] for joint in model["canonical_skeleton"]["joints"]] == list(HUMANOID.names)
+    assert model["supported_constraints"] == ["root_path", "pose_keyframe"]
+    assert model["supported_segments"] == ["text", "unconditioned"]
+    assert model["supports_retargeting"]
+    assert model["supports_loop"]
+    assert not model["supports_segment_seed"]
+
+
+def test_a_time_line_is_the_story_of_its_prompts(url: str, skeleton: Any) -> None:
+    """Sample i of a request is the story with seed + i, on the humanoid frame by frame."""
+    segments = [WALK, {**WALK, "prompt": "a person waves"}]
+    samples = ask(url, skeleton, segments=segments, options={"seed": 5, "num_samples": 2})
+    for seed, sample in zip((5, 6), samples, strict=True):
+        expected = global_transforms(told(seed, WALK["prompt"], "a person waves"))[1]
+        np.testing.assert_allclose(positions(sample), expected, atol=0.02)
+        assert sample["fps"] == 30
+    # a gap without a prompt is filled by standing
+    (idle,) = ask(url, skeleton, segments=[WALK, {"type": "unconditioned", "duration_frames": 60}])
+    assert np.abs(np.diff(positions(idle)[-15:, 0], axis=0)).max() < 0.01
+
+
+def test_other_frame_rates_have_the_same_motion(url: str, skeleton: Any) -> None:
+    (slow,) = ask(url, skeleton, segments=[{**WALK, "duration_frames": 20}], timing={"fps": 10})
+    np.testing.assert_allclose(positions(slow), positions(ask(url, skeleton)[0])[::3], atol=0.02)
+
+
+def test_a_seed_that_is_not_given_is_drawn_and_told(url: str, skeleton: Any) -> None:
+    from motionmcp import client
+
+    request = {"protocol_version": "1.0", "model": "motet", "skeleton": skeleton, "segments": [WALK]}
+    documents = [client.generate(url, request) for _ in range(2)]
+    seeds = [int(one["extensions"]["MMCP_motion"]["notes"][0]["message"].split()[-1]) for one in documents]
+    assert seeds[0] != seeds[1]
+    again = ask(url, skeleton, options={"seed": seeds[0]})
+    np.testing.assert_array_equal(positions(again[0]), positions(client.parse_gltf_samples(documents[0])[0]))
+
+
+@pytest.mark.parametrize("name", ["mixamo", "unreal"])
+def test_the_client_s_own_figure_gets_the_motion(url: str, name: str) -> None:
+    """Also one whose hips hang below a root at the floor: its root moves, and all joints are where motet puts them."""
+    own = rig(name)
+    (sample,) = ask(url, sent(own))
+    motion = from_humanoid(told(5, WALK["prompt"]), own)
+    expected = global_transforms(motion)[1] * own.metres_per_unit
+    below = own.subtree(next(one.rpartition(".")[0] for one in motion.channels if one.endswith(".tx")))
+    found = positions(sample)
+    np.testing.assert_allclose(found[:, below], expected[:, below], atol=0.02)
+    np.testing.assert_allclose(np.ptp(found[:, 0], axis=0), np.ptp(found[:, below[0]], axis=0), atol=1e-5)
+
+
+def test_keys_are_met(url: str, skeleton: Any) -> None:
+    pose = {"type": "pose_keyframe", "frame": 30, "joint_rotations": {"leftUpperArm": QUARTER}}
+    path = {"type": "root_path", "frames": [0, 59], "positions_xz": [[1, 2], [3, 2]], "heading_radians": [1.5, 1.5]}
+    (sample,) = ask(url, skeleton, constraints=[pose, path])
+    turn = sample["local_rot_mats"][30, sample["joint_names"].index("leftUpperArm")]
+    np.testing.assert_allclose(turn, [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-5)
+    found = positions(sample)
+    np.testing.assert_allclose(found[[0, 59], 0][:, [0, 2]], path["positions_xz"], atol=1e-4)
+    hips = found[0, HUMANOID.index("leftUpperLeg")] - found[0, HUMANOID.index("rightUpperLeg")]
+    assert abs(np.arctan2(-hips[2], hips[0]) - 1.5) < 0.2  # its left is a quarter turn from where it faces
+
+
+def test_without_a_prompt_it_goes_from_key_pose_to_key_pose(url: str, skeleton: Any) -> None:
+    keys = [
+        {"type": "pose_keyframe", "frame": 0, "joint_rotations": {"leftUpperArm": [0, 0, 0, 1]}, "fill_mode": "rest"},
+        {
+            "type": "pose_keyframe",
+            "frame": 40,
+            "joint_rotations": {"leftUpperArm": QUARTER},
+            "root_position": [0, 0.98, 1],
+            "fill_mode": "rest",
+        },
+    ]
+    (sample,) = ask(url, skeleton, segments=[], duration_frames=60, constraints=keys)
+    found, arm = positions(sample), sample["joint_names"].index("leftUpperArm")
+    np.testing.assert_allclose(sample["local_rot_mats"][0], np.tile(np.eye(3), (27, 1, 1)), atol=1e-5)
+    np.testing.assert_allclose(sample["local_rot_mats"][40, arm][:, 0], [0, 1, 0], atol=1e-5)
+    np.testing.assert_allclose(found[40:, 0], np.tile([0, 0.98, 1], (20, 1)), atol=0.02)
+    assert (np.diff(found[5:35, 0, 2]) > 0).all()  # it goes there
+
+
+def test_a_loop_ends_as_it_began(url: str, skeleton: Any) -> None:
+    (sample,) = ask(url, skeleton, options={"seed": 5, "loop": True})
+    turns, root = sample["local_rot_mats"], positions(sample)[:, 0]
+    np.testing.assert_allclose(turns[-1], turns[0], atol=1e-6)
+    assert root[-1, 1] == pytest.approx(root[0, 1])
+    steps = np.linalg.norm(np.diff(root, axis=0), axis=1)
+    assert len(turns) == 60
+    assert steps.max() < 3 * np.median(steps)  # it walks on where it leads back
+
+
+def test_unknown_words_are_noted(url: str, skeleton: Any) -> None:
+    from motionmcp import client
+
+    segments = [{**WALK, "prompt": "a person zorbs and walks"}]
+    request = {"protocol_version": "1.0", "model": "motet", "skeleton": skeleton, "segments": segments}
+    notes = client.generate(url, request)["extensions"]["MMCP_motion"]["notes"]
+    assert any(note["code"] == "unknown_words" and "zorbs" in note["message"] for note in notes)
+
+
+def key(frame: int = 0, **fields: Any) -> dict[str, Any]:
+    return {"type": "pose_keyframe", "frame": frame, "joint_rotations": {"leftUpperArm": QUARTER}, **fields}
+
+
+def pin(x: Any, frame: int = 0) -> dict[str, Any]:
+    return {"type": "root_path", "frames": [frame], "positions_xz": [[x, 0]]}
+
+
+NAN = float("nan")
+TREE = {"joints": [{"name": "trunk", "parent": None, "rest_translation": [0, 1, 0], "rest_rotation": [0, 0, 0, 1]}]}
+
+
+@pytest.mark.parametrize(
+    ("request_", "code", "said"),
+    [
+        ({"model": "other"}, "unknown_model", "other"),
+        ({"skeleton": TREE}, "invalid_skeleton", "human"),
+        ({"constraints": [key(joint_rotations={"tail": QUARTER})]}, "unknown_joint", "tail"),
+        ({"constraints": [key(60)]}, "frame_out_of_range", "60"),
+        ({"constraints": [pin(0), pin(1)]}, "invalid_request", "two constraints"),
+        (
+            {"constraints": [key(), key(joint_rotations={"leftUpperArm": [0, 0, 0, 1]})]},
+            "invalid_request",
+            "two constr",
+        ),
+        ({"constraints": [key(root_position=[0, 1, 0]), pin(1)]}, "invalid_request", "two constraints"),
+        ({"constraints": [pin(NAN)]}, "invalid_request", "finite"),
+        ({"constraints": [key(joint_rotations={"leftUpperArm": [NAN, 0, 0, 1]})]}, "invalid_request", "no rotation"),
+        ({"constraints": [key(joint_rotations={"leftUpperArm": [0, 0, 0, 0]})]}, "invalid_request", "no rotation"),
+        ({"constraints": [key(root_position=[0, NAN, 0])]}, "invalid_request", "root_position"),
+        ({"constraints": [{**pin(0), "type": "effector_target"}]}, "schema_validation", ""),
+        (
+            {
+                "constraints": [
+                    {"type": "effector_target", "joint": "leftHand", "frames": [0], "positions": [[0, 1, 0]]}
+                ]
+            },
+            "unsupported_constraint",
+            "effector_target",
+        ),
+        ({"segments": [{**WALK, "duration_frames": 10**6}]}, "invalid_options", "duration"),
+        ({"timing": {"fps": float("inf")}}, "invalid_options", "fps"),
+        ({"segments": [{**WALK, "duration_frames": 10**9}], "timing": {"fps": 1e8}}, "invalid_options", "fps"),
+        ({"segments": [{**WALK, "seed": 3}]}, "invalid_options", "options.seed"),
+        ({"segments": [{**WALK, "prompt": "zorb"}]}, "invalid_request", "zorb"),
+        ({"options": {"seed": -1}}, "invalid_options", "seed"),
+        ({"options": {"num_samples": 9}}, "invalid_options", "num_samples"),
+        ({"options": {"loop": True}, "constraints": [pin(0)]}, "invalid_options", "loop"),
+        ({"segments": [], "duration_frames": 60, "constraints": [key()]}, "invalid_request", "give two, or a prompt"),
+        (
+            {"segments": [], "duration_frames": 90, "constraints": [key(), key(89)]},
+            "invalid_request",
+            "at most 2 s are",
+        ),
+    ],
+)
+def test_what_cannot_be_answered_is_refused(url: str, skeleton: Any, request_: Any, code: str, said: str) -> None:
+    body = {"protocol_version": "1.0", "model": "motet", "skeleton": skeleton, "segments": [WALK], **request_}
+    post = urllib.request.Request(f"{url}/generate", json.dumps(body).encode())  # the SDK's client sends no NaN
+    with pytest.raises(urllib.error.HTTPError) as refused:
+        urllib.request.urlopen(post)
+    error = json.load(refused.value)["error"]
+    assert error["code"] == code, error
+    assert said in error["message"]
+
+
+def test_skeletons_that_are_turned_or_hold_no_numbers_are_refused(url: str, skeleton: Any) -> None:
+    for field, value in (("rest_rotation", QUARTER), ("rest_translation", [0, NAN, 0])):
+        joints = [*skeleton["joints"][:-1], {**skeleton["joints"][-1], field: value}]
+        test_what_cannot_be_answered_is_refused(url, skeleton, {"skeleton": {"joints": joints}}, "invalid_skeleton", "")
