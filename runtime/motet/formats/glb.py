@@ -22,7 +22,7 @@ from motet.draw.figure import COLOURS, Body, Bone
 from motet.errors import MotionError
 from motet.files import File, write_whole
 from motet.formats.gltf_data import COMPONENTS
-from motet.motion.humanoid import BONES, HUMANOID, LEFT_RIGHT, grounded, on_humanoid, relaxed, sided
+from motet.motion.humanoid import BONES, FINGERS, HUMANOID, LEFT_RIGHT, grounded, on_humanoid, relaxed, sided
 from motet.motion.kinematics import local_rotations, local_translations, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, rotmat_to_quat
@@ -201,23 +201,13 @@ def _prism(bone: Bone, start: Array, end: Array, corners: int) -> tuple[Array, A
 
 
 def _with_fingers() -> Skeleton:
-    """The humanoid with VRM's fingers: offsets from the parents, in metres, in the left hand; the right mirrors it."""
-    thumb, finger = ("Metacarpal", "Proximal", "Distal"), ("Proximal", "Intermediate", "Distal")
-    bones = {
-        "Thumb": (thumb, (0.025, -0.01, 0.025), (0.035, -0.005, 0.02), (0.025, -0.005, 0.015)),
-        "Index": (finger, (0.09, 0.0, 0.03), (0.04, 0.0, 0.0), (0.025, 0.0, 0.0)),
-        "Middle": (finger, (0.09, 0.0, 0.01), (0.045, 0.0, 0.0), (0.03, 0.0, 0.0)),
-        "Ring": (finger, (0.09, 0.0, -0.01), (0.04, 0.0, 0.0), (0.025, 0.0, 0.0)),
-        "Little": (finger, (0.09, 0.0, -0.03), (0.03, 0.0, 0.0), (0.02, 0.0, 0.0)),
-    }
-    joints = list(HUMANOID.joints)
+    """The humanoid with VRM's fingers after its joints."""
+    joints = {joint.name: joint for joint in HUMANOID.joints}
     for side, sign in zip(LEFT_RIGHT, (1.0, -1.0), strict=True):
-        for name, (parts, *offsets) in bones.items():
-            parent = HUMANOID.index(sided(side, "Hand"))
-            for part, (x, y, z) in zip(parts, offsets, strict=True):
-                joints.append(Joint(sided(side, name + part), parent, (sign * x, y, z)))
-                parent = len(joints) - 1
-    return Skeleton(tuple(joints), metres_per_unit=1.0)
+        for part, (parent, (x, y, z), order) in FINGERS.items():
+            above = list(joints).index(sided(side, parent))
+            joints[sided(side, part)] = Joint(sided(side, part), above, (sign * x, y, z), order)
+    return Skeleton(tuple(joints.values()), metres_per_unit=1.0)
 
 
 VRMA_SKELETON = _with_fingers()

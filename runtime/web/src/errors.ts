@@ -12,3 +12,13 @@ export class TextError extends Error {
 export class DecodingError extends Error {
   override name = "DecodingError";
 }
+
+/** A figure that is no human's, or a motion that cannot be used. */
+export class MotionError extends Error {
+  override name = "MotionError";
+}
+
+/** A file that is no motion, is cut short or is damaged; it says where. */
+export class FormatError extends MotionError {
+  override name = "FormatError";
+}

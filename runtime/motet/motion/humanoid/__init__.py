@@ -5,6 +5,7 @@ Two doors: :func:`to_humanoid` and :func:`from_humanoid`, with a :class:`Figure`
 
 from motet.motion.humanoid.bones import (
     BONES,
+    FINGERS,
     HUMANOID,
     LEFT_RIGHT,
     LEG,
@@ -37,6 +38,7 @@ from motet.motion.humanoid.retarget import (
 
 __all__ = [
     "BONES",
+    "FINGERS",
     "HUMANOID",
     "LEFT_RIGHT",
     "LEG",

@@ -6,7 +6,9 @@ is that of the world at rest, so a joint's rotation says the same on every figur
 
 Proportions: an adult of 1.70 m. Heights of knee, hip, shoulder and chin are the fractions of stature of Drillis and
 Contini (1966), as in Winter, "Biomechanics and Motor Control of Human Movement", figure 4.1, rounded to centimetres;
-the joint of the upper arm lies inside the shoulder's width, the ankle at the height of the joint's centre.
+the joint of the upper arm lies inside the shoulder's width, the ankle at the height of the joint's centre. The figures
+are in humanoid.json, for readers in other languages, too: of the trunk, and of the left side, which the right mirrors,
+each joint's parent, offset and Euler order.
 """
 
 import json
@@ -55,34 +57,10 @@ def _joints(trunk: Places, left: Places, sides: tuple[str, str], scale: float = 
     )
 
 
+_TABLES = json.loads((files("motet.motion.humanoid") / "humanoid.json").read_text("utf-8"))
+
 # an order's middle axis is the one that the joint turns least about, which keeps poses away from gimbal locks
-HUMANOID = Skeleton(
-    _joints(
-        {
-            "hips": ("", (0.0, 0.98, 0.0), "yzx"),
-            "spine": ("hips", (0.0, 0.09, 0.0), "yzx"),
-            "chest": ("spine", (0.0, 0.12, 0.0), "yzx"),
-            "upperChest": ("chest", (0.0, 0.12, 0.0), "yzx"),
-            "neck": ("upperChest", (0.0, 0.15, 0.0), "yzx"),
-            "head": ("neck", (0.0, 0.09, 0.0), "yzx"),
-            "head_end": ("head", (0.0, 0.15, 0.0), "zyx"),
-        },
-        {
-            "UpperLeg": ("hips", (0.09, -0.06, 0.0), "xzy"),
-            "LowerLeg": ("UpperLeg", (0.0, -0.42, 0.0), "xzy"),
-            "Foot": ("LowerLeg", (0.0, -0.42, 0.0), "xzy"),
-            "Toes": ("Foot", (0.0, -0.06, 0.13), "xzy"),
-            "Toes_end": ("Toes", (0.0, -0.02, 0.07), "zyx"),
-            "Shoulder": ("upperChest", (0.03, 0.09, 0.0), "zyx"),
-            "UpperArm": ("Shoulder", (0.14, 0.0, 0.0), "zyx"),
-            "LowerArm": ("UpperArm", (0.28, 0.0, 0.0), "yzx"),
-            "Hand": ("LowerArm", (0.25, 0.0, 0.0), "zyx"),
-            "Hand_end": ("Hand", (0.18, 0.0, 0.0), "zyx"),
-        },
-        LEFT_RIGHT,
-    ),
-    metres_per_unit=1.0,
-)
+HUMANOID = Skeleton(_joints(_TABLES["trunk"], _TABLES["left"], LEFT_RIGHT), metres_per_unit=1.0)
 """The humanoid's skeleton: 22 bones and the tips of head, hands and toes."""
 
 BONES = tuple(name for name in HUMANOID.names if not name.endswith(END_SUFFIX))
@@ -97,7 +75,9 @@ PARENTS = {name: HUMANOID.names[max(0, HUMANOID.joints[HUMANOID.index(name)].par
 T_POSE = HUMANOID.rest_positions + HUMANOID.offsets[0]
 """Positions (J, 3) of the humanoid's joints in the T-pose, with the soles at y = 0."""
 
-SOLE = {"Foot": ((0.0, -0.08, -0.05), (0.0, -0.08, 0.13)), "Toes": ((0.0, -0.02, 0.07),)}
+SOLE: Mapping[str, tuple[tuple[float, float, float], ...]] = {
+    part: tuple(map(tuple, points)) for part, points in _TABLES["soles"].items()
+}
 """Points of the sole in the frames of the foot (heel, ball) and of the toes (tip)."""
 
 
@@ -121,6 +101,9 @@ def ground_under(soles: Array) -> float:
     no frames."""
     return float(np.percentile(soles[..., 1].min(axis=1), 5)) if len(soles) else 0.0
 
+
+FINGERS: Places = _TABLES["fingers"]
+"""VRM's fingers of the left hand, each after its parent, "Hand" or another finger's bone."""
 
 MMM_SKELETON = Skeleton(
     _joints(

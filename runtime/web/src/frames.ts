@@ -1,0 +1,171 @@
+/* Motions as the frames of a model, and back: docs/bundle.md, "Frames". */
+import type { Manifest } from "./bundle.js";
+import { DecodingError, MotionError } from "./errors.js";
+import { eulersOf, fromEuler } from "./euler.js";
+import { holdFeet } from "./hold.js";
+import { BONES, HUMANOID, isHumanoid } from "./humanoid.js";
+import { unitOf } from "./measure.js";
+import { Body } from "./body.js";
+import { mapOf } from "./jointMap.js";
+import type { Frames } from "./models.js";
+import { checked, type Motion, resampled } from "./motion.js";
+import { rounded } from "./numbers.js";
+import { moved, type Pose as Ground, seenFrom } from "./planar.js";
+import { posesOf } from "./poses.js";
+import {
+  about, dot, minus, ofVector, plus, product, type Quaternion, rotated, size, times, type Vector, vectorOf, X, Y,
+} from "./rotations.js";
+import { toHumanoid } from "./retarget.js";
+import { Skeleton } from "./skeleton.js";
+
+const RADIANS = Math.PI / 180;
+const KINDS: Record<string, string> = { root_angles: "r", root_vectors: "e", root_sixd: "x" };
+
+/** The frames that a model takes of a motion of any human figure: of `describe`, `search`, `predict` or `generate`. */
+export function framesFor(motion: Motion, manifest: Manifest): number[][] {
+  const { representation, fps } = manifest.motion;
+  const bones = bonesOf(manifest);
+  const found = resampled(onFigure(checked(motion), fps), fps);
+  const metres = found.skeleton.metresPerUnit!;
+  const places = found.translations.map((moves) => times(moves[0]!, metres));
+  const turns = (bone: string) => found.rotations.map((row) => row[found.skeleton.index(bone)]!);
+  const root = found.rotations.map((row) => row[0]!);
+  if (representation === "root_sixd") return sixd(root, places, bones.slice(1).map(turns), fps);
+  const block = eulersOf(root, "yxz");
+  const unit = representation === "root_angles" ? RADIANS : 1;
+  const joints = bones.map((bone) => (representation === "root_angles" ? degrees(turns(bone), bone) : vectors(turns(bone))));
+  const rates = velocities(places, block.map(([heading]) => heading), fps);
+  return rates.map(([forward, left, turn], at) => {
+    const [, pitch, roll] = block[at]!;
+    return [forward, left, turn / unit, places[at]![1], pitch / unit, roll / unit, ...joints.flatMap((joint) => joint[at]!)];
+  });
+}
+
+/** The bones that the channels of a model on the humanoid speak of; DecodingError for any other model. */
+function bonesOf({ motion: { representation, channels, skeleton } }: Manifest): string[] {
+  const kind = KINDS[representation];
+  const bones = channels.filter((name) => name.endsWith(kind === "x" ? ".xx" : `.${kind}x`)).map((name) => name.slice(0, -3));
+  const whole = channels.length === (kind === "x" ? 4 + 6 * bones.length : 6 + 3 * bones.length);
+  const own = skeleton?.joints.length === HUMANOID.joints.length && skeleton.joints.every(({ name }, at) => name === HUMANOID.names[at]);
+  if (!kind || !whole || !own) throw new DecodingError(`motions are made into frames of models on the humanoid, not of ${representation}`);
+  return bones;
+}
+
+/** The motion on the humanoid or, where its joints are the humanoid's, as it is, in a known unit. */
+function onFigure(motion: Motion, fps: number): Motion {
+  const { skeleton } = motion;
+  if (isHumanoid(skeleton)) return motion;
+  if (!hasBones(skeleton)) {
+    if (!motion.travels) throw new MotionError("this motion lacks the path of the figure: it has no channels for the root's place");
+    return toHumanoid(motion.fps > fps ? resampled(motion, fps) : motion).motion;
+  }
+  const unit = skeleton.metresPerUnit ?? unitOf(skeleton, new Body(skeleton, mapOf(skeleton)).legLength(skeleton.rest)).metres;
+  if (unit === null) throw new MotionError("the unit of lengths is not known");
+  return { ...motion, skeleton: new Skeleton(skeleton.joints, unit) };
+}
+
+/** Whether a skeleton has all bones by the humanoid's names, which point within 45 degrees of the humanoid's. */
+function hasBones(skeleton: Skeleton): boolean {
+  const at = (own: Skeleton, name: string) => own.rest[own.names.indexOf(name)]!;
+  return BONES.every((name) => skeleton.names.includes(name)) && HUMANOID.joints.every(({ name, parent }) => {
+    if (parent < 0 || !skeleton.names.includes(name)) return true;
+    const above = HUMANOID.names[parent]!;
+    const [one, two] = [skeleton, HUMANOID].map((own) => minus(at(own, name), at(own, above))) as [Vector, Vector];
+    return Math.min(size(one), size(two)) < 1e-6 || dot(one, two) >= Math.cos(45 * RADIANS) * size(one) * size(two);
+  });
+}
+
+function degrees(turns: Quaternion[], bone: string): number[][] {
+  const { order } = HUMANOID.joints[HUMANOID.index(bone)]!;
+  return eulersOf(turns, order).map((angles) => Array.from("xyz", (axis) => angles[order.indexOf(axis)]! / RADIANS));
+}
+
+/** Rotation vectors that do not leap: from the last frame backwards each is the one nearest to that after it. */
+function vectors(turns: Quaternion[]): number[][] {
+  const found = turns.map(vectorOf);
+  for (let at = found.length - 2; at >= 0; at--) {
+    const [own, after] = [found[at]!, found[at + 1]!];
+    const angle = size(own);
+    const axis = angle > 1e-3 ? times(own, 1 / angle) : times(after, 1 / Math.max(size(after), 1e-9));
+    const rounds = Math.round((dot(after, axis) - angle) / (2 * Math.PI));
+    found[at] = plus(own, times(axis, 2 * Math.PI * rounds));
+  }
+  return found;
+}
+
+/** Forward and to the left in metres and the turn, a second; the first frame has the second one's. */
+function velocities(places: Vector[], facing: number[], fps: number): Ground[] {
+  if (places.length < 2) return [[0, 0, 0]];
+  return places.map((_, at) => {
+    const later = Math.max(at, 1);
+    const [from, to] = [later - 1, later].map((one): Ground => [places[one]![0], places[one]![2], facing[one]!]) as [Ground, Ground];
+    return seenFrom(from, to).map((rate) => rate * fps) as Ground;
+  });
+}
+
+function sixd(root: Quaternion[], places: Vector[], joints: Quaternion[][], fps: number): number[][] {
+  const facing = facingOf(root, fps);
+  const axes = (turn: Quaternion) => [...rotated(turn, X), ...rotated(turn, Y)];
+  return velocities(places, facing, fps).map((rates, at) => {
+    const hips = product(about(Y, -facing[at]!), root[at]!);
+    return [...rates, places[at]![1], ...axes(hips), ...joints.flatMap((turns) => axes(turns[at]!))];
+  });
+}
+
+/** The turn about the vertical axis, smoothed over time, calm where the root is tilted: docs/bundle.md, "Frames". */
+function facingOf(root: Quaternion[], fps: number): number[] {
+  const deviation = (4 / 30) * fps;
+  const reach = Math.max(1, rounded(4 * deviation));
+  const doubled = root.map(([, y, , w]) => [w * w - y * y, 2 * w * y] as const);
+  let last = 0;
+  return root.map((_, at) => {
+    let [real, imaginary] = [0, 0];
+    for (let step = Math.max(-reach, -at); step <= reach && at + step < root.length; step++) {
+      const weight = Math.exp(-0.5 * (step / deviation) ** 2);
+      real += weight * doubled[at + step]![0];
+      imaginary += weight * doubled[at + step]![1];
+    }
+    const angle = Math.atan2(imaginary, real);
+    last = at ? angle - 2 * Math.PI * Math.round((angle - last) / (2 * Math.PI)) : angle;
+    return last;
+  });
+}
+
+/** A motion of the humanoid from a model's frames, from the origin, facing z; feet of `root_sixd` are held unless `plant` is false. */
+export function motionOf(frames: Frames, manifest: Manifest, { plant = true }: { plant?: boolean } = {}): Motion {
+  const { representation, fps } = manifest.motion;
+  const bones = bonesOf(manifest);
+  if (!frames.length) throw new DecodingError("there are no frames to make a motion of");
+  if (representation === "root_sixd") return ofSixd(plant ? plantFeet(frames, manifest) : frames, manifest);
+  const unit = representation === "root_angles" ? RADIANS : 1;
+  let ground: Ground = [0, 0, 0];
+  const rows = frames.map((frame, at) => {
+    const [forward, left, turn, height, pitch, roll] = Array.from({ length: 6 }, (_, i) => frame[i]!) as [number, number, number, number, number, number];
+    if (at) ground = moved(ground, [forward / fps, left / fps, (turn * unit) / fps]);
+    const rotations: Record<string, Quaternion> = { hips: fromEuler([ground[2], pitch * unit, roll * unit], "yxz") };
+    bones.forEach((bone, i) => (rotations[bone] = turnOf([0, 1, 2].map((axis) => frame[6 + 3 * i + axis]! * unit) as Vector, bone, unit === 1)));
+    return { hips: [ground[0], height, ground[1]] as Vector, rotations };
+  });
+  return posed(rows, fps);
+}
+
+function turnOf(values: Vector, bone: string, isVector: boolean): Quaternion {
+  const { order } = HUMANOID.joints[HUMANOID.index(bone)]!;
+  return isVector ? ofVector(values) : fromEuler(Array.from(order, (axis) => values["xyz".indexOf(axis)]!) as Vector, order);
+}
+
+/** Frames of `root_sixd` with standing feet held in place: what Python gives for a sentence. */
+export function plantFeet(frames: Frames, manifest: Manifest): Frames {
+  const held = frames.length < 2 ? undefined : holdFeet(ofSixd(frames, manifest));
+  return held ? framesFor(held, manifest) : frames;
+}
+
+function ofSixd(frames: Frames, manifest: Manifest): Motion {
+  return posed(posesOf(frames, manifest), manifest.motion.fps);
+}
+
+function posed(poses: { hips: Vector; rotations: Record<string, Quaternion> }[], fps: number): Motion {
+  const rotations = poses.map((pose) => HUMANOID.names.map((name): Quaternion => pose.rotations[name] ?? [0, 0, 0, 1]));
+  const translations = poses.map((pose) => HUMANOID.joints.map(({ offset }, at) => (at ? offset : pose.hips)));
+  return checked({ skeleton: HUMANOID, fps, rotations, translations, travels: true });
+}

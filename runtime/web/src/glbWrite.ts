@@ -1,0 +1,110 @@
+/* Writing VRM Animation: docs/formats.md; a GLB file whose nodes are the humanoid in a T-pose. */
+import { MotionError } from "./errors.js";
+import { relaxed } from "./fingers.js";
+import { BONES, FINGERED, groundUnder, HUMANOID, solePoints } from "./humanoid.js";
+import { checked, type Motion, worldOf } from "./motion.js";
+import { minus, type Quaternion, STILL, type Vector } from "./rotations.js";
+import { END, type Skeleton } from "./skeleton.js";
+import { onHumanoid } from "./retarget.js";
+
+const FLOAT = 5126;
+
+class Buffer {
+  private readonly parts: Float32Array[] = [];
+  private length = 0;
+  readonly bufferViews: object[] = [];
+  readonly accessors: object[] = [];
+
+  /** The index of a new accessor of rows of numbers. */
+  add(rows: number[][], bounded = false): number {
+    const width = rows[0]!.length;
+    const data = Float32Array.from(rows.flat());
+    if (!data.every(Number.isFinite)) throw new MotionError("values of this motion exceed glTF's 32-bit numbers");
+    this.bufferViews.push({ buffer: 0, byteOffset: this.length, byteLength: data.byteLength });
+    const bounds = bounded ? { min: [data.at(0)!], max: [data.at(-1)!] } : {};
+    const type = { 1: "SCALAR", 3: "VEC3", 4: "VEC4" }[width];
+    this.accessors.push({ bufferView: this.bufferViews.length - 1, componentType: FLOAT, count: rows.length, type, ...bounds });
+    this.parts.push(data);
+    this.length += data.byteLength;
+    return this.accessors.length - 1;
+  }
+
+  document(): object {
+    return { bufferViews: this.bufferViews, accessors: this.accessors, buffers: [{ byteLength: this.length }] };
+  }
+
+  bytes(): Uint8Array {
+    return new Uint8Array(Float32Array.from(this.parts.flatMap((part) => Array.from(part))).buffer);
+  }
+}
+
+/** The bytes of a .vrma file of a motion, which is brought to the humanoid; a VRM avatar of any proportions plays it. */
+export function toVRMA(motion: Motion): Uint8Array {
+  const found = grounded(onHumanoid(checked(motion)));
+  const buffer = new Buffer();
+  const names = [...BONES, ...FINGERED.names.slice(HUMANOID.names.length)];
+  const humanBones = Object.fromEntries(names.map((name) => [name, { node: FINGERED.index(name) }]));
+  const document = {
+    asset: { version: "2.0", generator: "motet" },
+    extensionsUsed: ["VRMC_vrm_animation"],
+    extensions: { VRMC_vrm_animation: { specVersion: "1.0", humanoid: { humanBones } } },
+    scene: 0,
+    scenes: [{ nodes: [0] }],
+    nodes: nodesOf(FINGERED),
+    animations: [animation(buffer, found)],
+    ...buffer.document(),
+  };
+  return container(document, buffer.bytes());
+}
+
+/** A motion of the humanoid laid on the ground where it is up to 0.1 m off it, as motions of models may be. */
+export function grounded(motion: Motion): Motion {
+  const ground = groundUnder(solePoints(worldOf(motion)));
+  if (!(Math.abs(ground) < 0.1)) return motion;
+  return { ...motion, translations: motion.translations.map(([root, ...rest]) => [minus(root!, [0, ground, 0]), ...rest]) };
+}
+
+function nodesOf({ joints, children }: Skeleton): object[] {
+  return joints.map(({ name, offset }, at) => ({ name, translation: offset, ...(children[at]!.length ? { children: children[at] } : {}) }));
+}
+
+function animation(buffer: Buffer, { fps, rotations, translations }: Motion): object {
+  const times = buffer.add(rotations.map((_, at) => [at / fps]), true);
+  const start = buffer.add([[0]], true);
+  const [channels, samplers]: [object[], object[]] = [[], []];
+  const track = (node: number, path: string, values: number[][]) => {
+    channels.push({ sampler: samplers.length, target: { node, path } });
+    samplers.push({ input: values.length === rotations.length ? times : start, output: buffer.add(values), interpolation: "LINEAR" });
+  };
+  HUMANOID.names.forEach((name, at) => {
+    if (!name.endsWith(END)) track(at, "rotation", nearby(rotations.map((turns) => turns[at]!)));
+  });
+  track(0, "translation", translations.map((moves): Vector => moves[0]!));
+  const hands = relaxed(FINGERED, FINGERED.joints.map(() => STILL), Object.fromEntries(FINGERED.names.map((name, at) => [name, at])));
+  for (let at = HUMANOID.names.length; at < hands.length; at++) track(at, "rotation", [hands[at]!]);
+  return { name: "motion", channels, samplers };
+}
+
+/** The same rotations with signs that keep each quaternion near the one before it. */
+export function nearby(turns: Quaternion[]): Quaternion[] {
+  let last = turns[0]!;
+  return turns.map((turn) => {
+    const cosine = turn.reduce((sum, value, at) => sum + value * last[at]!, 0);
+    last = cosine < 0 ? (turn.map((value) => -value) as Quaternion) : turn;
+    return last;
+  });
+}
+
+/** A GLB file of a JSON object and the binary part, whose length is a multiple of four. */
+function container(document: object, content: Uint8Array): Uint8Array {
+  const json = new TextEncoder().encode(JSON.stringify(document));
+  const padded = Math.ceil(json.length / 4) * 4;
+  const file = new Uint8Array(28 + padded + content.length).fill(0x20, 20, 20 + padded);
+  const view = new DataView(file.buffer);
+  [0x46546c67, 2, file.length, padded, 0x4e4f534a].forEach((word, at) => view.setUint32(4 * at, word, true));
+  view.setUint32(20 + padded, content.length, true);
+  view.setUint32(24 + padded, 0x004e4942, true);
+  file.set(json, 20);
+  file.set(content, 28 + padded);
+  return file;
+}

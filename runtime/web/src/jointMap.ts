@@ -1,0 +1,178 @@
+/* Which joint of a skeleton is which bone of the humanoid, by the names of joints: docs/humanoid.md, "Which joint is which". */
+import { MotionError } from "./errors.js";
+import { ARM, LEG, SIDES } from "./humanoid.js";
+import type { Vector } from "./rotations.js";
+import { END, type Skeleton } from "./skeleton.js";
+import { type Table, TABLES } from "./tables.js";
+
+/** The joints of a skeleton that are bones; spine and neck are all joints of a chain, upwards. */
+export interface JointMap {
+  joints: Record<string, number>;
+  spine: number[];
+  neck: number[];
+  convention: string;
+  /** From 0 to 1. */
+  confidence: number;
+  /** Where the convention rests in a pose of its own: bone -> rotation vector in degrees; and where bones point in it. */
+  rest?: Record<string, Vector>;
+  points: Record<string, Vector>;
+  /** Where the convention rests in no body's pose: joint -> its axes that are left, up and forward, as "-z x -y". */
+  axes: Record<number, string>;
+}
+
+const CHAINS = ["spine", "neck"];
+const UNSIDED = ["hips", "head", ...CHAINS];
+const NEEDED = ["hips", "spine", ...SIDES.flatMap((side) => [...LEG.slice(0, 3), ...ARM.slice(1, 3)].map((part) => side + part))];
+
+/** The bones of limbs, from hip or shoulder on. */
+export const LIMBS = SIDES.flatMap((side) => [LEG, ARM.slice(1)].map((parts) => parts.map((part) => side + part)));
+
+/** The bones whose lengths tell that a figure is whole. */
+export const MEASURED = NEEDED.slice(2);
+
+/** The joint that carries legs and back: the hips, or what they hang on where the back is not theirs. */
+export function carrierOf({ joints, spine }: JointMap, skeleton: Skeleton): number {
+  return skeleton.above(joints.hips!).find((joint) => skeleton.under(joint).includes(spine[0]!))!;
+}
+
+/** A table for one way of writing the sides: of each bone the plain names that its joint can have. */
+interface Convention {
+  title: string;
+  names: Record<string, string[]>;
+  aside: Set<string>;
+  prefixes: string[];
+  rest?: Record<string, Vector>;
+  points: Record<string, Vector>;
+  axes: Record<string, string>;
+}
+
+const CONVENTIONS = TABLES.flatMap((table) => table.sides.map((sides) => conventionOf(table, sides)));
+
+function conventionOf(table: Table, words: [string, string]): Convention {
+  const names: Record<string, string[]> = {};
+  for (const [bone, known] of Object.entries(table.joints)) {
+    if (UNSIDED.includes(bone)) names[bone] = known.map(plain);
+    else SIDES.forEach((side, at) => (names[side + bone] = known.map((name) => plain(name.replaceAll("{s}", words[at]!)))));
+  }
+  return {
+    title: table.title,
+    names,
+    aside: new Set((table.aside ?? []).flatMap((name) => words.map((word) => plain(name.replaceAll("{s}", word))))),
+    prefixes: table.prefixes ?? [],
+    rest: table.rest && bothSides(table.rest, [1, -1, -1]),
+    points: bothSides(table.points ?? {}, [-1, 1, 1]),
+    axes: Object.fromEntries(Object.entries(table.axes ?? {}).map(([name, axes]) => [plain(name), axes])),
+  };
+}
+
+/** Vectors of the left side and, mirrored by signs, of the right. */
+function bothSides(ofLeft: Record<string, Vector>, signs: Vector): Record<string, Vector> {
+  const found: Record<string, Vector> = {};
+  for (const [bone, own] of Object.entries(ofLeft)) {
+    if (UNSIDED.includes(bone)) found[bone] = own;
+    else [found[`left${bone}`], found[`right${bone}`]] = [own, own.map((value, axis) => signs[axis]! * value) as Vector];
+  }
+  return found;
+}
+
+/** A name without what differs between files: case, separators, and the namespace before a colon. */
+function plain(name: string): string {
+  return name.slice(name.lastIndexOf(":") + 1).toLowerCase().replace(/[^a-z0-9]/g, "");
+}
+
+/** The map by the table that fits best; MotionError where none does, or joints are missing or out of order. */
+export function mapOf(skeleton: Skeleton): JointMap {
+  const matches = CONVENTIONS.map((convention) => match(convention, skeleton));
+  matches.sort((a, b) => b.known - a.known || a.absent - b.absent);
+  const fullest = matches[0]!;
+  const told = onOneSide(missing(fullest.map), fullest.map);
+  const best = told ? fullest : (matches.find(({ map }) => !missing(map).length) ?? fullest);
+  const lacking = missing(best.map);
+  if (lacking.length && !(Object.keys(best.map.joints).length >= 6 && best.known > 0.5 * skeleton.names.length)) {
+    throw new MotionError("no table of joints' names fits this skeleton: give a map of bones and joints");
+  }
+  return checkedMap(skeleton, best.map);
+}
+
+function match(convention: Convention, skeleton: Skeleton) {
+  const names = plainNames(convention, skeleton.names);
+  const chain = (bone: string) => (convention.names[bone] ?? []).map((name) => names.indexOf(name)).filter((at) => at >= 0).sort((a, b) => a - b);
+  const [spine, neck] = [chain("spine"), chain("neck")];
+  const hips = names.flatMap((name, at) => (name === convention.names.hips![0] && skeleton.children[at]!.length >= 3 ? [at] : []));
+  if (hips.length > 1) throw new MotionError("this file has two hips: put each figure in a file of its own");
+  const limbs = Object.entries(convention.names).filter(([bone]) => !CHAINS.includes(bone));
+  const found = limbs.map(([bone, known]) => [bone, known.map((name) => names.indexOf(name)).find((at) => at >= 0)] as const);
+  const joints = Object.fromEntries(found.filter((pair): pair is readonly [string, number] => pair[1] !== undefined));
+  const own = new Set([...Object.values(convention.names).flat(), ...convention.aside]);
+  const known = names.filter((name) => own.has(name)).length;
+  const chains = CHAINS.filter((bone) => convention.names[bone]);
+  const links = chains.flatMap((bone) => convention.names[bone]!).filter((name) => !names.includes(name)).length;
+  const absent = limbs.length - Object.keys(joints).length + chains.length - (spine.length ? 1 : 0) - (neck.length ? 1 : 0) + links;
+  // other makers' figures of these names have joints besides, or rest in another pose
+  const whole = known >= skeleton.names.filter((name) => !name.endsWith(END)).length;
+  const axes = Object.fromEntries(names.flatMap((name, at) => (convention.axes[name] ? [[at, convention.axes[name]!]] : [])));
+  const confidence = Math.round(100 * (1 - (0.3 * absent) / (absent + known))) / 100;
+  const { title, rest, points } = convention;
+  return { known, absent, map: { joints, spine, neck, convention: title, confidence, rest: whole ? rest : undefined, points, axes } };
+}
+
+/** Names without the convention's prefixes, or the first word where nearly all names begin with it. */
+function plainNames({ prefixes }: Convention, names: string[]): string[] {
+  const words = names.flatMap((name) => /^[A-Za-z]+[0-9]*[ _:.-]+(?=.)/.exec(name)?.[0] ?? []);
+  const count = (word: string) => words.filter((other) => other === word).length;
+  const common = words.reduce((best, word) => (count(word) > count(best) ? word : best), words[0] ?? "");
+  const shared = count(common) > 0.8 * names.length ? [common.replace(/[.\-]/g, "\\$&")] : [];
+  const pattern = [...prefixes, ...shared].map((prefix) => `(?:${prefix})[ _:.-]*`).join("|") || "(?!)";
+  return names.map((name) => plain(name.replace(new RegExp(`^(?:${pattern})(?=.)`, "i"), "")));
+}
+
+/** A map of a user's own: bone -> the joint's name, of spine and neck all names, upwards. MotionError says what is wrong. */
+export function mapFrom(skeleton: Skeleton, given: Record<string, string | string[]>): JointMap {
+  const places: Record<string, number[]> = {};
+  for (const [bone, names] of Object.entries(given)) {
+    const known = UNSIDED.includes(bone) || SIDES.some((side) => [...LEG, ...ARM].some((part) => side + part === bone));
+    if (!known) throw new MotionError(`${JSON.stringify(bone)} is not a bone of the humanoid`);
+    places[bone] = [names].flat().map((name) => skeleton.index(name));
+    if (!CHAINS.includes(bone) && places[bone]!.length !== 1) throw new MotionError(`${bone}: only spine and neck take a list`);
+  }
+  const used = Object.values(places).flat();
+  if (new Set(used).size < used.length) throw new MotionError("a joint can be only one bone");
+  const { spine = [], neck = [], ...limbs } = places;
+  const joints = Object.fromEntries(Object.entries(limbs).map(([bone, [joint]]) => [bone, joint!]));
+  return checkedMap(skeleton, { joints, spine, neck, convention: "a map", confidence: 1, points: {}, axes: {} });
+}
+
+const PARTNERS = Object.fromEntries(
+  [...LEG, ...ARM].flatMap((part) => [[`left${part}`, `right${part}`], [`right${part}`, `left${part}`]]),
+) as Record<string, string>;
+
+/** The needed bones that are missing, and those that are there on the other side only. */
+function missing({ joints, spine }: JointMap): string[] {
+  const there = new Set([...Object.keys(joints), ...(spine.length ? ["spine"] : [])]);
+  const oneSided = Object.keys(PARTNERS).filter((bone) => there.has(PARTNERS[bone]!));
+  return [...new Set([...NEEDED, ...oneSided])].filter((bone) => !there.has(bone));
+}
+
+function onOneSide(lacking: string[], { joints }: JointMap): boolean {
+  return lacking.length > 0 && lacking.every((bone) => PARTNERS[bone] && joints[PARTNERS[bone]!] !== undefined);
+}
+
+function checkedMap(skeleton: Skeleton, map: JointMap): JointMap {
+  const lacking = missing(map);
+  const where = onOneSide(lacking, map) ? " (joints are missing on one side only)" : "";
+  if (lacking.length) throw new MotionError(`no joint was found for ${lacking.join(", ")}${where}; give a map of bones and joints`);
+  const chains = [map.spine, [map.spine[0]!, ...map.neck]];
+  for (const side of SIDES) {
+    for (const [first, parts] of [[map.joints.hips!, LEG], [map.spine[0]!, ARM]] as const) {
+      chains.push([first, ...parts.map((part) => map.joints[side + part]).filter((joint) => joint !== undefined)]);
+    }
+  }
+  for (const chain of chains) {
+    chain.slice(1).forEach((lower, at) => {
+      if (lower === chain[at]! || !skeleton.above(lower).includes(chain[at]!)) {
+        throw new MotionError(`joints are out of order: ${skeleton.names[lower]} does not hang on ${skeleton.names[chain[at]!]}`);
+      }
+    });
+  }
+  return map;
+}

@@ -1,0 +1,50 @@
+/** The difference of the largest and the least number. */
+export function spread(values: number[]): number {
+  let [least, most] = [Infinity, -Infinity];
+  for (const value of values) [least, most] = [Math.min(least, value), Math.max(most, value)];
+  return most - least;
+}
+
+/** The value that a share (0 to 1) of the values lies below, between two of them on a line. */
+export function quantile(values: number[], share: number): number {
+  const sorted = Float64Array.from(values).sort();
+  const at = share * (sorted.length - 1);
+  const low = Math.floor(at);
+  return sorted[low]! + (at - low) * (sorted[Math.min(low + 1, sorted.length - 1)]! - sorted[low]!);
+}
+
+export function median(values: number[]): number {
+  return quantile(values, 0.5);
+}
+
+/** The nearest whole number, of two the even one, as in Python. */
+export function rounded(value: number): number {
+  const nearest = Math.round(value);
+  return Math.abs(value - Math.trunc(value)) === 0.5 && nearest % 2 ? nearest - 1 : nearest;
+}
+
+/** Smoothly from 0 at `start` to 1 at `end` (Perlin's "smootherstep", 2002). */
+export function rise(value: number, start: number, end: number): number {
+  const part = Math.max(0, Math.min(1, (value - start) / Math.max(end - start, 1e-12)));
+  return part ** 3 * (10 - 15 * part + 6 * part ** 2);
+}
+
+/** Numbers by row smoothed by a Gaussian window of so many rows' deviation; at both ends their mirror images in them go on. */
+export function smoothed(rows: number[][], deviation: number): number[][] {
+  const reach = rounded(3 * deviation);
+  const last = rows.length - 1;
+  if (last < 1 || !reach) return rows;
+  const window = Array.from({ length: 2 * reach + 1 }, (_, at) => Math.exp(-0.5 * ((at - reach) / deviation) ** 2));
+  const total = window.reduce((sum, weight) => sum + weight);
+  const value = (row: number, column: number): number =>
+    row < 0 ? 2 * rows[0]![column]! - value(-row, column)
+    : row > last ? 2 * rows[last]![column]! - value(2 * last - row, column)
+    : rows[row]![column]!;
+  return rows.map((own, row) => own.map((_, column) => window.reduce((sum, weight, at) => sum + weight * value(row + at - reach, column), 0) / total));
+}
+
+/** Each value's window of `reach` values before and as many after; those at the ends go on. */
+export function windows(values: number[], reach: number): number[][] {
+  const value = (at: number) => values[Math.max(0, Math.min(values.length - 1, at))]!;
+  return values.map((_, at) => Array.from({ length: 2 * reach + 1 }, (_, step) => value(at + step - reach)));
+}

@@ -1,0 +1,79 @@
+import { MotionError } from "./errors.js";
+import { spread } from "./numbers.js";
+import { plus, type Vector } from "./rotations.js";
+
+/** What ends the name of the tip of a last bone, which has no rotation of its own. */
+export const END = "_end";
+
+/** A joint and the offset from its parent at rest; the order of Euler angles is that of its file. */
+export interface Joint {
+  name: string;
+  /** The parent's index, which is lower, or -1 of the root alone, which is first. */
+  parent: number;
+  offset: Vector;
+  order: string;
+}
+
+/** A tree of joints; y is up. The pose in which no joint turns is called the rest pose. */
+export class Skeleton {
+  readonly names: string[];
+  /** The indices of each joint's children. */
+  readonly children: number[][];
+  /** Where each joint is at rest, the root at the origin. */
+  readonly rest: Vector[] = [];
+
+  /** metresPerUnit: metres of one unit of the offsets; null where the file does not say. */
+  constructor(
+    readonly joints: Joint[],
+    readonly metresPerUnit: number | null = null,
+  ) {
+    this.names = joints.map((joint) => joint.name);
+    if (!joints.length) throw new MotionError("a skeleton needs at least one joint");
+    if (new Set(this.names).size < joints.length) throw new MotionError("names of joints must be unique");
+    this.children = joints.map(() => []);
+    joints.forEach(({ name, parent, offset }, at) => {
+      if (at ? !(parent >= 0 && parent < at) : parent !== -1) throw new MotionError(`the joint ${name} must come after its parent`);
+      if (!offset.every(Number.isFinite)) throw new MotionError(`the offset of ${name} must be finite`);
+      this.rest.push(at ? plus(this.rest[parent]!, offset) : [0, 0, 0]);
+      if (at) this.children[parent]!.push(at);
+    });
+  }
+
+  /** The largest extent of the rest pose along an axis. */
+  get height(): number {
+    return Math.max(...[0, 1, 2].map((axis) => spread(this.rest.map((place) => place[axis]!))));
+  }
+
+  /** The same tree with other offsets and another unit. */
+  with(offset: (joint: number) => Vector, metresPerUnit: number | null): Skeleton {
+    return new Skeleton(this.joints.map((joint, at) => ({ ...joint, offset: offset(at) })), metresPerUnit);
+  }
+
+  index(name: string): number {
+    const found = this.names.indexOf(name);
+    if (found < 0) throw new MotionError(`the skeleton has no joint ${JSON.stringify(name)}`);
+    return found;
+  }
+
+  /** A joint and all that hang on it, in order. */
+  under(joint: number): number[] {
+    const found = [joint];
+    for (const one of found) found.push(...this.children[one]!);
+    return found.sort((a, b) => a - b);
+  }
+
+  /** A joint and all that it hangs on, up to the root. */
+  above(joint: number): number[] {
+    const found: number[] = [];
+    for (let at = joint; at >= 0; at = this.joints[at]!.parent) found.push(at);
+    return found;
+  }
+}
+
+/** A name, with a number behind it if it is taken; the result is then taken, too. */
+export function unique(name: string, taken: Set<string>): string {
+  let found = name;
+  for (let number = 2; taken.has(found); number++) found = `${name}_${number}`;
+  taken.add(found);
+  return found;
+}

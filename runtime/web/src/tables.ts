@@ -1,0 +1,45 @@
+/* The tables of joints' names, which are those of the Python package: a file for each convention. */
+import accad from "../../motet/motion/humanoid/conventions/accad.json";
+import bandaiNamco from "../../motet/motion/humanoid/conventions/bandai-namco.json";
+import biped from "../../motet/motion/humanoid/conventions/biped.json";
+import characterCreator from "../../motet/motion/humanoid/conventions/character-creator.json";
+import cmuAmc from "../../motet/motion/humanoid/conventions/cmu-amc.json";
+import cmuBvh43 from "../../motet/motion/humanoid/conventions/cmu-bvh-43.json";
+import cmuBvh from "../../motet/motion/humanoid/conventions/cmu-bvh.json";
+import daz from "../../motet/motion/humanoid/conventions/daz.json";
+import kaykit from "../../motet/motion/humanoid/conventions/kaykit.json";
+import lafan1 from "../../motet/motion/humanoid/conventions/lafan1.json";
+import makehuman from "../../motet/motion/humanoid/conventions/makehuman.json";
+import mixamo from "../../motet/motion/humanoid/conventions/mixamo.json";
+import mmm from "../../motet/motion/humanoid/conventions/mmm.json";
+import perceptionNeuron from "../../motet/motion/humanoid/conventions/perception-neuron.json";
+import poser from "../../motet/motion/humanoid/conventions/poser.json";
+import rigify from "../../motet/motion/humanoid/conventions/rigify.json";
+import rokoko from "../../motet/motion/humanoid/conventions/rokoko.json";
+import sfu from "../../motet/motion/humanoid/conventions/sfu.json";
+import smpl from "../../motet/motion/humanoid/conventions/smpl.json";
+import soma from "../../motet/motion/humanoid/conventions/soma.json";
+import unity from "../../motet/motion/humanoid/conventions/unity.json";
+import unreal from "../../motet/motion/humanoid/conventions/unreal.json";
+import vroid from "../../motet/motion/humanoid/conventions/vroid.json";
+import xsensBvh from "../../motet/motion/humanoid/conventions/xsens-bvh.json";
+import xsens from "../../motet/motion/humanoid/conventions/xsens.json";
+import type { Vector } from "./rotations.js";
+
+/** docs/humanoid.md, "The tables of names". */
+export interface Table {
+  title: string;
+  prefixes?: string[];
+  sides: [string, string][];
+  joints: Record<string, string[]>;
+  aside?: string[];
+  rest?: Record<string, Vector>;
+  points?: Record<string, Vector>;
+  axes?: Record<string, string>;
+}
+
+/** In the order of their files' names. */
+export const TABLES = [
+  accad, bandaiNamco, biped, characterCreator, cmuAmc, cmuBvh43, cmuBvh, daz, kaykit, lafan1, makehuman, mixamo, mmm,
+  perceptionNeuron, poser, rigify, rokoko, sfu, smpl, soma, unity, unreal, vroid, xsensBvh, xsens,
+] as Table[];

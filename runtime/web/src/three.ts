@@ -1,0 +1,71 @@
+/* Motions for three.js, which is no dependency: plain objects that THREE.AnimationClip.parse takes. */
+import { MotionError } from "./errors.js";
+import { grounded, nearby } from "./glbWrite.js";
+import { BONES, HUMANOID } from "./humanoid.js";
+import type { Motion } from "./motion.js";
+import { onHumanoid } from "./retarget.js";
+import type { Quaternion, Vector } from "./rotations.js";
+import { END } from "./skeleton.js";
+
+export interface Track {
+  name: string;
+  type: "quaternion" | "vector";
+  times: number[];
+  values: number[];
+}
+
+/** What THREE.AnimationClip.parse takes. */
+export interface Clip {
+  name: string;
+  duration: number;
+  tracks: Track[];
+}
+
+/** What is needed of a VRM that @pixiv/three-vrm has loaded. */
+export interface Avatar {
+  meta: { metaVersion: string };
+  humanoid: {
+    getNormalizedBoneNode(bone: never): { name: string } | null;
+    normalizedRestPose: Record<string, { position?: ArrayLike<number> } | undefined>;
+  };
+}
+
+/**
+ * A clip of a motion: of any human figure, for a VRM avatar; or else of the motion's own joints, by their names as three
+ * writes them. MotionError for a figure that is no human's, or an avatar without hips.
+ */
+export function toThree(motion: Motion, avatar?: Avatar): Clip {
+  const tracks = avatar ? avatarTracks(grounded(onHumanoid(motion)), avatar) : jointTracks(motion);
+  return { name: "motion", duration: (motion.rotations.length - 1) / motion.fps, tracks };
+}
+
+function jointTracks(motion: Motion): Track[] {
+  const { skeleton, rotations, translations } = motion;
+  return skeleton.names.flatMap((name, at) => {
+    const node = name.replace(/\s/g, "_").replace(/[[\].:/]/g, "");
+    const [turns, moves] = [rotations.map((row) => row[at]!), translations.map((row) => row[at]!)];
+    const moving = at === 0 || moves.some((move) => move !== skeleton.joints[at]!.offset);
+    const turn = name.endsWith(END) ? [] : [track(`${node}.quaternion`, "quaternion", motion.fps, nearby(turns))];
+    return moving ? [...turn, track(`${node}.position`, "vector", motion.fps, moves)] : turn;
+  });
+}
+
+function avatarTracks({ fps, rotations, translations }: Motion, { humanoid, meta }: Avatar): Track[] {
+  // a VRM of version 0 faces -z
+  const sign = meta.metaVersion === "0" ? -1 : 1;
+  const node = (bone: string) => humanoid.getNormalizedBoneNode(bone as never)?.name;
+  const [hips, height] = [node("hips"), humanoid.normalizedRestPose.hips?.position?.[1]];
+  if (hips === undefined || height === undefined) throw new MotionError("this avatar has no hips: a VRM humanoid is needed");
+  const tracks = BONES.flatMap((bone) => {
+    const [name, at] = [node(bone), HUMANOID.index(bone)];
+    const turns = rotations.map((row): Quaternion => [sign * row[at]![0], row[at]![1], sign * row[at]![2], row[at]![3]]);
+    return name === undefined ? [] : [track(`${name}.quaternion`, "quaternion", fps, nearby(turns))];
+  });
+  const scale = height / HUMANOID.joints[0]!.offset[1];
+  const moves = translations.map((row): Vector => [sign * scale * row[0]![0], scale * row[0]![1], sign * scale * row[0]![2]]);
+  return [...tracks, track(`${hips}.position`, "vector", fps, moves)];
+}
+
+function track(name: string, type: Track["type"], fps: number, rows: number[][]): Track {
+  return { name, type, times: rows.map((_, at) => at / fps), values: rows.flat() };
+}
