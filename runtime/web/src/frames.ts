@@ -7,7 +7,7 @@ import { BONES, HUMANOID, isHumanoid } from "./humanoid.js";
 import { unitOf } from "./measure.js";
 import { Body } from "./body.js";
 import { mapOf } from "./jointMap.js";
-import type { Frames } from "./models.js";
+import type { Frames } from "./model.js";
 import { checked, type Motion, resampled } from "./motion.js";
 import { rounded } from "./numbers.js";
 import { moved, type Pose as Ground, seenFrom } from "./planar.js";
