@@ -118,6 +118,19 @@ def long(model: SearchModel) -> list[float]:
     return (found / np.linalg.norm(found)).tolist()
 
 
+def parted(model: CodesModel) -> dict[str, list[str]]:
+    """What texts ask for one after another."""
+    texts = [
+        "Walk to the table, drink, turn around and walk away.",
+        "First the man slowly sits down, and then he bows; finally he jumps up and down!",
+        "a person is walking, then stops",
+        "she carries a box and punches, kicks and dances next to the wall",
+        "a tall, thin man walks 1.5 metres with the left and the right hand raised",
+        "rock and roll",
+    ]
+    return {text: model.parts(text) for text in texts}
+
+
 def answers() -> dict[str, Any]:
     generate, describe = motet.load("generate"), motet.load("describe")
     return {
@@ -125,6 +138,7 @@ def answers() -> dict[str, Any]:
         "story": told(generate),
         "after": continued(generate),
         "understood": understood(generate),
+        "parts": parted(generate),
         **described(describe),
         "score": scored(describe),
         "expected": expected(motet.load("predict")),

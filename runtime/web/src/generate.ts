@@ -1,11 +1,12 @@
 import type { Bundle, Manifest } from "./bundle.js";
 import { type Codec, codesOf, type Context, StreamingDecoder } from "./codec.js";
+import { FUNCTION_WORDS, partsOf, sentencesOf, stem, verbsOf } from "./composition.js";
 import { drawCodes, drawnAction, drawnSteps, type Drawing, type Source, Writer } from "./codes.js";
 import { BundleError, DecodingError, TextError } from "./errors.js";
 import type { Graph } from "./graph.js";
 import { Memory } from "./memory.js";
 import { type Frames, LanguageModel } from "./model.js";
-import { type Noise, Pcg64 } from "./random.js";
+import { type Noise, Pcg64, stateOf } from "./random.js";
 
 /** How motions are drawn: by default as the bundle says. */
 export interface GenerateSettings extends Partial<Drawing> {
@@ -17,6 +18,8 @@ export interface GenerateSettings extends Partial<Drawing> {
   seconds?: number;
   /** The most seconds of a motion that ends by itself. */
   max_seconds?: number;
+  /** Take a text that asks for several things in a row as one; else it is a story of its parts. */
+  whole?: boolean;
 }
 
 /** How a story is drawn: by default as the bundle says. */
@@ -25,6 +28,8 @@ export interface StorySettings extends Partial<Drawing> {
   /** Of each sentence, or one value for all; null for a sentence that ends by itself, as all do by default. */
   seconds?: number | (number | null)[];
   max_seconds?: number;
+  /** Take a text that asks for several things in a row as one; else its parts are passages, each of the same length. */
+  whole?: boolean;
   /** Where the figure is to stand briefly. */
   stand?: "start" | "end" | "both";
   /** The frames (T, D) that the story continues, such as those of an earlier one. */
@@ -45,8 +50,9 @@ export interface Understood {
   nearest: string[];
 }
 
-/** Sentences of a story, for each its seconds (0 where it ends by itself), and how it is drawn. */
+/** Sentences of a story, for each its seconds (0 where it ends by itself), whether they are whole, how it is drawn. */
 interface Told {
+  whole: boolean;
   texts: string[];
   seconds: number[];
   longest: number;
@@ -71,8 +77,34 @@ export class GenerateModel extends LanguageModel {
   async generate(text: string, settings: GenerateSettings = {}): Promise<Float32Array[][]> {
     const seed = this.setting("seed", settings.seed ?? 0);
     const count = this.setting("hypotheses", settings.hypotheses ?? 1);
+    if (!settings.whole && (await this.parts(text)).length > 1) {
+      const motions: Float32Array[][] = [];
+      for (const one of [seed, ...stateOf(seed, count - 1)]) motions.push((await this.story(text, { ...settings, seed: one })).frames);
+      return motions;
+    }
     const noise = Array.from({ length: count }, (_, at) => (at ? new Pcg64(seed, at - 1) : new Pcg64(seed)));
     return this.drawn(text, noise, settings);
+  }
+
+  /** What a text asks for one after another: docs/bundle.md, "Several things in one text". */
+  async parts(text: string): Promise<string[]> {
+    this.words(text);
+    const verbs = verbsOf(this.manifest.actions!.flatMap(({ words }) => words));
+    const found: string[] = [];
+    for (const sentence of sentencesOf(text)) {
+      const parts = partsOf(sentence, verbs);
+      found.push(...(parts.length > 1 && (await this.lacks(sentence)) ? parts : [sentence]));
+    }
+    return found.length > 1 ? found : [text];
+  }
+
+  /** Whether no sentence of the likeliest action has any form of a known word that is no function word. */
+  private async lacks(sentence: string): Promise<boolean> {
+    const context = await this.context(sentence);
+    const have = new Set(this.manifest.actions![context.indexOf(Math.max(...context))]!.words.map(stem));
+    const { ids } = this.vocabulary.encode(sentence);
+    const words = ids.map((id) => this.vocabulary.words[id]!).filter((word) => word !== "UNK" && !FUNCTION_WORDS.has(word));
+    return words.some((word) => !have.has(stem(word)));
   }
 
   /** The same by noise that is given for each motion. */
@@ -93,7 +125,7 @@ export class GenerateModel extends LanguageModel {
 
   /** One motion for several sentences, each from where the last one ends, and when each is shown. */
   async story(sentences: string | string[], settings: StorySettings = {}): Promise<{ frames: Float32Array[]; passages: Passage[] }> {
-    const told = this.told(sentences, settings);
+    const told = await this.parted(this.told(sentences, settings));
     const steps = told.texts.map(() => 0);
     const frames: Float32Array[] = [];
     for await (const piece of this.pieces(told, settings.after)) {
@@ -113,9 +145,10 @@ export class GenerateModel extends LanguageModel {
 
   /** The frames of `story` in pieces, as they are drawn; what cannot be told is refused before the first one. */
   stream(sentences: string | string[], settings: StorySettings = {}): AsyncGenerator<Float32Array[], void> {
-    const pieces = this.pieces(this.told(sentences, settings), settings.after);
+    const told = this.told(sentences, settings);
+    const pieces = async () => this.pieces(await this.parted(told), settings.after);
     return (async function* () {
-      for await (const { frames } of pieces) if (frames.length) yield frames;
+      for await (const { frames } of await pieces()) if (frames.length) yield frames;
     })();
   }
 
@@ -171,7 +204,14 @@ export class GenerateModel extends LanguageModel {
     }
     texts.forEach((text) => this.words(text));
     const longest = this.steps(this.setting("max_seconds", given.max_seconds));
-    return { texts, seconds, longest, drawing: this.drawing(given), noise: new Pcg64(this.setting("seed", given.seed ?? 0)) };
+    return { texts, seconds, whole: given.whole ?? false, longest, drawing: this.drawing(given), noise: new Pcg64(this.setting("seed", given.seed ?? 0)) };
+  }
+
+  /** The story with the parts of its sentences as passages. */
+  private async parted(told: Told): Promise<Told> {
+    if (told.whole) return told;
+    const parts = await Promise.all(told.texts.map((text) => this.parts(text)));
+    return { ...told, texts: parts.flat(), seconds: parts.flatMap((own, at) => own.map(() => told.seconds[at]! / own.length)) };
   }
 
   /** For each step of codes the frames that become final with it, and its sentence; then the remaining frames. */

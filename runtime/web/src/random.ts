@@ -19,7 +19,8 @@ export class Pcg64 implements Noise {
 
   /** spawned: which of the generators that the seed's one spawns, the first being 0. */
   constructor(seed: number, spawned?: number) {
-    const [a, b, c, d] = seedWords(seed, spawned);
+    const words = stateOf(seed, 8, spawned).map(BigInt);
+    const [a, b, c, d] = [0, 2, 4, 6].map((at) => words[at]! | (words[at + 1]! << 32n));
     this.increment = ((((c! << 64n) | d!) << 1n) | 1n) & M128;
     this.advance();
     this.state = (this.state + ((a! << 64n) | b!)) & M128;
@@ -49,8 +50,8 @@ export class Pcg64 implements Noise {
   }
 }
 
-/** The first four 64-bit words of numpy's SeedSequence (O'Neill's seed_seq_fe128 with a pool of four words). */
-function seedWords(seed: number, spawned?: number): bigint[] {
+/** The first 32-bit words of numpy's SeedSequence (O'Neill's seed_seq_fe128 with a pool of four words). */
+export function stateOf(seed: number, count: number, spawned?: number): number[] {
   const words = seed === 0 ? [0] : [];
   for (let left = BigInt(seed); left > 0n; left >>= 32n) words.push(Number(left & 0xffffffffn));
   if (spawned !== undefined) {
@@ -74,13 +75,12 @@ function seedWords(seed: number, spawned?: number): bigint[] {
   }
   for (const word of words.slice(4)) for (let to = 0; to < 4; to++) pool[to] = mix(pool[to]!, hash(word));
   constant = 0x8b51f9dd;
-  const drawn = Array.from({ length: 8 }, (_, at) => {
+  return Array.from({ length: count }, (_, at) => {
     let value = (pool[at % 4]! ^ constant) >>> 0;
     constant = Math.imul(constant, 0x58f38ded) >>> 0;
     value = Math.imul(value, constant) >>> 0;
-    return BigInt((value ^ (value >>> 16)) >>> 0);
+    return (value ^ (value >>> 16)) >>> 0;
   });
-  return [0, 2, 4, 6].map((at) => drawn[at]! | (drawn[at + 1]! << 32n));
 }
 
 /** Noise that is given, block after block, such as that of golden vectors. */

@@ -104,6 +104,7 @@ async function seeds(read: Read): Promise<void> {
   const jumps = await model.generate("someone jumps twice, then sits", { seed: 11, hypotheses: 2 });
   jumps.forEach((one, at) => shown(one, python.jumps[at]!, `jump ${at}`));
   shown((await model.story("a person runs", { after: walk!, seed: 2, seconds: 1.5 })).frames, python.after, "after");
+  for (const [text, parts] of Object.entries(python.parts)) equal(await model.parts(text), parts, text);
   for (const { text, confidence, ...rest } of python.understood) {
     const { confidence: found, ...other } = await model.understood(text);
     equal(other, { confident: rest.confident, nearest: rest.nearest }, text);
