@@ -24,6 +24,7 @@ from motet.errors import (
     SettingError,
     TextError,
     TextWarning,
+    TravelWarning,
     UnitError,
 )
 from motet.formats import clips
@@ -54,9 +55,9 @@ __all__ = [
     "Generated", "Hit", "Humanoid", "Index", "MixtureModel", "MotetError", "Motion", "MotionError", "OutputError",
     "Part", "Passage", "Pose", "PredictModel", "PredictSession", "ScriptError", "SearchModel", "SessionOptions",
     "SettingError", "SteerModel", "SteerSession", "SteerSnapshot", "Story", "StorySettings", "TdbnModel", "TdbnSession",
-    "TdbnSnapshot", "TextError", "TextWarning", "Understood", "UnitError", "check", "clips", "from_humanoid",
-    "list_bundles", "live_page", "load", "load_as", "motion", "read", "read_map", "to_humanoid", "write",
-    "write_live_page",
+    "TdbnSnapshot", "TextError", "TextWarning", "TravelWarning", "Understood", "UnitError", "check", "clips",
+    "from_humanoid", "list_bundles", "live_page", "load", "load_as", "motion", "read", "read_map", "to_humanoid",
+    "write", "write_live_page",
 ]
 # fmt: on
 

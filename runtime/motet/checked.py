@@ -11,6 +11,7 @@ from motet.errors import MotionError
 from motet.files import place_of
 from motet.formats import READABLE, clips, read_motion
 from motet.formats.text import Clip, chosen, split_clip
+from motet.motion.feet.treadmill import IMPLIED, is_in_place
 from motet.motion.humanoid import (
     HUMANOID,
     SURE_OF_JOINTS,
@@ -40,6 +41,7 @@ class Checked:
     ground: metres over y = 0 of the ground that the soles stand on. lowest: the same of the lowest point of the body in
         all frames.
     travel: metres between the ends of the ground that the hips pass over.
+    strides: whether its feet stride while its root stays (:func:`motet.motion.is_in_place`), as in clips of games.
     notes: sentences about what was assumed.
     bones: bone of the humanoid -> the names of the joints that it was taken from.
     """
@@ -59,6 +61,7 @@ class Checked:
     ground: float | None = None
     lowest: float | None = None
     travel: float | None = None
+    strides: bool = False
     notes: tuple[str, ...] = ()
     bones: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
@@ -100,9 +103,11 @@ def check(file: str | Path, *, clip: Clip = None, **options: Any) -> Checked:
         return Checked(*about, refused=str(error))
     way = np.ptp(positions(found.motion)[:, 0], axis=0)
     travel = float(np.hypot(way[0], way[2])) * (found.leg or leg_length()) / leg_length()
+    strides = is_in_place(motion)
     measured = (_facing(found.motion), *_heights(motion, found), travel)
     said = found.convention, found.confidence, found.unit, found.height
-    return Checked(*about, None, *said, *measured, found.notes, found.joints)
+    notes = (*found.notes, IMPLIED) if strides else found.notes
+    return Checked(*about, None, *said, *measured, strides, notes, found.joints)
 
 
 def _facing(motion: Motion) -> float | None:

@@ -24,6 +24,10 @@ def warn(said: str, category: type[Warning]) -> None:
     warnings.warn(said, category, stacklevel=level)
 
 
+class TravelWarning(UserWarning):
+    """A clip in place was given the path over the ground that its feet imply."""
+
+
 class MotetError(Exception):
     """Base of every error that motet raises on purpose."""
 

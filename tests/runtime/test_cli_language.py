@@ -103,7 +103,7 @@ def test_a_timeline_has_a_line_for_each_part(tmp_path: Path, files: list[Path]) 
     write_motion(path, moving(450))
     expected = describe_model().timeline(read_motion(path))
     rows = json.loads(run("describe", path, "--timeline", "--json").stdout)
-    assert rows == [{"input": str(path), **part.to_json()} for part in expected]
+    assert rows == [{"input": str(path), "in_place": False, **part.to_json()} for part in expected]
     assert {"start", "stop", "text", "log_probability", "confident"} <= set(rows[0])
     lines = run("describe", path, "--timeline").stdout.splitlines()
     told = [f"{part.start:.1f}-{part.stop:.1f} s  {'' if part.confident else '? '}{part.text}" for part in expected]

@@ -22,8 +22,8 @@ from motet.errors import FormatError, MotetError
 from motet.files import files_in
 from motet.formats import CLIPPED, MOCAP, READS, WRITES, write_motion
 from motet.formats.text import MARK
-from motet.motion.feet.contacts import lay_root_path
 from motet.motion.feet.hold import hold_feet as feet_held
+from motet.motion.feet.treadmill import with_travel
 from motet.motion.humanoid import LENGTH_UNITS, read_map, to_humanoid
 from motet.motion.kinematics import skeleton_of
 from motet.motion.looping import looped
@@ -250,7 +250,7 @@ def convert(
             motion = read(source)
             motion = motion.cut(start, stop) if start or stop is not None else motion
             motion = _to_humanoid(motion, map_file) if humanoid or map_file or hold_feet else motion
-            motion = lay_root_path(motion, keep_height=True) if travel else motion
+            motion = with_travel(motion) if travel else motion
             motion = output.shaped(feet_held(motion) if hold_feet else motion)
             motion = motion.scaled(METRES[unit]) if unit else motion
             motion = looped(motion) if loop else motion

@@ -10,7 +10,7 @@ from typing import Any, cast
 import click
 
 from motet.bundle.graph import SessionOptions
-from motet.cli.options import Tries, bar, bundle_option, naming, noted, session_options
+from motet.cli.options import Tries, bar, bundle_option, in_place, naming, noted, session_options
 from motet.cli.reading import Read, Source, read_options
 from motet.cli.writing import Output, out_option, places, size, write_options
 from motet.formats import READS, read_motion
@@ -76,15 +76,16 @@ def _hypotheses(
     """For each window of the motions its sentences, ready for JSON and as lines."""
     windows = []
     for source in sources:
-        with tries.of(source):
+        with tries.of(source) as caught:
             cut = model.windows(read(source))
-            windows += [(str(source), start, start + part.duration, model.prepared(part)) for start, part in cut]
+            said: dict[str, Any] = {"input": str(source), "in_place": in_place(caught)}
+            windows += [(said, start, start + part.duration, model.prepared(part)) for start, part in cut]
     with bar("describing") as progress:
         found = model.describe([part for *_, part in windows], progress=progress, **settings)
-    inputs, rows, lines = [name for name, *_ in windows], [], []
-    for (name, start, stop, _), descriptions in zip(windows, found, strict=True):
-        hypotheses = [description.to_json() for description in descriptions]
-        rows.append({"input": name, "start": start, "stop": stop, "hypotheses": hypotheses})
+    inputs, rows, lines = [said["input"] for said, *_ in windows], [], []
+    for (said, start, stop, _), descriptions in zip(windows, found, strict=True):
+        hypotheses, name = [description.to_json() for description in descriptions], said["input"]
+        rows.append({**said, "start": start, "stop": stop, "hypotheses": hypotheses})
         lines += [name] if len(sources) > 1 and start == 0 else []
         lines += [f"{start:.1f} to {stop:.1f} s"] if inputs.count(name) > 1 else []
         lines += [f"{description.score:8.2f}  {_told(description)}" for description in descriptions]
@@ -97,9 +98,9 @@ def _timelines(
     """For each part of the motions its sentence, ready for JSON and as lines."""
     rows, lines = [], []
     for source in sources:
-        with tries.of(source), bar(source.name) as progress:
+        with tries.of(source) as caught, bar(source.name) as progress:
             parts = model.timeline(read(source), progress=progress)
-            rows += [{"input": str(source), **part.to_json()} for part in parts]
+            rows += [{"input": str(source), "in_place": in_place(caught), **part.to_json()} for part in parts]
             lines += [str(source)] if len(sources) > 1 else []
             lines += [f"{part.start:.1f}-{part.stop:.1f} s  {_told(part)}" for part in parts]
     return rows, lines

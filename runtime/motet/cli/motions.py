@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from motet.bundle.graph import SessionOptions
-from motet.cli.options import Tries, bar, bundle_option, naming, noted, session_options
+from motet.cli.options import Tries, bar, bundle_option, in_place, naming, noted, session_options, warned
 from motet.cli.reading import Read, read_options
 from motet.cli.writing import Output, out_option, places, size, spare, write_options
 from motet.draw.page import write as write_html
@@ -76,10 +76,11 @@ def predict(
     writer = _writer(beyond, session, samples, count > model.horizon)
     for source in given:
         own = [next(outs) for _ in range(samples or 1)]
-        with tries.of(source):
+        with tries.of(source) as caught:
             futures, expected = _futures(model, read(source), writer, samples, count, **drawn)
             said = _written(futures, own, source.title, output, count, drawn["seed"])
-            rows.append({"input": str(source), **said, "beyond": writer and beyond, **expected})
+            said |= {"in_place": in_place(caught), "beyond": writer and beyond}
+            rows.append({"input": str(source), **said, **expected})
             if not as_json:
                 click.echo("\n".join(_lines(rows[-1], drawn["append"])))
     output.finish()
@@ -226,7 +227,7 @@ def join(
     spare(out, first, second)
     model = load_as(FillModel, bundle, session)
     one, other = read(first), read(second)
-    with naming(f"{first} and {second}"):
+    with naming(f"{first} and {second}"), warned(f"{first} and {second}"):
         found = model.join(one, other, seconds=seconds)
     found = output.write(out, found, f"{first.stem} {second.stem}")
     output.finish()

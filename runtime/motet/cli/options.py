@@ -13,7 +13,7 @@ import click
 import onnxruntime
 
 from motet.bundle.graph import MAX_THREADS, SessionOptions
-from motet.errors import ControlWarning, MotetError, MotionError, TextWarning, UnitError, quoted
+from motet.errors import ControlWarning, MotetError, MotionError, TextWarning, TravelWarning, UnitError, quoted
 from motet.settings import Progress, silent
 
 log = logging.getLogger("motet")
@@ -71,6 +71,28 @@ def noted() -> Iterator[None]:
         log.warning(text)
 
 
+Warned = list[warnings.WarningMessage]
+"""What was warned of so far."""
+
+
+@contextmanager
+def warned(given: object) -> Iterator[Warned]:
+    """Log what motet warns of a motion, each once, with what was given; other warnings go on."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", TravelWarning)
+        yield caught
+    for warning in caught:
+        if not issubclass(warning.category, TravelWarning):
+            warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
+    for text in dict.fromkeys(str(each.message) for each in caught if issubclass(each.category, TravelWarning)):
+        log.warning("%s: %s", given, text)
+
+
+def in_place(caught: Warned) -> bool:
+    """Whether a motion was a clip in place."""
+    return any(issubclass(warning.category, TravelWarning) for warning in caught)
+
+
 @contextmanager
 def bar(label: str) -> Iterator[Progress]:
     """A progress bar on stderr, if that is a terminal, as the callback of long work."""
@@ -93,10 +115,12 @@ class Tries:
         self.failed = 0
 
     @contextmanager
-    def of(self, given: object) -> Iterator[None]:
-        """What is done for one file or text; motet's own errors end only this."""
+    def of(self, given: object) -> Iterator["Warned"]:
+        """What is done for one file or text; motet's own errors end only this. What it was warned of meanwhile is said,
+        once, of the file."""
         try:
-            yield
+            with warned(given) as caught:
+                yield caught
         except MotetError as error:
             self.failed += 1
             click.echo(f"motet: {_named(given, error)}", err=True)

@@ -11,7 +11,7 @@ import click
 import numpy as np
 
 from motet.bundle.graph import SessionOptions
-from motet.cli.options import Tries, bar, bundle_option, noted, session_options
+from motet.cli.options import Tries, bar, bundle_option, noted, session_options, warned
 from motet.cli.reading import Read, read_options, unit_option
 from motet.errors import TextWarning
 from motet.files import check_place, write_whole
@@ -75,7 +75,9 @@ def embed(
 @click.option("--index", "file", type=Path, help=f"File for the vectors. [default: {INDEX_FILE} in FOLDER]")
 @unit_option
 @session_options
-@click.option("--json", "as_json", is_flag=True, help="Print a list with path, clip, start, stop and score of each.")
+@click.option(
+    "--json", "as_json", is_flag=True, help="Print a list with path, clip, times, score and in_place of each."
+)
 def search(
     query: str,
     folder: Path,
@@ -99,13 +101,14 @@ def search(
             model.ids(query)  # refused before all motions are read
     with bar("embedding") as progress:
         index = Index.open(folder, model, file, unit=unit_in, progress=progress)
-    with warnings.catch_warnings(action="ignore", category=TextWarning):  # said already
+    with warnings.catch_warnings(action="ignore", category=TextWarning), warned(query):  # words are said already
         hits = index.search(query if motion is None else motion, count)
     if as_json:
         click.echo(json.dumps([{**asdict(hit), "path": str(hit.path)} for hit in hits]))
     else:
         for hit in hits:
-            click.echo(f"{hit.score:6.2f}  {hit.place}  {hit.start:.1f} to {hit.stop:.1f} s")
+            said = ", in place: compared with the path that its feet imply" if hit.in_place else ""
+            click.echo(f"{hit.score:6.2f}  {hit.place}  {hit.start:.1f} to {hit.stop:.1f} s{said}")
     for path, fault in index.failed.items():
         click.echo(f"motet: {path}: {fault}", err=True)
     sys.exit(1 if index.failed else 0)

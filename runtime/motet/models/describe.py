@@ -152,7 +152,7 @@ class DescribeModel(LanguageModel):
         progress: called with the number of windows done and in total.
         MotionError like :meth:`frames`, except for long motions.
         """
-        motion = self.contract.on_figure(motion).resample(self.fps)
+        motion = self.on_figure(motion).resample(self.fps)
         settings, beam = self.settings(TimelineSettings), LOOPS["beam"]
         spans = windows(len(motion), motion.fps, settings)
         contexts = self.embed([motion[start:stop] for start, stop in spans])

@@ -13,6 +13,7 @@ from motet.bundle.graph import Arrays, Graph
 from motet.bundle.manifest import Manifest
 from motet.errors import BundleError, MotionError
 from motet.models.base import BundleModel
+from motet.motion.feet.treadmill import travelling
 from motet.motion.humanoid import HUMANOID, on_humanoid
 from motet.motion.motion import Motion, spline
 from motet.motion.root_motion import placed_after, to_figure_of
@@ -74,19 +75,20 @@ class FillModel(BundleModel):
         gaps: for several motions, a list for each. A gap is (start, stop) in seconds: the frames from ``start`` up to,
             but not including, ``stop`` are replaced. All others are unchanged, bit for bit, and so are channels, units,
             figure and frame rate. Where a figure's world or channels make that impossible, the result is on the
-            humanoid at the model's frame rate, which is logged.
+            humanoid at the model's frame rate, which is logged. A clip in place is first given the path that its feet
+            imply (:func:`motet.motion.with_travel`), of which a TravelWarning tells.
         progress: called with the number of motions done and in total.
         MotionError, with the remedy, for gaps that are empty, longer than :attr:`seconds`, outside the motion or
         overlapping, or with fewer than :attr:`least` frames at the model's rate before or after them; and for a figure
         that is not human.
         """
         if isinstance(motions, Motion):
-            return self._filled(motions, cast(Sequence[Gap], gaps))
+            return self._filled(travelling(motions), cast(Sequence[Gap], gaps))
         if len(gaps) != len(motions):
             raise MotionError(f"{len(motions)} motions need a list of gaps for each, not {len(gaps)}")
         found = list[Motion]()
         for motion, own in zip(motions, cast(Sequence[Sequence[Gap]], gaps), strict=True):
-            found.append(self._filled(motion, own))
+            found.append(self._filled(travelling(motion), own))
             progress(len(found), len(motions))
         return found
 
@@ -144,7 +146,7 @@ class FillModel(BundleModel):
         of the first are unchanged, bit for bit; for figures where that is impossible see :meth:`fill`.
         MotionError unless 0 < seconds <= :attr:`seconds`, and like :meth:`fill`.
         """
-        before, new, after = self._joined(first, second, seconds)
+        before, new, after = self._joined(travelling(first), travelling(second), seconds)
         return replace(before, values=np.concatenate([before.values, new.values, after.values]))
 
     def looped(self, motion: Motion, *, seconds: float = LOOP_SECONDS) -> Motion:
@@ -153,6 +155,7 @@ class FillModel(BundleModel):
         Position on the ground and heading carry over, by the same amount at each repetition. Errors like
         :meth:`join`. To find a part of the motion that already repeats, use :func:`motet.motion.looped`.
         """
+        motion = travelling(motion)
         before, new, _ = self._joined(motion, motion, seconds)
         return replace(before, values=np.concatenate([before.values, new.values]))
 

@@ -22,6 +22,7 @@ from motet.bundle.manifest import Manifest
 from motet.decode.loop import two_rows
 from motet.errors import BundleError, MotionError, TextError, TextWarning, warn
 from motet.models.base import BundleModel
+from motet.motion.feet.treadmill import travelling
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 
@@ -221,13 +222,14 @@ class LanguageModel(BundleModel):
     def frames(self, motion: Motion) -> Array:
         """The frames (T, D) float64 of a motion in the contract's channels and units, resampled to its frame rate.
 
-        A motion of any other human figure is retargeted onto the model's (docs/humanoid.md). MotionError where the
-        motion lacks channels (it names them), or has less than two frames or more than 30 s.
+        A motion of any other human figure is retargeted onto the model's (docs/humanoid.md), and a clip in place is
+        given the path that its feet imply (:func:`motet.motion.with_travel`), of which a TravelWarning tells.
+        MotionError where the motion lacks channels (it names them), or has less than two frames or more than 30 s.
         """
         if motion.duration > MAX_SECONDS:
             limit = f"the model takes at most {MAX_SECONDS:g} s: cut it, or describe its windows"
             raise MotionError(f"the motion lasts {motion.duration:.1f} s, but {limit}")
-        frames = self.contract.frames(motion)
+        frames = self.contract.frames(self.on_figure(motion))
         if len(frames) < 2:
             raise MotionError(f"the model needs two frames at {self.fps:g} fps, but the motion has {len(frames)}")
         return frames
@@ -236,10 +238,17 @@ class LanguageModel(BundleModel):
         """A motion as the model sees it, to be prepared once and reused; MotionError like :meth:`frames`."""
         return self.contract.features(self.frames(motion))
 
+    def on_figure(self, motion: Motion) -> Motion:
+        """A motion of any length on the model's figure, as in :meth:`frames`; one that is, at the model's frame rate,
+        is taken as it is."""
+        if motion.fps == self.fps and motion.skeleton == self.contract.skeleton:
+            return motion
+        return self.contract.on_figure(travelling(motion))
+
     def windows(self, motion: Motion, longest: float = MAX_SECONDS) -> list[tuple[float, Motion]]:
         """A motion of any length in the fewest equal parts of at most ``longest`` seconds, each with its start time.
         One of another human figure is first retargeted as a whole onto the model's, like in :meth:`frames`."""
-        motion = self.contract.on_figure(motion)
+        motion = self.on_figure(motion)
         most = max(1, math.floor(longest * motion.fps + 1e-9))  # parts are of whole frames
         count = max(1, math.ceil(len(motion) / most))
         edges = np.linspace(0, len(motion), count + 1).round().astype(int).tolist()

@@ -16,6 +16,7 @@ from motet.errors import BundleError, DecodingError, MotionError
 from motet.models.base import BundleModel
 from motet.models.continuation import brought_back, futures, together
 from motet.models.generate import GenerateModel
+from motet.motion.feet.treadmill import travelling
 from motet.motion.humanoid import Figure
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
@@ -98,7 +99,8 @@ class PredictModel(BundleModel):
         A motion is continued in its own channels, units and skeleton, from its own place. One of another human figure
         is retargeted onto the model's, and the prediction back, or returned on the model's where that is impossible
         (docs/humanoid.md). The model sees the last :attr:`seed_frames` at its frame rate; of another figure, all frames
-        are used to measure its joints and its ground. Resampling a motion keeps its last frame.
+        are used to measure its joints and its ground. Resampling a motion keeps its last frame. A clip in place is
+        given the path that its feet imply (:func:`motet.motion.with_travel`), of which a TravelWarning tells.
         append: return the resampled motion followed by the prediction.
         progress: called with the number of motions done and in total.
         beyond: a motion-code model such as ``motet.load("generate")``. It continues a prediction longer than the
@@ -109,7 +111,8 @@ class PredictModel(BundleModel):
         short, lacks channels of the model, or is not of a human figure; DecodingError for a length out of range, or
         where ``beyond`` is not a motion-code model.
         """
-        count, given = self.count(seconds, frames), [motions] if isinstance(motions, Motion) else list(motions)
+        count = self.count(seconds, frames)
+        given = [travelling(motion) for motion in ([motions] if isinstance(motions, Motion) else motions)]
         if beyond is not None and count > self.horizon:
             found = self._beyond(given, count, append, progress, beyond, seeds_of(seed, len(given), DecodingError))
         else:
@@ -159,7 +162,7 @@ class PredictModel(BundleModel):
         """
         samples = checked_int("samples", samples, 1, MAX_SAMPLES, DecodingError)
         count, seeds = self.count(seconds, frames), seeds_of(seed, samples, DecodingError)
-        return futures(beyond, self.at_own_rate(motion), count, seeds, append, progress)
+        return futures(beyond, self.at_own_rate(travelling(motion)), count, seeds, append, progress)
 
     def _seen(self, motion: Motion, measured: Figure | None = None) -> tuple[Motion, Motion, Array]:
         """The motion at the model's frame rate, the same on the model's figure, and its last frames (L, C)."""
@@ -206,7 +209,7 @@ class PredictModel(BundleModel):
         """
         if not self.knows_errors:
             raise DecodingError(f"{self!r} does not estimate its errors: it has no graph 'error'")
-        given = [motions] if isinstance(motions, Motion) else list(motions)
+        given = [travelling(motion) for motion in ([motions] if isinstance(motions, Motion) else motions)]
         seeds = np.zeros((len(given), self.seed_frames, len(self.contract.channels)), dtype=np.float32)
         for row, motion in zip(seeds, given, strict=True):
             row[:] = self._seen(motion)[2]

@@ -26,6 +26,7 @@ from motet.formats import MOCAP, clips, read_motion
 from motet.formats.npz import array
 from motet.formats.text import MARK
 from motet.models.language import MAX_SECONDS, LanguageModel
+from motet.motion.feet.treadmill import is_in_place, with_travel
 from motet.motion.motion import Motion
 from motet.motion.skeleton import metres
 from motet.settings import Progress, Range, Settings, silent
@@ -36,7 +37,7 @@ Query = str | Motion
 """A sentence, or a motion to find similar ones."""
 
 INDEX_FILE = ".motet-search.npz"  # of the index file in its folder
-VERSION = 2  # of its format
+VERSION = 3  # of its format
 
 
 @dataclass(frozen=True)
@@ -91,7 +92,8 @@ class SearchModel(LanguageModel):
 class Hit:
     """A motion file, the seconds in which it matches the query, and how well: 1 is identical.
 
-    clip: its name in a file that holds several; else empty.
+    clip: its name in a file that holds several; else empty. in_place: whether it is a clip in place, which is compared
+    with the path that its feet imply.
     """
 
     path: Path
@@ -99,6 +101,7 @@ class Hit:
     stop: float
     score: float
     clip: str = ""
+    in_place: bool = False
 
     @property
     def place(self) -> str:
@@ -110,7 +113,7 @@ class Hit:
 class Member:
     """A motion file of the folder, by its path within it, or a clip of one that holds several.
 
-    windows: (start, stop) in seconds; fault: why it has none.
+    windows: (start, stop) in seconds; fault: why it has none. in_place: whether it is a clip in place.
     """
 
     path: str
@@ -119,6 +122,7 @@ class Member:
     windows: tuple[tuple[float, float], ...] = ()
     fault: str = ""
     clip: str = ""
+    in_place: bool = False
 
     @property
     def name(self) -> str:
@@ -212,7 +216,7 @@ class Index:
             member, start, stop = self._windows[row]
             if member.name not in found:
                 place = self.folder / member.path
-                found[member.name] = Hit(place, start, stop, float(scores[row]), member.clip)
+                found[member.name] = Hit(place, start, stop, float(scores[row]), member.clip, member.in_place)
             if len(found) == wanted:
                 break
         return list(found.values())
@@ -262,10 +266,12 @@ def _embedded(path: Path, file: Member, model: SearchModel, unit: str | float | 
     for member in [replace(file, clip=name) for name in names] if len(names) > 1 else [file]:
         try:
             motion = read_motion(path, unit=unit, clip=member.clip or None)
+            in_place = is_in_place(motion)
+            motion = with_travel(motion) if in_place else motion
             parts = model.windows(motion, model.settings(IndexSettings).window)
             vectors = model.embed([part for _, part in parts])
             windows = tuple((start, start + part.duration) for start, part in parts)
-            found.append((replace(member, windows=windows), vectors))
+            found.append((replace(member, windows=windows, in_place=in_place), vectors))
         except MotetError as error:
             hint = " (Index.open's unit, --unit-in)" if isinstance(error, UnitError) else ""
             fault = str(error).removeprefix(f"{path}: ") + hint
@@ -313,6 +319,6 @@ def _read(file: Path, model: SearchModel) -> Index:
     return Index(model, folder, members, vectors.astype(np.float32, copy=False), unit=unit)
 
 
-def _member(path: str, size: int, changed: int, windows: Any, fault: str, clip: str) -> Member:
+def _member(path: str, size: int, changed: int, windows: Any, fault: str, clip: str, in_place: bool) -> Member:
     spans = tuple((float(start), float(stop)) for start, stop in windows)
-    return Member(str(path), int(size), int(changed), spans, str(fault), str(clip))
+    return Member(str(path), int(size), int(changed), spans, str(fault), str(clip), bool(in_place))

@@ -2,6 +2,7 @@
 
 from motet.motion.feet.contacts import feet_of, ground_of, has_feet, lay_root_path
 from motet.motion.feet.hold import hold_feet
+from motet.motion.feet.treadmill import is_in_place, with_travel
 from motet.motion.humanoid import HUMANOID, MIXAMO, Humanoid, JointMap, from_humanoid, read_map, rig, to_humanoid
 from motet.motion.kinematics import (
     global_transforms,
@@ -34,6 +35,7 @@ __all__ = [
     "heading",
     "hold_feet",
     "in_place",
+    "is_in_place",
     "lateral_axis",
     "lay_root_path",
     "local_rotations",
@@ -46,5 +48,6 @@ __all__ = [
     "rig",
     "sides_of",
     "to_humanoid",
+    "with_travel",
     "without_heading",
 ]

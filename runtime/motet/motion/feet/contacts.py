@@ -119,7 +119,6 @@ def lay_root_path(
     motion: Motion,
     feet: tuple[Sequence[str], Sequence[str]] | None = None,
     tremble: float = 0.015,
-    keep_height: bool = False,
 ) -> Motion:
     """The motion with root channels tx, ty, tz in "length" units, found from the feet's contact with the ground.
 
@@ -129,7 +128,6 @@ def lay_root_path(
         MotionError for a motion without skeleton or without such joints.
     tremble: seconds over which the feet are smoothed; recorded motions need little, generated ones 0.06 s, and 0
         smooths nothing.
-    keep_height: keep y, for a motion in place whose height is right.
     """
     if not 0 <= tremble < np.inf:
         raise MotionError(f"the smoothing time of feet must be 0 or more seconds, not {tremble}")
@@ -145,7 +143,7 @@ def lay_root_path(
     plane, velocity = smoothed(points[..., [0, 2]], tremble, motion.fps), np.zeros((0, 2))
     if len(motion) > 1:
         velocity = velocity_by_feet(plane, points[..., 1] + height[:, None], motion.fps)
-    return led_along(motion, velocity, places[:, 0, 1] * metres if keep_height else height, metres)
+    return led_along(motion, velocity, height, metres)
 
 
 def led_along(motion: Motion, velocity: Array, height: Array, metres: float) -> Motion:
