@@ -61,10 +61,7 @@ export class Bundle {
   static async open(bytes: Uint8Array): Promise<Bundle> {
     const zip = openZip(bytes);
     const manifest = parse(await zip.read("manifest.json", MAX_MANIFEST));
-    if (manifest.format !== FORMAT) {
-      throw new BundleError(`this is a bundle of format ${manifest.format}; format ${FORMAT} is read`);
-    }
-    const listed = Object.keys(manifest.files ?? {});
+    const listed = Object.keys(manifest.files);
     const extra = zip.names.filter((name) => name !== "manifest.json" && !listed.includes(name));
     if (extra.length) throw new BundleError(`not in its manifest: ${extra.join(", ")}`);
     if (listed.length > MAX_FILES) throw new BundleError(`the bundle has more than ${MAX_FILES} files`);
@@ -110,12 +107,27 @@ export class Bundle {
   }
 }
 
+/** What manifest.json has to hold, as far as every reader needs it. */
+const TEXTS = ["name", "verb", "loop"];
+const OBJECTS = ["files", "graphs", "tables", "golden", "motion", "defaults", "settings", "config"];
+
 function parse(bytes: Uint8Array): Manifest {
+  let manifest: Record<string, unknown>;
   try {
-    const manifest: unknown = JSON.parse(new TextDecoder("utf-8", { fatal: true }).decode(bytes));
-    if (typeof manifest === "object" && manifest !== null && "format" in manifest) return manifest as Manifest;
+    manifest = JSON.parse(new TextDecoder("utf-8", { fatal: true }).decode(bytes)) as typeof manifest;
   } catch {
-    // said below
+    throw new BundleError("manifest.json is not JSON");
   }
-  throw new BundleError("manifest.json is not a bundle's manifest");
+  if (!isObject(manifest) || !("format" in manifest)) throw new BundleError("manifest.json is not a bundle's manifest");
+  if (manifest.format !== FORMAT) throw new BundleError(`this is a bundle of format ${manifest.format}; format ${FORMAT} is read`);
+  for (const key of TEXTS) if (typeof manifest[key] !== "string") throw new BundleError(`manifest, ${key}: is no text`);
+  for (const key of OBJECTS) if (!isObject(manifest[key])) throw new BundleError(`manifest, ${key}: is no object`);
+  const { channels, mean, std, fps } = manifest.motion as Partial<Manifest["motion"]>;
+  const fits = [channels, mean, std].every((one) => Array.isArray(one) && one.length === channels!.length);
+  if (!fits || !(typeof fps === "number" && fps > 0)) throw new BundleError("manifest, motion: does not say what frames are");
+  return manifest as unknown as Manifest;
+}
+
+function isObject(value: unknown): value is Record<string, unknown> {
+  return typeof value === "object" && value !== null && !Array.isArray(value);
 }

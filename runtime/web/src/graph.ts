@@ -35,7 +35,9 @@ export class Graph {
   /** Load a graph that is safe and keeps the contract of the manifest; BundleError otherwise. */
   static async load(role: string, model: Uint8Array, spec: GraphSpec, settings: SessionSettings = {}): Promise<Graph> {
     checkGraph(model);
-    const runtime = await import("onnxruntime-web/wasm");
+    const runtime = await import("onnxruntime-web/wasm").catch((error: unknown) => {
+      throw new BundleError(`ONNX Runtime cannot be loaded (${String(error)}): npm install onnxruntime-web`);
+    });
     const session = await runtime.InferenceSession.create(model, settings).catch((error: unknown) => {
       throw new BundleError(`graph ${role}: ONNX Runtime cannot load it: ${String(error)}`);
     });

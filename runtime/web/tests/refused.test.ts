@@ -2,9 +2,10 @@
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
 import test from "node:test";
-import { Bundle, BundleError, DecodingError, type GenerateModel, load, type PredictModel, type SearchModel, TextError } from "../src/index.js";
+import { Bundle, BundleError, DecodingError, FillModel, type GenerateModel, load, type PredictModel, type SearchModel, TextError } from "../src/index.js";
 import { checkGraph } from "../src/graphSafety.js";
 import { Pcg64 } from "../src/random.js";
+import { openZip } from "../src/zip.js";
 
 const bytes = async (name: string) => new Uint8Array(await readFile(`../motet/bundles/${name}.zip`));
 
@@ -28,6 +29,55 @@ test("what is cut short or no bundle is refused", async () => {
   for (const damaged of [new Uint8Array(), whole.subarray(0, 1000), whole.subarray(1000), new TextEncoder().encode("no zip")]) {
     await assert.rejects(Bundle.open(damaged), BundleError);
   }
+});
+
+/** A zip of files that are stored as they are. */
+function zipped(files: Record<string, Uint8Array>): Uint8Array {
+  const [local, central]: Uint8Array[][] = [[], []];
+  let at = 0;
+  for (const [name, data] of Object.entries(files)) {
+    const [own, entry] = [new DataView(new ArrayBuffer(30)), new DataView(new ArrayBuffer(46))];
+    own.setUint32(0, 0x04034b50, true);
+    entry.setUint32(0, 0x02014b50, true);
+    for (const [view, size, length] of [[own, 18, 26], [entry, 20, 28]] as const) {
+      view.setUint32(size, data.length, true);
+      view.setUint32(size + 4, data.length, true);
+      view.setUint16(length, name.length, true);
+    }
+    entry.setUint32(42, at, true);
+    const text = new TextEncoder().encode(name);
+    local!.push(new Uint8Array(own.buffer), text, data);
+    central!.push(new Uint8Array(entry.buffer), text);
+    at += 30 + text.length + data.length;
+  }
+  const end = new DataView(new ArrayBuffer(22));
+  end.setUint32(0, 0x06054b50, true);
+  end.setUint16(10, Object.keys(files).length, true);
+  end.setUint32(16, at, true);
+  return new Uint8Array(Buffer.concat([...local!, ...central!, new Uint8Array(end.buffer)]));
+}
+
+test("bundles of another format, and manifests of another form, are refused", async () => {
+  const zip = openZip(await bytes("predict"));
+  const files: Record<string, Uint8Array> = {};
+  for (const name of zip.names) files[name] = await zip.read(name, 1 << 24);
+  const manifest = JSON.parse(new TextDecoder().decode(files["manifest.json"]));
+  const altered = (text: string) => load(zipped({ ...files, "manifest.json": new TextEncoder().encode(text) }));
+  await altered(JSON.stringify(manifest));
+  await assert.rejects(altered(JSON.stringify({ ...manifest, format: 2 })), /format 2; format 3 is read/);
+  for (const text of ["", "no JSON", "null", "[]", '{"format": 3}', JSON.stringify({ ...manifest, loop: "other" })]) {
+    await assert.rejects(altered(text), BundleError, text.slice(0, 20));
+  }
+  for (const name of ["files", "graphs", "motion", "defaults", "loop"]) {
+    for (const value of [undefined, null, 3, "x", []]) {
+      await assert.rejects(altered(JSON.stringify({ ...manifest, [name]: value })), BundleError, `${name}: ${value}`);
+    }
+  }
+});
+
+test("bundles that are not there, or of another kind, are refused", async () => {
+  await assert.rejects(load("http://localhost:1/predict.zip"), /BundleError: http:.*cannot be fetched/);
+  await assert.rejects(load(await bytes("predict"), FillModel), /for predict: it is no FillModel/);
 });
 
 /** A field of a protocol buffer: bytes, or a number. */

@@ -4,9 +4,13 @@ import test, { before } from "node:test";
 import { cases } from "../cases.js";
 import { inChromium } from "./chromium.js";
 
-let found: Record<string, string | null>;
+let page: { found: Record<string, string | null>; elsewhere: string };
 before(async () => {
-  found = (await inChromium("page.js")) as typeof found;
+  page = (await inChromium("page.js")) as typeof page;
 });
 
-for (const { name } of cases) test(`${name}, in Chromium`, () => assert.equal(found[name], null));
+for (const { name } of cases) test(`${name}, in Chromium`, () => assert.equal(page.found[name], null));
+
+test("a bundle of another origin is refused by name, in Chromium", () => {
+  assert.match(page.elsewhere, /^BundleError: http:.*predict\.zip cannot be fetched .*CORS/);
+});

@@ -39,7 +39,7 @@ export async function inChromium(script: string): Promise<unknown> {
   const { server, reported } = await served(script);
   const { port } = server.address() as { port: number };
   const root = process.getuid?.() === 0 ? ["--no-sandbox"] : [];
-  const flags = ["--headless=new", "--disable-gpu", "--no-first-run", `--user-data-dir=${profile}`, ...root];
+  const flags = ["--headless=new", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run", `--user-data-dir=${profile}`, ...root];
   const child = spawn(browser(), [...flags, `http://localhost:${port}/`], { stdio: "ignore", detached: true });
   const ended = new Promise<never>((_, fail) => {
     child.on("error", fail).on("exit", (code) => fail(new Error(`Chromium ended with ${code} before the page had reported`)));
@@ -72,7 +72,7 @@ async function served(script: string): Promise<{ server: Server; reported: Promi
     const headers = { "Cross-Origin-Opener-Policy": "same-origin", "Cross-Origin-Embedder-Policy": "require-corp" };
     response.writeHead(found ? 200 : 404, { ...headers, "Content-Type": TYPES[extname(path)] ?? "text/html" }).end(found ?? "");
   });
-  await new Promise<void>((done) => server.listen(0, "localhost", done));
+  await new Promise<void>((done) => server.listen(0, "127.0.0.1", done));
   return { server, reported };
 }
 
