@@ -162,8 +162,9 @@ def frames(text: str) -> dict[str, Any]:
     motion = read_motion(BytesIO(text.encode()), format="bvh")
     found: dict[str, Any] = {}
     for name in ("describe", "predict", "generate"):
-        contract = load(name).contract
-        values = contract.frames(motion)
+        model = load(name)
+        contract = model.contract
+        values = contract.frames(contract.on_figure(model.at_own_rate(motion)) if name == "predict" else motion)
         found[name] = {
             "frames": rounded(values),
             "places": rounded(positions(contract.motion(values, plant=False))[::8]),

@@ -11,7 +11,7 @@ const INDEX = 1;
 /** Degrees by which the bones of a finger at rest bend, each against the one before. */
 const BENDS = [15, 25, 15];
 
-/** Local rotations of a pose with its hands relaxed (docs/humanoid.md, "Fingers"); joints: of "leftHand", "rightHand". */
+/** Local rotations of a pose with its hands relaxed (docs/retargeting.md, "Fingers"); joints: of "leftHand", "rightHand". */
 export function relaxed(skeleton: Skeleton, still: Quaternion[], joints: Record<string, number>): Quaternion[] {
   const bent = [...still];
   const turns: Quaternion[] = [];

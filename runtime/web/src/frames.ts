@@ -21,11 +21,12 @@ import { Skeleton } from "./skeleton.js";
 const RADIANS = Math.PI / 180;
 const KINDS: Record<string, string> = { root_angles: "r", root_vectors: "e", root_sixd: "x" };
 
-/** The frames that a model takes of a motion of any human figure: of `describe`, `search`, `predict` or `generate`. */
+/** The frames of `describe`, `search`, `predict` or `generate` of a motion of any human figure; those of `predict` end with it. */
 export function framesFor(motion: Motion, manifest: Manifest): number[][] {
   const { representation, fps } = manifest.motion;
   const bones = bonesOf(manifest);
-  const found = resampled(onFigure(checked(motion), fps), fps);
+  const given = manifest.loop === "free_run" ? resampled(checked(motion), fps, true) : checked(motion);
+  const found = resampled(onFigure(given, fps), fps);
   const metres = found.skeleton.metresPerUnit!;
   const places = found.translations.map((moves) => times(moves[0]!, metres));
   const turns = (bone: string) => found.rotations.map((row) => row[found.skeleton.index(bone)]!);

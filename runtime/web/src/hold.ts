@@ -1,4 +1,4 @@
-/* Holding the feet of a whole motion: docs/humanoid.md, "Planting of feet". */
+/* Holding the feet of a whole motion: docs/retargeting.md, "Planting of feet". */
 import { groundUnder, HUMANOID, isHumanoid, LEG, SIDES, solePoints } from "./humanoid.js";
 import { Leg } from "./leg.js";
 import { type Motion, motionFrom, worldOf } from "./motion.js";

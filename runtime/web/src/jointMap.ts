@@ -1,4 +1,4 @@
-/* Which joint of a skeleton is which bone of the humanoid, by the names of joints: docs/humanoid.md, "Which joint is which". */
+/* Which joint of a skeleton is which bone of the humanoid, by the names of joints: docs/retargeting.md, "The tables of names". */
 import { MotionError } from "./errors.js";
 import { ARM, LEG, SIDES } from "./humanoid.js";
 import type { Vector } from "./rotations.js";

@@ -1,4 +1,4 @@
-/* How a figure stands against the humanoid, measured once: docs/humanoid.md, "The algorithm". */
+/* How a figure stands against the humanoid, measured once: docs/retargeting.md. */
 import { alignmentsOfPose, axesAgree, bodyFrame, RADIANS, restsInMotion } from "./alignment.js";
 import { Body } from "./body.js";
 import { calibrated } from "./calibration.js";

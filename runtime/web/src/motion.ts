@@ -21,7 +21,7 @@ export interface World {
   places: Vector[][];
 }
 
-/** Frames in which a motion is computed with, at most. */
+/** Numbers of a motion's frames, at most. */
 const MAX_VALUES = 2 ** 26;
 
 /** MotionError unless there is a frame, and all numbers of all frames are finite. */
@@ -82,21 +82,22 @@ export function cut(motion: Motion, start: number, stop: number): Motion {
 }
 
 /**
- * The motion at another frame rate, from its first frame to none after its last: frames are picked where the rates'
- * ratio is whole, else Euler angles in the joints' orders and translations are on lines between frames, or, for a
- * higher rate, on Catmull-Rom splines.
+ * The motion at another frame rate, from its first frame to none after its last, or with its last frame kept (toEnd):
+ * frames are picked where the rates' ratio is whole, else Euler angles in the joints' orders and translations are on
+ * lines between frames, or, for a higher rate, on Catmull-Rom splines.
  */
-export function resampled(motion: Motion, fps: number): Motion {
+export function resampled(motion: Motion, fps: number, toEnd = false): Motion {
   const ratio = motion.fps / fps;
   const frames = motion.rotations.length;
   const count = Math.floor((frames - 1) / ratio + 1e-9) + 1;
   const { joints } = motion.skeleton;
   if (!(count * joints.length * 3 < MAX_VALUES)) throw new MotionError(`${frames} frames at ${fps} fps are too many`);
   if (Math.abs(ratio - Math.round(ratio)) < 1e-9 && ratio > 0.5) {
-    const picked = <T>(rows: T[]) => rows.filter((_, at) => at % Math.round(ratio) === 0);
+    const start = toEnd ? (frames - 1) % Math.round(ratio) : 0;
+    const picked = <T>(rows: T[]) => rows.filter((_, at) => (at - start) % Math.round(ratio) === 0);
     return { ...motion, fps, rotations: picked(motion.rotations), translations: picked(motion.translations) };
   }
-  const times = Array.from({ length: count }, (_, at) => at * ratio);
+  const times = Array.from({ length: count }, (_, at) => (toEnd ? frames - 1 - (count - 1 - at) * ratio : at * ratio));
   const between = ratio < 1 ? onSplines : onLines;
   const turned = joints.map(({ order }, at) =>
     between(eulersOf(motion.rotations.map((row) => row[at]!), order), times).map((angles) => fromEuler(angles, order)),

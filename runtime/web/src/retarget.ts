@@ -1,4 +1,4 @@
-/* Motions of any human figure to the humanoid and back: docs/humanoid.md, "The algorithm". */
+/* Motions of any human figure to the humanoid and back: docs/retargeting.md. */
 import { MotionError } from "./errors.js";
 import { relaxed } from "./fingers.js";
 import { BONES, groundUnder, HIPS, HUMANOID, isHumanoid, LEG_LENGTH, NECK, SIDES, solePoints, SPINE } from "./humanoid.js";

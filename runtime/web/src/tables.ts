@@ -26,7 +26,7 @@ import xsensBvh from "../../motet/motion/humanoid/conventions/xsens-bvh.json";
 import xsens from "../../motet/motion/humanoid/conventions/xsens.json";
 import type { Vector } from "./rotations.js";
 
-/** docs/humanoid.md, "The tables of names". */
+/** docs/retargeting.md, "The tables of names". */
 export interface Table {
   title: string;
   prefixes?: string[];

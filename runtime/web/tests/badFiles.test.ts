@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import test from "node:test";
-import { FormatError, fromHumanoid, holdFeet, MotionError, readBVH, Skeleton, toHumanoid } from "../src/index.js";
+import { clipsOf, FormatError, fromHumanoid, holdFeet, MotionError, readBVH, readGLB, Skeleton, toHumanoid } from "../src/index.js";
 
 const mixamo = readFileSync("../../tests/runtime/skeletons/mixamo.bvh", "utf8");
 
@@ -56,4 +56,61 @@ test("a map names joints that no table knows", () => {
   const name = (at: number) => renamed.skeleton.names[at]!;
   const map = { ...Object.fromEntries(Object.entries(joints).map(([bone, at]) => [bone, name(at)])), spine: spine.map(name), neck: neck.map(name) };
   assert.deepEqual(toHumanoid(renamed, map).motion.rotations, toHumanoid(readBVH(mixamo)).motion.rotations);
+});
+
+const { scenes } = JSON.parse(readFileSync("tests/cases.json", "utf8"));
+const avatar = new Uint8Array(Buffer.from(scenes["avatar.vrm"].base64, "base64"));
+
+/** The avatar with another JSON object. */
+function changed(change: (document: any) => void): Uint8Array {
+  const length = new DataView(avatar.buffer).getUint32(12, true);
+  const document = JSON.parse(new TextDecoder().decode(avatar.subarray(20, 20 + length)));
+  change(document);
+  const json = new TextEncoder().encode(JSON.stringify(document));
+  const file = new Uint8Array(20 + json.length + avatar.length - 20 - length);
+  file.set(avatar.subarray(0, 20));
+  new DataView(file.buffer).setUint32(12, json.length, true);
+  file.set(json, 20);
+  file.set(avatar.subarray(20 + length), 20 + json.length);
+  return file;
+}
+
+test("glTF files that are wrong are refused by name", () => {
+  const bones = (document: any) => document.extensions.VRMC_vrm.humanoid.humanBones;
+  const wrong: [Uint8Array, RegExp][] = [
+    [new Uint8Array(), /not a glTF file/],
+    [new TextEncoder().encode("HIERARCHY"), /not a glTF file/],
+    [new TextEncoder().encode("null"), /not a file of glTF 2.0/],
+    [avatar.subarray(0, 15), /no JSON chunk/],
+    [avatar.subarray(0, avatar.length - 100), /cut short/],
+    [changed((d) => (d.asset.version = "1.0")), /not a file of glTF 2.0/],
+    [changed((d) => { d.extensions = { VRMC_vrm: {} }; d.skins = []; d.animations = []; }), /no skeleton: expected a skin with joints or a VRM humanoid/],
+    [changed((d) => { for (const [bone] of Object.entries(bones(d))) bones(d)[bone] = { node: 1e9 }; }), /joints that are not nodes/],
+    [changed((d) => d.nodes[3].children.push(0)), /cycle|not a tree/],
+    [changed((d) => (d.nodes = Array(30000).fill({}))), /30000 nodes/],
+    [changed((d) => (d.accessors[d.animations[0].samplers[0].output].count = 2 ** 40)), /beyond its buffer/],
+    [changed((d) => (d.accessors[d.animations[0].samplers[0].output].type = "VEC9")), /broken glTF file|beyond/],
+    [changed((d) => (d.bufferViews = 7)), /broken glTF file/],
+    [changed((d) => (d.buffers[0].uri = "other.bin")), /is a file of its own/],
+    [changed((d) => (d.bufferViews.at(-1).extensions = { EXT_meshopt_compression: {} })), /packed by meshoptimizer/],
+  ];
+  for (const [content, reason] of wrong) {
+    assert.throws(() => readGLB(content), (error) => error instanceof FormatError && reason.test(error.message), String(reason));
+  }
+  assert.throws(() => readGLB(avatar, "dance"), /no clip "dance"/);
+  assert.throws(() => clipsOf(avatar.subarray(0, 40)), FormatError);
+  const legless = readGLB(changed((d) => { for (const bone of Object.keys(bones(d))) if (/Leg|Foot|Toes/.test(bone)) delete bones(d)[bone]; }));
+  assert.throws(() => toHumanoid(legless), (error) => error instanceof MotionError && /no table|no joint was found for leftUpperLeg/.test(error.message));
+});
+
+test("a glTF file of which any byte was altered is read or refused, but nothing else is thrown", () => {
+  for (let at = 0; at < avatar.length; at += 53) {
+    const altered = Uint8Array.from(avatar);
+    altered[at]! ^= 0x15;
+    try {
+      readGLB(altered);
+    } catch (error) {
+      assert.ok(error instanceof FormatError, String(error));
+    }
+  }
 });

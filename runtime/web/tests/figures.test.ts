@@ -3,7 +3,9 @@ import assert from "node:assert/strict";
 import { readdirSync, readFileSync } from "node:fs";
 import { readFile } from "node:fs/promises";
 import test from "node:test";
-import { Bundle, framesFor, fromHumanoid, isHumanoid, type Motion, motionOf, plantFeet, readBVH, toBVH, toHumanoid, toVRMA, worldOf } from "../src/index.js";
+import {
+  Bundle, clipsOf, framesFor, fromHumanoid, isHumanoid, type Motion, motionOf, plantFeet, readBVH, readGLB, toBVH, toHumanoid, toVRMA, worldOf,
+} from "../src/index.js";
 import { TABLES } from "../src/tables.js";
 
 interface Case { text?: string; convention: string; confidence: number; unit: number; places: number[][][]; back?: number[][][] }
@@ -11,6 +13,7 @@ interface Case { text?: string; convention: string; confidence: number; unit: nu
 const cases = JSON.parse(readFileSync("tests/cases.json", "utf8")) as {
   figures: Record<string, Case>;
   frames: Record<string, { frames: number[][]; places: number[][][] }>;
+  scenes: Record<string, { base64: string; joints: string[]; fps: number; own: number[][][]; places: number[][][] }>;
   feet: { frames: number[][]; held: number[][]; places: number[][][] };
 };
 const manifestOf = async (name: string) => (await Bundle.open(new Uint8Array(await readFile(`../motet/bundles/${name}.zip`)))).manifest;
@@ -35,6 +38,17 @@ for (const [name, { text, convention, confidence, unit, places, back }] of Objec
     // lengths are in the figure's unit
     if (back) near(every(fromHumanoid(first, motion), 1), back, 1e-4 / unit, "back");
     if (back) near(every(fromHumanoid(first, found.figure), 1), back, 1e-4 / unit, "back onto what was measured");
+  });
+}
+
+for (const [name, { base64, joints, fps, own, places }] of Object.entries(cases.scenes)) {
+  test(`${name} is read as in Python, and comes to the humanoid`, () => {
+    const content = new Uint8Array(Buffer.from(base64, "base64"));
+    assert.equal(clipsOf(content)[0], "motion");
+    const motion = readGLB(content);
+    assert.deepEqual([motion.skeleton.names, motion.fps], [joints, fps]);
+    near(every(motion, 5), own, 1e-5, "its own joints");
+    near(every(toHumanoid(motion).motion, 5), places, 1e-4, "places");
   });
 }
 

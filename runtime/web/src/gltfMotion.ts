@@ -1,0 +1,237 @@
+/* Reading glTF 2.0 and VRM: a figure's joints, and its animations as clips; every angle is 0 in the rest pose of the nodes. */
+import { FormatError, MotionError } from "./errors.js";
+import { type Animation, Gltf, type Local, type Placed } from "./gltf.js";
+import { BONES } from "./humanoid.js";
+import { checked, type Motion, motionFrom } from "./motion.js";
+import { median } from "./numbers.js";
+import { inverse, minus, normalised, product, type Quaternion, rotated, type Vector } from "./rotations.js";
+import { END, type Joint, Skeleton, unique } from "./skeleton.js";
+
+const PATHS: Record<string, number> = { rotation: 4, translation: 3, scale: 3 };
+const MOST_JOINTS = 3000;
+const MOST_SKINS = 500;
+
+/** The names of the animations that move a figure. FormatError as {@link readGLB}. */
+export function clipsOf(content: Uint8Array): string[] {
+  return guarded(() => {
+    const gltf = Gltf.parse(content);
+    const taken = new Set<string>();
+    return clips(gltf, figures(gltf)).map(({ name }, at) => unique(name || `clip${at + 1}`, taken));
+  });
+}
+
+/**
+ * Read a clip of a .glb, .vrm, .vrma or .gltf file, by default the first, or the rest pose as one frame if there is
+ * none; lengths are metres. Bones of a VRM humanoid get VRM's names. FormatError names what the file lacks.
+ */
+export function readGLB(content: Uint8Array, clip: number | string = 0): Motion {
+  return guarded(() => {
+    const gltf = Gltf.parse(content);
+    const found = figures(gltf);
+    const animations = clips(gltf, found);
+    const at = typeof clip === "number" ? clip : animations.findIndex(({ name }) => name === clip);
+    const animation = animations[at];
+    if (!animation && (animations.length || clip !== 0)) throw new FormatError(`no clip ${JSON.stringify(clip)}: the file has ${animations.length}`);
+    return taken(gltf, found, animation);
+  });
+}
+
+/** What is misplaced or of a wrong type in a file becomes a FormatError. */
+function guarded<T>(read: () => T): T {
+  try {
+    return read();
+  } catch (error) {
+    if (error instanceof FormatError) throw error;
+    throw new FormatError(error instanceof MotionError ? error.message : `broken glTF file: ${String(error).slice(0, 200)}`);
+  }
+}
+
+function moves({ channels = [] }: Partial<Animation>): Set<number> {
+  const targets = channels.map(({ target }) => target).filter(({ node, path }) => PATHS[path] && node !== undefined);
+  return new Set(targets.map(({ node }) => node!));
+}
+
+function clips(gltf: Gltf, found: Set<number>[]): Animation[] {
+  const animations = gltf.document.animations ?? [];
+  const near = gltf.above(found.flatMap((joints) => [...joints]));
+  const moving = animations.filter((animation) => [...moves(animation)].some((node) => near.has(node)));
+  if (animations.length && !moving.length) throw new FormatError("its animations move no joint of its skeleton");
+  return moving;
+}
+
+/** The joints of each figure by node: those of the skins and the humanoid, or else what animations move. */
+function figures(gltf: Gltf): Set<number>[] {
+  const skins = gltf.document.skins ?? [];
+  if (skins.length > MOST_SKINS) throw new FormatError(`it has ${skins.length} skins: expected at most ${MOST_SKINS}`);
+  const bones = new Set(gltf.humanoid().values());
+  const moved = new Set((gltf.document.animations ?? []).flatMap((animation) => [...moves(animation)]));
+  const given = [bones, ...skins.map(({ joints }) => new Set(joints))].filter((joints) => joints.size);
+  const strange = given.flatMap((joints) => [...joints]).filter((node) => !gltf.nodes[node]);
+  if (strange.length) throw new FormatError(`joints that are not nodes: ${strange.slice(0, 5).join(", ")}`);
+  const roots = heads(gltf, new Set(gltf.order.filter((node) => gltf.parents[node]! < 0)));
+  const parts = (given.length ? given : [animated(gltf, moved, roots)]).flatMap((joints) => byHead(joints, roots));
+  const tops = parts.map((part) => top(gltf, part));
+  const above = heads(gltf, new Set([...moved, ...tops]));
+  const found = new Map<number, Set<number>>();
+  parts.forEach((part, at) => {
+    const head = above.get(tops[at]!)!;
+    found.set(head, new Set([...(found.get(head) ?? []), ...part]));
+  });
+  return [...found.values()].filter((joints) => !bones.size || [...joints].some((node) => bones.has(node)));
+}
+
+function byHead(joints: Set<number>, roots: Map<number, number>): Set<number>[] {
+  const found = new Map<number, Set<number>>();
+  for (const node of joints) found.set(roots.get(node)!, (found.get(roots.get(node)!) ?? new Set()).add(node));
+  return [...found.values()];
+}
+
+/** In each tree the moved nodes and the bones below them, if some are below others. */
+function animated(gltf: Gltf, moved: Set<number>, roots: Map<number, number>): Set<number> {
+  const bones = new Set([...moved].filter((node) => gltf.nodes[node]!.camera === undefined));
+  const hanging = new Set<number>();
+  for (const node of gltf.order) {
+    const [{ mesh, camera }, parent] = [gltf.nodes[node]!, gltf.parents[node]!];
+    if ((bones.has(parent) || hanging.has(parent)) && (bones.has(node) || (mesh === undefined && camera === undefined))) hanging.add(node);
+  }
+  const trees = new Set([...bones].filter((node) => hanging.has(node)).map((node) => roots.get(node)));
+  if (!trees.size) throw new FormatError("no skeleton: expected a skin with joints or a VRM humanoid; export the armature, too");
+  return new Set([...bones, ...hanging].filter((node) => trees.has(roots.get(node))));
+}
+
+/** The highest of some nodes that each node is or is below. */
+function heads(gltf: Gltf, among: Set<number>): Map<number, number> {
+  const found = new Map<number, number>();
+  for (const node of gltf.order) {
+    const above = found.get(gltf.parents[node]!);
+    if (above !== undefined || among.has(node)) found.set(node, above ?? node);
+  }
+  return found;
+}
+
+/** The lowest node that all of a part are or are below. */
+function top(gltf: Gltf, part: Set<number>): number {
+  const inOrder = gltf.order.filter((node) => part.has(node));
+  const line = gltf.above([inOrder[0]!]);
+  let at = inOrder.at(-1)!;
+  while (!line.has(at)) at = gltf.parents[at]!;
+  return at;
+}
+
+/** The figure that an animation moves most, counting its ancestors, else that with the most joints, in the animation's frames. */
+function taken(gltf: Gltf, found: Set<number>[], animation?: Animation): Motion {
+  const moved = animation ? moves(animation) : new Set<number>();
+  const weight = (joints: Set<number>) => [...gltf.above(joints)].filter((node) => moved.has(node)).length * MOST_JOINTS + joints.size;
+  const joints = jointsOf(gltf, found.reduce((best, one) => (weight(one) > weight(best) ? one : best)));
+  const near = gltf.above(joints);
+  const rest = gltf.world(near);
+  const { frames, fps } = animation ? tracks(gltf, animation, near) : { frames: [new Map<number, Local>()], fps: 30 };
+  const skeleton = skeletonOf(gltf, joints, rest);
+  const turns: Quaternion[][] = [];
+  const places: Vector[][] = [];
+  for (const values of frames) {
+    const world = gltf.world(near, values);
+    turns.push(joints.map((node) => product(world.get(node)!.turn, inverse(rest.get(node)!.turn))));
+    places.push(joints.map((node) => world.get(node)!.place));
+  }
+  return checked({ ...motionFrom(skeleton, turns, moving(skeleton, turns, places), fps), travels: animation !== undefined });
+}
+
+/** The joints and the nodes between them, with the ends attached to them, parents first. */
+function jointsOf(gltf: Gltf, joints: Set<number>): number[] {
+  const outside = gltf.above([gltf.parents[top(gltf, joints)]!]);
+  const inside = new Set([...gltf.above(joints)].filter((node) => !outside.has(node)));
+  const ends = (node: number) => gltf.name(node).endsWith(END) && inside.has(gltf.parents[node]!) && !gltf.nodes[node]!.children?.length;
+  const found = gltf.order.filter((node) => inside.has(node) || ends(node));
+  if (found.length > MOST_JOINTS) throw new FormatError(`its skeleton has ${found.length} joints: expected at most ${MOST_JOINTS}`);
+  return found;
+}
+
+function skeletonOf(gltf: Gltf, joints: number[], rest: Map<number, Placed>): Skeleton {
+  const bones = new Map([...gltf.humanoid()].filter(([bone]) => BONES.includes(bone)).map(([bone, node]) => [node, bone]));
+  const [own, given] = [new Set<string>(), new Set<string>(bones.values())];
+  const found = joints.map((node): Joint => {
+    const name = unique(gltf.name(node), own);
+    const parent = joints.indexOf(gltf.parents[node]!);
+    const place = rest.get(node)!.place;
+    const offset = parent < 0 ? place : minus(place, rest.get(joints[parent]!)!.place);
+    return { name: bones.get(node) ?? unique(name, given), parent, offset, order: "zyx" };
+  });
+  return new Skeleton(found, 1);
+}
+
+/** Translations in their parents' frames of the root, and of joints that leave their offset. */
+function moving(skeleton: Skeleton, turns: Quaternion[][], places: Vector[][]): Map<number, Vector[]> {
+  const found = new Map([[0, places.map((pose) => pose[0]!)]]);
+  const still = 1e-4 * Math.max(skeleton.height, 1e-9);
+  skeleton.joints.forEach(({ parent, offset }, at) => {
+    if (parent < 0) return;
+    const local = places.map((pose, frame) => rotated(inverse(turns[frame]![parent]!), minus(pose[at]!, pose[parent]!)));
+    if (local.some((move) => Math.max(...minus(move, offset).map(Math.abs)) > still)) found.set(at, local);
+  });
+  return found;
+}
+
+interface Keys {
+  node: number;
+  path: string;
+  times: number[];
+  values: number[][];
+  kind: string;
+}
+
+/** What is moved in every frame of an animation, of some nodes, and its frame rate. */
+function tracks(gltf: Gltf, animation: Animation, nodes: Set<number>): { frames: Map<number, Local>[]; fps: number } {
+  const keys: Keys[] = [];
+  for (const { sampler, target: { node, path } } of animation.channels) {
+    if (node === undefined || !nodes.has(node) || !PATHS[path]) continue;
+    const { input, output, interpolation = "LINEAR" } = animation.samplers[sampler]!;
+    const times = gltf.array(input).map(([time]) => time!);
+    const values = gltf.array(output);
+    if (!times.length || values.length !== times.length * (interpolation === "CUBICSPLINE" ? 3 : 1) || values[0]!.length !== PATHS[path]) {
+      throw new FormatError("its animation has tracks without keys, or with others than it says");
+    }
+    keys.push({ node, path, times, values, kind: interpolation });
+  }
+  const [start, end] = [Math.min(...keys.map(({ times }) => times[0]!)), Math.max(...keys.map(({ times }) => times.at(-1)!))];
+  const steps = keys.filter(({ times }) => times.length > 1).map(({ times }) => median(times.slice(1).map((time, at) => time - times[at]!)));
+  const step = steps.length ? Math.min(...steps) : 0;
+  const rate = step > 0 && step < 0.1 ? 1 / step : 30; // keys further apart do not tell a frame rate
+  const fps = Math.abs(rate - Math.round(rate)) < 0.01 * rate ? Math.round(rate) : rate;
+  const count = (end - start) * fps + 1;
+  if (!(count * gltf.nodes.length < 1e7)) throw new FormatError(`${end - start} s at ${fps} fps is too many frames`);
+  const frames = Array.from({ length: Math.round(count) }, (_, frame) => {
+    const moved = new Map<number, Local>();
+    for (const key of keys) moved.set(key.node, { ...moved.get(key.node), [key.path]: sampled(key, start + frame / fps) });
+    return moved;
+  });
+  return { frames, fps };
+}
+
+/** A track's value at a time: linear (turns the shortest way), in steps, or by the tangents of splines. */
+function sampled({ times: at, values, kind, path }: Keys, time: number): number[] {
+  let [before, end] = [0, Math.max(at.length - 1, 1)];
+  while (end - before > 1) {
+    const middle = (before + end) >> 1;
+    [before, end] = at[middle]! > time + 1e-6 ? [before, middle] : [middle, end];
+  }
+  const next = Math.min(before + 1, at.length - 1);
+  const span = Math.max(at[next]! - at[before]!, 1e-9);
+  const t = Math.max(0, Math.min(1, (time - at[before]!) / span));
+  if (kind === "CUBICSPLINE") {
+    const [p, out, arrive, q] = [values[3 * before + 1]!, values[3 * before + 2]!, values[3 * next]!, values[3 * next + 1]!];
+    const u = 1 - t;
+    return p.map((value, i) => (1 + 2 * t) * u * u * value + t * u * u * span * out[i]! + t * t * (3 - 2 * t) * q[i]! - t * t * u * span * arrive[i]!);
+  }
+  const [low, high] = [values[before]!, values[next]!];
+  if (kind === "STEP") return t < 1 - 1e-4 ? low : high;
+  return path === "rotation" ? slerp(low as Quaternion, high as Quaternion, t) : low.map((value, i) => value + t * (high[i]! - value));
+}
+
+function slerp(from: Quaternion, to: Quaternion, share: number): Quaternion {
+  const [low, high] = [normalised(from), normalised(to)];
+  const cosine = low.reduce((sum, value, at) => sum + value * high[at]!, 0);
+  const angle = Math.acos(Math.min(1, Math.abs(cosine)));
+  const weight = (part: number) => (angle < 1e-4 ? part : Math.sin(part * angle) / Math.sin(angle));
+  return low.map((value, at) => weight(1 - share) * value + weight(share) * Math.sign(cosine || 1) * high[at]!) as Quaternion;
+}
