@@ -37,7 +37,8 @@ class MotionError(MotetError, ValueError):
 
 
 class UnitError(MotionError):
-    """A length is needed in metres, and it is not known how long a unit of the skeleton is."""
+    """A length is needed in metres, and it is not known how long a unit of the skeleton is, or what is said of it makes
+    a human a giant or a dwarf."""
 
 
 class FormatError(MotionError):

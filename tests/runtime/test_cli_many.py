@@ -96,6 +96,22 @@ def test_a_unit_for_a_mixed_folder_loses_no_file(tmp_path: Path, clips: Path) ->
     assert (len(rows), len(texts)) == (3, 1)
 
 
+def test_a_unit_loses_no_file_of_a_folder_that_is_searched_and_is_the_one_reason_where_it_is_wrong(
+    tmp_path: Path, clips: Path
+) -> None:
+    for name in (WALK, "39_14.asf"):
+        (tmp_path / name).write_bytes((clips / name).read_bytes())
+    motet.write(tmp_path / "centimetres.bvh", motet.read(clips / WALK), like="mixamo")
+    mixamo = motet.read(tmp_path / "centimetres.bvh", unit="cm")
+    motet.write(tmp_path / "other.bvh", mixamo.scaled(0.05))  # legs of 17 cm, if these were centimetres
+    result = run("search", "a person walks", tmp_path, "--unit-in", "cm", "--json")
+    assert {Path(row["path"]).name for row in json.loads(result.stdout)} == {WALK, "centimetres.bvh"}
+    assert result.stderr.startswith(f"motet: {tmp_path / 'other.bvh'}: legs of 0.168 m: ")
+    assert result.stderr.count("\n") == 1
+    assert "give the right unit" in result.stderr
+    assert "lacks joints" not in result.stderr
+
+
 def test_the_frame_rate_and_the_skeleton_of_an_amc_can_be_told(tmp_path: Path, clips: Path) -> None:
     skeleton = tmp_path / "skeleton.asf"
     skeleton.write_bytes((clips / WALK).with_suffix(".asf").read_bytes())

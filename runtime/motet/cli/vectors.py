@@ -6,12 +6,13 @@ import sys
 import warnings
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import click
 import numpy as np
 
-from motet.bundle.graph import SessionOptions
-from motet.cli.options import Tries, bar, bundle_option, noted, session_options, warned
+from motet.bundle.graph import Floats, SessionOptions
+from motet.cli.options import Tries, bar, bundle_option, in_place, noted, session_options, warned
 from motet.cli.reading import Read, read_options, unit_option
 from motet.errors import TextWarning
 from motet.files import check_place, write_whole
@@ -29,6 +30,7 @@ from motet.models.search import INDEX_FILE, Index, SearchModel
 @click.option("--bundle", help="Name or path of a bundle. [default: describe, with --text generate]")
 @session_options
 @read_options
+@click.option("--json", "as_json", is_flag=True, help="Print a list with the input of each row.")
 def embed(
     motions: tuple[Path, ...],
     texts: tuple[str, ...],
@@ -36,8 +38,10 @@ def embed(
     bundle: str | None,
     session: SessionOptions,
     read: Read,
+    as_json: bool,
 ) -> None:
-    """Write context vectors of motion files, or of sentences, one row each, to compare and cluster.
+    """Write context vectors of motion files, of each clip of a file of several, or of sentences, one row each, to
+    compare and cluster.
 
     Motions have those of a bundle that describes, sentences those of one that generates; the two are not comparable.
     A file or sentence that fails has no row.
@@ -47,24 +51,32 @@ def embed(
     if out.suffix.lower() != ".npy":
         raise click.UsageError(f"context vectors are written as .npy, not {out.name!r}")
     check_place(out)
-    tries = Tries()
+    tries, rows = Tries(), list[dict[str, Any]]()
     if motions:
         describer, prepared = load_as(DescribeModel, bundle or "describe", session), []
-        for source in read.sources(motions):
-            with tries.of(source):
+        for source in read.sources(motions, every=True):
+            with tries.of(source) as caught:
                 prepared.append(describer.prepared(read(source)))
+                rows.append({"input": str(source), "in_place": in_place(caught)})
         read.say_resampled(describer.fps)
         vectors = describer.embed(prepared)
     else:
         generator = load_as(GenerateModel, bundle or "generate", session)
+        usable = list(tries.usable(dict(enumerate(texts)), generator.unknown).values())
+        rows += [{"input": text} for text in usable]
         with noted():
-            vectors = generator.embed(list(tries.usable(dict(enumerate(texts)), generator.unknown).values()))
+            vectors = generator.embed(usable)
     if len(vectors):
-        buffer = io.BytesIO()
-        np.save(buffer, vectors, allow_pickle=False)
-        write_whole(out, buffer.getvalue())
-        click.echo(f"{out}: {len(vectors)} context vectors of {vectors.shape[1]} numbers")
+        _save(out, vectors)
+        said = f"{out}: {len(vectors)} context vectors of {vectors.shape[1]} numbers"
+        click.echo(json.dumps(rows) if as_json else said)
     tries.finish()
+
+
+def _save(out: Path, vectors: Floats) -> None:
+    buffer = io.BytesIO()
+    np.save(buffer, vectors, allow_pickle=False)
+    write_whole(out, buffer.getvalue())
 
 
 @click.command()

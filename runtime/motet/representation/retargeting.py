@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from motet.errors import MotionError, listed
+from motet.errors import MotionError, UnitError, listed
 from motet.motion.humanoid import HUMANOID, Figure, from_humanoid, is_mmm, map_of, on_humanoid, unit_by_legs
 from motet.motion.kinematics import (
     AXES,
@@ -97,6 +97,8 @@ def to_model_figure(motion: Motion, pose: Motion, reason: str, figure: Figure | 
             return found
         found = from_humanoid(found, skeleton)
         said = map_of(pose).names(skeleton).values()
+    except UnitError:  # it is a human's
+        raise
     except MotionError as error:
         raise MotionError(f"{error}; and it cannot be used as it is: {reason}") from error
     for name in frozenset(found.rotation_columns()).difference(skeleton.names[:1], *said):

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from motet.errors import MotionError, listed
+from motet.errors import MotionError, UnitError, listed
 from motet.motion.humanoid.alignment import Calibration, alignments_of_pose, axes_agree, body_frame, rests_in_motion
 from motet.motion.humanoid.bones import HUMANOID, LEFT_RIGHT, LEG, SOLE, SPINE, T_POSE, leg_length, part_of, sided
 from motet.motion.humanoid.joint_map import BY_THE_TREE, LIMB_BONES, NEEDED, Body, JointMap, humanoid_direction
@@ -169,10 +169,8 @@ def unit_of(skeleton: Skeleton, leg: float) -> Unit:
         if shortest < leg * stated < longest:
             return Unit(stated, None)
         looks = f"; its lengths look like {guess}" if guess else ""
-        remedy = (
-            "give the right unit (motet's --unit-in), or where the file says its own, scale the figure at its source"
-        )
-        raise MotionError(f"legs of {leg * stated:.3g} m: a human's are {shortest:g} to {longest:g} m{looks}: {remedy}")
+        remedy = "give the right unit, or where the file says its own, scale the figure at its source"
+        raise UnitError(f"legs of {leg * stated:.3g} m: a human's are {shortest:g} to {longest:g} m{looks}: {remedy}")
     if guess is None:
         return Unit(None, "unit not known: the figure is taken to be an adult's size")
     metres = LENGTH_UNITS[guess]
