@@ -64,6 +64,8 @@ const STANDING = { text: "a person stands still", seconds: 0.8 };
 
 /** Motions for a sentence, drawn as codes. */
 export class GenerateModel extends LanguageModel {
+  private readonly verbs: ReturnType<typeof verbsOf>;
+
   constructor(
     manifest: Manifest,
     private readonly encoder: Graph,
@@ -71,6 +73,7 @@ export class GenerateModel extends LanguageModel {
     private readonly codec: Codec,
   ) {
     super(manifest);
+    this.verbs = verbsOf((manifest.actions ?? []).flatMap(({ words }) => words));
   }
 
   /** Motions as frames (T, D) of `root_sixd`: those that Python draws with the same seed, before feet are held. */
@@ -89,10 +92,9 @@ export class GenerateModel extends LanguageModel {
   /** What a text asks for one after another: docs/bundle.md, "Several things in one text". */
   async parts(text: string): Promise<string[]> {
     this.words(text);
-    const verbs = verbsOf(this.manifest.actions!.flatMap(({ words }) => words));
     const found: string[] = [];
     for (const sentence of sentencesOf(text)) {
-      const parts = partsOf(sentence, verbs);
+      const parts = partsOf(sentence, this.verbs);
       found.push(...(parts.length > 1 && (await this.lacks(sentence)) ? parts : [sentence]));
     }
     return found.length > 1 ? found : [text];

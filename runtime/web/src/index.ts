@@ -1,13 +1,13 @@
 export { Bundle, type Manifest } from "./bundle.js";
 export { BundleError, DecodingError, TextError } from "./errors.js";
-export { DescribeModel } from "./describe.js";
+export { DescribeModel, type Description, type DescribeSettings } from "./describe.js";
 export { FillModel } from "./fill.js";
-export { GenerateModel, type GenerateSettings } from "./generate.js";
+export { GenerateModel, type GenerateSettings, type Passage, type StorySettings, type Understood } from "./generate.js";
 export type { Frames } from "./model.js";
 export { type AnyModel, load } from "./models.js";
 export { PredictModel } from "./predict.js";
 export { SearchModel } from "./search.js";
-export { type Pose, posesOf } from "./poses.js";
+export { type Pose, poser, posesOf } from "./poses.js";
 export { readBVH, toBVH } from "./bvh.js";
 export { FormatError, MotionError } from "./errors.js";
 export { framesFor, motionOf, plantFeet } from "./frames.js";

@@ -13,14 +13,19 @@ export interface Pose {
 const ROOT = ["root.forward", "root.left", "root.turn", "root.height"];
 
 /** Poses of frames in `root_sixd` (docs/bundle.md, Frames), from the origin, facing z; such as `generate` gives. */
-export function posesOf(frames: Frames, { motion: { representation, channels, fps } }: Manifest): Pose[] {
+export function posesOf(frames: Frames, manifest: Manifest): Pose[] {
+  return poser(manifest)(frames);
+}
+
+/** Gives the poses of pieces of a motion as they come, such as those of `stream`: each goes on where the last one ended. */
+export function poser({ motion: { representation, channels, fps } }: Manifest): (frames: Frames) => Pose[] {
   if (representation !== "root_sixd" || `${channels.slice(0, 4)}` !== `${ROOT}`) {
     throw new DecodingError(`poses are made of root_sixd, not of ${representation}`);
   }
   const bones = channels.filter((name) => name.endsWith(".xx")).map((name) => name.slice(0, -3));
-  let ground: Ground = [0, 0, 0];
-  return frames.map((frame, at) => {
-    if (at) ground = moved(ground, [frame[0]! / fps, frame[1]! / fps, frame[2]! / fps]);
+  let ground: Ground | undefined;
+  return (frames) => frames.map((frame) => {
+    ground = ground ? moved(ground, [frame[0]! / fps, frame[1]! / fps, frame[2]! / fps]) : [0, 0, 0];
     const rotations = Object.fromEntries(bones.map((bone, i) => [bone, quaternionOf(rotationOf(frame, ROOT.length + 6 * i))]));
     const half = ground[2] / 2;
     rotations[bones[0]!] = product([0, Math.sin(half), 0, Math.cos(half)], rotations[bones[0]!]!);

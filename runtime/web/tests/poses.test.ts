@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
 import test from "node:test";
-import { type GenerateModel, load, posesOf } from "../src/index.js";
+import { GenerateModel, load, poser, posesOf } from "../src/index.js";
 import { rotationOf, type Vector } from "../src/rotations.js";
 
 /** A vector turned by a quaternion. */
@@ -27,4 +27,13 @@ test("generate gives poses that walk forward, bones turned as the frames say", a
     });
   }
   assert.deepEqual(await model.generate("a person walks forward", { seed: 3, seconds: 3 }), [frames]);
+});
+
+test("pieces of a stream are posed like the whole story", async () => {
+  const model = await load(new Uint8Array(await readFile("../motet/bundles/generate.zip")), GenerateModel);
+  const settings = { seed: 2, seconds: 2 };
+  const pose = poser(model.manifest);
+  const poses: ReturnType<typeof posesOf> = [];
+  for await (const frames of model.stream("a person turns around", settings)) poses.push(...pose(frames));
+  assert.deepEqual(poses, posesOf((await model.story("a person turns around", settings)).frames, model.manifest));
 });
