@@ -4,8 +4,8 @@ import { type Animation, Gltf, type Local, type Placed } from "./gltf.js";
 import { BONES } from "./humanoid.js";
 import { checked, type Motion, motionFrom } from "./motion.js";
 import { median } from "./numbers.js";
-import { inverse, minus, normalised, product, type Quaternion, rotated, type Vector } from "./rotations.js";
-import { END, type Joint, Skeleton, unique } from "./skeleton.js";
+import { cross, dot, inverse, minus, normalised, product, type Quaternion, rotated, STILL, type Vector } from "./rotations.js";
+import { END, type Joint, type RestNode, Skeleton, unique } from "./skeleton.js";
 
 const PATHS: Record<string, number> = { rotation: 4, translation: 3, scale: 3 };
 const MOST_JOINTS = 3000;
@@ -157,7 +157,15 @@ function skeletonOf(gltf: Gltf, joints: number[], rest: Map<number, Placed>): Sk
     const offset = parent < 0 ? place : minus(place, rest.get(joints[parent]!)!.place);
     return { name: bones.get(node) ?? unique(name, given), parent, offset, order: "zyx" };
   });
-  return new Skeleton(found, 1);
+  return new Skeleton(found, 1, joints.map((node) => restNode(gltf, node, rest)));
+}
+
+function restNode(gltf: Gltf, node: number, rest: Map<number, Placed>): RestNode {
+  const above = rest.get(gltf.parents[node]!);
+  // a scale that differs by axis counts as the even one of the same volume
+  const scale = above ? Math.cbrt(Math.abs(dot(cross(above.linear[0], above.linear[1]), above.linear[2]))) : 1;
+  const { turn, place } = above ?? { turn: STILL, place: [0, 0, 0] };
+  return { name: gltf.name(node), turn: rest.get(node)!.turn, above: { turn, scale, place } };
 }
 
 /** Translations in their parents' frames of the root, and of joints that leave their offset. */

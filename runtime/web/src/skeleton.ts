@@ -1,6 +1,6 @@
 import { MotionError } from "./errors.js";
 import { spread } from "./numbers.js";
-import { plus, type Vector } from "./rotations.js";
+import { plus, type Quaternion, type Vector } from "./rotations.js";
 
 /** What ends the name of the tip of a last bone, which has no rotation of its own. */
 export const END = "_end";
@@ -14,6 +14,13 @@ export interface Joint {
   order: string;
 }
 
+/** The node of a glTF file that a joint is: its rotation in the world at rest, and what it hangs below. */
+export interface RestNode {
+  name: string;
+  turn: Quaternion;
+  above: { turn: Quaternion; scale: number; place: Vector };
+}
+
 /** A tree of joints; y is up. The pose in which no joint turns is called the rest pose. */
 export class Skeleton {
   readonly names: string[];
@@ -22,10 +29,11 @@ export class Skeleton {
   /** Where each joint is at rest, the root at the origin. */
   readonly rest: Vector[] = [];
 
-  /** metresPerUnit: metres of one unit of the offsets; null where the file does not say. */
+  /** metresPerUnit: metres of one unit of the offsets; null where the file does not say. nodes: of a glTF file's joints. */
   constructor(
     readonly joints: Joint[],
     readonly metresPerUnit: number | null = null,
+    readonly nodes?: RestNode[],
   ) {
     this.names = joints.map((joint) => joint.name);
     if (!joints.length) throw new MotionError("a skeleton needs at least one joint");
@@ -46,7 +54,7 @@ export class Skeleton {
 
   /** The same tree with other offsets and another unit. */
   with(offset: (joint: number) => Vector, metresPerUnit: number | null): Skeleton {
-    return new Skeleton(this.joints.map((joint, at) => ({ ...joint, offset: offset(at) })), metresPerUnit);
+    return new Skeleton(this.joints.map((joint, at) => ({ ...joint, offset: offset(at) })), metresPerUnit, this.nodes);
   }
 
   index(name: string): number {

@@ -4,8 +4,8 @@ import { grounded, nearby } from "./glbWrite.js";
 import { BONES, HUMANOID } from "./humanoid.js";
 import type { Motion } from "./motion.js";
 import { onHumanoid } from "./retarget.js";
-import type { Quaternion, Vector } from "./rotations.js";
-import { END } from "./skeleton.js";
+import { inverse, minus, product, type Quaternion, rotated, times, type Vector } from "./rotations.js";
+import { END, type Skeleton } from "./skeleton.js";
 
 export interface Track {
   name: string;
@@ -32,7 +32,8 @@ export interface Avatar {
 
 /**
  * A clip of a motion: of any human figure, for a VRM avatar; or else of the motion's own joints, by their names as three
- * writes them. MotionError for a figure that is no human's, or an avatar without hips.
+ * writes them, which for a figure of readGLB are the nodes that GLTFLoader gives. MotionError for a figure that is no
+ * human's, or an avatar without hips.
  */
 export function toThree(motion: Motion, avatar?: Avatar): Clip {
   const tracks = avatar ? avatarTracks(grounded(onHumanoid(motion)), avatar) : jointTracks(motion);
@@ -40,14 +41,27 @@ export function toThree(motion: Motion, avatar?: Avatar): Clip {
 }
 
 function jointTracks(motion: Motion): Track[] {
-  const { skeleton, rotations, translations } = motion;
-  return skeleton.names.flatMap((name, at) => {
-    const node = name.replace(/\s/g, "_").replace(/[[\].:/]/g, "");
-    const [turns, moves] = [rotations.map((row) => row[at]!), translations.map((row) => row[at]!)];
-    const moving = at === 0 || moves.some((move) => move !== skeleton.joints[at]!.offset);
-    const turn = name.endsWith(END) ? [] : [track(`${node}.quaternion`, "quaternion", motion.fps, nearby(turns))];
-    return moving ? [...turn, track(`${node}.position`, "vector", motion.fps, moves)] : turn;
+  const { skeleton, rotations, translations, fps } = motion;
+  return skeleton.joints.flatMap(({ name, offset }, at) => {
+    const node = (skeleton.nodes?.[at]?.name ?? name).replace(/\s/g, "_").replace(/[[\].:/]/g, "");
+    const moving = at === 0 || translations.some((row) => row[at] !== offset);
+    const turns = () => nearby(rotations.map((row) => turned(skeleton, at, row[at]!)));
+    const turn = name.endsWith(END) ? [] : [track(`${node}.quaternion`, "quaternion", fps, turns())];
+    const moves = () => translations.map((row) => placed(skeleton, at, row[at]!));
+    return moving ? [...turn, track(`${node}.position`, "vector", fps, moves())] : turn;
   });
+}
+
+/** A joint's rotation as that of its node, in the frame of what it hangs below. */
+function turned({ nodes }: Skeleton, at: number, turn: Quaternion): Quaternion {
+  const node = nodes?.[at];
+  return node ? product(product(inverse(node.above.turn), turn), node.turn) : turn;
+}
+
+function placed({ nodes, joints }: Skeleton, at: number, move: Vector): Vector {
+  const above = nodes?.[at]?.above;
+  if (!above) return move;
+  return times(rotated(inverse(above.turn), joints[at]!.parent < 0 ? minus(move, above.place) : move), 1 / above.scale);
 }
 
 function avatarTracks({ fps, rotations, translations }: Motion, { humanoid, meta }: Avatar): Track[] {

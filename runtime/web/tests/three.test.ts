@@ -4,9 +4,9 @@ import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import test from "node:test";
 import * as THREE from "three";
-import { fromHumanoid, HUMANOID, type Motion, MotionError, readBVH, toHumanoid, toThree, worldOf } from "../src/index.js";
+import { fromHumanoid, HUMANOID, type Motion, MotionError, readBVH, readGLB, toHumanoid, toThree, worldOf } from "../src/index.js";
 
-const { figures } = JSON.parse(readFileSync("tests/cases.json", "utf8"));
+const { figures, scenes } = JSON.parse(readFileSync("tests/cases.json", "utf8"));
 const file: Motion = readBVH(figures.walk.text);
 const { motion: walk } = toHumanoid(file);
 
@@ -69,6 +69,28 @@ test("a clip of a figure's own joints moves a skeleton of their names", () => {
   const metres = worldOf(own).places[9]!.map((place) => place.map((value) => value / 100));
   assertAt(nodes, metres, 100); // the file is in centimetres
 });
+
+for (const name of ["moving.glb", "avatar.vrm"]) {
+  test(`a clip for the nodes of ${name} moves them, below their scale and turn`, () => {
+    const content = new Uint8Array(Buffer.from(scenes[name].base64, "base64"));
+    const { nodes } = JSON.parse(new TextDecoder().decode(content.subarray(20, 20 + new DataView(content.buffer).getUint32(12, true))));
+    const objects = nodes.map((node: any) => {
+      const object = Object.assign(new THREE.Object3D(), { name: THREE.PropertyBinding.sanitizeNodeName(node.name) });
+      object.position.fromArray(node.translation ?? [0, 0, 0]);
+      object.quaternion.fromArray(node.rotation ?? [0, 0, 0, 1]);
+      object.scale.fromArray(node.scale ?? [1, 1, 1]);
+      return object;
+    }) as THREE.Object3D[];
+    nodes.forEach((node: any, at: number) => (node.children ?? []).forEach((child: number) => objects[at]!.add(objects[child]!)));
+    const character = readGLB(content);
+    for (const own of [character, fromHumanoid(walk, character, { ahead: true })]) {
+      playedAt(toThree(own), objects[0]!, 5 / own.fps);
+      objects[0]!.updateMatrixWorld(true);
+      const joints = own.skeleton.nodes!.map((node) => objects.find((object) => object.name === THREE.PropertyBinding.sanitizeNodeName(node.name))!);
+      assertAt(joints, worldOf(own).places[5]!, 1);
+    }
+  });
+}
 
 test("an avatar without hips is refused", () => {
   const avatar = { meta: { metaVersion: "1" }, humanoid: { getNormalizedBoneNode: () => null, normalizedRestPose: {} } };
