@@ -30,8 +30,9 @@ ONE_WAY = {
     "motet.decode": ("motet.representation", "motet.models", "motet.formats", "motet.draw", "motet.cli"),
     "motet.formats": ("motet.bundle", "motet.decode", "motet.models", "motet.cli"),
     "motet.draw": ("motet.bundle", "motet.decode", "motet.models", "motet.formats", "motet.cli"),
-    "motet.models": ("motet.live", "motet.cli"),
-    "motet.live": ("motet.cli",),
+    "motet.models": ("motet.live", "motet.serve", "motet.cli"),
+    "motet.live": ("motet.serve", "motet.cli"),
+    "motet.serve": ("motet.cli",),
     "motet_train": ("motet_export",),
     "motet_train.data": (*PRODUCT[1:], "motet_train.papers", "motet_train.cli"),
     "motet_train.models": (*PRODUCT[2:], "motet_train.papers", "motet_train.cli"),
@@ -77,7 +78,7 @@ def test_imports_run_one_way(package: str) -> None:
 @pytest.mark.parametrize(
     ("rooms", "without"),
     [
-        (("motet", "motet.cli"), (*HEAVY, "PIL", "tqdm", "websockets", "pythonosc")),
+        (("motet", "motet.cli"), (*HEAVY, "PIL", "tqdm", "websockets", "pythonosc", "starlette", "uvicorn")),
         (("motet_train.recipes", "motet_train.cli.train"), (*HEAVY[1:], "PIL")),
     ],
 )

@@ -21,6 +21,7 @@ COMMANDS = {
     "join": ("motet.cli.motions", "", "Join two motions by a transition."),
     "control": ("motet.cli.motions", "", "Run a script such as 'walk 3s, run 3s'."),
     "live": ("motet.cli.live", "", "Steer figures live: in a page, by a server, onto an avatar."),
+    "serve": ("motet.cli.serve", "serve", "Serve models over HTTP."),
     "search": ("motet.cli.vectors", "", "Find motions in a folder by a sentence or a motion."),
     "embed": ("motet.cli.vectors", "", "Write context vectors of motions or sentences."),
     "check": ("motet.cli.files", "", "Say what motion files hold and how they are understood."),
@@ -38,6 +39,7 @@ COMMANDS = {
 
 NEEDS = {
     "live": ("websockets", "pythonosc"),
+    "serve": ("starlette", "uvicorn", "python_multipart", "websockets"),
     "train": ("torch", "tqdm"),
     "evaluate": ("torch", "tqdm", "matplotlib", "sklearn", "sacrebleu"),
     "export": ("torch", "tqdm", "onnx", "onnxscript"),

@@ -9,7 +9,7 @@ import re
 import socket
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Self
+from typing import Protocol, Self
 
 from motet.errors import MotetError, OutputError
 from motet.live import protocol
@@ -69,6 +69,10 @@ class Connection(ServerConnection):
             if not self.transport.is_closing():
                 super().data_received(data[start : start + (1 << 12)])
 
+    def abort(self) -> None:
+        """See :class:`Wire`."""
+        self.transport.abort()
+
     def process_event(self, event: Event) -> None:
         """See the class."""
         super().process_event(event)
@@ -82,13 +86,116 @@ class Connection(ServerConnection):
             self.transport.abort()
 
 
-class LiveServer:
+class Wire(Protocol):
+    """A connection to a client; ConnectionClosed where it is closed."""
+
+    async def send(self, text: str, /) -> None:
+        """Send a message."""
+
+    async def recv(self) -> str | bytes:
+        """The client's next message."""
+
+    async def close(self, code: int, reason: str) -> None:
+        """Close it, and say why."""
+
+    def abort(self) -> None:
+        """Close it at once."""
+
+
+class LiveClients:
+    """The clients of a server, whichever way they come: :meth:`client` is all of one.
+
+    characters: that a client has at first. rate: ticks a second, by default the model's, which is life's speed. watch:
+    called with each pose of the client that is here the longest. ControlError for a number of characters that a client
+    cannot have.
+    """
+
+    def __init__(
+        self,
+        model: SteerModel,
+        characters: int = 1,
+        rate: float | None = None,
+        watch: Callable[[Pose, float], None] | None = None,
+        limits: Limits = LIMITS,
+    ) -> None:
+        self.model, self.characters = model, characters
+        self.rate, self.watch, self.limits = rate or model.fps, watch, limits
+        ClientSession(model, characters)  # refuses now what it would refuse every client
+        self._clients: list[ClientSession] = []
+
+    async def client(self, connection: Wire) -> None:
+        """All of one client, until it goes or is dropped: ticks and its messages, side by side."""
+        if len(self._clients) >= self.limits.clients or self._figures() + self.characters > self.limits.figures:
+            said = f"there are {len(self._clients)} clients already, of {self._figures()} figures"
+            await connection.close(1013, said)  # try again later
+            return
+        client, fault = ClientSession(self.model, self.characters), None
+        self._clients.append(client)
+        try:
+            await connection.send(protocol.hello(self.model))
+            async with asyncio.TaskGroup() as both:
+                both.create_task(self._listen(connection, client))
+                both.create_task(self._tick(connection, client))
+        except* ConnectionClosed:
+            pass
+        except* MotetError as faults:
+            fault = faults.exceptions[0]
+        finally:
+            self._clients.remove(client)
+        if fault is not None:
+            log.warning("dropped a client: %s", fault)
+            await self._drop(connection, str(fault))
+
+    def _figures(self) -> int:
+        return sum(client.session.characters for client in self._clients)
+
+    async def _listen(self, connection: Wire, client: ClientSession) -> None:
+        tick, count = 0, 0
+        while True:
+            text = await connection.recv()
+            tick, count = client.ticks, (count + 1 if tick == client.ticks else 1)
+            if count > self.limits.messages:
+                raise ProtocolError(f"more than {self.limits.messages} messages between two frames")
+            notes = client.handle(text)
+            if self._figures() > self.limits.figures:
+                raise ProtocolError(f"all clients together may have {self.limits.figures} figures")
+            for said in notes:
+                await self._send(connection, protocol.message("note", message=said))
+
+    async def _tick(self, connection: Wire, client: ClientSession) -> None:
+        clock = asyncio.get_running_loop().time
+        due = clock()
+        while True:
+            pose = client.tick()
+            if self.watch and client is self._clients[0]:
+                self.watch(pose, client.ticks / self.model.fps)
+            await self._send(connection, client.frame(pose))
+            due = max(due + 1 / self.rate, clock() - 0.1)  # what is late is not made up for
+            await asyncio.sleep(due - clock())
+
+    async def _send(self, connection: Wire, text: str) -> None:
+        try:
+            async with asyncio.timeout(self.limits.stall):
+                await connection.send(text)
+        except TimeoutError:
+            raise ProtocolError(f"took no frames for {self.limits.stall:g} s") from None
+
+    async def _drop(self, connection: Wire, reason: str) -> None:
+        """Say why, as far as the client still listens, and close: it broke a rule (1008)."""
+        short = reason.encode()[:120].decode(errors="ignore")  # a frame that closes has room for 123 bytes
+        try:
+            async with asyncio.timeout(self.limits.stall):
+                await connection.send(protocol.message("error", message=reason))
+                await connection.close(1008, short)
+        except (TimeoutError, ConnectionClosed):
+            connection.abort()
+
+
+class LiveServer(LiveClients):
     """Listens while it is entered (``async with``).
 
-    characters: that a client has at first. rate: ticks a second, by default the model's, which is life's speed.
-    origins: of further web pages that may connect, such as "null" (a page that was opened as a file). watch:
-    called with each pose of the client that is here the longest.
-    OutputError where it cannot listen, ControlError for a number of characters that a client cannot have.
+    origins: of further web pages that may connect, such as "null" (a page that was opened as a file). Others like
+    :class:`LiveClients`. OutputError where it cannot listen.
     """
 
     def __init__(  # noqa: PLR0913  settings, each of which has a default
@@ -103,17 +210,15 @@ class LiveServer:
         watch: Callable[[Pose, float], None] | None = None,
         limits: Limits = LIMITS,
     ) -> None:
-        self.model, self.host, self.port, self.characters = model, host, port, characters
-        self.rate, self.watch, self.limits = rate or model.fps, watch, limits
-        ClientSession(model, characters)  # refuses now what it would refuse every client
+        super().__init__(model, characters, rate, watch, limits)
+        self.host, self.port = host, port
         self._origins = [None, LOCAL, *map(Origin, origins)]
-        self._clients: list[ClientSession] = []
         self._server: Server | None = None
 
     async def __aenter__(self) -> Self:
         try:
             self._server = await serve(
-                self._client,
+                self._connected,
                 self.host,
                 self.port,
                 origins=self._origins,
@@ -137,76 +242,13 @@ class LiveServer:
         self._server.close()
         await self._server.wait_closed()
 
-    async def _client(self, connection: ServerConnection) -> None:
-        """All of one client, until it goes or is dropped: ticks and its messages, side by side."""
-        if len(self._clients) >= self.limits.clients or self._figures() + self.characters > self.limits.figures:
-            said = f"there are {len(self._clients)} clients already, of {self._figures()} figures"
-            await connection.close(1013, said)  # try again later
-            return
+    async def _connected(self, connection: ServerConnection) -> None:
         # the system holds no more for a client than this, either
         connection.transport.get_extra_info("socket").setsockopt(
             socket.SOL_SOCKET, socket.SO_SNDBUF, self.limits.buffer
         )
-        client, fault = ClientSession(self.model, self.characters), None
-        self._clients.append(client)
-        try:
-            await connection.send(protocol.hello(self.model))
-            async with asyncio.TaskGroup() as both:
-                both.create_task(self._listen(connection, client))
-                both.create_task(self._tick(connection, client))
-        except* ConnectionClosed:
-            pass
-        except* MotetError as faults:
-            fault = faults.exceptions[0]
-        finally:
-            self._clients.remove(client)
-        if fault is not None:
-            log.warning("dropped a client: %s", fault)
-            await self._drop(connection, str(fault))
-
-    def _figures(self) -> int:
-        return sum(client.session.characters for client in self._clients)
-
-    async def _listen(self, connection: ServerConnection, client: ClientSession) -> None:
-        tick, count = 0, 0
-        while True:
-            text = await connection.recv()
-            tick, count = client.ticks, (count + 1 if tick == client.ticks else 1)
-            if count > self.limits.messages:
-                raise ProtocolError(f"more than {self.limits.messages} messages between two frames")
-            notes = client.handle(text)
-            if self._figures() > self.limits.figures:
-                raise ProtocolError(f"all clients together may have {self.limits.figures} figures")
-            for said in notes:
-                await self._send(connection, protocol.message("note", message=said))
-
-    async def _tick(self, connection: ServerConnection, client: ClientSession) -> None:
-        clock = asyncio.get_running_loop().time
-        due = clock()
-        while True:
-            pose = client.tick()
-            if self.watch and client is self._clients[0]:
-                self.watch(pose, client.ticks / self.model.fps)
-            await self._send(connection, client.frame(pose))
-            due = max(due + 1 / self.rate, clock() - 0.1)  # what is late is not made up for
-            await asyncio.sleep(due - clock())
-
-    async def _send(self, connection: ServerConnection, text: str) -> None:
-        try:
-            async with asyncio.timeout(self.limits.stall):
-                await connection.send(text)
-        except TimeoutError:
-            raise ProtocolError(f"took no frames for {self.limits.stall:g} s") from None
-
-    async def _drop(self, connection: ServerConnection, reason: str) -> None:
-        """Say why, as far as the client still listens, and close: it broke a rule (1008)."""
-        short = reason.encode()[:120].decode(errors="ignore")  # a frame that closes has room for 123 bytes
-        try:
-            async with asyncio.timeout(self.limits.stall):
-                await connection.send(protocol.message("error", message=reason))
-                await connection.close(1008, short)
-        except (TimeoutError, ConnectionClosed):
-            connection.transport.abort()
+        assert isinstance(connection, Connection)
+        await self.client(connection)
 
 
 def run_server(server: LiveServer, ready: Callable[[], None] = lambda: None) -> None:

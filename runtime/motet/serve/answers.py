@@ -1,0 +1,219 @@
+"""What models answer to requests, as the commands of the same names would."""
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass
+from functools import partial
+from pathlib import PurePath
+from typing import Any, TypeVar, cast
+
+from motet.models.describe import DescribeModel, Description
+from motet.models.generate import PLAYED, Generated
+from motet.models.generate_codes import CodesModel, Story
+from motet.models.predict import PredictModel
+from motet.motion.looping import looped
+from motet.motion.motion import Motion
+from motet.motion.skeleton import METRES
+from motet.serve.asked import Asked, RequestError, read_upload
+from motet.serve.batches import Batcher
+from motet.serve.content import MEDIA, as_json, character_of, figure_of, file_of, frames_of, shaped
+from motet.serve.limits import Limits
+
+T = TypeVar("T")
+Key = frozenset[tuple[str, Any]]
+
+MODEL = ("seed", "max_seconds", "temperature", "top_p", "strict", "whole")
+"""Settings of ``motet generate`` that are its model's."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The content of an answer, and how well its sentences were understood, where it has some."""
+
+    content: bytes
+    media: str
+    understood: list[dict[str, Any]] | None = None
+
+
+class Answers:
+    """Answers requests by three models. Errors are those of the models, RequestError, and FormatError for files.
+
+    Models run and answers are written in one thread, one call after the other: while it writes the answers of a batch,
+    the next one gathers. Files are read in two others.
+    """
+
+    def __init__(self, generate: CodesModel, describe: DescribeModel, predict: PredictModel, limits: Limits) -> None:
+        self._writer, self._describer, self._predictor, self.limits = generate, describe, predict, limits
+        self._models, self._files = ThreadPoolExecutor(1, "models"), ThreadPoolExecutor(2, "files")
+        self._generated = Batcher(self._generate, self._models, limits.batch)
+        self._described = Batcher(self._describe, self._models, limits.batch)
+        self._predicted = Batcher(self._predict, self._models, limits.batch)
+
+    def close(self) -> None:
+        """End the threads, once what runs is done."""
+        for pool in (self._models, self._files):
+            pool.shutdown(cancel_futures=True)
+
+    def state(self) -> dict[str, Any]:
+        """What a look at the server's health shows: the models, and how many requests wait for them."""
+        models = (self._writer, self._describer, self._predictor)
+        waiting = len(self._generated) + len(self._described) + len(self._predicted)
+        return {"models": {model.VERB: model.manifest.name for model in models}, "waiting": waiting}
+
+    # ---- generate
+
+    async def generate(self, asked: Asked, form: str) -> Answer:
+        """The motion of a sentence, or of several as a story, in a format out of MEDIA."""
+        texts, settings = await _in(self._files, self._told, asked, asked.settings.get("story", False))
+        character = await _in(self._files, character_of, asked, form, self.limits)
+        if asked.settings.get("story") or {"stand", "after"} & {*asked.settings, *asked.files}:
+            settings |= await self._after(asked)
+            result: Generated = await _in(self._models, partial(self._writer.story, texts, **settings))
+        else:
+            seed = settings.pop("seed", 0)
+            result = await self._generated(frozenset(settings.items()), (texts[0], seed))
+        return await _in(self._models, self._shown, result, texts, asked, form, character)
+
+    async def stream(self, asked: Asked) -> AsyncIterator[bytes]:
+        """Lines of JSON: the figure, then frames as they are drawn; errors before the first."""
+        texts, settings = await _in(self._files, self._told, asked, True)
+        settings |= await self._after(asked)
+        pieces = await _in(self._models, partial(self._writer.stream, texts, **settings))
+        understood = await _in(self._models, self._understood, texts, asked)
+        piece = await _in(self._models, next, pieces, None)
+
+        async def lines() -> AsyncIterator[bytes]:
+            nonlocal piece
+            if piece is not None:
+                yield as_json({"understood": understood, **figure_of(piece)}) + b"\n"
+            while piece is not None:
+                yield await _in(self._files, lambda shown: as_json(frames_of(shown)) + b"\n", piece)
+                piece = await _in(self._models, next, pieces, None)
+
+        return lines()
+
+    def _told(self, asked: Asked, story: bool) -> tuple[list[str], dict[str, Any]]:
+        """The sentences and the settings of the model; RequestError where there is none, or too much."""
+        texts: list[str] = asked.settings.get("text", [])
+        settings = asked.some(*MODEL, "seconds", "stand")
+        if not texts:
+            raise RequestError("text: is missing: expected a sentence, such as 'a person walks'")
+        if len(texts) > 1 and not story:
+            raise RequestError(
+                f"text: {len(texts)} sentences become one motion with story=true; else ask for each alone"
+            )
+        seconds = settings.get("seconds")
+        each = seconds if isinstance(seconds, list) else [seconds] * len(texts)
+        if len(each) != len(texts):
+            raise RequestError(f"seconds: expected a number, or one for each of {len(texts)} texts, not {len(each)}")
+        most = settings.get("max_seconds", self._writer.defaults["max_seconds"])
+        parts = [len(self._parts(text, asked)) for text in texts]
+        self._check_length(sum(count * most if one is None else one for count, one in zip(parts, each, strict=True)))
+        return texts, {**settings, "seconds": each[0] if len(texts) == 1 else seconds}
+
+    def _check_length(self, seconds: float) -> None:
+        if seconds > self.limits.motion_seconds:
+            most = f"this server gives at most {self.limits.motion_seconds:g} s"
+            raise RequestError(f"seconds, max_seconds: up to {seconds:g} s of motion are asked for: {most}")
+
+    async def _after(self, asked: Asked) -> dict[str, Motion]:
+        after = asked.files.get("after")
+        return {} if after is None else {"after": await _in(self._files, read_upload, after, self.limits)}
+
+    def _generate(self, key: Key, asked: list[tuple[str, int]]) -> list[Generated]:
+        texts, seeds = zip(*asked, strict=True)
+        return [row[0] for row in self._writer.generate(list(texts), seed=list(seeds), **cast(Any, dict(key)))]
+
+    def _parts(self, text: str, asked: Asked) -> list[str]:
+        """What a text asks for one after another."""
+        return [text] if asked.settings.get("whole") else self._writer.parts(text)
+
+    def _understood(self, texts: list[str], asked: Asked) -> list[dict[str, Any]]:
+        parts = [part for text in texts for part in self._parts(text, asked)]
+        return [{"text": part, **asdict(self._writer.understood(part))} for part in parts]
+
+    def _shown(self, result: Generated, texts: list[str], asked: Asked, form: str, character: Any) -> Answer:
+        """The answer of what was drawn, like ``motet generate`` writes it."""
+        motion = result.playable(asked.settings.get("fps", PLAYED), not asked.settings.get("no_plant", False))
+        motion = shaped(looped(motion) if asked.settings.get("loop") else motion, asked, character)
+        understood, told = self._understood(texts, asked), " / ".join(texts)
+        passages = [asdict(one) for one in result.passages] if isinstance(result, Story) else []
+        if form == "json":
+            said = {"understood": understood, "unknown": result.unknown, "passages": passages}
+            content = as_json({**said, "seconds": motion.duration, **figure_of(motion), **frames_of(motion)})
+        else:
+            captions = [(one["start"], one["text"]) for one in passages] or None
+            content = file_of(motion, form, asked, character, told, captions)
+        return Answer(content, MEDIA[form], understood)
+
+    # ---- describe
+
+    async def describe(self, asked: Asked) -> Answer:
+        """What ``motet describe --json`` says of a file."""
+        motion, name = await self._given(asked), asked.files["file"].name
+        if asked.settings.get("timeline"):
+            if asked.some("beams", "draws"):
+                raise RequestError("timeline gives one sentence for each part: it goes with neither beams nor draws")
+            parts = await _in(self._models, self._describer.timeline, motion)
+            return _said([{"input": name, **part.to_json()} for part in parts])
+        windows = await _in(self._files, self._describer.windows, motion)
+        settings = asked.some("beams", "draws", "seed")
+        if settings.get("draws") == 0:  # none drawn: beam search
+            settings = {**settings, "draws": None, "decoding": "beam"}
+        found = await self._described(frozenset(settings.items()), [window for _, window in windows])
+        rows = [
+            {"input": name, "start": start, "stop": start + part.duration, "hypotheses": [one.to_json() for one in row]}
+            for (start, part), row in zip(windows, found, strict=True)
+        ]
+        return _said(rows)
+
+    def _describe(self, key: Key, files: list[list[Motion]]) -> list[list[list[Description]]]:
+        found = iter(self._describer.describe([window for file in files for window in file], **cast(Any, dict(key))))
+        return [[next(found) for _ in file] for file in files]
+
+    async def _given(self, asked: Asked) -> Motion:
+        """The motion of the file of a request."""
+        if "file" not in asked.files:
+            raise RequestError(
+                "there is no file: send its bytes as the body, and its type as format, or a form's 'file'"
+            )
+        unit = asked.settings.get("unit_in")
+        if unit is not None and unit not in METRES:
+            raise RequestError(f"unit_in: expected one of {', '.join(METRES)}, not {unit!r}")
+        options = {**asked.some("clip", "partial"), **({"unit": unit} if unit else {})}
+        return await _in(self._files, partial(read_upload, asked.files["file"], self.limits, **options))
+
+    # ---- predict
+
+    async def predict(self, asked: Asked, form: str) -> Answer:
+        """How the motion of a file goes on, like ``motet predict`` writes it."""
+        motion, model = await self._given(asked), self._predictor
+        character = await _in(self._files, character_of, asked, form, self.limits)
+        count = model.count(**asked.some("seconds", "frames"))
+        self._check_length(count / model.fps)
+        key = frozenset({"frames": count, **asked.some("append")}.items())
+        result = await self._predicted(key, (motion, asked.settings.get("seed", 0)))
+        return await _in(self._models, self._continued, result, asked, form, character)
+
+    def _predict(self, key: Key, asked: list[tuple[Motion, int]]) -> list[Motion]:
+        motions, seeds = zip(*asked, strict=True)
+        options = {**dict(key), "seed": list(seeds), "beyond": self._writer}
+        return self._predictor.predict(list(motions), **cast(Any, options))
+
+    def _continued(self, motion: Motion, asked: Asked, form: str, character: Any) -> Answer:
+        motion = shaped(motion, asked, character)
+        if form == "json":
+            content = as_json({"seconds": motion.duration, **figure_of(motion), **frames_of(motion)})
+        else:
+            content = file_of(motion, form, asked, character, PurePath(asked.files["file"].name).stem)
+        return Answer(content, MEDIA[form])
+
+
+def _said(rows: list[dict[str, Any]]) -> Answer:
+    return Answer(as_json(rows), MEDIA["json"])
+
+
+async def _in(pool: ThreadPoolExecutor, call: Callable[..., T], *given: Any) -> T:
+    """What a call gives, made in a thread of a pool."""
+    return await asyncio.get_running_loop().run_in_executor(pool, call, *given)

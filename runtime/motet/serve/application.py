@@ -1,0 +1,126 @@
+"""The server as an ASGI application of Starlette, and run by uvicorn: both come with the extra ``serve``."""
+
+import asyncio
+import signal
+import socket
+import warnings
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import asynccontextmanager
+from importlib.metadata import version
+from typing import Any
+
+from motet.bundle.bundle import Bundle
+from motet.bundle.graph import SessionOptions
+from motet.errors import BundleError, MotetError, OutputError, TextWarning
+from motet.models.base import BundleModel
+from motet.models.describe import DescribeModel
+from motet.models.generate_codes import CodesModel
+from motet.models.load import load_as
+from motet.models.predict import PredictModel
+from motet.models.steer import SteerModel
+
+try:
+    import python_multipart  # noqa: F401  which Starlette needs for forms
+    import uvicorn
+    import websockets  # noqa: F401  which uvicorn needs for live figures
+    from starlette.applications import Starlette
+    from starlette.exceptions import HTTPException
+    from starlette.middleware import Middleware
+    from starlette.middleware.cors import CORSMiddleware
+    from starlette.routing import WebSocketRoute
+except ImportError as error:
+    remedy = "install the extra with  pip install 'motet[serve]'"
+    raise ImportError(f"motet.serve.application needs {error.name}: {remedy}") from error
+
+from motet.live.server import LIMITS
+from motet.serve.answers import Answers
+from motet.serve.endpoints import UNDERSTOOD, broken, fault, refused, routes
+from motet.serve.limits import Gate, Limits
+from motet.serve.live import LiveDoor
+
+KINDS: dict[str, type[BundleModel]] = {
+    "generate": CodesModel,
+    "describe": DescribeModel,
+    "predict": PredictModel,
+    "control": SteerModel,
+}
+"""What a server needs a bundle of, by verb, which is the default bundle's name."""
+
+
+def app(
+    bundles: Sequence[str] = (),
+    *,
+    origins: Sequence[str] = (),
+    limits: Limits | None = None,
+    session: SessionOptions | None = None,
+) -> Starlette:
+    """The ASGI application of ``motet serve``, for any server: ``uvicorn --factory motet.serve.application:app``.
+
+    bundles: names or paths of bundles that take the place of "generate", "describe", "predict" and "control".
+    origins: of web pages that may call it (CORS) and steer figures. limits: by default those of :class:`Limits`.
+    session: how graphs run. BundleError for a bundle that cannot be used.
+    """
+    named = {verb: verb for verb in KINDS} | {Bundle.open(name).manifest.verb: name for name in bundles}
+    if others := sorted(named.keys() - KINDS.keys()):
+        raise BundleError(f"bundle {named[others[0]]} is for {others[0]!r}; a server takes {', '.join(KINDS)}")
+    models: dict[str, Any] = {verb: load_as(kind, named[verb], session) for verb, kind in KINDS.items()}
+    steer, answers = models.pop("control"), Answers(**models, limits=limits or Limits())
+
+    @asynccontextmanager
+    async def running(_: Starlette) -> AsyncIterator[None]:
+        with warnings.catch_warnings():  # the answers say what was not understood
+            warnings.simplefilter("ignore", TextWarning)
+            yield
+        answers.close()
+
+    cors = Middleware(CORSMiddleware, allow_origins=origins, allow_methods=["*"], expose_headers=[UNDERSTOOD])
+    return Starlette(
+        routes=[*routes(answers, version("motet")), WebSocketRoute("/live", LiveDoor(steer, origins).open)],
+        middleware=[*([cors] if origins else []), Middleware(Gate, limits=answers.limits)],
+        exception_handlers={MotetError: fault, HTTPException: refused, Exception: broken},
+        lifespan=running,
+    )
+
+
+def run(
+    application: Starlette,
+    host: str = "127.0.0.1",
+    port: int = 8000,
+    *,
+    ready: Callable[[int], object] = lambda port: None,
+) -> None:
+    """Run an application until Ctrl-C or SIGTERM; requests that are being answered then have 30 seconds.
+
+    ready: called with the port when it listens, of use where ``port`` is 0, for a free one. OutputError where it cannot
+    listen.
+    """
+    config = uvicorn.Config(
+        application,
+        log_config=None,
+        log_level="warning",
+        access_log=False,
+        server_header=False,
+        timeout_graceful_shutdown=30,
+        ws_max_size=LIMITS.message_bytes,
+        ws_ping_interval=LIMITS.ping,
+        ws_ping_timeout=LIMITS.ping,
+        ws_per_message_deflate=False,
+    )
+    with listening(host, port) as place:
+        ready(place.getsockname()[1])
+        before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+        try:
+            asyncio.run(uvicorn.Server(config).serve([place]))
+        except KeyboardInterrupt:  # which uvicorn raises again when it is done
+            return
+        finally:
+            signal.signal(signal.SIGTERM, before)
+
+
+def listening(host: str, port: int) -> socket.socket:
+    """A socket that listens; OutputError where it cannot."""
+    try:
+        family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        return socket.create_server((host, port), family=family, backlog=1024)
+    except OSError as error:
+        raise OutputError(f"cannot listen on {host}:{port}: {error.strerror or error}") from error

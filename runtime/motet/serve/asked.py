@@ -1,0 +1,185 @@
+"""What a request asks: its settings, by the names of the command line, from the address, a form or JSON; its files."""
+
+import io
+import json
+import zipfile
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from pathlib import PurePath
+from typing import Any, Literal
+
+from starlette.datastructures import UploadFile
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+
+from motet.errors import FormatError, MotetError, quoted
+from motet.formats import READABLE, read_motion
+from motet.motion.motion import Motion
+from motet.serve.limits import Limits
+from motet.settings import is_number
+
+TAKES = tuple(extension for extension in READABLE if extension != ".amc")  # whose skeleton is another file
+LONGEST_TEXT, MOST_TEXTS = 1000, 100
+
+Kind = Literal["text", "texts", "number", "numbers", "whole", "flag"]
+
+WORDS = {"text": "a text", "texts": "a text or a list of texts", "number": "a number", "whole": "a whole number"}
+WORDS |= {"numbers": "a number or a list of numbers", "flag": "true or false"}
+FLAGS = {"true": True, "1": True, "on": True, "false": False, "0": False, "off": False}
+
+
+class RequestError(MotetError, ValueError):
+    """A request that asks for what there is not, or in words that are none."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A setting of requests. choices: all values of a text, where they are few."""
+
+    kind: Kind
+    help: str
+    choices: tuple[str, ...] = ()
+
+    def from_text(self, name: str, given: Sequence[str]) -> Any:
+        """The value of a setting from the texts of an address or a form; RequestError like :meth:`checked`."""
+        if self.kind in ("text", "texts"):
+            return self.checked(name, given[-1] if self.kind == "text" else list(given))
+        values = [FLAGS.get(text.lower()) if self.kind == "flag" else _number(text) for text in given]
+        return self.checked(name, values if self.kind == "numbers" and len(values) > 1 else values[-1])
+
+    def checked(self, name: str, value: Any) -> Any:
+        """A value of JSON, one text or number as a list where several may be; RequestError for another type."""
+        many = self.kind in ("texts", "numbers") and isinstance(value, list)
+        if not all(map(self._fits, value if many else [value])) or (many and not 0 < len(value) <= MOST_TEXTS):
+            wanted = f"one of {', '.join(self.choices)}" if self.choices else WORDS[self.kind]
+            raise RequestError(f"{name}: expected {wanted}, not {quoted(json.dumps(value))}")
+        return [value] if self.kind == "texts" and not many else value
+
+    def _fits(self, value: Any) -> bool:
+        if self.kind == "flag":
+            return isinstance(value, bool)
+        if self.kind in ("text", "texts"):  # lone surrogates are no characters
+            fits = (
+                isinstance(value, str)
+                and len(value) <= LONGEST_TEXT
+                and not any("\ud800" <= c <= "\udfff" for c in value)
+            )
+            return fits and (not self.choices or value in self.choices)
+        return is_number(value) and (self.kind != "whole" or isinstance(value, int))
+
+
+class Upload(io.BytesIO):
+    """A file that came with a request; errors call it by ``name``, which never leads to a file of this machine."""
+
+    def __init__(self, content: bytes, name: str) -> None:
+        super().__init__(content)
+        self.name = PurePath(name.replace("\\", "/").replace("\0", "")).name or "file"
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A request: settings by name as far as they are given, and files by name."""
+
+    settings: Mapping[str, Any]
+    files: Mapping[str, Upload] = field(default_factory=dict)
+
+    def some(self, *names: str) -> dict[str, Any]:
+        """The settings of these names that are given."""
+        return {name: self.settings[name] for name in names if name in self.settings}
+
+
+async def asked(request: Request, parameters: Mapping[str, Parameter], files: Sequence[str], limits: Limits) -> Asked:
+    """What a request asks; RequestError for anything that is not among the parameters and files.
+
+    The body is a JSON object, a form, or the bytes of the file called "file", whose type is in "format".
+    """
+    given, uploads = from_texts(request.query_params.multi_items(), parameters), dict[str, Upload]()
+    kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    if kind == "multipart/form-data" or (kind == "application/x-www-form-urlencoded" and "file" not in files):
+        async with request.form(max_files=len(files), max_fields=200, max_part_size=limits.text_bytes) as form:
+            parts = form.multi_items()
+            uploads = {name: await _upload(name, one, files) for name, one in parts if isinstance(one, UploadFile)}
+            given |= from_texts([(name, one) for name, one in parts if isinstance(one, str)], parameters)
+    elif body := await request.body():
+        if kind == "application/json" or "file" not in files:
+            given |= from_json(body, parameters, limits)
+        else:
+            uploads["file"] = Upload(body, "file")
+    if "file" in uploads and "format" in given:
+        uploads["file"].name = f"{PurePath(uploads['file'].name).stem}.{given.pop('format')}"
+    return Asked(given, uploads)
+
+
+def from_texts(pairs: Iterable[tuple[str, str]], parameters: Mapping[str, Parameter]) -> dict[str, Any]:
+    """Settings from names and texts, without those that are left empty; RequestError like :func:`from_json`."""
+    found: dict[str, list[str]] = {}
+    for name, text in pairs:
+        if text or name == "text":
+            found.setdefault(name, []).append(text)
+    return {name: _known(name, parameters).from_text(name, texts) for name, texts in found.items()}
+
+
+def from_json(body: bytes, parameters: Mapping[str, Parameter], limits: Limits) -> dict[str, Any]:
+    """Settings from a JSON object, without those that are null; RequestError for an unknown or mistyped one."""
+
+    def refuse(constant: str) -> None:
+        raise ValueError(f"{constant} is no number")
+
+    if len(body) > limits.text_bytes:
+        raise HTTPException(413, f"the JSON is too large: expected at most {limits.text_bytes} bytes")
+    try:
+        told = json.loads(body, parse_constant=refuse)
+    except (ValueError, RecursionError) as fault:
+        raise RequestError(f"the body must be JSON: {fault}") from fault
+    if not isinstance(told, dict):
+        raise RequestError(f"the body must be a JSON object, not {quoted(json.dumps(told))}")
+    return {name: _known(name, parameters).checked(name, value) for name, value in told.items() if value is not None}
+
+
+def _known(name: str, parameters: Mapping[str, Parameter]) -> Parameter:
+    if name in parameters:
+        return parameters[name]
+    near = get_close_matches(name, parameters, 1)
+    said = f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(parameters)}"
+    raise RequestError(f"{quoted(name)} is unknown: {said}")
+
+
+def _number(text: str) -> float | str:
+    """The number that a text is, whole where it is written so; else the text."""
+    for read in (int, float):
+        try:
+            return read(text)
+        except ValueError:
+            continue
+    return text
+
+
+async def _upload(name: str, part: UploadFile, files: Sequence[str]) -> Upload:
+    if name not in files:
+        raise RequestError(f"{quoted(name)} is no file that is asked for: expected {' or '.join(files) or 'none'}")
+    return Upload(await part.read(), part.filename or "file")
+
+
+def read_upload(file: Upload, limits: Limits, **options: Any) -> Motion:
+    """The motion of a file that came with a request; errors like :func:`motet.read`, and FormatError for one that is
+    too long, or that unpacks to much more than it is."""
+    extension = PurePath(file.name).suffix.lower()
+    if extension not in TAKES:
+        raise FormatError(file.name, f"cannot read files of type {extension!r}; expected one of {' '.join(TAKES)}")
+    if extension == ".npz" and unpacked(file) > 8 * limits.body_bytes:
+        raise FormatError(file.name, f"it unpacks to more than {8 * limits.body_bytes} bytes")
+    file.seek(0)
+    motion = read_motion(file, **options)
+    if motion.duration > limits.motion_seconds:
+        raise FormatError(file.name, f"it lasts {motion.duration:.0f} s: expected at most {limits.motion_seconds:g} s")
+    return motion
+
+
+def unpacked(file: Upload) -> int:
+    """How many bytes a zip archive says that its files have; 0 for a damaged one, as its reader will say."""
+    try:
+        with zipfile.ZipFile(file) as archive:
+            return sum(info.file_size for info in archive.infolist())
+    except Exception:  # of a dozen types
+        return 0

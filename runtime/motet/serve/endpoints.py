@@ -1,0 +1,138 @@
+"""What answers requests: from a request to an answer of models, to pages, and to errors as JSON."""
+
+import asyncio
+import json
+import logging
+from collections.abc import AsyncIterator, Awaitable, Callable
+from typing import TypeVar
+
+from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import HTMLResponse, JSONResponse, Response, StreamingResponse
+from starlette.routing import Route
+
+from motet.draw.page import source
+from motet.errors import BundleError, MotetError, OutputError
+from motet.serve.answers import Answer, Answers
+from motet.serve.asked import TAKES, Asked, asked
+from motet.serve.content import MEDIA
+from motet.serve.doors import DOORS, Door
+from motet.serve.limits import Limits, refusal
+from motet.serve.openapi import described, manual
+
+T = TypeVar("T")
+Endpoint = Callable[[Request], Awaitable[Response]]
+
+log = logging.getLogger(__name__)
+
+UNDERSTOOD = "Motet-Understood"
+"""The header of an answer with JSON: of each sentence its confidence, and what the model knows that is near."""
+
+PAGE = {
+    "Content-Security-Policy": "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-src 'self'",
+    "X-Content-Type-Options": "nosniff",
+}
+
+
+def routes(answers: Answers, version: str) -> list[Route]:
+    """All addresses but that of live figures."""
+    document, start = described(version), source("motet.serve", "page.html")
+    start = start.replace("{{STYLE}}", source("motet.draw", "page.css")).replace("{{TAKES}}", ",".join(TAKES))
+
+    async def health(_: Request) -> Response:
+        return JSONResponse({"status": "ok", "version": version, **answers.state()})
+
+    async def openapi(_: Request) -> Response:
+        return JSONResponse(document)
+
+    async def page(_: Request) -> Response:
+        return HTMLResponse(start, headers=PAGE)
+
+    async def docs(_: Request) -> Response:
+        return HTMLResponse(manual(version), headers=PAGE)
+
+    others = {"/": page, "/docs": docs, "/openapi.json": openapi, "/health": health}
+    doors = [Route(door.path, endpoint(door, answers), methods=list(door.methods)) for door in DOORS]
+    return [*doors, *(Route(path, function) for path, function in others.items())]
+
+
+def endpoint(door: Door, answers: Answers) -> Endpoint:
+    """What answers requests to an address."""
+    limits = answers.limits
+
+    async def answered(request: Request) -> Response:
+        try:
+            async with asyncio.timeout(limits.seconds):
+                given = await asked(request, door.parameters, door.files, limits)
+                return await while_there(request, _answer(door, answers, given, request))
+        except TimeoutError:
+            raise HTTPException(504, f"there was no answer within {limits.seconds:g} s") from None
+
+    return answered
+
+
+async def _answer(door: Door, answers: Answers, given: Asked, request: Request) -> Response:
+    if door.name == "stream":
+        lines = await answers.stream(given)
+        return StreamingResponse(_to_the_end(lines, answers.limits), media_type="application/x-ndjson")
+    if door.name == "describe":
+        return _response(await answers.describe(given), "description.json")
+    form = request.path_params["format"]
+    if form not in MEDIA:
+        raise HTTPException(404, f"there is no format {form!r}: expected one of {', '.join(MEDIA)}")
+    made = await (answers.generate if door.name == "generate" else answers.predict)(given, form)
+    return _response(made, f"motion.{form}")
+
+
+def _response(answer: Answer, name: str) -> Response:
+    shown = name.endswith((".html", ".json"))
+    headers = {"X-Content-Type-Options": "nosniff"}
+    headers |= {} if shown else {"Content-Disposition": f'attachment; filename="{name}"'}
+    headers |= {} if answer.understood is None else {UNDERSTOOD: json.dumps(answer.understood)}
+    return Response(answer.content, headers=headers, media_type=answer.media)
+
+
+async def _to_the_end(lines: AsyncIterator[bytes], limits: Limits) -> AsyncIterator[bytes]:
+    """The lines of a stream; one that fails ends with the error."""
+    try:
+        while True:
+            async with asyncio.timeout(limits.seconds):
+                line = await anext(lines, None)
+            if line is None:
+                return
+            yield line
+    except (MotetError, TimeoutError) as error:
+        said = str(error) or f"there were no frames within {limits.seconds:g} s"
+        yield json.dumps({"error": said, "type": type(error).__name__}).encode() + b"\n"
+
+
+async def while_there(request: Request, work: Awaitable[T]) -> T:
+    """What is worked out for a client, whose request is read; ClientDisconnect as soon as it leaves."""
+    working, leaving = asyncio.ensure_future(work), asyncio.ensure_future(request.receive())
+    try:
+        await asyncio.wait({working, leaving}, return_when=asyncio.FIRST_COMPLETED)
+        if not working.done():
+            raise ClientDisconnect
+        return working.result()
+    finally:
+        working.cancel()
+        leaving.cancel()
+
+
+async def fault(_: Request, error: Exception) -> Response:
+    """One of motet's errors, by its sentence: 400, or 500 where it is none of the client's."""
+    inner = isinstance(error, BundleError | OutputError)
+    if inner:
+        log.error("%s", error)
+    return refusal(500 if inner else 400, str(error), type(error).__name__)
+
+
+async def refused(_: Request, error: Exception) -> Response:
+    """What Starlette refuses, such as an unknown address."""
+    assert isinstance(error, HTTPException)
+    return refusal(error.status_code, error.detail, **error.headers or {})
+
+
+async def broken(_: Request, __: Exception) -> Response:
+    """A fault of the server: no more is said of it than that."""
+    return refusal(500, "the server is at fault; its log says more", "Error")

@@ -1,0 +1,95 @@
+"""What a server takes and gives at most, and the gate that every request passes: too large, too many, too slow."""
+
+import asyncio
+from dataclasses import dataclass
+from typing import Any
+
+from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
+from starlette.responses import JSONResponse
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a server allows.
+
+    body_bytes: of a request. all_bytes: of the bodies of all requests at once. requests: answered or waiting at once.
+    seconds: until a request is answered, and in which a client takes a part of the answer. motion_seconds: of a motion
+    that is given or asked for. fps: of an answer. text_bytes: of a body that is JSON, or a field of a form. batch:
+    requests that share a call of a model.
+    """
+
+    body_bytes: int = 32 << 20
+    all_bytes: int = 256 << 20
+    requests: int = 256
+    seconds: float = 60.0
+    motion_seconds: float = 300.0
+    fps: float = 240.0
+    text_bytes: int = 1 << 16
+    batch: int = 32
+
+
+def refusal(status: int, said: str, kind: str = "RequestError", **headers: str) -> JSONResponse:
+    """An answer that says in a sentence why there is no other."""
+    return JSONResponse({"error": said, "type": kind}, status, headers)
+
+
+class Gate:
+    """Middleware that refuses with 413 what is too large, before it is read where its length is declared, and with 503
+    what is too much at once; and that leaves clients who do not take their answer."""
+
+    def __init__(self, app: ASGIApp, limits: Limits) -> None:
+        self.app, self.limits = app, limits
+        self.requests = self.held = 0
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass a request on, or refuse it."""
+        if scope["type"] != "http" or scope["path"] == "/health":
+            await self.app(scope, receive, send)
+        elif declared(scope) > self.limits.body_bytes:
+            await refusal(413, self._too_large(), Connection="close")(scope, receive, send)
+        elif self.requests >= self.limits.requests:
+            said = f"{self.requests} requests are being answered already: try again later"
+            await refusal(503, said, **{"Retry-After": "1", "Connection": "close"})(scope, receive, send)
+        else:
+            await self._passed(scope, receive, send)
+
+    async def _passed(self, scope: Scope, receive: Receive, send: Send) -> None:
+        held = 0
+
+        async def counted() -> Message:
+            nonlocal held
+            message = await receive()
+            size = len(message.get("body", b""))
+            held, self.held = held + size, self.held + size
+            if held > self.limits.body_bytes:
+                raise HTTPException(413, self._too_large(), {"Connection": "close"})
+            if self.held > self.limits.all_bytes:
+                said = f"the files of all requests exceed {self.limits.all_bytes} bytes: try again later"
+                raise HTTPException(503, said, {"Retry-After": "1", "Connection": "close"})
+            return message
+
+        async def timed(message: Message) -> None:
+            try:
+                async with asyncio.timeout(self.limits.seconds):
+                    await send(message)
+            except TimeoutError:
+                raise ClientDisconnect from None
+
+        self.requests += 1
+        try:
+            await self.app(scope, counted, timed)
+        except ClientDisconnect:
+            pass  # nobody is there to be told
+        finally:
+            self.requests, self.held = self.requests - 1, self.held - held
+
+    def _too_large(self) -> str:
+        return f"the request is too large: expected at most {self.limits.body_bytes} bytes"
+
+
+def declared(scope: dict[str, Any] | Scope) -> int:
+    """The length that a request states of its body; 0 where it states none."""
+    lengths = [value for name, value in scope["headers"] if name == b"content-length"]
+    return int(lengths[0]) if lengths and lengths[0].isdigit() else 0
