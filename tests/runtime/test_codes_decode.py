@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from fake_codes import ACTIONS, END, KNOWN, NULL_ACTION, PARTS, memory_tables, n
 from numpy.typing import NDArray
 
 from motet.decode.codes import (
+    LEAP,
     PAST,
     CodesSettings,
     Memory,
@@ -116,14 +118,15 @@ def test_a_memory_goes_on_in_the_motion_whose_past_is_the_present() -> None:
     for start, (action, codes) in zip(STARTS, MOTIONS, strict=False):
         for at in range(1, len(codes)):
             for uniform in (0.001, 0.5, 0.999):
-                assert known.next(action, recent_of(codes, at), at, True, uniform) == start + at
+                over = naive_parts(codes)[at]
+                assert known.next(action, recent_of(codes, at), at, True, uniform, over) == start + at
 
 
 def test_a_memory_follows_the_action_whatever_was_before() -> None:
     known, (_, codes) = memory(), MOTIONS[0]
     for action in range(ACTIONS):
         for uniform in np.linspace(0, 0.99, 20):
-            place = known.next(action, recent_of(codes, 4), 4, True, uniform)
+            place = known.next(action, recent_of(codes, 4), 4, True, uniform, 0.5)
             assert MOTIONS[np.searchsorted(STARTS, place, side="right") - 1][0] == action
 
 
@@ -131,12 +134,22 @@ CLOSE = 0.2
 """By which remembered places are brought together, so that several resemble the present."""
 
 
-def naive_shares(action: int, recent: list[Array], age: int, ends: bool) -> dict[int, float]:
+def naive_parts(codes: Array) -> list[float]:
+    """The share of a motion's movement that is over before each of its steps, and after the last."""
+    counts = [0.125]
+    for before, step in pairwise(codes):
+        body = numbers_of(np.stack([before, step]))[:, 1:]
+        counts.append(0.125 + float(((body[1] - body[0]) ** 2).sum()) * (step[0] != END))
+    return [sum(counts[:at]) / sum(counts) for at in range(len(counts) + 1)]
+
+
+def naive_shares(action: int, recent: list[Array], age: int, ends: bool, done: float) -> dict[int, float]:
     """How often each remembered place is gone on with, in the most literal way."""
     found = {}
     for start, (of, codes) in zip(STARTS.tolist(), MOTIONS, strict=False):
         for at in range(len(codes)) if of == action else ():
-            if not (at > 0 if age else at / len(codes) < 0.3):
+            over = naive_parts(codes)[at]
+            if not (at > 0 if age else over < 0.3) or over > done + LEAP:
                 continue
             off = (at - age) ** 2 / 64 if ends else min((at - age) ** 2 / 64, 2.0)
             for back, weight in enumerate(PAST, start=1):
@@ -147,16 +160,19 @@ def naive_shares(action: int, recent: list[Array], age: int, ends: bool) -> dict
     return {place: chance / total for place, chance in found.items()}
 
 
-@pytest.mark.parametrize(("age", "ends"), [(0, False), (1, True), (3, False), (3, True), (40, False)])
-def test_a_memory_goes_on_where_the_past_resembles_the_present(age: int, ends: bool) -> None:
+@pytest.mark.parametrize(
+    ("age", "ends", "done"),
+    [(0, False, 0.0), (1, True, 0.2), (3, False, 0.4), (3, True, 1.0), (3, True, 0.0), (40, False, 0.8)],
+)
+def test_a_memory_goes_on_where_the_past_resembles_the_present(age: int, ends: bool, done: float) -> None:
     """Amid all remembered places, as often at each as it is near."""
     known, rng = memory(), np.random.default_rng(age)
     known = replace(known, keys={action: np.float32(CLOSE) * keys for action, keys in known.keys.items()})
     middle = CLOSE * np.mean([numbers_of(codes[:-1]).mean(axis=0) for _, codes in MOTIONS], axis=0)
     recent = [(middle + 0.1 * rng.normal(size=middle.shape)).astype(np.float32) for _ in PAST[: age or 3]]
-    found = [known.next(1, recent, age, ends, (one + 0.5) / 2000) for one in range(2000)]
-    shares = naive_shares(1, recent, age, ends)
-    assert sum(share > 0.02 for share in shares.values()) > 3
+    found = [known.next(1, recent, age, ends, (one + 0.5) / 2000, done) for one in range(2000)]
+    shares = naive_shares(1, recent, age, ends, done)
+    assert sum(share > 0.02 for share in shares.values()) > 1
     for place, share in shares.items():
         assert found.count(place) / 2000 == pytest.approx(share, abs=2e-3)
     assert set(found) <= shares.keys()
@@ -261,6 +277,33 @@ def test_all_from_memory_is_a_remembered_motion_to_its_end() -> None:
         assert codes.tolist() in known
         played.add(str(codes.tolist()))
     assert len(played) == len(MOTIONS)
+
+
+@pytest.mark.parametrize("steps", [1, 2, 4, 6])
+def test_of_a_longer_action_what_moves_most_is_shown(steps: int) -> None:
+    known = memory()
+    best = set()
+    for start, (action, codes) in zip(STARTS.tolist(), MOTIONS, strict=False):
+        parts = naive_parts(codes)
+        shown = [parts[at + steps] - parts[at] for at in range(len(codes) - steps)]
+        if action == 1:
+            best.add(start + max(at for at, one in enumerate(shown) if one >= 0.9 * max(shown)))
+    assert {known.busiest(1, [], steps, uniform) for uniform in np.linspace(0, 0.99, 20)} == best
+    assert known.busiest(1, [], 50, 0.0) == STARTS[1]  # as long as it is: from the start
+
+
+def test_a_short_motion_begins_where_its_action_shows_most() -> None:
+    given, actions = source(), np.repeat(np.arange(ACTIONS), 4)
+    for share in (0.01, 1.0):  # the first step is remembered, however few others are
+        writer = Writer(given, rngs(*range(12)), replace(PLAIN, memory=share))
+        _, codes = next(drawn_steps(writer, actions, 3, exactly=True))
+        for row, action in enumerate(actions.tolist()):
+            starts = {given.memory.busiest(action, [], 3, uniform) for uniform in np.linspace(0, 0.99, 20)}
+            (place,) = (one for one in starts if given.memory.codes[one].tolist() == codes[row].tolist())
+            assert writer.age[row] == given.memory.ages[place] + 1
+    plain = Writer(given, rngs(*range(12)), PLAIN)
+    next(drawn_steps(plain, actions, 3, exactly=True))
+    assert (plain.age == 1).all()
 
 
 def test_a_share_of_steps_is_remembered() -> None:

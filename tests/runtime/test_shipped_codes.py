@@ -12,7 +12,9 @@ import motet
 from motet.decode.codes import WINDOW, CodesSettings, Writer, drawn_steps
 from motet.errors import DecodingError, MotionError, TextError, TextWarning
 from motet.models.generate_codes import CodesModel
+from motet.motion.humanoid import HUMANOID
 from motet.motion.kinematics import positions
+from motet.motion.looping import looped
 from motet.motion.motion import Motion
 
 WALK, JUMP = "a person walks forward", "a person jumps up"
@@ -233,3 +235,31 @@ def test_the_command_line_tells_a_story(tmp_path: Path, clips: Path, model: Code
     assert result.exit_code == 0, result.stderr
     assert run("generate", WALK, "--story", "--bundle", "cmu-generate", "-o", out).exit_code == 2
     assert run("generate", "a violin", "--strict", "-o", out).exit_code == 1
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_jump_is_never_left_out(model: CodesModel, seed: int) -> None:
+    (jump,) = model.generate("a person jumps", seed=seed)
+    height = positions(jump.motion)[:, 0, 1]
+    assert height.max() - height[0] > 0.2
+    assert jump.motion.duration > 2
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_two_seconds_show_the_act(model: CodesModel, seed: int) -> None:
+    """The take of a kick begins with more than two seconds in which nobody kicks."""
+    (kick,) = model.generate("a person kicks", seed=seed, seconds=2)
+    feet = [HUMANOID.names.index(f"{side}Foot") for side in ("left", "right")]
+    assert kick.motion.duration == pytest.approx(2)
+    assert positions(kick.motion)[:, feet, 1].max() > 0.7
+    (jump,) = model.generate("a person jumps", seed=seed, seconds=2)
+    height = positions(jump.motion)[:, 0, 1]
+    assert np.ptp(height) > 0.3
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_loop_of_an_action_moves(model: CodesModel, seed: int) -> None:
+    (jacks,) = model.generate("a man does jumping jacks", seed=seed)
+    whole, loop = (np.diff(positions(one), axis=0) for one in (jacks.motion, looped(jacks.motion)))
+    energy = [float((steps**2).sum(axis=-1).mean()) for steps in (whole, loop)]
+    assert energy[1] > 0.5 * energy[0]

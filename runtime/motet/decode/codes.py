@@ -24,6 +24,12 @@ from motet.settings import Range, Settings
 PAST = (1.0, 0.5, 0.25)
 """Weights of the last step and those before it."""
 
+LEAP = 0.3
+"""The share of a motion's movement that may be left out from one step to the next: its act may not."""
+
+REST = 0.125
+"""What a step without movement counts beside the squared differences of codes' numbers."""
+
 WINDOW = 64
 """Steps that a writer looks back at most, those of the windows that writers are trained on: a stream may last for ever.
 """
@@ -31,8 +37,8 @@ WINDOW = 64
 
 @dataclass(frozen=True, eq=False)
 class Memory:
-    """M remembered steps. codes: (M, P) int64. ages: (M,) int64 steps since its motion began. parts: (M,) which part of
-    its motion was over, 0 to 1.
+    """M remembered steps. codes: (M, P) int64. ages: (M,) int64 steps since its motion began. parts: (M,) which share
+    of its motion's movement was over before it, 0 to 1. lasts: (M,) int64 the last step of its motion.
 
     rows: of each action the remembered steps (R,), and keys: their (R, K L) float32 numbers of the K steps before each.
     """
@@ -40,6 +46,7 @@ class Memory:
     codes: Ids
     ages: Ids
     parts: Scores
+    lasts: Ids
     rows: dict[int, Ids]
     keys: dict[int, Floats]
 
@@ -68,26 +75,58 @@ class Memory:
         rows, own = (dict(zip(names.tolist(), np.split(one, begins[1:]), strict=True)) for one in (order, keys))
         starts = np.flatnonzero(np.diff(ages, prepend=ages[:1] + 1) != 1)
         lengths = np.diff(starts, append=len(ages))
-        parts = (ages - np.repeat(ages[starts], lengths)) / np.repeat(lengths, lengths)
-        return Memory(codes, ages, parts, rows, own)
+        body = numbers[:, moves.shape[1] :].astype(np.float64)
+        change = REST + (np.diff(body, axis=0, prepend=body[:1]) ** 2).sum(axis=1) * real[:, 0]
+        change[starts] = REST  # as if the figure had stood in it before
+        over, lasts = np.cumsum(change), np.repeat(starts + lengths - 1, lengths)
+        before = np.repeat(over[starts] - change[starts], lengths)
+        return Memory(codes, ages, (over - change - before) / (over[lasts] - before), lasts, rows, own)
 
-    def next(self, action: int, recent: Sequence[Floats], age: int, ends: bool, uniform: float) -> int:
+    def next(
+        self, action: int, recent: Sequence[Floats], age: int, ends: bool, uniform: float, done: float = 0.0
+    ) -> int:
         """The place (a row) at which an action continues, by exp(-2 d) of the distance d of the squared numbers.
 
         recent: numbers (L,) of the last steps, the latest first, no more than K. None yet: any start of a motion.
         ends: whether it is to end where remembered motions do; else it may come back to what was done before.
+        done: the share of the movement that is over, of which no more than LEAP is left out.
         """
         rows = self.rows[action]
         ages = self.ages[rows]
         if not recent:
             starts = rows[ages == ages.min()]
             return int(starts[int(uniform * len(starts))])
+        # after a first step, to begin again would look like going on; and nothing is begun where it is nearly over
+        fitting = ages > 0 if age else self.parts[rows] < 0.3
+        return self._near(action, recent, age, ends, uniform, fitting & (self.parts[rows] <= done + LEAP))
+
+    def busiest(self, action: int, recent: Sequence[Floats], steps: int, uniform: float) -> int:
+        """The place at which an action is taken up to show the most of it in a number of steps.
+
+        It is one of each remembered motion: the last from which nearly as much is shown as from any. A motion that is
+        not longer is shown from its start. recent: as for :meth:`next`.
+        """
+        rows = self.rows[action]
+        found = []
+        for last in np.unique(self.lasts[rows]):
+            motion = rows[self.lasts[rows] == last]
+            starts = motion[: max(1, len(motion) - steps)]
+            shown = self.parts[np.minimum(starts + steps, last)] - self.parts[starts]
+            found.append(starts[np.flatnonzero(shown >= 0.9 * shown.max())[-1]])
+        if not recent:
+            return int(found[int(uniform * len(found))])
+        return self._near(action, recent, 0, False, uniform, np.isin(rows, found))
+
+    def _near(
+        self, action: int, recent: Sequence[Floats], age: int, ends: bool, uniform: float, fitting: NDArray[np.bool_]
+    ) -> int:
+        """A place of an action whose past resembles the present: of the ``fitting`` (R,), if there are any."""
+        rows = self.rows[action]
+        ages = self.ages[rows]
         seen = np.stack([recent[min(back, len(recent) - 1)] for back in range(len(PAST))])
         off = ((self.keys[action] - (np.sqrt(PAST)[:, None] * seen).ravel()) ** 2).sum(axis=1)
         later = (ages - age) ** 2 / 64  # earlier or later in its motion
         off += later if ends else np.minimum(later, 2.0)
-        # after a first step, to begin again would look like going on; and nothing is begun where it is nearly over
-        fitting = ages > 0 if age else self.parts[rows] < 0.3
         off[~fitting & fitting.any()] = np.inf
         shares = np.cumsum(np.exp((off.min() - off) / 0.5))
         return int(rows[np.searchsorted(shares, uniform * shares[-1], side="right")])
@@ -137,18 +176,22 @@ class Source:
 class Writer:
     """Draws codes for B rows, each of its own action and noise; holds all state of one request.
 
-    age: (B,) int64 steps since the action began.
+    age: (B,) int64 steps since the action began. done: (B,) the share of its movement that is over.
     """
 
     def __init__(self, source: Source, noise: Sequence[Noise], drawing: CodesSettings) -> None:
         self.source, self.noise, self.drawing = source, list(noise), drawing
         rows = 2 * len(self.noise)  # told the action, and not told
-        self.age = np.zeros(len(self.noise), dtype=np.int64)
+        self.begin()
         self.state = zero_state(source.step, rows)
         self.last = np.zeros((rows, source.parts), dtype=np.int64)
         self.last[:, 0] = source.end + 1
         self.recent: list[Floats] = []  # numbers (B, L) of the last steps, the latest first
-        self._before = self.last, self.state, self.recent, self.age
+        self._before = self.last, self.state, self.recent, self.age, self.done
+
+    def begin(self) -> None:
+        """Begin an action in every row."""
+        self.age, self.done = np.zeros(len(self.noise), dtype=np.int64), np.zeros(len(self.noise))
 
     def see(self, codes: Ids) -> None:
         """Take steps (N, P) as what every row did before, whatever action it was."""
@@ -156,29 +199,39 @@ class Writer:
             self._known(np.full(len(self.noise), self.source.null_action))
             self.last = np.tile(step, (len(self.last), 1))
 
-    def draw(self, actions: Ids, ends: bool = True) -> Ids:
+    def draw(self, actions: Ids, ends: bool = True, steps: int = 0) -> Ids:
         """The next step (B, P) of rows with the given actions (B,).
 
-        ends: whether a motion may end; else an action that would end begins again. Each row takes one block of uniform
-        numbers (P + 2,) from its noise.
+        ends: whether a motion may end; else an action that would end begins again. steps: of this and those to come,
+        where they are to show the most of an action that begins. Each row takes one block of uniform numbers (P + 2,)
+        from its noise.
         """
         known, uniform, memory = self._known(actions), self.source.uniform(self.noise), self.source.memory
         codes = np.full((len(actions), self.source.parts), -1, dtype=np.int64)
-        for row in np.flatnonzero(uniform[:, 0] < self.drawing.memory):
+        share = self.drawing.memory
+        self.age, self.done = self.age.copy(), self.done.copy()
+        for row in np.flatnonzero((uniform[:, 0] < share) | (steps > 0 and share > 0)):
             if (action := int(actions[row])) in memory.rows:
-                recent = [numbers[row] for numbers in self.recent]
-                codes[row] = memory.codes[memory.next(action, recent, int(self.age[row]), ends, uniform[row, 1])]
+                recent, number = [numbers[row] for numbers in self.recent], float(uniform[row, 1])
+                if steps:
+                    place = memory.busiest(action, recent, steps, number)
+                    self.age[row] = memory.ages[place]
+                else:
+                    age, done = int(self.age[row]), float(self.done[row])
+                    place = memory.next(action, recent, age, ends, number, done)
+                codes[row] = memory.codes[place]
+                self.done[row] = memory.parts[min(place + 1, memory.lasts[place])]
         again = self._parts(known, uniform[:, 2:], codes, ends)
         self.last = np.tile(codes, (2, 1))
-        self.age = np.where(again, 0, self.age + 1)
+        self.age, self.done = np.where(again, 0, self.age + 1), np.where(again, 0.0, self.done)
         return codes
 
     def take_back(self) -> None:
         """Undo the last draw, such as that of an end, and continue from before it."""
-        self.last, self.state, self.recent, self.age = self._before
+        self.last, self.state, self.recent, self.age, self.done = self._before
 
     def _known(self, actions: Ids) -> Floats:
-        self._before = self.last, self.state, self.recent, self.age
+        self._before = self.last, self.state, self.recent, self.age, self.done
         told = np.concatenate([actions, np.full(len(actions), self.source.null_action)]).astype(np.int64)
         inputs = {"codes": self.last, "action": told, "age": np.tile(self.age, 2)}
         outputs, self.state = advance(self.source.step, self.state, inputs)
@@ -215,7 +268,7 @@ class Writer:
     def keep(self, rows: NDArray[np.intp]) -> None:
         """Go on with some of the rows only."""
         both = np.concatenate([rows, rows + len(self.noise)])
-        self.noise, self.age = [self.noise[row] for row in rows], self.age[rows]
+        self.noise, self.age, self.done = [self.noise[row] for row in rows], self.age[rows], self.done[rows]
         self.recent = [numbers[rows] for numbers in self.recent]
         self.last, self.state = self.last[both], {name: array[both] for name, array in self.state.items()}
 
@@ -244,7 +297,7 @@ def drawn_actions(source: Source, contexts: Floats, noise: Sequence[Noise], cert
 def draw_codes(writer: Writer, actions: Ids, longest: int, exactly: bool = False) -> list[Ids]:
     """Steps (N, P) that each row of a writer draws for its action (B,): up to its end, or to ``longest`` steps.
 
-    exactly: to ``longest`` steps; an action that ends before is done again.
+    exactly: to ``longest`` steps; an action that ends before is done again, and of a longer one the most is shown.
     """
     steps: list[list[Ids]] = [[] for _ in actions]
     for rows, codes in drawn_steps(writer, actions, longest, exactly):
@@ -259,9 +312,10 @@ def drawn_steps(writer: Writer, actions: Ids, longest: int, exactly: bool = Fals
     A writer whose rows have all ended can draw other actions from there.
     """
     rows = np.arange(len(actions))
-    writer.age = np.zeros_like(writer.age)
+    writer.begin()
     for length in range(longest):
-        codes = writer.draw(actions[rows], ends=not exactly and length > 0)
+        first = length == 0
+        codes = writer.draw(actions[rows], ends=not exactly and not first, steps=longest if exactly and first else 0)
         going = codes[:, 0] != writer.source.end
         if not going.any():
             writer.take_back()

@@ -2,7 +2,8 @@
 
 A loop begins and ends with the same pose, ignoring position and heading, at the same velocity. All pairs of frames are
 compared by the root mean square over the joints; of loops nearly as good, such as one, two and three strides, the
-longest is taken. The remaining difference is spread over the loop: rotations by rotation vectors, all else linearly.
+longest is taken. A part in which the figure hardly moves beside the rest is none: a pause repeats best, and shows
+nothing. The remaining difference is spread over the loop: rotations by rotation vectors, all else linearly.
 """
 
 from dataclasses import replace
@@ -13,6 +14,9 @@ from motet.errors import MotionError
 from motet.motion.kinematics import AXES, global_transforms, local_rotations, local_translations, posed, skeleton_of
 from motet.motion.motion import TURN, Motion
 from motet.motion.rotations import UP, Array, inverse, product, rotated, rotmat_to_rotvec, rotvec_to_rotmat, twist
+
+LIVELY = 0.6
+"""Least energy of a loop beside the mean of the whole motion's."""
 
 
 def looped(motion: Motion, shortest: float = 0.7) -> Motion:
@@ -72,9 +76,10 @@ def _repetition(motion: Motion, hips: int, shortest: float) -> tuple[int, int]:
         )
     # at most 1,500 frames are compared pairwise: in longer motions every second or third, then those in between
     seen, step = _seen(motion, hips), -(-len(motion) // 1500)
-    lengths = np.arange(-(-least // step), -(-len(motion) // step))
+    lengths = range(-(-least // step), -(-len(motion) // step))
     apart = _apart(seen[::step], seen[::step])
-    along = [apart.diagonal(length) for length in lengths]
+    energy = _energy(seen)[::step]
+    along = [np.where(_means(energy, length) >= LIVELY, apart.diagonal(length), np.inf) for length in lengths]
     best = np.array([each.min() for each in along])
     low = np.zeros(len(best), dtype=bool)  # the ends do not count as minima
     low[1:-1] = (best[1:-1] <= best[:-2]) & (best[1:-1] <= best[2:])
@@ -82,7 +87,7 @@ def _repetition(motion: Motion, hips: int, shortest: float) -> tuple[int, int]:
     # nearly as good: 1.25 times the best difference, or .01 of the height, the variation of a steady walk
     length = int(np.flatnonzero(low & (best <= max(1.25 * best.min(), 0.01)))[-1])
     start = int(along[length].argmin()) * step
-    ends = (start, start + int(lengths[length]) * step)
+    ends = (start, start + lengths[length] * step)
     first, last = (np.arange(max(0, at - step + 1), min(len(seen), at + step)) for at in ends)
     apart = np.where(last - first[:, None] >= least, _apart(seen[first], seen[last]), np.inf)
     i, j = np.unravel_index(apart.argmin(), apart.shape)
@@ -97,6 +102,21 @@ def _repetition(motion: Motion, hips: int, shortest: float) -> tuple[int, int]:
             f"longer one of two strides or more"
         )
     return start, stop
+
+
+def _energy(seen: Array) -> Array:
+    """The squared speed (T,) of rows as :func:`_seen` gives them, beside its mean."""
+    speeds = seen[:, seen.shape[1] // 2 :]
+    squares = (speeds**2).sum(axis=1)
+    found: Array = squares / max(float(squares.mean()), 1e-12)
+    return found
+
+
+def _means(values: Array, length: int) -> Array:
+    """The means (T - length,) of ``length`` values each of (T,)."""
+    sums = np.cumsum(np.insert(values, 0, 0.0))
+    found: Array = (sums[length:-1] - sums[: -length - 1]) / length
+    return found
 
 
 def _apart(one: Array, other: Array) -> Array:

@@ -38,6 +38,8 @@ export function drawnAction(source: Source, context: ArrayLike<number>, noise: N
 /** What a writer knows of its rows before a step; `last` and `states` twice, told the action and not told. */
 interface Known {
   age: number[];
+  /** Of each row the share of its action's movement that is over. */
+  done: number[];
   last: number[][];
   states: Record<string, NumberArray<Float32Array>>;
   /** Of each row the numbers of its last steps, the latest first. */
@@ -53,7 +55,8 @@ export class Writer {
     const first = [source.end + 1, ...Array<number>(source.parts - 1).fill(0)];
     const rows = noise.length;
     const last = Array<number[]>(2 * rows).fill(first);
-    this.now = { age: noise.map(() => 0), last, states: source.step.zeroState(2 * rows), recent: noise.map(() => []) };
+    const zeros = noise.map(() => 0);
+    this.now = { age: zeros, done: zeros, last, states: source.step.zeroState(2 * rows), recent: noise.map(() => []) };
     this.before = this.now;
   }
 
@@ -67,17 +70,27 @@ export class Writer {
 
   /** Other actions begin. */
   begin(): void {
-    this.now = { ...this.now, age: this.now.age.map(() => 0) };
+    const zeros = this.now.age.map(() => 0);
+    this.now = { ...this.now, age: zeros, done: zeros };
   }
 
-  /** The next step (B, P) of rows with the given actions; an action that would end begins again unless it may end. */
-  async draw(actions: number[], ends: boolean): Promise<number[][]> {
+  /**
+   * The next step (B, P) of rows with the given actions; an action that would end begins again unless it may end.
+   * steps: of this and those to come, where they are to show the most of an action that begins; else 0.
+   */
+  async draw(actions: number[], ends: boolean, steps: number): Promise<number[][]> {
     const known = await this.known(actions);
-    const { age, recent } = this.now;
     const uniform = this.noise.map((one) => one.uniform(this.source.parts + 2));
-    const given = actions.map((action, row) => this.remembered(action, recent[row]!, age[row]!, ends, uniform[row]!));
+    const { memory } = this.source;
+    const places = actions.map((action, row) => this.remembered(action, row, ends, steps, uniform[row]!));
+    const from = places.map((place, row) => (steps && place !== undefined ? memory.ages[place]! : this.now.age[row]!));
+    this.now = { ...this.now, age: from };
+    const given = places.map((place) => (place === undefined ? undefined : memory.codes(place)));
     const { codes, again } = await this.drawn(known, uniform.map((block) => block.slice(2)), given, ends);
-    this.now = { ...this.now, last: [...codes, ...codes], age: age.map((one, row) => (again[row] ? 0 : one + 1)) };
+    const age = from.map((one, row) => (again[row] ? 0 : one + 1));
+    const over = places.map((place, row) => (place === undefined ? this.now.done[row]! : memory.after(place)));
+    const done = over.map((one, row) => (again[row] ? 0 : one));
+    this.now = { ...this.now, last: [...codes, ...codes], age, done };
     return codes;
   }
 
@@ -88,11 +101,12 @@ export class Writer {
 
   /** Go on with some of the rows only. */
   keep(rows: number[]): void {
-    const { age, last, states, recent } = this.now;
+    const { age, done, last, states, recent } = this.now;
     const both = [...rows, ...rows.map((row) => row + this.noise.length)];
     this.noise = rows.map((row) => this.noise[row]!);
     this.now = {
       age: rows.map((row) => age[row]!),
+      done: rows.map((row) => done[row]!),
       last: both.map((row) => last[row]!),
       states: taken(states, both),
       recent: rows.map((row) => recent[row]!),
@@ -101,7 +115,7 @@ export class Writer {
 
   /** What the step makes of the last codes, and of all before: (2 B, H). */
   private async known(actions: number[]): Promise<NumberArray<Float32Array>> {
-    const { age, last, states, recent } = (this.before = this.now);
+    const { age, done, last, states, recent } = (this.before = this.now);
     const inputs = {
       codes: integers(last.flat(), last.length, this.source.parts),
       action: integers([...actions, ...actions.map(() => this.source.nullAction)]),
@@ -112,15 +126,18 @@ export class Writer {
     const row = (at: number) => data.slice(at * shape[1]!, (at + 1) * shape[1]!);
     const started = last[0]![0] !== this.source.end + 1;
     const latest = started ? recent.map((before, at) => [row(at), ...before].slice(0, RECENT)) : recent;
-    this.now = { age, last, states: lately(next), recent: latest };
+    this.now = { age, done, last, states: lately(next), recent: latest };
     return outputs.known!;
   }
 
-  /** A step from memory, or none where the net draws it. */
-  private remembered(action: number, recent: Float32Array[], age: number, ends: boolean, uniform: number[]): number[] | undefined {
+  /** A row of the memory that is gone on with, or none where the net draws the step. */
+  private remembered(action: number, row: number, ends: boolean, steps: number, uniform: number[]): number | undefined {
     const { memory } = this.source;
-    if (uniform[0]! >= this.drawing.memory || !memory.knows(action)) return undefined;
-    return memory.codes(memory.next(action, recent, age, ends, uniform[1]!));
+    const { age, done, recent } = this.now;
+    const share = this.drawing.memory;
+    if (!(uniform[0]! < share || (steps && share > 0)) || !memory.knows(action)) return undefined;
+    if (steps) return memory.busiest(action, recent[row]!, steps, uniform[1]!);
+    return memory.next(action, recent[row]!, age[row]!, ends, uniform[1]!, done[row]!);
   }
 
   /** The codes of rows, one after the other where they are not given; and which rows begin their action again. */
@@ -171,7 +188,8 @@ export async function* drawnSteps(writer: Writer, actions: number[], longest: nu
   let rows = actions.map((_, row) => row);
   writer.begin();
   for (let length = 0; length < longest; length++) {
-    const codes = await writer.draw(rows.map((row) => actions[row]!), !exactly && length > 0);
+    const steps = exactly && !length ? longest : 0;
+    const codes = await writer.draw(rows.map((row) => actions[row]!), !exactly && length > 0, steps);
     const going = codes.flatMap((step, at) => (step[0] === writer.source.end ? [] : [at]));
     if (!going.length) return writer.takeBack();
     if (going.length < rows.length) writer.keep(going);

@@ -8,14 +8,21 @@ const NEAR = 0.5;
 /** What is added to a distance for each squared step of difference in age, and the most of it. */
 const LATER = 1 / 64;
 const LATEST = 2;
-/** The part of a motion in which an action is taken up that follows another. */
+/** The share of a motion's movement in which an action is taken up that follows another. */
 const EARLY = 0.3;
+/** The share of a motion's movement that may be left out from one step to the next. */
+const LEAP = 0.3;
+/** What a step without movement counts beside the squared differences of codes' numbers. */
+const REST = 0.125;
+/** The share of the most that a number of steps can show from which on a start is as good. */
+const GOOD = 0.9;
 
 /** Remembered steps of codes: docs/bundle.md, the loop `codes`. */
 export class Memory {
   readonly steps: number;
-  private readonly ages: Int32Array;
+  readonly ages: Int32Array;
   private readonly parts: Float64Array;
+  private readonly lasts: Int32Array;
   /** Numbers of the codes of all steps, and how many a step has. */
   private readonly numbers: Float32Array;
   private readonly width: number;
@@ -29,7 +36,26 @@ export class Memory {
     this.numbers = new Float32Array(steps * this.width);
     this.ages = Int32Array.from({ length: steps }, (_, row) => Number(table.data[(row + 1) * columns - 1]));
     for (let row = 0; row < steps; row++) this.remember(row, moves, body, actions);
-    this.parts = partsOf(this.ages);
+    this.lasts = lastsOf(this.ages);
+    this.parts = this.partsOf(moves.shape[1]!, moves.shape[0]!);
+  }
+
+  /** The share of the movement of its motion that was over before each step, 0 to 1. */
+  private partsOf(ways: number, end: number): Float64Array {
+    const parts = new Float64Array(this.steps);
+    for (let start = 0; start < this.steps; start = this.lasts[start]! + 1) {
+      let over = 0;
+      for (let row = start; row <= this.lasts[start]!; row++) {
+        parts[row] = over;
+        over += REST;
+        const ends = Number(this.table.data[row * this.table.shape[1]!]) === end;
+        for (let at = ways; at < this.width && row > start && !ends; at++) {
+          over += (this.numbers[row * this.width + at]! - this.numbers[(row - 1) * this.width + at]!) ** 2;
+        }
+      }
+      for (let row = start; row <= this.lasts[start]!; row++) parts[row]! /= over;
+    }
+    return parts;
   }
 
   private remember(row: number, moves: NumberArray, body: NumberArray, actions: number): void {
@@ -62,19 +88,46 @@ export class Memory {
     return Array.from(this.table.data.subarray(row * columns, (row + 1) * columns - 2), Number);
   }
 
+  /** The share of the movement of its motion that is over after a step. */
+  after(row: number): number {
+    return this.parts[Math.min(row + 1, this.lasts[row]!)]!;
+  }
+
   /**
    * The row at which an action continues. recent: numbers of the last steps, the latest first. ends: whether it may end
-   * where remembered motions do.
+   * where remembered motions do. done: the share of the movement that is over.
    */
-  next(action: number, recent: Float32Array[], age: number, ends: boolean, uniform: number): number {
+  next(action: number, recent: Float32Array[], age: number, ends: boolean, uniform: number, done: number): number {
     const all = this.rows.get(action)!;
     if (!recent.length) {
       const least = all.reduce((found, row) => Math.min(found, this.ages[row]!), Infinity);
       const starts = all.filter((row) => this.ages[row] === least);
       return starts[Math.floor(uniform * starts.length)]!;
     }
-    const fitting = all.filter((row) => (age ? this.ages[row]! > 0 : this.parts[row]! < EARLY));
-    const rows = fitting.length ? fitting : all;
+    const fitting = all.filter(
+      (row) => (age ? this.ages[row]! > 0 : this.parts[row]! < EARLY) && this.parts[row]! <= done + LEAP,
+    );
+    return this.near(fitting.length ? fitting : all, recent, age, ends, uniform);
+  }
+
+  /** The row at which an action is taken up to show the most of it in a number of steps. recent: as for `next`. */
+  busiest(action: number, recent: Float32Array[], steps: number, uniform: number): number {
+    const all = this.rows.get(action)!;
+    const found: number[] = [];
+    for (let at = 0; at < all.length; ) {
+      const [start, last] = [all[at]!, this.lasts[all[at]!]!];
+      const starts = Array.from({ length: Math.max(1, last + 1 - start - steps) }, (_, i) => start + i);
+      const shown = starts.map((row) => this.parts[Math.min(row + steps, last)]! - this.parts[row]!);
+      const most = shown.reduce((a, b) => Math.max(a, b));
+      found.push(starts[shown.findLastIndex((one) => one >= GOOD * most)]!);
+      while (at < all.length && all[at]! <= last) at++;
+    }
+    if (!recent.length) return found[Math.floor(uniform * found.length)]!;
+    return this.near(found, recent, 0, false, uniform);
+  }
+
+  /** A row whose past resembles the present. */
+  private near(rows: number[], recent: Float32Array[], age: number, ends: boolean, uniform: number): number {
     const off = new Float64Array(rows.length);
     for (let at = 0; at < rows.length; at++) {
       const later = LATER * (this.ages[rows[at]!]! - age) ** 2;
@@ -102,13 +155,13 @@ export class Memory {
   }
 }
 
-/** Which part of its motion was over at each step, 0 to 1, by the steps' ages. */
-function partsOf(ages: Int32Array): Float64Array {
-  const parts = new Float64Array(ages.length);
+/** The last step of the motion of each step, by the steps' ages. */
+function lastsOf(ages: Int32Array): Int32Array {
+  const lasts = new Int32Array(ages.length);
   for (let start = 0, stop = 0; start < ages.length; start = stop) {
     do stop++;
     while (stop < ages.length && ages[stop] === ages[stop - 1]! + 1);
-    for (let row = start; row < stop; row++) parts[row] = (ages[row]! - ages[start]!) / (stop - start);
+    lasts.fill(stop - 1, start, stop);
   }
-  return parts;
+  return lasts;
 }
