@@ -25,6 +25,7 @@ from motet_train.models.action_net import ActionNet
 from motet_train.models.codec import MotionCodec
 from motet_train.models.filler import Filler
 from motet_train.models.joint_embedding import JointEmbedding
+from motet_train.models.known_motions import KnownMotions
 from motet_train.models.matching import Matching
 from motet_train.models.motion_codes import MotionCodes
 from motet_train.models.motion_to_language import MotionToLanguage
@@ -46,6 +47,7 @@ MODELS: Mapping[str, Callable[[Mapping[str, Any]], Net]] = {
     "motion-codes": MotionCodes.from_config,
     "angle-crbm": AngleCRBM.from_config,
     "motion-matching": Matching.from_config,
+    "known-motions": KnownMotions.from_config,
     "gap-filler": Filler.from_config,
     "trajectory": Predictor.from_config,
     **{name: partial(li2018.from_config, name) for name in li2018.SYSTEMS},

@@ -4,6 +4,7 @@ Where a long motion changes is the best path of a hidden Markov model (Viterbi 1
 are sentences and whose changes all cost the same.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import pairwise
@@ -17,12 +18,19 @@ from motet.decode.loop import Loop, Scores
 from motet.decode.loops import LOOPS
 from motet.decode.words import Hypothesis, Limits, noise_of, score_words
 from motet.errors import DecodingError
+from motet.models.known import AnswerSettings, Known, Seen, known_of, turn_of
 from motet.models.language import EOS, MAX_SECONDS, PAD, SOS, UNK, LanguageModel, padded
 from motet.motion.motion import Motion
 from motet.settings import Progress, Range, Settings, seeds_of, silent
 
-Decoding = Literal["beam", "consensus"]
+Decoding = Literal["known", "beam", "consensus"]
 """How descriptions are found."""
+
+AT_ONCE = 256
+"""Motions that are compared with all known ones at once."""
+
+LEAST = 1e-6
+"""The probability below which none is told."""
 
 
 @dataclass(frozen=True)
@@ -53,10 +61,12 @@ class TimelineSettings(Settings):
 
 @dataclass(frozen=True)
 class Description:
-    """A sentence, normalised, and the natural logarithm of its probability given the motion.
+    """A sentence and the natural logarithm of its probability: that it is right about the motion, where known motions
+    answer; else that it is said of the motion, in these very words.
 
-    score: by which the sentences of a motion are ranked: the log-probability, or the agreement of a sampled sentence
-        with all samples, from 0 to 1. confident: whether it is as probable as correct descriptions are.
+    score: by which the sentences of a motion are ranked: the probability that it is right, the log-probability, or the
+        agreement of a sampled sentence with all samples, from 0 to 1. confident: whether it is as probable as correct
+        descriptions are.
     """
 
     text: str
@@ -64,9 +74,14 @@ class Description:
     score: float
     confident: bool
 
+    @property
+    def probability(self) -> float:
+        """The probability that is said in :attr:`log_probability`, from 0 to 1."""
+        return math.exp(self.log_probability)
+
     def to_json(self) -> dict[str, Any]:
-        """All fields as a JSON object."""
-        return asdict(self)
+        """All fields and the probability as a JSON object."""
+        return {**asdict(self), "probability": self.probability}
 
 
 @dataclass(frozen=True)
@@ -88,13 +103,18 @@ class DescribeModel(LanguageModel):
     settings by name, and return up to ``beams`` hypotheses for each row, best first."""
 
     VERB = "describe"
-    SETTINGS = (ConfidenceSettings, TimelineSettings)
+    SETTINGS = (ConfidenceSettings, TimelineSettings, AnswerSettings)
     LOOPS = ("beam", "consensus")
+    known: Known | None = None
+    """The motions that it knows, whose sentences answer; None for a model that only writes sentences."""
 
     def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:
         super().__init__(manifest, graphs, tables)
         self.bind("encoder", {"frames": "batch time D", "lengths": "*batch"}, {"context": "batch C"})
         self.bind("step", self.loop.inputs, self.loop.outputs)
+        if "space" in graphs:
+            self.bind("space", {"frames": "batch time D", "lengths": "*batch"}, {"vector": "batch E"})
+            self.known = known_of(self)
 
     @overload
     def describe(
@@ -116,19 +136,22 @@ class DescribeModel(LanguageModel):
     ) -> list[Description] | list[list[Description]]:
         """Up to ``beams`` descriptions of a motion, the best first; for several motions, a list for each.
 
-        decoding: "beam" for beam search, whose best is the most probable sentence; "consensus" for sampling ``draws``
-            sentences, the best being the one that agrees most with all (:mod:`motet.decode.words`), not necessarily
-            a probable one. By default consensus where ``draws`` is given, and otherwise the bundle's loop.
+        decoding: "known" for sentences about known motions that are near (:mod:`motet.models.known`), of different
+            kinds of action, or one, :data:`motet.models.known.NOTHING`; "beam" for beam search, whose best is the most
+            probable sentence; "consensus" for sampling ``draws`` sentences, the best being the one that agrees most
+            with all (:mod:`motet.decode.words`), not necessarily a probable one. By default consensus where ``draws``
+            is given, otherwise known where the bundle has known motions, or else the bundle's loop.
         seed: of sampling; each motion gets the same samples as alone.
         progress: called with the number of motions done and in total.
 
         A motion at another frame rate is resampled. MotionError like :meth:`frames`; cut longer motions with
         :meth:`windows`. DecodingError where ``beams`` (the bundle's by default) is not between 1 and 100, ``draws`` not
-        between 1 and 1,000 or given for beam search, or the seed negative.
+        between 1 and 1,000 or given for another decoding than consensus, the seed negative, or no motion known.
         """
-        if decoding not in (None, *self.LOOPS):
-            raise DecodingError(f"decoding must be one of {', '.join(self.LOOPS)}, not {decoding!r}")
-        name = decoding or (None if draws is None else "consensus")
+        name = self._decoding(decoding, draws)
+        if name == "known":
+            found = self._answers([motions] if isinstance(motions, Motion) else motions, beams, progress)
+            return found[0] if isinstance(motions, Motion) else found
         loop, (first,) = LOOPS[name] if name else self.loop, seeds_of(seed, 1, DecodingError)
         given = {"beams": beams, "draws": draws}
         settings: dict[str, Any] = {**loop.settled(loop.defaults(self.manifest.defaults), given)}
@@ -142,12 +165,38 @@ class DescribeModel(LanguageModel):
         ]
         return rows[0] if isinstance(motions, Motion) else rows
 
+    def _decoding(self, decoding: str | None, draws: int | None) -> str | None:
+        """How to decode, None for the bundle's loop; DecodingError where that is not possible."""
+        choices = ("known",) * (self.known is not None) + self.LOOPS
+        if decoding not in (None, *choices):
+            raise DecodingError(f"decoding must be one of {', '.join(choices)}, not {decoding!r}")
+        if decoding == "known" and draws is not None:
+            raise DecodingError("known motions answer without draws: leave them out, or choose consensus")
+        return decoding or ("consensus" if draws is not None else "known" if self.known else None)
+
+    def _answers(self, motions: Sequence[Motion], beams: int | None, progress: Progress) -> list[list[Description]]:
+        """What known motions answer."""
+        assert self.known is not None
+        beam = LOOPS["beam"]
+        count = int(beam.settled(beam.defaults(self.manifest.defaults), {"beams": beams})["beams"])
+        least, found = self.known.settings.sure, list[list[Description]]()
+        for start in range(0, len(motions), AT_ONCE):
+            frames = [self.frames(motion) for motion in motions[start : start + AT_ONCE]]
+            vectors = self.contexts(frames, "space")
+            lengths = [len(one) / self.fps for one in frames]
+            turns = [turn_of(one, self.contract) for one in frames]
+            for row in self.known.answers(list(map(Seen, vectors, lengths, turns)), count):
+                said = [(text, math.log(max(chance, LEAST)), chance) for text, chance in row]
+                found.append([Description(*one, one[2] >= least) for one in said])
+            progress(len(found), len(motions))
+        return found
+
     def timeline(self, motion: Motion, *, progress: Progress = silent) -> list[Part]:
         """What happens in a motion of any length: consecutive parts, each with its best description.
 
-        Short windows are described, each sentence is scored for all nearby windows, and the motion is cut where
-        switching to another sentence pays. Each part is then described like in :meth:`describe`, one of more than 30 s
-        by its middle; neighbours with the same description are merged.
+        Short windows are described, each sentence (of known motions: each kind of action) is scored for all nearby
+        windows, and the motion is cut where switching to another pays. Each part is then described like in
+        :meth:`describe`, one of more than 30 s by its middle; neighbours with the same description are merged.
 
         progress: called with the number of windows done and in total.
         MotionError like :meth:`frames`, except for long motions.
@@ -155,12 +204,27 @@ class DescribeModel(LanguageModel):
         motion = self.on_figure(motion).resample(self.fps)
         settings, beam = self.settings(TimelineSettings), LOOPS["beam"]
         spans = windows(len(motion), motion.fps, settings)
+        if self.known is not None:
+            scores = self._kinds([motion[start:stop] for start, stop in spans], progress)
+            return self._parts(motion, edges(spans, best_path(scores, self.known.settings.change)))
         contexts = self.embed([motion[start:stop] for start, stop in spans])
         likeliest = self._hypotheses(beam, contexts, beam.defaults(self.manifest.defaults))
         ids = self.vocabulary.ids
         said = [(ids[SOS], *best.ids, ids[EOS]) for best, *_ in likeliest]
         scores = near_scores(self.graphs["step"], contexts, said, round(settings.near / settings.hop), progress)
         return self._parts(motion, edges(spans, best_path(scores, settings.change)))
+
+    def _kinds(self, parts: Sequence[Motion], progress: Progress) -> Scores:
+        """Log-probabilities (W, Q) of the sets of kinds of action that are the likeliest of some part."""
+        assert self.known is not None
+        found = []
+        for start in range(0, len(parts), AT_ONCE):
+            frames = [self.frames(part) for part in parts[start : start + AT_ONCE]]
+            counted, _ = self.known.near(self.contexts(frames, "space"))
+            found.append(self.known.shares(counted).astype(np.float32))
+            progress(start + len(frames), len(parts))
+        shares = np.concatenate(found)
+        return np.log(0.02 + shares[:, np.unique(shares.argmax(axis=1))].astype(np.float64))
 
     def _parts(self, motion: Motion, cuts: list[int]) -> list[Part]:
         """Parts of a motion between cuts; a cut between two equal descriptions is dropped."""

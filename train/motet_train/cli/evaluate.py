@@ -41,6 +41,12 @@ from motet_train.settings import read_settings
     show_default=True,
     help="With --says: name or path of the search bundle whose space is used to compare motions and prompts.",
 )
+@click.option(
+    "--actions",
+    metavar="PATTERNS",
+    help="Describe: whether the action is right, and the sure ones, of clips of --data by their names, such as "
+    "'ACCAD_*,CC0_*', whatever the model was trained on; or of its own 'test' part.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one nested object with stable keys.")
 @click.option("--plots", type=Path, help="Folder for the figures of the papers.")
 @unit_in
@@ -51,6 +57,7 @@ def evaluate(
     data: Path | None,
     says: bool,
     search: str,
+    actions: str | None,
     as_json: bool,
     plots: Path | None,
     unit_in: str | None,
@@ -68,11 +75,11 @@ def evaluate(
     the space of a search model.
     """
     torch.set_num_threads(1)
-    if says and keep:
-        raise click.UsageError("--says only prints figures, or draws them with --plots: drop --save")
+    if (says or actions) and keep:
+        raise click.UsageError("--says and --actions only print figures: drop --save")
     runs = {name: Run.load(Path(name)) for name in models if (Path(name) / MANIFEST).is_file()}
     loaded = {name: runs[name].bundle_model() if name in runs else load(name, session) for name in models}
-    suite = suite_of(loaded, says)
+    suite = suite_of(loaded, says, actions)
     if keep and (bundles := [name for name in models if name not in runs]):
         raise click.UsageError(f"--save stores figures in training runs, but {', '.join(bundles)} is a bundle")
     found = dict.fromkeys(loaded, data) if says else data_of(loaded, suite, data)

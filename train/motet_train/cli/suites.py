@@ -10,6 +10,7 @@ from typing import Any, cast
 import click
 
 from motet.models.base import BundleModel
+from motet.models.describe import DescribeModel
 from motet.models.fill import FillModel
 from motet.models.generate import GenerateModel
 from motet.models.generate_codes import CodesModel
@@ -24,6 +25,7 @@ from motet_train.data.errors import DataError
 from motet_train.data.store import Store
 from motet_train.evaluate.figures import Drawings, error_over_time, strips
 from motet_train.evaluate.fill import FILL_GOALS, fill_report
+from motet_train.evaluate.language.actions import actions_report, clips_apart
 from motet_train.evaluate.language.describe import describe_report
 from motet_train.evaluate.language.generate import ASKED, LANGUAGE_GOALS, generate_report
 from motet_train.evaluate.language.search import SEARCH_GOALS, search_report
@@ -197,6 +199,16 @@ def _says(models: Mapping[str, GenerateModel], given: Given) -> Results:
     return Results(json_ready(reports), says_text(reports), lambda: drawings)
 
 
+def _actions(models: Mapping[str, DescribeModel], given: Given, clips: str) -> Results:
+    """Of the test motions of each model's own split where ``clips`` is "test"."""
+    store = Store.open(given.first)
+    corpora = {
+        name: split_as(model.manifest, store) if clips == "test" else clips_apart(store, clips)
+        for name, model in models.items()
+    }
+    return Results.of({name: actions_report(model, corpora[name]) for name, model in models.items()}, {})
+
+
 _LANGUAGE = Suite("describe, generate and search models", _language)
 
 SUITES = {
@@ -211,8 +223,13 @@ SUITES = {
 """Verb -> the suite of its models; steered figures have one of their own."""
 
 
-def suite_of(models: Mapping[str, BundleModel], says: bool = False) -> Suite:
-    """The suite of all the models; UsageError if they need several. says: the one of everyday prompts."""
+def suite_of(models: Mapping[str, BundleModel], says: bool = False, clips: str | None = None) -> Suite:
+    """The suite of all the models; UsageError if they need several. says: the one of everyday prompts. clips: the one
+    of right descriptions of these."""
+    if clips is not None:
+        if wrong := [name for name, model in models.items() if model.VERB != "describe"]:
+            raise click.UsageError(f"--actions takes describe models, not {', '.join(wrong)}")
+        return Suite("describe models", partial(_actions, clips=clips), draws=False)
     if says:
         if wrong := [name for name, model in models.items() if model.VERB != "generate"]:
             raise click.UsageError(f"--says takes generate models, not {', '.join(wrong)}")

@@ -22,7 +22,7 @@ from motet_train.papers.tdbn import recipe as tdbn
 from motet_train.papers.tdbn import steered
 from motet_train.papers.tdbn.clips import read_clips
 from motet_train.plan import PLANNED_VERBS, STAGES, Plan
-from motet_train.recipes import actions, codec, codes, fill, language, matching, predict, search
+from motet_train.recipes import actions, codec, codes, fill, known, language, matching, predict, search
 from motet_train.recipes.actions import WordVectors
 from motet_train.recipes.recipe import Job, Recipe
 from motet_train.runs import Run
@@ -182,6 +182,7 @@ def train_crbm(job: Job, data: Path | None, unit_in: str | None, labels: str | N
 
 NETS = {
     "describe": "motion to language: a net that describes a motion in words.",
+    "known": "nothing, but gathers the known motions that answer for describe, and learns how sure they are.",
     "search": "a joint embedding for search: motions and sentences in one space.",
     "mixture": "language to motion, after Plappert et al. 2017: frame by frame from a mixture.",
     "codec": "a codec of motions: frames to codes and back.",
@@ -199,7 +200,7 @@ def _on_store(name: str, recipes: Mapping[str, Recipe], train_net: Callable[...,
 
     def run(job: Job, data: Path, **given: Any) -> Run:
         corpus = {key: given.pop(key) for key in ("sentences", "people", "gaits", "unit_in", "figure")}
-        runs = {key: Run.load(given[key]) for key in ("start", "codec", "actions") if given.get(key)}
+        runs = {key: Run.load(given[key]) for key in ("start", "codec", "actions", "writer", "space") if given.get(key)}
         if "word_vectors" in given:
             file, origin = given.pop("word_vectors"), given.pop("vectors_from")
             given["vectors"] = file and WordVectors(file, origin)
@@ -227,7 +228,13 @@ parts = with_options(
         "--actions", type=Path, required=True, help="Run of an action net, trained on the same data and split."
     ),
 )
+known_parts = with_options(
+    click.option("--writer", type=Path, required=True, help="Run of describe, trained on the same data and split."),
+    click.option("--space", type=Path, required=True, help="Run of search, trained on the same data and split."),
+    split,
+)
 _on_store("describe", language.RECIPES, language.train_language, by_epochs)
+_on_store("known", known.RECIPES, known.train_known, known_parts)
 _on_store("search", search.RECIPES, search.train_search, by_epochs)
 _on_store("mixture", plappert2017.RECIPES, language.train_language, by_epochs, loss)
 _on_store("codec", codec.RECIPES, codec.train_codec, by_steps, start)

@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import torch
@@ -20,6 +20,9 @@ from motet_train.data.sentences import alike, mirror_text, usable
 from motet_train.data.store import Store
 
 Ids = NDArray[np.int64]
+
+Cut = Callable[[NDArray[Any], np.random.Generator], NDArray[Any]]
+"""What is seen of the frames (T, D) of a motion: some of them, perhaps changed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,12 +184,20 @@ class Pairs(Rows):
 class Views:
     """N motions, as they are and perhaps mirrored: M = 1 or 2 kinds.
 
-    seen: (M, N, K, S), of each motion K views. sentences: of each kind and motion. groups: (M, N).
+    seen: (M, N, K, S), of each motion K views, of so many frames (N, K). sentences: of each kind and motion. groups:
+    (M, N).
     """
 
     seen: Tensor
+    frames: NDArray[np.int64]
     sentences: tuple[tuple[tuple[Ids, ...], ...], ...]
     groups: NDArray[np.int64]
+
+    def only(self, motions: Sequence[int]) -> "Views":
+        """Some of the motions."""
+        rows = list(motions)
+        sentences = tuple(tuple(kind[row] for row in rows) for kind in self.sentences)
+        return Views(self.seen[:, rows], self.frames[rows], sentences, self.groups[:, rows])
 
     def epoch(self, rng: np.random.Generator, batch: int) -> Iterator[Pairs]:
         """Visit every motion once, with mirroring, view and two sentences drawn afresh."""
@@ -202,25 +213,23 @@ class Views:
 
 
 def views(
-    examples: Examples, see: Callable[[Tensor, Tensor], Tensor], count: int, windows: tuple[int, int], seed: int
+    examples: Examples, see: Callable[[Tensor, Tensor], Tensor], count: int, cut: Cut, seed: int, whole: bool = False
 ) -> Views:
-    """``count`` views of each motion of the examples, of any offset and of at most :func:`drawn_length` frames.
+    """``count`` views of each motion of the examples, of any offset.
 
     see: from frames (B, T, D) of lengths (B,) to the numbers (B, S) by which a net knows a motion; computed once.
+    cut: what is seen of frames (T, D). whole: one view more, the last, is of all frames.
     """
-    rng, found = np.random.default_rng(seed), []
+    rng, found, frames = np.random.default_rng(seed), [], []
     for record in examples.records:
-        parts = []
-        for _ in range(count):
-            offset = int(rng.integers(len(examples.store.records[record].spans)))
-            frames = examples.store.sequence(record, offset)
-            longest = drawn_length(rng, windows)
-            start = int(rng.integers(max(0, len(frames) - longest) + 1))
-            parts.append(frames[start : start + longest])
+        spans = len(examples.store.records[record].spans)
+        parts = [cut(examples.store.sequence(record, int(rng.integers(spans))), rng) for _ in range(count)]
+        parts += [examples.store.sequence(record).astype(np.float64)] * whole
         mirrored = [] if examples.mirror is None else [examples.mirror(part) for part in parts]
+        frames.append(list(map(len, parts)))
         given, lengths = padded([*parts, *mirrored], "float32")
         found.append(see(torch.from_numpy(given), torch.from_numpy(lengths)))
     sentences = (examples.sentences,) if examples.mirror is None else (examples.sentences, examples.mirrored)
-    seen = torch.stack(found).reshape(len(found), len(sentences), count, -1).transpose(0, 1)
+    seen = torch.stack(found).reshape(len(found), len(sentences), count + whole, -1).transpose(0, 1)
     groups = alike([[ids.tobytes() for ids in said] for kind in sentences for said in kind])
-    return Views(seen, sentences, np.array(groups, dtype=np.int64).reshape(len(sentences), -1))
+    return Views(seen, np.array(frames), sentences, np.array(groups, dtype=np.int64).reshape(len(sentences), -1))

@@ -47,6 +47,7 @@ class JointEmbeddingConfig:
     noise: float = 0.2
     temperature: float = 0.1
     wordings: float = 1.0
+    travelled: int = 0
 
 
 class JointEmbedding(Net):
@@ -62,7 +63,7 @@ class JointEmbedding(Net):
         self.places = EulerPlaces(config.figure) if config.figure.parents else None
         joints = max(0, len(config.figure.parents) - 1)
         seen = 3 * joints + len(config.figure.root) if joints else config.channels
-        statistics = of_frames(torch.zeros(1, 1, seen), torch.ones(1)).shape[1] + 2 * joints + 1
+        statistics = of_frames(torch.zeros(1, 1, seen), torch.ones(1)).shape[1] + 2 * joints + 1 + 2 * config.travelled
         self.register_buffer("seen_mean", torch.zeros(statistics))
         self.register_buffer("seen_scale", torch.ones(statistics))
         self.motion = nn.Linear(statistics, config.vector)
@@ -90,12 +91,19 @@ class JointEmbedding(Net):
 
     def statistics(self, frames: Tensor, lengths: Tensor) -> Tensor:
         """Frames (B, T, D) of lengths (B,) to what is seen of the whole motion (B, S)."""
-        normal, length = normalised(frames, self.mean, self.scale, LIMIT), lengths[:, None].log()
+        normal = normalised(frames, self.mean, self.scale, LIMIT)
+        length = torch.cat([lengths[:, None].log(), self.way(frames, lengths)], dim=1)
         if self.places is None:
             return torch.cat([of_frames(normal, lengths), length], dim=1)
         places = self.places(frames) / 0.2  # metres
         seen = torch.cat([places, normal[..., list(self.config.figure.root)]], dim=-1)
         return torch.cat([of_frames(seen, lengths), of_speeds(places, lengths), length], dim=1)
+
+    def way(self, frames: Tensor, lengths: Tensor) -> Tensor:
+        """Sums over frames (B, T, D) of lengths (B,) of the channels of the way, and of their sizes."""
+        rates = frames[..., : self.config.travelled] / self.scale[: self.config.travelled].clamp(min=SMALLEST) / 10
+        rates = torch.where(before(lengths, frames.shape[1])[..., None], rates, 0.0)
+        return torch.cat([rates.sum(dim=1), rates.abs().sum(dim=1)], dim=1)
 
     def embed_text(self, words: Tensor, lengths: Tensor) -> Tensor:
         """Ids (B, W) of sentences of lengths (B,) to unit vectors (B, E)."""

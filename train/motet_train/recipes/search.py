@@ -1,15 +1,19 @@
 """The recipe of the joint embedding of motions and sentences, and its training from a store."""
 
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 
 import torch
 from torch.nn import functional
 
 from motet.models.language import RULES, padded
-from motet_train.data.batches import views
+from motet.representation.contract import named
+from motet_train.data.batches import Examples, Views, views
+from motet_train.data.disguise import Disguise, seen_as
 from motet_train.data.sentences import alike, usable
 from motet_train.data.store import Store
-from motet_train.descent import GradientLearner, Term
+from motet_train.descent import GradientLearner, Term, Training
 from motet_train.models.joint_embedding import JointEmbedding, JointEmbeddingConfig
 from motet_train.models.kinematics import figure_of
 from motet_train.recipes.language import Divided, divided, manifest
@@ -19,18 +23,20 @@ from motet_train.runs import Run
 
 @dataclass(frozen=True)
 class SearchVisits:
-    """How motions are seen, see :func:`motet_train.data.batches.views`; mirror: also mirrored."""
+    """How motions are seen: see :func:`motet_train.data.batches.views`, and for windows and disguise
+    :func:`motet_train.data.disguise.seen_as`. mirror: also mirrored."""
 
-    views: int = 8
+    views: int = 12
     windows: tuple[int, int] = (25, 120)
     mirror: bool = True
+    disguise: Disguise = field(default_factory=Disguise)
 
 
 DEFAULT = Recipe(
     "search",
     "joint-embedding",
     "nearest",
-    JointEmbeddingConfig(0, 0),
+    JointEmbeddingConfig(0, 0, noise=0.3, travelled=3),
     ("channels", "words", "figure"),
     replace(ADAMW, epochs=250, every=10, batch=256, warm_up=10, cosine=True, weight_decay=0.05),
     SearchVisits(),
@@ -47,21 +53,36 @@ def train_search(store: Store, job: Job, data: str = "", by: str = "trial") -> R
     found = divided(store, visits.mirror, by)
     sizes = {"channels": len(found.contract.channels), "words": len(found.vocabulary)}
     config = job.recipe.sized(**sizes, figure=figure_of(found.contract))
+    if not named(store.representation).required:
+        config = replace(config, travelled=0)  # its channels do not say where the figure goes
     torch.manual_seed(job.about.seed)
     net = JointEmbedding(config)
     net.measure_by(found.contract.mean, found.contract.std)
     asked = _Asked(found, found.parts.validation)
-    examples = found.examples(found.parts.train)
-    seen = views(examples, net.statistics, visits.views, tuple(visits.windows), job.about.seed)
+    seen = seen_by(net, found.examples(found.parts.train), visits, job.about.seed)
+    learner = space_learner(net.to(job.device), training, seen, lambda: asked.measures(net))
+    return job.run(net, learner, manifest(job, found, asdict(config), data, by))
+
+
+def seen_by(net: JointEmbedding, examples: Examples, visits: SearchVisits, seed: int, whole: bool = False) -> Views:
+    """The views of examples that a net is trained on. whole: and of each motion as it is."""
+    windows, store = (visits.windows[0], visits.windows[1]), examples.store
+    cut = partial(seen_as, how=visits.disguise, windows=windows, channels=store.channels, fps=store.fps)
+    return views(examples, net.statistics, visits.views, cut, seed, whole)
+
+
+def space_learner(
+    net: JointEmbedding, training: Training, seen: Views, validate: Callable[[], dict[str, float]] = dict
+) -> GradientLearner:
+    """What trains a net on views, by which it is measured first."""
     net.see_by(seen.seen)
-    learner = GradientLearner(
-        net.to(job.device),
+    return GradientLearner(
+        net,
         training,
         lambda pairs: (Term(net.losses(pairs), len(pairs)),),
         lambda rng: seen.epoch(rng, training.batch),
-        lambda: asked.measures(net),
+        validate,
     )
-    return job.run(net, learner, manifest(job, found, asdict(config), data, by))
 
 
 class _Asked:

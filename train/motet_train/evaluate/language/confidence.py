@@ -137,12 +137,12 @@ def joined(motions: Sequence[Motion]) -> Motion:
     return replace(motions[0], values=np.concatenate([motion.values for motion in motions]))
 
 
-def matched(joins: Sequence[float], cuts: Sequence[float]) -> int:
-    """How many joins have a cut of their own within a second, the nearest first."""
+def matched(joins: Sequence[float], cuts: Sequence[float], within: float = 1.0) -> int:
+    """How many joins have a cut of their own within a second or other time, the nearest first."""
     pairs = sorted((abs(join - cut), join, cut) for join in joins for cut in cuts)
     free_joins, free_cuts = set(joins), set(cuts)
     for distance, join, cut in pairs:
-        if distance <= 1.0 + 1e-9 and join in free_joins and cut in free_cuts:
+        if distance <= within + 1e-9 and join in free_joins and cut in free_cuts:
             free_joins.remove(join)
             free_cuts.remove(cut)
     return len(joins) - len(free_joins)

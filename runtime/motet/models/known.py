@@ -1,0 +1,224 @@
+"""What a motion shows, answered from known motions that are near it in a space of motions (docs/bundle.md, Describe).
+
+Sentences are not compared with each other: all wordings of one kind of action count together, and a sentence is as
+good as the share of near motions that it would be right about (minimum Bayes risk, Kumar and Byrne 2004).
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Annotated, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motet.bundle.graph import Floats
+from motet.errors import BundleError
+from motet.models.base import BundleModel
+from motet.motion.rotations import Array
+from motet.representation.contract import MotionContract
+from motet.settings import Range, Settings
+
+NOTHING = "no human motion that it knows"
+"""What is said of a motion that is like none of those that are known, or too short to tell."""
+
+LEFT, RIGHT, STRAIGHT = 1, -1, 2
+"""Where a sentence says that somebody goes; 0 if it does not say."""
+
+
+@dataclass(frozen=True)
+class AnswerSettings(Settings):
+    """How known motions answer. Training finds the last five (docs/language.md).
+
+    near: how many of the nearest motions count. temperature: a motion this much less similar counts e times less.
+    turned, straight: from how many degrees on a path turns, and up to how many it is straight. change: the cost of
+    another action in a timeline. shortest: what is shorter is not described. sure: least probability of a description
+    that is trusted. outside: least similarity of the nearest motion; below it nothing is said. bias, share, similarity,
+    length: of the logistic function that gives the probability, see :meth:`Known.probability`.
+    """
+
+    FEATURE: ClassVar[str] = "answer"
+    near: Annotated[int, Range(1, 1000)] = 40
+    temperature: Annotated[float, Range(0.001, 10)] = 0.07
+    turned: Annotated[float, Range(0, 360, "degrees")] = 45.0
+    straight: Annotated[float, Range(0, 360, "degrees")] = 25.0
+    change: Annotated[float, Range(0, 1000, "nats")] = 3.0
+    shortest: Annotated[float, Range(0, 30, "s")] = 0.5
+    sure: Annotated[float, Range(0, 1)] = 0.8
+    outside: Annotated[float, Range(-1, 1)] = 0.0
+    bias: Annotated[float, Range(-1000, 1000)] = 0.0
+    share: Annotated[float, Range(-1000, 1000)] = 1.0
+    similarity: Annotated[float, Range(-1000, 1000)] = 0.0
+    length: Annotated[float, Range(-1000, 1000)] = 0.0
+
+
+class Seen(NamedTuple):
+    """What is known of a motion. vector: its place in the space (E,). seconds: its length. turn: of its path in
+    degrees, to the left; None where it is not told."""
+
+    vector: Floats
+    seconds: float
+    turn: float | None
+
+
+class Answer(NamedTuple):
+    """A sentence, and the probability that it is right."""
+
+    text: str
+    probability: float
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """T known motions with A actions and S sentences, which name K kinds of action.
+
+    vectors: (T, V, E) int8, V views of each motion, unit vectors times 127. actions: (T,) that of each motion.
+    shown: (A, K) 2 where an action shows a kind, 1 where one may say so, else 0. sentences: S of them. said: (S,) the
+    action that each is about. names: (S, K) whether it names a kind. ways: (S, 3), where it says that somebody goes,
+    the degrees that it gives, and whether it is about going and nothing else. All as in the bundle's tables.
+    """
+
+    vectors: NDArray[np.int8]
+    actions: NDArray[np.int16]
+    shown: NDArray[np.uint8]
+    sentences: tuple[str, ...]
+    said: NDArray[np.int16]
+    names: NDArray[np.uint8]
+    ways: NDArray[np.int16]
+    settings: AnswerSettings = AnswerSettings()
+
+    @cached_property
+    def _bank(self) -> Floats:
+        return self.vectors.reshape(-1, self.vectors.shape[-1]).astype(np.float32) / np.float32(127)
+
+    @cached_property
+    def _kinds(self) -> tuple[NDArray[np.uint8], NDArray[np.intp]]:
+        """The Q different sets of kinds that sentences name (Q, K), and which of them each sentence names (S,)."""
+        found, places = np.unique(self.names, axis=0, return_inverse=True)
+        return found, places.reshape(-1)
+
+    @property
+    def sets(self) -> NDArray[np.uint8]:
+        """The Q different sets of kinds that sentences name (Q, K)."""
+        return self._kinds[0]
+
+    @cached_property
+    def _right(self) -> Array:
+        """Which sets of kinds are right about which actions (A, Q): one is shown, and none is not to be said."""
+        sets = self.sets.astype(np.int64)
+        shows = (self.shown == 2).astype(np.int64) @ sets.T > 0
+        wrong = (self.shown == 0).astype(np.int64) @ sets.T > 0
+        right: Array = (shows & ~wrong).astype(np.float64)
+        return right
+
+    def near(self, vectors: Floats) -> tuple[Array, Array]:
+        """How much each action counts (N, A), 1 in all, by the motions near vectors (N, E); and the greatest
+        similarity (N,)."""
+        how, (motions, views) = self.settings, self.vectors.shape[:2]
+        alike = (vectors @ self._bank.T).reshape(len(vectors), motions, views).max(axis=2).astype(np.float64)
+        best = alike.max(axis=1, keepdims=True)
+        least = np.sort(alike, axis=1)[:, -min(how.near, motions)][:, None]
+        weights = np.where(alike >= least, np.exp((alike - best) / how.temperature), 0.0)
+        counted = np.zeros((len(vectors), len(self.shown)))
+        np.add.at(counted.T, self.actions, weights.T)
+        return counted / weights.sum(axis=1, keepdims=True), best[:, 0]
+
+    def shares(self, counted: Array) -> Array:
+        """Of each set of kinds (N, Q) the share of near motions that it is right about; 0 where none of them is said to
+        show it."""
+        asked = np.zeros((len(self.shown), self._right.shape[1]))
+        asked[self.said, self._kinds[1]] = 1
+        return np.where(counted @ asked > 0, counted @ self._right, 0.0)
+
+    def answers(self, seen: Sequence[Seen], count: int = 1) -> list[list[Answer]]:
+        """For each motion up to ``count`` sentences about different kinds of action, the likeliest first; one of
+        :data:`NOTHING` where the motion is too short, or like none that is known."""
+        how, found = self.settings, list[list[Answer]]()
+        counted, alike = self.near(np.stack([one.vector for one in seen]))
+        shares = self.shares(counted)
+        for one, row, share, similarity in zip(seen, counted, shares, alike, strict=True):
+            if one.seconds < how.shortest or similarity < how.outside:
+                found.append([Answer(NOTHING, 0.0)])
+                continue
+            best = [int(q) for q in np.argsort(-share, kind="stable")[:count] if share[q] > 0]
+            chances = self.probability(share[best], similarity, one.seconds)
+            said = [self._sentence(q, row, one.turn) for q in best]
+            found.append([Answer(text, float(chance)) for text, chance in zip(said, chances, strict=True)])
+        return found
+
+    def probability(self, share: Array, similarity: float, seconds: float) -> Array:
+        """How probable it is that sentences are right, of the ``share`` (N,) of near motions that each is right about,
+        the nearest one's similarity and the length."""
+        how = self.settings
+        score = how.bias + how.share * log_odds(share)
+        return 1 / (1 + np.exp(-(score + how.similarity * similarity + how.length * math.log(max(seconds, 0.1)))))
+
+    def _sentence(self, kinds: int, counted: Array, turn: float | None) -> str:
+        """The sentence that names a set of kinds: one whose way fits if there is any, and of these the one of the
+        action that counts most."""
+        rows = np.flatnonzero((self._kinds[1] == kinds) & (counted[self.said] > 0))
+        fits, side = self._fits(rows, turn)
+        best = int(rows[np.lexsort((-counted[self.said[rows]], -fits))[0]])
+        text = self.sentences[best]
+        if side and self.ways[best, 2] and self.ways[best, 0] != side:
+            return f"{text}, turning {'left' if side == LEFT else 'right'}"
+        return text
+
+    def _fits(self, rows: NDArray[np.intp], turn: float | None) -> tuple[Array, int]:
+        """How well the ways of sentences (N,) fit a path that turns by so many degrees, and its side, 0 for none."""
+        how, ways = self.settings, self.ways[rows]
+        if turn is None:
+            return np.zeros(len(rows)), 0
+        side = (LEFT if turn > 0 else RIGHT) if abs(turn) >= how.turned else 0
+        fits = np.zeros(len(rows))
+        if side:
+            fits[ways[:, 0] == side] = 1
+            fits[(ways[:, 0] == -side) | (ways[:, 0] == STRAIGHT)] = -1
+        elif abs(turn) <= how.straight:
+            fits[(ways[:, 0] == STRAIGHT)] = 0.5
+            fits[np.abs(ways[:, 0]) == 1] = -1
+        told = ways[:, 1] > 0
+        fits[told & (np.abs(ways[:, 1] - abs(turn)) > 30)] = -1
+        return fits, side
+
+
+def log_odds(share: Array) -> Array:
+    """The log-odds of shares, of .02 to .98."""
+    kept = np.clip(share, 0.02, 0.98)
+    odds: Array = np.log(kept / (1 - kept))
+    return odds
+
+
+def turn_of(frames: Array, contract: MotionContract) -> float | None:
+    """By how many degrees a figure turns to the left in frames (T, D) of a contract; None where the channels do not
+    tell, or it does not stay upright."""
+    at = {name: column for column, name in enumerate(contract.channels)}
+    if not {"root.turn", "root.pitch", "root.roll"} <= at.keys():
+        return None
+    factor = np.degrees(1.0) if contract.units[at["root.turn"]].startswith("rad") else 1.0
+    leant = np.abs(frames[:, [at["root.pitch"], at["root.roll"]]]).max(initial=0) * factor
+    turned = float(frames[1:, at["root.turn"]].sum() / contract.fps * factor)
+    return turned if leant < 70 else None
+
+
+def known_of(model: BundleModel) -> Known:
+    """The known motions of a model, from its tables; BundleError where one is missing or does not fit."""
+    table = model.table
+    text = table("known_sentences", "BYTES", "uint8").tobytes().decode("utf-8", "replace").split("\n")
+    found = Known(
+        table("known_vectors", "MOTIONS VIEWS E", "int8"),
+        table("known_actions", "MOTIONS", "int16"),
+        table("known_shown", "ACTIONS KINDS", "uint8"),
+        tuple(text),
+        table("known_said", "SENTENCES", "int16"),
+        table("known_names", "SENTENCES KINDS", "uint8"),
+        table("known_ways", "SENTENCES 3", "int16"),
+        model.settings(AnswerSettings),
+    )
+    for name, rows in (("known_actions", found.actions), ("known_said", found.said)):
+        if not len(rows) or rows.min() < 0 or rows.max() >= len(found.shown):
+            raise BundleError(f"manifest, tables: {name!r} has numbers that are none of {len(found.shown)} actions")
+    if len(text) != len(found.said) or not found.vectors.size:
+        raise BundleError(f"manifest, tables: 'known_sentences' has {len(text)} lines, expected {len(found.said)}")
+    return found

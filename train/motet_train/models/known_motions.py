@@ -1,0 +1,76 @@
+"""Known motions as the bundle has them: a space, the motions in it, what they show, and a net that writes sentences.
+
+Nothing here is trained: the nets come from runs of their own.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from numpy.typing import NDArray
+from torch import nn
+
+from motet.bundle.graph import GraphSpec
+from motet.models.known import Known
+from motet_train.models.joint_embedding import JointEmbedding, JointEmbeddingConfig
+from motet_train.models.motion_to_language import MotionToLanguage, MotionToLanguageConfig
+from motet_train.models.net import Net
+
+
+@dataclass(frozen=True)
+class KnownMotionsConfig:
+    """The nets, and how many there are of what is known. letters: bytes of all sentences. E is that of the space."""
+
+    writer: MotionToLanguageConfig
+    space: JointEmbeddingConfig
+    motions: int
+    views: int
+    actions: int
+    kinds: int
+    sentences: int
+    letters: int
+
+
+class KnownMotions(Net):
+    """Both nets, and tables as :class:`motet.models.known.Known` has them."""
+
+    CONFIG = KnownMotionsConfig
+
+    def __init__(self, config: KnownMotionsConfig) -> None:
+        super().__init__(config.writer.channels)
+        self.config = config
+        self.writer, self.space = MotionToLanguage(config.writer), JointEmbedding(config.space)
+        shapes: dict[str, tuple[tuple[int, ...], torch.dtype]] = {
+            "vectors": ((config.motions, config.views, config.space.vector), torch.int8),
+            "actions": ((config.motions,), torch.int16),
+            "shown": ((config.actions, config.kinds), torch.uint8),
+            "sentences": ((config.letters,), torch.uint8),
+            "said": ((config.sentences,), torch.int16),
+            "names": ((config.sentences, config.kinds), torch.uint8),
+            "ways": ((config.sentences, 3), torch.int16),
+        }
+        self.known_tables = tuple(shapes)
+        for name, (shape, dtype) in shapes.items():
+            self.register_buffer(f"known_{name}", torch.zeros(shape, dtype=dtype))
+
+    @staticmethod
+    def of(writer: MotionToLanguage, space: JointEmbedding, known: Known) -> "KnownMotions":
+        """The net of two trained ones and what is known."""
+        letters = torch.frombuffer(bytearray("\n".join(known.sentences).encode()), dtype=torch.uint8)
+        motions, views, _ = known.vectors.shape
+        counts = (motions, views, *known.shown.shape, len(known.sentences), len(letters))
+        net = KnownMotions(KnownMotionsConfig(writer.config, space.config, *counts))
+        net.writer, net.space = writer, space
+        net.mean, net.scale = writer.mean.clone(), writer.scale.clone()
+        for name in net.known_tables:
+            table = letters if name == "sentences" else torch.from_numpy(getattr(known, name))
+            getattr(net, f"known_{name}").copy_(table)
+        return net
+
+    def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
+        """Those of the net that writes sentences, and the space's encoder of motions."""
+        return {**self.writer.graphs(), "space": self.space.graphs()["motion"]}
+
+    def tables(self) -> dict[str, NDArray[Any]]:
+        """What is known."""
+        return {f"known_{name}": getattr(self, f"known_{name}").numpy() for name in self.known_tables}
