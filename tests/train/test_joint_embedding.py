@@ -152,8 +152,9 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_views_are_parts_of_the_motions_with_their_sentences(store: Path) -> None:
     found = divided(Store.open(store), mirror=False)
     examples = found.examples(found.parts.train)
-    made = views(examples, lambda frames, lengths: frames[:, :1].sum(dim=2), 3, (2, 4), seed=0)
+    made = views(examples, lambda frames, lengths: frames[:, :1].sum(dim=2), 3, lambda frames, rng: frames[1:], seed=0)
     assert made.seen.shape == (1, len(examples.records), 3, 1)
+    np.testing.assert_array_equal(made.only([2, 0]).seen, made.seen[:, [2, 0]])
     (pairs,) = made.epoch(np.random.default_rng(0), 100)
     firsts = [{float(f.sum()) for o in range(3) for f in found.store.sequence(r, o)} for r in examples.records]
     for seen, words, other in zip(pairs.seen, pairs.words, pairs.others, strict=True):

@@ -17,13 +17,15 @@ from motet.formats import READS, read_motion
 from motet.models.describe import DescribeModel, Description
 from motet.models.generate import PLAYED, Generated, GenerateModel
 from motet.models.generate_codes import CodesModel, Story
+from motet.models.known import NOTHING
 from motet.models.load import load_as
 from motet.motion.looping import looped
 
 
 @click.command(
-    help=f"""Describe motion files: sentences, the best first, each with its log-probability, or, with --draws, with how
-    well it agrees with all sentences drawn (0 to 1). A sentence after "?" is one that the model is not sure of.
+    help=f"""Describe motion files: sentences, the best first, each with the probability that it is right, or, with
+    --draws, with how well it agrees with all sentences drawn (0 to 1). A sentence after "?" is one that the model is
+    not sure of; of a motion like none that is known it says "{NOTHING}".
 
     All files are described in one batch, motions over 30 s in windows; with --timeline, motions of any length are cut
     where what is done changes. Any human figure will do. Of a file of several clips all are described, or the one of
@@ -107,7 +109,8 @@ def _timelines(
 
 
 def _told(description: Description) -> str:
-    return description.text if description.confident else f"? {description.text}"
+    sure = description.confident or description.text == NOTHING
+    return description.text if sure else f"? {description.text}"
 
 
 @click.command()

@@ -229,7 +229,7 @@ parts = with_options(
     ),
 )
 known_parts = with_options(
-    click.option("--writer", type=Path, required=True, help="Run of describe, trained on the same data and split."),
+    click.option("--writer", type=Path, required=True, help="Run of describe, which writes sentences (--draws)."),
     click.option("--space", type=Path, required=True, help="Run of search, trained on the same data and split."),
     split,
 )

@@ -74,7 +74,14 @@ every_training = with_options(
     click.option("--name", help="Bundle name. [default: the run's folder]"),
 )
 
-split = click.option("--split", "by", type=click.Choice(SPLITS), default="trial", show_default=True)
+split = click.option(
+    "--split",
+    "by",
+    metavar=f"[{'|'.join(SPLITS)}|PATTERN]",
+    default="trial",
+    show_default=True,
+    help="What is kept back: trials, people, nothing, or the clips of a pattern such as 'ACCAD_*'.",
+)
 unit_in = click.option("--unit-in", type=click.Choice(list(METRES)), help="Length unit of files that do not state it.")
 
 

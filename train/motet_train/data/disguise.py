@@ -31,10 +31,9 @@ OFF = {
 class Disguise:
     """How motions are changed.
 
-    share: of the motions. crop: of these and of all others, how often only 1 to 4 s are seen, of several places where
-    most happens. tempo, pace: how much faster or slower all goes, and how far for its steps, as the logarithm.
-    standing: how often the root stays where it is. repeated: how often a loop of less than 1.6 s is seen several
-    times. off: how much wrong rest poses count.
+    share: of the motions. crop: of these and of all others, how often only 1 to 4 s are seen. tempo, pace: how much
+    faster or slower all goes, and how far for its steps, as the logarithm. standing: how often the root stays where it
+    is. repeated: how often a loop of less than 1.6 s is seen several times. off: how much wrong rest poses count.
     """
 
     share: float = 0.6
@@ -60,7 +59,8 @@ def seen_as(
     """
     few = round(fps), round(4 * fps)
     length = drawn_length(rng, few if rng.random() < how.crop else windows)
-    frames = np.asarray(_liveliest(frames, length, rng), dtype=np.float64)
+    start = int(rng.integers(max(0, len(frames) - length) + 1))
+    frames = np.asarray(frames[start : start + length], dtype=np.float64)
     if rng.random() >= how.share or not set(ROOT_BLOCK) <= set(channels):
         return frames
     frames = _paced(frames, float(np.exp(rng.uniform(-how.tempo, how.tempo))))
@@ -69,14 +69,6 @@ def seen_as(
     if rng.random() < how.repeated and len(frames) < 1.6 * fps:
         frames = np.tile(frames, (-(-round(2.5 * fps) // len(frames)), 1))
     return frames
-
-
-def _liveliest(frames: Array, length: int, rng: np.random.Generator) -> Array:
-    """Of three cuts of a length the one in which most happens: the idle frames before an act do not show it."""
-    places = rng.integers(max(0, len(frames) - length) + 1, size=3)
-    cuts = [frames[place : place + length] for place in places]
-    energy = [float(np.abs(np.diff(cut, axis=0)).sum()) for cut in cuts]
-    return cuts[int(np.argmax(energy))]
 
 
 def _paced(frames: Array, tempo: float) -> Array:

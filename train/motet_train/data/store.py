@@ -9,6 +9,7 @@ import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -260,10 +261,13 @@ def split(entries: Sequence[Entry], seed: int, by: str = "trial") -> Split:
 
     by: "trial", which keeps the pieces of a take together, or "subject" to keep all motions of a person together, so
     that validation and test show people never seen in training; these parts then have at most .1 each. "none" trains on
-    everything, the validation and test motions of "trial" as well. DataError where a part would be empty.
+    everything, the validation and test motions of "trial" as well. A pattern with a "*", such as "ACCAD_*", names the
+    clips of the test part; of the others people are for validation. DataError where a part would be empty.
     """
+    if "*" in by:
+        return _without(entries, seed, by)
     if by not in SPLITS:
-        raise DataError(f"motions are split by trial, by subject or by none, not by {by!r}")
+        raise DataError(f"motions are split by trial, by subject, by none or by a pattern with a *, not by {by!r}")
     if by == "none":
         return replace(split(entries, seed), train=tuple(range(len(entries))))
     groups: dict[str, list[int]] = {}
@@ -282,3 +286,14 @@ def split(entries: Sequence[Entry], seed: int, by: str = "trial") -> Split:
             + who * (by == "subject")
         )
     return Split(*(tuple(sorted(part)) for part in parts))
+
+
+def _without(entries: Sequence[Entry], seed: int, pattern: str) -> Split:
+    """What matches a pattern is the test part; of the rest the test part is for training, too."""
+    test = tuple(index for index, entry in enumerate(entries) if fnmatchcase(entry.name, pattern))
+    rest = [index for index in range(len(entries)) if index not in set(test)]
+    if not test or not rest:
+        raise DataError(f"{len(test)} of {len(entries)} motions match {pattern}: some must, and some must not")
+    parts = split([entries[index] for index in rest], seed, "subject")
+    train = sorted(rest[place] for place in (*parts.train, *parts.test))
+    return Split(tuple(train), tuple(rest[place] for place in parts.validation), test)

@@ -57,27 +57,36 @@ DEFAULT = Recipe(
 
 RECIPES = {"default": DEFAULT}
 
+TRIED = "tried.npz"
+"""Of a run: the answers about people kept back that their probability was learned from."""
+
 GOING = frozenset({"walk", "run", "skip", "backwards", "turn", "jump", "carry", "sidestep"})
 """Kinds of going, of which it is worth telling where to."""
 
 
 def train_known(store: Store, job: Job, data: str, by: str, writer: Run, space: Run) -> Run:
-    """Gather the known motions of a store, for the runs of a net that writes sentences and of a space that were trained
-    on the same store and split. DataError where they were not."""
+    """Gather the known motions of a store, for the runs of a net that writes sentences, of the same channels, and of a
+    space that was trained on the same store and split. DataError where they are not."""
     began, visits = perf_counter(), job.recipe.visits
     found = divided(store, mirror=True, by=by)
     if not isinstance(writer.model, MotionToLanguage) or not isinstance(space.model, JointEmbedding):
         raise DataError("known motions need a run of describe (--writer) and one of search (--space)")
-    for run in (writer, space):
-        if run.manifest["vocabulary"] != list(found.vocabulary.words):
-            raise DataError(f"{run.manifest['name']} was trained on other sentences: use the same data and split")
+    if space.manifest["vocabulary"] != list(found.vocabulary.words):
+        raise DataError(f"{space.manifest['name']} was trained on other sentences: use the same data and split")
+    if writer.manifest["motion"]["channels"] != list(found.contract.channels):
+        raise DataError(f"{writer.manifest['name']} describes motions of other channels than those of {data}")
     examples = found.examples(found.parts.train)
     seen = search.seen_by(space.model, examples, visits, job.about.seed, whole=True)
     known = _gathered(found, examples, space.model, seen, visits.kept)
-    settings = learned(_tried(job, found, examples, space.model, seen), visits.sure)
+    tried = _tried(job, found, examples, space.model, seen)
+    np.savez(job.folder / TRIED, **tried._asdict())
+    settings = learned(tried, visits.sure)
     net = KnownMotions.of(writer.model, space.model, known)
     about = manifest(job, found, asdict(net.config), data, by)
+    about |= {key: writer.manifest[key] for key in ("motion", "text", "vocabulary")}
     about["training"] |= {
+        "epochs": job.training.epochs,
+        "kept_epoch": job.training.epochs,
         "seconds": round(perf_counter() - began, 1),
         "parameters": sum(one.numel() for one in net.parameters()),
         "writer": _made(writer),
@@ -125,11 +134,11 @@ def way_of(sentence: str) -> tuple[int, int, int]:
     """Where a sentence says that somebody goes, the degrees that it gives, 0 for none, and whether it is about going
     alone."""
     text, kinds = " ".join(RULES.words(sentence)), named(sentence)
-    turns = re.search(r"\b(?:turn|veer|swerv|curv|corner|bend|angl|circl|spin|rotat)", text)
-    sides = frozenset(re.findall(r"\b(left|right)(?! (?:angle|foot|leg|hand|arm|side step))", text))
+    turns = re.search(r"(?<!in )\b(?:turn|veer|swerv|curv|corner|bend|angl|circl|spin|rotat)", text)
+    sides = frozenset(re.findall(r"\b(?:left|right)\b(?! angle)", text))
     way = STRAIGHT if re.search(r"\bstraight\b", text) else 0
-    if turns:
-        way = {frozenset({"left"}): LEFT, frozenset({"right"}): RIGHT}.get(sides, 0)
+    if turns and not re.search(r"\b(?:foot|feet|legs?|arms?|hands?|shoulder)\b", text):
+        way = {frozenset({"left"}): LEFT, frozenset({"right"}): RIGHT}.get(sides, way)
     digits = re.search(r"\b(\d(?: ?\d)*) degrees?\b", text)
     degrees = int(digits[1].replace(" ", "")) if digits else 90 if re.search(r"right angle|quarter", text) else 0
     return way, min(degrees, 720), int(bool(kinds) and kinds <= GOING)
@@ -200,19 +209,28 @@ def grouped(people: Sequence[str], count: int) -> NDArray[np.int64]:
 
 
 def learned(tried: Tried, sure: float) -> AnswerSettings:
-    """How probable answers are (logistic regression), from which probability on so many of them are right, and below
-    which similarity hardly one in ten is. The defaults where there are too few answers or all are alike."""
+    """How probable answers are (logistic regression), from which probability on so many of them are right, and the
+    similarity that one in a hundred motions does not have. The defaults where there are too few answers or all are
+    alike.
+
+    What is nearer is never taken to be less probable: a weight below 0 would trust what is far from all that is known.
+    """
     from sklearn.linear_model import LogisticRegression
 
     if len(tried.right) < 50 or tried.right.all() or not tried.right.any():
         return AnswerSettings()
-    rows = np.column_stack([log_odds(tried.share), tried.similarity, np.log(np.maximum(tried.seconds, 0.1))])
-    fitted = LogisticRegression(C=10.0, max_iter=1000).fit(rows, tried.right)
+    columns = [log_odds(tried.share), tried.similarity, np.log(np.maximum(tried.seconds, 0.1))]
+    fit = LogisticRegression(C=10.0, max_iter=1000).fit
+    fitted = fit(np.column_stack(columns), tried.right)
+    if fitted.coef_[0, 1] < 0:
+        columns[1] = np.zeros_like(columns[1])
+        fitted = fit(np.column_stack(columns), tried.right)
     share, similarity, length = (round(float(one), 4) for one in fitted.coef_[0])
     bias = round(float(fitted.intercept_[0]), 4)
-    chances = fitted.predict_proba(rows)[:, 1]
+    chances = fitted.predict_proba(np.column_stack(columns))[:, 1]
     limits = AnswerSettings(bias=bias, share=share, similarity=similarity, length=length)
-    return replace(limits, sure=_least(chances, tried.right, sure), outside=_outside(tried))
+    outside = round(float(np.percentile(tried.similarity, 1)), 4)
+    return replace(limits, sure=_least(chances, tried.right, sure), outside=outside)
 
 
 def _least(chances: NDArray[np.float64], right: NDArray[np.bool_], wanted: float) -> float:
@@ -221,11 +239,3 @@ def _least(chances: NDArray[np.float64], right: NDArray[np.bool_], wanted: float
     precision = np.cumsum(right[order]) / np.arange(1, len(order) + 1)
     good = np.flatnonzero(precision[19:] >= wanted) + 19  # of fewer than 20 nothing is learned
     return round(float(chances[order[good[-1]]]), 4) if len(good) else 1.0
-
-
-def _outside(tried: Tried) -> float:
-    """The greatest similarity below which at most one answer in ten is right; -1 where there is none."""
-    order = np.argsort(tried.similarity, kind="stable")
-    precision = np.cumsum(tried.right[order]) / np.arange(1, len(order) + 1)
-    poor = np.flatnonzero(precision[9:] <= 0.1) + 9
-    return round(float(tried.similarity[order[poor[-1]]]), 4) if len(poor) else -1.0

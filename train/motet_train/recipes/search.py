@@ -36,9 +36,9 @@ DEFAULT = Recipe(
     "search",
     "joint-embedding",
     "nearest",
-    JointEmbeddingConfig(0, 0, noise=0.3, travelled=3),
+    JointEmbeddingConfig(0, 0, travelled=3),
     ("channels", "words", "figure"),
-    replace(ADAMW, epochs=250, every=10, batch=256, warm_up=10, cosine=True, weight_decay=0.05),
+    replace(ADAMW, epochs=120, every=10, batch=256, warm_up=10, cosine=True, weight_decay=0.05),
     SearchVisits(),
     {"count": 5},
 )
