@@ -38,7 +38,9 @@ def test_describe_prints_json_for_every_file(files: list[Path]) -> None:
     assert [row["input"] for row in rows] == [str(path) for path in files]
     expected = describe_model().describe([read_motion(path) for path in files], 3)
     for row, wanted in zip(rows, expected, strict=True):
-        assert [set(h) for h in row["hypotheses"]] == [{"text", "log_probability", "score", "confident"}] * 3
+        assert [set(h) for h in row["hypotheses"]] == [
+            {"text", "log_probability", "score", "confident", "probability"}
+        ] * 3
         assert [h["text"] for h in row["hypotheses"]] == [d.text for d in wanted]
         np.testing.assert_allclose(
             [h["log_probability"] for h in row["hypotheses"]], [d.log_probability for d in wanted], atol=1e-5

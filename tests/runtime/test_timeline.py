@@ -1,5 +1,6 @@
 """Where a long motion changes, beside the most literal way to find out."""
 
+import math
 from dataclasses import replace
 from itertools import pairwise, product
 from pathlib import Path
@@ -134,7 +135,7 @@ def test_a_description_is_believed_from_the_log_probability_of_its_bundle_on() -
         other = DescribeModel(Manifest.from_json({**model.manifest.source, **settings}), model.graphs)
         assert [one.confident for one in other.describe(motion)] == [place <= n for place in range(len(found))]
     expected = {"text": "a", "log_probability": -99.0, "score": 1.0, "confident": False}
-    assert Description("a", -99.0, 1.0, False).to_json() == expected
+    assert Description("a", -99.0, 1.0, False).to_json() == {**expected, "probability": pytest.approx(math.exp(-99))}
 
 
 def test_the_settings_of_a_bundle_cut_its_timelines() -> None:

@@ -240,7 +240,7 @@ def test_a_split_of_too_little_is_refused() -> None:
     with pytest.raises(DataError, match="100 motions of 2 subjects are too few"):
         split(entries([50, 50]), 0, "subject")
     assert [len(part) for part in (split(entries([3]), 0).validation, split(entries([3]), 0).test)] == [1, 1]
-    with pytest.raises(DataError, match="by trial, by subject or by none"):
+    with pytest.raises(DataError, match="by trial, by subject, by none or by a pattern"):
         split(entries([30]), 0, "day")
 
 
