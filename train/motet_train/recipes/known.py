@@ -75,6 +75,7 @@ def train_known(store: Store, job: Job, data: str, by: str, writer: Run, space: 
         raise DataError(f"{space.manifest['name']} was trained on other sentences: use the same data and split")
     if writer.manifest["motion"]["channels"] != list(found.contract.channels):
         raise DataError(f"{writer.manifest['name']} describes motions of other channels than those of {data}")
+    space.model.eval()
     examples = found.examples(found.parts.train)
     seen = search.seen_by(space.model, examples, visits, job.about.seed, whole=True)
     known = _gathered(found, examples, space.model, seen, visits.kept)
