@@ -191,3 +191,9 @@ def test_resumed_training_is_the_same_to_the_bit(store: Path, tmp_path: Path) ->
     assert all(torch.equal(whole[name], parts[name]) for name in whole)
     other = trained(store, tmp_path / "other", "--seed", 1).model.state_dict()
     assert any(not torch.equal(whole[name], other[name]) for name in whole)
+
+
+def test_vectors_of_many_views_are_of_length_1() -> None:
+    net = JointEmbedding(JointEmbeddingConfig(D, V)).eval()
+    vectors = net.embed_statistics(torch.randn(2, 3, 4, len(net.seen_mean)))
+    torch.testing.assert_close(vectors.norm(dim=-1), torch.ones(2, 3, 4))

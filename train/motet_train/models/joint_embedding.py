@@ -77,11 +77,11 @@ class JointEmbedding(Net):
         return self.embed_statistics(self.statistics(frames, lengths))
 
     def embed_statistics(self, seen: Tensor) -> Tensor:
-        """Statistics (B, S) to unit vectors (B, E)."""
+        """Statistics (..., S) to unit vectors (..., E)."""
         found = normalised(seen, self.seen_mean, self.seen_scale, LIMIT)
         if self.training:
             found = found + self.config.noise * torch.randn_like(found)
-        return functional.normalize(self.motion(self.dropout(found)), dim=1)
+        return functional.normalize(self.motion(self.dropout(found)), dim=-1)
 
     def see_by(self, seen: Tensor) -> None:
         """Set mean and scale of statistics from examples (..., S)."""
