@@ -5,8 +5,9 @@ import logging
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain, groupby, islice
 from pathlib import Path
 
@@ -14,6 +15,7 @@ import click
 
 from motet import checked
 from motet.checked import Checked
+from motet.cli.jobs import in_order, jobs_option
 from motet.cli.options import Tries
 from motet.cli.reading import Read, Source, read_options
 from motet.cli.writing import Output, places, size, write_options
@@ -61,17 +63,20 @@ class Row:
 @click.argument("files", nargs=-1, required=True, type=Path, metavar="FILE|FOLDER...")
 @click.option("-o", "--out", type=Path, help="Page (.html) that plays the figure of the file beside the humanoid.")
 @read_options
+@jobs_option
 @click.option("--json", "as_json", is_flag=True, help="Print a list of objects, one for each clip.")
-def check(files: tuple[Path, ...], out: Path | None, read: Read, as_json: bool) -> None:
+def check(files: tuple[Path, ...], out: Path | None, read: Read, jobs: int | None, as_json: bool) -> None:
     """Look at motion files."""
     if out is not None and out.suffix.lower() != ".html":
         raise click.UsageError(f"-o is a page: expected a name that ends in .html, not {out.name!r}")
     paths = [path for given in files for path in (_motion_files(given) if given.is_dir() else [given])]
+    given: Iterable[tuple[Source, Path | None]]
     if out is None:
-        rows = (_row(source, None, read) for path in paths for source in read.sources([path], every=True))
+        given = ((source, None) for path in paths for source in read.sources([path], every=True))
     else:
         sources = read.sources(paths, every=True)
-        rows = (_row(source, page, read) for source, page in zip(sources, places(out, sources), strict=True))
+        given = zip(sources, places(out, sources), strict=True)
+    rows = in_order(partial(_row, read=read), given, jobs)
     counts = _print_json(rows) if as_json else _print_text(rows, paths)
     if counts["unreadable"] or counts["refused"]:
         sys.exit(1)
@@ -85,7 +90,8 @@ def _motion_files(folder: Path) -> list[Path]:
     return found
 
 
-def _row(source: Source, page: Path | None, read: Read) -> Row:
+def _row(given: tuple[Source, Path | None], read: Read) -> Row:
+    source, page = given
     try:
         found = checked.check(source.path, clip=source.clip, **read.options)
         if page is not None:
