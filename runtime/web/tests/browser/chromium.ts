@@ -35,12 +35,13 @@ const page = (script: string) => `<!doctype html><meta charset="utf-8">
 
 /** What a module of build/ exports by default, as JSON, once it has run in Chromium. */
 export async function inChromium(script: string): Promise<unknown> {
+  const program = browser();
   const profile = await mkdtemp(join(tmpdir(), "motet-chromium-"));
   const { server, reported } = await served(script);
   const { port } = server.address() as { port: number };
   const root = process.getuid?.() === 0 ? ["--no-sandbox"] : [];
   const flags = ["--headless=new", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run", `--user-data-dir=${profile}`, ...root];
-  const child = spawn(browser(), [...flags, `http://localhost:${port}/`], { stdio: "ignore", detached: true });
+  const child = spawn(program, [...flags, `http://localhost:${port}/`], { stdio: "ignore", detached: true });
   const ended = new Promise<never>((_, fail) => {
     child.on("error", fail).on("exit", (code) => fail(new Error(`Chromium ended with ${code} before the page had reported`)));
     setTimeout(() => fail(new Error(`the page did not report within ${SECONDS} s`)), SECONDS * 1000).unref();
