@@ -18,13 +18,15 @@ from motet.bundle.golden import read
 from motet.decode.codec import Context
 from motet.decode.loops import LOOPS
 from motet.decode.words import noise_of, score_words
-from motet.errors import TextWarning
+from motet.errors import ControlWarning, TextWarning
 from motet.models.describe import DescribeModel
 from motet.models.generate_codes import CodesModel
 from motet.models.language import EOS, SOS
 from motet.models.predict import PredictModel
 from motet.models.search import SearchModel
+from motet.models.steer import SteerModel
 from motet.motion.motion import Motion
+from motet.motion.rotations import quat_product
 
 KEPT = Path(__file__).parents[2] / "runtime/web/tests/python.json"
 EVERY = 30  # frames of which one is kept
@@ -131,8 +133,37 @@ def parted(model: CodesModel) -> dict[str, list[str]]:
     return {text: model.parts(text) for text in texts}
 
 
+STEERED: list[dict[str, Any]] = [
+    {"control": {"gait": "walk", "velocity": [[1.2, 0.4], [0.3, -1.1]]}},
+    {"control": {"gait": ["run", "walk"], "speed": 2.5, "direction": [80.0, -40.0], "facing": [80.0, -20.0]}},
+    {"push": [0.5, -0.3]},
+    {"control": {"speed": 0.0}},
+    {"put": [[1.0, 2.0, 30.0], [-2.0, 0.5, -90.0]], "control": {"gait": "zombie", "direction": 10.0, "speed": 0.4}},
+]
+"""Calls of two figures' session, one after the other; after each three quarters of a second pass."""
+
+
+def steered(model: SteerModel, hold_feet: bool) -> list[list[Any]]:
+    """Of two figures in every twelfth picture at 48 a second: ground, hips, rotations in the world and below, contacts."""
+    session, found = model.start(characters=2, hold_feet=hold_feet), []
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ControlWarning)
+        for calls in STEERED:
+            for name, given in calls.items():
+                session.control(**given) if name == "control" else getattr(session, name)(given)
+            poses = [session.advance(1 / 48) for _ in range(36)]
+            found += poses[::12]
+    rows: list[list[Any]] = []
+    for pose in found:
+        rotations = pose.rotations.copy()
+        rotations[:, 0] = quat_product(pose.heading, rotations[:, 0])
+        parts = (pose.ground, pose.height[:, None], rotations.reshape(2, -1), pose.contacts)
+        rows.append(np.round(np.concatenate(parts, axis=1, dtype=np.float64), 6).tolist())
+    return rows
+
+
 def answers() -> dict[str, Any]:
-    generate, describe = motet.load("generate"), motet.load("describe")
+    generate, describe, control = motet.load("generate"), motet.load("describe"), motet.load("control")
     return {
         **generated(generate),
         "story": told(generate),
@@ -143,6 +174,9 @@ def answers() -> dict[str, Any]:
         "score": scored(describe),
         "expected": expected(motet.load("predict")),
         "long": long(motet.load("search")),
+        "steering": STEERED,
+        "steered": steered(control, hold_feet=False),
+        "held": steered(control, hold_feet=True),
     }
 
 

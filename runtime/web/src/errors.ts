@@ -13,6 +13,11 @@ export class DecodingError extends Error {
   override name = "DecodingError";
 }
 
+/** A command to a steered figure that cannot be followed. */
+export class ControlError extends Error {
+  override name = "ControlError";
+}
+
 /** A figure that is no human's, or a motion that cannot be used. */
 export class MotionError extends Error {
   override name = "MotionError";

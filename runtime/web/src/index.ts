@@ -1,5 +1,7 @@
 export { Bundle, type Manifest } from "./bundle.js";
-export { BundleError, DecodingError, TextError } from "./errors.js";
+export { BundleError, ControlError, DecodingError, TextError } from "./errors.js";
+export { ControlModel, type StartSettings } from "./control.js";
+export { ControlSession, type ControlSnapshot, type SteeredPose, type Told } from "./controlSession.js";
 export { DescribeModel, type Description, type DescribeSettings } from "./describe.js";
 export { FillModel } from "./fill.js";
 export { GenerateModel, type GenerateSettings, type Passage, type StorySettings, type Understood } from "./generate.js";

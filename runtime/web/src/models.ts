@@ -1,4 +1,5 @@
 import { Bundle } from "./bundle.js";
+import { type ControlModel, controlModel } from "./control.js";
 import { DescribeModel } from "./describe.js";
 import { BundleError } from "./errors.js";
 import { FillModel } from "./fill.js";
@@ -14,10 +15,11 @@ const ROLES: Record<string, string[]> = {
   codes: ["encoder", "step", "part", "decoder", "tokens"],
   free_run: ["encoder", "step"],
   between: ["filler"],
+  matching: [],
   nearest: ["motion", "text"],
 };
 
-export type AnyModel = DescribeModel | GenerateModel | PredictModel | FillModel | SearchModel;
+export type AnyModel = ControlModel | DescribeModel | GenerateModel | PredictModel | FillModel | SearchModel;
 
 /**
  * Load a bundle from an address or its bytes; BundleError where it cannot be fetched, is damaged, or of a kind that is
@@ -50,6 +52,8 @@ async function loaded(bundle: Bundle, settings?: SessionSettings): Promise<AnyMo
       return new PredictModel(manifest, graphs);
     case "between":
       return new FillModel(manifest, graphs);
+    case "matching":
+      return controlModel(bundle);
     case "nearest":
       return new SearchModel(manifest, graphs);
     default:

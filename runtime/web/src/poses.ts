@@ -1,8 +1,9 @@
 import type { Manifest } from "./bundle.js";
 import { DecodingError } from "./errors.js";
 import type { Frames } from "./model.js";
-import { moved, type Pose as Ground } from "./planar.js";
-import { product, type Quaternion, quaternionOf, rotationOf } from "./rotations.js";
+import { moved, type Pose as Ground, seenFrom } from "./planar.js";
+import { about, inverse, product, type Quaternion, quaternionOf, rotated, rotationOf, X, Y } from "./rotations.js";
+import { wrapped } from "./springs.js";
 
 /** The humanoid in one frame: its hips in metres, and each bone's rotation in its parent's frame, by VRM 1.0's names. */
 export interface Pose {
@@ -30,5 +31,17 @@ export function poser({ motion: { representation, channels, fps } }: Manifest): 
     const half = ground[2] / 2;
     rotations[bones[0]!] = product([0, Math.sin(half), 0, Math.cos(half)], rotations[bones[0]!]!);
     return { hips: [ground[0], frame[3]!, ground[1]], rotations };
+  });
+}
+
+/** Frames in `root_sixd` of poses in turn that know where their figure is, such as a steered one's; the first stands still. */
+export function framesOf(poses: (Pose & { ground: Ground })[], fps: number): number[][] {
+  return poses.map(({ hips, rotations, ground }, at) => {
+    const [forward, left, turn] = seenFrom(poses[Math.max(at - 1, 0)]!.ground, ground);
+    const axes = Object.entries(rotations).flatMap(([bone, turned]) => {
+      const own = bone === "hips" ? product(inverse(about(Y, ground[2])), turned) : turned;
+      return [...rotated(own, X), ...rotated(own, Y)];
+    });
+    return [forward * fps, left * fps, wrapped(turn) * fps, hips[1], ...axes];
   });
 }

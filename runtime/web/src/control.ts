@@ -1,0 +1,116 @@
+/* Figures that are steered by motion matching; no ONNX Runtime is needed. */
+import type { Bundle, Manifest } from "./bundle.js";
+import { ControlSession } from "./controlSession.js";
+import { BundleError, ControlError } from "./errors.js";
+import { Gaits, type Speeds } from "./gaits.js";
+import { BONES } from "./humanoid.js";
+import { FEATURES, Matcher, type Tables } from "./matching.js";
+import { Model } from "./model.js";
+import { Steerer } from "./steering.js";
+import { lockOf, steeringOf, type LockSettings } from "./steeringSettings.js";
+
+/** A session has at most so many figures. */
+const LARGEST_CROWD = 100_000;
+/** A number of a table at most. */
+const LARGEST = 1e9;
+
+export interface StartSettings {
+  /** By default the first. */
+  gait?: string;
+  characters?: number;
+  /** x and z in metres and facing in degrees, for all or for each; by default the origin, facing z. */
+  places?: readonly number[] | readonly (readonly number[])[];
+  /** Keep planted feet in place, by turning hips and knees. */
+  holdFeet?: boolean;
+  /** Refuse a speed outside a gait's range, instead of clamping it. */
+  strict?: boolean;
+}
+
+/** A figure that goes where it is told, in several gaits. */
+export class ControlModel extends Model {
+  readonly gaits: readonly string[];
+  readonly abilities: Gaits;
+  readonly steerer: Steerer;
+  readonly lock: LockSettings;
+
+  constructor(manifest: Manifest, tables: Tables) {
+    super(manifest);
+    const steering = steeringOf(manifest.settings);
+    const { names, speeds, odd } = configOf(manifest, tables.codes.length / tables.left.length);
+    this.abilities = new Gaits(names, speeds, steering);
+    this.gaits = names;
+    this.lock = lockOf(manifest.settings);
+    const matcher = new Matcher(tables, odd, names.length, steering, this.fps);
+    matcher.goals.forEach((goals, gait) => {
+      if (!goals.rows.length) throw new BundleError(`table left: no row of ${JSON.stringify(names[gait])} can be jumped to`);
+    });
+    this.steerer = new Steerer(matcher);
+  }
+
+  /** Of each gait the slowest and the fastest speed forward and the usual one, m/s. */
+  get speeds(): Record<string, { slowest: number; usual: number; fastest: number }> {
+    const of = (gait: number) => {
+      const [slowest, usual, fastest] = this.abilities.speeds[gait]!;
+      return { slowest, usual, fastest };
+    };
+    return Object.fromEntries(this.gaits.map((name, gait) => [name, of(gait)]));
+  }
+
+  /** A session of figures that stand still. ControlError for what is out of range. */
+  start({ gait = this.gaits[0]!, characters = 1, places, holdFeet = true, strict = false }: StartSettings = {}): ControlSession {
+    if (!Number.isInteger(characters) || characters < 1 || characters > LARGEST_CROWD) {
+      throw new ControlError(`characters must be a whole number from 1 to ${LARGEST_CROWD}, not ${characters}`);
+    }
+    const session = new ControlSession(this, this.abilities.number(gait), characters, holdFeet, strict);
+    if (places !== undefined) session.put(places);
+    return session;
+  }
+}
+
+function configOf({ config, motion: { channels } }: Manifest, codes: number): { names: string[]; speeds: Speeds[]; odd: number } {
+  const [names, speeds, odd] = [config.gaits as string[], config.speeds as Speeds[], config.odd as number];
+  if (!Array.isArray(names) || !names.length || !names.every((name) => typeof name === "string")) {
+    throw new BundleError("manifest, config.gaits: must be names");
+  }
+  const within = (row: unknown) => Array.isArray(row) && row.length === 5 && row.every((speed) => speed >= 0 && speed <= 100);
+  if (!Array.isArray(speeds) || speeds.length !== names.length || !speeds.every(within)) {
+    throw new BundleError("manifest, config.speeds: must hold a row of 5 speeds, 0 to 100 m/s, for each gait");
+  }
+  if (!(Number.isInteger(odd) && odd >= 0 && odd <= codes)) throw new BundleError(`manifest, config.odd: must be 0 to ${codes}`);
+  const bones = channels.filter((name) => name.endsWith(".xx")).map((name) => name.slice(0, -3));
+  if (`${bones}` !== `${BONES}`) throw new BundleError("manifest, motion.channels: must be those of the humanoid, in its order");
+  return { names, speeds, odd };
+}
+
+/** The model of a bundle, whose tables are checked: docs/bundle.md, the loop `matching`. */
+export async function controlModel(bundle: Bundle): Promise<ControlModel> {
+  return new ControlModel(bundle.manifest, await tablesOf(bundle));
+}
+
+async function tablesOf(bundle: Bundle): Promise<Tables> {
+  const [rows, codes] = bundle.manifest.tables?.codes?.shape ?? [];
+  const gaits = (bundle.manifest.config?.gaits as string[] | undefined)?.length;
+  const values = 4 * BONES.length + 1;
+  const table = async (name: string, dtype: string, shape: (number | undefined)[], least = -LARGEST, most = (_: number) => LARGEST) => {
+    const own = bundle.manifest.tables?.[name];
+    if (own && (own.dtype !== dtype || `${own.shape}` !== `${shape}`)) {
+      throw new BundleError(`table ${name} is ${own.dtype} (${own.shape}), not ${dtype} (${shape})`);
+    }
+    const { data } = await bundle.table(name);
+    if (!data.every((value, at) => value >= least && value <= most(at))) {
+      throw new BundleError(`table ${name}: holds a number that is out of range`);
+    }
+    return data;
+  };
+  return {
+    codes: (await table("codes", "float16", [rows, codes])) as Float32Array,
+    moves: (await table("moves", "float32", [rows, 6])) as Float32Array,
+    features: (await table("features", "int8", [rows, FEATURES])) as Int8Array,
+    shows: (await table("shows", "uint8", [rows, gaits], 0, () => 1)) as Uint8Array,
+    left: (await table("left", "int32", [rows], 0, (at) => rows! - 1 - at)) as Int32Array,
+    feature_mean: (await table("feature_mean", "float32", [FEATURES])) as Float32Array,
+    feature_scale: (await table("feature_scale", "float32", [FEATURES], 1e-6)) as Float32Array,
+    pose_mean: (await table("pose_mean", "float32", [values])) as Float32Array,
+    pose_basis: (await table("pose_basis", "float16", [codes, values])) as Float32Array,
+  };
+}

@@ -1,0 +1,89 @@
+/* A foot lock for live figures, standing feet stay in place without look-ahead: docs/bundle.md, "The foot lock". */
+import { BONES, HUMANOID, LEG, SIDES, SOLES } from "./humanoid.js";
+import { Leg } from "./leg.js";
+import { about, inverse, minus, plus, product, type Quaternion, rotated, type Vector, X, Y } from "./rotations.js";
+import { damped, dampingOf } from "./springs.js";
+import type { LockSettings } from "./steeringSettings.js";
+import type { Played } from "./steering.js";
+
+const LEGS = SIDES.map((side) => LEG.map((part) => BONES.indexOf(side + part)));
+/** Where the joints of a leg begin in their parents' frames. */
+const OFFSETS = LEGS.map((bones) => bones.map((bone) => HUMANOID.joints[HUMANOID.index(BONES[bone]!)]!.offset));
+/** Points of a sole, and which joint of a leg carries each. */
+const POINTS = LEG.flatMap((part, joint) => (SOLES[part] ?? []).map((point): [number, Vector] => [joint, point]));
+
+/** Of one foot: by how much it is moved along x and z and how fast that changes, and where the points of its sole were. */
+interface Foot {
+  shift: [number, number];
+  drift: [number, number];
+  soles: Vector[] | null;
+}
+
+/** The lock of one figure: a foot each, left and right. */
+export type Lock = [Foot, Foot];
+
+export function newLock(): Lock {
+  const foot = (): Foot => ({ shift: [0, 0], drift: [0, 0], soles: null });
+  return [foot(), foot()];
+}
+
+/** The next pose, a tick later, with standing feet held in place and above the ground. */
+export function held(lock: Lock, pose: Played, how: LockSettings, dt: number): Played {
+  const [x, z, facing] = pose.ground;
+  const hips = product(about(Y, facing), pose.rotations[0]!);
+  const rotations = [...pose.rotations];
+  lock.forEach((foot, side) => {
+    const leg = legOf(pose, side, hips, [x, pose.height, z]);
+    const soles = POINTS.map(([joint, point]) => plus(leg.places[joint]!, rotated(leg.turned[joint]!, point)));
+    const lowest = soles.reduce((least, point, at) => (point[1] < soles[least]![1] ? at : least), 0);
+    shift(foot, minus(soles[lowest]!, (foot.soles ?? soles)[lowest]!), pose.contacts[side]! > how.stands, how, dt);
+    foot.soles = soles;
+    const lift = Math.max(0, -soles[lowest]![1]);
+    if (foot.shift[0] || foot.shift[1] || lift) reach(rotations, side, hips, leg, [foot.shift[0], lift, foot.shift[1]]);
+  });
+  return { ...pose, rotations };
+}
+
+interface Limb {
+  turned: Quaternion[];
+  places: Vector[];
+}
+
+/** Rotations and places in the world of the joints of a leg. */
+function legOf({ rotations }: Played, side: number, hips: Quaternion, root: Vector): Limb {
+  let [above, place] = [hips, root];
+  const [turned, places]: [Quaternion[], Vector[]] = [[], []];
+  LEGS[side]!.forEach((bone, joint) => {
+    place = plus(place, rotated(above, OFFSETS[side]![joint]!));
+    above = product(above, rotations[bone]!);
+    turned.push(above);
+    places.push(place);
+  });
+  return { turned, places };
+}
+
+/** By how much a foot is moved now, whose lowest point was `moved` since the last tick. */
+function shift(foot: Foot, [x, , z]: Vector, contact: boolean, how: LockSettings, dt: number): void {
+  const stay: [number, number] = [foot.shift[0] - x, foot.shift[1] - z];
+  if (contact && Math.hypot(x, z) < how.swings * dt && Math.hypot(...stay) < how.farthest) {
+    [foot.shift, foot.drift] = [stay, [0, 0]];
+    return;
+  }
+  const damping = dampingOf(how.fade);
+  const [offX, rateX] = damped(foot.shift[0], foot.drift[0], damping, dt);
+  const [offZ, rateZ] = damped(foot.shift[1], foot.drift[1], damping, dt);
+  [foot.shift, foot.drift] = [[offX, offZ], [rateX, rateZ]];
+}
+
+/** Turn thigh, shin and foot of a leg so that the ankle is moved; the foot stays as it is in the world. */
+function reach(rotations: Quaternion[], side: number, hips: Quaternion, { turned, places }: Limb, move: Vector): void {
+  const [hip, knee, ankle] = places as [Vector, Vector, Vector];
+  const [thigh, shin, foot] = turned as [Quaternion, Quaternion, Quaternion];
+  const leg = new Leg(hip, knee, ankle, rotated(shin, X));
+  const turns = leg.turns(leg.eased(plus(ankle, move)));
+  const [above, below] = [product(turns.thigh, thigh), product(turns.shin, shin)];
+  const bones = LEGS[side]!;
+  rotations[bones[0]!] = product(inverse(hips), above);
+  rotations[bones[1]!] = product(inverse(above), below);
+  rotations[bones[2]!] = product(inverse(below), foot);
+}

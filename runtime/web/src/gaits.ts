@@ -1,0 +1,61 @@
+/* What a figure can be asked: gaits with their speeds, and commands within them. Metres a second and radians. */
+import { ControlError } from "./errors.js";
+import type { Target } from "./matching.js";
+import { clamp, wrapped } from "./springs.js";
+import type { Steering } from "./steeringSettings.js";
+
+/** The slowest, the usual, and the fastest speed forward, sideways and backwards; 0 where a gait cannot go that way. */
+export type Speeds = readonly [slowest: number, usual: number, forward: number, sideways: number, backwards: number];
+
+/** The last command to a figure. */
+export interface Command {
+  gait: number;
+  speed: number;
+  /** Of travel. */
+  direction: number;
+  facing: number;
+  /** Whether it is to face the way it moves. */
+  facesWay: boolean;
+}
+
+export class Gaits {
+  constructor(
+    readonly names: readonly string[],
+    readonly speeds: readonly Speeds[],
+    private readonly how: Steering,
+  ) {}
+
+  /** The number of a gait; ControlError for an unknown one. */
+  number(name: string): number {
+    const found = this.names.indexOf(name);
+    if (found < 0) throw new ControlError(`unknown gait ${JSON.stringify(name)}; expected one of ${this.names.join(", ")}`);
+    return found;
+  }
+
+  /** A facing from which a gait goes in a direction: not all go sideways and backwards. */
+  facing(gait: number, direction: number, facing: number): number {
+    const [, , , sideways, backwards] = this.speeds[gait]!;
+    const farthest = Math.min(sideways, backwards) > 0 ? Math.PI : this.how.ahead;
+    return direction - clamp(wrapped(direction - facing), -farthest, farthest);
+  }
+
+  /** A command's target within the gait's limits, and what is said where it exceeds them. */
+  target({ gait, speed, direction, facing: told }: Command): { target: Target; beyond: string | null } {
+    const [slowest, , ...fastest] = this.speeds[gait]!;
+    const facing = speed > 0 ? this.facing(gait, direction, told) : told;
+    const aside = Math.abs(wrapped(direction - facing));
+    const high = fastest[[this.how.aside, this.how.back].filter((edge) => aside >= edge).length]!;
+    const low = Math.min(slowest, high);
+    const within = speed > 0 ? clamp(speed, low, high) : 0;
+    const limits = `${JSON.stringify(this.names[gait])} allows 0 or ${low}-${high} m/s in this direction, not ${speed}`;
+    const target: Target = [within * Math.sin(direction), within * Math.cos(direction), wrapped(facing)];
+    return { target, beyond: Math.abs(within - speed) > 1e-6 ? limits : null };
+  }
+}
+
+/** A command with what is told anew. Given a direction but no facing, the figure faces it once it moves. */
+export function told(command: Command, given: Partial<Omit<Command, "facesWay">>): Command {
+  const faces = given.direction !== undefined || given.facing !== undefined ? given.facing === undefined : command.facesWay;
+  const found = { ...command, ...given, facesWay: faces };
+  return { ...found, facing: faces && found.speed > 0 ? found.direction : found.facing };
+}

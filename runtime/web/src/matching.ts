@@ -1,0 +1,190 @@
+/* Motion matching, which recorded frame a figure plays next: docs/bundle.md, the loop `matching`. Metres, seconds, radians. */
+import { Goals } from "./goals.js";
+import type { Pose as Ground } from "./planar.js";
+import { damped, dampedPath, dampingOf, wrapped } from "./springs.js";
+import type { Steering } from "./steeringSettings.js";
+
+/** The tables of a bundle, row by row: N rows, K codes of a pose, G gaits, P numbers of a pose. */
+export interface Tables {
+  codes: Float32Array;
+  moves: Float32Array;
+  features: Int8Array;
+  shows: Uint8Array;
+  left: Int32Array;
+  feature_mean: Float32Array;
+  feature_scale: Float32Array;
+  pose_mean: Float32Array;
+  pose_basis: Float32Array;
+}
+
+/** Velocity along x and z, m/s, and facing, radians. */
+export type Target = [x: number, z: number, facing: number];
+
+/** What one figure plays, and where it is. */
+export interface Playback {
+  row: number;
+  /** The part of the way to the next row. */
+  part: number;
+  mirror: boolean;
+  /** Rows that are played in the next tick. */
+  rate: number;
+  ticksToSearch: number;
+  root: Ground;
+  /** The springs that approach the target, and how fast they change. */
+  spring: Target;
+  springRate: Target;
+  /** The inertialization offset of the codes, and how fast it changes. */
+  offset: Float64Array;
+  offsetRate: Float64Array;
+}
+
+/** Features of where a row goes: places and facings in thirds of the horizon, and the speed. Those of how it is now follow. */
+export const TRAJECTORY = 13;
+export const FEATURES = TRAJECTORY + 21;
+/** In which tables hold a scaled unit of a feature. */
+const STEPS = 16;
+
+/** Triples of a mirror image: of feet, their velocities, hips and hands, in the order of the other side's. */
+const SWAPPED = [1, 0, 3, 2, 4, 6, 5];
+const COLUMNS = [...Array(TRAJECTORY).keys(), ...SWAPPED.flatMap((three) => [0, 1, 2].map((i) => TRAJECTORY + 3 * three + i))];
+/** To the left is the first of a pair or a triple. */
+const SIGNS = COLUMNS.map((_, i) => (i < TRAJECTORY ? (i % 2 || i === TRAJECTORY - 1 ? 1 : -1) : (i - TRAJECTORY) % 3 ? 1 : -1));
+
+/** Searches the tables for a gait's best row, and jumps there. */
+export class Matcher {
+  readonly rows: number;
+  readonly codes: number;
+  readonly dt: number;
+  /** Rows that are played until the next search, at most. */
+  readonly reserve: number;
+  /** Of each code of a mirror image its sign. */
+  private readonly codeSigns: Float64Array;
+  private readonly features: Float32Array;
+  readonly goals: Goals[];
+  private readonly asked = new Float64Array(FEATURES);
+  private readonly image = new Float64Array(FEATURES);
+
+  constructor(
+    readonly tables: Tables,
+    odd: number,
+    readonly gaits: number,
+    readonly how: Steering,
+    readonly fps: number,
+  ) {
+    this.rows = tables.left.length;
+    this.codes = tables.codes.length / this.rows;
+    this.dt = 1 / fps;
+    this.reserve = Math.ceil((how.search_every + 1) * how.fastest) + 2;
+    this.codeSigns = Float64Array.from({ length: this.codes }, (_, k) => (k < this.codes - odd ? 1 : -1));
+    this.features = Float32Array.from(tables.features, (step) => step / STEPS);
+    const lasts = (row: number) => tables.left[row]! >= Math.max(this.reserve, how.lasting) && !this.flies(row);
+    const all = [...Array(this.rows).keys()].filter(lasts);
+    this.goals = Array.from({ length: gaits }, (_, gait) => {
+      const rows = all.filter((row) => this.shows(row, gait)).filter((_, at) => at % how.row_step === 0);
+      return new Goals(this.features, FEATURES, rows, tables.feature_mean, tables.feature_scale, how.lag);
+    });
+  }
+
+  /** The row of a gait with the least speed, the first of them; of those that something follows. */
+  stillest(gait: number): number {
+    let still = -1;
+    for (let row = 0; row < this.rows; row++) {
+      if (!this.shows(row, gait) || this.tables.left[row]! < this.reserve) continue;
+      if (still < 0 || this.tables.moves[6 * row + 3]! < this.tables.moves[6 * still + 3]!) still = row;
+    }
+    return still;
+  }
+
+  /** A figure at a place that plays a row, and searches after so many ticks. */
+  playing(row: number, [x, z, facing]: Ground = [0, 0, 0], ticksToSearch = 0): Playback {
+    const [offset, offsetRate] = [new Float64Array(this.codes), new Float64Array(this.codes)];
+    const springs = { spring: [0, 0, facing] as Target, springRate: [0, 0, 0] as Target, offset, offsetRate };
+    return { row, part: 0, mirror: false, rate: 1, ticksToSearch, root: [x, z, facing], ...springs };
+  }
+
+  shows(row: number, gait: number): boolean {
+    return this.tables.shows[row * this.gaits + gait]! > 0;
+  }
+
+  /** Whether no foot stands. */
+  private flies(row: number): boolean {
+    return Math.max(this.tables.moves[6 * row + 4]!, this.tables.moves[6 * row + 5]!) < this.how.stands;
+  }
+
+  /** Let a figure whose search is due jump to the row that fits best, where another than its own does. */
+  search(figure: Playback, target: Target, gait: number): void {
+    if (figure.ticksToSearch-- > 0) return;
+    const { how } = this;
+    figure.ticksToSearch = how.search_every - 1;
+    const row = figure.row + (figure.part > 0.5 ? 1 : 0);
+    const stays = this.shows(row, gait) && this.tables.left[row]! >= this.reserve;
+    if (stays && this.flies(row)) return; // a flight is played to its end
+    const goals = this.goals[gait]!;
+    this.ask(figure, row, target);
+    const here = figure.mirror ? this.image : this.asked;
+    const cost = stays ? goals.cost(here, this.features, row * FEATURES) : Infinity;
+    const found = goals.nearest(this.asked, this.image, cost);
+    if (!found) return;
+    const ahead = found.row - row;
+    if (!stays || ahead < -how.jump_back || ahead > how.jump_ahead) this.jump(figure, found.row, found.mirror);
+  }
+
+  /** What is asked for, as features, and their mirror image: the row's own but for where it goes. */
+  private ask(figure: Playback, row: number, target: Target): void {
+    const { asked, image } = this;
+    const { feature_mean: mean, feature_scale: scale } = this.tables;
+    const at = row * FEATURES;
+    for (let i = TRAJECTORY; i < FEATURES; i++) {
+      asked[i] = figure.mirror ? this.features[at + COLUMNS[i]!]! * SIGNS[i]! : this.features[at + i]!;
+    }
+    this.trajectory(figure, target).forEach((value, i) => {
+      asked[i] = Math.fround((value - mean[i]!) * scale[i]!);
+    });
+    for (let i = 0; i < FEATURES; i++) image[i] = asked[COLUMNS[i]!]! * SIGNS[i]!;
+  }
+
+  /** Where the springs lead, as features that are not yet scaled. */
+  private trajectory({ root, spring, springRate }: Playback, [toX, toZ, toFacing]: Target): number[] {
+    const { velocity, facing: halfLife, half_speed, horizon } = this.how;
+    const [slow, calm] = [dampingOf(velocity), dampingOf(halfLife)];
+    const [cos, sin] = [Math.cos(root[2]), Math.sin(root[2])];
+    const [offX, offZ, off] = [spring[0] - toX, spring[1] - toZ, wrapped(spring[2] - toFacing)];
+    const [places, facings]: [number[], number[]] = [[], []];
+    for (const time of [horizon / 3, (horizon * 2) / 3, horizon]) {
+      const x = toX * time + dampedPath(offX, springRate[0], slow, time);
+      const z = toZ * time + dampedPath(offZ, springRate[1], slow, time);
+      const angle = toFacing + damped(off, springRate[2], calm, time)[0] - root[2];
+      places.push(cos * x - sin * z, sin * x + cos * z);
+      facings.push(Math.sin(angle), Math.cos(angle));
+    }
+    const soon = (horizon * 2) / 3;
+    const speed = Math.hypot(toX + damped(offX, springRate[0], slow, soon)[0], toZ + damped(offZ, springRate[1], slow, soon)[0]);
+    return [...places, ...facings, speed / (speed + half_speed)];
+  }
+
+  /** Go on from another row; what the pose loses by it goes into the inertialization offset. */
+  private jump(figure: Playback, row: number, mirror: boolean): void {
+    const add = (sign: number) => {
+      const at = figure.row * this.codes;
+      const { codes } = this.tables;
+      for (let k = 0; k < this.codes; k++) {
+        const side = figure.mirror ? sign * this.codeSigns[k]! : sign;
+        const change = codes[at + k + this.codes]! - codes[at + k]!;
+        figure.offset[k]! += side * (codes[at + k]! + figure.part * change);
+        figure.offsetRate[k]! += side * change * this.fps;
+      }
+    };
+    add(1);
+    Object.assign(figure, { row, part: 0, mirror });
+    add(-1);
+  }
+
+  /** The codes that are played, and their offset. */
+  played({ row, part, mirror, offset }: Playback, into: Float64Array): void {
+    const { codes } = this.tables;
+    for (let k = 0, at = row * this.codes; k < this.codes; k++, at++) {
+      const value = codes[at]! + part * (codes[at + this.codes]! - codes[at]!);
+      into[k] = (mirror ? this.codeSigns[k]! * value : value) + offset[k]!;
+    }
+  }
+}
