@@ -144,7 +144,7 @@ STEERED: list[dict[str, Any]] = [
 
 
 def steered(model: SteerModel, hold_feet: bool) -> list[list[Any]]:
-    """Of two figures in every twelfth picture at 48 a second: ground, hips, rotations in the world and below, contacts."""
+    """Of two figures in every twelfth picture, 48 a second: ground, hips, rotations, contacts."""
     session, found = model.start(characters=2, hold_feet=hold_feet), []
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ControlWarning)

@@ -1,7 +1,8 @@
 /* What every runtime has to give, in Node and in a browser: golden vectors, and answers that Python gave (python.json). */
 import { type NumberArray, rows } from "../src/arrays.js";
 import { Bundle } from "../src/bundle.js";
-import { DescribeModel, FillModel, GenerateModel, load, PredictModel, SearchModel } from "../src/index.js";
+import { ControlModel, DescribeModel, FillModel, GenerateModel, load, PredictModel, SearchModel, type Told } from "../src/index.js";
+import { framesOf } from "../src/poses.js";
 import { Recorded } from "../src/random.js";
 import python from "./python.json";
 
@@ -145,6 +146,32 @@ async function long(read: Read): Promise<void> {
   close(await model.embedMotion(many), python.long, "vector");
 }
 
+/** The golden run of the bundle: targets in, frames out. */
+async function steersTargets(read: Read): Promise<void> {
+  const { model, frames, wanted } = await loaded(read, "control", ControlModel);
+  const session = model.start({ holdFeet: false });
+  const poses = frames("track").map(([x, z, facing]) => session.tickTo([[x!, z!, facing!]])[0]!);
+  close(flat(framesOf(poses, model.fps)), wanted("frames").data, "frames");
+}
+
+/** The calls of python.json, and some pictures of each, with the feet held and without. */
+async function steers(read: Read): Promise<void> {
+  const { model } = await loaded(read, "control", ControlModel);
+  for (const [holdFeet, wanted] of [[false, python.steered], [true, python.held]] as const) {
+    const session = model.start({ characters: 2, holdFeet });
+    const found = python.steering.flatMap(({ put, push, control }: { put?: number[][]; push?: number[]; control?: Told }) => {
+      if (put) session.put(put);
+      if (push) session.push(push);
+      if (control) session.control(control);
+      return Array.from({ length: 36 }, () => session.advance(1 / 48)).filter((_, at) => at % 12 === 0);
+    });
+    equal(found.length, wanted.length, "pictures");
+    found.forEach((poses, at) => poses.forEach(({ ground, hips, rotations, contacts }, figure) => {
+      close([...ground, hips[1], ...Object.values(rotations).flat(), ...contacts], wanted[at]![figure]!, `figure ${figure} in picture ${at}, held: ${holdFeet}`);
+    }));
+  }
+}
+
 export const cases: Case[] = [
   ...graphs,
   { name: "describe says what Python says", run: describe },
@@ -152,6 +179,8 @@ export const cases: Case[] = [
   { name: "predict continues as Python does", run: predict },
   { name: "fill fills as Python does", run: fill },
   { name: "search embeds as Python does", run: search },
+  { name: "control runs along targets as Python does", run: steersTargets },
+  { name: "control steers as Python does, with feet held and without", run: steers },
   { name: "a seed generates the motion that it does in Python", run: seeds },
   { name: "a story, and its stream, are those of Python", run: story },
   { name: "draws agree on what they do in Python", run: agreed },

@@ -1,0 +1,81 @@
+/* Commands to steered figures, and bundles of them, that are wrong are refused by name; the search is that of all rows. */
+import assert from "node:assert/strict";
+import { readFile } from "node:fs/promises";
+import test from "node:test";
+import { BundleError, ControlError, ControlModel, load, type Told } from "../src/index.js";
+import { Goals } from "../src/goals.js";
+import { steeringOf } from "../src/steeringSettings.js";
+
+const bytes = new Uint8Array(await readFile("../motet/bundles/control.zip"));
+const model = (await load(bytes)) as ControlModel;
+
+test("what cannot be followed is refused, and changes nothing", () => {
+  const session = model.start({ characters: 2, strict: true });
+  session.control({ gait: "walk", speed: 1.2, direction: 30 });
+  const before = session.targets;
+  const refused: [Told, RegExp][] = [
+    [{ gait: "fly" }, /unknown gait "fly"; expected one of walk, run/],
+    [{ gait: ["walk"] }, /1 gaits do not fit 2 characters/],
+    [{ speed: NaN }, /speed must be finite numbers/],
+    [{ speed: [1, 2, 3] }, /speed needs speed, for all or for each of 2 characters/],
+    [{ speed: 50 }, /"walk" allows 0 or .* not 50/],
+    [{ direction: Infinity }, /direction must be finite/],
+    [{ facing: "left" as unknown as number }, /facing must be finite/],
+    [{ velocity: [1] }, /a velocity needs x, z/],
+    [{ velocity: [[1, 0], [0, NaN]] }, /a velocity must be finite/],
+    [{ velocity: [1, 0], speed: 1 }, /not both/],
+  ];
+  for (const [told, said] of refused) {
+    assert.throws(() => session.control(told), (error) => error instanceof ControlError && said.test(error.message), JSON.stringify(told));
+  }
+  assert.deepEqual(session.targets, before);
+  for (const seconds of [-1, 1.5, NaN]) assert.throws(() => session.advance(seconds), ControlError);
+  for (const characters of [0, 1.5, NaN, 1e6]) assert.throws(() => model.start({ characters }), ControlError);
+  assert.throws(() => model.start({ gait: "fly" }), ControlError);
+  assert.throws(() => model.start({ places: [1, 2] }), ControlError);
+  assert.throws(() => session.restore(model.start().snapshot()), /1 characters does not fit 2/);
+  assert.throws(() => session.restore(model.start({ characters: 2, holdFeet: false }).snapshot()), ControlError);
+});
+
+test("a session is restored, and figures move as each would alone", () => {
+  const session = model.start({ characters: 2 });
+  session.control({ gait: ["walk", "run"], velocity: [[1, 0.5], [-2, 1]] });
+  for (let at = 0; at < 20; at++) session.advance(1 / 60);
+  const snapshot = session.snapshot();
+  const next = Array.from({ length: 30 }, () => session.advance(1 / 60));
+  session.restore(snapshot);
+  assert.deepEqual(Array.from({ length: 30 }, () => session.advance(1 / 60)), next);
+  const alone = model.start({ gait: "walk" });
+  alone.control({ gait: "run", velocity: [-2, 1] });
+  for (let at = 0; at < 49; at++) alone.advance(1 / 60);
+  assert.deepEqual(alone.advance(1 / 60), [next.at(-1)![1]]);
+});
+
+test("the search finds what a search of all rows finds", () => {
+  const { goals, tables } = model.steerer.matcher;
+  const width = tables.feature_mean.length;
+  let state = 5;
+  const random = () => (state = (state * 48271) % 2147483647) / 2147483647;
+  const features = Float32Array.from(tables.features, (step) => step / 16);
+  for (const some of goals as Goals[]) {
+    for (let trial = 0; trial < 20; trial++) {
+      const at = some.rows[Math.floor(random() * some.rows.length)]! * width;
+      const asked = Float64Array.from({ length: width }, (_, i) => features[at + i]! + 3 * (random() - 0.5));
+      const costs = some.rows.map((row) => some.cost(asked, features, row * width));
+      const least = Math.min(...costs);
+      const found = some.nearest(asked, asked, Infinity)!;
+      assert.equal(found.row, some.rows[costs.indexOf(least)]);
+      assert.ok(Math.abs(found.cost - least) < 1e-9 * Math.max(1, least));
+      assert.equal(some.nearest(asked, asked, least * (1 - 1e-9)), null);
+    }
+  }
+});
+
+test("settings and tables that are out of range are refused", () => {
+  assert.throws(() => steeringOf({ steering: { velocity: 0 } }), /steering.velocity: must be 0.01 to 10/);
+  assert.throws(() => steeringOf({ steering: { search_every: 2.5 } }), BundleError);
+  assert.throws(() => steeringOf({ steering: { wings: 2 } }), /wings is unknown/);
+  const { manifest, steerer } = model;
+  const made = (config: object) => new ControlModel({ ...manifest, config: { ...manifest.config, ...config } }, steerer.matcher.tables);
+  for (const config of [{ gaits: [] }, { speeds: [[1, 2]] }, { odd: 99 }, { gaits: "walk" }]) assert.throws(() => made(config), BundleError);
+});
