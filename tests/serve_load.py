@@ -1,4 +1,4 @@
-"""Figures of docs/serve.md: python tests/serve_load.py [REQUESTS] [CLIENTS].
+"""Figures of docs/serve.md: python tests/serve_load.py [REQUESTS] [CLIENTS] [SECONDS of each motion].
 
 Clients ask a server at once, each for one motion after the other; every answer has to be the bytes that Python gives
 for it alone. Beside it the same motions by Python, one after the other and all at once, without a server.
@@ -29,19 +29,25 @@ SENTENCES = [
 ]
 
 
-def main(requests: int = 1000, clients: int = 16) -> None:
+def main(requests: int = 1000, clients: int = 16, length: float | None = None) -> None:
     """Print requests a second and processor time of each, and what was lost or differs."""
     asked = [(SENTENCES[i % len(SENTENCES)], i // len(SENTENCES)) for i in range(requests)]
     model = motet.load("generate")
-    alone = measured("direct, one by one", lambda: [written(model.generate(t, seed=s)[0]) for t, s in asked], asked)
+    alone = measured(
+        "direct, one by one", lambda: [written(model.generate(t, seed=s, seconds=length)[0]) for t, s in asked], asked
+    )
     texts, seeds = map(list, zip(*asked, strict=True))
-    measured("direct, all at once", lambda: [written(row[0]) for row in model.generate(texts, seed=seeds)], asked)
+    measured(
+        "direct, all at once",
+        lambda: [written(row[0]) for row in model.generate(texts, seed=seeds, seconds=length)],
+        asked,
+    )
     command = [sys.executable, "-m", "motet", "serve", "--port", "0"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as server:
         assert server.stderr is not None
         port = int(server.stderr.readline().split(";")[0].rpartition(":")[2])
-        ask(port, asked[:clients], clients)  # warms up
-        answers = measured(f"served to {clients} clients", lambda: ask(port, asked, clients), asked, server.pid)
+        ask(port, asked[:clients], clients, length)  # warms up
+        answers = measured(f"served to {clients} clients", lambda: ask(port, asked, clients, length), asked, server.pid)
         server.terminate()
     lost = sum(answer is None for answer in answers)
     differ = sum(answer not in (None, own) for answer, own in zip(answers, alone, strict=True))
@@ -66,7 +72,7 @@ def written(one: motet.Generated) -> bytes:
     return file.getvalue()
 
 
-def ask(port: int, asked: list[tuple[str, int]], clients: int) -> list[bytes | None]:
+def ask(port: int, asked: list[tuple[str, int]], clients: int, length: float | None) -> list[bytes | None]:
     """The answers to all requests, None for one that is lost; client i asks for every ``clients``-th."""
     answers: list[bytes | None] = [None] * len(asked)
 
@@ -74,7 +80,7 @@ def ask(port: int, asked: list[tuple[str, int]], clients: int) -> list[bytes | N
         connection = http.client.HTTPConnection("127.0.0.1", port)
         for place in range(first, len(asked), clients):
             text, seed = asked[place]
-            connection.request("GET", f"/generate.bvh?text={quote(text)}&seed={seed}")
+            connection.request("GET", f"/generate.bvh?text={quote(text)}&seed={seed}&seconds={length or ''}")
             answer = connection.getresponse()
             content = answer.read()
             answers[place] = content if answer.status == 200 else None
@@ -94,4 +100,4 @@ def processor_time(pid: int) -> float:
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))
+    main(*map(int, sys.argv[1:3]), *map(float, sys.argv[3:]))
