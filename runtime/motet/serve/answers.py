@@ -12,6 +12,7 @@ from motet.models.describe import DescribeModel, Description
 from motet.models.generate import PLAYED, Generated
 from motet.models.generate_codes import CodesModel, Story
 from motet.models.predict import PredictModel
+from motet.motion.feet.treadmill import is_in_place
 from motet.motion.looping import looped
 from motet.motion.motion import Motion
 from motet.motion.skeleton import METRES
@@ -151,19 +152,20 @@ class Answers:
 
     async def describe(self, asked: Asked) -> Answer:
         """What ``motet describe --json`` says of a file."""
-        motion, name = await self._given(asked), asked.files["file"].name
+        motion = await self._given(asked)
+        said = {"input": asked.files["file"].name, "in_place": await _in(self._files, is_in_place, motion)}
         if asked.settings.get("timeline"):
             if asked.some("beams", "draws"):
                 raise RequestError("timeline gives one sentence for each part: it goes with neither beams nor draws")
             parts = await _in(self._models, self._describer.timeline, motion)
-            return _said([{"input": name, **part.to_json()} for part in parts])
+            return _said([{**said, **part.to_json()} for part in parts])
         windows = await _in(self._files, self._describer.windows, motion)
         settings = asked.some("beams", "draws", "seed")
         if settings.get("draws") == 0:  # none drawn: beam search
             settings = {**settings, "draws": None, "decoding": "beam"}
         found = await self._described(frozenset(settings.items()), [window for _, window in windows])
         rows = [
-            {"input": name, "start": start, "stop": start + part.duration, "hypotheses": [one.to_json() for one in row]}
+            {**said, "start": start, "stop": start + part.duration, "hypotheses": [one.to_json() for one in row]}
             for (start, part), row in zip(windows, found, strict=True)
         ]
         return _said(rows)

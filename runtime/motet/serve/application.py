@@ -11,7 +11,7 @@ from typing import Any
 
 from motet.bundle.bundle import Bundle
 from motet.bundle.graph import SessionOptions
-from motet.errors import BundleError, MotetError, OutputError, TextWarning
+from motet.errors import BundleError, MotetError, OutputError, TextWarning, TravelWarning
 from motet.models.base import BundleModel
 from motet.models.describe import DescribeModel
 from motet.models.generate_codes import CodesModel
@@ -69,7 +69,8 @@ def app(
     @asynccontextmanager
     async def running(_: Starlette) -> AsyncIterator[None]:
         with warnings.catch_warnings():  # the answers say what was not understood
-            warnings.simplefilter("ignore", TextWarning)
+            for category in (TextWarning, TravelWarning):
+                warnings.simplefilter("ignore", category)
             yield
         answers.close()
 
