@@ -32,7 +32,8 @@ export const MEASURED = NEEDED.slice(2);
 
 /** The joint that carries legs and back: the hips, or what they hang on where the back is not theirs. */
 export function carrierOf({ joints, spine }: JointMap, skeleton: Skeleton): number {
-  return skeleton.above(joints.hips!).find((joint) => skeleton.under(joint).includes(spine[0]!))!;
+  const above = skeleton.above(spine[0]!);
+  return skeleton.above(joints.hips!).find((joint) => above.includes(joint))!;
 }
 
 /** A table for one way of writing the sides: of each bone the plain names that its joint can have. */

@@ -24,6 +24,7 @@ export interface RestNode {
 /** A tree of joints; y is up. The pose in which no joint turns is called the rest pose. */
 export class Skeleton {
   readonly names: string[];
+  private readonly places: Map<string, number>;
   /** The indices of each joint's children. */
   readonly children: number[][];
   /** Where each joint is at rest, the root at the origin. */
@@ -37,7 +38,8 @@ export class Skeleton {
   ) {
     this.names = joints.map((joint) => joint.name);
     if (!joints.length) throw new MotionError("a skeleton needs at least one joint");
-    if (new Set(this.names).size < joints.length) throw new MotionError("names of joints must be unique");
+    this.places = new Map(this.names.map((name, at) => [name, at]));
+    if (this.places.size < joints.length) throw new MotionError("names of joints must be unique");
     this.children = joints.map(() => []);
     joints.forEach(({ name, parent, offset }, at) => {
       if (at ? !(parent >= 0 && parent < at) : parent !== -1) throw new MotionError(`the joint ${name} must come after its parent`);
@@ -58,8 +60,8 @@ export class Skeleton {
   }
 
   index(name: string): number {
-    const found = this.names.indexOf(name);
-    if (found < 0) throw new MotionError(`the skeleton has no joint ${JSON.stringify(name)}`);
+    const found = this.places.get(name);
+    if (found === undefined) throw new MotionError(`the skeleton has no joint ${JSON.stringify(name)}`);
     return found;
   }
 
