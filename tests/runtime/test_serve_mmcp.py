@@ -1,15 +1,20 @@
 """The MMCP server, by the protocol's own client over HTTP; motions against those of the library."""
 
 import json
+import re
+import sys
 import threading
 import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from command_line import run
 
 import motet
 from motet.motion import HUMANOID, Motion, from_humanoid, global_transforms, rig
@@ -22,18 +27,20 @@ WALK = {"type": "text", "prompt": "a person walks forward", "duration_frames": 6
 QUARTER = [0.0, 0.0, 0.5**0.5, 0.5**0.5]
 """A quarter turn about z."""
 
+PAGE = Path(__file__).parents[2] / "docs/blender.md"
+
 
 @pytest.fixture(scope="module")
 def url() -> Iterator[str]:
-    from motet.serve.mmcp import mmcp_app
+    from motet.serve.application import app
 
-    config = uvicorn.Config(mmcp_app(motet.load("generate"), motet.load("fill")), port=0, log_level="error")
+    config = uvicorn.Config(app(mmcp=True), port=0, log_level="error")
     server = uvicorn.Server(config)
     thread = threading.Thread(target=server.run)
     thread.start()
     while not server.started:
         time.sleep(0.01)
-    yield f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"
+    yield f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}/mmcp"
     server.should_exit = True
     thread.join()
 
@@ -194,6 +201,13 @@ def test_unknown_words_are_noted(url: str, skeleton: Any) -> None:
     assert any(note["code"] == "unknown_words" and "zorbs" in note["message"] for note in notes)
 
 
+def test_a_missing_sdk_is_named_with_the_pip_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("motet.cli.NEEDS", {"mmcp": ("no_such_package",)})
+    refused = run("serve", "--mmcp")
+    assert refused.exit_code == 2
+    assert "--mmcp needs no_such_package: install the extra with  pip install 'motet[mmcp]'" in refused.stderr
+
+
 def key(frame: int = 0, **fields: Any) -> dict[str, Any]:
     return {"type": "pose_keyframe", "frame": frame, "joint_rotations": {"leftUpperArm": QUARTER}, **fields}
 
@@ -264,3 +278,21 @@ def test_skeletons_that_are_turned_or_hold_no_numbers_are_refused(url: str, skel
     for field, value in (("rest_rotation", QUARTER), ("rest_translation", [0, NAN, 0])):
         joints = [*skeleton["joints"][:-1], {**skeleton["joints"][-1], field: value}]
         test_what_cannot_be_answered_is_refused(url, skeleton, {"skeleton": {"joints": joints}}, "invalid_skeleton", "")
+
+
+def test_the_page_s_lines_for_blender(url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What they hand to Blender's importer is the motion that was asked for."""
+    (lines,) = re.findall(r"^```py\n(.*?)^```$", PAGE.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+    imported: list[Motion] = []
+    scene = SimpleNamespace(gltf=lambda filepath: imported.append(motet.read(filepath)))
+    monkeypatch.setitem(sys.modules, "bpy", SimpleNamespace(ops=SimpleNamespace(import_scene=scene)))
+    monkeypatch.chdir(tmp_path)
+    exec(lines.replace("http://localhost:8000/mmcp", url), {})
+    (motion,) = imported
+    assert len(motion) == 150
+    turned, found = global_transforms(motion)
+    np.testing.assert_allclose(found[0, 0, [0, 2]], [1.0, 0.0], atol=1e-4)
+    assert motion.skeleton
+    shoulder, upper, lower = map(motion.skeleton.index, ("leftShoulder", "leftUpperArm", "leftLowerArm"))
+    arm = turned[120, shoulder].T @ (found[120, lower] - found[120, upper])
+    np.testing.assert_allclose(arm / np.linalg.norm(arm), [0, 1, 0], atol=1e-3)

@@ -40,6 +40,7 @@ COMMANDS = {
 NEEDS = {
     "live": ("websockets", "pythonosc"),
     "serve": ("starlette", "uvicorn", "python_multipart", "websockets"),
+    "mmcp": ("motionmcp", "fastapi"),
     "train": ("torch", "tqdm"),
     "evaluate": ("torch", "tqdm", "matplotlib", "sklearn", "sacrebleu"),
     "export": ("torch", "tqdm", "onnx", "onnxscript"),

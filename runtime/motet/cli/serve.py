@@ -3,6 +3,7 @@
 import click
 
 from motet.bundle.graph import SessionOptions
+from motet.cli import missing
 from motet.cli.options import session_options
 
 
@@ -27,6 +28,7 @@ from motet.cli.options import session_options
 @click.option(
     "--requests", type=click.IntRange(1, 10_000), default=256, show_default=True, help="Answered or waiting at once."
 )
+@click.option("--mmcp", is_flag=True, help="Speak the Motion Model Context Protocol, too, at /mmcp: for Blender.")
 @session_options
 def serve(
     port: int,
@@ -37,6 +39,7 @@ def serve(
     max_seconds: float,
     timeout: float,
     requests: int,
+    mmcp: bool,
     session: SessionOptions,
 ) -> None:
     """Serve models over HTTP: sentences to motions, motion files to sentences and to their continuations.
@@ -49,8 +52,10 @@ def serve(
     from motet.serve.application import app, run
     from motet.serve.limits import Limits
 
+    if mmcp and (lacking := missing("mmcp")):
+        raise click.UsageError(f"--mmcp needs {', '.join(lacking)}: install the extra with  pip install 'motet[mmcp]'")
     limits = Limits(body_bytes=max_megabytes << 20, motion_seconds=max_seconds, seconds=timeout, requests=requests)
-    application = app(bundles, origins=origins, limits=limits, session=session)
+    application = app(bundles, origins=origins, limits=limits, session=session, mmcp=mmcp)
     shown = f"[{host}]" if ":" in host else host
     run(
         application,

@@ -14,6 +14,7 @@ from motet.bundle.graph import SessionOptions
 from motet.errors import BundleError, MotetError, OutputError, TextWarning, TravelWarning
 from motet.models.base import BundleModel
 from motet.models.describe import DescribeModel
+from motet.models.fill import FillModel
 from motet.models.generate_codes import CodesModel
 from motet.models.load import load_as
 from motet.models.predict import PredictModel
@@ -27,7 +28,7 @@ try:
     from starlette.exceptions import HTTPException
     from starlette.middleware import Middleware
     from starlette.middleware.cors import CORSMiddleware
-    from starlette.routing import WebSocketRoute
+    from starlette.routing import Mount, WebSocketRoute
 except ImportError as error:
     remedy = "install the extra with  pip install 'motet[serve]'"
     raise ImportError(f"motet.serve.application needs {error.name}: {remedy}") from error
@@ -53,17 +54,21 @@ def app(
     origins: Sequence[str] = (),
     limits: Limits | None = None,
     session: SessionOptions | None = None,
+    mmcp: bool = False,
 ) -> Starlette:
     """The ASGI application of ``motet serve``, for any server: ``uvicorn --factory motet.serve.application:app``.
 
     bundles: names or paths of bundles that take the place of "generate", "describe", "predict" and "control".
     origins: of web pages that may call it (CORS) and steer figures. limits: by default those of :class:`Limits`.
-    session: how graphs run. BundleError for a bundle that cannot be used.
+    session: how graphs run. mmcp: speak the Motion Model Context Protocol, too, at /mmcp (:mod:`motet.serve.mmcp`).
+    BundleError for a bundle that cannot be used; ImportError with the remedy where the extra mmcp is missing.
     """
-    named = {verb: verb for verb in KINDS} | {Bundle.open(name).manifest.verb: name for name in bundles}
-    if others := sorted(named.keys() - KINDS.keys()):
-        raise BundleError(f"bundle {named[others[0]]} is for {others[0]!r}; a server takes {', '.join(KINDS)}")
-    models: dict[str, Any] = {verb: load_as(kind, named[verb], session) for verb, kind in KINDS.items()}
+    kinds = KINDS | ({"fill": FillModel} if mmcp else {})
+    named = {verb: verb for verb in kinds} | {Bundle.open(name).manifest.verb: name for name in bundles}
+    if others := sorted(named.keys() - kinds.keys()):
+        raise BundleError(f"bundle {named[others[0]]} is for {others[0]!r}; a server takes {', '.join(kinds)}")
+    models: dict[str, Any] = {verb: load_as(kind, named[verb], session) for verb, kind in kinds.items()}
+    doors = _mmcp(models["generate"], models.pop("fill")) if mmcp else []
     steer, answers = models.pop("control"), Answers(**models, limits=limits or Limits())
 
     @asynccontextmanager
@@ -76,11 +81,17 @@ def app(
 
     cors = Middleware(CORSMiddleware, allow_origins=origins, allow_methods=["*"], expose_headers=[UNDERSTOOD])
     return Starlette(
-        routes=[*routes(answers, version("motet")), WebSocketRoute("/live", LiveDoor(steer, origins).open)],
+        routes=[*routes(answers, version("motet")), WebSocketRoute("/live", LiveDoor(steer, origins).open), *doors],
         middleware=[*([cors] if origins else []), Middleware(Gate, limits=answers.limits)],
         exception_handlers={MotetError: fault, HTTPException: refused, Exception: broken},
         lifespan=running,
     )
+
+
+def _mmcp(model: CodesModel, fill: FillModel) -> list[Mount]:
+    from motet.serve.mmcp import mmcp_app
+
+    return [Mount("/mmcp", mmcp_app(model, fill))]
 
 
 def run(
