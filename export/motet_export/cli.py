@@ -9,8 +9,10 @@ import click
 from motet.bundle.bundle import Bundle
 from motet.bundle.graph import SessionOptions
 from motet.cli.options import session_options
+from motet.files import new_folder
 from motet.models.load import KINDS
 from motet_export.bundles import export_run, halve_bundle, parity_of
+from motet_export.restored import restored
 from motet_train.runs import MANIFEST, Run
 
 
@@ -21,12 +23,18 @@ from motet_train.runs import MANIFEST, Run
 )
 @click.option("--int8", is_flag=True, help="8-bit weights: a quarter of the size; reports changes.")
 @click.option("--half", is_flag=True, help="16-bit weights, computed with in 32 bits: half the size.")
-def export(run: Path, out: Path, int8: bool, half: bool) -> None:
+@click.option("--back", is_flag=True, help="RUN is a bundle: write a training run with its weights, to train on from.")
+def export(run: Path, out: Path, int8: bool, half: bool, back: bool) -> None:
     """Export the training run RUN to ONNX as a bundle, if ONNX Runtime computes what torch does.
 
     RUN may be the folder that `motet train all` wrote: then OUT gets a bundle of each run that is a model by itself.
     With --half, RUN may be a bundle, too: it is written anew with its weights rounded.
     """
+    if back:
+        with new_folder(out) as folder:
+            restored(Bundle.open(run)).save(folder)
+        click.echo(str(out))
+        return
     if half and run.suffix == ".zip":
         for name, value in halve_bundle(Bundle.open(run), out).items():
             click.echo(f"half {name:<20} {value:.3g}")

@@ -1,6 +1,7 @@
 """The shipped model that writes motions as codes, as a user has it: lengths, stories, streams, what it knows."""
 
 import json
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -263,3 +264,27 @@ def test_a_loop_of_an_action_moves(model: CodesModel, seed: int) -> None:
     whole, loop = (np.diff(positions(one), axis=0) for one in (jacks.motion, looped(jacks.motion)))
     energy = [float((steps**2).sum(axis=-1).mean()) for steps in (whole, loop)]
     assert energy[1] > 0.5 * energy[0]
+
+
+def test_the_action_taken_is_told(model: CodesModel, tmp_path: Path) -> None:
+    with pytest.warns(
+        TextWarning, match="nothing of 'circle' in what 'a person walks in a circle' is taken for"
+    ) as said:
+        (circle,) = model.generate("a person walks in a circle")
+    assert {one.filename for one in said} == {__file__}
+    assert circle.lacking == ("circle",)
+    action = next(e for e in model.manifest.source["actions"] if e["sentence"] == circle.action)
+    assert "circle" not in action["words"]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        (walk,) = model.generate(WALK)
+        story = model.story([WALK, JUMP])
+    assert (walk.lacking, story.lacking, story.action) == ((), (), "")
+    assert [one.action for one in story.passages] == [walk.action, story.passages[1].action]
+    with pytest.warns(TextWarning, match="nothing of 'circle'"):
+        next(model.stream("a person walks in a circle"))
+    result = run("generate", "a person walks in a circle", "-o", tmp_path / "a.npz", "--json")
+    (row,) = json.loads(result.stdout)
+    assert [row["hypotheses"][0][key] for key in ("action", "lacking")] == [circle.action, ["circle"]]
+    assert "nothing of 'circle'" in result.stderr
+    assert f"as: {walk.action}" in run("generate", WALK, "-o", tmp_path / "b.npz").stdout

@@ -236,7 +236,8 @@ def _written(
         motion = output.write(place, looped(motion) if loop else motion, text)
         facts = {"frames": len(motion), "fps": motion.fps, "seconds": motion.duration}
         passages = {"passages": list(map(asdict, result.passages))} if isinstance(result, Story) else {}
-        found.append({"output": str(place), "log_likelihood": result.log_likelihood, **facts, **passages})
+        told = {"action": result.action or None, "lacking": list(result.lacking)}
+        found.append({"output": str(place), "log_likelihood": result.log_likelihood, **facts, **told, **passages})
     return {"input": text, "hypotheses": found}
 
 
@@ -246,5 +247,8 @@ def _lines(rows: list[dict[str, Any]]) -> Iterator[str]:
             likelihood = found["log_likelihood"]
             score = "" if likelihood is None else f", log-likelihood {likelihood:.1f}"
             yield f"{found['output']}: {size(found['frames'], found['fps'])}{score}: {row['input']}"
+            if found["action"]:
+                yield f"  as: {found['action']}"
             for passage in found.get("passages", ()):
-                yield f"  {passage['start']:.1f}-{passage['stop']:.1f} s {passage['text']}"
+                shown = "" if found["action"] else f" (as: {passage['action']})"
+                yield f"  {passage['start']:.1f}-{passage['stop']:.1f} s {passage['text']}{shown}"

@@ -81,11 +81,12 @@ def two_rows(indices: Ids) -> Ids:
 class Sample(NamedTuple):
     """A finished sequence: its frames (T, D), which loops give normalised, and the sum of its steps' log-likelihoods.
 
-    None where a loop has no likelihoods.
+    None where a loop has no likelihoods. action: the number of the one that it shows, where a loop knows actions.
     """
 
     frames: NDArray[Any]
     log_likelihood: float | None
+    action: int | None = None
 
 
 class Noise(Protocol):

@@ -62,6 +62,8 @@ class Generated:
     log_likelihood: of the normalised frames as drawn and of their end, like :meth:`GenerateModel.score`;
         None where the model's loop has no likelihoods.
     after: the motion that it continues; without one it starts at the origin.
+    action: a sentence of the action that it shows, "" where a model knows none, or several are shown.
+    lacking: known words of its sentence that no sentence of that action has.
     """
 
     contract: MotionContract
@@ -69,6 +71,8 @@ class Generated:
     log_likelihood: float | None
     unknown: tuple[str, ...] = ()
     after: Motion | None = None
+    action: str = ""
+    lacking: tuple[str, ...] = ()
 
     @cached_property
     def features(self) -> Motion:
@@ -170,8 +174,12 @@ class GenerateModel(LanguageModel):
         for start in range(0, len(texts), self.loop.batch):
             batch = slice(start, start + self.loop.batch)
             for text, row in zip(texts[batch], self.decode(contexts[batch], noise[batch], chosen), strict=True):
-                unknown = tuple(self.unknown(text))
-                yield [Generated(self.contract, one.frames, one.log_likelihood, unknown) for one in row]
+                yield self.results(text, row)
+
+    def results(self, sentence: str, samples: Sequence[Sample]) -> list[Generated]:
+        """What was drawn for a sentence; a TextWarning where it shows less than was asked."""
+        unknown = tuple(self.unknown(sentence))
+        return [Generated(self.contract, one.frames, one.log_likelihood, unknown) for one in samples]
 
     def parts(self, sentence: str) -> list[str]:
         """What a sentence asks for one after another: itself alone, where the model knows it as one thing."""

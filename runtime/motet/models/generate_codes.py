@@ -2,8 +2,8 @@
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import accumulate
 from typing import Annotated, Any, ClassVar, Literal, Unpack, cast, get_args
 
@@ -43,11 +43,14 @@ class StorySettings(LoopSettings, total=False):
 
 @dataclass(frozen=True)
 class Passage:
-    """A sentence of a story, shown from ``start`` to ``stop`` in seconds."""
+    """A sentence of a story, shown from ``start`` to ``stop`` in seconds; ``action`` and ``lacking`` as for
+    :class:`motet.models.generate.Generated`."""
 
     text: str
     start: float
     stop: float
+    action: str = ""
+    lacking: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -149,11 +152,11 @@ class CodesModel(GenerateModel):
             found += parts if len(parts) > 1 and self.lacking(one) else [one]
         return found if len(found) > 1 else [sentence]
 
-    def lacking(self, sentence: str) -> list[str]:
-        """The known words of a sentence, but for function words, of which no sentence of the likeliest action has any
-        form."""
+    def lacking(self, sentence: str, action: int | None = None) -> list[str]:
+        """The known words of a sentence, but for function words, of which no sentence of an action has any form, by
+        default of the likeliest."""
         ids, _ = self.vocabulary.encode(sentence)
-        have = self._stems[int(self.contexts([ids])[0].argmax())]
+        have = self._stems[int(self.contexts([ids])[0].argmax()) if action is None else action]
         words = {self.vocabulary.words[one] for one in ids.tolist()} - FUNCTION_WORDS - set(SPECIALS)
         return sorted(word for word in words if stem(word) not in have)
 
@@ -191,6 +194,20 @@ class CodesModel(GenerateModel):
             raise TextError(said)
         warn(said, TextWarning)
 
+    def results(self, sentence: str, samples: Sequence[Sample]) -> list[Generated]:
+        """See :meth:`GenerateModel.results`."""
+        told = {action: self._shown(sentence, action) for one in samples if (action := one.action) is not None}
+        found = zip(super().results(sentence, samples), samples, strict=True)
+        return [replace(one, action=told[own][0], lacking=told[own][1]) for one, (*_, own) in found if own is not None]
+
+    def _shown(self, sentence: str, action: int) -> tuple[str, tuple[str, ...]]:
+        """A sentence of the action taken for a sentence, and the words that it lacks, of which a TextWarning says."""
+        taken, lacking = self._sentences[action], tuple(self.lacking(sentence, action))
+        if lacking:
+            words = ", ".join(f"'{word}'" for word in lacking)
+            warn(f"nothing of {words} in what {sentence!r} is taken for: {taken!r}", TextWarning)
+        return taken, lacking
+
     def decode(self, contexts: Floats, noise: Sequence[Noise], settings: Mapping[str, Any]) -> list[list[Sample]]:
         """See :meth:`GenerateModel.decode`."""
         count, seconds = settings["hypotheses"], settings["seconds"]
@@ -200,7 +217,8 @@ class CodesModel(GenerateModel):
         writer = Writer(self.source, each, CodesSettings(**settings))
         found = draw_codes(writer, actions, longest, exactly=seconds > 0)
         last = max(1, round(seconds * self.fps)) if seconds else None
-        samples = [Sample(self.codec.frames_of(codes)[:last], None) for codes in found]
+        frames = [self.codec.frames_of(codes)[:last] for codes in found]
+        samples = [Sample(one, None, action) for one, action in zip(frames, actions.tolist(), strict=True)]
         return [samples[start : start + count] for start in range(0, len(samples), count)]
 
     def story(self, sentences: str | Sequence[str], **settings: Unpack[StorySettings]) -> Story:
@@ -213,15 +231,17 @@ class CodesModel(GenerateModel):
         DecodingError for seconds, a seed or a setting out of range, and for several ``hypotheses``; MotionError for a
         motion that is too short to continue or not of a human figure; TextError like :meth:`generate`.
         """
-        texts, after, drawn = self._told(sentences, **settings)
+        texts, after, actions, drawn = self._told(sentences, **settings)
         pieces = list(drawn)
         frames = np.concatenate([found for _, found in pieces])
         steps = Counter(number for number, _ in pieces[:-1])
         shown = accumulate(steps[number] * self.codec.field.hop for number in range(len(texts)))
         stops = [min(stop, len(frames)) / self.fps for stop in shown]
-        passages = tuple(map(Passage, texts, [0.0, *stops], stops))
+        passages = tuple(map(Passage, texts, [0.0, *stops], stops, *zip(*actions, strict=True)))
         unknown = tuple(word for text in texts for word in self.unknown(text))
-        return Story(self.contract, frames, None, unknown, after, passages)
+        lacking = tuple(word for one in passages for word in one.lacking)
+        action = passages[0].action if len(passages) == 1 else ""
+        return Story(self.contract, frames, None, unknown, after, action, lacking, passages)
 
     def stream(self, sentences: str | Sequence[str], **settings: Unpack[StorySettings]) -> Iterator[Motion]:
         """The motion of :meth:`story` in pieces, as they are drawn: each continues the last one.
@@ -229,7 +249,7 @@ class CodesModel(GenerateModel):
         Feet are as drawn, since planting them requires knowing how long they stand. Memory and the time of a piece stay
         constant, however long the stream lasts. Errors like :meth:`story`.
         """
-        _, after, drawn = self._told(sentences, **settings)  # what cannot be told is refused before the first piece
+        _, after, _, drawn = self._told(sentences, **settings)  # what cannot be told is refused before the first piece
 
         def pieces() -> Iterator[Motion]:
             last, pose = after, None
@@ -251,9 +271,9 @@ class CodesModel(GenerateModel):
         strict: bool = False,
         whole: bool = False,
         **settings: Unpack[LoopSettings],
-    ) -> tuple[list[str], Motion | None, Iterator[tuple[int, Array]]]:
+    ) -> tuple[list[str], Motion | None, list[tuple[str, tuple[str, ...]]], Iterator[tuple[int, Array]]]:
         """The sentences of a story with those of standing, the motion on the model's figure that it continues, and its
-        pieces as they are drawn."""
+        pieces as they are drawn; with them comes for each sentence what it is taken for, and what that lacks."""
         texts = [sentences] if isinstance(sentences, str) else list(sentences)
         drawn = cast(Mapping[str, float | None], settings)
         if not texts:
@@ -275,25 +295,29 @@ class CodesModel(GenerateModel):
                 each.insert(place, 0.8)
         contexts, noise, chosen = self.asked(texts, 1, seed, strict, drawn)
         figure = None if after is None else self.contract.on_figure(self.at_own_rate(after))
-        return texts, figure, self._pieces(figure, contexts, each, noise, chosen)
+        actions: list[tuple[str, tuple[str, ...]]] = []
+        asked = zip(texts, contexts, each, strict=True)
+        return texts, figure, actions, self._pieces(figure, asked, noise, chosen, actions)
 
     def _pieces(
         self,
         after: Motion | None,
-        contexts: Floats,
-        seconds: Sequence[float],
+        asked: Iterable[tuple[str, Floats, float]],
         noise: Sequence[Noise],
         settings: Mapping[str, Any],
+        actions: list[tuple[str, tuple[str, ...]]],
     ) -> Iterator[tuple[int, Array]]:
         """For each step of codes, the number of its sentence and the frames (T, D) that become final with it; then the
-        remaining frames. seconds: of each sentence, 0 where it ends by itself."""
+        remaining frames. asked: sentences with their contexts and seconds, 0 where one ends by itself. actions: what
+        :meth:`_shown` says of each sentence is added."""
         context = None if after is None else self.context(after)
         writer, decoder = Writer(self.source, noise, CodesSettings(**settings)), self.decoder(context)
         if context is not None:
             writer.see(context.codes)
         done, given, end, limit = 0, 0, 0.0, None
-        for number, (told, length) in enumerate(zip(contexts, seconds, strict=True)):
+        for number, (text, told, length) in enumerate(asked):
             action = drawn_actions(self.source, told[None], noise, settings["certainty"])
+            actions.append(self._shown(text, int(action[0])))
             end += length
             longest = self.codec.steps(end) - done if length else self.codec.steps(settings["max_seconds"])
             limit = max(1, round(end * self.fps)) if length else None

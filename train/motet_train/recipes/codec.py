@@ -17,6 +17,7 @@ from motet_train.data.store import Store, split
 from motet_train.descent import GradientLearner, Term, Terms
 from motet_train.models.codec import CodecConfig, MotionCodec, places_in_world
 from motet_train.models.kinematics import joint_weights, tree_of
+from motet_train.models.motion_codes import MotionCodes
 from motet_train.recipes.recipe import MUON, Job, Recipe
 from motet_train.runs import Run
 
@@ -87,11 +88,14 @@ def train_codec(store: Store, job: Job, data: str = "", by: str = "trial", start
 
 
 def _settled(start: Run) -> MotionCodec:
-    """A codec of which only the decoder is trained; DataError where the run is not one of a codec."""
-    if not isinstance(start.model, MotionCodec):
+    """A codec, or that of a model that writes its codes, of which only the decoder is trained; DataError where the run
+    has none."""
+    found = start.model.codec if isinstance(start.model, MotionCodes) else start.model
+    if not isinstance(found, MotionCodec):
         raise DataError(f"a decoder is that of a codec (motet train codec), not of {start.manifest['model']}")
-    start.model.encoder.requires_grad_(False)
-    return start.model
+    found.decoder.requires_grad_(True)
+    found.encoder.requires_grad_(False)
+    return found
 
 
 def fit_book(poses: list[Array], hop: int, size: int, seed: int) -> Array:

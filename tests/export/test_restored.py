@@ -1,0 +1,37 @@
+"""A bundle as the training run that it came from: every weight is found again, whatever the exporter made of it."""
+
+from pathlib import Path
+
+import pytest
+import torch
+from test_codes_export import run
+
+from motet.bundle.bundle import Bundle
+from motet_export.bundles import export_run, parity_of
+from motet_export.exporter import ExportError, round_weights
+from motet_export.restored import restored
+
+NEW = ("writer.masked", "num_batches_tracked")
+"""What only training uses."""
+
+
+@pytest.mark.parametrize("half", [False, True])
+def test_every_weight_is_found_again(tmp_path: Path, half: bool) -> None:
+    given = run()
+    export_run(given, tmp_path / "codes.zip", half=half)
+    bundle = Bundle.open(tmp_path / "codes.zip")
+    found = restored(bundle)
+    assert found.manifest["training"] == given.manifest["training"]
+    if half:
+        round_weights(given.model)
+    state = found.model.state_dict()
+    for name, value in given.model.state_dict().items():
+        if not name.endswith(NEW):
+            torch.testing.assert_close(state[name], value, rtol=0, atol=0, msg=name)
+    parity_of(found, bundle)
+
+
+def test_8_bit_weights_are_not_those_that_were_trained(tmp_path: Path) -> None:
+    export_run(run(), tmp_path / "codes.zip", int8=True)
+    with pytest.raises(ExportError, match="8-bit weights"):
+        restored(Bundle.open(tmp_path / "codes.zip"))
