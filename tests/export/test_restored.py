@@ -18,6 +18,11 @@ NEW = ("writer.masked", "num_batches_tracked")
 @pytest.mark.parametrize("half", [False, True])
 def test_every_weight_is_found_again(tmp_path: Path, half: bool) -> None:
     given = run()
+    torch.manual_seed(0)
+    with torch.no_grad():
+        for name, value in given.model.state_dict().items():  # equal tensors, as in new norms, are exported once
+            if name in dict(given.model.named_parameters()) or "running" in name:
+                value += 0.1 * torch.rand_like(value)
     export_run(given, tmp_path / "codes.zip", half=half)
     bundle = Bundle.open(tmp_path / "codes.zip")
     found = restored(bundle)

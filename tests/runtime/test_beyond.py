@@ -214,6 +214,7 @@ def test_the_command_line_gives_what_python_gives(tmp_path: Path, clips: Path, w
     outs = [str(tmp_path / f"a-{number}.npz") for number in (1, 2)]
     assert row == {
         "input": str(clips / "39_14.amc"),
+        "in_place": False,
         "fps": 30.0,
         "frames": 30,
         "seconds": 1.0,

@@ -18,6 +18,7 @@ def test_reading_loading_and_resampling_are_logged(clips: Path, caplog: pytest.L
     assert lines[0][1].endswith("describe.zip for describe on CPUExecutionProvider")
     assert lines[1:] == [
         ("DEBUG", f"read {clips / '39_14.amc'}: {motion!r}"),
+        ("DEBUG", f"resampling {motion!r} to 30 fps"),  # to see whether it walks in place
         ("DEBUG", f"resampling {motion!r} to 10 fps"),
         ("INFO", "brought to the humanoid: joints of CMU and HDM05, ASF/AMC, confidence 1.00"),
     ]

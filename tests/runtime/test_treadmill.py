@@ -126,8 +126,8 @@ def lying(motion: Motion) -> Motion:
 def test_what_is_no_walk(recorded: Motion) -> None:
     still = in_place(recorded)
     assert not is_in_place(lying(still))
-    for frames in (0, 1, 2, 3, round(0.2 * still.fps)):
-        assert not is_in_place(still[:frames]) or frames > 3
+    for frames in (0, 1, 2, 3):
+        assert not is_in_place(still[:frames])
     t_pose = replace(still, values=np.zeros_like(still.values))
     assert not is_in_place(t_pose)
     angles = still.select(tuple(name for name in still.channels if name[-2] != "t"))

@@ -23,9 +23,10 @@ from motet.motion.looping import looped
 
 
 @click.command(
-    help=f"""Describe motion files: sentences, the best first, each with the probability that it is right, or, with
-    --draws, with how well it agrees with all sentences drawn (0 to 1). A sentence after "?" is one that the model is
-    not sure of; of a motion like none that is known it says "{NOTHING}".
+    help=f"""Describe motion files: sentences, the best first, each with its log-probability or, from a bundle of known
+    motions, the probability that it is right; with --draws, with how well it agrees with all sentences drawn (0 to 1).
+    A sentence after "?" is one that the model is not sure of; a bundle of known motions says "{NOTHING}" of a motion
+    like none of them.
 
     All files are described in one batch, motions over 30 s in windows; with --timeline, motions of any length are cut
     where what is done changes. Any human figure will do. Of a file of several clips all are described, or the one of
