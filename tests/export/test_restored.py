@@ -22,7 +22,7 @@ def test_every_weight_is_found_again(tmp_path: Path, half: bool) -> None:
     with torch.no_grad():
         for name, value in given.model.state_dict().items():  # equal tensors, as in new norms, are exported once
             if name in dict(given.model.named_parameters()) or "running" in name:
-                value += 0.1 * torch.rand_like(value)
+                value.add_(0.1 * torch.rand_like(value))
     export_run(given, tmp_path / "codes.zip", half=half)
     bundle = Bundle.open(tmp_path / "codes.zip")
     found = restored(bundle)
