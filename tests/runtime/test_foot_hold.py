@@ -6,10 +6,12 @@ import pytest
 from motet.errors import MotionError
 from motet.formats import read_motion
 from motet.motion import HUMANOID, global_transforms, hold_feet, positions, to_humanoid
-from motet.motion.feet.hold import HoldSettings, Leg
+from motet.motion.feet.hold import HoldSettings
+from motet.motion.feet.leg import Leg
 from motet.motion.humanoid.bones import LEFT_RIGHT, LEG, ground_under, sole_points
 from motet.motion.motion import Motion
-from motet.motion.rotations import euler_to_rotmat
+from motet.motion.parts import parts
+from motet.motion.rotations import euler_to_rotmat, quat_to_rotmat
 from motet.motion.skeleton import Joint, Skeleton
 
 BALLS = [HUMANOID.index(side + "Toes") for side in LEFT_RIGHT]
@@ -184,24 +186,25 @@ def legs(rng, count):
     thigh = turned @ np.array([0.05, -0.4, 0.02])
     shin = turned @ euler_to_rotmat(rng.uniform([0.1, -0.1, -0.1], [2, 0.1, 0.1], (count, 3)), "xzy")
     knee = hip + thigh
-    return Leg(hip, knee, knee + shin @ np.array([0.01, -0.45, 0.0]), shin[..., 0]), along
+    return [hip, knee, knee + shin @ np.array([0.01, -0.45, 0.0]), shin[..., 0]], along
 
 
 def test_ankles_come_to_where_they_shall_and_bones_keep_their_lengths():
-    leg, along = legs(np.random.default_rng(0), 500)
-    away = leg.ankle - leg.hip + 0.05 * along / np.linalg.norm(along, axis=-1, keepdims=True)
+    places, along = legs(np.random.default_rng(0), 500)
+    (hip, knee, ankle, _), leg = places, Leg(*map(parts, places))
+    away = ankle - hip + 0.05 * along / np.linalg.norm(along, axis=-1, keepdims=True)
     length = np.linalg.norm(away, axis=-1, keepdims=True)
-    target = leg.hip + away * np.clip(length, 0.3, 0.8) / length
-    thigh, shin = leg.turns(target)
-    knee = leg.hip + np.einsum("tij,tj->ti", thigh, leg.knee - leg.hip)
-    ankle = knee + np.einsum("tij,tj->ti", shin, leg.ankle - leg.knee)
-    np.testing.assert_allclose(ankle, target, atol=1e-9)
+    target = hip + away * np.clip(length, 0.3, 0.8) / length
+    thigh, shin = (quat_to_rotmat(np.stack(turn, axis=-1)) for turn in leg.turns(parts(target)))
+    reached = hip + np.einsum("tij,tj->ti", thigh, knee - hip) + np.einsum("tij,tj->ti", shin, ankle - knee)
+    np.testing.assert_allclose(reached, target, atol=1e-9)
     for turn in (thigh, shin):
         np.testing.assert_allclose(turn @ np.swapaxes(turn, 1, 2), np.tile(np.eye(3), (500, 1, 1)), atol=1e-12)
     # seen from the thigh the shin turns about the knee's axis, square to the thigh
     relative = np.swapaxes(thigh, 1, 2) @ shin
-    np.testing.assert_allclose(np.einsum("tij,tj->ti", relative, leg._axis), leg._axis, atol=1e-9)
-    assert np.abs((leg._axis * (leg.knee - leg.hip)).sum(-1)).max() < 1e-12
+    axis = np.stack(leg._axis, axis=-1)
+    np.testing.assert_allclose(np.einsum("tij,tj->ti", relative, axis), axis, atol=1e-9)
+    assert np.abs((axis * (knee - hip)).sum(-1)).max() < 1e-12
 
 
 def test_a_leg_eases_into_and_out_of_full_length():
@@ -210,16 +213,15 @@ def test_a_leg_eases_into_and_out_of_full_length():
     zero = np.zeros((len(wanted), 3))
     for bend in (0.0, 5.0, 20.0):
         upper, lower = (0.42 * np.array([0, -np.cos(a), np.sin(a)]) for a in np.radians([bend / 2, -bend / 2]))
-        leg = Leg(zero, zero + upper, zero + upper + lower, zero + np.array([1.0, 0, 0]))
-        eased = leg.eased(zero + np.outer(wanted, [0, -1.0, 0]))
-        length = -eased[:, 1]
+        leg = Leg(*(parts(zero + place) for place in (0, upper, upper + lower, [1.0, 0, 0])))
+        length = -leg.eased(parts(np.outer(wanted, [0, -1.0, 0])))[1]
         now = np.linalg.norm(upper + lower)
         assert length.max() <= (now + 0.84) / 2 + 1e-9
         assert (np.sign(length - now) == np.sign(wanted - now))[np.abs(wanted - now) > 1e-6].mean() > 0.5
         assert np.abs(length - wanted)[wanted < now].max() < 0.012
         angle = 2 * np.degrees(np.arccos(np.minimum(length / 0.84, 1)))
         assert np.abs(np.diff(angle)).max() < 2
-    np.testing.assert_allclose(leg.eased(leg.ankle), leg.ankle, atol=1e-12)
+        np.testing.assert_allclose(leg.eased(leg.ankle), leg.ankle, atol=1e-12)
 
 
 @pytest.mark.parametrize("frames", [0, 1, 2, 3])

@@ -19,7 +19,7 @@ from motet.errors import BundleError, ControlError
 from motet.files import File, place_of, write_whole
 from motet.models.steer import FEATURE_STEPS, SteerModel
 from motet.motion.feet import lock as foot_lock
-from motet.motion.feet.hold import Leg
+from motet.motion.feet.leg import Leg
 from motet.motion.humanoid import BONES, HUMANOID
 from motet.settings import checked_int
 
@@ -71,7 +71,7 @@ def net_data(model: SteerModel) -> dict[str, Any]:
                 {"joints": [HUMANOID.index(BONES[bone]) for bone in leg], "bones": leg}
                 for leg in foot_lock.LEG_BONES.tolist()
             ],
-            "soles": list(zip(foot_lock.CARRIERS, foot_lock.POINTS.tolist(), strict=True)),
+            "soles": foot_lock.POINTS,
             "knee": {"shortest": Leg.SHORTEST, "share": Leg.EASED_SHARE, "gives": list(Leg.GIVES)},
             "lock": asdict(model.settings(foot_lock.FootLockSettings)),
         },

@@ -4,7 +4,7 @@ A foot stands while its heel, ball or toe tip is low and slow. The contact of ea
 movement over the ground is removed from the foot: the heel's after landing, that of all three while the sole is flat,
 the ball's and toes' as the foot rolls off. The removed movement adds up to a shift of the foot; over a stance its
 median is 0, so the foot stands where it stood on average. Before and after, the shift blends in and out smoothly. Hip,
-knee and ankle follow by two-bone inverse kinematics (:class:`Leg`).
+knee and ankle follow by two-bone inverse kinematics (:class:`motet.motion.feet.leg.Leg`).
 """
 
 from dataclasses import dataclass, replace
@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 
 from motet.errors import MotionError
 from motet.motion.feet.contacts import SOLES, ContactSettings, contacts_of, rise, smoothed
+from motet.motion.feet.leg import Leg
 from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, LEG, Figure, ground_under, leg_length, sided, sole_points
 from motet.motion.kinematics import AXES, global_transforms, posed, skeleton_of, with_channels
 from motet.motion.motion import Motion
-from motet.motion.rotations import Array, inverse, product, rotated, rotvec_to_rotmat, swing, unit
+from motet.motion.parts import Quaternion, Vector, parts
+from motet.motion.rotations import Array, inverse, product, quat_to_rotmat, rotated
 
 
 @dataclass(frozen=True)
@@ -65,8 +67,8 @@ def hold_feet(
     turned = np.array(rotations)
     for (joints, hinge), points in zip(legs, np.split(soles, 2, axis=1), strict=True):
         hip, knee, ankle = (places[:, i] * scale for i in joints)
-        leg = Leg(hip, knee, ankle, rotated(rotations[:, joints[1]], hinge))
-        turns = leg.turns(_target(leg, points, motion.fps, settings))
+        leg = Leg(*map(parts, (hip, knee, ankle, rotated(rotations[:, joints[1]], hinge))))
+        turns = map(_matrices, leg.turns(_target(leg, points, motion.fps, settings)))
         for i, turn in zip(joints, (*turns, np.eye(3)), strict=True):
             hanging = list(skeleton.subtree(skeleton.names[i]))
             turned[:, hanging] = product(turn[..., None, :, :], rotations[:, hanging])
@@ -108,12 +110,16 @@ def _measured(
     return [(joints, fitted.aligned[joints[1]][:, 0]) for joints in sides], scale, soles
 
 
-def _target(leg: "Leg", points: Array, fps: float, settings: HoldSettings) -> Array:
-    """The ankle's target (T, 3), from points (T, K, 3) of the sole over ground at 0."""
-    target = leg.eased(leg.ankle + np.insert(_shift(points, fps, settings), 1, 0.0, axis=1))
-    depth = -(points[..., 1].min(axis=1) + target[:, 1] - leg.ankle[:, 1])
-    target[:, 1] += np.minimum(lift(depth, settings.soft * fps), settings.farthest)
-    return target
+def _target(leg: Leg, points: Array, fps: float, settings: HoldSettings) -> Vector:
+    """The ankle's target in T frames, from points (T, K, 3) of the sole over ground at 0."""
+    (shift_x, shift_z), (x, y, z) = _shift(points, fps, settings).T, leg.ankle
+    to_x, to_y, to_z = leg.eased((x + shift_x, y, z + shift_z))
+    depth = -(points[..., 1].min(axis=1) + to_y - y)
+    return to_x, to_y + np.minimum(lift(depth, settings.soft * fps), settings.farthest), to_z
+
+
+def _matrices(quats: Quaternion) -> Array:
+    return quat_to_rotmat(np.stack(quats, axis=-1))
 
 
 def _shift(points: Array, fps: float, settings: HoldSettings) -> Array:
@@ -174,66 +180,3 @@ def lift(depth: Array, soft: float) -> Array:
 def windows(values: Array, reach: int) -> Array:
     """Values (T,) with ``reach`` before and as many after each, (T, 2 reach + 1); those at the ends go on."""
     return np.lib.stride_tricks.sliding_window_view(np.pad(values, reach, mode="edge"), 2 * reach + 1)
-
-
-class Leg:
-    """A thigh and a shin: positions of hip, knee and ankle (T, 3), and the knee's axis (T, 3), about which the shin
-    turns back when the knee bends. Any unit of length."""
-
-    SHORTEST = -0.95
-    """The cosine of the largest bend of a knee, 162 degrees: targets beyond it are not reached."""
-
-    EASED_SHARE = 0.5
-    """The largest lengthening of a leg, as a share of the length left until it is straight."""
-
-    GIVES = (0.012, 0.006)
-    """Shares of the length of a straight leg: 1 cm, how much too long it stays when it has to bend; and 5 mm short of
-    straight, or a knee bent by 12 degrees, where that is e times less."""
-
-    def __init__(self, hip: Array, knee: Array, ankle: Array, hinge: Array) -> None:
-        self.hip, self.knee, self.ankle = hip, knee, ankle
-        along, down = knee - hip, ankle - knee
-        self._upper, self._lower = _length(along), _length(down)
-        self._axis = unit(hinge - _dot(hinge, along) / _dot(along, along) * along)
-        # the part of the shin in the plane of the bend
-        self._in_plane = np.sqrt(np.maximum(1 - _dot(unit(down), self._axis) ** 2, 1e-12))
-        self._longest = np.sqrt(self._upper**2 + self._lower**2 + 2 * self._upper * self._lower * self._in_plane)
-
-    def eased(self, target: Array) -> Array:
-        """The position (T, 3) near ``target`` (T, 3), on the line to the hip, that the ankle reaches without a snap.
-
-        Near straight, a knee bends or straightens infinitely fast relative to the leg's length. So a leg lengthens less
-        the straighter it gets, and a straight one bends only softly.
-        """
-        away = target - self.hip
-        now, wanted = _length(self.ankle - self.hip), _length(away)
-        left = np.maximum(self._longest - now, 1e-9)
-        longer = -self.EASED_SHARE * left * np.expm1(-np.maximum(wanted - now, 0) / (self.EASED_SHARE * left))
-        less = np.maximum(now - wanted, 0)
-        give, fade = (part * self._longest for part in self.GIVES)
-        shorter = less**2 / np.maximum(less + give * np.exp(-left / fade), 1e-12)
-        return self.hip + away * ((now + longer - shorter) / np.maximum(wanted, 1e-12))
-
-    def turns(self, target: Array) -> tuple[Array, Array]:
-        """World rotations (T, 3, 3) of thigh and shin that bring the ankle to ``target`` (T, 3), or as near as
-        possible.
-
-        The knee turns about its axis, as far as that is square to the thigh, until the leg is as long as it has to be,
-        bent back even where it was bent forward; then thigh and shin turn together the shortest way.
-        """
-        along, down, upper, lower = self.knee - self.hip, self.ankle - self.knee, self._upper, self._lower
-        cosine = (_length(target - self.hip) ** 2 - upper**2 - lower**2) / (2 * upper * lower * self._in_plane)
-        bent = np.arctan2(_dot(np.cross(along, down), self._axis), _dot(along, down))  # negative if forward
-        bend = rotvec_to_rotmat(self._axis * (np.arccos(np.clip(cosine, self.SHORTEST, 1.0)) - bent))
-        turn = swing(along + rotated(bend, down), target - self.hip)
-        return turn, product(turn, bend)
-
-
-def _dot(one: Array, other: Array) -> Array:
-    found: Array = (one * other).sum(axis=-1, keepdims=True)
-    return found
-
-
-def _length(vectors: Array) -> Array:
-    found: Array = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return found

@@ -2,19 +2,33 @@
 
 Contacts come from the table being played, by :func:`motet.motion.feet.contacts.contacts_of` of the recordings. While a
 foot stands, the movement of its lowest point over the ground is removed, tick by tick; when it lifts off, the
-correction fades. Hip, knee and ankle follow (:class:`motet.motion.feet.hold.Leg`). The offline twin, which knows how
+correction fades. Hip, knee and ankle follow (:class:`motet.motion.feet.leg.Leg`). The offline twin, which knows how
 long a foot will stand, is :mod:`motet.motion.feet.hold`.
 """
 
-from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 
-from motet.motion.feet.hold import Leg
+from motet.motion.feet.leg import Leg
 from motet.motion.humanoid import BONES, HUMANOID, LEFT_RIGHT, LEG, SOLE, sided
-from motet.motion.pose import Floats, Pose, damped, damping_of
-from motet.motion.rotations import Array, conjugate, quat_product, quat_rotated, rotmat_to_quat
+from motet.motion.parts import (
+    Part,
+    Quaternion,
+    Vector,
+    inverse,
+    larger,
+    parts,
+    plus,
+    product,
+    root,
+    rotated,
+    where,
+)
+from motet.motion.pose import Pose, damping_of
 from motet.settings import Range, Settings
 
 
@@ -35,78 +49,120 @@ class FootLockSettings(Settings):
 LEG_BONES = np.array([[BONES.index(sided(side, part)) for part in LEG] for side in LEFT_RIGHT])
 """Bones (2, 4) of both legs among the humanoid's."""
 
-LEG_OFFSETS = HUMANOID.offsets[[[HUMANOID.index(BONES[bone]) for bone in leg] for leg in LEG_BONES.T]]
-"""Where they begin in their parents' frames (4, 2, 3), the hips' for the first."""
+OFFSETS = HUMANOID.offsets[[[HUMANOID.index(BONES[bone]) for bone in leg] for leg in LEG_BONES]]
+"""Where they begin in their parents' frames (2, 4, 3), the hips' for the first."""
 
-POINTS = np.array([place for places in SOLE.values() for place in places], dtype=np.float32)
-CARRIERS = [LEG.index(part) for part, places in SOLE.items() for _ in places]
-"""Points (3, 3) of a sole, and which joint of a leg carries each."""
+POINTS = [(LEG.index(part), point) for part, points in SOLE.items() for point in points]
+"""Points of a sole, and which joint of a leg carries each."""
+
+Pair = tuple[Part, Part]
+"""Along x and z."""
+
+
+class Foot(NamedTuple):
+    """By how much a foot is moved and how fast that changes, and where the points of its sole were, None before the
+    first tick."""
+
+    shift: Pair = (0.0, 0.0)
+    drift: Pair = (0.0, 0.0)
+    soles: tuple[Vector, ...] | None = None
+
+
+class Limb(NamedTuple):
+    """What is played of a leg: rotations of its joints, where they begin, both in their parents' frames, and how much
+    its foot stands."""
+
+    local: list[Quaternion]
+    offsets: list[Vector]
+    contact: Part
 
 
 @dataclass(eq=False)
 class FootLock:
     """The lock of B characters. dt: seconds of a tick.
 
-    shift, drift: (B, 2, 2) by how much each foot is moved along x and z, and how fast that changes. soles: (B, 2, 3, 3)
-    where the points of the soles were, None before the first tick. All float64; they are replaced, never written into.
+    feet: those of one character, left and right, in floats; of more the feet of all as one, in float64 arrays (2, B).
+    They are replaced, never written into.
     """
 
     characters: int
     dt: float
     settings: FootLockSettings = FootLockSettings()
-    shift: Array | None = None
-    drift: Array | None = None
-    soles: Array | None = None
+    feet: tuple[Foot, ...] = (Foot(), Foot())
 
     def held(self, pose: Pose) -> Pose:
         """The next pose, one tick later, with standing feet held in place and above ground."""
-        how, (hips, turned, places) = self.settings, _legs(pose)
-        soles = places[:, :, CARRIERS] + quat_rotated(turned[:, :, CARRIERS], POINTS)
-        if self.soles is None or self.shift is None or self.drift is None:
-            self.shift = self.drift = np.zeros((*soles.shape[:2], 2))
-            self.soles = soles
-        lowest = soles[..., 1].argmin(axis=2)[..., None, None]
-        moved = np.take_along_axis(soles - self.soles, lowest, axis=2)[:, :, 0, ::2]
-        faded, slower = damped(self.shift, self.drift, damping_of(how.fade), self.dt)
-        held = self.shift - moved
-        stands = pose.contacts[..., None] > how.stands
-        stands &= np.linalg.norm(held, axis=-1, keepdims=True) < how.farthest
-        stands &= np.linalg.norm(moved, axis=-1, keepdims=True) < how.swings * self.dt
-        self.drift, self.shift, self.soles = np.where(stands, 0, slower), np.where(stands, held, faded), soles
-        lift = np.maximum(-soles[..., 1].min(axis=2), 0)
-        if not self.shift.any() and not lift.any():
-            return pose
-        target = places[:, :, 2] + np.stack([self.shift[..., 0], lift, self.shift[..., 1]], axis=-1)
-        return replace(pose, rotations=_reached(pose.rotations, hips, turned, places, target))
+        hips = product(parts(pose.heading), parts(pose.rotations[:, 0]))
+        (x, z, _), (height,) = parts(pose.ground), parts(pose.height[:, None])
+        legs = zip(self.feet, _limbs(pose), strict=False)
+        found = [self._stood(foot, limb, hips, (x, height, z)) for foot, limb in legs]
+        self.feet = tuple(foot for foot, _ in found)
+        # joints, their parts, and both sides of each character; or the sides of one, joints, their parts
+        turned = np.array([turns for _, turns in found])
+        rotations = pose.rotations.copy()
+        rotations[:, LEG_BONES[:, :3]] = turned if len(found) == 2 else turned[0].transpose(3, 2, 0, 1)
+        return Pose(pose.ground, rotations, pose.height, pose.contacts)
+
+    def _stood(self, foot: Foot, limb: Limb, hips: Quaternion, place: Vector) -> tuple[Foot, list[Quaternion]]:
+        """A foot a tick later, and the rotations of thigh, shin and foot in their parents' frames."""
+        turned, places, above = [], [], hips
+        for local, offset in zip(limb.local, limb.offsets, strict=True):
+            place = plus(place, rotated(above, offset))
+            above = product(above, local)
+            turned.append(above)
+            places.append(place)
+        soles = tuple(plus(places[joint], rotated(turned[joint], point)) for joint, point in POINTS)
+        (shift_x, shift_z), drift, height = self._shifted(foot, soles, limb.contact)
+        lift, played = larger(-height, 0.0), limb.local[:3]
+        moves, after = (shift_x != 0) | (shift_z != 0) | (lift > 0), Foot((shift_x, shift_z), drift, soles)
+        if moves is False:
+            return after, played
+        x, y, z = places[2]
+        reached = _reached(hips, turned, places, (x + shift_x, y + lift, z + shift_z))
+        if moves is True:
+            return after, reached
+        return after, [
+            (where(moves, a, e), where(moves, b, f), where(moves, c, g), where(moves, d, h))
+            for (a, b, c, d), (e, f, g, h) in zip(reached, played, strict=True)
+        ]
+
+    def _shifted(self, foot: Foot, soles: tuple[Vector, ...], contact: Part) -> tuple[Pair, Pair, Part]:
+        """The shift of a foot and how fast it changes, a tick later, and the height of the lowest point of its sole."""
+        how, before = self.settings, soles if foot.soles is None else foot.soles
+        height, x, z = soles[0][1], soles[0][0] - before[0][0], soles[0][2] - before[0][2]
+        for (to_x, y, to_z), (from_x, _, from_z) in zip(soles[1:], before[1:], strict=True):
+            lower = y < height
+            height, x, z = where(lower, y, height), where(lower, to_x - from_x, x), where(lower, to_z - from_z, z)
+        held_x, held_z = foot.shift[0] - x, foot.shift[1] - z
+        stands = (contact > how.stands) & (root(held_x * held_x + held_z * held_z) < how.farthest)
+        stands = stands & (root(x * x + z * z) < how.swings * self.dt)
+        (faded_x, slower_x), (faded_z, slower_z) = map(self._faded, foot.shift, foot.drift)
+        shift = where(stands, held_x, faded_x), where(stands, held_z, faded_z)
+        return shift, (where(stands, 0.0, slower_x), where(stands, 0.0, slower_z)), height
+
+    def _faded(self, off: Part, rate: Part) -> Pair:
+        """A shift and its rate, as the spring of its half-life takes it back."""
+        damping = damping_of(self.settings.fade)
+        rise, left = (rate + damping * off) * self.dt, math.exp(-damping * self.dt)
+        return (off + rise) * left, (rate - damping * rise) * left
 
 
-def _legs(pose: Pose) -> tuple[Floats, Floats, Array]:
-    """World rotations of the hips (B, 4), and rotations (B, 2, 4, 4) and places (B, 2, 4, 3) of the legs' joints."""
-    hips = quat_product(pose.heading, pose.rotations[:, 0])
-    place = pose.place[:, None]
-    place[..., 1] = pose.height[:, None]
-    local, above = pose.rotations[:, LEG_BONES], hips[:, None]
-    turned, places = np.empty_like(local), np.empty((*local.shape[:3], 3))
-    for joint, offset in enumerate(LEG_OFFSETS.astype(np.float32)):
-        place = place + quat_rotated(above, offset)
-        above = quat_product(above, local[:, :, joint])
-        turned[:, :, joint], places[:, :, joint] = above, place
-    return hips, turned, places
+def _limbs(pose: Pose) -> Iterator[Limb]:
+    """The left and the right leg of one character, or the legs of all as one."""
+    if len(pose) == 1:
+        for bones, offsets, contact in zip(LEG_BONES, OFFSETS.tolist(), pose.contacts[0].tolist(), strict=True):
+            yield Limb(pose.rotations[0, bones].tolist(), offsets, contact)
+    else:
+        local = np.array(pose.rotations[:, LEG_BONES].transpose(2, 3, 1, 0), dtype=np.float64, order="C")
+        offsets = OFFSETS.transpose(1, 2, 0)[..., None]
+        yield Limb([tuple(quats) for quats in local], [tuple(offset) for offset in offsets], pose.contacts.T)
 
 
-def _reached(rotations: Floats, hips: Floats, turned: Floats, places: Array, target: Array) -> Floats:
-    """Rotations (B, J, 4) with ankles at targets (B, 2, 3), from those of :func:`_legs`."""
-    hip, knee, ankle, goal = (p.reshape(-1, 3) for p in (*np.moveaxis(places[:, :, :3], 2, 0), target))
-    thigh, shin, foot = (turned[:, :, joint] for joint in range(3))
-    hinge = quat_rotated(shin, np.array([1, 0, 0], dtype=np.float32)).reshape(-1, 3).astype(np.float64)
-    leg = Leg(hip, knee, ankle, hinge)
-    turns = leg.turns(leg.eased(goal))
-    new_thigh, new_shin = (
-        quat_product(rotmat_to_quat(turn).astype(np.float32).reshape(-1, 2, 4), before)
-        for turn, before in zip(turns, (thigh, shin), strict=True)
-    )
-    found = rotations.copy()
-    found[:, LEG_BONES[:, 0]] = quat_product(conjugate(hips)[:, None], new_thigh)
-    found[:, LEG_BONES[:, 1]] = quat_product(conjugate(new_thigh), new_shin)
-    found[:, LEG_BONES[:, 2]] = quat_product(conjugate(new_shin), foot)
-    return found
+def _reached(hips: Quaternion, turned: list[Quaternion], places: list[Vector], target: Vector) -> list[Quaternion]:
+    """Rotations of thigh, shin and foot in their parents' frames, of a leg with its ankle at a target; the foot stays
+    as it is in the world."""
+    thigh, shin, foot = turned[:3]
+    leg = Leg(places[0], places[1], places[2], rotated(shin, (1.0, 0.0, 0.0)))
+    turn_thigh, turn_shin = leg.turns(leg.eased(target))
+    thigh, shin = product(turn_thigh, thigh), product(turn_shin, shin)
+    return [product(inverse(hips), thigh), product(inverse(thigh), shin), product(inverse(shin), foot)]
