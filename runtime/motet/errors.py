@@ -2,7 +2,8 @@
 
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 
@@ -26,6 +27,19 @@ def warn(said: str, category: type[Warning]) -> None:
 
 class TravelWarning(UserWarning):
     """A clip in place was given the path over the ground that its feet imply."""
+
+
+@contextmanager
+def travel_warnings() -> Iterator[list[warnings.WarningMessage]]:
+    """What is warned of clips in place, in the end each once; other warnings go on."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", TravelWarning)
+        yield caught
+    for warning in caught:
+        if not issubclass(warning.category, TravelWarning):
+            warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
+    travel = {str(warning.message): warning for warning in caught if issubclass(warning.category, TravelWarning)}
+    caught[:] = travel.values()
 
 
 class MotetError(Exception):

@@ -13,7 +13,7 @@ from command_line import run
 from figures import walker
 
 import motet
-from motet.cli.jobs import FEW, in_order
+from motet.jobs import FEW, in_order
 
 
 def late(number: int) -> tuple[int, int]:
@@ -51,7 +51,7 @@ def test_check_says_the_same_by_one_process_and_by_two(tmp_path: Path) -> None:
 @pytest.mark.skipif(sys.platform == "win32", reason="no such signals there")
 def test_an_interrupt_ends_it_quietly(tmp_path: Path) -> None:
     code = (
-        "import sys, time\nfrom motet.cli.jobs import in_order\nprint('on', flush=True)\n"
+        "import sys, time\nfrom motet.jobs import in_order\nprint('on', flush=True)\n"
         "try:\n    list(in_order(time.sleep, [.05] * 400, 2))\nexcept KeyboardInterrupt:\n    sys.exit(130)"
     )
     started = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)

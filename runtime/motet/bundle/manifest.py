@@ -1,7 +1,10 @@
 """The manifest of a bundle or of a training run, read once and with types; docs/bundle.md says what is in it."""
 
+import hashlib
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -94,6 +97,12 @@ class Manifest:
     files: Mapping[str, FileEntry]
     golden: Golden | None
     source: Mapping[str, Any]
+
+    @cached_property
+    def identity(self) -> str:
+        """A unique identity of the model: its name, its version and a hash of its manifest."""
+        text = json.dumps(self.source, sort_keys=True).encode()
+        return f"{self.name} {self.version} {hashlib.sha256(text).hexdigest()[:16]}"
 
     @staticmethod
     def from_json(data: object) -> "Manifest":

@@ -1,28 +1,26 @@
 """``motet check``, ``convert`` and ``view``: motion files looked at, brought to other formats, and played."""
 
-import json
 import logging
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
-from functools import partial
-from itertools import chain, groupby, islice
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain, groupby
 from pathlib import Path
+from typing import Any
 
 import click
 
-from motet import checked
 from motet.checked import Checked
-from motet.cli.jobs import in_order, jobs_option
+from motet.cli.many import Many, many_options, print_list
 from motet.cli.options import Tries
-from motet.cli.reading import Read, Source, read_options
+from motet.cli.reading import Read, read_options
 from motet.cli.writing import Output, places, size, write_options
+from motet.corpus.answers import Answer, Check, Verb, to_json
+from motet.corpus.sources import Source
 from motet.draw.page import write_many
-from motet.errors import FormatError, MotetError
-from motet.files import files_in
-from motet.formats import CLIPPED, MOCAP, READS, WRITES, write_motion
+from motet.formats import READS, WRITES, write_motion
 from motet.formats.text import MARK
 from motet.motion.feet.hold import hold_feet as feet_held
 from motet.motion.feet.treadmill import with_travel
@@ -43,7 +41,13 @@ class Row:
     source: Source
     found: Checked | None
     reason: str | None
-    page: Path | None = None
+
+    @staticmethod
+    def of(answer: Answer) -> "Row":
+        """What an answer of :class:`Look` says."""
+        source, found = answer.source, next(iter(answer.rows), None)
+        unread = answer.error.removeprefix(f"{source.path}: ").removeprefix(f"{source.path}, ")
+        return Row(source, found, found.refused if found else unread)
 
     @property
     def verdict(self) -> str:
@@ -60,79 +64,67 @@ class Row:
     was assumed. Exit code 1 if anything cannot be read or is no human's motion. Reads {READS}.
     """
 )
-@click.argument("files", nargs=-1, required=True, type=Path, metavar="FILE|FOLDER...")
+@click.argument("files", nargs=-1, required=True, type=Path, metavar="FILE|FOLDER|ZIP...")
 @click.option("-o", "--out", type=Path, help="Page (.html) that plays the figure of the file beside the humanoid.")
 @read_options
-@jobs_option
+@many_options
 @click.option("--json", "as_json", is_flag=True, help="Print a list of objects, one for each clip.")
-def check(files: tuple[Path, ...], out: Path | None, read: Read, jobs: int | None, as_json: bool) -> None:
+def check(files: tuple[Path, ...], out: Path | None, many: Many, as_json: bool) -> None:
     """Look at motion files."""
     if out is not None and out.suffix.lower() != ".html":
         raise click.UsageError(f"-o is a page: expected a name that ends in .html, not {out.name!r}")
-    paths = [path for given in files for path in (_motion_files(given) if given.is_dir() else [given])]
-    given: Iterable[tuple[Source, Path | None]]
-    if out is None:
-        given = ((source, None) for path in paths for source in read.sources([path], every=True))
+    sources = many.sources(files)
+    if out is not None:
+        sources = [replace(one, place=place) for one, place in zip(sources, places(out, sources), strict=True)]
+    counts: Counter[str] = Counter()
+    rows = _counted(map(Row.of, many.answers(Look(many.read.options), sources, "checking", named=False)), counts)
+    if as_json:
+        print_list(map(_json, rows))
     else:
-        sources = read.sources(paths, every=True)
-        given = zip(sources, places(out, sources), strict=True)
-    rows = in_order(partial(_row, read=read), given, jobs)
-    counts = _print_json(rows) if as_json else _print_text(rows, paths)
+        _print_text(rows, sources, counts)
     if counts["unreadable"] or counts["refused"]:
         sys.exit(1)
 
 
-def _motion_files(folder: Path) -> list[Path]:
-    kinds = tuple(dict.fromkeys((*MOCAP, *CLIPPED)))
-    found = files_in(folder, kinds)
-    if not found:
-        raise FormatError(folder, f"no motion files ({' '.join(kinds)}) are in it")
-    return found
+class Look(Check):
+    """Also writes the page at a source's place."""
 
-
-def _row(given: tuple[Source, Path | None], read: Read) -> Row:
-    source, page = given
-    try:
-        found = checked.check(source.path, clip=source.clip, **read.options)
-        if page is not None:
-            figures = {"as in the file": read(source)}
+    def rows(self, answer: Answer) -> list[Any]:
+        """The one row."""
+        (found,), source = super().rows(answer), answer.source
+        if source.place is not None:
+            figures = {"as in the file": self.read(answer)}
             if found.refused is None:
                 figures["as the humanoid"] = to_humanoid(figures["as in the file"]).motion
-            title = Path(found.file).name + (f"{MARK}{found.clip}" if found.clip else "")
-            write_many(page, list(figures.values()), list(figures), title)
-        return Row(source, found, found.refused, page)
-    except MotetError as error:
-        return Row(source, None, str(error).removeprefix(f"{source.path}: ").removeprefix(f"{source.path}, "))
+            title = source.path.name + (f"{MARK}{found.clip}" if found.clip else "")
+            write_many(source.place, list(figures.values()), list(figures), title)
+        return [found]
 
 
-def _print_json(rows: Iterator[Row]) -> Counter[str]:
-    """The list, one line for each row as it is found."""
-    counts: Counter[str] = Counter()
+def _counted(rows: Iterable[Row], counts: Counter[str]) -> Iterator[Row]:
     for row in rows:
-        unread = {"file": str(row.source.path), "clip": row.source.clip, "error": row.reason}
-        said = json.dumps(row.found.to_json() if row.found else unread)
-        click.echo(("," if counts.total() else "[") + said)
         counts[row.verdict] += 1
-    click.echo("]" if counts else "[]")
-    return counts
+        yield row
+
+
+def _json(row: Row) -> str:
+    return to_json(row.found or {"file": str(row.source.path), "clip": row.source.clip, "error": row.reason})
 
 
 COLUMNS = "{:<26}{:>6}{:>8}{:>9}{:>7}{:>11}{:>10}{:>10}{:>7}"
 """Columns of the table, after the name."""
 
 
-def _print_text(rows: Iterator[Row], paths: Sequence[Path]) -> Counter[str]:
-    """A report of one row, a table of several, line by line as they are found."""
-    first = list(islice(rows, 2))
-    if len(first) < 2:
-        for row in first:
+def _print_text(rows: Iterator[Row], sources: Sequence[Source], counts: Mapping[str, int]) -> None:
+    """A report of one row, a table of several, line by line as they are found and counted."""
+    if len(sources) < 2:
+        for row in rows:
             click.echo("\n".join(_report(row)))
-        return Counter(row.verdict for row in first)
-    counts: Counter[str] = Counter()
-    width = min(max(12, *(len(str(path)) for path in paths)) + 2, 48)  # letters for the names of files
+        return
+    width = min(max(12, *(len(str(source.path)) for source in sources)) + 2, 48)  # letters for the names of files
     head = ("figure", "sure", "tall m", "seconds", "fps", "facing", "ground m", "travel m", "notes")
     click.echo(f"{'file':<{width}}{COLUMNS.format(*head)}")
-    for file, of_file in groupby(chain(first, rows), key=lambda row: row.source.path):
+    for file, of_file in groupby(rows, key=lambda row: row.source.path):
         last = None
         for row in of_file:
             if row.source.clip is not None and last is None:
@@ -140,10 +132,8 @@ def _print_text(rows: Iterator[Row], paths: Sequence[Path]) -> Counter[str]:
             name = str(file) if row.source.clip is None else f"  #{row.source.clip}"
             said = f"{row.verdict}, as above" if row.reason and last and last.reason == row.reason else _line(row)
             click.echo(f"{name:<{width - 2}}  {said}")
-            counts[row.verdict] += 1
             last = row
-    click.echo(f"{counts.total()} motions: " + ", ".join(f"{count} {word}" for word, count in counts.items()))
-    return counts
+    click.echo(f"{len(sources)} motions: " + ", ".join(f"{count} {word}" for word, count in counts.items()))
 
 
 def _line(row: Row) -> str:
@@ -175,8 +165,8 @@ def _report(row: Row) -> Iterator[str]:
     said += [("refused", found.refused)] if found.refused else _understood(found)
     said.append(("length", size(found.frames, found.fps)))
     said += [("" if number else "assumed", note) for number, note in enumerate(found.notes)]
-    if row.page is not None:
-        said.append(("page", str(row.page)))
+    if row.source.place is not None:
+        said.append(("page", str(row.source.place)))
     return chain([str(row.source)], (f"  {name:<9} {text}" for name, text in said))
 
 
@@ -215,7 +205,7 @@ def _metres(value: float | None) -> str:
     Reads {READS}; writes {WRITES}.
     """
 )
-@click.argument("files", nargs=-1, required=True, type=Path, metavar="IN... [OUT]")
+@click.argument("files", nargs=-1, required=True, type=Path, metavar="IN|FOLDER|ZIP... [OUT]")
 @click.option("-o", "--out", type=Path, help="File to write. [default: the second of two files]")
 @click.option("--from", "start", type=click.FloatRange(0), default=0.0, help="Cut: seconds from the start.")
 @click.option("--to", "stop", type=click.FloatRange(0, min_open=True), help="Cut: seconds to stop at.")
@@ -230,40 +220,60 @@ def _metres(value: float | None) -> str:
 @click.option("--loop", is_flag=True, help="Cut to a seamless loop, such as strides of a walk.")
 @write_options
 @read_options
-def convert(
-    files: Sequence[Path],
-    out: Path | None,
-    start: float,
-    stop: float | None,
-    mirror: bool,
-    unit: str | None,
-    humanoid: bool,
-    map_file: Path | None,
-    travel: bool,
-    hold_feet: bool,
-    loop: bool,
-    output: Output,
-    read: Read,
-) -> None:
+@many_options
+def convert(files: Sequence[Path], out: Path | None, output: Output, many: Many, **how: Any) -> None:
     """Convert motion files."""
     if out is None:
         if len(files) != 2:
             raise click.UsageError("give IN and OUT, or several files and -o OUT")
         *files, out = files
-    sources, tries = read.sources(files), Tries()
-    for source, place in zip(sources, places(out, sources, output=output), strict=True):
-        with tries.of(source):
-            motion = read(source)
-            motion = motion.cut(start, stop) if start or stop is not None else motion
-            motion = _to_humanoid(motion, map_file) if humanoid or map_file or hold_feet else motion
-            motion = with_travel(motion) if travel else motion
-            motion = output.shaped(feet_held(motion) if hold_feet else motion)
-            motion = motion.scaled(METRES[unit]) if unit else motion
-            motion = looped(motion) if loop else motion
-            output.save(place, mirrored(motion) if mirror else motion, source.title)
-            click.echo(f"{place}: {size(len(motion), motion.fps)}")
+    sources = many.sources(files, every=False)
+    sources = [replace(one, place=to) for one, to in zip(sources, places(out, sources, output=output), strict=True)]
+    many = replace(many, jobs=1) if output.onto else many  # which holds all clips until the end
+    verb = Convert(many.read.options, output, Changes(**how))
+    for answer in many.answers(verb, sources, "converting"):
+        for row in answer.rows:
+            click.echo(f"{row['output']}: {size(row['frames'], row['fps'])}")
     output.finish()
-    tries.finish()
+    many.tries.finish()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Changes:
+    """What is done to a motion on its way, as the options of ``motet convert`` say."""
+
+    start: float
+    stop: float | None
+    mirror: bool
+    unit: str | None
+    humanoid: bool
+    map_file: Path | None
+    travel: bool
+    hold_feet: bool
+    loop: bool
+
+
+@dataclass(frozen=True)
+class Convert(Verb):
+    """Writes each motion to its source's place: a row with input, output, frames and fps."""
+
+    output: Output
+    how: Changes
+
+    def rows(self, answer: Answer) -> list[Any]:
+        """The one row."""
+        how, place = self.how, answer.source.place
+        assert place is not None
+        motion = self.read(answer)
+        motion = motion.cut(how.start, how.stop) if how.start or how.stop is not None else motion
+        motion = _to_humanoid(motion, how.map_file) if how.humanoid or how.map_file or how.hold_feet else motion
+        motion = with_travel(motion) if how.travel else motion
+        motion = self.output.shaped(feet_held(motion) if how.hold_feet else motion)
+        motion = motion.scaled(METRES[how.unit]) if how.unit else motion
+        motion = looped(motion) if how.loop else motion
+        self.output.save(place, mirrored(motion) if how.mirror else motion, answer.source.title)
+        said = {"input": str(answer.source), "output": str(place)}
+        return [{**said, "frames": len(motion), "fps": motion.fps}]
 
 
 def _to_humanoid(motion: Motion, map_file: Path | None) -> Motion:

@@ -1,7 +1,7 @@
 """``motet describe`` and ``motet generate``: from motion files to sentences, and from sentences to motion files."""
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -10,11 +10,12 @@ from typing import Any, cast
 import click
 
 from motet.bundle.graph import SessionOptions
-from motet.cli.options import Tries, bar, bundle_option, in_place, naming, noted, session_options
-from motet.cli.reading import Read, Source, read_options
+from motet.cli.many import Many, many_options, print_list
+from motet.cli.options import Tries, bar, bundle_option, naming, noted, session_options
+from motet.cli.reading import read_options
 from motet.cli.writing import Output, out_option, places, size, write_options
+from motet.corpus.answers import Answer, Describe, Timeline, to_json
 from motet.formats import READS, read_motion
-from motet.models.describe import DescribeModel, Description
 from motet.models.generate import PLAYED, Generated, GenerateModel
 from motet.models.generate_codes import CodesModel, Story
 from motet.models.known import NOTHING
@@ -28,12 +29,12 @@ from motet.motion.looping import looped
     A sentence after "?" is one that the model is not sure of; a bundle of known motions says "{NOTHING}" of a motion
     like none of them.
 
-    All files are described in one batch, motions over 30 s in windows; with --timeline, motions of any length are cut
+    Motions over 30 s are described in windows; with --timeline, motions of any length are cut
     where what is done changes. Any human figure will do. Of a file of several clips all are described, or the one of
     --clip or MOTION.glb#CLIP. Reads {READS}.
     """
 )
-@click.argument("motions", nargs=-1, required=True, type=Path, metavar="MOTION...")
+@click.argument("motions", nargs=-1, required=True, type=Path, metavar="MOTION|FOLDER|ZIP...")
 @bundle_option("describe")
 @click.option("--beams", type=click.IntRange(1, 100), help="Sentences to print. [default: the bundle's]")
 @click.option(
@@ -45,6 +46,7 @@ from motet.motion.looping import looped
 @click.option("--timeline", is_flag=True, help="One sentence for each part of a motion, with its times.")
 @session_options
 @read_options
+@many_options
 @click.option("--json", "as_json", is_flag=True, help="Print a list: each window or part with its input and seconds.")
 def describe(
     motions: tuple[Path, ...],
@@ -54,64 +56,44 @@ def describe(
     seed: int,
     timeline: bool,
     session: SessionOptions,
-    read: Read,
+    many: Many,
     as_json: bool,
 ) -> None:
     """Describe motion files."""
     if timeline and (beams, draws) != (None, None):
         raise click.UsageError("--timeline gives one sentence for each part: it goes with neither --beams nor --draws")
-    model, tries = load_as(DescribeModel, bundle, session), Tries()
-    sources = read.sources(motions, every=True)
-    if timeline:
-        rows, lines = _timelines(model, sources, read, tries)
+    settings = {"beams": beams, "draws": draws or None, "decoding": "beam" if draws == 0 else None, "seed": seed}
+    options = many.read.options, bundle, session
+    verb = Timeline(*options) if timeline else Describe(*options, settings)
+    sources = many.sources(motions)
+    answers = many.answers(verb, sources, "describing")
+    if as_json:
+        print_list(to_json(row) for answer in answers for row in answer.rows)
     else:
-        settings = {"beams": beams, "draws": draws or None, "decoding": "beam" if draws == 0 else None, "seed": seed}
-        rows, lines = _hypotheses(model, sources, read, tries, settings)
-    read.say_resampled(model.fps)
-    for line in [json.dumps(rows)] if as_json else lines:
-        click.echo(line)
-    tries.finish()
+        for answer in answers:
+            for line in _told_of(answer, len(sources) > 1):
+                click.echo(line)
+    many.read.say_resampled(lambda: verb.model.fps)
+    many.tries.finish()
 
 
-def _hypotheses(
-    model: DescribeModel, sources: Sequence[Source], read: Read, tries: Tries, settings: Mapping[str, Any]
-) -> tuple[list[dict[str, Any]], list[str]]:
-    """For each window of the motions its sentences, ready for JSON and as lines."""
-    windows = []
-    for source in sources:
-        with tries.of(source) as caught:
-            cut = model.windows(read(source))
-            said: dict[str, Any] = {"input": str(source), "in_place": in_place(caught)}
-            windows += [(said, start, start + part.duration, model.prepared(part)) for start, part in cut]
-    with bar("describing") as progress:
-        found = model.describe([part for *_, part in windows], progress=progress, **settings)
-    inputs, rows, lines = [said["input"] for said, *_ in windows], [], []
-    for (said, start, stop, _), descriptions in zip(windows, found, strict=True):
-        hypotheses, name = [description.to_json() for description in descriptions], said["input"]
-        rows.append({**said, "start": start, "stop": stop, "hypotheses": hypotheses})
-        lines += [name] if len(sources) > 1 and start == 0 else []
-        lines += [f"{start:.1f} to {stop:.1f} s"] if inputs.count(name) > 1 else []
-        lines += [f"{description.score:8.2f}  {_told(description)}" for description in descriptions]
-    return rows, lines
+def _told_of(answer: Answer, several: bool) -> Iterator[str]:
+    """The sentences of a motion, after its name if there are several."""
+    if several and answer.rows:
+        yield str(answer.source)
+    for row in answer.rows:
+        if "hypotheses" not in row:
+            yield f"{row['start']:.1f}-{row['stop']:.1f} s  {_told(row)}"
+            continue
+        if len(answer.rows) > 1:
+            yield f"{row['start']:.1f} to {row['stop']:.1f} s"
+        for found in row["hypotheses"]:
+            yield f"{found['score']:8.2f}  {_told(found)}"
 
 
-def _timelines(
-    model: DescribeModel, sources: Sequence[Source], read: Read, tries: Tries
-) -> tuple[list[dict[str, Any]], list[str]]:
-    """For each part of the motions its sentence, ready for JSON and as lines."""
-    rows, lines = [], []
-    for source in sources:
-        with tries.of(source) as caught, bar(source.name) as progress:
-            parts = model.timeline(read(source), progress=progress)
-            rows += [{"input": str(source), "in_place": in_place(caught), **part.to_json()} for part in parts]
-            lines += [str(source)] if len(sources) > 1 else []
-            lines += [f"{part.start:.1f}-{part.stop:.1f} s  {_told(part)}" for part in parts]
-    return rows, lines
-
-
-def _told(description: Description) -> str:
-    sure = description.confident or description.text == NOTHING
-    return description.text if sure else f"? {description.text}"
+def _told(found: Mapping[str, Any]) -> str:
+    sure = found["confident"] or found["text"] == NOTHING
+    return str(found["text"]) if sure else f"? {found['text']}"
 
 
 @click.command()

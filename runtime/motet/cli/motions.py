@@ -86,7 +86,7 @@ def predict(
     output.finish()
     if as_json and rows:
         click.echo(json.dumps(rows))
-    read.say_resampled(model.fps)
+    read.say_resampled(lambda: model.fps)
     tries.finish()
 
 

@@ -13,7 +13,8 @@ import click
 import onnxruntime
 
 from motet.bundle.graph import MAX_THREADS, SessionOptions
-from motet.errors import ControlWarning, MotetError, MotionError, TextWarning, TravelWarning, UnitError, quoted
+from motet.corpus.answers import Answer, named
+from motet.errors import ControlWarning, MotetError, MotionError, TextWarning, TravelWarning, quoted, travel_warnings
 from motet.settings import Progress, silent
 
 log = logging.getLogger("motet")
@@ -78,14 +79,10 @@ Warned = list[warnings.WarningMessage]
 @contextmanager
 def warned(given: object) -> Iterator[Warned]:
     """Log what motet warns of a motion, each once, with what was given; other warnings go on."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", TravelWarning)
+    with travel_warnings() as caught:
         yield caught
     for warning in caught:
-        if not issubclass(warning.category, TravelWarning):
-            warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
-    for text in dict.fromkeys(str(each.message) for each in caught if issubclass(each.category, TravelWarning)):
-        log.warning("%s: %s", given, text)
+        log.warning("%s: %s", given, warning.message)
 
 
 def in_place(caught: Warned) -> bool:
@@ -123,7 +120,15 @@ class Tries:
                 yield caught
         except MotetError as error:
             self.failed += 1
-            click.echo(f"motet: {_named(given, error)}", err=True)
+            click.echo(f"motet: {named(given, error)}", err=True)
+
+    def say(self, answer: Answer) -> None:
+        """Name an answer's failure, and what was warned of."""
+        for text in answer.warned:
+            log.warning("%s: %s", answer.source, text)
+        if answer.error:
+            self.failed += 1
+            click.echo(f"motet: {answer.error}", err=True)
 
     def usable(self, texts: Mapping[int, str], check: Callable[[str], object]) -> dict[int, str]:
         """The texts that pass a check."""
@@ -146,10 +151,4 @@ def naming(path: Path | str | None) -> Iterator[None]:
     try:
         yield
     except MotionError as error:
-        raise error if path is None else MotionError(_named(path, error)) from error
-
-
-def _named(given: object, error: MotetError) -> str:
-    hint = " (--unit-in)" if isinstance(error, UnitError) else ""
-    text = str(error).removeprefix(f"{getattr(given, 'path', None)}: ")
-    return f"{text}{hint}" if str(given) in text else f"{given}: {text}{hint}"
+        raise error if path is None else MotionError(named(path, error)) from error

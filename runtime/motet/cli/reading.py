@@ -9,10 +9,8 @@ from typing import Any
 
 import click
 
-from motet.errors import MotetError
-from motet.files import place_of
-from motet.formats import FORMATS, READABLE, clips, read_motion
-from motet.formats.text import MARK, chosen, plain_names, split_clip
+from motet.corpus.sources import Source, sources_of
+from motet.formats import FORMATS
 from motet.motion.motion import Motion
 from motet.motion.skeleton import METRES
 
@@ -20,43 +18,6 @@ log = logging.getLogger(__name__)
 
 FPS = click.FloatRange(0, 10_000, min_open=True)
 """Frame rates that a motion is read with or resampled to."""
-
-
-@dataclass(frozen=True)
-class Source:
-    """A motion file, and which clip of it; None for the first."""
-
-    path: Path
-    clip: str | None = None
-
-    def __str__(self) -> str:
-        return str(self.path) if self.clip is None else f"{self.path}{MARK}{self.clip}"
-
-    @property
-    def name(self) -> str:
-        """What stands for ``{name}`` in the names of results."""
-        return self.path.stem
-
-    @property
-    def label(self) -> str:
-        """What stands for ``{clip}``: the clip's name, as a file name can have it, or the file's where it has none."""
-        names, index = self._clips()
-        # what the name of a file cannot have, on one system or another
-        return plain_names(names, r'[<>:"/\\|?*#\x00-\x1f]|^[. ]|[. ]$')[index]
-
-    @property
-    def title(self) -> str:
-        """What its result is called as a clip: the clip's name where one was asked for, else the file's."""
-        names, index = self._clips()
-        return self.name if self.clip is None else names[index]
-
-    def _clips(self) -> tuple[tuple[str, ...], int]:
-        """The names of the file's clips, its own where it has none, and which of them it is."""
-        try:
-            names = clips(self.path)
-            return names, chosen(self.path, names, 1 if self.clip is None else self.clip)
-        except MotetError:
-            return (self.name,), 0
 
 
 @dataclass(frozen=True)
@@ -75,28 +36,20 @@ class Read:
         source, *others = [given] if isinstance(given, Source) else self.sources([given])
         if others:
             raise click.UsageError(f"expected one motion, but {given} holds {len(others) + 1} clips: name one")
-        motion = read_motion(source.path, clip=source.clip, **self.options)
+        motion = source.read(**self.options)
         self.rates.append(motion.fps)
         return motion
 
     def sources(self, given: Sequence[Path], every: bool = False) -> list[Source]:
         """What files hold, as ``--clip`` says or their own names (a.glb#Walk). every: all clips where nothing does."""
-        return [source for path in given for source in self._of(path, every)]
+        return [source for path in given for source in sources_of(path, self.clip, every)]
 
-    def _of(self, given: Path, every: bool) -> list[Source]:
-        file, named = split_clip(given, READABLE)
-        path, asked = place_of(file), "all" if every and self.clip is None else self.clip
-        if named is not None or asked != "all":
-            return [Source(path, asked if named is None else named)]
-        try:
-            names = clips(path)
-        except MotetError:  # it is said when the file is read
-            names = ()
-        return [Source(path, name) for name in names] if len(names) > 1 else [Source(path)]
-
-    def say_resampled(self, fps: float) -> None:
-        """Log in one line how many of the motions that were read have another frame rate than a model's."""
-        if count := sum(abs(rate - fps) > 1e-6 for rate in self.rates):
+    def say_resampled(self, rate_of: Callable[[], float]) -> None:
+        """Log in one line how many of the motions that were read have another frame rate than a model's, for which a
+        model may have to be loaded."""
+        if not log.isEnabledFor(logging.INFO):
+            return
+        if count := sum(abs(rate - (fps := rate_of())) > 1e-6 for rate in self.rates):
             log.info("resampled %d of %d motions to %g fps", count, len(self.rates), fps)
 
 

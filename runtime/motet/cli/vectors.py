@@ -12,24 +12,26 @@ import click
 import numpy as np
 
 from motet.bundle.graph import Floats, SessionOptions
-from motet.cli.options import Tries, bar, bundle_option, in_place, noted, session_options, warned
-from motet.cli.reading import Read, read_options, unit_option
+from motet.cli.many import Many, jobs_option, many_options
+from motet.cli.options import bar, bundle_option, noted, session_options, warned
+from motet.cli.reading import read_options, unit_option
+from motet.corpus.answers import Embed
 from motet.errors import TextWarning
 from motet.files import check_place, write_whole
 from motet.formats import names_motion, read_motion
-from motet.models.describe import DescribeModel
 from motet.models.generate import GenerateModel
 from motet.models.load import load_as
 from motet.models.search import INDEX_FILE, Index, SearchModel
 
 
 @click.command()
-@click.argument("motions", nargs=-1, type=Path, metavar="[MOTION...]")
+@click.argument("motions", nargs=-1, type=Path, metavar="[MOTION|FOLDER|ZIP...]")
 @click.option("--text", "texts", multiple=True, help="A sentence, instead of motions; may be given several times.")
 @click.option("-o", "--out", required=True, type=Path, help="The .npy to write: (N, C) float32.")
 @click.option("--bundle", help="Name or path of a bundle. [default: describe, with --text generate]")
 @session_options
 @read_options
+@many_options
 @click.option("--json", "as_json", is_flag=True, help="Print a list with the input of each row.")
 def embed(
     motions: tuple[Path, ...],
@@ -37,7 +39,7 @@ def embed(
     out: Path,
     bundle: str | None,
     session: SessionOptions,
-    read: Read,
+    many: Many,
     as_json: bool,
 ) -> None:
     """Write context vectors of motion files, of each clip of a file of several, or of sentences, one row each, to
@@ -51,15 +53,13 @@ def embed(
     if out.suffix.lower() != ".npy":
         raise click.UsageError(f"context vectors are written as .npy, not {out.name!r}")
     check_place(out)
-    tries, rows = Tries(), list[dict[str, Any]]()
+    tries, rows = many.tries, list[dict[str, Any]]()
     if motions:
-        describer, prepared = load_as(DescribeModel, bundle or "describe", session), []
-        for source in read.sources(motions, every=True):
-            with tries.of(source) as caught:
-                prepared.append(describer.prepared(read(source)))
-                rows.append({"input": str(source), "in_place": in_place(caught)})
-        read.say_resampled(describer.fps)
-        vectors = describer.embed(prepared)
+        verb = Embed(many.read.options, bundle or "describe", session)
+        for answer in many.answers(verb, many.sources(motions), "embedding"):
+            rows += answer.rows
+        vectors = np.array([row.pop("vector") for row in rows])
+        many.read.say_resampled(lambda: verb.model.fps)
     else:
         generator = load_as(GenerateModel, bundle or "generate", session)
         usable = list(tries.usable(dict(enumerate(texts)), generator.unknown).values())
@@ -86,6 +86,7 @@ def _save(out: Path, vectors: Floats) -> None:
 @bundle_option("search")
 @click.option("--index", "file", type=Path, help=f"File for the vectors. [default: {INDEX_FILE} in FOLDER]")
 @unit_option
+@jobs_option
 @session_options
 @click.option(
     "--json", "as_json", is_flag=True, help="Print a list with path, clip, times, score and in_place of each."
@@ -97,6 +98,7 @@ def search(
     bundle: str,
     file: Path | None,
     unit_in: str | None,
+    jobs: int | None,
     session: SessionOptions,
     as_json: bool,
 ) -> None:
@@ -112,7 +114,7 @@ def search(
         with noted():
             model.ids(query)  # refused before all motions are read
     with bar("embedding") as progress:
-        index = Index.open(folder, model, file, unit=unit_in, progress=progress)
+        index = Index.open(folder, model, file, unit=unit_in, jobs=jobs, progress=progress)
     with warnings.catch_warnings(action="ignore", category=TextWarning), warned(query):  # words are said already
         hits = index.search(query if motion is None else motion, count)
     if as_json:

@@ -2,14 +2,15 @@
 
 import functools
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import click
 
-from motet.cli.reading import FPS, Source
+from motet.cli.reading import FPS
+from motet.corpus.sources import Source
 from motet.formats import ONTO, WRITABLE, Character, check_writable, put_onto, read_character, write_all_on, write_on
 from motet.formats.text import Names
 from motet.motion.humanoid import RIGS
@@ -101,7 +102,11 @@ def write_options(command: Callable[..., None]) -> Callable[..., None]:
 
 def spare(place: Path, *sources: Path) -> None:
     """Refuse a result that would take the place of a file that it is made from."""
-    if place.resolve() in {source.resolve() for source in sources}:
+    _spare(place, {source.resolve() for source in sources})
+
+
+def _spare(place: Path, sources: Collection[Path]) -> None:
+    if place.resolve() in sources:
         raise click.UsageError(f"{place} is an input and would be overwritten: name another file for the result")
 
 
@@ -140,7 +145,8 @@ def places(out: Path, sources: Sequence[Source | str], samples: int = 1, output:
         raise click.UsageError(
             "several results have the same name: give an OUT with {name} and, for clips, {clip}, or without both"
         )
+    given = {source.path.resolve() for source in sources if isinstance(source, Source)}
     for place in found:
         output.check(place) if output else check_writable(place)
-        spare(place, *(source.path for source in sources if isinstance(source, Source)))
+        _spare(place, given)
     return found

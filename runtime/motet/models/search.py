@@ -5,14 +5,13 @@ vector for each window of each motion, and ``index``, the bytes of a JSON object
 each motion file, its size and modification time, and its windows in seconds or why it could not be used.
 """
 
-import hashlib
 import io
 import json
 import logging
 import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, overload
 
@@ -25,6 +24,7 @@ from motet.files import files_in, write_whole
 from motet.formats import MOCAP, clips, read_motion
 from motet.formats.npz import array
 from motet.formats.text import MARK
+from motet.jobs import in_order
 from motet.models.language import MAX_SECONDS, LanguageModel
 from motet.motion.feet.treadmill import is_in_place, with_travel
 from motet.motion.motion import Motion
@@ -74,12 +74,6 @@ class SearchModel(LanguageModel):
         given = [sentences] if isinstance(sentences, str) else sentences
         found = self.contexts([self.ids(text) for text in given], "text")
         return found[0] if isinstance(sentences, str) else found
-
-    @cached_property
-    def identity(self) -> str:
-        """A unique identity of this model: its name, its version and a hash of its manifest."""
-        text = json.dumps(self.manifest.source, sort_keys=True).encode()
-        return f"{self.manifest.name} {self.manifest.version} {hashlib.sha256(text).hexdigest()[:16]}"
 
     def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
         """Frames (T, D) and a sentence ("text" of the settings) to ids (words,) int64 and the vectors (E,) of both."""
@@ -152,6 +146,7 @@ class Index:
         file: str | Path | None = None,
         *,
         unit: str | float | None = None,
+        jobs: int | None = 1,
         progress: Progress = silent,
     ) -> "Index":
         """The index of all motion files in a folder and its subfolders; or of the folder of an index file.
@@ -161,6 +156,7 @@ class Index:
         file: the index file, by default ".motet-search.npz" in the folder, if that is writable.
         unit: the length unit of files that do not state theirs, like in :func:`motet.read`; an index made with another
         unit is rebuilt.
+        jobs: processes for many files that are new or have changed; None: one for each core.
         progress: called with the number of motion files done and in total.
         FormatError for a missing folder, one without motion files, or an index that is damaged or of another model;
         MotionError where no motion can be used, or for an unknown unit.
@@ -171,7 +167,7 @@ class Index:
         kept = place if place.is_file() else Path(file or place / INDEX_FILE)
         before = _read(kept, model) if kept.is_file() else None
         folder = before.folder if before is not None and kept == place else place
-        found = _renewed(folder, model, before, unit, progress)
+        found = _renewed(folder, model, before, unit, jobs, progress)
         if before is None or (before.folder, before.unit, before.members) != (folder.absolute(), unit, found.members):
             _keep(found, kept, needed=file is not None)
         for path in found.vanished:
@@ -231,7 +227,12 @@ def direction(model: SearchModel, motion: Motion) -> Floats:
 
 
 def _renewed(
-    folder: Path, model: SearchModel, before: Index | None, unit: str | float | None, progress: Progress
+    folder: Path,
+    model: SearchModel,
+    before: Index | None,
+    unit: str | float | None,
+    jobs: int | None,
+    progress: Progress,
 ) -> Index:
     """The current index of a folder, reusing the entries of unchanged files."""
     known: dict[tuple[str, int, int], list[tuple[Member, Floats]]] = {}  # by path, size and modification time
@@ -244,20 +245,29 @@ def _renewed(
     paths = files_in(folder, MOCAP)
     if not paths:
         raise FormatError(folder, f"no motion files ({' '.join(MOCAP)}) are in it")
-    found: list[tuple[Member, Floats]] = []
-    for done, path in enumerate(paths, start=1):
-        state = path.stat()
-        file = Member(path.relative_to(folder).as_posix(), state.st_size, state.st_mtime_ns)
-        same = before is not None and before.unit == unit and known.get((file.path, file.size, file.changed))
-        found += same or _embedded(path, file, model, unit)
+    files = list(map(partial(_file, folder), paths))
+    kept = known if before is not None and before.unit == unit else {}
+    new = [file for file in files if (file.path, file.size, file.changed) not in kept]
+    embedded, found = (
+        in_order(partial(_embedded, folder, model=model, unit=unit), new, jobs),
+        list[tuple[Member, Floats]](),
+    )
+    for done, file in enumerate(files, start=1):
+        found += kept.get((file.path, file.size, file.changed)) or next(embedded)
         progress(done, len(paths))
     members, vectors = zip(*found, strict=True)
     gone = sorted({path for path, _, _ in known} - {member.path for member in members})
     return Index(model, folder, members, np.concatenate(vectors), tuple(folder / path for path in gone), unit)
 
 
-def _embedded(path: Path, file: Member, model: SearchModel, unit: str | float | None) -> list[tuple[Member, Floats]]:
+def _file(folder: Path, path: Path) -> Member:
+    state = path.stat()
+    return Member(path.relative_to(folder).as_posix(), state.st_size, state.st_mtime_ns)
+
+
+def _embedded(folder: Path, file: Member, model: SearchModel, unit: str | float | None) -> list[tuple[Member, Floats]]:
     """The members of a motion file, one for each clip, with their windows' vectors, or with the reason for none."""
+    path = folder / file.path
     try:
         names = clips(path)
     except MotetError:  # it is said when the file is read
@@ -283,7 +293,7 @@ def _keep(index: Index, file: Path, needed: bool) -> None:
     """Write the file; if not ``needed``, only warn where that fails."""
     text = {
         "version": VERSION,
-        "model": index.model.identity,
+        "model": index.model.manifest.identity,
         "folder": str(index.folder.absolute()),
         "unit": index.unit,
         "members": [asdict(member) for member in index.members],
@@ -311,8 +321,12 @@ def _read(file: Path, model: SearchModel) -> Index:
     except Exception as error:
         reason = str(error)[:200]
         raise FormatError(file, f"not an index of motions: {reason}; remove it, or name another") from error
-    if version != VERSION or made != model.identity:
-        by = f"the model {made}, not {model.identity}" if version == VERSION else f"another motet (version {version})"
+    if version != VERSION or made != model.manifest.identity:
+        by = (
+            f"the model {made}, not {model.manifest.identity}"
+            if version == VERSION
+            else f"another motet (version {version})"
+        )
         raise FormatError(file, f"this index was made by {by}: remove it, or name another")
     if vectors.shape != (sum(len(member.windows) for member in members), model.sizes["E"]):
         raise FormatError(file, "this index is damaged: its vectors are not those of its windows; remove it")

@@ -1,0 +1,152 @@
+"""Motion files that are named one by one, by folders, patterns or zips, and the clips in them."""
+
+import glob
+import hashlib
+import tempfile
+import zipfile
+import zlib
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from motet.errors import FormatError, MotetError, MotionError
+from motet.files import files_in, place_of
+from motet.formats import CLIPPED, MOCAP, READABLE, clips, read_motion
+from motet.formats.text import MARK, chosen, plain_names, split_clip
+from motet.motion.motion import Motion
+
+KINDS = tuple(dict.fromkeys((*MOCAP, *CLIPPED)))
+"""The extensions of what is taken of a folder or zip."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """A motion file, and which clip of it; None for the first.
+
+    path: of the file; one in a zip has the zip's path before its own: a.zip/walks/1.bvh. place: where its result is
+    written, if it is written to a file of its own.
+    """
+
+    path: Path
+    clip: str | None = None
+    place: Path | None = None
+
+    def __str__(self) -> str:
+        return str(self.path) if self.clip is None else f"{self.path}{MARK}{self.clip}"
+
+    @property
+    def name(self) -> str:
+        """What stands for ``{name}`` in the names of results."""
+        return self.path.stem
+
+    @property
+    def label(self) -> str:
+        """What stands for ``{clip}``: the clip's name, as a file name can have it, or the file's where it has none."""
+        names, index = self._clips()
+        # what the name of a file cannot have, on one system or another
+        return plain_names(names, r'[<>:"/\\|?*#\x00-\x1f]|^[. ]|[. ]$')[index]
+
+    @property
+    def title(self) -> str:
+        """What its result is called as a clip: the clip's name where one was asked for, else the file's."""
+        names, index = self._clips()
+        return self.name if self.clip is None else names[index]
+
+    def read(self, **options: Any) -> Motion:
+        """The motion, with options of :func:`motet.read`; FormatError as there, and for a damaged zip."""
+        with opened(self.path) as file:
+            return read_motion(file, clip=self.clip, **options)
+
+    def hash(self) -> str:
+        """SHA-256 of the file, in hex; "" where it cannot be read."""
+        try:
+            with opened(self.path) as file, file.open("rb") as content:
+                return hashlib.file_digest(content, "sha256").hexdigest()
+        except (MotetError, OSError):
+            return ""
+
+    def _clips(self) -> tuple[tuple[str, ...], int]:
+        """The names of the file's clips, its own where it has none, and which of them it is."""
+        try:
+            with opened(self.path) as file:
+                names = clips(file)
+            return names, chosen(self.path, names, 1 if self.clip is None else self.clip)
+        except MotetError:
+            return (self.name,), 0
+
+
+def files_of(given: Sequence[Path]) -> list[Path]:
+    """The motion files that are meant: of folders and zips all in them, of patterns what they match, each in order of
+    names. FormatError for a folder, zip or pattern without any."""
+    return [file for path in given for file in _files(path)]
+
+
+def _files(path: Path) -> list[Path]:
+    if path.is_dir():
+        found, where = files_in(path, KINDS), "are in it"
+    elif path.suffix.lower() == ".zip" and path.is_file():
+        found, where = [path / name for name in _members(path)], "are in it"
+    elif glob.has_magic(str(path)) and not place_of(split_clip(path, READABLE)[0]).exists():
+        matching = sorted(Path(path.anchor).glob(str(path.relative_to(path.anchor))))
+        found, where = [one for one in matching if one.suffix.lower() in KINDS], "have such names"
+    else:
+        return [path]
+    if not found:
+        raise FormatError(path, f"no motion files ({' '.join(KINDS)}) {where}")
+    return found
+
+
+def sources_of(file: Path, clip: str | None = None, every: bool = False) -> list[Source]:
+    """What a file holds, as its own name (a.glb#Walk) or ``clip`` says: a name, a number or "all". every: all clips
+    where nothing does."""
+    path, named = split_clip(file, READABLE)
+    path, asked = place_of(path), "all" if every and clip is None else clip
+    if named is not None or asked != "all":
+        return [Source(path, asked if named is None else named)]
+    try:
+        with opened(path) as place:
+            names = clips(place)
+    except MotetError:  # it is said when the file is read
+        names = ()
+    return [Source(path, name) for name in names] if len(names) > 1 else [Source(path)]
+
+
+def _members(path: Path) -> list[str]:
+    """The motion files of a zip by name, but for hidden ones."""
+    with _zip(path) as archive:
+        names = sorted(archive.namelist())
+    shown = (name for name in names if not any(part[0] in "._" for part in PurePosixPath(name).parts))
+    return [name for name in shown if PurePosixPath(name).suffix.lower() in KINDS]
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[Path]:
+    """Where a file lies; one in a zip is unpacked for as long as the context lasts, with the skeletons (.asf) beside it
+    and in the folders above. Errors name it by its path in the zip."""
+    box = next((parent for parent in path.parents if parent.suffix.lower() == ".zip" and parent.is_file()), None)
+    if box is None or path.exists():
+        yield path
+        return
+    inside = PurePosixPath(path.relative_to(box).as_posix())
+    with tempfile.TemporaryDirectory(prefix="motet-") as folder:
+        try:
+            with _zip(box) as archive:
+                beside = (PurePosixPath(name) for name in archive.namelist() if name.lower().endswith(".asf"))
+                for name in (inside, *(name for name in beside if name.parent in inside.parents)):
+                    archive.extract(str(name), folder)
+        except (KeyError, OSError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
+            raise FormatError(path, f"cannot be unpacked: {error}") from error
+        try:
+            yield Path(folder) / inside
+        except MotionError as error:
+            line, reason = getattr(error, "line", None), getattr(error, "reason", str(error))
+            raise FormatError(path, str(reason).replace(folder, str(box)), line) from error
+
+
+def _zip(path: Path) -> zipfile.ZipFile:
+    try:
+        return zipfile.ZipFile(path)
+    except (zipfile.BadZipFile, OSError) as error:
+        raise FormatError(path, f"not a readable zip file: {error}") from error

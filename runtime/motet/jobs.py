@@ -1,0 +1,83 @@
+"""Many things on all cores: a function of each, in processes, with results in the order of what was given."""
+
+import os
+import pickle
+import signal
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from functools import cache
+from itertools import chain, islice
+from typing import Any, TypeVar
+
+from motet.errors import MotetError
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+FEW = 8
+"""Fewer things are done before other processes have started."""
+
+_sent = b""
+"""In a process of its own: what it does with each thing, pickled."""
+
+
+def in_order(function: Callable[[T], R], given: Iterable[T], jobs: int | None, few: int = FEW) -> Iterator[R]:
+    """The results of a function, in the order of what is given, each as soon as those before it are there.
+
+    jobs: processes; 1: this one, None: one for each core that may be used. few: fewer things are done in this one. At
+    most four results for each process wait, so memory does not grow. What the function raises ends all; what is
+    interrupted starts no more. MotetError where a process was killed.
+    """
+    first, jobs = list(islice(rest := iter(given), few)), cores() if jobs is None else jobs
+    if jobs < 2 or len(first) < few:
+        yield from map(function, chain(first, rest))
+        return
+    with ProcessPoolExecutor(jobs, initializer=_begin, initargs=(pickle.dumps(function),)) as pool:
+        waiting: deque[Future[R]] = deque()
+        try:
+            for one in chain(first, rest):
+                waiting.append(pool.submit(_do, one))
+                if len(waiting) > 4 * jobs:
+                    yield waiting.popleft().result()
+            while waiting:
+                yield waiting.popleft().result()
+        except BrokenProcessPool as error:
+            said = "a process was killed, as where memory is short: give fewer --jobs"
+            raise MotetError(said) from error
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def in_batches(
+    function: Callable[[Sequence[T]], Sequence[R]], given: Sequence[T], jobs: int | None, most: int
+) -> Iterator[R]:
+    """The results of a function of batches, of at most ``most`` things each, one for each thing; else as
+    :func:`in_order`."""
+    jobs = 1 if len(given) < FEW else cores() if jobs is None else jobs
+    size = most if jobs == 1 else max(1, min(most, len(given) // (4 * jobs)))
+    batches = (given[start : start + size] for start in range(0, len(given), size))
+    yield from chain.from_iterable(in_order(function, batches, jobs, few=1))
+
+
+def cores() -> int:
+    """How many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _begin(function: bytes) -> None:
+    global _sent  # noqa: PLW0603  sent once, not with each thing
+    _sent = function
+    _function.cache_clear()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt is for the first process, which then ends the others
+
+
+@cache
+def _function() -> Callable[[Any], Any]:
+    found: Callable[[Any], Any] = pickle.loads(_sent)
+    return found
+
+
+def _do(one: Any) -> Any:
+    return _function()(one)
