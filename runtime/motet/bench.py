@@ -124,7 +124,7 @@ def steer_figures(model: SteerModel, seconds: float, _: Path | None = None) -> F
     """A tick of one character that walks, and of 1000 that go all ways, without and with the foot lock; and the
     positions of all joints of the crowd.
 
-    Of ticks the median, the mean and the 99th percentile: only one in a few searches the table, for all at once.
+    Of ticks the median, the mean and the 99th percentile: of one character, only one in a few searches the table.
     """
     found: Figures = {}
     for name, characters, unit in (("tick", 1, "us"), ("crowd", 1000, "ms")):

@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
+import motet
 from motet.decode.matching import (
     FEATURES,
     TRAJECTORY,
     Matcher,
     Playback,
+    Query,
     SteeringSettings,
     Table,
     horizons,
@@ -39,7 +41,8 @@ def matcher(table: Table) -> Matcher:
 def test_the_search_finds_what_looking_at_every_row_finds(table: Table, matcher: Matcher) -> None:
     rng = np.random.default_rng(1)
     asked, gait = rng.normal(size=(20, FEATURES)).astype(np.float32), rng.integers(2, size=20)
-    rows, mirrors, costs = matcher.best(asked, gait)
+    asked = np.round(asked * Matcher.STEPS).astype(np.float32) / Matcher.STEPS
+    rows, mirrors, costs = matcher.best(matcher.query(asked), gait)
     columns, signs = mirrored_features()
     for wanted, kind, row, mirror, cost in zip(asked, gait, rows, mirrors, costs, strict=True):
         usable = [i for i in range(ROWS) if table.shows[i, kind] and table.left[i] >= SETTINGS.lasting]
@@ -53,9 +56,26 @@ def test_the_search_finds_what_looking_at_every_row_finds(table: Table, matcher:
                 found[i, image] = float(((features - wanted) ** 2).sum() / 2 + SETTINGS.lag * lag)
         assert (row, mirror) == min(found, key=found.__getitem__)
         assert cost + float((wanted**2).sum()) / 2 == pytest.approx(min(found.values()), rel=1e-3)
-    np.testing.assert_allclose(matcher.cost_at(asked, rows, mirrors), costs, atol=1e-3)
-    for one, found in enumerate(zip(rows, mirrors, costs, strict=True)):
-        assert [part[0] for part in matcher.best(asked[one : one + 1], gait[one : one + 1])] == list(found)
+    np.testing.assert_allclose(matcher.cost_at(matcher.query(asked), rows, mirrors), costs, atol=1e-3)
+
+
+def test_costs_are_the_same_bits_alone_and_in_blocks_in_any_order() -> None:
+    matcher = motet.load("control").matcher
+    rng = np.random.default_rng(5)
+    goals = matcher.goals[0]
+    asked = matcher.table.features[0, rng.choice(goals.rows, 70)] + rng.normal(size=(70, FEATURES), scale=3)
+    asked[0] = 100  # far more than there is
+    query, gait = matcher.query(asked.astype(np.float32)), rng.integers(2, size=70)
+    together = matcher.best(query, gait)
+    for order in (rng.permutation(70), [3], [0]):
+        for found, wanted in zip(
+            matcher.best(Query(*(part[order] for part in query)), gait[order]), together, strict=True
+        ):
+            np.testing.assert_array_equal(found, wanted[order])
+    np.testing.assert_array_equal(matcher.cost_at(query, *together[:2]), together[2])
+    exact = query.features.astype(np.float64) @ goals.costs.astype(np.float64)
+    np.testing.assert_array_equal(query.features @ goals.costs, exact)
+    np.testing.assert_array_equal(query.lags @ goals.lags, query.lags.astype(np.float64) @ goals.lags)
 
 
 def test_a_mirror_image_of_a_mirror_image_is_the_row(table: Table) -> None:
@@ -110,7 +130,7 @@ def test_codes_of_a_pose_come_back_from_it() -> None:
     quats = rng.normal(size=(5, 3, 4)) + np.array([0, 0, 0, 9])
     quats /= np.linalg.norm(quats, axis=-1, keepdims=True)
     values = np.column_stack([quats.reshape(5, 12), rng.normal(size=5)])
-    poses = PoseCodes(values.mean(axis=0), rng.normal(size=(13, 13)))
+    poses = PoseCodes(values.mean(axis=0), rng.normal(size=(13, 13)).astype(np.float16).astype(np.float64))
     codes = poses.encode(-quats.astype(np.float32), values[:, -1].astype(np.float32))
     rotations, height = poses.decode(codes)
     np.testing.assert_allclose(rotations, quats, atol=1e-5)

@@ -62,6 +62,38 @@ def test_each_of_a_crowd_moves_as_it_would_alone(model: SteerModel) -> None:
                 np.testing.assert_array_equal(getattr(together, part), single)
 
 
+def test_each_of_many_searches_in_its_turn_and_moves_as_it_would_alone(
+    model: SteerModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    count, every = 44, model.matcher.settings.search_every
+    ways = np.linspace(-180, 180, count)
+    crowd = model.start(characters=count)
+    who = [0, 5, 13, 43]
+    alone = [model.start(phases=n % every) for n in who]
+    sizes: list[int] = []
+    best = model.matcher.best
+    for turn, gait in ((0, "walk"), (90, "run")):
+        crowd.control(gait=gait, speed=1.5, direction=ways + turn)
+        for session, n in zip(alone, who, strict=True):
+            session.control(gait=gait, speed=1.5, direction=ways[n] + turn)
+        for _ in range(40):
+            with monkeypatch.context() as patch:
+                patch.setattr(model.matcher, "best", lambda query, kind: sizes.append(len(kind)) or best(query, kind))
+                together = crowd.tick()
+            for session, n in zip(alone, who, strict=True):
+                one = session.tick()
+                for part in ("ground", "height", "rotations", "contacts"):
+                    np.testing.assert_array_equal(getattr(together, part)[n], getattr(one, part)[0])
+    assert set(sizes) == {count // every, count // every + 1}  # in every tick as many
+    assert np.hypot(*together.ground[:, :2].T).min() > 1
+
+
+@pytest.mark.parametrize("phases", [6, -1, 0.5, [0, 1, 2], "one", [0, np.nan]])
+def test_phases_that_make_no_sense(model: SteerModel, phases: Any) -> None:
+    with pytest.raises(ControlError, match="phases must be whole numbers from 0 to 5, for all or for each of 2"):
+        model.start(characters=2, phases=phases)
+
+
 def test_a_snapshot_comes_back_to_the_same_bits(model: SteerModel) -> None:
     session = model.start(characters=2)
     session.control(speed=1.4, direction=[0, 45])

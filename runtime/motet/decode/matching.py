@@ -88,6 +88,7 @@ class SteeringSettings(Settings):
 
 
 Rows = NDArray[np.int64]
+ALL = slice(None)
 
 
 @dataclass(eq=False)
@@ -95,7 +96,8 @@ class Playback:
     """Of B figures; K are the codes of a pose. Whole numbers are int64, others float64.
 
     row, part: (B,) the row that is played, and the part of the way to the next one. mirror: (B,) 1 for the mirror image
-    of the row, else 0. rate: (B,) rows that are played in the next tick. ticks_to_search: (B,).
+    of the row, else 0. rate: (B,) rows that are played in the next tick. ticks_to_search: (B,). in_turn: (B,) bool,
+    whether a figure searches in its turn alone, or whenever it is told something.
     root: (B, 3) x, z in metres and facing in radians. spring, spring_rate: (B, 3) the springs that approach the target:
     velocity along x and z in m/s and facing in radians, and how fast they change. offset, offset_rate: (B, K) the
     inertialization offset of the codes, and how fast it changes.
@@ -106,6 +108,7 @@ class Playback:
     mirror: Rows
     rate: Array
     ticks_to_search: Rows
+    in_turn: NDArray[np.bool_]
     root: Array
     spring: Array
     spring_rate: Array
@@ -113,13 +116,17 @@ class Playback:
     offset_rate: Array
 
     @staticmethod
-    def at(row: int, figures: int, codes: int) -> "Playback":
-        """Figures at the origin that play a row, and search in the next tick."""
-        # all search in the same tick: each moves as it would alone
+    def at(row: int, figures: int, codes: int, phases: Rows | None = None) -> "Playback":
+        """Figures at the origin that play a row, and search in the next tick; or each after as many as its phase
+        (figures,), and from then on in its turn alone."""
         whole, ground, pose = (np.zeros(shape) for shape in (figures, (figures, 3), (figures, codes)))
         rows, count = np.full(figures, row, dtype=np.int64), np.zeros(figures, dtype=np.int64)
-        found = Playback(rows, whole, count, whole + 1, count, ground, ground, ground, pose, pose)
-        return found.copy()
+        ticks, in_turn = count if phases is None else phases, np.full(figures, phases is not None)
+        return Playback(rows, whole, count, whole + 1, ticks, in_turn, ground, ground, ground, pose, pose).copy()
+
+    def hasten(self, who: NDArray[np.bool_]) -> None:
+        """Let those of figures (B,) that wait for no turn search in the next tick."""
+        self.ticks_to_search[who & ~self.in_turn] = 0
 
     def copy(self) -> "Playback":
         """One that shares no array."""
@@ -135,6 +142,9 @@ speed at the second of them. The others say how it is now, all seen from the fac
 of both feet, three numbers each, the hips' velocity, and the places of both hands."""
 
 FEATURES = TRAJECTORY + 21
+
+LAST = slice(2 * HORIZONS - 2, 2 * HORIZONS)
+"""The features that say where a row leads at the last of the horizons: left and forward."""
 
 
 def mirrored_features() -> tuple[NDArray[np.intp], Floats]:
@@ -190,45 +200,71 @@ class Table:
         """K."""
         return len(self.frames[0, 0]) - 6
 
-    def at(self, playback: Playback) -> tuple[Array, Array]:
-        """What is played (B, K + 6), between two rows, and by how much it changes from the one to the other."""
-        first = self.frames[playback.mirror, playback.row].astype(np.float64)
-        change = self.frames[playback.mirror, playback.row + 1] - first
-        return first + playback.part[:, None] * change, change
-
-    def places(self, features: NDArray[Any]) -> NDArray[Any]:
-        """Where features (..., F) lead at the last of the horizons (..., 2): left and forward, metres."""
-        last = slice(2 * HORIZONS - 2, 2 * HORIZONS)
-        found: NDArray[Any] = features[..., last] / self.scale[last] + self.mean[last]
-        return found
+    def at(self, playback: Playback, who: Rows | slice = ALL) -> tuple[Array, Array]:
+        """What figures (n,) play (n, K + 6), between two rows, and by how much it changes from the one to the other."""
+        mirror, row = playback.mirror[who], playback.row[who]
+        first = self.frames[mirror, row].astype(np.float64)
+        change = self.frames[mirror, row + 1] - first
+        return first + playback.part[who, None] * change, change
 
 
 class Goals(NamedTuple):
-    """Rows of a gait (M,) that may be jumped to; and of them, followed by their mirror images, the features (F, 2 M),
-    half their squared length (2 M,), and where they lead (2 M, 2)."""
+    """Rows of a gait (M,) that may be jumped to. costs: (T, F + 1, W) of them, followed by their mirror images, the
+    features and half their squared length; in T tiles of W columns, the last filled up with what costs infinitely much.
+    lags: (T, 3, W) the features that say where they lead, and ones."""
 
     rows: Rows
+    costs: Floats
+    lags: Floats
+
+    @staticmethod
+    def of(rows: Rows, columns: Floats, width: int) -> "Goals":
+        """Those of rows (M,), of columns (2 M, F + 1), in tiles of a width."""
+        costs = np.zeros((-(-len(columns) // width) * width, FEATURES + 1), dtype=np.float32)
+        costs[:, -1] = np.inf
+        costs[: len(columns)] = columns
+        costs = np.ascontiguousarray(costs.reshape(-1, width, FEATURES + 1).swapaxes(1, 2))
+        return Goals(rows, costs, np.concatenate([costs[:, LAST], np.ones_like(costs[:, :1])], axis=1))
+
+
+class Query(NamedTuple):
+    """What n figures look for, in float32 steps of 1 / ``Matcher.STEPS``: times a row's columns of :class:`Goals` it is
+    what that row costs, more than a constant, and the lag, where it is above 0.
+
+    features: (n, F + 1). lags: (n, 3)."""
+
     features: Floats
-    half: Floats
-    places: Floats
+    lags: Floats
 
 
 class Matcher:
-    """Searches a table, and jumps."""
+    """Searches a table, and jumps.
+
+    What is asked is rounded to 1 / ``STEPS`` of a feature's scaled unit, as features are to 1 / 16: products are then
+    whole multiples of a number, and their sums as exact in float32 as they are small, below ``STEPS`` x 16. So a figure
+    finds the same row alone as in a block, whatever the order in which a processor adds.
+    """
+
+    STEPS = 256
+    LARGEST = 16.0
+    """Features that are asked are no larger, on either side of 0."""
+
+    BLOCK, TILE = 32, 224
+    """Figures and columns of the products: they stay in a processor's cache, and OpenBLAS starts no threads for them,
+    which on a busy machine wait for each other."""
 
     def __init__(self, table: Table, settings: SteeringSettings, fps: float) -> None:
         self.table, self.settings, self.fps = table, settings, fps
         # the rows that are played until the next search, at most
         self.reserve = int(np.ceil((settings.search_every + 1) * settings.fastest)) + 2
         self.least_left = max(self.reserve, settings.lasting)
-        self.half: Floats = (table.features[0] ** 2).sum(axis=1) / 2
+        half: Floats = (table.features[0] ** 2).sum(axis=1) / 2
+        self.costs = np.concatenate([table.features, np.stack([half, half])[..., None]], axis=2)
         self.flies = table.frames[0, :, -2:].max(axis=1) < settings.stands
         self.goals = []
         for shows in table.shows.T:
             rows = np.flatnonzero(shows & (table.left >= self.least_left) & ~self.flies)[:: settings.row_step]
-            features = table.features[:, rows].reshape(-1, FEATURES)
-            places = table.places(features).astype(np.float32)
-            self.goals.append(Goals(rows, np.ascontiguousarray(features.T), np.tile(self.half[rows], 2), places))
+            self.goals.append(Goals.of(rows, self.costs[:, rows].reshape(-1, FEATURES + 1), self.TILE))
 
     def stillest(self, gait: int) -> int:
         """The row of a gait in which there is the least speed; of those that something follows."""
@@ -246,20 +282,21 @@ class Matcher:
             return
         playback.ticks_to_search[who] = self.settings.search_every - 1
         row, mirror, kind = playback.row[who] + (playback.part[who] > 0.5), playback.mirror[who], gait[who]
-        query = self.table.features[mirror, row]
-        wanted = self.desired_trajectory(playback, target)[who]
-        query[:, :TRAJECTORY] = (wanted - self.table.mean[:TRAJECTORY]) * self.table.scale[:TRAJECTORY]
+        asked = self.table.features[mirror, row]
+        wanted = self.desired_trajectory(playback, target, who)
+        asked[:, :TRAJECTORY] = (wanted - self.table.mean[:TRAJECTORY]) * self.table.scale[:TRAJECTORY]
+        query = self.query(asked)
         best, image, cost = self.best(query, kind)
         stays = self.table.shows[row, kind] & (self.table.left[row] >= self.reserve)
         near = (best >= row - self.settings.jump_back) & (best <= row + self.settings.jump_ahead)  # on either side
         stays &= near | self.flies[row] | (self.cost_at(query, row, mirror) <= cost)
         self.jump(playback, who[~stays], best[~stays], image[~stays])
 
-    def desired_trajectory(self, playback: Playback, target: Array) -> Array:
-        """Where the springs lead: features (B, TRAJECTORY), not yet scaled."""
-        how, facing = self.settings, playback.root[:, 2]
+    def desired_trajectory(self, playback: Playback, target: Array, who: Rows | slice = ALL) -> Array:
+        """Where the springs of figures (n,) lead: features (n, TRAJECTORY), not yet scaled."""
+        how, facing, target = self.settings, playback.root[who, 2], target[who]
         cos, sin = np.cos(facing), np.sin(facing)
-        off, rate = playback.spring - target, playback.spring_rate
+        off, rate = playback.spring[who] - target, playback.spring_rate[who]
         travel, turns = (off[:, :2], rate[:, :2]), (wrapped(off[:, 2]), rate[:, 2])
         slow, calm = damping_of(how.velocity), damping_of(how.facing)
         places, facings, times = [], [], horizons(how)
@@ -271,50 +308,61 @@ class Matcher:
         speed = np.hypot(*(target[:, :2] + damped(*travel, slow, times[1])[0]).T)
         return np.stack([*places, *facings, speed_feature(speed, how)], axis=1)
 
-    def best(self, query: Floats, gait: Rows) -> tuple[Rows, Rows, Floats]:
-        """For features (n, F) and gaits (n,) the row (n,), 1 where it is mirrored (n,), and its cost (n,)."""
-        row, mirror, cost = np.empty(len(gait), np.int64), np.empty(len(gait), np.int64), np.empty_like(query[:, 0])
-        # each by itself: how a product rounds depends on how many rows it has
-        for one, kind in enumerate(gait.tolist()):
-            goals, (way, far) = self.goals[kind], self._way(query[one])
-            lag = np.maximum(far / 2 - goals.places @ way, 0)
-            costs = goals.half + np.float32(self.settings.lag) * lag - query[one] @ goals.features
-            at = int(costs.argmin())
-            mirror[one], place = divmod(at, len(goals.rows))
-            row[one], cost[one] = goals.rows[place], costs[at]
+    def query(self, asked: Floats) -> Query:
+        """What is looked for, of features (n, F) that are asked."""
+        table, last = self.table, LAST
+        left, forward = (asked[:, last] / table.scale[last] + table.mean[last]).T
+        far = np.hypot(left, forward)
+        way = np.stack([left, forward]) * (self.settings.lag / np.maximum(far, 1e-6))
+        lacks = far * self.settings.lag / 2 - table.mean[last] @ way
+        features = np.concatenate([-asked.clip(-self.LARGEST, self.LARGEST), np.ones_like(asked[:, :1])], axis=1)
+        lags = np.column_stack([*-way / table.scale[last, None], lacks])
+        return Query(*((np.rint(values * self.STEPS) / self.STEPS).astype(np.float32) for values in (features, lags)))
+
+    def best(self, query: Query, gait: Rows) -> tuple[Rows, Rows, Floats]:
+        """For what n figures look for and gaits (n,) the row (n,), 1 where it is mirrored (n,), and its cost (n,)."""
+        row, mirror, cost = (
+            np.empty(len(gait), np.int64),
+            np.empty(len(gait), np.int64),
+            np.empty(len(gait), np.float32),
+        )
+        for kind in set(gait.tolist()):
+            goals, figures = self.goals[kind], np.flatnonzero(gait == kind)
+            for start in range(0, len(figures), self.BLOCK):
+                who = figures[start : start + self.BLOCK]
+                costs = query.features[who] @ goals.costs  # (T, n, W)
+                costs += np.maximum(query.lags[who] @ goals.lags, 0)
+                column = costs.argmin(axis=2)
+                least = np.take_along_axis(costs, column[..., None], axis=2)[..., 0]
+                tile, each = least.argmin(axis=0), np.arange(len(who))
+                mirror[who], place = np.divmod(tile * self.TILE + column[tile, each], len(goals.rows))
+                row[who], cost[who] = goals.rows[place], least[tile, each]
         return row, mirror, cost
 
-    def cost_at(self, query: Floats, row: Rows, mirror: Rows) -> Floats:
+    def cost_at(self, query: Query, row: Rows, mirror: Rows) -> Floats:
         """The cost (n,) of given rows, as :meth:`best` gives it."""
-        own = self.table.features[mirror, row]
-        way, far = self._way(query)
-        lag = np.maximum(far / 2 - (way * self.table.places(own)).sum(axis=1), 0)
-        found: Floats = self.half[row] + self.settings.lag * lag - (query * own).sum(axis=1)
+        own = self.costs[mirror, row]
+        lag = (query.lags[:, :2] * own[:, LAST]).sum(axis=1) + query.lags[:, 2]
+        found: Floats = (query.features * own).sum(axis=1) + np.maximum(lag, 0)
         return found
-
-    def _way(self, query: Floats) -> tuple[Floats, Floats]:
-        """The direction (..., 2) and how far (...) features (..., F) lead at the last of the horizons."""
-        places: Floats = self.table.places(query).astype(np.float32)
-        far: Floats = np.hypot(places[..., 0], places[..., 1])
-        return (places / np.maximum(far, np.float32(1e-6))[..., None]).astype(np.float32), far
 
     def jump(self, playback: Playback, who: Rows, row: Rows, mirror: Rows) -> None:
         """Let figures (n,) continue from rows (n,) and mirror images (n,); what their poses lose goes into the
         inertialization offset."""
         if not len(who):
             return
-        before, speed = self._codes(playback)
+        before, speed = self._codes(playback, who)
         playback.row[who], playback.part[who], playback.mirror[who] = row, 0, mirror
-        after, speed_after = self._codes(playback)
-        playback.offset = playback.offset + (before - after)
-        playback.offset_rate = playback.offset_rate + (speed - speed_after)
+        after, speed_after = self._codes(playback, who)
+        playback.offset[who] += before - after
+        playback.offset_rate[who] += speed - speed_after
 
     def pose(self, playback: Playback, codes: Array) -> None:
         """Let all figures have the codes (B, K) of another pose; they come back to what they play."""
         now, _ = self._codes(playback)
         playback.offset, playback.offset_rate = codes - now, np.zeros_like(now)
 
-    def _codes(self, playback: Playback) -> tuple[Array, Array]:
-        """The codes (B, K) that are played, and how fast they change, a second."""
-        now, change = self.table.at(playback)
+    def _codes(self, playback: Playback, who: Rows | slice = ALL) -> tuple[Array, Array]:
+        """The codes (n, K) that figures (n,) play, and how fast they change, a second."""
+        now, change = self.table.at(playback, who)
         return now[:, : self.table.codes], change[:, : self.table.codes] * self.fps

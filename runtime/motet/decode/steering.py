@@ -15,12 +15,15 @@ from motet.decode.matching import Matcher, Playback, Rows, SteeringSettings
 from motet.motion.pose import Pose, damped, damping_of
 from motet.motion.rotations import Array, wrapped
 
+BLOCK = 64
+"""Poses of a product: so few that OpenBLAS starts no threads, which on a busy machine wait for each other."""
+
 
 @dataclass(frozen=True, eq=False)
 class PoseCodes:
     """Poses in few numbers: quaternions and the hips' height are a linear map of codes.
 
-    mean: (P,) the pose whose codes are 0. basis: (K, P) what each code adds to it; float64.
+    mean: (P,) the pose whose codes are 0. basis: (K, P) what each code adds to it, of float16; both float64.
     """
 
     mean: Array
@@ -28,8 +31,12 @@ class PoseCodes:
 
     def decode(self, codes: Array) -> tuple[Floats, Floats]:
         """Codes (B, K) to unit quaternions (B, J, 4) and the hips' height (B,) in metres, both float32."""
-        # one row at a time: how a product rounds depends on how many rows it has
-        values = self.mean + np.matmul(codes[:, None], self.basis)[:, 0]
+        # so that sums are exact, and a pose is the same alone as in a block: the basis has multiples of 2^-24
+        codes = np.rint(codes * 2**20) / 2**20
+        values = np.empty((len(codes), len(self.mean)))
+        for start in range(0, len(codes), BLOCK):
+            np.matmul(codes[start : start + BLOCK], self.basis, out=values[start : start + BLOCK])
+        values += self.mean
         quats = values[:, :-1].reshape(len(values), -1, 4)
         quats /= np.sqrt(np.maximum((quats * quats).sum(axis=2, keepdims=True), 1e-12))
         return quats.astype(np.float32), values[:, -1].astype(np.float32)

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from motet.bundle.fields import LARGEST, Fields
 from motet.bundle.graph import Arrays, Graph
 from motet.bundle.manifest import Manifest
-from motet.decode.matching import FEATURES, Matcher, Playback, SteeringSettings, Table
+from motet.decode.matching import FEATURES, Matcher, Playback, Rows, SteeringSettings, Table
 from motet.decode.steering import PoseCodes
 from motet.errors import BundleError, ControlError
 from motet.models.base import LARGEST_CROWD, ControlModel
@@ -22,6 +22,9 @@ from motet.motion.pose import Pose
 from motet.motion.rotations import rotmat_to_quat
 from motet.representation.root_sixd import ROOT_SIXD, SIXD_KINDS, joint_rotations
 from motet.settings import checked_int
+
+SPREAD_FROM = 32
+"""From so many characters on the searches of a session are spread over the ticks."""
 
 FEATURE_STEPS = 16  # in which tables hold a scaled unit of a feature, in 8 bits
 
@@ -88,6 +91,7 @@ class SteerModel(ControlModel):
         places: ArrayLike | None = None,
         hold_feet: bool = True,
         strict: bool = False,
+        phases: ArrayLike | None = None,
     ) -> SteerSession:
         """A session of ``characters`` figures that stand still, or continue from a motion's last pose.
 
@@ -95,18 +99,37 @@ class SteerModel(ControlModel):
             and facing in degrees; by default all are at the origin and face z.
         hold_feet: keep planted feet in place, by turning hips and knees. strict: refuse a speed outside a gait's range,
             instead of clamping it.
+        phases: a whole number for all or for each, from 0, less than the ``search_every`` of the bundle's settings: the
+            ticks until its first search of the table. From then on it searches in its turn alone, every
+            ``search_every`` ticks, and what it is told waits for that. By default the phases of 32 characters or more
+            are 0, 1, 2 and so on in turn, so that each tick costs the same; fewer search after every command. A
+            character moves as it would alone with its phase.
         ControlError for values out of range, MotionError for a motion that does not fit.
         """
         characters = checked_int("characters", characters, 1, LARGEST_CROWD, ControlError)
         gait = self.gaits[0] if start is None or isinstance(start, Motion) else start
         number = self.abilities.number(gait)
-        playback = Playback.at(self.matcher.stillest(number), characters, self.sizes["K"])
+        spread = self._phases(characters, phases)
+        playback = Playback.at(self.matcher.stillest(number), characters, self.sizes["K"], spread)
         session = SteerSession(self, playback, number, hold_feet, strict)
         if isinstance(start, Motion):
             session.take(self.pose_of(start))
         if places is not None:
             session.put(places)
         return session
+
+    def _phases(self, characters: int, given: ArrayLike | None) -> Rows | None:
+        """The phase of each character; None for those that search after every command."""
+        every = self.matcher.settings.search_every
+        if given is None:
+            return np.arange(characters) % every if characters >= SPREAD_FROM else None
+        found = np.asarray(given)
+        fits = found.shape in ((), (characters,)) and found.dtype.kind in "iu"
+        if not (fits and (found >= 0).all() and (found < every).all()):
+            raise ControlError(
+                f"phases must be whole numbers from 0 to {every - 1}, for all or for each of {characters}"
+            )
+        return np.broadcast_to(found.astype(np.int64), characters)
 
     def pose_of(self, motion: Motion) -> Pose:
         """The last pose of a motion, at the origin; MotionError for one that is not of a human figure."""

@@ -172,7 +172,7 @@ class SteerSession:
                 self._said.add(gait)
                 warn(said, ControlWarning)
         changed = (np.abs(target - self._target).max(axis=1) > 1e-4) | (command.gait != self._command.gait)
-        self._playback.ticks_to_search[changed] = 0  # what is told is searched for at once
+        self._playback.hasten(changed)
         self._target, self._command = target, command
 
     def _numbers(self, needed: str, values: ArrayLike, *columns: int) -> Array:
@@ -222,7 +222,7 @@ class SteerSession:
     def push(self, velocity: ArrayLike) -> None:
         """Push the characters by a velocity (2,) or (characters, 2) along x and z, m/s, from which they recover."""
         self._playback.spring[:, :2] += self._numbers("a velocity needs x and z", velocity, 2)
-        self._playback.ticks_to_search[:] = 0
+        self._playback.hasten(np.ones(self.characters, dtype=bool))
 
     def put(self, places: ArrayLike) -> None:
         """Place the characters elsewhere: (3,) or (characters, 3) x and z in metres, facing in degrees."""
