@@ -1,10 +1,9 @@
-"""Learning by gradient descent: the settings, Muon, a step, and the learner of all nets that autograd can train."""
+"""Learning by gradient descent: the settings, a step, and the learner of all nets that autograd can train."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
-from itertools import chain
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, Protocol
 
@@ -16,6 +15,7 @@ from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
 from motet_train import distributed
 from motet_train.models.net import Net
+from motet_train.muon import Muon
 from motet_train.runs import RunError
 from motet_train.trainer import Part
 
@@ -75,47 +75,6 @@ def rate(training: Training, done: int) -> float:
     if training.decay is not None:
         factor *= training.decay[0] ** (done // training.decay[1])
     return training.learning_rate * factor
-
-
-class Muon:
-    """Groups marked "muon" go by Muon (Jordan et al. 2024), with steps as large as AdamW's; all others by AdamW.
-
-    Muon's steps are orthogonal matrices: each direction of a matrix is learned at the same rate, also the rare ones.
-    """
-
-    def __init__(self, groups: Iterable[Mapping[str, Any]], lr: float) -> None:
-        given = [dict(group) for group in groups]
-        matrices = [group for group in given if "muon" in group]
-        others = [group for group in given if "muon" not in group]
-        self.parts: list[torch.optim.Optimizer] = []
-        if matrices:
-            self.parts.append(torch.optim.Muon(matrices, lr=lr, adjust_lr_fn="match_rms_adamw"))
-        if others:
-            self.parts.append(torch.optim.AdamW(others, lr=lr, betas=(0.9, 0.98)))
-
-    @property
-    def param_groups(self) -> list[dict[str, Any]]:
-        """Those of both, as torch's optimisers have them."""
-        return list(chain.from_iterable(part.param_groups for part in self.parts))
-
-    def step(self) -> None:
-        """One step of both."""
-        for part in self.parts:
-            part.step()
-
-    def zero_grad(self, set_to_none: bool = True) -> None:
-        """Forget the gradients of both."""
-        for part in self.parts:
-            part.zero_grad(set_to_none=set_to_none)
-
-    def state_dict(self) -> dict[str, Any]:
-        """The states of both."""
-        return {"parts": [part.state_dict() for part in self.parts]}
-
-    def load_state_dict(self, state_dict: Mapping[str, Any], /) -> None:
-        """Take up what :meth:`state_dict` gave."""
-        for part, state in zip(self.parts, state_dict["parts"], strict=True):
-            part.load_state_dict(state)
 
 
 OPTIMISERS: Mapping[str, Callable[..., torch.optim.Optimizer | Muon]] = {

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import torch
 from numpy.typing import NDArray
 
 from motet.representation.base import FrameMirror
+from motet_train.data.acts import acts
 from motet_train.data.batches import frame_mirror
 from motet_train.data.errors import DataError
 from motet_train.data.sentences import Actions
@@ -105,20 +107,24 @@ def _made(training: Mapping[str, Any]) -> dict[str, Any]:
 def coded(
     store: Store, records: tuple[int, ...], codec: MotionCodec, actions: Actions, mirror: FrameMirror
 ) -> list[CodedMotion]:
-    """Every span of some records, as it is and mirrored, by a codec."""
+    """The acts of every span of some records, as they are and mirrored, by a codec."""
     found = []
     for record in records:
         entry = store.records[record]
-        for start, stop in entry.spans:
-            frames = np.array(store.frames[start:stop], np.float64)
+        shown = acts(store.motion(record))
+        acted = shown[0][1] < len(store.sequence(record))
+        starts, ends = entry.starts or acted, entry.ends or acted
+        for (begin, end), (start, stop) in product(entry.spans, shown):
+            frames = np.array(store.frames[begin + start : min(begin + stop, end)], np.float64)
             for mirrored in (False, True):
                 codes = codes_of(codec, mirror(frames) if mirrored else frames, store.fps)
                 if not len(codes):
                     continue
-                if entry.ends:
+                if ends:
                     codes = np.pad(codes, ((0, 1), (0, 0)))
                     codes[-1, 0] = codec.config.moves
-                found.append(CodedMotion(codes, actions.of[record, mirrored], entry.starts, start == entry.spans[0][0]))
+                first = begin == entry.spans[0][0]
+                found.append(CodedMotion(codes, actions.of[record, mirrored], starts, first))
     return found
 
 
