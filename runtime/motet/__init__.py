@@ -32,11 +32,14 @@ from motet.formats import read_motion as read
 from motet.formats import write_motion as write
 from motet.live.page import live_page, write_live_page
 from motet.models.base import BundleModel, ControlModel
+from motet.models.compose import Composition, Met
+from motet.models.composition import Passage
 from motet.models.describe import DescribeModel, Description, Part
 from motet.models.fill import FillModel
 from motet.models.generate import Generated, GenerateModel, GenerateSettings, MixtureModel
-from motet.models.generate_codes import CodesModel, Passage, Story, StorySettings, Understood
+from motet.models.generate_codes import CodesModel, Story, StorySettings, Understood
 from motet.models.load import load, load_as
+from motet.models.plans import Moment, parse_plan, read_plan
 from motet.models.predict import PredictModel, PredictSession
 from motet.models.search import Hit, Index, SearchModel
 from motet.models.steer import SteerModel
@@ -50,14 +53,15 @@ __version__ = version("motet")
 
 # fmt: off
 __all__ = [
-    "Bundle", "BundleError", "BundleModel", "Checked", "CodesModel", "ControlError", "ControlModel", "ControlWarning",
-    "DecodingError", "DescribeModel", "Description", "FillModel", "FormatError", "GenerateModel", "GenerateSettings",
-    "Generated", "Hit", "Humanoid", "Index", "MixtureModel", "MotetError", "Motion", "MotionError", "OutputError",
-    "Part", "Passage", "Pose", "PredictModel", "PredictSession", "ScriptError", "SearchModel", "SessionOptions",
-    "SettingError", "SteerModel", "SteerSession", "SteerSnapshot", "Story", "StorySettings", "TdbnModel", "TdbnSession",
-    "TdbnSnapshot", "TextError", "TextWarning", "TravelWarning", "Understood", "UnitError", "check", "clips",
-    "from_humanoid", "list_bundles", "live_page", "load", "load_as", "motion", "read", "read_map", "to_humanoid",
-    "write", "write_live_page",
+    "Bundle", "BundleError", "BundleModel", "Checked", "CodesModel", "Composition", "ControlError", "ControlModel",
+    "ControlWarning", "DecodingError", "DescribeModel", "Description", "FillModel", "FormatError", "GenerateModel",
+    "GenerateSettings", "Generated", "Hit", "Humanoid", "Index", "Met", "MixtureModel", "Moment", "MotetError",
+    "Motion", "MotionError", "OutputError", "Part", "Passage", "Pose", "PredictModel", "PredictSession",
+    "ScriptError", "SearchModel", "SessionOptions", "SettingError", "SteerModel", "SteerSession", "SteerSnapshot",
+    "Story", "StorySettings", "TdbnModel", "TdbnSession", "TdbnSnapshot", "TextError", "TextWarning",
+    "TravelWarning", "Understood", "UnitError", "check", "clips", "from_humanoid", "list_bundles", "live_page",
+    "load", "load_as", "motion", "parse_plan", "read", "read_map", "read_plan", "to_humanoid", "write",
+    "write_live_page",
 ]
 # fmt: on
 

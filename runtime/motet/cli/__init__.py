@@ -16,6 +16,7 @@ from motet.errors import MotetError
 COMMANDS = {
     "describe": ("motet.cli.language", "", "Describe motions in ranked sentences."),
     "generate": ("motet.cli.language", "", "Generate motions from sentences."),
+    "compose": ("motet.cli.language", "", "Compose motions: prompts, places and poses at given times."),
     "predict": ("motet.cli.motions", "", "Predict how motions continue."),
     "fill": ("motet.cli.motions", "", "Fill gaps of motions, and close loops."),
     "join": ("motet.cli.motions", "", "Join two motions by a transition."),

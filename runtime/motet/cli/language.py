@@ -1,4 +1,4 @@
-"""``motet describe`` and ``motet generate``: from motion files to sentences, and from sentences to motion files."""
+"""``motet describe``, ``generate`` and ``compose``: from motion files to sentences, and back."""
 
 import json
 from collections.abc import Iterable, Iterator, Mapping
@@ -20,6 +20,7 @@ from motet.models.generate import PLAYED, Generated, GenerateModel
 from motet.models.generate_codes import CodesModel, Story
 from motet.models.known import NOTHING
 from motet.models.load import load_as
+from motet.models.plans import parse_plan, read_plan
 from motet.motion.looping import looped
 
 
@@ -235,3 +236,47 @@ def _lines(rows: list[dict[str, Any]]) -> Iterator[str]:
             for passage in found.get("passages", ()):
                 shown = "" if found["action"] else f" (as: {passage['action']})"
                 yield f"  {passage['start']:.1f}-{passage['stop']:.1f} s {passage['text']}{shown}"
+
+
+@click.command()
+@click.argument("plan", metavar="PLAN")
+@out_option
+@bundle_option("generate")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of what is drawn.")
+@click.option("--strict", is_flag=True, help="Fail on a prompt that the model knows only in part.")
+@write_options
+@session_options
+@click.option("--json", "as_json", is_flag=True, help="Print an object with the passages and what was met.")
+def compose(
+    plan: str,
+    out: Path,
+    bundle: str,
+    seed: int,
+    strict: bool,
+    output: Output,
+    as_json: bool,
+    session: SessionOptions,
+) -> None:
+    """Write a motion for PLAN: prompts at their times, and where to be, which way to face and which pose to have when.
+
+    PLAN is a JSON file, a list of moments such as {"at": 3, "place": [0, 3], "facing": 90, "text": "a person waves"},
+    or a script: "0s a person walks; 3s at 0 3 facing 90 a person waves; 4.5s pose kick.bvh@1.2; 6s". Places are x and
+    z in metres; the first moment is the start, the last one the end.
+    """
+    output.check(out)
+    moments = read_plan(plan) if Path(plan).suffix.lower() == ".json" else parse_plan(plan)
+    model = load_as(CodesModel, bundle, session)
+    with noted():
+        found = model.compose(moments, seed=seed, strict=strict)
+    motion = output.write(out, found.motion, " / ".join(passage.text for passage in found.passages))
+    output.finish()
+    facts = {"output": str(out), "frames": len(motion), "fps": motion.fps, "seconds": motion.duration}
+    passages, met = [asdict(one) for one in found.passages], [one._asdict() for one in found.met]
+    if as_json:
+        click.echo(json.dumps({**facts, "passages": passages, "met": met}))
+        return
+    click.echo(f"{out}: {size(len(motion), motion.fps)}")
+    for one in found.passages:
+        click.echo(f"  {one.start:.1f}-{one.stop:.1f} s {one.text} (as: {one.action})")
+    for each in found.met:
+        click.echo(f"  {each}")

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterable, Iterator, Set
+from dataclasses import dataclass
 
 STOPS = re.compile(r"(?:[.!?;](?!\d)|\n)\s*")
 THEN = re.compile(
@@ -20,6 +21,18 @@ FUNCTION_WORDS = frozenset((
 ))
 """Words that say little about what is done."""
 # fmt: on
+
+
+@dataclass(frozen=True)
+class Passage:
+    """A sentence of a story, shown from ``start`` to ``stop`` in seconds; ``action`` and ``lacking`` as for
+    :class:`motet.models.generate.Generated`."""
+
+    text: str
+    start: float
+    stop: float
+    action: str = ""
+    lacking: tuple[str, ...] = ()
 
 
 def stem(word: str) -> str:

@@ -18,9 +18,12 @@ from motet.decode.codes import CodesSettings, Memory, Source, Writer, draw_codes
 from motet.decode.continue_codes import ContinuationSettings
 from motet.decode.loop import Noise, Sample, apart
 from motet.errors import BundleError, DecodingError, MotionError, TextError, TextWarning, warn
-from motet.models.composition import FUNCTION_WORDS, parts_of, sentences_of, stem, verbs_of
+from motet.models.compose import Composition, compose
+from motet.models.composition import FUNCTION_WORDS, Passage, parts_of, sentences_of, stem, verbs_of
 from motet.models.generate import Generated, GenerateModel, LoopSettings
 from motet.models.language import SPECIALS
+from motet.models.plans import Moment
+from motet.models.steer import SteerModel
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.representation.root_sixd import in_world
@@ -39,18 +42,6 @@ class StorySettings(LoopSettings, total=False):
     seed: Seed
     strict: bool
     whole: bool
-
-
-@dataclass(frozen=True)
-class Passage:
-    """A sentence of a story, shown from ``start`` to ``stop`` in seconds; ``action`` and ``lacking`` as for
-    :class:`motet.models.generate.Generated`."""
-
-    text: str
-    start: float
-    stop: float
-    action: str = ""
-    lacking: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -242,6 +233,23 @@ class CodesModel(GenerateModel):
         lacking = tuple(word for one in passages for word in one.lacking)
         action = passages[0].action if len(passages) == 1 else ""
         return Story(self.contract, frames, None, unknown, after, action, lacking, passages)
+
+    def compose(
+        self, moments: Sequence[Moment], *, steer: SteerModel | None = None, seed: int = 0, strict: bool = False
+    ) -> Composition:
+        """A motion that shows prompts at their times, and is where it is asked to be, facing that way, in given poses.
+
+        moments: what is asked for at which time (:class:`motet.Moment`), such as ``motet.parse_plan`` and
+            ``motet.read_plan`` give. Feet are planted. A prompt that asks for walking or running, and nothing else, is
+            steered to its places; any other motion is turned and moved there by up to half a metre a second.
+        steer: the model of walks to places, by default the bundle "control".
+        seed, strict: like :meth:`story`.
+        SettingError for moments that are out of order; MotionError for a place that is out of reach, with the time that
+        it takes, and for a pose that is not a human's or is under the ground; TextError like :meth:`story`.
+        """
+        from motet.models.load import load  # which knows this class
+
+        return compose(moments, self, steer or load("control"), seed, strict)
 
     def stream(self, sentences: str | Sequence[str], **settings: Unpack[StorySettings]) -> Iterator[Motion]:
         """The motion of :meth:`story` in pieces, as they are drawn: each continues the last one.

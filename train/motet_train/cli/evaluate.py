@@ -47,6 +47,7 @@ from motet_train.settings import read_settings
     help="Describe: whether the action is right, and the sure ones, of clips of --data by their names, such as "
     "'ACCAD_*,CC0_*', whatever the model was trained on; or of its own 'test' part.",
 )
+@click.option("--composed", is_flag=True, help="Generate: how well compositions meet places, poses and times.")
 @click.option("--json", "as_json", is_flag=True, help="Print one nested object with stable keys.")
 @click.option("--plots", type=Path, help="Folder for the figures of the papers.")
 @unit_in
@@ -58,6 +59,7 @@ def evaluate(
     says: bool,
     search: str,
     actions: str | None,
+    composed: bool,
     as_json: bool,
     plots: Path | None,
     unit_in: str | None,
@@ -75,14 +77,14 @@ def evaluate(
     the space of a search model.
     """
     torch.set_num_threads(1)
-    if (says or actions) and keep:
-        raise click.UsageError("--says and --actions only print figures: drop --save")
+    if (says or actions or composed) and keep:
+        raise click.UsageError("--says, --actions and --composed only print figures: drop --save")
     runs = {name: Run.load(Path(name)) for name in models if (Path(name) / MANIFEST).is_file()}
     loaded = {name: runs[name].bundle_model() if name in runs else load(name, session) for name in models}
-    suite = suite_of(loaded, says, actions)
+    suite = suite_of(loaded, says, actions, composed)
     if keep and (bundles := [name for name in models if name not in runs]):
         raise click.UsageError(f"--save stores figures in training runs, but {', '.join(bundles)} is a bundle")
-    found = dict.fromkeys(loaded, data) if says else data_of(loaded, suite, data)
+    found = dict.fromkeys(loaded, data) if says or composed else data_of(loaded, suite, data)
     if plots is not None:  # before hours of measuring
         if not suite.draws:
             raise click.UsageError(f"--plots is not available for {suite.what}")

@@ -23,6 +23,7 @@ from motet.models.tdbn_control import TdbnModel
 from motet_train.cli.train import read_expmap_files
 from motet_train.data.errors import DataError
 from motet_train.data.store import Store
+from motet_train.evaluate.compose import COMPOSE_GOALS, compose_report
 from motet_train.evaluate.figures import Drawings, error_over_time, strips
 from motet_train.evaluate.fill import FILL_GOALS, fill_report
 from motet_train.evaluate.language.actions import actions_report, clips_apart
@@ -199,6 +200,13 @@ def _says(models: Mapping[str, GenerateModel], given: Given) -> Results:
     return Results(json_ready(reports), says_text(reports), lambda: drawings)
 
 
+def _composed(models: Mapping[str, CodesModel], given: Given) -> Results:
+    found = {name: compose_report(model) for name, model in models.items()}
+    made, plain = ({name: report[key] for name, report in found.items()} for key in ("composed", "unconstrained"))
+    beside = {f"{name}, no constraints": report for name, report in plain.items()}
+    return Results(json_ready(found), report_table(made, COMPOSE_GOALS, beside))
+
+
 def _actions(models: Mapping[str, DescribeModel], given: Given, clips: str) -> Results:
     """Of the test motions of each model's own split where ``clips`` is "test"."""
     store = Store.open(given.first)
@@ -223,13 +231,19 @@ SUITES = {
 """Verb -> the suite of its models; steered figures have one of their own."""
 
 
-def suite_of(models: Mapping[str, BundleModel], says: bool = False, clips: str | None = None) -> Suite:
+def suite_of(
+    models: Mapping[str, BundleModel], says: bool = False, clips: str | None = None, composed: bool = False
+) -> Suite:
     """The suite of all the models; UsageError if they need several. says: the one of everyday prompts. clips: the one
-    of right descriptions of these."""
+    of right descriptions of these. composed: the one of compositions."""
     if clips is not None:
         if wrong := [name for name, model in models.items() if model.VERB != "describe"]:
             raise click.UsageError(f"--actions takes describe models, not {', '.join(wrong)}")
         return Suite("describe models", partial(_actions, clips=clips), draws=False)
+    if composed:
+        if wrong := [name for name, model in models.items() if not isinstance(model, CodesModel)]:
+            raise click.UsageError(f"--composed takes models that generate codes, not {', '.join(wrong)}")
+        return Suite("generate models", _composed, data="", draws=False)
     if says:
         if wrong := [name for name, model in models.items() if model.VERB != "generate"]:
             raise click.UsageError(f"--says takes generate models, not {', '.join(wrong)}")

@@ -1,0 +1,145 @@
+"""Plans of compositions: what is asked for at which time, as moments, a JSON file of them, or a script.
+
+A script's moments are separated by semicolons or lines: ``0s a person walks; 3s at 0 3 facing 90 a person waves;
+4.5s pose kick.bvh@1.2; 6s``. Each is a time, then, in this order and each optional: ``at`` with x and z in metres,
+``facing`` with degrees, ``pose`` with a motion file and, after @, the seconds of its key frame; then a prompt.
+"""
+
+import json
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from motet.errors import FormatError, MotetError, ScriptError, SettingError, quoted
+from motet.formats import read_motion
+from motet.motion.motion import Motion
+from motet.settings import is_number
+
+LONGEST, FARTHEST = 600.0, 1000.0  # seconds of a composition; metres from its start, and degrees
+SHORTEST, APART = 0.5, 0.1 - 1e-9  # seconds of a prompt, and from one moment to the next
+NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
+PART = re.compile(
+    rf"(?P<at>{NUMBER})s?(?!\S)(?:\s+at\s+(?P<x>{NUMBER})\s+(?P<z>{NUMBER})(?!\S))?"
+    rf"(?:\s+facing\s+(?P<facing>{NUMBER})(?!\S))?"
+    rf"(?:\s+pose\s+(?P<pose>\S+?)(?:@(?P<pose_at>{NUMBER}))?(?!\S))?(?:\s+(?P<text>.+))?",
+    re.DOTALL,
+)
+
+Reader = Callable[[Path], Motion]
+"""Reads a motion file."""
+
+
+@dataclass(frozen=True)
+class Moment:
+    """What is asked for ``at`` so many seconds.
+
+    text: a prompt, shown from here to the next one. place: x and z of the hips in metres, the figure's left is +x when
+    it faces 0. facing: degrees from +z to the left, 90 along x. pose: a motion of any human figure, of which the frame
+    at ``pose_at`` seconds is met, wherever the figure then is. The first moment's place and facing are the start; the
+    last moment is the end. SettingError for what is no such value.
+    """
+
+    at: float
+    text: str | None = None
+    place: tuple[float, float] | None = None
+    facing: float | None = None
+    pose: Motion | None = None
+    pose_at: float = 0.0
+
+    def __post_init__(self) -> None:
+        place, motion = self.place, self.pose
+        flat = isinstance(place, Sequence) and len(place) == 2 and all(map(_near, place))
+        within = motion is None or (is_number(self.pose_at) and 0 <= self.pose_at * motion.fps < len(motion))
+        for wrong, said in (
+            (not (is_number(self.at) and 0 <= self.at <= LONGEST), f"at must be 0 to {LONGEST:g} s, not {self.at!r}"),
+            (self.text is not None and not (isinstance(self.text, str) and self.text.strip()), "text must be a prompt"),
+            (place is not None and not flat, f"place must be x and z in metres, not {place!r}"),
+            (self.facing is not None and not _near(self.facing), f"facing must be degrees, not {self.facing!r}"),
+            (motion is not None and not isinstance(motion, Motion), f"pose must be a motion, not {motion!r}"),
+        ):
+            if wrong:
+                raise SettingError(said)
+        if not within and motion is not None:
+            raise SettingError(f"pose_at must be within the motion's {motion.duration:g} s, not {self.pose_at!r}")
+
+
+def _near(value: object) -> bool:
+    return is_number(value) and abs(float(value)) <= FARTHEST  # type: ignore[arg-type]  # a number it is
+
+
+def read_plan(path: str | Path, read: Reader = read_motion) -> list[Moment]:
+    """The moments of a JSON file: a list of objects whose keys are those of :class:`Moment`.
+
+    "pose" names a motion file, relative to the plan's folder; ``read`` reads it. FormatError with the number of the
+    wrong moment.
+    """
+    path = Path(path)
+    try:
+        rows = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise FormatError(path, error.strerror or "cannot be read") from error
+    except ValueError as error:
+        raise FormatError(path, f"is no JSON: {error}", getattr(error, "lineno", None)) from error
+    if not isinstance(rows, list):
+        raise FormatError(path, 'a plan is a list of moments, such as [{"at": 0, "text": "a person walks"}, {"at": 3}]')
+    found = []
+    for number, row in enumerate(rows, start=1):
+        try:
+            found.append(_moment(row, lambda name: read(path.parent / name)))
+        except MotetError as error:
+            raise FormatError(path, f"moment {number}: {error}") from error
+    return found
+
+
+def _moment(row: Any, read: Callable[[str], Motion]) -> Moment:
+    known = [field.name for field in fields(Moment)]
+    if not isinstance(row, Mapping) or "at" not in row:
+        raise SettingError(f'a moment is an object with its time, such as {{"at": 3}}, not {quoted(repr(row))}')
+    if unknown := [key for key in row if key not in known]:
+        raise SettingError(f"unknown key {quoted(unknown[0])}; expected {', '.join(known)}")
+    if not isinstance(pose := row.get("pose"), str | None):
+        raise SettingError(f"pose must be the path of a motion file, not {pose!r}")
+    return Moment(**{**row, "pose": None if pose is None else read(pose)})
+
+
+def parse_plan(script: str, read: Reader = read_motion) -> list[Moment]:
+    """The moments of a script; ScriptError marks the place of an error. ``read`` reads the files of poses."""
+    found, start = [], 0
+    for part in re.split(r"[;\n]", script):
+        match = PART.fullmatch(part.strip())
+        if not match or re.match(r"(at|facing|pose)\b", match["text"] or ""):
+            where = "expected a time, then at X Z, facing DEGREES, pose FILE@SECONDS, a prompt, in this order"
+            raise ScriptError(script, start, f'{where}, such as "3s at 0 3 facing 90 a person waves"')
+        given = {key: float(match[key]) for key in ("at", "facing", "pose_at") if match[key]}
+        place = (float(match["x"]), float(match["z"])) if match["x"] else None
+        pose = read(Path(match["pose"])) if match["pose"] else None
+        try:
+            found.append(Moment(text=match["text"], place=place, pose=pose, **given))
+        except SettingError as error:
+            raise ScriptError(script, start, str(error)) from error
+        start += len(part) + 1
+    return found
+
+
+def time_line(moments: Sequence[Moment]) -> list[Moment]:
+    """The moments, if they are in order; SettingError says which is not."""
+    found = list(moments)
+    if len(found) < 2 or found[0].at or found[0].text is None:
+        raise SettingError("a plan begins with a prompt at 0 s, and its last moment is its end")
+    for number, (one, two) in enumerate(pairwise(found), start=2):
+        if two.at - one.at < APART:
+            raise SettingError(
+                f"moment {number} is at {two.at:g} s, the one before it at {one.at:g} s: times must rise"
+            )
+        if two is not found[-1] and two == Moment(two.at):
+            raise SettingError(f"moment {number}, at {two.at:g} s, asks for nothing")
+    if found[-1].text is not None:
+        raise SettingError(f"the last moment is the end: {quoted(found[-1].text)} needs a later one")
+    told = [one for one in found if one.text is not None] + found[-1:]
+    for one, two in pairwise(told):
+        if two.at - one.at < SHORTEST:
+            raise SettingError(f"{quoted(str(one.text))} has {two.at - one.at:.2g} s: a prompt needs {SHORTEST:g}")
+    return found
