@@ -46,8 +46,7 @@ def node_ticks(model: SteerModel) -> list[float]:
         way = np.radians(degrees)
         told = {"x": speed * np.sin(way), "z": speed * np.cos(way), "facing": way, "gait": model.gaits.index(gait)}
         controls += [told] * TICKS
-    scripts = [source("motet.draw", "numbers.js"), source("motet.live", "loop.js")]
-    given = json.dumps({"scripts": scripts, "net": net_data(model), "controls": controls})
+    given = json.dumps({"script": source("motet.live", "control.js"), "net": net_data(model), "controls": controls})
     command = ["node", str(Path(__file__).parent / "runtime" / "live_loop.mjs")]
     done = subprocess.run(command, input=given, capture_output=True, text=True, check=True)
     found: list[float] = json.loads(done.stdout)["milliseconds"]

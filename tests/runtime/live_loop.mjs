@@ -1,18 +1,14 @@
-// Runs the loop of a live page without a browser: JSON {scripts, net, controls} on stdin; poses, and each tick's milliseconds.
+// Runs the script of a live page without a browser: JSON {script, net, controls} on stdin; the poses of its figure.
 import { readFileSync } from 'fs';
 
-const { scripts, net: given, controls } = JSON.parse(readFileSync(0));
-const names = '{ netOf, standing, tell, tick, globalTransforms }';
-const loop = new Function(`${scripts.join('\n')}\nreturn ${names};`)();
-const net = await loop.netOf(given);
-const figure = loop.standing(net);
+const { script, net, controls } = JSON.parse(readFileSync(0));
+const { Figure, modelOf } = new Function(`${script}\nreturn motetControl;`)();
+const figure = new Figure(await modelOf(net, Buffer.from(net.bytes, 'base64')), [0, 0, 0]);
 const milliseconds = [];
 const poses = controls.map((control) => {
   const start = performance.now();
-  loop.tell(net, figure, control);
-  const pose = loop.tick(net, figure);
+  figure.tick(control);
   milliseconds.push(performance.now() - start);
-  return pose;
+  return figure.shown(1);
 });
-const positions = poses.map((pose) => loop.globalTransforms(net, pose).places);
-console.log(JSON.stringify({ poses, positions, milliseconds }));
+console.log(JSON.stringify({ poses, milliseconds }));

@@ -57,18 +57,18 @@ def test_the_body_has_its_skull_on_its_neck() -> None:
 @pytest.mark.skipif(NODE is None, reason="there is no node")
 def test_the_script_of_the_page_does_what_python_does(steer_model: SteerModel) -> None:
     session, controls, poses = steer_model.start(), [], []
+    session.tick()  # a figure of the page is shown from its first tick on
     for gait, speed, way, towards in PLAN:
         session.control(gait=gait, speed=speed, direction=way, facing=towards)
         x, z, facing = session.target[0].tolist()
         told = {"x": x, "z": z, "facing": facing, "gait": steer_model.gaits.index(gait)}
         controls += [told] * 45
         poses += [session.tick() for _ in range(45)]
-    scripts = [source("motet.draw", "numbers.js"), source("motet.live", "loop.js")]
-    found = run_loop({"scripts": scripts, "net": net_data(steer_model), "controls": controls})
+    found = run_loop({"script": source("motet.live", "control.js"), "net": net_data(steer_model), "controls": controls})
     assert np.ptp([pose.ground[0, :2] for pose in poses], axis=0).min() > 1.5  # it goes somewhere
-    for ours, (pose, places) in zip(poses, zip(found["poses"], found["positions"], strict=True), strict=True):
+    for ours, pose in zip(poses, found["poses"], strict=True):
         np.testing.assert_allclose(pose["ground"], ours.ground[0], atol=1e-9)
-        np.testing.assert_allclose(places, ours.positions()[0], atol=1e-5)
+        np.testing.assert_allclose(pose["places"], ours.positions()[0], atol=1e-5)
         np.testing.assert_allclose(pose["rotations"], ours.rotations[0], atol=1e-5)
         np.testing.assert_allclose(pose["contacts"], ours.contacts[0], atol=1e-6)
 
@@ -95,9 +95,10 @@ def page(tmp_path_factory: pytest.TempPathFactory, steer_model: SteerModel) -> A
 
 def ticks(page: Browser, count: int = 45) -> SimpleNamespace:
     """Where the steered figure is, and how its speed is, after so many ticks with what is pressed."""
-    told = f"(() => {{ for (let n = 0; n < {count}; n++) motet.tick(motet.asked()); return motet.figures[0]; }})()"
+    told = f"(() => {{ for (let n = 0; n < {count}; n++) motet.tick(motet.asked());"
+    told += " const { root, velocity } = motet.figures[0]; return { root, velocity }; })()"
     figure = page.value(told)
-    return SimpleNamespace(place=np.array(figure["root"][:2]), facing=figure["root"][2], going=figure["spring"][:2])
+    return SimpleNamespace(place=np.array(figure["root"][:2]), facing=figure["root"][2], going=figure["velocity"])
 
 
 def test_keys_steer_the_figure(page: Browser) -> None:

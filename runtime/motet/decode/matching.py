@@ -310,14 +310,17 @@ class Matcher:
 
     def query(self, asked: Floats) -> Query:
         """What is looked for, of features (n, F) that are asked."""
-        table, last = self.table, LAST
-        left, forward = (asked[:, last] / table.scale[last] + table.mean[last]).T
-        far = np.hypot(left, forward)
-        way = np.stack([left, forward]) * (self.settings.lag / np.maximum(far, 1e-6))
-        lacks = far * self.settings.lag / 2 - table.mean[last] @ way
-        features = np.concatenate([-asked.clip(-self.LARGEST, self.LARGEST), np.ones_like(asked[:, :1])], axis=1)
-        lags = np.column_stack([*-way / table.scale[last, None], lacks])
-        return Query(*((np.rint(values * self.STEPS) / self.STEPS).astype(np.float32) for values in (features, lags)))
+        asked, scale, mean = self._rounded(asked.clip(-self.LARGEST, self.LARGEST)), self.table.scale, self.table.mean
+        place = asked[:, LAST] / scale[LAST] + mean[LAST]
+        far = np.hypot(place[:, 0], place[:, 1])
+        way = place * (self.settings.lag / np.maximum(far, 1e-6))[:, None]
+        lacks = far * self.settings.lag / 2 - (way * mean[LAST]).sum(axis=1)
+        lags = self._rounded(np.column_stack([-way / scale[LAST], lacks]))
+        return Query(np.concatenate([-asked, np.ones_like(asked[:, :1])], axis=1), lags)
+
+    def _rounded(self, values: NDArray[Any]) -> Floats:
+        found: Floats = (np.rint(values * self.STEPS) / self.STEPS).astype(np.float32)
+        return found
 
     def best(self, query: Query, gait: Rows) -> tuple[Rows, Rows, Floats]:
         """For what n figures look for and gaits (n,) the row (n,), 1 where it is mirrored (n,), and its cost (n,)."""

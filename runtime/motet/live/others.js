@@ -30,7 +30,7 @@ function followed(net, figures, n) {
   const [x, z, facing] = figures[0].root, angle = facing + Math.PI + (n % 2 ? 0.6 : -0.6);
   const behind = 0.7 + 0.5 * n, point = [x + behind * Math.sin(angle), z + behind * Math.cos(angle)];
   const [dx, dz] = [point[0] - figures[n].root[0], point[1] - figures[n].root[1]], away = Math.hypot(dx, dz);
-  const stays = away < (Math.hypot(...figures[n].spring.slice(0, 2)) < 0.1 ? 0.8 : 0.3);
+  const stays = away < (Math.hypot(...figures[n].velocity) < 0.1 ? 0.8 : 0.3);
   return towardsPoint(net, figures, n, point, stays ? 0 : Math.max(0.7, 1.3 * away));
 }
 
@@ -45,9 +45,9 @@ function towardsPoint(net, figures, n, [toX, toZ], pace) {
     vz += dz / gap * (ROOM - gap) * 2;
   });
   const wanted = Math.hypot(vx, vz), fast = fastest(net), top = net.speeds[net.gaits[0]][2];
-  const gait = wanted > (figure.target.gait === fast ? 0.8 : 1) * top ? fast : 0;
-  const speed = wanted < 0.25 ? 0 : inRange(net, gait, wanted), ratio = wanted ? speed / wanted : 0;
-  const facing = speed ? Math.atan2(vx, vz) : figure.target.facing;
+  const gait = wanted > (figure.asked.gait === fast ? 0.8 : 1) * top ? fast : 0;
+  const speed = wanted < 0.25 ? 0 : inRange(net.model, gait, wanted), ratio = wanted ? speed / wanted : 0;
+  const facing = speed ? Math.atan2(vx, vz) : figure.asked.facing;
   return { gait, x: vx * ratio, z: vz * ratio, facing };
 }
 
@@ -55,12 +55,4 @@ function towardsPoint(net, figures, n, [toX, toZ], pace) {
 function fastest(net) {
   const usual = net.gaits.map((gait) => net.speeds[gait][1]);
   return usual.indexOf(Math.max(...usual));
-}
-
-/** A speed that a gait has at an angle from the facing; 0 is always one. */
-function inRange(net, gait, speed, aside = 0) {
-  const [low, , ...fastest] = net.speeds[net.gaits[gait]];
-  const sectors = [net.steering.aside, net.steering.back];
-  const high = fastest[sectors.filter((edge) => Math.abs(wrapped(aside)) >= edge).length];
-  return speed > 0 ? clamp(speed, Math.min(low, high), high) : 0;
 }

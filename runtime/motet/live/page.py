@@ -1,7 +1,7 @@
 """Write a steered figure as one HTML page that runs it: no network, no other file, any browser.
 
-The page is ``page.html`` with ``loop.js``, the twin in JavaScript of :mod:`motet.decode.steering` and
-:mod:`motet.motion.feet.lock`, and with the bundle's own numbers: its settings, and its tables, gzipped.
+The page is ``page.html`` with ``control.js``, built from ``runtime/web`` (``npm run build:live`` there), and with the
+bundle's own numbers: its settings, and its tables, gzipped.
 """
 
 import gzip
@@ -12,15 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.decode.matching import SteeringSettings, mirrored_features
+from motet.decode.matching import SteeringSettings
 from motet.draw.figure import Body
 from motet.draw.page import bone_data, filled, source
 from motet.errors import BundleError, ControlError
 from motet.files import File, place_of, write_whole
-from motet.models.steer import FEATURE_STEPS, SteerModel
-from motet.motion.feet import lock as foot_lock
-from motet.motion.feet.leg import Leg
-from motet.motion.humanoid import BONES, HUMANOID
+from motet.models.steer import SteerModel
+from motet.motion.feet.lock import FootLockSettings
+from motet.motion.humanoid import HUMANOID
 from motet.settings import checked_int
 
 
@@ -44,38 +43,21 @@ def live_page(model: SteerModel, characters: int = 1, title: str = "motet") -> s
     most = 8
     characters = checked_int("characters", characters, 1, most, ControlError)
     data = {"net": net_data(model), "body": body_data(), "characters": characters, "most": most}
-    scripts = {"LOOP": source("motet.live", "loop.js"), "OTHERS": source("motet.live", "others.js")}
+    scripts = {"CONTROL": source("motet.live", "control.js"), "OTHERS": source("motet.live", "others.js")}
     return filled(source("motet.live", "page.html"), title, data, **scripts)
 
 
 def net_data(model: SteerModel) -> dict[str, Any]:
-    """All that ``loop.js`` steers a figure with, ready for JSON."""
-    columns, signs = mirrored_features()
+    """All that ``control.js`` steers a figure with, ready for JSON: ``Given`` of ``livePage.ts``, and the bytes."""
     tables = {name: array.reshape(len(array), -1) for name, array in model.tables.items()}
-    shapes = {name: {"kind": array.dtype.str[1:], "shape": array.shape} for name, array in tables.items()}
+    manifest, kinds = model.manifest, (SteeringSettings, FootLockSettings)
     return {
-        "fps": model.fps,
-        "gaits": list(model.gaits),
-        "speeds": dict(zip(model.gaits, model.manifest.config["speeds"], strict=True)),
-        "steering": asdict(model.settings(SteeringSettings)),
-        "still": model.matcher.stillest(0),
-        "odd": model.manifest.config["odd"],
-        "columns": columns.tolist(),
-        "signs": signs.tolist(),
-        "featureSteps": FEATURE_STEPS,
-        "figure": {
-            "parents": HUMANOID.parents.tolist(),
-            "offsets": HUMANOID.offsets.tolist(),
-            "bones": [HUMANOID.index(bone) for bone in BONES],
-            "legs": [
-                {"joints": [HUMANOID.index(BONES[bone]) for bone in leg], "bones": leg}
-                for leg in foot_lock.LEG_BONES.tolist()
-            ],
-            "soles": foot_lock.POINTS,
-            "knee": {"shortest": Leg.SHORTEST, "share": Leg.EASED_SHARE, "gives": list(Leg.GIVES)},
-            "lock": asdict(model.settings(foot_lock.FootLockSettings)),
+        "manifest": {
+            "motion": {"fps": model.fps, "channels": list(model.contract.channels)},
+            "settings": {kind.FEATURE: asdict(model.settings(kind)) for kind in kinds},
+            "config": {name: manifest.config[name] for name in ("gaits", "speeds", "odd")},
         },
-        "tables": shapes,
+        "tables": {name: {"kind": array.dtype.str[1:], "shape": array.shape} for name, array in tables.items()},
         "bytes": b64encode(gzip.compress(b"".join(map(_shuffled, tables.values())), mtime=0)).decode(),
     }
 

@@ -73,7 +73,8 @@ export async function readNpz(bytes: Uint8Array, limit: number): Promise<Map<str
   return found;
 }
 
-function halves(bits: Uint16Array): Float32Array {
+/** Numbers of half precision. */
+export function halves(bits: Uint16Array): Float32Array {
   return Float32Array.from(bits, (half) => {
     const exponent = (half >> 10) & 31;
     const fraction = half & 1023;

@@ -11,6 +11,8 @@ import { lockOf, steeringOf, type LockSettings } from "./steeringSettings.js";
 
 /** A session has at most so many figures. */
 const LARGEST_CROWD = 100_000;
+/** From so many figures on the searches of a session are spread over the ticks. */
+const SPREAD_FROM = 32;
 /** A number of a table at most. */
 const LARGEST = 1e9;
 
@@ -24,6 +26,9 @@ export interface StartSettings {
   holdFeet?: boolean;
   /** Refuse a speed outside a gait's range, instead of clamping it. */
   strict?: boolean;
+  /** Ticks until the first search, below `search_every`: from then on each searches in its turn alone, and what it is told
+   *  waits for that. By default those of 32 figures or more are 0, 1, 2 and so on in turn: every tick costs the same. */
+  phases?: number | readonly number[];
 }
 
 /** A figure that goes where it is told, in several gaits. */
@@ -57,13 +62,22 @@ export class ControlModel extends Model {
   }
 
   /** A session of figures that stand still. ControlError for what is out of range. */
-  start({ gait = this.gaits[0]!, characters = 1, places, holdFeet = true, strict = false }: StartSettings = {}): ControlSession {
+  start({ gait = this.gaits[0]!, characters = 1, places, holdFeet = true, strict = false, phases }: StartSettings = {}): ControlSession {
     if (!Number.isInteger(characters) || characters < 1 || characters > LARGEST_CROWD) {
       throw new ControlError(`characters must be a whole number from 1 to ${LARGEST_CROWD}, not ${characters}`);
     }
-    const session = new ControlSession(this, this.abilities.number(gait), characters, holdFeet, strict);
+    const session = new ControlSession(this, this.abilities.number(gait), characters, holdFeet, strict, this.phases(characters, phases));
     if (places !== undefined) session.put(places);
     return session;
+  }
+
+  private phases(characters: number, given?: number | readonly number[]): number[] | null {
+    const every = this.steerer.matcher.how.search_every;
+    if (given === undefined && characters < SPREAD_FROM) return null;
+    const found = Array.from({ length: characters }, (_, at) => (given === undefined ? at % every : Array.isArray(given) ? (given[at] as number) : (given as number)));
+    const fits = (!Array.isArray(given) || given.length === characters) && found.every((phase) => Number.isInteger(phase) && phase >= 0 && phase < every);
+    if (!fits) throw new ControlError(`phases must be whole numbers from 0 to ${every - 1}, for all or for each of ${characters}`);
+    return found;
   }
 }
 

@@ -1,13 +1,14 @@
 /* A session of steered figures: commands in, within what gaits allow, and a pose a tick out. */
 import type { ControlModel } from "./control.js";
 import { ControlError } from "./errors.js";
-import { held, type Lock, newLock } from "./footLock.js";
+import { newLock } from "./footLock.js";
 import { type Command, told } from "./gaits.js";
 import { BONES } from "./humanoid.js";
-import type { Playback, Target } from "./matching.js";
+import type { Target } from "./matching.js";
 import type { Pose } from "./poses.js";
 import { about, product, type Quaternion, Y } from "./rotations.js";
 import { wrapped } from "./springs.js";
+import { hasten, standing, type Steered, tell, tick } from "./steered.js";
 import { between, type Played } from "./steering.js";
 
 /** A number of a command at most: metres, m/s, degrees. */
@@ -39,13 +40,6 @@ export interface Told {
   velocity?: readonly number[] | readonly (readonly number[])[];
 }
 
-interface Steered {
-  playback: Playback;
-  lock: Lock;
-  command: Command;
-  target: Target;
-}
-
 interface State {
   figures: Steered[];
   /** The last two ticks, between which `advance` shows a pose, and how far it is. */
@@ -70,13 +64,9 @@ export class ControlSession {
     readonly characters: number,
     private readonly holdFeet: boolean,
     private readonly strict: boolean,
+    phases: readonly number[] | null,
   ) {
-    const { matcher } = model.steerer;
-    const still = matcher.stillest(gait);
-    const figures = Array.from({ length: characters }, (): Steered => {
-      const command = { gait, speed: 0, direction: 0, facing: 0, facesWay: false };
-      return { playback: matcher.playing(still), lock: newLock(), command, target: [0, 0, 0] };
-    });
+    const figures = Array.from({ length: characters }, (_, at) => standing(model, gait, undefined, phases?.[at]));
     this.state = { figures, shown: null, ahead: 0 };
   }
 
@@ -116,12 +106,7 @@ export class ControlSession {
         console.warn(beyond);
       }
     });
-    this.state.figures.forEach((figure, at) => {
-      const [command, { target }] = [commands[at]!, found[at]!];
-      const changed = target.some((value, i) => Math.abs(value - figure.target[i]!) > 1e-4) || command.gait !== figure.command.gait;
-      if (changed) figure.playback.ticksToSearch = 0; // what is told is searched for at once
-      Object.assign(figure, { command, target });
-    });
+    this.state.figures.forEach((figure, at) => tell(figure, commands[at]!, found[at]!.target));
   }
 
   /** The next pose of each figure, 1 / fps seconds later. */
@@ -135,11 +120,7 @@ export class ControlSession {
   }
 
   private played(targets?: Target[]): Played[] {
-    const { steerer, lock: how, fps } = this.model;
-    return this.state.figures.map(({ playback, lock, command, target }, at) => {
-      const pose = steerer.tick(playback, targets?.[at] ?? target, command.gait);
-      return this.holdFeet ? held(lock, pose, how, 1 / fps) : pose;
-    });
+    return this.state.figures.map((figure, at) => tick(this.model, figure, this.holdFeet, targets?.[at]));
   }
 
   /** The poses `seconds` later, 0 to 1, for a display of any frame rate: between two ticks. A command shows within a tick. */
@@ -159,7 +140,7 @@ export class ControlSession {
     this.state.figures.forEach(({ playback }, at) => {
       const [x, z, facing] = playback.spring;
       playback.spring = [x + rows[at]![0]!, z + rows[at]![1]!, facing];
-      playback.ticksToSearch = 0;
+      hasten(playback);
     });
   }
 

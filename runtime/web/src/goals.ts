@@ -5,6 +5,11 @@ const BOX = 8;
 /** The two features of where a row leads at the last of the horizons. */
 const [LEFT, FORWARD] = [4, 5];
 
+/** What is asked is rounded, so that costs are exact sums: each runtime finds the same row. */
+export function rounded(value: number): number {
+  return Math.round(256 * value) / 256;
+}
+
 /** Features of rows, and for each box of them the least and the largest of each. */
 export class Goals {
   private readonly features: Float32Array;
@@ -54,7 +59,8 @@ export class Goals {
     const [left, forward] = [asked[LEFT]! / scale[LEFT]! + mean[LEFT]!, asked[FORWARD]! / scale[FORWARD]! + mean[FORWARD]!];
     const far = Math.hypot(left, forward);
     const [x, z] = [(lag * left) / Math.max(far, 1e-6), (lag * forward) / Math.max(far, 1e-6)];
-    return [x / scale[LEFT]!, z / scale[FORWARD]!, (lag * far) / 2 - x * mean[LEFT]! - z * mean[FORWARD]!];
+    const half = (lag * far) / 2 - x * mean[LEFT]! - z * mean[FORWARD]!;
+    return [rounded(x / scale[LEFT]!), rounded(z / scale[FORWARD]!), rounded(half)];
   }
 
   private least(asked: Float64Array, bound: number): { at: number; cost: number } {

@@ -1,7 +1,7 @@
 /* Motion matching, which recorded frame a figure plays next: docs/bundle.md, the loop `matching`. Metres, seconds, radians. */
-import { Goals } from "./goals.js";
+import { Goals, rounded } from "./goals.js";
 import type { Pose as Ground } from "./planar.js";
-import { damped, dampedPath, dampingOf, wrapped } from "./springs.js";
+import { clamp, damped, dampedPath, dampingOf, wrapped } from "./springs.js";
 import type { Steering } from "./steeringSettings.js";
 
 /** The tables of a bundle, row by row: N rows, K codes of a pose, G gaits, P numbers of a pose. */
@@ -29,6 +29,8 @@ export interface Playback {
   /** Rows that are played in the next tick. */
   rate: number;
   ticksToSearch: number;
+  /** Whether it searches in its turn alone, or whenever it is told something. */
+  inTurn: boolean;
   root: Ground;
   /** The springs that approach the target, and how fast they change. */
   spring: Target;
@@ -43,6 +45,8 @@ export const TRAJECTORY = 13;
 export const FEATURES = TRAJECTORY + 21;
 /** In which tables hold a scaled unit of a feature. */
 const STEPS = 16;
+/** Features that are asked are no larger, on either side of 0. */
+const LARGEST = 16;
 
 /** Triples of a mirror image: of feet, their velocities, hips and hands, in the order of the other side's. */
 const SWAPPED = [1, 0, 3, 2, 4, 6, 5];
@@ -95,11 +99,12 @@ export class Matcher {
     return still;
   }
 
-  /** A figure at a place that plays a row, and searches after so many ticks. */
-  playing(row: number, [x, z, facing]: Ground = [0, 0, 0], ticksToSearch = 0): Playback {
+  /** A figure at a place that plays a row; with a phase it searches in its turn alone, first after so many ticks. */
+  playing(row: number, [x, z, facing]: Ground = [0, 0, 0], phase?: number): Playback {
     const [offset, offsetRate] = [new Float64Array(this.codes), new Float64Array(this.codes)];
     const springs = { spring: [0, 0, facing] as Target, springRate: [0, 0, 0] as Target, offset, offsetRate };
-    return { row, part: 0, mirror: false, rate: 1, ticksToSearch, root: [x, z, facing], ...springs };
+    const turn = { ticksToSearch: phase ?? 0, inTurn: phase !== undefined };
+    return { row, part: 0, mirror: false, rate: 1, ...turn, root: [x, z, facing], ...springs };
   }
 
   shows(row: number, gait: number): boolean {
@@ -140,6 +145,7 @@ export class Matcher {
     this.trajectory(figure, target).forEach((value, i) => {
       asked[i] = Math.fround((value - mean[i]!) * scale[i]!);
     });
+    for (let i = 0; i < FEATURES; i++) asked[i] = rounded(clamp(asked[i]!, -LARGEST, LARGEST));
     for (let i = 0; i < FEATURES; i++) image[i] = asked[COLUMNS[i]!]! * SIGNS[i]!;
   }
 

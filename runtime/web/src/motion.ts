@@ -42,7 +42,7 @@ export function atRest(skeleton: Skeleton): Motion {
 }
 
 /** Forward kinematics. */
-export function worldOf({ skeleton, rotations, translations }: Motion): World {
+export function worldOf({ skeleton, rotations, translations }: Pick<Motion, "skeleton" | "rotations" | "translations">): World {
   const turns: Quaternion[][] = [];
   const places: Vector[][] = [];
   rotations.forEach((own, frame) => {

@@ -51,6 +51,18 @@ test("a session is restored, and figures move as each would alone", () => {
   assert.deepEqual(alone.advance(1 / 60), [next.at(-1)![1]]);
 });
 
+test("each of many searches in its turn, and moves as it would alone", () => {
+  const count = 40;
+  const crowd = model.start({ characters: count });
+  const alone = model.start({ phases: 3 });
+  crowd.control({ gait: "run", speed: 2.5, direction: Array.from({ length: count }, (_, at) => 9 * at) });
+  alone.control({ gait: "run", speed: 2.5, direction: 9 * 15 });
+  for (let at = 0; at < 40; at++) assert.deepEqual(crowd.tick()[15], alone.tick()[0]);
+  for (const phases of [6, -1, 0.5, [0, 1, 2]]) {
+    assert.throws(() => model.start({ characters: 2, phases }), /phases must be whole numbers from 0 to 5, for all or for each of 2/);
+  }
+});
+
 test("the search finds what a search of all rows finds", () => {
   const { goals, tables } = model.steerer.matcher;
   const width = tables.feature_mean.length;

@@ -1,0 +1,120 @@
+/* What the page of `motet live` steers its figures with: one script without modules, motet/live/control.js. */
+import { halves } from "./arrays.js";
+import { ControlModel } from "./control.js";
+import type { Manifest } from "./bundle.js";
+import { BONES, HUMANOID, SIDES } from "./humanoid.js";
+import type { Tables } from "./matching.js";
+import { worldOf } from "./motion.js";
+import type { Pose as Ground } from "./planar.js";
+import { about, product, type Quaternion, STILL, type Vector, Y } from "./rotations.js";
+import { standing, type Steered, tell, tick } from "./steered.js";
+import { between, type Played } from "./steering.js";
+
+export { plus, rotated } from "./rotations.js";
+
+/** Joints of the foot and of the toes, left and right. */
+export const FEET = SIDES.map((side) => ["Foot", "Toes"].map((part) => HUMANOID.index(side + part)));
+
+const KINDS = { f4: Float32Array, i1: Int8Array, u1: Uint8Array, i4: Int32Array, f2: Uint16Array };
+
+/** The numbers of a bundle, as motet/live/page.py writes them. */
+export interface Given {
+  manifest: Manifest;
+  tables: Record<string, { kind: keyof typeof KINDS; shape: [rows: number, width: number] }>;
+}
+
+/** Where a figure goes: which gait, its velocity along x and z in m/s, and its facing in radians. */
+export interface Asked {
+  gait: number;
+  x: number;
+  z: number;
+  facing: number;
+}
+
+/** The model of a page, whose tables are gzipped. */
+export async function modelOf({ manifest, tables }: Given, bytes: BufferSource): Promise<ControlModel> {
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return new ControlModel(manifest, unpacked(new Uint8Array(await new Response(stream).arrayBuffer()), tables));
+}
+
+/** The tables row by row. They come one after the other, column by column, of each first all first bytes of its numbers. */
+function unpacked(bytes: Uint8Array, tables: Given["tables"]): Tables {
+  const found: Record<string, unknown> = {};
+  let at = 0;
+  for (const [name, { kind, shape: [rows, width] }] of Object.entries(tables)) {
+    const size = KINDS[kind].BYTES_PER_ELEMENT;
+    const target = new Uint8Array(rows * width * size);
+    for (let column = 0; column < width; column++) {
+      for (let byte = 0; byte < size; byte++) {
+        for (let row = 0; row < rows; row++) target[(row * width + column) * size + byte] = bytes[at++]!;
+      }
+    }
+    found[name] = kind === "f2" ? halves(new Uint16Array(target.buffer)) : new KINDS[kind](target.buffer);
+  }
+  return found as unknown as Tables;
+}
+
+/** A figure of the page, and the last two ticks, between which it is shown. */
+export class Figure {
+  private readonly steered: Steered;
+  private before: Played;
+  private now: Played;
+
+  constructor(
+    private readonly model: ControlModel,
+    place: Ground,
+  ) {
+    this.steered = standing(model, 0, place);
+    this.before = this.now = tick(model, this.steered, true);
+  }
+
+  /** x and z in metres, and the facing in radians. */
+  get root(): Ground {
+    return this.steered.playback.root;
+  }
+
+  /** Along x and z in m/s. */
+  get velocity(): [x: number, z: number] {
+    const [x, z] = this.steered.playback.spring;
+    return [x, z];
+  }
+
+  /** What it was asked, within the limits of its gait. */
+  get asked(): Asked {
+    const [x, z, facing] = this.steered.target;
+    return { gait: this.steered.command.gait, x, z, facing };
+  }
+
+  /** A tick later, asked anew. */
+  tick({ gait, x, z, facing }: Asked): void {
+    const command = { gait, speed: Math.hypot(x, z), direction: Math.atan2(x, z), facing, facesWay: false };
+    tell(this.steered, command, this.model.abilities.target(command).target);
+    [this.before, this.now] = [this.now, tick(this.model, this.steered, true)];
+  }
+
+  /** As it is at a part of the way from the last tick but one to the last. */
+  shown(part: number): Shown {
+    return shownOf(between(this.before, this.now, part));
+  }
+}
+
+/** A pose with rotations and places in the world of the humanoid's joints. */
+export interface Shown extends Played {
+  turned: Quaternion[];
+  places: Vector[];
+}
+
+function shownOf(pose: Played): Shown {
+  const own = HUMANOID.names.map((name): Quaternion => pose.rotations[BONES.indexOf(name)] ?? STILL);
+  own[0] = product(about(Y, pose.ground[2]), own[0]!);
+  const moves = HUMANOID.joints.map(({ offset }) => offset);
+  moves[0] = [pose.ground[0], pose.height, pose.ground[1]];
+  const { turns, places } = worldOf({ skeleton: HUMANOID, rotations: [own], translations: [moves] });
+  return { ...pose, turned: turns[0]!, places: places[0]! };
+}
+
+/** A speed that a gait has at an angle from the facing; 0 is always one. */
+export function inRange({ abilities }: ControlModel, gait: number, speed: number, aside = 0): number {
+  const [x, z] = abilities.target({ gait, speed, direction: aside, facing: 0, facesWay: false }).target;
+  return Math.hypot(x, z);
+}

@@ -1,0 +1,39 @@
+/* One steered figure: what it plays, what it is told, how its feet are held. Sessions and the page of `motet live` have some. */
+import type { ControlModel } from "./control.js";
+import { held, type Lock, newLock } from "./footLock.js";
+import type { Command } from "./gaits.js";
+import type { Playback, Target } from "./matching.js";
+import type { Pose as Ground } from "./planar.js";
+import type { Played } from "./steering.js";
+
+export interface Steered {
+  playback: Playback;
+  lock: Lock;
+  command: Command;
+  target: Target;
+}
+
+/** A figure that stands still at a place; with a phase it searches in its turn alone, first after so many ticks. */
+export function standing({ steerer: { matcher } }: ControlModel, gait: number, place?: Ground, phase?: number): Steered {
+  const facing = place?.[2] ?? 0;
+  const command = { gait, speed: 0, direction: 0, facing, facesWay: false };
+  return { playback: matcher.playing(matcher.stillest(gait), place, phase), lock: newLock(), command, target: [0, 0, facing] };
+}
+
+/** Set where a figure goes from now on: a command, and the target that its gait makes of it. */
+export function tell(figure: Steered, command: Command, target: Target): void {
+  const changed = target.some((value, i) => Math.abs(value - figure.target[i]!) > 1e-4) || command.gait !== figure.command.gait;
+  if (changed) hasten(figure.playback);
+  Object.assign(figure, { command, target });
+}
+
+/** Let a figure that waits for no turn search in the next tick. */
+export function hasten(playback: Playback): void {
+  if (!playback.inTurn) playback.ticksToSearch = 0;
+}
+
+/** The next pose, 1 / fps seconds later. */
+export function tick({ steerer, lock: how, fps }: ControlModel, figure: Steered, holdFeet: boolean, target = figure.target): Played {
+  const pose = steerer.tick(figure.playback, target, figure.command.gait);
+  return holdFeet ? held(figure.lock, pose, how, 1 / fps) : pose;
+}
