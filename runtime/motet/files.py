@@ -50,18 +50,28 @@ def write_whole(file: File, content: str | bytes) -> None:
         if not isinstance(file, str | Path):
             file.write(data)
             return
-        path = check_place(file).resolve()
+        with replacing(file) as temporary:
+            temporary.write_bytes(data)
+    except (OSError, ValueError) as error:
+        raise _refusal(place_of(file), error) from error
+
+
+@contextmanager
+def replacing(path: str | Path) -> Iterator[Path]:
+    """A temporary sibling to write, which takes the place of ``path`` in the end, as :func:`write_whole` says; after an
+    exception nothing is left of it. OutputError if it cannot be written."""
+    try:
+        path = check_place(path).resolve()
         temporary = temporary_beside(path)
         try:
-            temporary.write_bytes(data)
+            yield temporary
             if path.exists():
                 shutil.copymode(path, temporary)
             temporary.replace(path)
-        except BaseException:
+        finally:
             temporary.unlink(missing_ok=True)
-            raise
-    except (OSError, ValueError) as error:
-        raise _refusal(place_of(file), error) from error
+    except OSError as error:
+        raise _refusal(Path(path), error) from error
 
 
 @contextmanager

@@ -27,6 +27,7 @@ COMMANDS = {
     "embed": ("motet.cli.vectors", "", "Write context vectors of motions or sentences."),
     "check": ("motet.cli.files", "", "Say what motion files hold and how they are understood."),
     "convert": ("motet.cli.files", "", "Convert motion files to other formats, rates, units."),
+    "merge": ("motet.cli.many", "", "Merge the answers that --parts wrote."),
     "view": ("motet.cli.files", "", "Write a web page that plays a motion."),
     "bundle": ("motet.cli.bundles", "", "List, inspect, verify and pack models (bundles)."),
     "bench": ("motet.cli.bundles", "", "Measure how fast a model runs here."),

@@ -1,6 +1,8 @@
 """``motet check``, ``convert`` and ``view``: motion files looked at, brought to other formats, and played."""
 
+import hashlib
 import logging
+import pickle
 import sys
 import tempfile
 from collections import Counter
@@ -18,7 +20,7 @@ from motet.cli.options import Tries
 from motet.cli.reading import Read, read_options
 from motet.cli.writing import Output, places, size, write_options
 from motet.corpus.answers import Answer, Check, Verb, to_json
-from motet.corpus.sources import Source
+from motet.corpus.sources import Source, files_of
 from motet.draw.page import write_many
 from motet.formats import READS, WRITES, write_motion
 from motet.formats.text import MARK
@@ -76,6 +78,8 @@ def check(files: tuple[Path, ...], out: Path | None, many: Many, as_json: bool) 
     sources = many.sources(files)
     if out is not None:
         sources = [replace(one, place=place) for one, place in zip(sources, places(out, sources), strict=True)]
+    if many.parts:
+        many.write_part(Check(many.read.options), sources, files, "checking")
     counts: Counter[str] = Counter()
     rows = _counted(map(Row.of, many.answers(Look(many.read.options), sources, "checking", named=False)), counts)
     if as_json:
@@ -227,10 +231,18 @@ def convert(files: Sequence[Path], out: Path | None, output: Output, many: Many,
         if len(files) != 2:
             raise click.UsageError("give IN and OUT, or several files and -o OUT")
         *files, out = files
+    if many.shard.count > 1:  # all names differ, not only those of this shard
+        if "{" not in str(out):
+            raise click.UsageError("shards of convert need an OUT with {name} and, for clips, {clip}")
+        places(out, list(map(Source, files_of(files))), output=output)
     sources = many.sources(files, every=False)
     sources = [replace(one, place=to) for one, to in zip(sources, places(out, sources, output=output), strict=True)]
     many = replace(many, jobs=1) if output.onto else many  # which holds all clips until the end
     verb = Convert(many.read.options, output, Changes(**how))
+    if many.parts and output.onto:
+        raise click.UsageError("--parts writes a file for each motion: it does not go with --onto")
+    if many.parts:
+        many.write_part(verb, sources, files, "converting")
     for answer in many.answers(verb, sources, "converting"):
         for row in answer.rows:
             click.echo(f"{row['output']}: {size(row['frames'], row['fps'])}")
@@ -259,6 +271,12 @@ class Convert(Verb):
 
     output: Output
     how: Changes
+
+    def about(self) -> dict[str, Any]:
+        """Also what is done."""
+        figure = hashlib.sha256(pickle.dumps(self.output.character)).hexdigest()
+        output = {"fps": self.output.fps, "in_place": self.output.in_place, "figure": figure}
+        return {**super().about(), "changes": {key: str(value) for key, value in vars(self.how).items()}, **output}
 
     def rows(self, answer: Answer) -> list[Any]:
         """The one row."""

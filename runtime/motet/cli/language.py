@@ -67,6 +67,8 @@ def describe(
     options = many.read.options, bundle, session
     verb = Timeline(*options) if timeline else Describe(*options, settings)
     sources = many.sources(motions)
+    if many.parts:
+        many.write_part(verb, sources, motions, "describing")
     answers = many.answers(verb, sources, "describing")
     if as_json:
         print_list(to_json(row) for answer in answers for row in answer.rows)

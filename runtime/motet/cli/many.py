@@ -1,10 +1,13 @@
-"""How commands go over many motions: on all cores, with progress, each answer in order and each failure named."""
+"""How commands go over many motions: on all cores or a cluster, with progress, each answer in order and each failure
+named; and in parts, which other processes and machines write beside this one."""
 
 import functools
+import logging
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +15,15 @@ import click
 
 from motet.cli.options import Tries, bar
 from motet.cli.reading import Read
-from motet.corpus.answers import Answer, Verb
+from motet.corpus import parts as corpus_parts
+from motet.corpus import ray_engine
+from motet.corpus.answers import Answer, Hashed, Verb
+from motet.corpus.parts import Part, Shard, digest, failures
 from motet.corpus.sources import Source, files_of
 from motet.jobs import in_batches
 from motet.settings import silent
+
+log = logging.getLogger(__name__)
 
 jobs_option = click.option(
     "--jobs", type=click.IntRange(1, 256), metavar="N", help="Processes for many files. [default: one for each core]"
@@ -27,17 +35,27 @@ class Many:
     """What the options of a command over many motions say."""
 
     read: Read
-    jobs: int | None
+    jobs: int | None = None
+    parts: Path | None = None
+    shard: Shard = field(default_factory=Shard)
+    engine: str = "processes"
+    address: str | None = None
     tries: Tries = field(default_factory=Tries)
 
     def sources(self, given: Sequence[Path], every: bool = True) -> list[Source]:
-        """The motions that files, folders, zips and patterns name. every: all clips where nothing says which."""
-        return self.read.sources(files_of(given), every)
+        """The motions of this shard that files, folders, zips and patterns name. every: all clips where nothing says
+        which."""
+        files = self.shard.of(list(enumerate(files_of(given))))
+        return [replace(one, number=number) for number, file in files for one in self.read.sources([file], every)]
 
     def answers(self, verb: Verb, sources: Sequence[Source], label: str, named: bool = True) -> Iterator[Answer]:
         """The answers in order, with progress where they are not printed as they come. named: failures are said."""
-        with nullcontext(silent) if sys.stdout.isatty() else bar(label) as progress:
-            for done, answer in enumerate(in_batches(verb, sources, self.jobs, verb.MOST), start=1):
+        if self.engine == "ray":
+            found = ray_engine.answers(verb, sources, self.jobs, self.address)
+        else:
+            found = in_batches(verb, sources, self.jobs, verb.most)
+        with nullcontext(silent) if sys.stdout.isatty() and self.parts is None else bar(label) as progress:
+            for done, answer in enumerate(found, start=1):
                 progress(done, len(sources))
                 if named:
                     self.tries.say(answer)
@@ -45,16 +63,65 @@ class Many:
                     self.read.rates.append(answer.fps)
                 yield answer
 
+    def write_part(self, verb: Verb, sources: Sequence[Source], given: Sequence[Path], label: str) -> None:
+        """Write the part of this shard, or what is missing of it, into the folder of ``--parts``."""
+        assert self.parts is not None
+        files = files_of(given)
+        corpus = {"files": len(files), "corpus": digest(files)}
+        part = Part(self.parts, {"motet": version("motet"), **verb.about(), **corpus, "shard": str(self.shard)})
+        before = part.complete()
+        if not before:
+            part.write(sources, lambda rest: self.answers(Hashed.of(verb), rest, label))
+            if digest(files_of(given)) != corpus["corpus"]:
+                log.warning(
+                    "the corpus changed while %s was written: it merges only with parts begun before", part.path
+                )
+        count, failed = failures(part.path)
+        said = "was complete already: " if before else ""
+        click.echo(f"{part.path}: {said}{count} motions, {failed} failed")
+        sys.exit(1 if failed else 0)
+
 
 def many_options(command: Callable[..., None]) -> Callable[..., None]:
     """Gives a command ``many``, with the ``read`` of :func:`motet.cli.reading.read_options`, which stands above it."""
 
     @jobs_option
+    @click.option("--parts", type=Path, metavar="FOLDER", help="Write the answers there, or what is missing of them.")
+    @click.option("--shard", metavar="I/N", help="With --parts: every N-th file from the I-th, such as 3/16.")
+    @click.option(
+        "--engine",
+        type=click.Choice(["processes", "ray"]),
+        default="processes",
+        show_default=True,
+        help="What runs it; ray: a Ray cluster, of this machine or at --address.",
+    )
+    @click.option("--address", help="Of the Ray cluster, such as auto or ray://host:10001.")
     @functools.wraps(command)
-    def with_many(read: Read, jobs: int | None, **options: Any) -> None:
-        command(many=Many(read, jobs), **options)
+    def with_many(
+        read: Read,
+        jobs: int | None,
+        parts: Path | None,
+        shard: str | None,
+        engine: str,
+        address: str | None,
+        **options: Any,
+    ) -> None:
+        if shard is not None and parts is None:
+            raise click.UsageError("--shard writes a part: give --parts FOLDER")
+        if address is not None and engine != "ray":
+            raise click.UsageError("--address is that of a Ray cluster: give --engine ray")
+        many = Many(read, jobs, parts, Shard() if shard is None else Shard.parse(shard), engine, address)
+        command(many=many, **options)
 
     return with_many
+
+
+@click.command()
+@click.argument("parts", nargs=-1, required=True, type=Path, metavar="FOLDER|PART...")
+@click.option("-o", "--out", required=True, type=Path, help="The .jsonl, .parquet or, of embed, .npy to write.")
+def merge(parts: tuple[Path, ...], out: Path) -> None:
+    """Merge the parts that --parts and --shard wrote, in the order of the files: the bytes are those of one part."""
+    click.echo(f"{out}: {corpus_parts.merge(parts, out)} answers")
 
 
 def print_list(rows: Iterator[str]) -> None:

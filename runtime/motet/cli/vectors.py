@@ -27,7 +27,7 @@ from motet.models.search import INDEX_FILE, Index, SearchModel
 @click.command()
 @click.argument("motions", nargs=-1, type=Path, metavar="[MOTION|FOLDER|ZIP...]")
 @click.option("--text", "texts", multiple=True, help="A sentence, instead of motions; may be given several times.")
-@click.option("-o", "--out", required=True, type=Path, help="The .npy to write: (N, C) float32.")
+@click.option("-o", "--out", type=Path, help="The .npy to write, where there is no --parts: (N, C) float32.")
 @click.option("--bundle", help="Name or path of a bundle. [default: describe, with --text generate]")
 @session_options
 @read_options
@@ -36,7 +36,7 @@ from motet.models.search import INDEX_FILE, Index, SearchModel
 def embed(
     motions: tuple[Path, ...],
     texts: tuple[str, ...],
-    out: Path,
+    out: Path | None,
     bundle: str | None,
     session: SessionOptions,
     many: Many,
@@ -50,12 +50,14 @@ def embed(
     """
     if bool(motions) == bool(texts):
         raise click.UsageError("give either motion files or --text")
-    if out.suffix.lower() != ".npy":
-        raise click.UsageError(f"context vectors are written as .npy, not {out.name!r}")
+    verb = Embed(many.read.options, bundle or "describe", session)
+    if many.parts and motions:
+        many.write_part(verb, many.sources(motions), motions, "embedding")
+    if out is None or out.suffix.lower() != ".npy":
+        raise click.UsageError("context vectors are written as .npy: give -o VECTORS.npy")
     check_place(out)
     tries, rows = many.tries, list[dict[str, Any]]()
     if motions:
-        verb = Embed(many.read.options, bundle or "describe", session)
         for answer in many.answers(verb, many.sources(motions), "embedding"):
             rows += answer.rows
         vectors = np.array([row.pop("vector") for row in rows])

@@ -29,7 +29,7 @@ Kind = TypeVar("Kind")
 class Answer:
     """What was found of a motion: rows ready for :func:`to_json`, or an error that names it; and the warnings.
 
-    fps: its frame rate, None where it was not read.
+    fps: its frame rate, None where it was not read. hash: SHA-256 of its file, in hex, where that was asked for.
     """
 
     source: Source
@@ -37,6 +37,7 @@ class Answer:
     error: str = ""
     warned: tuple[str, ...] = ()
     fps: float | None = None
+    hash: str = ""
 
     @property
     def in_place(self) -> bool:
@@ -70,11 +71,15 @@ def to_json(row: Any) -> str:
 class Verb:
     """Answers batches of motions: one :class:`Answer` each, the same as alone.
 
-    reading: options of :func:`motet.read`. MOST: motions that are answered at once.
+    reading: options of :func:`motet.read`.
     """
 
     reading: Mapping[str, Any]
-    MOST: ClassVar[int] = 1
+
+    @property
+    def most(self) -> int:
+        """Motions that are answered at once."""
+        return 1
 
     def __call__(self, sources: Sequence[Source]) -> list[Answer]:
         """The answers, in order."""
@@ -103,13 +108,41 @@ class Verb:
 
 
 @dataclass(frozen=True)
+class Hashed(Verb):
+    """Another verb's answers, with the hashes of the files."""
+
+    verb: Verb
+
+    @staticmethod
+    def of(verb: Verb) -> "Hashed":
+        """That of a verb."""
+        return Hashed(verb.reading, verb)
+
+    @property
+    def most(self) -> int:
+        """That of the verb."""
+        return self.verb.most
+
+    def __call__(self, sources: Sequence[Source]) -> list[Answer]:
+        """The answers, in order."""
+        answers = self.verb(sources)
+        for answer in answers:
+            answer.hash = answer.source.hash()
+        return answers
+
+
+@dataclass(frozen=True)
 class OfModel(Verb, Generic[Kind]):
     """A verb of a model, which each process loads once. bundle: its name or path."""
 
     bundle: str = ""
     session: SessionOptions = field(default_factory=SessionOptions)
     MODEL: ClassVar[Any]
-    MOST = 64
+
+    @property
+    def most(self) -> int:
+        """Motions that are answered at once."""
+        return 64
 
     @cached_property
     def model(self) -> Kind:
@@ -156,7 +189,11 @@ class Timeline(OfModel[DescribeModel]):
 
     bundle: str = "describe"
     MODEL = DescribeModel
-    MOST = 1  # windows of one motion are many
+
+    @property
+    def most(self) -> int:
+        """One, whose windows are many."""
+        return 1
 
     def rows(self, answer: Answer) -> list[Any]:
         """A row for each part."""

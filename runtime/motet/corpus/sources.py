@@ -2,6 +2,7 @@
 
 import glob
 import hashlib
+import re
 import tempfile
 import zipfile
 import zlib
@@ -26,12 +27,13 @@ class Source:
     """A motion file, and which clip of it; None for the first.
 
     path: of the file; one in a zip has the zip's path before its own: a.zip/walks/1.bvh. place: where its result is
-    written, if it is written to a file of its own.
+    written, if it is written to a file of its own. number: of the file in its corpus.
     """
 
     path: Path
     clip: str | None = None
     place: Path | None = None
+    number: int = 0
 
     def __str__(self) -> str:
         return str(self.path) if self.clip is None else f"{self.path}{MARK}{self.clip}"
@@ -86,6 +88,8 @@ def files_of(given: Sequence[Path]) -> list[Path]:
 def _files(path: Path) -> list[Path]:
     if path.is_dir():
         found, where = files_in(path, KINDS), "are in it"
+    elif url := url_of(path):
+        found, where = _listed(path, url), "are there"
     elif path.suffix.lower() == ".zip" and path.is_file():
         found, where = [path / name for name in _members(path)], "are in it"
     elif glob.has_magic(str(path)) and not place_of(split_clip(path, READABLE)[0]).exists():
@@ -125,24 +129,88 @@ def _members(path: Path) -> list[str]:
 def opened(path: Path) -> Iterator[Path]:
     """Where a file lies; one in a zip is unpacked for as long as the context lasts, with the skeletons (.asf) beside it
     and in the folders above. Errors name it by its path in the zip."""
-    box = next((parent for parent in path.parents if parent.suffix.lower() == ".zip" and parent.is_file()), None)
-    if box is None or path.exists():
+    box, url = _box(path), url_of(path)
+    if (box or url) is None or path.exists():
         yield path
         return
-    inside = PurePosixPath(path.relative_to(box).as_posix())
     with tempfile.TemporaryDirectory(prefix="motet-") as folder:
+        place = _fetched(path, url, folder) if box is None else _unpacked(path, box, folder)
+        box = box or path.parent
         try:
-            with _zip(box) as archive:
-                beside = (PurePosixPath(name) for name in archive.namelist() if name.lower().endswith(".asf"))
-                for name in (inside, *(name for name in beside if name.parent in inside.parents)):
-                    archive.extract(str(name), folder)
-        except (KeyError, OSError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
-            raise FormatError(path, f"cannot be unpacked: {error}") from error
-        try:
-            yield Path(folder) / inside
+            yield place
         except MotionError as error:
             line, reason = getattr(error, "line", None), getattr(error, "reason", str(error))
             raise FormatError(path, str(reason).replace(folder, str(box)), line) from error
+
+
+def _box(path: Path) -> Path | None:
+    """The zip that a file is in."""
+    return next((parent for parent in path.parents if parent.suffix.lower() == ".zip" and parent.is_file()), None)
+
+
+def _unpacked(path: Path, box: Path, folder: str) -> Path:
+    inside = PurePosixPath(path.relative_to(box).as_posix())
+    try:
+        with _zip(box) as archive:
+            beside = (PurePosixPath(name) for name in archive.namelist() if name.lower().endswith(".asf"))
+            for name in (inside, *(name for name in beside if name.parent in inside.parents)):
+                archive.extract(str(name), folder)
+    except (KeyError, OSError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
+        raise FormatError(path, f"cannot be unpacked: {error}") from error
+    return Path(folder) / inside
+
+
+def size_of(file: Path) -> int:
+    """Bytes of a file, or of the zip that it is in; -1 where there is none."""
+    try:
+        if (url := url_of(file)) and not file.exists():
+            system, name = _system(file, url)
+            return int(system.size(name))
+        return (_box(file) or file).stat().st_size
+    except OSError:
+        return -1
+
+
+def url_of(path: Path) -> str | None:
+    """The URL that a path is of, as which "s3://bucket/a.bvh" and what else fsspec knows is given; None for others."""
+    found = re.fullmatch(r"([a-z][a-z0-9+.-]+):/+(.*)", path.as_posix())
+    return f"{found[1]}://{found[2]}" if found else None
+
+
+def _system(path: Path, url: str) -> tuple[Any, str]:
+    """The file system of a URL and the name there; FormatError where fsspec lacks it."""
+    try:
+        import fsspec
+
+        system, name = fsspec.core.url_to_fs(url)
+        return system, str(name)
+    except (ImportError, ValueError) as error:
+        raise FormatError(path, f"{error}; pip install 'motet[scale]', and the package of its file system") from error
+
+
+def _listed(path: Path, url: str) -> list[Path]:
+    """The motion files at a URL of a folder, a pattern or one file."""
+    system, name = _system(path, url)
+    try:
+        if not glob.has_magic(url) and not system.isdir(name):
+            return [path]
+        names = system.glob(name) if glob.has_magic(url) else system.find(name)
+    except OSError as error:
+        raise FormatError(path, f"nothing answers there: {error}") from error
+    shown = (Path(system.unstrip_protocol(one)) for one in sorted(names))
+    return [one for one in shown if one.suffix.lower() in KINDS and one.name[0] != "."]
+
+
+def _fetched(path: Path, url: str | None, folder: str) -> Path:
+    """A file at a URL, with the skeletons (.asf) beside it, in a folder."""
+    system, name = _system(path, str(url))
+    try:
+        asf = system.glob(f"{name.rpartition('/')[0]}/*.asf") if path.suffix.lower() == ".amc" else []
+        for one in (name, *asf):
+            system.get_file(one, str(Path(folder) / PurePosixPath(one).name))
+    except OSError as error:
+        raise FormatError(path, f"cannot be fetched: {error}") from error
+    return Path(folder) / PurePosixPath(name).name
 
 
 def _zip(path: Path) -> zipfile.ZipFile:
