@@ -255,9 +255,12 @@ def _motions(model: LanguageModel) -> list[Motion]:
 def _sentences(model: LanguageModel) -> list[str]:
     """Eight sentences of 1 to 15 words of the vocabulary."""
     rng = np.random.default_rng(4)
-    words = model.vocabulary.words[len(SPECIALS) :]
-    return [" ".join(rng.choice(words, length)) for length in range(1, 17, 2)]
+    return [" ".join(rng.choice(_known(model), length)) for length in range(1, 17, 2)]
 
 
 def _text(model: LanguageModel, rng: np.random.Generator) -> str:
-    return " ".join(rng.choice(model.vocabulary.words[len(SPECIALS) :], 5))
+    return " ".join(rng.choice(_known(model), 5))
+
+
+def _known(model: LanguageModel) -> tuple[str, ...]:
+    return (*model.vocabulary.words[len(SPECIALS) :], *model.vocabulary.common)

@@ -1,5 +1,7 @@
 """From a bundle back to a training run: the weights that its graphs hold, to train on from them."""
 
+from typing import Any
+
 import numpy as np
 import onnx
 import torch
@@ -27,6 +29,9 @@ def restored(bundle: Bundle) -> Run:
     for name, value in other.state_dict().items():
         if value.is_floating_point():
             value.uniform_(0.5, 1.5)
+        elif value.dtype == torch.int8:
+            value.random_(-127, 127)
+        if value.is_floating_point() or value.dtype == torch.int8:
             known |= {part.numpy().tobytes(): name for part in (value, value.mT if value.dim() > 1 else value)}
     for role, (module, spec) in other.graphs().items():
         held = _tensors(bundle.read(manifest.graphs[role].file))
@@ -46,9 +51,10 @@ def restored(bundle: Bundle) -> Run:
     return Run(manifest.source, net.eval())
 
 
-def _tensors(data: bytes) -> dict[str, NDArray[np.float32]]:
-    """The tensors of real numbers in a graph by name, those kept in 16 bits by that of their cast to 32."""
+def _tensors(data: bytes) -> dict[str, NDArray[Any]]:
+    """The tensors of real numbers and bytes in a graph by name, those kept in 16 bits by that of their cast to 32."""
     graph = onnx.load_from_string(data).graph
     cast = {node.input[0]: node.output[0] for node in graph.node if node.op_type == "Cast"}
     found = {cast.get(one.name, one.name): numpy_helper.to_array(one) for one in graph.initializer}
-    return {name: value.astype(np.float32) for name, value in found.items() if value.dtype.kind == "f"}
+    real = {name: value.astype(np.float32) for name, value in found.items() if value.dtype.kind == "f"}
+    return real | {name: value for name, value in found.items() if value.dtype == np.int8}

@@ -1,6 +1,7 @@
 """The model that writes codes as an ONNX bundle: what torch computes, decoded to motions code by code."""
 
 import json
+import warnings
 from dataclasses import asdict
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from torch import nn
 
 import motet
 from motet.bundle.bundle import Bundle
+from motet.errors import TextWarning
 from motet.models.generate_codes import CodesModel
 from motet.models.language import RULES, SPECIALS
 from motet.models.load import verify
@@ -31,6 +33,7 @@ from motet_train.runs import Run
 pytestmark = pytest.mark.slow  # torch's exporter
 
 WORDS = [*SPECIALS, "a", "person", "walks", "runs", "left", "right", "stands", "still"]
+COMMON = {"strolls": "walks", "sprinted": "runs"}
 SAID = ("a person walks", "a person runs left", "a person stands still")
 BONES = [name for name in HUMANOID.names if not name.endswith(END_SUFFIX)]
 CHANNELS = (*ROOT_SIXD, *(f"{bone}.{kind}" for bone in BONES for kind in SIXD_KINDS))
@@ -44,9 +47,11 @@ CONTRACT = MotionContract(
 def run() -> Run:
     torch.manual_seed(0)
     codec = CodecConfig(D, tree_of(CONTRACT), moves=MOVES, groups=2, levels=(3, 3), width=8, blocks=1, fine=6)
-    text = ActionsConfig(len(WORDS), len(SAID), stems_of(WORDS), embedding=6, hidden=5)
+    stems, table = stems_of(WORDS, tuple(COMMON)), {"common": len(COMMON), "vector": 4}
+    text = ActionsConfig(len(WORDS), len(SAID), stems, embedding=6, hidden=5, **table)
     writer = CodeModelConfig(len(SAID), width=12, layers=2, heads=2, action=5, ages=16)
     net = MotionCodes(MotionCodesConfig(codec, text, writer, remembered=36))
+    net.text.start_from(torch.randn(len(stems), 4))
     for parameter in net.writer.parameters():
         nn.init.normal_(parameter, std=0.3)
     net.measure_by(CONTRACT.mean, CONTRACT.std)
@@ -56,7 +61,7 @@ def run() -> Run:
     named = {"name": "small-codes", "verb": "generate", "model": "motion-codes", "loop": "codes"}
     actions = [{"sentence": said, "words": said.split()} for said in SAID]
     plain = json.loads(json.dumps(asdict(net.config)))
-    known = {"text": RULES.to_json(), "vocabulary": WORDS, "actions": actions, "config": plain}
+    known = {"text": RULES.to_json(), "vocabulary": WORDS, "common": COMMON, "actions": actions, "config": plain}
     settings = {"defaults": {**DRAWING, "memory": 0.3}, "licence": {}, "training": {}}
     return Run({**named, **known, **settings, "motion": CONTRACT.to_json()}, net.eval())
 
@@ -145,3 +150,24 @@ def test_all_from_memory_plays_what_is_remembered(bundle: Path) -> None:
     for generated in model.generate("a person walks", 4, memory=1.0):
         off = [float(np.abs(generated.frames[:, 4:] - one).max()) for one in known if len(generated.frames) == len(one)]
         assert min(off) < 1e-4
+
+
+def test_common_words_reach_the_graph_with_their_vectors(bundle: Path) -> None:
+    model, net = CodesModel.load(Bundle.open(bundle)), run().model
+    assert isinstance(net, MotionCodes)
+    with torch.no_grad():
+        for text, ids in (("a person strolls", [4, 5, 12]), ("a person sprinting", [4, 5, 13]), ("sprintd", [13])):
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", TextWarning)
+                found = model.embed(text)
+            expected = net.text(torch.tensor([ids]), torch.tensor([len(ids)]))[0]
+            torch.testing.assert_close(torch.from_numpy(found), expected)
+    assert not np.array_equal(model.embed("a person strolls"), model.embed("a person walks"))
+    assert model.lacking("a person strolls", 0) == []
+    assert model.lacking("a person strolls", 1) == ["strolls"]
+    known, near = (model.understood(text).confidence for text in ("a person walks", "a person strolls"))
+    assert 0 < near < known <= 1
+    with pytest.warns(TextWarning, match="'sprintd' is read as 'sprinted'"):
+        model.embed("sprintd")
+    with pytest.warns(TextWarning, match=r"does not know eine, geht .*; it is for English"):
+        model.ids("eine a geht")

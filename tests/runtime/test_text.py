@@ -19,6 +19,7 @@ from motet.models.language import (
     TextRules,
     Vocabulary,
 )
+from motet.models.spelling import corrected, distance
 
 LENIENT = replace(RULES, spelling={})
 
@@ -63,13 +64,14 @@ def test_the_spelling_table_is_normal_and_settled() -> None:
 
 
 def test_rules_travel_and_the_codes_own_do_not_change_what_a_vocabulary_reads() -> None:
-    plain = json.loads(json.dumps(replace(RULES, spelling={"wlak": "walk"}, spelled=3).to_json()))
+    plain = json.loads(json.dumps(replace(RULES, spelling={"klaw": "walk"}, spelled=3).to_json()))
     rules = TextRules.from_json(plain)
     old = Vocabulary([*SPECIALS, "walk", "wlaks", "2", "5", "one", "steps"], rules)
     assert rules.to_json() == plain
-    assert old.decode(old.encode("wlak wlaks two 5 steps")[0]) == "walk wlaks 25 steps"
+    assert old.decode(old.encode("klaw wlaks two 5 steps")[0]) == "walk wlaks 25 steps"
     new = Vocabulary(old.words)
-    assert new.encode("wlak wlaks 2")[1] == ["wlak", "walks"]
+    assert new.encode("klaw wlaks 2")[1] == ["klaw"]
+    assert new.encode("klaw wlaks 2")[0].tolist() == [3, 4, 6]
     assert old.encode("wlak wlaks")[1] == []
 
 
@@ -173,3 +175,71 @@ def test_a_sentence_that_no_model_can_take(sentence: str, reason: str) -> None:
 def test_what_is_no_vocabulary(bad: list[str]) -> None:
     with pytest.raises(TextError, match="a vocabulary"):
         Vocabulary(bad)
+
+
+KNOWN = Vocabulary((*SPECIALS, "walks", "walking", "jumps", "person"), common={"strolls": "walks", "leaps": "jumps"})
+
+
+def test_common_words_go_on_after_the_words_of_sentences() -> None:
+    ids, unknown = KNOWN.encode("a person strolls, then leaps")
+    assert ids.tolist() == [3, 7, 8, 3, 9]
+    assert unknown == ["a", "then"]
+    assert (len(KNOWN), KNOWN.near("leaps"), KNOWN.near("jumps"), KNOWN.near("then")) == (8, "jumps", "jumps", "")
+
+
+@pytest.mark.parametrize(
+    ("word", "meant"),
+    [
+        ("walk", "walks"),  # the first with the stem, by count
+        ("walked", "walks"),
+        ("strolling", "strolls"),
+        ("jmups", "jumps"),
+        ("jumpz", "jumps"),
+        ("psrson", "person"),
+        ("erson", ""),  # another first letter
+        ("pxrsxn", ""),  # two letters off
+        ("ump", ""),
+        ("j", ""),
+        ("", ""),
+    ],
+)
+def test_a_word_is_known_by_its_stem_or_with_a_letter_wrong(word: str, meant: str) -> None:
+    assert KNOWN.meant(word) == meant
+
+
+@pytest.mark.parametrize("common", [{"walks": "jumps"}, {"UNK": "jumps"}, {"strolls": "hops"}])
+def test_what_are_no_common_words(common: dict[str, str]) -> None:
+    with pytest.raises(TextError):
+        Vocabulary((*SPECIALS, "walks", "jumps"), common=common)
+
+
+def naive_distance(first: str, second: str) -> int:
+    """By trying all that could be done to the last letters."""
+    if not first or not second:
+        return len(first) + len(second)
+    found = [
+        naive_distance(first[:-1], second) + 1,
+        naive_distance(first, second[:-1]) + 1,
+        naive_distance(first[:-1], second[:-1]) + (first[-1] != second[-1]),
+    ]
+    if first[-2:] == second[-2:][::-1] and len(first) > 1 and len(second) > 1:
+        found.append(naive_distance(first[:-2], second[:-2]) + 1)
+    return min(found)
+
+
+def test_distances_are_those_of_a_naive_twin() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(150):
+        first, second = ("".join(rng.choice(list("abc"), rng.integers(0, 6))) for _ in range(2))
+        assert distance(first, second) == naive_distance(first, second), (first, second)
+
+
+def test_a_misspelt_word_is_the_nearest_one_where_that_is_clear() -> None:
+    words = ["jump", "jumps", "jumble", "kick", "kicks", "kiss", "backflips", "bump"]
+    assert corrected("jmup", words) == "jump"
+    assert corrected("kicsk", words) == "kick"  # or kicks
+    assert corrected("kics", words) == ""  # kick, kicks or kiss
+    assert corrected("kics", ["kick"], words) == "kick"
+    assert corrected("juump", words) == "jump"
+    assert corrected("bakcflps", words) == "backflips"  # two letters off of eight
+    assert corrected("jumpss", ["jump", "jumping"], words) == "jumps"

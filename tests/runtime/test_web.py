@@ -21,7 +21,7 @@ from motet.decode.words import noise_of, score_words
 from motet.errors import ControlWarning, TextWarning
 from motet.models.describe import DescribeModel
 from motet.models.generate_codes import CodesModel
-from motet.models.language import EOS, SOS
+from motet.models.language import EOS, SOS, SPECIALS, Vocabulary
 from motet.models.predict import PredictModel
 from motet.models.search import SearchModel
 from motet.models.steer import SteerModel
@@ -78,6 +78,17 @@ def understood(model: CodesModel) -> list[dict[str, Any]]:
         {"text": text, "confidence": one.confidence, "confident": one.confident, "nearest": one.nearest}
         for text, one in found
     ]
+
+
+def known() -> dict[str, Any]:
+    """A small vocabulary, and what words are taken for: themselves, their stem, a misspelling, and what is near."""
+    words = (*SPECIALS, "walks", "walking", "jumps", "waves", "person", "backflips", "7")
+    found = Vocabulary(words, common={"strolls": "walks", "greets": "waves", "backrubs": "waves", "wares": "person"})
+    given = ["person", "strolls", "strolling", "greeted", "walk", "jmups", "jumpz", "bakcflps", "backflubs", "wavs"]
+    given += ["waes", "ump", "pxrsxn", "\u043f\u0440\u044b\u0433"]
+    read = {word: [found.meant(word), found.near(word)] for word in given}
+    ids = found.encode(" ".join(read))[0].tolist()
+    return {"vocabulary": words, "common": found.common, "rules": found.rules.to_json(), "read": read, "ids": ids}
 
 
 def described(model: DescribeModel) -> dict[str, Any]:
@@ -170,6 +181,7 @@ def answers() -> dict[str, Any]:
         "after": continued(generate),
         "understood": understood(generate),
         "parts": parted(generate),
+        "known": known(),
         **described(describe),
         "score": scored(describe),
         "expected": expected(motet.load("predict")),

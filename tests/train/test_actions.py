@@ -12,9 +12,11 @@ from codes_data import ACTIONS, TEXT, small_store, trained
 from torch import nn
 
 from motet.cli import main
+from motet.models.language import SPECIALS
 from motet_train.data.errors import DataError
-from motet_train.data.sentences import actions_of, mirror_text, principal, read_word_vectors
+from motet_train.data.sentences import actions_of, mirror_text
 from motet_train.data.store import Store
+from motet_train.data.word_table import nearest, principal, read_word_vectors, word_table
 from motet_train.models.action_net import ActionNet, ActionsConfig, stem, stems_of
 from motet_train.recipes.actions import Said
 from motet_train.recipes.language import divided
@@ -135,19 +137,61 @@ def test_principal_components_are_those_of_scikit_learn() -> None:
     np.testing.assert_allclose(np.linalg.norm(wide, axis=1) * centred[0], centred * np.linalg.norm(wide[0]))
 
 
+COMMON = """walks 1 0 0
+strolls .9 .1 0
+. 1 0 0
+x 1 0 0
+Runs 0 1 0
+runs 0 1 0
+sprints .1 .9 .1
+cooks -1 .1 -1
+walks 9 9 9
+"""
+
+
+def test_further_words_are_those_near_to_a_word_of_the_sentences(tmp_path: Path) -> None:
+    file = tmp_path / "vectors.txt"
+    file.write_text(COMMON)
+    words = (*SPECIALS, "walks", "runs", "hops")
+    found = read_word_vectors(file, words, first=9)
+    assert list(found) == ["walks", "strolls", "runs", "sprints", "cooks"]
+    assert nearest(found, words[4:]) == {"strolls": "walks", "sprints": "runs"}
+    assert list(read_word_vectors(file, words, first=1)) == ["walks", "strolls", "runs"]
+    table = word_table(file, words, 2)
+    assert table.common == {"strolls": "walks", "sprints": "runs"}
+    assert table.vectors.shape == (9, 2)
+    assert table.vectors.any(axis=1).tolist() == [False] * 4 + [True, True, False, True, True]
+
+
 @torch.no_grad()
-def test_a_net_starts_from_vectors() -> None:
-    config = ActionsConfig(6, 3, (0, 1, 2, 3, 4, 4), embedding=2, hidden=5)
+def test_a_word_that_no_sentence_has_is_known_by_its_vector_and_its_stem() -> None:
+    words, common = (*SPECIALS, "walks", "jumps"), ("strolls", "jumped")
+    stems = stems_of(words, common)
+    assert stems == (0, 1, 2, 3, 4, 5, 3, 5)
+    config = ActionsConfig(6, 3, stems, embedding=4, hidden=5, common=2, vector=2, unheard=0.0, word_dropout=0.0)
     torch.manual_seed(0)
-    plain = ActionNet(config)
-    torch.manual_seed(0)
-    net, known = ActionNet(config), torch.tensor([False, False, False, False, True, True])
-    vectors = torch.arange(12.0).reshape(6, 2)
-    net.start_from(vectors, known)
-    assert torch.equal(net.words.weight[known], vectors[known])
-    assert torch.equal(net.words.weight[~known], plain.words.weight[~known])
-    torch.testing.assert_close(net.roots.weight, 0.3 * plain.roots.weight)
-    assert torch.equal(net.outward.weight, plain.outward.weight)
+    net = ActionNet(config).eval()
+    net.start_from(torch.tensor([[0.0, 0.0]] * 4 + [[1.0, -2.0], [0.5, 0.0], [1.0, -2.0], [9.0, -9.0]]))
+    assert net.vectors[4:].tolist() == [[16, -32], [8, 0], [16, -32], [127, -127]]
+
+    def said(*ids: int) -> torch.Tensor:
+        found: torch.Tensor = net(torch.tensor([ids]), torch.tensor([len(ids)]))
+        return found
+
+    assert not torch.equal(said(3), said(6))
+    assert not torch.equal(said(4), said(6))
+    net.words.weight.zero_()
+    net.roots.weight.zero_()
+    assert torch.equal(said(4), said(6))
+    net.roots.weight[5] = 1
+    assert not torch.equal(said(4), said(5))
+    net.train().dropout.p = 0
+    assert torch.equal(said(4, 5), said(6, 5))
+    replaced = ActionNet(replace(config, unheard=1.0, dropout=0.0)).train()
+    replaced.load_state_dict(net.state_dict())
+    replaced.words.weight[4] = 3
+    net.words.weight[4], net.roots.weight[5] = 0, 0
+    torch.testing.assert_close(replaced(torch.tensor([[4, 5]]), torch.tensor([2])), said(4, 5))
 
 
 @torch.no_grad()
@@ -189,7 +233,7 @@ def test_sentences_without_a_known_word_are_not_measured_by(store: Store) -> Non
 
 
 def test_a_run_learns_with_vectors_and_without(folder: Path, tmp_path: Path) -> None:
-    (tmp_path / "vectors.txt").write_text(VECTORS)
+    (tmp_path / "vectors.txt").write_text(f"{VECTORS}strolls 1 0 2 1\n")
     longer = TEXT.replace("steps = 6\nevery = 3", "steps = 120\nevery = 40")
     given = ("--word-vectors", tmp_path / "vectors.txt", "--vectors-from", "nobody, CC0")
     runs = [trained("actions", longer, folder, tmp_path / "plain")]
@@ -203,12 +247,14 @@ def test_a_run_learns_with_vectors_and_without(folder: Path, tmp_path: Path) -> 
         assert isinstance(model, ActionNet)
         assert (manifest["verb"], manifest["model"]) == ("actions", "motion-actions")
         assert len(manifest["actions"]) == model.config.actions == 6
-        assert len(manifest["vocabulary"]) == model.config.words == len(model.config.stems)
+        assert len(manifest["vocabulary"]) == model.config.words == len(model.config.stems) - model.config.common
         by = {entry["sentence"]: entry["words"] for entry in manifest["actions"]}
         assert by["a person turns left"] == ["a", "goes", "left", "person", "someone", "the", "to", "turns"]
         assert set(by) >= {said[0] for said in ACTIONS.values()}
-    said = {"file": "vectors.txt", "words": 4, "numbers": 4, "origin": "nobody, CC0"}
+    said = {"file": "vectors.txt", "words": 5, "origin": "nobody, CC0"}
     assert runs[1].manifest["training"]["word_vectors"] == said
+    assert runs[1].manifest["common"] == {"strolls": "walks"}
+    assert "common" not in runs[0].manifest
     assert "word_vectors" not in runs[0].manifest["training"]
     first, second = (run.model.state_dict() for run in runs)
     assert any(not torch.equal(first[name], second[name]) for name in first)

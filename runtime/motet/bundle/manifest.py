@@ -86,6 +86,7 @@ class Manifest:
     settings: Mapping[str, Mapping[str, Any]]
     text: Mapping[str, Any] | None
     vocabulary: tuple[str, ...]
+    common: Mapping[str, str]
     control: Control | None
     config: Mapping[str, Any]
     licence: Mapping[str, Any]
@@ -125,6 +126,7 @@ class Manifest:
             settings={name: entry.data for name, entry in top.entries("settings")},
             text=top.mapping("text") if "text" in top else None,
             vocabulary=top.texts("vocabulary") if "vocabulary" in top else (),
+            common=_common(top.fields("common")) if "common" in top else {},
             control=_control(top.fields("control"), len(motion.channels)) if "control" in top else None,
             graphs={role: GraphEntry(one.text("file"), GraphSpec.read(one)) for role, one in top.entries("graphs")},
             tables={name: _table(one) for name, one in top.entries("tables")},
@@ -200,6 +202,10 @@ def _control(data: Fields, channels: int) -> Control:
     if not labels or set(starts.data) != set(labels):
         raise data.fault(f"frames for each of {', '.join(labels)}", list(starts.data), "starts")
     return Control(labels, {label: starts.table(label, channels) for label in labels})
+
+
+def _common(data: Fields) -> dict[str, str]:
+    return {word: data.text(word) for word in data.data}
 
 
 def _table(data: Fields) -> TableEntry:

@@ -21,7 +21,6 @@ from motet.errors import BundleError, DecodingError, MotionError, TextError, Tex
 from motet.models.compose import Composition, compose
 from motet.models.composition import FUNCTION_WORDS, Passage, parts_of, sentences_of, stem, verbs_of
 from motet.models.generate import Generated, GenerateModel, LoopSettings
-from motet.models.language import SPECIALS
 from motet.models.plans import Moment
 from motet.models.steer import SteerModel
 from motet.motion.motion import Motion
@@ -144,12 +143,12 @@ class CodesModel(GenerateModel):
         return found if len(found) > 1 else [sentence]
 
     def lacking(self, sentence: str, action: int | None = None) -> list[str]:
-        """The known words of a sentence, but for function words, of which no sentence of an action has any form, by
-        default of the likeliest."""
+        """The known words of a sentence, but for function words, of which no sentence of an action has any form, nor
+        of what a common word is near to; by default of the likeliest action."""
         ids, _ = self.vocabulary.encode(sentence)
         have = self._stems[int(self.contexts([ids])[0].argmax()) if action is None else action]
-        words = {self.vocabulary.words[one] for one in ids.tolist()} - FUNCTION_WORDS - set(SPECIALS)
-        return sorted(word for word in words if stem(word) not in have)
+        words = set(map(self.vocabulary.meant, self.vocabulary.rules.words(sentence))) - FUNCTION_WORDS - {""}
+        return sorted(one for one in words if have.isdisjoint({stem(one), stem(self.vocabulary.near(one))}))
 
     def composed(self, sentence: str, seed: int, strict: bool, settings: Mapping[str, float | None]) -> list[Generated]:
         """See :meth:`GenerateModel.composed`; the first motion is the :meth:`story` of this seed."""
@@ -163,7 +162,8 @@ class CodesModel(GenerateModel):
         return self._understood(sentence, self.embed(sentence))
 
     def _understood(self, sentence: str, context: Floats) -> Understood:
-        asked, unheard = set(self.vocabulary.rules.words(sentence)), math.log(1 + len(self._sentences))
+        words = self.vocabulary.rules.words(sentence)
+        asked, unheard = {self.vocabulary.meant(word) or word for word in words}, math.log(1 + len(self._sentences))
         heard = sum(self._rare.get(word, 0.0) for word in asked)
         share = heard / (sum(self._rare.get(word, unheard) for word in asked) or 1.0)
         order, how = np.argsort(-context, kind="stable"), self._familiar

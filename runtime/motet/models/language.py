@@ -22,6 +22,8 @@ from motet.bundle.manifest import Manifest
 from motet.decode.loop import two_rows
 from motet.errors import BundleError, MotionError, TextError, TextWarning, warn
 from motet.models.base import BundleModel
+from motet.models.composition import stem
+from motet.models.spelling import corrected
 from motet.motion.feet.treadmill import travelling
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
@@ -144,17 +146,21 @@ RULES = TextRules()
 @dataclass(frozen=True)
 class Vocabulary:
     """The words a model knows: a word's place is its id. TextError unless PAD, SOS, EOS and UNK are the first, and each
-    word is there once. rules: how sentences become words."""
+    word is there once. rules: how sentences become words. common: further words, whose ids go on after those, each with
+    the one of ``words`` that is nearest to it."""
 
     words: tuple[str, ...]
     rules: TextRules = field(default=RULES, hash=False)
+    common: Mapping[str, str] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "words", tuple(self.words))
         if self.words[: len(SPECIALS)] != SPECIALS:
             raise TextError(f"a vocabulary starts with {', '.join(SPECIALS)}, not with {', '.join(self.words[:4])}")
-        if len(self.ids) != len(self.words):
+        if len(self.ids) != len(self.words) + len(self.common):
             raise TextError("a vocabulary holds each word once")
+        if lacking := set(self.common.values()) - set(self.words):
+            raise TextError(f"a vocabulary's common words are near words that it holds, not {min(lacking)!r}")
 
     @staticmethod
     def of(sentences: Iterable[str]) -> "Vocabulary":
@@ -168,7 +174,23 @@ class Vocabulary:
     @cached_property
     def ids(self) -> dict[str, int]:
         """Word -> id."""
-        return {word: i for i, word in enumerate(self.words)}
+        return {word: i for i, word in enumerate((*self.words, *self.common))}
+
+    def meant(self, word: str) -> str:
+        """The known word that a lower-case word is, or the first that has its stem, or of which it is a misspelling
+        (:func:`motet.models.spelling.corrected`); "" where there is none."""
+        if word in self.ids or len(word) < 4:
+            return word if word in self.ids else ""
+        return self._stems.get(stem(word)) or corrected(word, self.words[len(SPECIALS) :], self.common)
+
+    def near(self, word: str) -> str:
+        """The one of ``words`` that a word is (:meth:`meant`), or that is nearest to it; "" where there is none."""
+        known = self.meant(word)
+        return self.common.get(known, known)
+
+    @cached_property
+    def _stems(self) -> dict[str, str]:
+        return {stem(word): word for word in reversed((*self.words[len(SPECIALS) :], *self.common))}
 
     def encode(self, sentence: str) -> tuple[NDArray[np.int64], list[str]]:
         """Ids (words,) int64 of a sentence, without SOS and EOS, and its unknown words, whose id is UNK's.
@@ -179,15 +201,16 @@ class Vocabulary:
         if len(sentence) > 2000:
             raise TextError(f"the sentence has {len(sentence)} letters, but at most 2000 are allowed")
         found = self.rules.words(sentence)
-        unknown = [word for word in found if word not in self.ids]
+        meant = list(map(self.meant, found))
+        unknown = [word for word, known in zip(found, meant, strict=True) if not known]
         if not found:
             raise TextError(f"the sentence {sentence!r} has no words")
         if len(found) > MAX_WORDS:
             raise TextError(f"the sentence has {len(found)} words, but at most {MAX_WORDS} are allowed: {sentence!r}")
         if len(unknown) == len(found):
             examples = ", ".join(self.words[len(SPECIALS) : len(SPECIALS) + 20])
-            raise TextError(f"the model knows no word of {sentence!r}; it knows words such as {examples}")
-        return np.array([self.ids.get(word, self.ids[UNK]) for word in found], dtype=np.int64), unknown
+            raise TextError(f"the model, for English, knows no word of {sentence!r}; it knows words such as {examples}")
+        return np.array([self.ids[word or UNK] for word in meant], dtype=np.int64), unknown
 
     def decode(self, ids: Iterable[int]) -> str:
         """The sentence of ids (:meth:`TextRules.sentence`), without PAD, SOS, EOS and UNK."""
@@ -202,7 +225,7 @@ class LanguageModel(BundleModel):
         if manifest.text is None:
             raise BundleError("manifest, text: is missing")
         try:
-            self.vocabulary = Vocabulary(manifest.vocabulary, TextRules.from_json(manifest.text))
+            self.vocabulary = Vocabulary(manifest.vocabulary, TextRules.from_json(manifest.text), manifest.common)
         except TextError as error:
             raise BundleError(f"manifest, vocabulary: {error}") from error
         self.sizes["V"] = len(self.vocabulary)
@@ -216,7 +239,11 @@ class LanguageModel(BundleModel):
         that is empty, too long, or of unknown words only."""
         ids, unknown = self.vocabulary.encode(sentence)
         if unknown:
-            warn(f"the model does not know {', '.join(unknown)} (in {sentence!r})", TextWarning)
+            english = "; it is for English" if 2 * len(unknown) > len(ids) else ""
+            warn(f"the model does not know {', '.join(unknown)} (in {sentence!r}){english}", TextWarning)
+        for word in self.vocabulary.rules.words(sentence):
+            if (meant := self.vocabulary.meant(word)) and stem(meant) != stem(word):
+                warn(f"{word!r} is read as {meant!r} (in {sentence!r})", TextWarning)
         return ids
 
     def frames(self, motion: Motion) -> Array:

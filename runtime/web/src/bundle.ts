@@ -34,6 +34,7 @@ export interface Manifest {
   config: Record<string, unknown>;
   text?: TextTables;
   vocabulary?: string[];
+  common?: Record<string, string>;
   actions?: { sentence: string; words: string[] }[];
   licence: { weights: string | null; data: string | null };
 }

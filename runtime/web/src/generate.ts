@@ -104,9 +104,8 @@ export class GenerateModel extends LanguageModel {
   private async lacks(sentence: string): Promise<boolean> {
     const context = await this.context(sentence);
     const have = new Set(this.manifest.actions![context.indexOf(Math.max(...context))]!.words.map(stem));
-    const { ids } = this.vocabulary.encode(sentence);
-    const words = ids.map((id) => this.vocabulary.words[id]!).filter((word) => word !== "UNK" && !FUNCTION_WORDS.has(word));
-    return words.some((word) => !have.has(stem(word)));
+    const words = this.vocabulary.split(sentence).map((word) => this.vocabulary.meant(word));
+    return words.some((word) => word && !FUNCTION_WORDS.has(word) && ![word, this.vocabulary.near(word)].some((one) => have.has(stem(one))));
   }
 
   /** The same by noise that is given for each motion. */
@@ -162,7 +161,7 @@ export class GenerateModel extends LanguageModel {
     for (const { words } of actions) for (const word of new Set(words)) said.set(word, (said.get(word) ?? 0) + 1);
     const rare = (word: string) => Math.log((1 + actions.length) / said.get(word)!);
     const unheard = Math.log(1 + actions.length);
-    const asked = [...new Set(this.vocabulary.split(text))];
+    const asked = [...new Set(this.vocabulary.split(text).map((word) => this.vocabulary.meant(word) || word))];
     const heard = asked.reduce((sum, word) => sum + (said.has(word) ? rare(word) : 0), 0);
     const all = asked.reduce((sum, word) => sum + (said.has(word) ? rare(word) : unheard), 0);
     const order = Array.from(context.keys()).sort((a, b) => context[b]! - context[a]! || a - b);

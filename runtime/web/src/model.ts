@@ -64,7 +64,7 @@ export abstract class LanguageModel extends Model {
   constructor(manifest: Manifest) {
     super(manifest);
     if (!manifest.vocabulary || !manifest.text) throw new BundleError(`the bundle ${manifest.name} has no words`);
-    this.vocabulary = new Vocabulary(manifest.vocabulary, manifest.text);
+    this.vocabulary = new Vocabulary(manifest.vocabulary, manifest.text, manifest.common);
   }
 
   protected words(sentence: string) {

@@ -1,5 +1,7 @@
 import type { TextTables } from "./bundle.js";
+import { stem } from "./composition.js";
 import { BundleError, TextError } from "./errors.js";
+import { corrected } from "./spelling.js";
 
 const [PAD, SOS, EOS, UNK] = [0, 1, 2, 3];
 const MAX_WORDS = 40;
@@ -12,14 +14,19 @@ export class Vocabulary {
   /** Words that are never chosen. */
   static readonly BANNED = [PAD!, SOS!, UNK!];
   private readonly ids: Map<string, number>;
+  private readonly stems: Map<string, string>;
   private readonly misspelt: RegExp;
 
   constructor(
     readonly words: string[],
     private readonly rules: TextTables,
+    /** Further words, whose ids go on, each with the one of `words` that is nearest to it. */
+    private readonly common: Record<string, string> = {},
   ) {
     if (`${words.slice(0, 4)}` !== "PAD,SOS,EOS,UNK" || rules.rules !== 1) throw new BundleError("its vocabulary is damaged");
-    this.ids = new Map(words.map((word, id) => [word, id]));
+    const every = [...words, ...Object.keys(common)];
+    this.ids = new Map(every.map((word, id) => [word, id]));
+    this.stems = new Map(every.slice(UNK! + 1).reverse().map((word) => [stem(word), word]));
     const wrong = Object.keys(rules.spelling).sort((a, b) => b.length - a.length);
     this.misspelt = new RegExp(`(?<![\\p{L}\\p{N}_])(${wrong.join("|") || "(?!)"})(?![\\p{L}\\p{N}_])`, "gu");
   }
@@ -34,9 +41,21 @@ export class Vocabulary {
     if (words.length > MAX_WORDS) {
       throw new TextError(`the sentence has ${words.length} words, but at most ${MAX_WORDS} are allowed`);
     }
-    const unknown = words.filter((word) => !this.ids.has(word));
+    const unknown = words.filter((word) => !this.meant(word));
     if (unknown.length === words.length) throw new TextError(`the model knows no word of ${JSON.stringify(sentence)}`);
-    return { ids: words.map((word) => this.ids.get(word) ?? UNK!), unknown };
+    return { ids: words.map((word) => this.ids.get(this.meant(word)) ?? UNK!), unknown };
+  }
+
+  /** The known word that a word is, or the first of its stem, or of which it is a misspelling; "" where there is none. */
+  meant(word: string): string {
+    if (this.ids.has(word) || [...word].length < 4) return this.ids.has(word) ? word : "";
+    return this.stems.get(stem(word)) ?? corrected(word, this.words.slice(UNK! + 1), Object.keys(this.common));
+  }
+
+  /** The one of `words` that a word is, or that is nearest to it; "" where there is none. */
+  near(word: string): string {
+    const known = this.meant(word);
+    return Object.hasOwn(this.common, known) ? this.common[known]! : known;
   }
 
   /** The words of a sentence, known or not; each digit is one of its own. */

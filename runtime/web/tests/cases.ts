@@ -1,9 +1,10 @@
 /* What every runtime has to give, in Node and in a browser: golden vectors, and answers that Python gave (python.json). */
 import { type NumberArray, rows } from "../src/arrays.js";
-import { Bundle } from "../src/bundle.js";
+import { Bundle, type TextTables } from "../src/bundle.js";
 import { ControlModel, DescribeModel, FillModel, GenerateModel, load, PredictModel, SearchModel, type Told } from "../src/index.js";
 import { framesOf } from "../src/poses.js";
 import { Recorded } from "../src/random.js";
+import { Vocabulary } from "../src/text.js";
 import python from "./python.json";
 
 /** Reads the zip of a shipped bundle. */
@@ -172,10 +173,19 @@ async function steers(read: Read): Promise<void> {
   }
 }
 
+/** Words as they are, of a known stem, misspelt, common and unknown. */
+async function words(): Promise<void> {
+  const { vocabulary, rules, common, read, ids } = python.known;
+  const known = new Vocabulary(vocabulary, rules as unknown as TextTables, common);
+  for (const [word, wanted] of Object.entries(read)) equal([known.meant(word), known.near(word)], wanted, word);
+  equal(known.encode(Object.keys(read).join(" ")).ids, ids, "ids");
+}
+
 export const cases: Case[] = [
   ...graphs,
   { name: "describe says what Python says", run: describe },
   { name: "generate draws what Python draws", run: generate },
+  { name: "words are known as in Python", run: words },
   { name: "predict continues as Python does", run: predict },
   { name: "fill fills as Python does", run: fill },
   { name: "search embeds as Python does", run: search },

@@ -37,7 +37,9 @@ def train() -> None:
 steps = click.option("--steps", type=click.IntRange(1), help="[default: the preset's]")
 epochs = click.option("--epochs", type=click.IntRange(1), help="[default: the preset's]")
 word_vectors = with_options(
-    click.option("--word-vectors", type=Path, help="Initial word vectors: a word and its numbers per line."),
+    click.option(
+        "--word-vectors", type=Path, help="Vectors of words, common ones first: a word and its numbers per line."
+    ),
     click.option("--vectors-from", help="Source and licence of the vectors, for the manifest."),
 )
 of_plan = with_options(

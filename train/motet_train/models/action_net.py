@@ -12,12 +12,19 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from motet.bundle.graph import GraphSpec, TensorSpec
+from motet.models.language import SPECIALS, UNK
 from motet_train.models.net import Net, before
+
+UNKNOWN = SPECIALS.index(UNK)
+"""The id of unknown words."""
 
 
 @dataclass(frozen=True)
 class ActionsConfig:
-    """Sizes. words: of the vocabulary. stems: for each word the index of its stem."""
+    """Sizes. words: of the sentences. stems: for each word the index of its stem. common: further words, known by
+    their vectors alone; the last of ``stems`` are theirs. vector: numbers of each word's vector, 0 for none. unheard:
+    share of words that training knows by their vectors alone, too.
+    """
 
     words: int
     actions: int
@@ -26,6 +33,9 @@ class ActionsConfig:
     hidden: int = 128
     dropout: float = 0.5
     word_dropout: float = 0.3
+    common: int = 0
+    vector: int = 0
+    unheard: float = 0.15
 
 
 class ActionNet(Net):
@@ -33,6 +43,7 @@ class ActionNet(Net):
 
     CONFIG = ActionsConfig
     stems: Tensor
+    vectors: Tensor
 
     def __init__(self, config: ActionsConfig) -> None:
         super().__init__(0)  # it takes words, no channels
@@ -40,23 +51,39 @@ class ActionNet(Net):
         self.register_buffer("stems", torch.tensor(config.stems), persistent=False)
         self.words = nn.Embedding(config.words, config.embedding)
         self.roots = nn.Embedding(max(config.stems) + 1, config.embedding)
+        self.meant = nn.Linear(config.vector, config.embedding, bias=False) if config.vector else None
+        table = torch.zeros(config.words + config.common, config.vector, dtype=torch.int8)
+        self.register_buffer("vectors", None if self.meant is None else table)
         self.around = nn.Conv1d(config.embedding, config.hidden, 3, padding=1)
         self.outward = nn.Linear(2 * config.hidden + config.embedding, config.actions)
         self.dropout = nn.Dropout(config.dropout)
 
     @torch.no_grad()
-    def start_from(self, vectors: Tensor, known: Tensor) -> None:
-        """Start from vectors (words, E) of deviation 1 where ``known`` (words,); stems say little beside them."""
-        self.words.weight[known] = vectors[known]
+    def start_from(self, vectors: Tensor) -> None:
+        """Take vectors (words, V) of deviation 1, in sixteenths, of words and common words, 0 for none; words and stems
+        say little beside them at first."""
+        assert self.meant is not None
+        self.vectors.copy_((16 * vectors).round().clamp(-127, 127))
+        nn.init.orthogonal_(self.meant.weight)
+        self.words.weight.zero_()
         self.roots.weight.mul_(0.3)
+
+    def _of(self, words: Tensor) -> Tensor:
+        """What is known of words (B, W): (B, W, E)."""
+        own, stems = words.masked_fill(words >= self.config.words, UNKNOWN), self.stems[words]
+        if self.training and self.meant is not None:
+            unheard = torch.rand(words.shape, device=words.device) < self.config.unheard
+            own, stems = own.masked_fill(unheard, UNKNOWN), stems.masked_fill(unheard, int(self.stems[UNKNOWN]))
+        found: Tensor = self.words(own) + self.roots(stems)
+        return found if self.meant is None else found + self.meant(self.vectors[words].float() / 16)
 
     def forward(self, words: Tensor, lengths: Tensor) -> Tensor:
         """Ids (B, W) int64 of sentences of lengths (B,) int64 to log-probabilities (B, A)."""
         known = before(lengths, words.shape[1]).to(torch.float32)
-        if self.training:  # 3 is the id of unknown words
-            words = words.masked_fill(torch.rand(words.shape, device=words.device) < self.config.word_dropout, 3)
-        vectors = self.words(words) + self.roots(self.stems[words])
-        vectors = self.dropout(vectors) * known[..., None]
+        if self.training:
+            dropped = torch.rand(words.shape, device=words.device) < self.config.word_dropout
+            words = words.masked_fill(dropped, UNKNOWN)
+        vectors = self.dropout(self._of(words)) * known[..., None]
         around = functional.gelu(self.around(vectors.transpose(1, 2))) * known[:, None]
         count = known.sum(dim=1, keepdim=True).clamp_min(1)
         most = around.amax(dim=2).clamp_min(0)  # as if a word followed that says nothing: padding changes nothing
@@ -82,7 +109,8 @@ def stem(word: str) -> str:
     return word[:-1] if len(word) > 3 and word[-1] == word[-2] else word
 
 
-def stems_of(words: Sequence[str]) -> tuple[int, ...]:
-    """For each word the number of its stem."""
+def stems_of(words: Sequence[str], common: Sequence[str] = ()) -> tuple[int, ...]:
+    """For each word the number of its stem; for common words that of an unknown word where no word has their stem."""
     numbers: dict[str, int] = {}
-    return tuple(numbers.setdefault(stem(word), len(numbers)) for word in words)
+    own = [numbers.setdefault(stem(word), len(numbers)) for word in words]
+    return (*own, *(numbers.get(stem(word), own[UNKNOWN]) for word in common))

@@ -12,8 +12,9 @@ from torch.nn import functional
 from motet.models.language import RULES, Vocabulary, padded
 from motet_train.data.batches import Rows
 from motet_train.data.errors import DataError
-from motet_train.data.sentences import Actions, actions_of, principal, read_word_vectors
+from motet_train.data.sentences import Actions, actions_of
 from motet_train.data.store import Store
+from motet_train.data.word_table import word_table
 from motet_train.descent import GradientLearner, Term, Terms
 from motet_train.models.action_net import ActionNet, ActionsConfig, stems_of
 from motet_train.recipes.language import divided, manifest
@@ -24,8 +25,8 @@ DEFAULT = Recipe(
     "actions",
     "motion-actions",
     "codes",
-    ActionsConfig(0, 0),
-    ("words", "actions", "stems"),
+    ActionsConfig(0, 0, vector=64),
+    ("words", "actions", "stems", "common"),
     replace(ADAMW, steps=5000, every=500, batch=128, weight_decay=0.05, falling=0.5),
 )
 
@@ -34,7 +35,7 @@ RECIPES = {"default": DEFAULT}
 
 @dataclass(frozen=True)
 class WordVectors:
-    """A file of word vectors (:func:`motet_train.data.sentences.read_word_vectors`). origin: its source and licence."""
+    """A file of word vectors (:func:`motet_train.data.word_table.read_word_vectors`). origin: source and licence."""
 
     file: Path
     origin: str | None = None
@@ -52,21 +53,25 @@ class SentenceBatch(Rows):
 def train_actions(store: Store, job: Job, data: str = "", by: str = "trial", vectors: WordVectors | None = None) -> Run:
     """Train on the sentences of a store's training part, see :meth:`motet_train.recipes.recipe.Job.run`.
 
-    vectors: of words, from which the net starts; those of other words are random.
+    vectors: of words, those of sentences and common ones, which the net then knows by their vectors alone.
     """
     found = divided(store, mirror=True, by=by)
     actions = spoken(store, found.parts.train)
     words = found.vocabulary.words
+    table = vectors and word_table(vectors.file, words, job.recipe.config.vector)
+    common = table.common if table else {}
+    vocabulary = replace(found.vocabulary, common=common)
+    sizes = {"words": len(words), "actions": len(actions), "common": len(common)}
     torch.manual_seed(job.about.seed)
-    net = ActionNet(job.recipe.sized(words=len(words), actions=len(actions), stems=stems_of(words)))
-    said = Said(actions, found.vocabulary)
+    config = job.recipe.sized(**sizes, stems=stems_of(words, tuple(common)))
+    net = ActionNet(config if table else replace(config, vector=0))
+    said = Said(actions, vocabulary)
     about = manifest(job, found, asdict(net.config), data, by)
     about["actions"] = described(actions)
-    if vectors is not None:
-        read = read_word_vectors(vectors.file, words)
-        parts, known = principal(read, words, net.config.embedding)
-        net.start_from(torch.from_numpy(parts).float(), torch.from_numpy(known))
-        of = {"file": vectors.file.name, "words": len(read), "numbers": len(next(iter(read.values())))}
+    if vectors and table:
+        net.start_from(torch.from_numpy(table.vectors).float())
+        of = {"file": vectors.file.name, "words": int(table.vectors.any(axis=1).sum())}
+        about |= {"common": common}
         about["training"]["word_vectors"] = {**of, "origin": vectors.origin}
 
     def loss(batch: SentenceBatch) -> Terms:
@@ -107,7 +112,7 @@ class Said:
         asking: dict[str, set[int]] = {}
         for action, said in enumerate(actions.unseen):
             for s in said:
-                if not vocabulary.ids.keys().isdisjoint(RULES.words(s)):
+                if any(map(vocabulary.meant, RULES.words(s))):
                     asking.setdefault(s, set()).add(action)
         self.unseen = padded([vocabulary.encode(s)[0] for s in asking], "int64") if asking else None
         self.alike = torch.zeros(len(asking), len(actions), dtype=torch.bool)

@@ -91,7 +91,7 @@ def train_codes(store: Store, job: Job, data: str, by: str, codec: Run, actions:
     drawn = job.training.batch, writer.unsaid, len(shown)
     learner = GradientLearner(net.to(job.device), job.training, loss, lambda rng: (windows.draw(*drawn, rng),))
     about = manifest(job, found, asdict(net.config), data, by)
-    about["actions"] = actions.manifest["actions"]
+    about |= {key: actions.manifest[key] for key in ("actions", "common") if key in actions.manifest}
     about["training"] |= {"codec": _made(codec.manifest["training"]), "actions": _made(actions.manifest["training"])}
     return job.run(net, learner, about)
 
