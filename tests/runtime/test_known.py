@@ -71,9 +71,8 @@ def test_what_is_short_or_far_gets_no_answer() -> None:
 
 
 def test_the_probability_is_a_logistic_function() -> None:
-    how = AnswerSettings(bias=0.5, share=2.0, similarity=1.5, length=-1.0)
-    found = replace(KNOWN, settings=how).probability(np.array([0.8]), 0.6, 2.0)
-    score = 0.5 + 2 * np.log(0.8 / 0.2) + 1.5 * 0.6 - np.log(2.0)
+    found = replace(KNOWN, settings=AnswerSettings(bias=0.5, share=2.0)).probability(np.array([0.8]))
+    score = 0.5 + 2 * np.log(0.8 / 0.2)
     assert found[0] == pytest.approx(1 / (1 + np.exp(-score)))
 
 

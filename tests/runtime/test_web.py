@@ -105,6 +105,19 @@ def described(model: DescribeModel) -> dict[str, Any]:
     }
 
 
+def answered(model: DescribeModel) -> list[list[dict[str, Any]]]:
+    """Of known motions, about the frames of the golden run and about four of them; they are taken as they are."""
+
+    class OfFrames(DescribeModel):
+        def frames(self, motion: Motion, least: int = 1) -> NDArray[Any]:
+            return motion.values
+
+    other = OfFrames(model.manifest, model.graphs, model.tables)
+    motion = replace(model.contract.features(golden("describe")), fps=model.fps)
+    rows = other.describe([motion, motion[:4]], 3)
+    return [[{"text": one.text, "score": one.score, "confident": one.confident} for one in row] for row in rows]
+
+
 def scored(model: DescribeModel) -> float:
     """The log-probability of a sentence given the frames of the golden run."""
     ids = model.vocabulary.ids
@@ -184,6 +197,7 @@ def answers() -> dict[str, Any]:
         "known": known(),
         **described(describe),
         "score": scored(describe),
+        "answered": answered(describe),
         "expected": expected(motet.load("predict")),
         "long": long(motet.load("search")),
         "steering": STEERED,

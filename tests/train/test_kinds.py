@@ -2,14 +2,18 @@
 
 import numpy as np
 import pytest
+import torch
 
 from motet.models.known import LEFT, RIGHT, STRAIGHT
 from motet.representation.root_block import ROOT_BLOCK
+from motet_train.data.batches import Views
 from motet_train.data.disguise import Disguise, seen_as
 from motet_train.data.errors import DataError
 from motet_train.data.kinds import KINDS, careful, named, shown_by
 from motet_train.data.store import Entry, split
 from motet_train.evaluate.language.actions import calibration_error
+from motet_train.models.discriminant import discriminate
+from motet_train.models.joint_embedding import JointEmbedding, JointEmbeddingConfig
 from motet_train.recipes.known import Tried, grouped, learned, way_of
 
 WALKS = ("a person walks", "she strolls along", "He walks on.", "walking to the left", "one hops a bit", "goes on foot")
@@ -38,6 +42,9 @@ def test_where_sentences_say_that_somebody_goes() -> None:
     assert way_of("he veers to the right by 45 degrees while running")[:2] == (RIGHT, 45)
     assert way_of("he runs straight ahead") == (STRAIGHT, 0, 1)
     assert way_of("a person walks using the left and the right foot in turn")[0] == 0
+    assert way_of("he pivots right")[0] == RIGHT
+    assert way_of("someone walks off to the left")[0] == way_of("she runs diagonally left")[0] == LEFT
+    assert way_of("a man runs and changes direction to the right")[0] == RIGHT
     assert way_of("she sits")[2] == 0
 
 
@@ -65,6 +72,7 @@ def test_clips_of_a_pattern_are_kept_back() -> None:
     people = [{entries[i].subject for i in part} for part in (parts.train, parts.validation)]
     assert people[0].isdisjoint(people[1])
     assert "B" not in people[0] | people[1]
+    assert {entries[i].subject for i in split(entries, 0, "B_*,C_0").test} == {"B", "C"}
     with pytest.raises(DataError, match="0 of 24 motions match"):
         split(entries, 0, "X_*")
 
@@ -77,13 +85,42 @@ def test_people_of_one_corpus_are_one_group() -> None:
 def test_the_probability_is_that_of_being_right() -> None:
     rng = np.random.default_rng(0)
     share, similarity = rng.uniform(0, 1, 4000), rng.uniform(0.2, 1, 4000)
-    right = rng.random(4000) < share
-    how = learned(Tried(share, similarity, rng.uniform(1, 9, 4000), right), 0.9)
+    right, one = rng.random(4000) < share, np.zeros(4000, np.int64)
+    how = learned(Tried(share, similarity, one, right), 0.9)
     assert how.share == pytest.approx(1.0, abs=0.15)
     assert abs(how.bias) < 0.4
-    assert abs(how.length) < 0.15
     trusted = share > 1 / (1 + (1 - how.sure) / how.sure)
     assert right[trusted].mean() == pytest.approx(0.9, abs=0.04)
     assert 0.2 < how.outside < 0.22
     assert calibration_error(share, right) < 0.05
     assert calibration_error(np.full(4000, 0.95), right) == pytest.approx(0.95 - right.mean())
+
+
+def test_what_is_sure_is_right_in_every_group() -> None:
+    rng = np.random.default_rng(0)
+    share, group = rng.uniform(0, 1, 4000), np.repeat([0, 1], [3000, 1000])
+    right = rng.random(4000) < np.where(group == 0, share**0.2, share)
+    easy = learned(Tried(share[:3000], share[:3000], group[:3000], right[:3000]), 0.9)
+    both = learned(Tried(share, share, group, right), 0.9)
+    bounds = [
+        share[1 / (1 + (share / (1 - share)) ** -h.share * np.exp(-h.bias)) >= h.sure].min() for h in (easy, both)
+    ]
+    assert bounds[0] < 0.45
+    assert bounds[1] > 0.7
+    assert right[(group == 1) & (share >= bounds[1])].mean() > 0.88
+
+
+def test_directions_that_tell_actions_apart_count() -> None:
+    """Of three statistics the first is wide and says nothing, the second tells the actions, the third is noise."""
+    rng, net = np.random.default_rng(0), JointEmbedding(JointEmbeddingConfig(1, 0, vector=1)).eval()
+    sizes = len(net.seen_mean)
+    seen = torch.from_numpy(rng.normal(size=(1, 60, 5, sizes))).float()
+    groups = np.arange(60)[None] % 2
+    seen[..., 0] += torch.from_numpy(6 * rng.normal(size=(1, 60, 1))).float()
+    seen[..., 1] += torch.from_numpy(3.0 * groups[..., None])
+    discriminate(net, Views(seen, np.full((60, 5), 9), ((),), groups))
+    with torch.no_grad():
+        found = net.embed_statistics(seen[0, :, 0])[:, 0].numpy()
+    assert abs(((found > 0) == groups[0]).mean() - 0.5) > 0.4  # either side is an action's
+    weights = net.motion.weight[0].abs().tolist()
+    assert weights[1] > 10 * max(weights[:1] + weights[2:])

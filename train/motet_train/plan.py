@@ -11,7 +11,7 @@ from motet_train.data.predict_data import store_material
 from motet_train.data.preparation import ALL, preparation
 from motet_train.data.store import Store, part, prepare_parts
 from motet_train.progress import log, preparing
-from motet_train.recipes import actions, codec, codes, fill, language, matching, predict, search
+from motet_train.recipes import actions, codec, codes, fill, known, language, matching, predict, search
 from motet_train.recipes.actions import WordVectors
 from motet_train.recipes.recipe import Job, Recipe
 from motet_train.run_folder import is_finished, trained
@@ -60,6 +60,7 @@ STAGES: Mapping[str, Stage] = {
     "generate": Stage("generate", codes.DEFAULT, codes.train_codes, {"codec": "sharp", "actions": "actions"}),
     "fill": Stage("fill", fill.DEFAULT, fill.train_fill),
     "describe": Stage("describe", language.DEFAULT, language.train_language),
+    "known": Stage("describe", known.DEFAULT, known.train_known, {"writer": "describe"}),
 }
 """By their names, those that take least time first, each after those that it needs."""
 

@@ -4,7 +4,6 @@ Sentences are not compared with each other: all wordings of one kind of action c
 good as the share of near motions that it would be right about (minimum Bayes risk, Kumar and Byrne 2004).
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -29,13 +28,13 @@ LEFT, RIGHT, STRAIGHT = 1, -1, 2
 
 @dataclass(frozen=True)
 class AnswerSettings(Settings):
-    """How known motions answer. Training finds the last five (docs/language.md).
+    """How known motions answer. Training finds the last four (docs/language.md).
 
     near: how many of the nearest motions count. temperature: a motion this much less similar counts e times less.
     turned, straight: from how many degrees on a path turns, and up to how many it is straight. change: the cost of
     another action in a timeline. shortest: what is shorter is not described. sure: least probability of a description
-    that is trusted. outside: least similarity of the nearest motion; below it nothing is said. bias, share, similarity,
-    length: of the logistic function that gives the probability, see :meth:`Known.probability`.
+    that is trusted. outside: least similarity of the nearest motion; below it nothing is said. bias, share: of the
+    logistic function that gives the probability, see :meth:`Known.probability`.
     """
 
     FEATURE: ClassVar[str] = "answer"
@@ -49,8 +48,6 @@ class AnswerSettings(Settings):
     outside: Annotated[float, Range(-1, 1)] = 0.0
     bias: Annotated[float, Range(-1000, 1000)] = 0.0
     share: Annotated[float, Range(-1000, 1000)] = 1.0
-    similarity: Annotated[float, Range(-1000, 1000)] = 0.0
-    length: Annotated[float, Range(-1000, 1000)] = 0.0
 
 
 class Seen(NamedTuple):
@@ -142,17 +139,18 @@ class Known:
                 found.append([Answer(NOTHING, 0.0)])
                 continue
             best = [int(q) for q in np.argsort(-share, kind="stable")[:count] if share[q] > 0]
-            chances = self.probability(share[best], similarity, one.seconds)
+            chances = self.probability(share[best])
             said = [self._sentence(q, row, one.turn) for q in best]
             found.append([Answer(text, float(chance)) for text, chance in zip(said, chances, strict=True)])
         return found
 
-    def probability(self, share: Array, similarity: float, seconds: float) -> Array:
-        """How probable it is that sentences are right, of the ``share`` (N,) of near motions that each is right about,
-        the nearest one's similarity and the length."""
-        how = self.settings
-        score = how.bias + how.share * log_odds(share)
-        return 1 / (1 + np.exp(-(score + how.similarity * similarity + how.length * math.log(max(seconds, 0.1)))))
+    def probability(self, share: Array) -> Array:
+        """How probable it is that sentences are right, of the ``share`` (N,) of near motions that each is right about.
+
+        The nearest one's similarity and the length tell no more: their weights change sign from corpus to corpus.
+        """
+        score: Array = self.settings.bias + self.settings.share * log_odds(share)
+        return 1 / (1 + np.exp(-score))
 
     def _sentence(self, kinds: int, counted: Array, turn: float | None) -> str:
         """The sentence that names a set of kinds: one whose way fits if there is any, and of these the one of the

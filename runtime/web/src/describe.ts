@@ -2,13 +2,20 @@ import type { NumberArray } from "./arrays.js";
 import { beamSearch, type Hypothesis, type Limits, scoreWords } from "./beam.js";
 import type { Manifest } from "./bundle.js";
 import { consensus } from "./consensus.js";
+import { DecodingError } from "./errors.js";
 import type { Graph } from "./graph.js";
+import { type Known, turnOf } from "./known.js";
 import { type Frames, LanguageModel } from "./model.js";
 import { type Noise, Pcg64 } from "./random.js";
 import { Vocabulary } from "./text.js";
 
+/** The probability below which none is told. */
+const LEAST = 1e-6;
+
 /** How descriptions are found: by default as the bundle says. */
 export interface DescribeSettings {
+  /** "known": sentences about known motions that are near, by default where the bundle has any and no draws are asked for. */
+  decoding?: "known" | "beam" | "consensus";
   /** Sentences that are kept, and given. */
   beams?: number;
   /** Sentences that are drawn: the best agrees most with all of them, and need not be the most probable. */
@@ -20,7 +27,10 @@ export interface DescribeSettings {
   maxWords?: number;
 }
 
-/** A sentence. score: by which it is ranked. confident: whether it is as probable as right ones are. */
+/**
+ * A sentence and the logarithm of its probability: that it is right, where known motions answer, or else that it is said
+ * in these words. score: by which it is ranked. confident: whether it is as probable as right ones are.
+ */
 export interface Description {
   text: string;
   logProbability: number;
@@ -30,12 +40,14 @@ export interface Description {
 
 /** Sentences for a motion. */
 export class DescribeModel extends LanguageModel {
-  constructor(manifest: Manifest, private readonly graphs: Record<string, Graph>) {
+  constructor(manifest: Manifest, private readonly graphs: Record<string, Graph>, private readonly known?: Known) {
     super(manifest);
   }
 
   /** Sentences that describe frames (T, D), best first. */
   async describe(frames: Frames, settings: DescribeSettings = {}): Promise<Description[]> {
+    const decoding = settings.decoding ?? (this.known && settings.draws === undefined ? "known" : undefined);
+    if (decoding === "known") return this.answers(frames, settings);
     const least = this.manifest.settings.confidence?.log_probability ?? -5.5;
     const found = await this.hypotheses(frames, settings);
     return found.map(({ ids, logProbability, score }) => {
@@ -43,11 +55,26 @@ export class DescribeModel extends LanguageModel {
     });
   }
 
-  /** The same as ids of words; noise: what draws are made by, instead of a seed. */
+  /** What known motions answer. */
+  private async answers(frames: Frames, settings: DescribeSettings): Promise<Description[]> {
+    if (!this.known) throw new DecodingError("no motion is known: choose beam or consensus");
+    if (settings.draws !== undefined) throw new DecodingError("known motions answer without draws: leave them out, or choose consensus");
+    const beams = this.setting("beams", settings.beams ?? this.manifest.defaults.beams ?? 5);
+    const { vector } = await this.graphs.space!.run(this.motion(frames));
+    const { known, manifest } = this;
+    const found = known.answers(vector!.data as Float32Array, frames.length / this.fps, turnOf(frames, manifest.motion), beams);
+    return found.map(({ text, probability }) => {
+      const logProbability = Math.log(Math.max(probability, LEAST));
+      return { text, logProbability, score: probability, confident: probability >= known.settings.sure };
+    });
+  }
+
+  /** Sentences that are written, as ids of words; noise: what draws are made by, instead of a seed. */
   async hypotheses(frames: Frames, settings: DescribeSettings = {}, noise?: Noise): Promise<Hypothesis[]> {
     const limits = this.limits(settings.maxWords);
     const beams = this.setting("beams", settings.beams ?? this.manifest.defaults.beams ?? 5);
-    const draws = settings.draws ?? (this.manifest.loop === "consensus" ? (this.manifest.defaults.draws ?? 100) : undefined);
+    const drawing = settings.decoding ? settings.decoding === "consensus" : this.manifest.loop === "consensus";
+    const draws = settings.draws ?? (drawing ? (this.manifest.defaults.draws ?? 100) : undefined);
     if (draws === undefined) return beamSearch(this.graphs.step!, await this.context(frames), limits, beams);
     const given = noise ?? new Pcg64(this.setting("seed", settings.seed ?? 0));
     const temperature = this.setting("temperature", settings.temperature ?? this.manifest.defaults.temperature ?? 1);

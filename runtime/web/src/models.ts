@@ -5,6 +5,7 @@ import { BundleError } from "./errors.js";
 import { FillModel } from "./fill.js";
 import { type GenerateModel, generateModel } from "./generate.js";
 import type { Graph, SessionSettings } from "./graph.js";
+import { Known } from "./known.js";
 import { PredictModel } from "./predict.js";
 import { SearchModel } from "./search.js";
 
@@ -45,7 +46,7 @@ async function loaded(bundle: Bundle, settings?: SessionSettings): Promise<AnyMo
   switch (manifest.loop) {
     case "beam":
     case "consensus":
-      return new DescribeModel(manifest, graphs);
+      return new DescribeModel(manifest, graphs, await Known.of(bundle));
     case "codes":
       return generateModel(bundle, graphs);
     case "free_run":

@@ -134,6 +134,12 @@ async function agreed(read: Read): Promise<void> {
   equal(found.map(({ text }) => text), python.draws.map(({ text }) => text), "texts");
   close(found.flatMap((one) => [one.logProbability, one.score]), python.draws.flatMap((one) => [one.logProbability, one.score]), "scores");
   close([await model.score(frames("frames"), "a person walks")], [python.score], "score");
+  for (const [at, wanted] of python.answered.entries()) {
+    const given = at ? frames("frames").slice(0, 4) : frames("frames"); // too short to be told
+    const told = (await model.describe(given, { beams: 3 })).map(({ text, score, confident }) => ({ text, score, confident }));
+    equal(told.map(({ text, confident }) => [text, confident]), wanted.map(({ text, confident }) => [text, confident]), "answers");
+    close(told.map(({ score }) => score), wanted.map(({ score }) => score), "probabilities");
+  }
 }
 
 async function expected(read: Read): Promise<void> {

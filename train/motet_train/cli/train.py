@@ -202,7 +202,7 @@ def _on_store(name: str, recipes: Mapping[str, Recipe], train_net: Callable[...,
 
     def run(job: Job, data: Path, **given: Any) -> Run:
         corpus = {key: given.pop(key) for key in ("sentences", "people", "gaits", "unit_in", "figure")}
-        runs = {key: Run.load(given[key]) for key in ("start", "codec", "actions", "writer", "space") if given.get(key)}
+        runs = {key: Run.load(given[key]) for key in ("start", "codec", "actions", "writer") if given.get(key)}
         if "word_vectors" in given:
             file, origin = given.pop("word_vectors"), given.pop("vectors_from")
             given["vectors"] = file and WordVectors(file, origin)
@@ -232,7 +232,6 @@ parts = with_options(
 )
 known_parts = with_options(
     click.option("--writer", type=Path, required=True, help="Run of describe, which writes sentences (--draws)."),
-    click.option("--space", type=Path, required=True, help="Run of search, trained on the same data and split."),
     split,
 )
 _on_store("describe", language.RECIPES, language.train_language, by_epochs)

@@ -261,8 +261,8 @@ def split(entries: Sequence[Entry], seed: int, by: str = "trial") -> Split:
 
     by: "trial", which keeps the pieces of a take together, or "subject" to keep all motions of a person together, so
     that validation and test show people never seen in training; these parts then have at most .1 each. "none" trains on
-    everything, the validation and test motions of "trial" as well. A pattern with a "*", such as "ACCAD_*", names the
-    clips of the test part; of the others people are for validation. DataError where a part would be empty.
+    everything, the validation and test motions of "trial" as well. Patterns with a "*", such as "ACCAD_*,CC0_*", name
+    the clips of the test part; of the others people are for validation. DataError where a part would be empty.
     """
     if "*" in by:
         return _without(entries, seed, by)
@@ -288,9 +288,14 @@ def split(entries: Sequence[Entry], seed: int, by: str = "trial") -> Split:
     return Split(*(tuple(sorted(part)) for part in parts))
 
 
+def matches(name: str, patterns: str) -> bool:
+    """Whether a clip's name matches one of several patterns, separated by commas."""
+    return any(fnmatchcase(name, one) for one in patterns.split(","))
+
+
 def _without(entries: Sequence[Entry], seed: int, pattern: str) -> Split:
     """What matches a pattern is the test part; of the rest the test part is for training, too."""
-    test = tuple(index for index, entry in enumerate(entries) if fnmatchcase(entry.name, pattern))
+    test = tuple(i for i, entry in enumerate(entries) if matches(entry.name, pattern))
     rest = [index for index in range(len(entries)) if index not in set(test)]
     if not test or not rest:
         raise DataError(f"{len(test)} of {len(entries)} motions match {pattern}: some must, and some must not")

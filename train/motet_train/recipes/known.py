@@ -1,14 +1,12 @@
 """The recipe of the known motions that answer for describe: which they are, and how sure their answers can be.
 
 The probability that an answer is right is learned from people who are kept back, those of one corpus together: on their
-motions, spaces that have never seen them answer. Their own space then knows everybody.
+motions, spaces that have never seen them answer. The space that is kept then knows everybody.
 """
 
 import re
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields, replace
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from time import perf_counter
 from typing import NamedTuple
 
@@ -24,6 +22,7 @@ from motet_train.data.errors import DataError
 from motet_train.data.kinds import KINDS, Shown, careful, named, shown_by
 from motet_train.data.sentences import actions_of
 from motet_train.data.store import Store
+from motet_train.models.discriminant import discriminate
 from motet_train.models.joint_embedding import JointEmbedding, JointEmbeddingConfig
 from motet_train.models.known_motions import KnownMotions, KnownMotionsConfig
 from motet_train.models.motion_to_language import MotionToLanguage, MotionToLanguageConfig
@@ -31,7 +30,6 @@ from motet_train.recipes import language, search
 from motet_train.recipes.language import Divided, divided, manifest
 from motet_train.recipes.recipe import Job, Recipe
 from motet_train.runs import Run, surroundings
-from motet_train.trainer import train
 
 
 @dataclass(frozen=True)
@@ -40,7 +38,7 @@ class KnownVisits(search.SearchVisits):
     people are divided to learn how sure answers are. sure: how often an answer that is trusted is to be right."""
 
     kept: int = 4
-    folds: int = 3
+    folds: int = 5
     sure: float = 0.94
 
 
@@ -60,29 +58,33 @@ RECIPES = {"default": DEFAULT}
 TRIED = "tried.npz"
 """Of a run: the answers about people kept back that their probability was learned from."""
 
+TURNING = r"(?<!in )\b(?:turn|veer|swerv|curv|corner|bend|angl|circl|spin|rotat|pivot|diagonal|head|cut|chang|off to)"
+"""Beginnings of words of a path that is not straight."""
+
 GOING = frozenset({"walk", "run", "skip", "backwards", "turn", "jump", "carry", "sidestep"})
 """Kinds of going, of which it is worth telling where to."""
 
 
-def train_known(store: Store, job: Job, data: str, by: str, writer: Run, space: Run) -> Run:
-    """Gather the known motions of a store, for the runs of a net that writes sentences, of the same channels, and of a
-    space that was trained on the same store and split. DataError where they are not."""
+def train_known(store: Store, job: Job, data: str, by: str, writer: Run) -> Run:
+    """Gather the known motions of a store, for the run of a net that writes sentences, of the same channels. DataError
+    where it is not."""
     began, visits = perf_counter(), job.recipe.visits
     found = divided(store, mirror=True, by=by)
-    if not isinstance(writer.model, MotionToLanguage) or not isinstance(space.model, JointEmbedding):
-        raise DataError("known motions need a run of describe (--writer) and one of search (--space)")
-    if space.manifest["vocabulary"] != list(found.vocabulary.words):
-        raise DataError(f"{space.manifest['name']} was trained on other sentences: use the same data and split")
+    if not isinstance(writer.model, MotionToLanguage):
+        raise DataError("known motions need a run of describe (--writer)")
     if writer.manifest["motion"]["channels"] != list(found.contract.channels):
         raise DataError(f"{writer.manifest['name']} describes motions of other channels than those of {data}")
-    space.model.eval()
+    config = replace(search.config_for(store, found, search.DEFAULT), words=0)  # it reads no sentences
+    space = JointEmbedding(config).eval()
+    space.measure_by(found.contract.mean, found.contract.std)
     examples = found.examples(found.parts.train)
-    seen = search.seen_by(space.model, examples, visits, job.about.seed, whole=True)
-    known = _gathered(found, examples, space.model, seen, visits.kept)
-    tried = _tried(job, found, examples, space.model, seen)
+    seen = search.seen_by(space, examples, visits, job.about.seed, whole=True)
+    tried = _tried(found, examples, space, seen, visits)
+    discriminate(space, _cut(seen))
+    known = _gathered(found, examples, space, seen, visits.kept)
     np.savez(job.folder / TRIED, **tried._asdict())
     settings = learned(tried, visits.sure)
-    net = KnownMotions.of(writer.model, space.model, known)
+    net = KnownMotions.of(writer.model, space, known)
     about = manifest(job, found, asdict(net.config), data, by)
     about |= {key: writer.manifest[key] for key in ("motion", "text", "vocabulary")}
     about["training"] |= {
@@ -91,7 +93,6 @@ def train_known(store: Store, job: Job, data: str, by: str, writer: Run, space: 
         "seconds": round(perf_counter() - began, 1),
         "parameters": sum(one.numel() for one in net.parameters()),
         "writer": _made(writer),
-        "space": _made(space),
         **surroundings("cpu"),
     }
     about["settings"] = {**writer.manifest["settings"], settings.FEATURE: asdict(settings)}
@@ -112,7 +113,8 @@ def _gathered(found: Divided, examples: Examples, space: JointEmbedding, seen: V
     shows = [shown_by(said, titles[action]) for action, said in enumerate(actions.sentences)]
     kinds, sentences, said = list(KINDS), list[str](), list[int]()
     for action, wordings in enumerate(actions.sentences):
-        kept_here = careful(wordings, shows[action].shown, 3) or list(wordings[:1])
+        clear = [one for one in wordings if {"left", "right"} - {*RULES.words(one)}] or wordings  # "left, right, left"
+        kept_here = careful(clear, shows[action].shown, 3) or list(clear[:1])
         sentences += kept_here
         said += [action] * len(kept_here)
     shown = [[2 if kind in one.shown else int(kind in one.sayable) for kind in kinds] for one in shows]
@@ -135,7 +137,7 @@ def way_of(sentence: str) -> tuple[int, int, int]:
     """Where a sentence says that somebody goes, the degrees that it gives, 0 for none, and whether it is about going
     alone."""
     text, kinds = " ".join(RULES.words(sentence)), named(sentence)
-    turns = re.search(r"(?<!in )\b(?:turn|veer|swerv|curv|corner|bend|angl|circl|spin|rotat)", text)
+    turns = re.search(TURNING, text)
     sides = frozenset(re.findall(r"\b(?:left|right)\b(?! angle)", text))
     way = STRAIGHT if re.search(r"\bstraight\b", text) else 0
     if turns and not re.search(r"\b(?:foot|feet|legs?|arms?|hands?|shoulder)\b", text):
@@ -147,37 +149,41 @@ def way_of(sentence: str) -> tuple[int, int, int]:
 
 class Tried(NamedTuple):
     """Answers about motions of people kept back: the share of near motions that each is right about, the similarity of
-    the nearest, the length in seconds, and whether it is right, (N,) each."""
+    the nearest, the group of people, and whether it is right, (N,) each."""
 
     share: NDArray[np.float64]
     similarity: NDArray[np.float64]
-    seconds: NDArray[np.float64]
+    group: NDArray[np.int64]
     right: NDArray[np.bool_]
 
 
-def _tried(job: Job, found: Divided, examples: Examples, space: JointEmbedding, seen: Views) -> Tried:
+def _tried(found: Divided, examples: Examples, space: JointEmbedding, seen: Views, visits: KnownVisits) -> Tried:
     """For each group of people what spaces that never saw them answer about them: about each motion as it is, and
     about two views."""
     entries, tried = [found.store.records[record] for record in examples.records], []
     shows = [shown_by((*entry.sentences, *entry.unseen), entry.action) for entry in entries]
-    groups = grouped([entry.subject for entry in entries], job.recipe.visits.folds)
+    groups = grouped([entry.subject for entry in entries], visits.folds)
     for fold in range(groups.max() + 1):
         rest, kept_back = (np.flatnonzero(rows).tolist() for rows in (groups != fold, groups == fold))
         if not rest or not kept_back:
             continue
         mine = seen.only(rest)
-        net = _space_like(space, job, replace(mine, seen=mine.seen[:, :, :-1]))
+        discriminate(space, _cut(mine))
         part = found.examples(tuple(examples.records[row] for row in rest))
-        known = _gathered(found, part, net, mine, job.recipe.visits.kept)
+        known = _gathered(found, part, space, mine, visits.kept)
         for view in (-1, 0, 1):
             with torch.no_grad():
-                vectors = net.embed_statistics(seen.seen[0, kept_back, view]).numpy()
-            seconds = seen.frames[kept_back, view] / found.store.fps
-            tried.append(_answered(known, vectors, seconds, [shows[row] for row in kept_back]))
+                vectors = space.embed_statistics(seen.seen[0, kept_back, view]).numpy()
+            tried.append(_answered(known, vectors, fold, [shows[row] for row in kept_back]))
     return Tried(*map(np.concatenate, zip(*tried, strict=True)))
 
 
-def _answered(known: Known, vectors: Floats, seconds: NDArray[np.float64], shows: Sequence[Shown]) -> Tried:
+def _cut(seen: Views) -> Views:
+    """Without the last view, of whole motions: those that are disguised tell what does not matter."""
+    return replace(seen, seen=seen.seen[:, :, :-1])
+
+
+def _answered(known: Known, vectors: Floats, group: int, shows: Sequence[Shown]) -> Tried:
     """What is answered about motions at some places of the space, of which is known what they show."""
     counted, alike = known.near(vectors)
     shares = known.shares(counted)
@@ -185,17 +191,8 @@ def _answered(known: Known, vectors: Floats, seconds: NDArray[np.float64], shows
     for shown, names in zip(shows, known.sets[best], strict=True):
         kinds = {kind for kind, named in zip(KINDS, names, strict=True) if named}
         right.append(shown.right_kinds(kinds))
-    return Tried(shares[np.arange(len(best)), best], alike, seconds, np.array(right, dtype=bool))
-
-
-def _space_like(space: JointEmbedding, job: Job, seen: Views) -> JointEmbedding:
-    """A space as another, trained on other views."""
-    torch.manual_seed(job.about.seed)
-    net = JointEmbedding(space.config)
-    net.mean, net.scale = space.mean.clone(), space.scale.clone()
-    with TemporaryDirectory() as folder:
-        train(search.space_learner(net, job.training, seen), job.about.seed, Path(folder))
-    return net.eval()
+    said = shares[np.arange(len(best)), best]
+    return Tried(said, alike, np.full(len(best), group), np.array(right, dtype=bool))
 
 
 def grouped(people: Sequence[str], count: int) -> NDArray[np.int64]:
@@ -210,33 +207,33 @@ def grouped(people: Sequence[str], count: int) -> NDArray[np.int64]:
 
 
 def learned(tried: Tried, sure: float) -> AnswerSettings:
-    """How probable answers are (logistic regression), from which probability on so many of them are right, and the
-    similarity that one in a hundred motions does not have. The defaults where there are too few answers or all are
-    alike.
+    """How probable answers are (logistic regression, in which each group counts as the root of its size), from which
+    probability on so many of them are right, and the similarity that one in a hundred motions does not have. The
+    defaults where there are too few answers or all are alike.
 
-    What is nearer is never taken to be less probable: a weight below 0 would trust what is far from all that is known.
+    Other people's files are like the group that is hardest to tell: the bound is the highest of the groups'.
     """
     from sklearn.linear_model import LogisticRegression
 
     if len(tried.right) < 50 or tried.right.all() or not tried.right.any():
         return AnswerSettings()
-    columns = [log_odds(tried.share), tried.similarity, np.log(np.maximum(tried.seconds, 0.1))]
-    fit = LogisticRegression(C=10.0, max_iter=1000).fit
-    fitted = fit(np.column_stack(columns), tried.right)
-    if fitted.coef_[0, 1] < 0:
-        columns[1] = np.zeros_like(columns[1])
-        fitted = fit(np.column_stack(columns), tried.right)
-    share, similarity, length = (round(float(one), 4) for one in fitted.coef_[0])
-    bias = round(float(fitted.intercept_[0]), 4)
-    chances = fitted.predict_proba(np.column_stack(columns))[:, 1]
-    limits = AnswerSettings(bias=bias, share=share, similarity=similarity, length=length)
-    outside = round(float(np.percentile(tried.similarity, 1)), 4)
-    return replace(limits, sure=_least(chances, tried.right, sure), outside=outside)
+    odds, sizes = log_odds(tried.share)[:, None], np.bincount(tried.group)[tried.group]
+    weights = np.sqrt(len(sizes) / sizes)
+    fitted = LogisticRegression(C=10.0, max_iter=1000).fit(odds, tried.right, sample_weight=weights)
+    chances = fitted.predict_proba(odds)[:, 1]
+    bounds = [_least(chances[rows], tried.right[rows], sure) for rows in (tried.group == g for g in set(tried.group))]
+    reached = [one for one in bounds if one is not None]
+    return AnswerSettings(
+        bias=round(float(fitted.intercept_[0]), 4),
+        share=round(float(fitted.coef_[0, 0]), 4),
+        sure=round(max(reached, default=1.0), 4),
+        outside=round(float(np.percentile(tried.similarity, 1)), 4),
+    )
 
 
-def _least(chances: NDArray[np.float64], right: NDArray[np.bool_], wanted: float) -> float:
-    """The least probability at and above which the wanted share of answers is right; 1 where there is none."""
+def _least(chances: NDArray[np.float64], right: NDArray[np.bool_], wanted: float) -> float | None:
+    """The least probability at and above which the wanted share of answers is right; None where there is none."""
     order = np.argsort(-chances, kind="stable")
     precision = np.cumsum(right[order]) / np.arange(1, len(order) + 1)
     good = np.flatnonzero(precision[19:] >= wanted) + 19  # of fewer than 20 nothing is learned
-    return round(float(chances[order[good[-1]]]), 4) if len(good) else 1.0
+    return float(chances[order[good[-1]]]) if len(good) else None

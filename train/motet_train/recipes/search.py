@@ -51,10 +51,7 @@ def train_search(store: Store, job: Job, data: str = "", by: str = "trial") -> R
     """Train on a store, see :func:`motet_train.recipes.language.train_language`."""
     visits, training = job.recipe.visits, job.training
     found = divided(store, visits.mirror, by)
-    sizes = {"channels": len(found.contract.channels), "words": len(found.vocabulary)}
-    config = job.recipe.sized(**sizes, figure=figure_of(found.contract))
-    if not named(store.representation).required:
-        config = replace(config, travelled=0)  # its channels do not say where the figure goes
+    config = config_for(store, found, job.recipe)
     torch.manual_seed(job.about.seed)
     net = JointEmbedding(config)
     net.measure_by(found.contract.mean, found.contract.std)
@@ -62,6 +59,15 @@ def train_search(store: Store, job: Job, data: str = "", by: str = "trial") -> R
     seen = seen_by(net, found.examples(found.parts.train), visits, job.about.seed)
     learner = space_learner(net.to(job.device), training, seen, lambda: asked.measures(net))
     return job.run(net, learner, manifest(job, found, asdict(config), data, by))
+
+
+def config_for(store: Store, found: Divided, recipe: Recipe) -> JointEmbeddingConfig:
+    """The configuration of a recipe's net for a store."""
+    sizes = {"channels": len(found.contract.channels), "words": len(found.vocabulary)}
+    config: JointEmbeddingConfig = recipe.sized(**sizes, figure=figure_of(found.contract))
+    if named(store.representation).required:
+        return config
+    return replace(config, travelled=0)  # its channels do not say where the figure goes
 
 
 def seen_by(net: JointEmbedding, examples: Examples, visits: SearchVisits, seed: int, whole: bool = False) -> Views:

@@ -1,7 +1,6 @@
 """Whether descriptions are right by what is done, how often those that are sure are, and whether turns are told."""
 
 from collections.abc import Sequence
-from fnmatch import fnmatchcase
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +8,7 @@ from numpy.typing import NDArray
 from motet.models.describe import DescribeModel, Description
 from motet.models.known import NOTHING
 from motet_train.data.kinds import Shown, shown_by
-from motet_train.data.store import Split, Store
+from motet_train.data.store import Split, Store, matches
 from motet_train.evaluate.language.attributes import common_side, side, turning
 from motet_train.evaluate.language.confidence import joined, matched
 from motet_train.evaluate.language.describe import nearest_motions
@@ -24,8 +23,7 @@ BINS = 10
 
 def clips_apart(store: Store, patterns: str) -> SplitStore:
     """The clips whose names match one of several patterns, separated by commas, as the test part; all others train."""
-    names = [entry.name for entry in store.records]
-    found = [any(fnmatchcase(name, one) for one in patterns.split(",")) for name in names]
+    found = [matches(entry.name, patterns) for entry in store.records]
     parts = ([i for i, own in enumerate(found) if own == wanted] for wanted in (False, True))
     train, test = map(tuple, parts)
     return SplitStore(store, Split(train, (), test))

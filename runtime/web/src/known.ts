@@ -1,0 +1,147 @@
+/* What a motion shows, answered from known motions that are near it: docs/bundle.md, "Describe". */
+import type { Bundle, Manifest } from "./bundle.js";
+import { BundleError } from "./errors.js";
+import type { Frames } from "./model.js";
+
+/** What is said of a motion that is like none of those that are known, or too short to tell. */
+export const NOTHING = "no human motion that it knows";
+
+/** Where a sentence says that somebody goes; 0 if it does not say. */
+const [LEFT, RIGHT, STRAIGHT] = [1, -1, 2];
+
+/** The settings of `answer`, with the values of bundles that do not say them. */
+const SETTINGS = {
+  near: 40, temperature: 0.07, turned: 45, straight: 25, shortest: 0.5, sure: 0.8, outside: 0, bias: 0, share: 1,
+};
+
+/** The tables, row after row. */
+interface Tables {
+  vectors: Int8Array;
+  actions: Int16Array;
+  shown: Uint8Array;
+  sentences: string[];
+  said: Int16Array;
+  names: Uint8Array;
+  ways: Int16Array;
+}
+
+/** Known motions and what is said of them. */
+export class Known {
+  readonly settings: typeof SETTINGS;
+  /** The different sets of kinds that sentences name, and which of them each sentence names. */
+  private readonly sets: number[][];
+  private readonly named: number[];
+
+  private constructor(private readonly tables: Tables, private readonly shape: number[], private readonly kinds: number, given?: Record<string, number>) {
+    this.settings = { ...SETTINGS, ...given };
+    const rows = tables.sentences.map((_, row) => tables.names.subarray(row * kinds, (row + 1) * kinds).join());
+    const order = [...new Set(rows)].sort(); // as zeros and ones they sort like numbers
+    this.sets = order.map((one) => one.split(",").flatMap((said, kind) => (said === "1" ? [kind] : [])));
+    const places = new Map(order.map((one, place) => [one, place]));
+    this.named = rows.map((row) => places.get(row)!);
+  }
+
+  /** Those of a bundle that has any. */
+  static async of(bundle: Bundle): Promise<Known | undefined> {
+    if (!bundle.manifest.graphs.space) return undefined;
+    const [vectors, actions, shown, letters, said, names, ways] = await Promise.all(
+      ["vectors", "actions", "shown", "sentences", "said", "names", "ways"].map((name) => bundle.table(`known_${name}`)),
+    );
+    const sentences = new TextDecoder().decode(letters!.data as Uint8Array).split("\n");
+    const [count, kinds] = shown!.shape as [number, number];
+    for (const rows of [actions!, said!]) {
+      if (!rows.data.length || (rows.data as Int16Array).some((one) => one < 0 || one >= count)) {
+        throw new BundleError(`tables of known motions have numbers that are none of ${count} actions`);
+      }
+    }
+    const fits = [said!, names!, ways!].every((table) => table.shape[0] === sentences.length) && names!.shape[1] === kinds;
+    if (!fits || vectors!.shape[0] !== actions!.shape[0] || !vectors!.data.length) throw new BundleError("tables of known motions do not fit each other");
+    const tables = Object.entries({ vectors, actions, shown, said, names, ways }).map(([name, table]) => [name, table!.data]);
+    return new Known({ ...Object.fromEntries(tables), sentences } as Tables, vectors!.shape, kinds, bundle.manifest.settings.answer);
+  }
+
+  /** Up to `count` sentences about a motion at a place of the space, of so many seconds, that turns so far (degrees). */
+  answers(vector: ArrayLike<number>, seconds: number, turn: number | undefined, count: number): { text: string; probability: number }[] {
+    const { counted, similarity } = this.near(vector);
+    if (seconds < this.settings.shortest || similarity < this.settings.outside) return [{ text: NOTHING, probability: 0 }];
+    const shares = this.shares(counted).map((share, set) => ({ share, set }));
+    const best = shares.filter(({ share }) => share > 0).sort((a, b) => b.share - a.share || a.set - b.set);
+    return best.slice(0, count).map(({ share, set }) => {
+      return { text: this.sentence(set, counted, turn), probability: this.probability(share) };
+    });
+  }
+
+  /** How much each action counts, 1 in all, by the motions near a place; and the greatest similarity. */
+  private near(vector: ArrayLike<number>): { counted: number[]; similarity: number } {
+    const [motions, views, size] = this.shape as [number, number, number];
+    const { near, temperature } = this.settings;
+    const alike = Array.from({ length: motions }, (_, motion) => {
+      const products = Array.from({ length: views }, (_, view) => {
+        const start = (motion * views + view) * size;
+        return this.tables.vectors.subarray(start, start + size).reduce((sum, value, i) => sum + (value / 127) * vector[i]!, 0);
+      });
+      return Math.max(...products);
+    });
+    const order = [...alike].sort((a, b) => b - a);
+    const least = order[Math.min(near, motions) - 1]!;
+    const weights = alike.map((one) => (one >= least ? Math.exp((one - order[0]!) / temperature) : 0));
+    const total = weights.reduce((sum, one) => sum + one, 0);
+    const counted = new Array<number>(this.tables.shown.length / this.kinds).fill(0);
+    weights.forEach((weight, motion) => { counted[this.tables.actions[motion]!]! += weight / total; });
+    return { counted, similarity: order[0]! };
+  }
+
+  /** Of each set of kinds the share of near motions that it is right about; 0 where none of them is said to show it. */
+  private shares(counted: number[]): number[] {
+    const asked = new Set(this.named.filter((_, row) => counted[this.tables.said[row]!]! > 0));
+    const near = [...counted.keys()].filter((action) => counted[action]! > 0);
+    return this.sets.map((set, place) => {
+      if (!asked.has(place)) return 0;
+      return near.reduce((sum, action) => sum + (this.right(set, action) ? counted[action]! : 0), 0);
+    });
+  }
+
+  /** Whether a set of kinds is right about an action: one is shown, and none is not to be said. */
+  private right(set: number[], action: number): boolean {
+    const shown = set.map((kind) => this.tables.shown[action * this.kinds + kind]!);
+    return shown.includes(2) && !shown.includes(0);
+  }
+
+  private probability(share: number): number {
+    const kept = Math.min(Math.max(share, 0.02), 0.98);
+    return 1 / (1 + Math.exp(-(this.settings.bias + this.settings.share * Math.log(kept / (1 - kept)))));
+  }
+
+  /** The sentence that names a set of kinds: one whose way fits if there is any, and then the one that counts most. */
+  private sentence(set: number, counted: number[], turn: number | undefined): string {
+    const { said, ways, sentences } = this.tables;
+    const side = turn === undefined || Math.abs(turn) < this.settings.turned ? 0 : turn > 0 ? LEFT! : RIGHT!;
+    const rows = this.named.flatMap((one, row) => (one === set && counted[said[row]!]! > 0 ? [row] : []));
+    const [best] = rows
+      .map((row) => ({ row, fit: this.fit(row, turn, side), counts: counted[said[row]!]! }))
+      .sort((a, b) => b.fit - a.fit || b.counts - a.counts || a.row - b.row);
+    const text = sentences[best!.row]!;
+    const unsaid = side && ways[3 * best!.row + 2] && ways[3 * best!.row] !== side;
+    return unsaid ? `${text}, turning ${side === LEFT ? "left" : "right"}` : text;
+  }
+
+  /** How well the way of a sentence fits a path that turns by so many degrees to a side. */
+  private fit(row: number, turn: number | undefined, side: number): number {
+    if (turn === undefined) return 0;
+    const [way, degrees] = this.tables.ways.subarray(3 * row, 3 * row + 2);
+    if (degrees! > 0 && Math.abs(degrees! - Math.abs(turn)) > 30) return -1;
+    if (side) return way === side ? 1 : way === -side || way === STRAIGHT ? -1 : 0;
+    if (Math.abs(turn) > this.settings.straight) return 0;
+    return way === STRAIGHT ? 0.5 : way === LEFT || way === RIGHT ? -1 : 0;
+  }
+}
+
+/** By how many degrees a figure turns to the left in frames; undefined where they do not tell, or it does not stay upright. */
+export function turnOf(frames: Frames, motion: Manifest["motion"]): number | undefined {
+  const [turn, pitch, roll] = ["root.turn", "root.pitch", "root.roll"].map((name) => motion.channels.indexOf(name));
+  if (Math.min(turn!, pitch!, roll!) < 0) return undefined;
+  const factor = motion.units[turn!]!.startsWith("rad") ? 180 / Math.PI : 1;
+  const leant = Math.max(...Array.from(frames, (frame) => Math.max(Math.abs(frame[pitch!]!), Math.abs(frame[roll!]!)))) * factor;
+  const turned = frames.slice(1).reduce((sum, frame) => sum + frame[turn!]!, 0);
+  return leant < 70 ? (turned / motion.fps) * factor : undefined;
+}

@@ -1,0 +1,74 @@
+"""Known motions from training to evaluation, as a user has them."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from language_data import small_store
+
+from motet.cli import main
+from motet.models.describe import DescribeModel
+from motet.models.known import NOTHING
+from motet.models.language import RULES
+from motet_train.data.store import Store
+from motet_train.runs import Run
+
+NETS = "[model]\nencoder_units = [4, 4]\ndecoder_units = [6, 6]\nembedding = 4\n"
+
+
+def motet(*arguments: object) -> Result:
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    found = tmp_path_factory.mktemp("known")
+    small_store(found, 40)
+    (found / "small.toml").write_text(NETS)
+    given = ("--data", found / "store", "--split", "trial", "--epochs", 1, "--config", found / "small.toml")
+    for arguments in (
+        ("describe", *given, "--out", found / "writer"),
+        ("known", *given[:4], "--writer", found / "writer", "--out", found / "known"),
+    ):
+        result = motet("train", *arguments)
+        assert result.exit_code == 0, result.output
+    return found
+
+
+def test_known_motions_answer_for_clips_kept_back(folder: Path) -> None:
+    run, store = Run.load(folder / "known"), Store.open(folder / "store")
+    model = run.bundle_model()
+    assert isinstance(model, DescribeModel)
+    assert model.known is not None
+    split = run.manifest["training"]["split"]
+    test = [i for i, entry in enumerate(store.records) if entry.name in split["test"]]
+    said = {RULES.normalise(s) for entry in store.records for s in entry.sentences}
+    for row in model.describe([store.motion(i) for i in test], 3):
+        assert len({one.text for one in row}) == len(row)
+        for one in row:
+            plain = one.text.removesuffix(", turning left").removesuffix(", turning right")
+            assert one.text == NOTHING or plain in said
+            assert one.score == pytest.approx(one.probability, abs=1e-5)
+    tried = np.load(folder / "known" / "tried.npz")
+    assert {len(tried[name]) for name in tried} == {3 * split["train"]}
+
+
+def test_descriptions_are_judged_by_action(folder: Path) -> None:
+    for clips, count in (("test", 4), ("0*,1*", 20)):
+        result = motet("evaluate", folder / "known", "--actions", clips, "--data", folder / "store", "--json")
+        assert result.exit_code == 0, result.output
+        report = json.loads(result.stdout)
+        assert report["actions"]["of"] == count
+        assert 0 <= report["actions"]["right"] <= 1
+        assert 0 <= report["lookup"]["right"] <= 1
+    assert "--actions takes describe models" in motet("evaluate", "search", "--actions", "test").output
+
+
+def test_known_motions_need_a_net_that_writes(folder: Path) -> None:
+    given = ("train", "known", "--data", folder / "store", "--out", folder / "none")
+    result = motet(*given, "--writer", folder / "known")
+    assert result.exit_code != 0
+    assert "known motions need a run of describe (--writer)" in result.output
+    assert not (folder / "none" / "run.json").exists()
