@@ -163,6 +163,22 @@ def test_keys_are_met(url: str, skeleton: Any) -> None:
     assert abs(np.arctan2(-hips[2], hips[0]) - 1.5) < 0.2  # its left is a quarter turn from where it faces
 
 
+@pytest.mark.parametrize("name", ["motet", "mixamo"])
+def test_a_walk_is_steered_along_a_path(url: str, skeleton: Any, name: str) -> None:
+    """Its feet stand, on any figure, though the path is not that of the prompt's own walk."""
+    given = skeleton if name == "motet" else sent(rig(name))
+    frames = list(range(0, 90, 3))
+    path = [[0.02 * frame, 0.03 * frame] for frame in frames]
+    constraint = {"type": "root_path", "frames": frames, "positions_xz": path}
+    segment = {**WALK, "duration_frames": 90}
+    (sample,) = ask(url, given, segments=[segment], constraints=[constraint])
+    found = positions(sample)
+    np.testing.assert_allclose(found[frames, 0][:, [0, 2]], path, atol=1e-4)
+    toes = [i for i, one in enumerate(sample["joint_names"]) if one.endswith(("Toes", "ToeBase"))]
+    speeds = 30 * np.linalg.norm(np.diff(found[:, toes][..., [0, 2]], axis=0), axis=-1)
+    assert np.median(speeds.min(axis=1)) < 0.15  # m/s, of the foot that stands
+
+
 def test_without_a_prompt_it_goes_from_key_pose_to_key_pose(url: str, skeleton: Any) -> None:
     keys = [
         {"type": "pose_keyframe", "frame": 0, "joint_rotations": {"leftUpperArm": [0, 0, 0, 1]}, "fill_mode": "rest"},
@@ -235,6 +251,7 @@ TREE = {"joints": [{"name": "trunk", "parent": None, "rest_translation": [0, 1, 
         ),
         ({"constraints": [key(root_position=[0, 1, 0]), pin(1)]}, "invalid_request", "two constraints"),
         ({"constraints": [pin(NAN)]}, "invalid_request", "finite"),
+        ({"constraints": [pin(9, 59)]}, "invalid_request", "9.0 m at up to 1.92 m/s take 5.0 s"),
         ({"constraints": [key(joint_rotations={"leftUpperArm": [NAN, 0, 0, 1]})]}, "invalid_request", "no rotation"),
         ({"constraints": [key(joint_rotations={"leftUpperArm": [0, 0, 0, 0]})]}, "invalid_request", "no rotation"),
         ({"constraints": [key(root_position=[0, NAN, 0])]}, "invalid_request", "root_position"),

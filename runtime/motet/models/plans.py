@@ -19,7 +19,7 @@ from motet.motion.motion import Motion
 from motet.settings import is_number
 
 LONGEST, FARTHEST = 600.0, 1000.0  # seconds of a composition; metres from its start, and degrees
-SHORTEST, APART = 0.5, 0.1 - 1e-9  # seconds of a prompt, and from one moment to the next
+SHORTEST, APART = 0.3, 0.1 - 1e-9  # seconds of a prompt, and from one moment to the next
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
 PART = re.compile(
     rf"(?P<at>{NUMBER})s?(?!\S)(?:\s+at\s+(?P<x>{NUMBER})\s+(?P<z>{NUMBER})(?!\S))?"

@@ -139,8 +139,9 @@ def _check(walk: Walk, ground: Array, fps: float) -> None:
         if leg.place is None:
             continue
         far, way = float(np.hypot(*(leg.place - at))), float(np.arctan2(*(leg.place - at)))
-        need = far / walk.gait.high + HURRIED * _pause(walk, leg, way) + START * (leg is walk.legs[0])
         at, then = leg.place, (leg.frame + 1) / fps
+        begun = START * min(1.0, then - now) if leg is walk.legs[0] else 0.0
+        need = far / walk.gait.high + HURRIED * _pause(walk, leg, way) + begun
         if far > NEAR and need > then - now:
             raise MotionError(
                 f"{walk.text!r} cannot be at the place of {then:.3g} s in time: {far:.1f} m at up to "

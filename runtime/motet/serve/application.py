@@ -68,7 +68,7 @@ def app(
     if others := sorted(named.keys() - kinds.keys()):
         raise BundleError(f"bundle {named[others[0]]} is for {others[0]!r}; a server takes {', '.join(kinds)}")
     models: dict[str, Any] = {verb: load_as(kind, named[verb], session) for verb, kind in kinds.items()}
-    doors = _mmcp(models["generate"], models.pop("fill")) if mmcp else []
+    doors = _mmcp(models["generate"], models.pop("fill"), models["control"]) if mmcp else []
     steer, answers = models.pop("control"), Answers(**models, limits=limits or Limits())
 
     @asynccontextmanager
@@ -88,10 +88,10 @@ def app(
     )
 
 
-def _mmcp(model: CodesModel, fill: FillModel) -> list[Mount]:
+def _mmcp(model: CodesModel, fill: FillModel, steer: SteerModel) -> list[Mount]:
     from motet.serve.mmcp import mmcp_app
 
-    return [Mount("/mmcp", mmcp_app(model, fill))]
+    return [Mount("/mmcp", mmcp_app(model, fill, steer))]
 
 
 def run(

@@ -5,20 +5,23 @@ becomes a story, and constraints become keys that the motion passes through (doc
 """
 
 import asyncio
+import math
 import secrets
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property
-from itertools import pairwise
+from itertools import accumulate, pairwise
 
 import numpy as np
 
 from motet.errors import DecodingError, MotetError, MotionError
 from motet.models.fill import LOOP_SECONDS, FillModel
 from motet.models.generate_codes import CodesModel
+from motet.models.plans import APART, Moment
+from motet.models.steer import SteerModel
 from motet.motion import heading
-from motet.motion.humanoid import HUMANOID, Figure, from_humanoid
+from motet.motion.humanoid import HUMANOID, Figure, from_humanoid, leg_length
 from motet.motion.keys import Key, Moves
 from motet.motion.kinematics import chained, local_rotations, local_translations, motion_of
 from motet.motion.motion import Motion, spline
@@ -50,12 +53,13 @@ Keys = Mapping[int, Key]
 """Frame -> what the figure is to be there."""
 
 
-def mmcp_app(model: CodesModel, fill: FillModel) -> FastAPI:
-    """The ASGI application of an MMCP server whose prompts ``model`` shows, and where ``fill`` goes between key poses.
+def mmcp_app(model: CodesModel, fill: FillModel, steer: SteerModel) -> FastAPI:
+    """The ASGI application of an MMCP server whose prompts ``model`` shows, where ``fill`` goes between key poses, and
+    ``steer`` along root paths.
 
     ImportError with the remedy where the SDK is missing.
     """
-    application: FastAPI = build_app(MotetBackbone(model, fill), title="motet")
+    application: FastAPI = build_app(MotetBackbone(model, fill, steer), title="motet")
     return application
 
 
@@ -64,8 +68,8 @@ class MotetBackbone(Backbone):  # type: ignore[misc]  # the SDK has no types
 
     model_id = "motet"
 
-    def __init__(self, model: CodesModel, fill: FillModel) -> None:
-        self.model, self.fill = model, fill
+    def __init__(self, model: CodesModel, fill: FillModel, steer: SteerModel) -> None:
+        self.model, self.fill, self.steer = model, fill, steer
 
     def capabilities(self) -> ModelSpec:
         """See the SDK: no end effectors, no ground but a flat one, one seed for a whole time line."""
@@ -114,14 +118,23 @@ class MotetBackbone(Backbone):  # type: ignore[misc]  # the SDK has no types
         elif request.options and request.options.loop:
             motion = self._loop(request.segments[0], request.total_frames, fps, seed)
         else:
-            texts = [getattr(segment, "prompt", IDLE) for segment in request.segments]
-            seconds = [segment.duration_frames / fps for segment in request.segments]
-            seconds[-1] += 2 / self.model.fps  # what the last frame is interpolated from
-            plant = request.options is None or request.options.post_processing
-            story = self.model.story(texts, seconds=seconds, seed=seed)
-            motion = story.playable(fps, plant)[: request.total_frames]
+            motion = self._shown(request, fps, _steps(keys, figure), seed)
         moves = _on_figure(motion, figure).through(keys, round(REACH * fps))
         return moves.turns, moves.root
+
+    def _shown(self, request: GenerateRequest, fps: float, steps: Mapping[int, Moment], seed: int) -> Motion:
+        """The prompts as a story; with places on the way as a composition, whose walks are steered there."""
+        texts = [getattr(segment, "prompt", IDLE) for segment in request.segments]
+        seconds = [segment.duration_frames / fps for segment in request.segments]
+        seconds[-1] += 2 / self.model.fps  # what the last frame is interpolated from
+        if steps.keys() - {0}:
+            starts = accumulate(seconds, initial=0.0)
+            told = [Moment(at, text) for at, text in zip(starts, [*texts, None], strict=True)]
+            composed = self.model.compose(_line(told, steps, fps, self.model.fps), steer=self.steer, seed=seed)
+            return composed.motion.resample(fps)[: request.total_frames]
+        plant = request.options is None or request.options.post_processing
+        story = self.model.story(texts, seconds=seconds, seed=seed)
+        return story.playable(fps, plant)[: request.total_frames]
 
     def _loop(self, segment: schemas.TextSegment, frames: int, fps: float, seed: int) -> Motion:
         """A cycle that ends as it began, at another place: the last half second leads back."""
@@ -254,6 +267,28 @@ def _pose(given: schemas.PoseKeyframeConstraint, skeleton: Skeleton) -> Key:
     if given.root_position is not None and not np.isfinite(place).all():
         raise MotionError(f"{where}: root_position must be finite numbers")
     return Key(turns, place)
+
+
+def _steps(keys: Keys, figure: Figure) -> dict[int, Moment]:
+    """Where a root path goes, by frame, at the humanoid's size; where the figure faces first."""
+    scale, found = leg_length() / figure.fitted.leg, {}
+    for frame, key in keys.items():
+        if np.isfinite(key.place[[0, 2]]).all():
+            x, z = (scale * key.place[[0, 2]]).tolist()
+            facing = None if frame or np.isnan(key.facing) else math.degrees(key.facing)
+            found[frame] = Moment(0, place=(x, z), facing=facing)
+    return found
+
+
+def _line(told: Sequence[Moment], steps: Mapping[int, Moment], fps: float, rate: float) -> list[Moment]:
+    """Prompts and the steps of a path in order of time; a step that is nearly at the time of a moment joins it."""
+    line = {one.at: one for one in told}
+    for frame, step in sorted(steps.items()):
+        at = frame / fps + 1 / rate if frame else 0.0  # a moment's frame is the last one before it
+        at = next((one for one in line if abs(one - at) < APART), at)
+        one = line.get(at, Moment(at))
+        line[at] = one if one.place else replace(one, place=step.place, facing=step.facing)
+    return [line[at] for at in sorted(line)]
 
 
 def _humanoid(figure: Figure, keys: Keys, fps: float) -> Motion:
