@@ -41,6 +41,7 @@ from motet.models.generate_codes import CodesModel, Story, StorySettings, Unders
 from motet.models.load import load, load_as
 from motet.models.plans import Moment, parse_plan, read_plan
 from motet.models.predict import PredictModel, PredictSession
+from motet.models.quantities import Quantities
 from motet.models.search import Hit, Index, SearchModel
 from motet.models.steer import SteerModel
 from motet.models.steer_session import SteerSession, SteerSnapshot
@@ -56,12 +57,11 @@ __all__ = [
     "Bundle", "BundleError", "BundleModel", "Checked", "CodesModel", "Composition", "ControlError", "ControlModel",
     "ControlWarning", "DecodingError", "DescribeModel", "Description", "FillModel", "FormatError", "GenerateModel",
     "GenerateSettings", "Generated", "Hit", "Humanoid", "Index", "Met", "MixtureModel", "Moment", "MotetError",
-    "Motion", "MotionError", "OutputError", "Part", "Passage", "Pose", "PredictModel", "PredictSession",
+    "Motion", "MotionError", "OutputError", "Part", "Passage", "Pose", "PredictModel", "PredictSession", "Quantities",
     "ScriptError", "SearchModel", "SessionOptions", "SettingError", "SteerModel", "SteerSession", "SteerSnapshot",
-    "Story", "StorySettings", "TdbnModel", "TdbnSession", "TdbnSnapshot", "TextError", "TextWarning",
-    "TravelWarning", "Understood", "UnitError", "check", "clips", "from_humanoid", "list_bundles", "live_page",
-    "load", "load_as", "motion", "parse_plan", "read", "read_map", "read_plan", "to_humanoid", "write",
-    "write_live_page",
+    "Story", "StorySettings", "TdbnModel", "TdbnSession", "TdbnSnapshot", "TextError", "TextWarning", "TravelWarning",
+    "Understood", "UnitError", "check", "clips", "from_humanoid", "list_bundles", "live_page", "load", "load_as",
+    "motion", "parse_plan", "read", "read_map", "read_plan", "to_humanoid", "write", "write_live_page",
 ]
 # fmt: on
 

@@ -129,6 +129,7 @@ def _told(found: Mapping[str, Any]) -> str:
 @click.option("--stand", type=click.Choice(["start", "end", "both"]), help="Start or end in standing.")
 @click.option("--loop", is_flag=True, help="Write only a seamless loop.")
 @click.option("--whole", is_flag=True, help="Do not split texts that ask for several things in a row.")
+@click.option("--numbers/--no-numbers", default=True, help="Turn, go and repeat as much as texts say. [default: yes]")
 @click.option("--strict", is_flag=True, help="Fail on a text that the model knows only in part.")
 @write_options
 @session_options
@@ -157,7 +158,7 @@ def generate(
     told = story or after is not None or settings["stand"] is not None
     settings = {key: value for key, value in settings.items() if value is not None}
     tries, model = Tries(), load_as(CodesModel if told else GenerateModel, bundle, session)
-    asked = tries.usable(dict(enumerate(texts)), model.unknown)
+    asked = _usable(tries, model, texts, settings["numbers"])
     if told:
         found = _stories(tries, cast(CodesModel, model), asked, story, after, **settings)
     else:
@@ -175,22 +176,26 @@ def generate(
     tries.finish()
 
 
+def _usable(tries: Tries, model: GenerateModel, texts: tuple[str, ...], numbers: bool) -> dict[int, str]:
+    """The texts of which words are known, and numbers make sense, by their places."""
+    known = tries.usable(dict(enumerate(texts)), model.unknown)
+    return tries.usable(known, model.quantities) if numbers else known
+
+
 Found = tuple[int, str, list[Generated]]
 """The place of an input among all, the input, and its motions, the best first."""
 
 
 @noted()
 def _motions(
-    tries: Tries, model: GenerateModel, asked: dict[int, str], seed: int, strict: bool, whole: bool, **settings: Any
+    tries: Tries, model: GenerateModel, asked: dict[int, str], seed: int, strict: bool, **settings: Any
 ) -> list[Found]:
     """The motions of each text by itself, of all of them in one batch."""
     if strict:  # one text that is refused leaves the others
-        asked = tries.usable(asked, partial(model.check, whole=whole))
+        asked = tries.usable(asked, partial(model.check, whole=settings["whole"], numbers=settings["numbers"]))
     with bar("generating") as progress:
         seeds = [seed + index for index in asked]
-        found = model.generate(
-            list(asked.values()), seed=seeds, strict=strict, whole=whole, progress=progress, **settings
-        )
+        found = model.generate(list(asked.values()), seed=seeds, strict=strict, progress=progress, **settings)
     return [(index, text, results) for (index, text), results in zip(asked.items(), found, strict=True)]
 
 
@@ -222,7 +227,8 @@ def _written(
         motion = output.write(place, looped(motion) if loop else motion, text)
         facts = {"frames": len(motion), "fps": motion.fps, "seconds": motion.duration}
         passages = {"passages": list(map(asdict, result.passages))} if isinstance(result, Story) else {}
-        told = {"action": result.action or None, "lacking": list(result.lacking)}
+        told: dict[str, Any] = {"action": result.action or None, "lacking": list(result.lacking)}
+        told |= {"asked": dict(result.asked), "measured": dict(result.measured)}
         found.append({"output": str(place), "log_likelihood": result.log_likelihood, **facts, **told, **passages})
     return {"input": text, "hypotheses": found}
 
@@ -235,9 +241,19 @@ def _lines(rows: list[dict[str, Any]]) -> Iterator[str]:
             yield f"{found['output']}: {size(found['frames'], found['fps'])}{score}: {row['input']}"
             if found["action"]:
                 yield f"  as: {found['action']}"
+            if found["action"] and (numbers := _numbers(found)):
+                yield f"  {numbers}"
             for passage in found.get("passages", ()):
-                shown = "" if found["action"] else f" (as: {passage['action']})"
+                numbers = "" if found["action"] else _numbers(passage)
+                shown = "" if found["action"] else f" (as: {passage['action']}{numbers and f'; {numbers}'})"
                 yield f"  {passage['start']:.1f}-{passage['stop']:.1f} s {passage['text']}{shown}"
+
+
+def _numbers(found: Mapping[str, Any]) -> str:
+    """What was asked in numbers beside what was measured: "asked 3 steps: 3"."""
+    shown = {kind: f": {value:.3g} shown" for kind, value in found["measured"].items()}
+    told = ", ".join(f"{value:.3g} {kind}{shown.get(kind, '')}" for kind, value in found["asked"].items())
+    return told and f"asked: {told}"
 
 
 @click.command()

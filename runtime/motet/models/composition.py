@@ -1,8 +1,8 @@
 """Composed sentences: "walk to the table, drink, then turn around" as parts that are shown one after another."""
 
 import re
-from collections.abc import Iterable, Iterator, Set
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Set
+from dataclasses import dataclass, field
 
 STOPS = re.compile(r"(?:[.!?;](?!\d)|\n)\s*")
 THEN = re.compile(
@@ -25,14 +25,16 @@ FUNCTION_WORDS = frozenset((
 
 @dataclass(frozen=True)
 class Passage:
-    """A sentence of a story, shown from ``start`` to ``stop`` in seconds; ``action`` and ``lacking`` as for
-    :class:`motet.models.generate.Generated`."""
+    """A sentence of a story, shown from ``start`` to ``stop`` in seconds; ``action``, ``lacking``, ``asked`` and
+    ``measured`` as for :class:`motet.models.generate.Generated`."""
 
     text: str
     start: float
     stop: float
     action: str = ""
     lacking: tuple[str, ...] = ()
+    asked: Mapping[str, float] = field(default_factory=dict)
+    measured: Mapping[str, float] = field(default_factory=dict)
 
 
 def stem(word: str) -> str:

@@ -4,7 +4,7 @@ Gaussians (section 4.3 of Plappert et al. 2017)."""
 import warnings
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, TypedDict, Unpack, cast, overload
 
@@ -18,6 +18,7 @@ from motet.errors import DecodingError, TextError, TextWarning
 from motet.files import File
 from motet.formats import Character, write_motion
 from motet.models.language import LanguageModel
+from motet.models.quantities import Quantities
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
@@ -48,6 +49,7 @@ class GenerateSettings(LoopSettings, total=False):
 
 
 class _Options(GenerateSettings, total=False):
+    numbers: bool
     whole: bool
     seed: Seed
     strict: bool
@@ -64,6 +66,9 @@ class Generated:
     after: the motion that it continues; without one it starts at the origin.
     action: a sentence of the action that it shows, "" where a model knows none, or several are shown.
     lacking: known words of its sentence that no sentence of that action has.
+    asked: what its sentence asks for in numbers (:mod:`motet.models.quantities`): degrees to the left, metres, steps,
+        times, seconds, and a pace beside the usual; empty where several things are shown. measured: how much of each
+        the motion has, as far as it can be said.
     """
 
     contract: MotionContract
@@ -73,6 +78,8 @@ class Generated:
     after: Motion | None = None
     action: str = ""
     lacking: tuple[str, ...] = ()
+    asked: Mapping[str, float] = field(default_factory=dict)
+    measured: Mapping[str, float] = field(default_factory=dict)
 
     @cached_property
     def features(self) -> Motion:
@@ -131,6 +138,7 @@ class GenerateModel(LanguageModel):
         sentences: str | Sequence[str],
         hypotheses: int | None = None,
         *,
+        numbers: bool = True,
         whole: bool = False,
         seed: Seed = 0,
         strict: bool = False,
@@ -141,11 +149,11 @@ class GenerateModel(LanguageModel):
 
         A mixture model ranks them, the likeliest per frame first. Those of a motion-code model are independent, and the
         first does not depend on their number.
+        numbers: show as many degrees, metres, steps, times and seconds as sentences say (:meth:`quantities`), or warn.
         whole: take a sentence that asks for several things in a row (:meth:`parts`) as one; else each of its motions is
             a story of its parts, and seconds is what they last together.
         seed: sentence i uses seed + i (or seed[i]), and gets the same motions as alone with that seed.
-        progress: called with the number of sentences done and in total.
-        strict: fail on unknown words instead of warning.
+        strict: fail on unknown words instead of warning. progress: called with the number of sentences done and in all.
         settings: those of the model's loop (:mod:`motet.decode.loops`); None (the default) for the bundle's.
             temperature: of sampling: about the centres of a mixture's components, or of codes. max_seconds: a motion
             that has not ended by then is cut. Mixture models also take candidates: frames drawn by each hypothesis in a
@@ -156,15 +164,19 @@ class GenerateModel(LanguageModel):
         """
         texts = [sentences] if isinstance(sentences, str) else list(sentences)
         own = {"hypotheses": hypotheses, **cast(Mapping[str, float | None], settings)}
-        seeds = seeds_of(seed, len(texts), DecodingError)
-        composed = {i for i, text in enumerate(texts) if not whole and len(self.parts(text)) > 1}
+        read, seeds = {**own, "numbers": numbers, "whole": whole}, seeds_of(seed, len(texts), DecodingError)
+        composed = {i for i, text in enumerate(texts) if self._composed(text, numbers, whole)}
         single = [i for i in range(len(texts)) if i not in composed]
         drawn = self._drawn([texts[i] for i in single], [seeds[i] for i in single], strict, own)
         found: dict[int, list[Generated]] = {}
         for i in (*single, *sorted(composed)):
-            found[i] = self.composed(texts[i], seeds[i], strict, own) if i in composed else next(drawn)
+            found[i] = self.composed(texts[i], seeds[i], strict, read) if i in composed else next(drawn)
             progress(len(found), len(texts))
         return found[0] if isinstance(sentences, str) else [found[i] for i in range(len(texts))]
+
+    def _composed(self, sentence: str, numbers: bool, whole: bool) -> bool:
+        """Whether a sentence is told as a story: of its parts, or of its numbers."""
+        return (not whole and len(self.parts(sentence)) > 1) or (numbers and bool(self.quantities(sentence).amounts))
 
     def _drawn(
         self, texts: Sequence[str], seeds: Sequence[int], strict: bool, settings: Mapping[str, float | None]
@@ -185,7 +197,12 @@ class GenerateModel(LanguageModel):
         """What a sentence asks for one after another: itself alone, where the model knows it as one thing."""
         return [sentence]
 
-    def composed(self, sentence: str, seed: int, strict: bool, settings: Mapping[str, float | None]) -> list[Generated]:
+    def quantities(self, sentence: str) -> Quantities:
+        """What a sentence asks for in numbers, and what it is taken for without them; nothing where the model's loop
+        cannot follow them."""
+        return Quantities(sentence)
+
+    def composed(self, sentence: str, seed: int, strict: bool, settings: Mapping[str, Any]) -> list[Generated]:
         """Motions that show the parts of a sentence, as many as the setting hypotheses says; see :meth:`generate`."""
         raise DecodingError(f"models of the loop {self.manifest.loop!r} show one sentence at a time")
 
@@ -205,11 +222,12 @@ class GenerateModel(LanguageModel):
             raise DecodingError("seconds must be more than 0; omit them to let a motion end by itself")
         return self.loop.settled(self.defaults, settings)
 
-    def check(self, sentence: str, whole: bool = False) -> None:
+    def check(self, sentence: str, whole: bool = False, numbers: bool = True) -> None:
         """TextError where the model does not know all of a sentence, or of its parts; see :meth:`note`."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", TextWarning)
-            for part in [sentence] if whole else self.parts(sentence):
+            for said in [sentence] if whole else self.parts(sentence):
+                part = self.quantities(said).text if numbers else said
                 self.note(part, self.embed(part), strict=True)
 
     def note(self, sentence: str, context: Floats, strict: bool) -> None:

@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate
 from typing import Annotated, Any, ClassVar, Literal, Unpack, cast, get_args
@@ -14,15 +14,19 @@ from motet.bundle.fields import Fields
 from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
 from motet.decode.codec import Codec, Context, ReceptiveField, StreamingDecoder
-from motet.decode.codes import CodesSettings, Memory, Source, Writer, draw_codes, drawn_actions, drawn_steps
+from motet.decode.codes import CodesSettings, Memory, Source, Writer, draw_codes, drawn_actions
 from motet.decode.continue_codes import ContinuationSettings
 from motet.decode.loop import Noise, Sample, apart
 from motet.errors import BundleError, DecodingError, MotionError, TextError, TextWarning, warn
+from motet.models.amounts import Seen, short
 from motet.models.compose import Composition, compose
 from motet.models.composition import FUNCTION_WORDS, Passage, parts_of, sentences_of, stem, verbs_of
 from motet.models.generate import Generated, GenerateModel, LoopSettings
 from motet.models.plans import Moment
+from motet.models.quantities import PACES, Quantities, known_turns, quantities_of
 from motet.models.steer import SteerModel
+from motet.models.telling import Part, Piece, Teller
+from motet.motion.humanoid import HUMANOID
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.representation.root_sixd import in_world
@@ -32,7 +36,14 @@ Stand = Literal["start", "end", "both"]
 """Where a figure stands briefly."""
 
 
-class StorySettings(LoopSettings, total=False):
+class ReadSettings(LoopSettings, total=False):
+    """Settings of a loop, and of how sentences are read: :meth:`GenerateModel.generate`."""
+
+    numbers: bool
+    whole: bool
+
+
+class StorySettings(ReadSettings, total=False):
     """Settings of a call of :meth:`CodesModel.story`; seconds may be a list, of one value for each sentence."""
 
     after: Motion | None
@@ -40,7 +51,6 @@ class StorySettings(LoopSettings, total=False):
     stand: Stand | None
     seed: Seed
     strict: bool
-    whole: bool
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -139,8 +149,28 @@ class CodesModel(GenerateModel):
         found = []
         for one in sentences_of(sentence):
             parts = parts_of(one, self._verbs)
-            found += parts if len(parts) > 1 and self.lacking(one) else [one]
+            told = self.quantities(one)
+            apart = len(parts) > 1 and (self.lacking(told.text) or any(self._more(part, told) for part in parts))
+            found += parts if apart else [one]
         return found if len(found) > 1 else [sentence]
+
+    def _more(self, part: str, told: Quantities) -> bool:
+        """Whether a part of a sentence asks for another number than the sentence does: it has several of a kind, or is
+        to have them one after another."""
+        return bool(quantities_of(part).amounts) and dict(quantities_of(part).amounts) != dict(told.amounts)
+
+    def quantities(self, sentence: str) -> Quantities:
+        """What a sentence asks for in numbers, and what it is taken for: itself where the likeliest action has all its
+        words, else what it says without the numbers, or with another angle; no pace that this action has. TextError
+        like :func:`motet.models.quantities.quantities_of`."""
+        found = quantities_of(sentence) if self.contract.skeleton == HUMANOID else Quantities(sentence)
+        if found.amounts and found.text != sentence:
+            texts = [sentence] if found.amounts.keys() & {"degrees", "times"} else []
+            known = (text for text in (*texts, *known_turns(found)) if not (self.unknown(text) or self.lacking(text)))
+            found = replace(found, text=next(known, found.text))
+        if "pace" in found.amounts and not any(map(PACES.fullmatch, self.lacking(found.text))):
+            found = replace(found, amounts={kind: value for kind, value in found.amounts.items() if kind != "pace"})
+        return found
 
     def lacking(self, sentence: str, action: int | None = None) -> list[str]:
         """The known words of a sentence, but for function words, of which no sentence of an action has any form, nor
@@ -150,10 +180,10 @@ class CodesModel(GenerateModel):
         words = set(map(self.vocabulary.meant, self.vocabulary.rules.words(sentence))) - FUNCTION_WORDS - {""}
         return sorted(one for one in words if have.isdisjoint({stem(one), stem(self.vocabulary.near(one))}))
 
-    def composed(self, sentence: str, seed: int, strict: bool, settings: Mapping[str, float | None]) -> list[Generated]:
+    def composed(self, sentence: str, seed: int, strict: bool, settings: Mapping[str, Any]) -> list[Generated]:
         """See :meth:`GenerateModel.composed`; the first motion is the :meth:`story` of this seed."""
-        count = int(self._settled(settings)["hypotheses"])
-        own = {name: value for name, value in settings.items() if name != "hypotheses"}
+        own: dict[str, Any] = {name: value for name, value in settings.items() if name != "hypotheses"}
+        count = int(self._settled({"hypotheses": settings["hypotheses"]})["hypotheses"])
         seeds = [seed, *np.random.SeedSequence(seed).generate_state(count - 1).tolist()]
         return [self.story(sentence, **cast(StorySettings, {**own, "seed": one, "strict": strict})) for one in seeds]
 
@@ -222,17 +252,33 @@ class CodesModel(GenerateModel):
         DecodingError for seconds, a seed or a setting out of range, and for several ``hypotheses``; MotionError for a
         motion that is too short to continue or not of a human figure; TextError like :meth:`generate`.
         """
-        texts, after, actions, drawn = self._told(sentences, **settings)
+        parts, after, drawn = self._told(sentences, **settings)
         pieces = list(drawn)
-        frames = np.concatenate([found for _, found in pieces])
-        steps = Counter(number for number, _ in pieces[:-1])
-        shown = accumulate(steps[number] * self.codec.field.hop for number in range(len(texts)))
-        stops = [min(stop, len(frames)) / self.fps for stop in shown]
-        passages = tuple(map(Passage, texts, [0.0, *stops], stops, *zip(*actions, strict=True)))
-        unknown = tuple(word for text in texts for word in self.unknown(text))
+        frames = np.concatenate([piece.frames for piece in pieces])
+        stops = [*accumulate(sum(one.longer for one in pieces if one.number == i) for i in range(len(parts)))]
+        actions = {piece.number: piece.action for piece in pieces}
+        passages = tuple(
+            self._passage(part, actions[i], frames[start:stop], start / self.fps, stop / self.fps)
+            for i, (part, start, stop) in enumerate(zip(parts, [0, *stops], stops, strict=False))
+        )
+        unknown = tuple(word for part in parts for word in self.unknown(part.asked.text))
         lacking = tuple(word for one in passages for word in one.lacking)
-        action = passages[0].action if len(passages) == 1 else ""
-        return Story(self.contract, frames, None, unknown, after, action, lacking, passages)
+        only = passages[0] if len(passages) == 1 else Passage("", 0, 0)
+        told = (only.action, lacking, only.asked, only.measured)
+        return Story(self.contract, frames, None, unknown, after, *told, passages=passages)
+
+    def _passage(self, part: Part, action: int, frames: Array, start: float, stop: float) -> Passage:
+        """What is said of the frames (T, D) that show a part; a TextWarning tells numbers that are not met."""
+        taken, lacking = self._shown(part.asked.text, action)
+        asked: dict[str, float] = {kind: value for kind, value in part.asked.amounts.items()}  # noqa: C416
+        seen = Seen.of(self.contract, frames) if asked and len(frames) else None
+        found = [(kind, seen.measured(kind, part.asked.act)) for kind in part.asked.amounts] if seen else []
+        measured: dict[str, float] = {kind: value for kind, value in found if not np.isnan(value)}
+        for kind in asked.keys() - measured.keys() - {"pace"}:
+            warn(f"{part.text!r} asks for {asked[kind]:g} {kind}, which are not counted in what is shown", TextWarning)
+        for kind in short(asked, measured, part.asked.either):
+            warn(f"{part.text!r} asks for {asked[kind]:g} {kind}; shown: {measured[kind]:.3g}", TextWarning)
+        return Passage(part.text, start, stop, taken, lacking, asked, measured)
 
     def compose(
         self, moments: Sequence[Moment], *, steer: SteerModel | None = None, seed: int = 0, strict: bool = False
@@ -255,15 +301,19 @@ class CodesModel(GenerateModel):
         """The motion of :meth:`story` in pieces, as they are drawn: each continues the last one.
 
         Feet are as drawn, since planting them requires knowing how long they stand. Memory and the time of a piece stay
-        constant, however long the stream lasts. Errors like :meth:`story`.
+        constant, however long the stream lasts; but what is asked for by a number other than of seconds comes as one
+        piece. Errors like :meth:`story`.
         """
-        _, after, _, drawn = self._told(sentences, **settings)  # what cannot be told is refused before the first piece
+        parts, after, drawn = self._told(sentences, **settings)  # what cannot be told is refused before the first piece
 
         def pieces() -> Iterator[Motion]:
-            last, pose = after, None
-            for _, frames in drawn:
-                if len(frames):
-                    last, pose = in_world(self.contract.features(frames), last, pose)
+            last, pose, told = after, None, 0
+            for piece in drawn:
+                if piece.number == told:
+                    self._shown(parts[told].asked.text, piece.action)
+                    told += 1
+                if len(piece.frames):
+                    last, pose = in_world(self.contract.features(piece.frames), last, pose)
                     yield last
 
         return pieces()
@@ -277,12 +327,12 @@ class CodesModel(GenerateModel):
         stand: Stand | None = None,
         seed: Seed = 0,
         strict: bool = False,
-        whole: bool = False,
-        **settings: Unpack[LoopSettings],
-    ) -> tuple[list[str], Motion | None, list[tuple[str, tuple[str, ...]]], Iterator[tuple[int, Array]]]:
-        """The sentences of a story with those of standing, the motion on the model's figure that it continues, and its
-        pieces as they are drawn; with them comes for each sentence what it is taken for, and what that lacks."""
+        **settings: Unpack[ReadSettings],
+    ) -> tuple[list[Part], Motion | None, Iterator[Piece]]:
+        """The parts of a story with those of standing, the motion on the model's figure that it continues, and its
+        pieces as they are drawn."""
         texts = [sentences] if isinstance(sentences, str) else list(sentences)
+        numbers, whole = settings.pop("numbers", True), settings.pop("whole", False)
         drawn = cast(Mapping[str, float | None], settings)
         if not texts:
             raise TextError("a story needs a sentence")
@@ -290,10 +340,7 @@ class CodesModel(GenerateModel):
             raise DecodingError(f"stand is one of {', '.join(get_args(Stand))}, not {stand!r}")
         if drawn.get("hypotheses") not in (None, 1):
             raise DecodingError(f"a story is one motion: hypotheses must be 1, not {drawn['hypotheses']}")
-        given: list[Any] = [seconds] * len(texts) if np.ndim(cast(Any, seconds)) == 0 else list(cast(Any, seconds))
-        if len(given) != len(texts):
-            raise DecodingError(f"seconds must be a number, or one for each of {len(texts)} sentences, not {seconds}")
-        lengths = [self._settled({"seconds": one})["seconds"] for one in given]
+        lengths = self._lengths(seconds, len(texts))
         parts = [[text] if whole else self.parts(text) for text in texts]
         each = [length / len(own) for own, length in zip(parts, lengths, strict=True) for _ in own]
         texts = [part for own in parts for part in own]
@@ -301,41 +348,22 @@ class CodesModel(GenerateModel):
             if stand in (end, "both"):
                 texts.insert(place, "a person stands still")
                 each.insert(place, 0.8)
-        contexts, noise, chosen = self.asked(texts, 1, seed, strict, drawn)
+        asked = [self.quantities(text) if numbers else Quantities(text) for text in texts]
+        contexts, noise, chosen = self.asked([one.text for one in asked], 1, seed, strict, drawn)
         figure = None if after is None else self.contract.on_figure(self.at_own_rate(after))
-        actions: list[tuple[str, tuple[str, ...]]] = []
-        asked = zip(texts, contexts, each, strict=True)
-        return texts, figure, actions, self._pieces(figure, asked, noise, chosen, actions)
+        told = [
+            Part(text, one, context, length or one.amounts.get("seconds", 0.0))
+            for text, one, context, length in zip(texts, asked, contexts, each, strict=True)
+        ]
+        teller = Teller(self.source, self.codec, self.contract, noise, chosen, self.continuation.context)
+        return told, figure, teller.pieces(told, None if figure is None else self.context(figure))
 
-    def _pieces(
-        self,
-        after: Motion | None,
-        asked: Iterable[tuple[str, Floats, float]],
-        noise: Sequence[Noise],
-        settings: Mapping[str, Any],
-        actions: list[tuple[str, tuple[str, ...]]],
-    ) -> Iterator[tuple[int, Array]]:
-        """For each step of codes, the number of its sentence and the frames (T, D) that become final with it; then the
-        remaining frames. asked: sentences with their contexts and seconds, 0 where one ends by itself. actions: what
-        :meth:`_shown` says of each sentence is added."""
-        context = None if after is None else self.context(after)
-        writer, decoder = Writer(self.source, noise, CodesSettings(**settings)), self.decoder(context)
-        if context is not None:
-            writer.see(context.codes)
-        done, given, end, limit = 0, 0, 0.0, None
-        for number, (text, told, length) in enumerate(asked):
-            action = drawn_actions(self.source, told[None], noise, settings["certainty"])
-            actions.append(self._shown(text, int(action[0])))
-            end += length
-            longest = self.codec.steps(end) - done if length else self.codec.steps(settings["max_seconds"])
-            limit = max(1, round(end * self.fps)) if length else None
-            for _, step in drawn_steps(writer, action, longest, exactly=length > 0):
-                done += 1
-                frames = decoder.push(step)[: None if limit is None else limit - given]
-                given += len(frames)
-                yield number, frames
-            end = end if length else done * self.codec.seconds
-        yield number, decoder.finish()[: None if limit is None else limit - given]
+    def _lengths(self, seconds: float | Sequence[float | None] | None, count: int) -> list[float]:
+        """The seconds of so many sentences, 0 where one ends by itself; DecodingError like :meth:`story`."""
+        given: list[Any] = [seconds] * count if np.ndim(cast(Any, seconds)) == 0 else list(cast(Any, seconds))
+        if len(given) != count:
+            raise DecodingError(f"seconds must be a number, or one for each of {count} sentences, not {seconds}")
+        return [self._settled({"seconds": one})["seconds"] for one in given]
 
     def decoder(self, context: Context | None = None) -> StreamingDecoder:
         """A decoder of codes to frames, from the origin or after the end of a motion."""

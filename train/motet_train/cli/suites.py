@@ -35,6 +35,7 @@ from motet_train.evaluate.predict import liveliness, mocap
 from motet_train.evaluate.steer.report import Recorded, steer_report, steer_text
 from motet_train.evaluate.tables import Goals, Report, json_ready, report_table
 from motet_train.evaluate.text_adherence.composed import composed_report
+from motet_train.evaluate.text_adherence.numbers import numbers_report
 from motet_train.evaluate.text_adherence.prompts import outside, prompts, read_trials, trained_on
 from motet_train.evaluate.text_adherence.table import best_of, said_to_be_outside, says_drawings, says_table, says_text
 from motet_train.papers.li2018.expmap import is_expmap
@@ -194,7 +195,7 @@ def _says(models: Mapping[str, GenerateModel], given: Given) -> Results:
         reports[name] = says_table(best_of(model), trials, training, search=given.search)
         asked = {"outside": outside(), "prompts": [prompt.text for prompt in prompts()]}
         if isinstance(model, CodesModel):
-            reports[name] |= composed_report(model, seeds=range(3))
+            reports[name] |= composed_report(model, seeds=range(3)) | numbers_report(model, seeds=range(3))
         reports[name]["said_outside"] = {key: said_to_be_outside(model, texts) for key, texts in asked.items()}
     drawings = {name: says_drawings(best_of(model)) for name, model in models.items()}
     return Results(json_ready(reports), says_text(reports), lambda: drawings)

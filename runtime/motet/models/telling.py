@@ -1,0 +1,132 @@
+"""How a story is drawn: parts one after another, in pieces as they come, or to a measure where a part has numbers."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from motet.bundle.graph import Floats
+from motet.decode.codec import Codec, Context, StreamingDecoder
+from motet.decode.codes import CodesSettings, Source, Writer, drawn_actions, drawn_steps
+from motet.decode.loop import Ids, Noise
+from motet.models.amounts import Seen, enough, fitted
+from motet.models.quantities import Kind, Quantities
+from motet.motion.rotations import Array
+from motet.representation.contract import MotionContract
+
+LONGEST = 300.0
+"""Seconds that a part with a number lasts at most."""
+
+SLOWEST: Mapping[Kind, float] = {"degrees": 20.0, "metres": 0.3, "steps": 0.5, "times": 0.1}
+"""How much is done in a second at least, but for ten seconds: who does less is not drawn on."""
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A part of a story: its sentence, what that asks for in numbers, its context (A,), and seconds, 0 where it ends by
+    itself."""
+
+    text: str
+    asked: Quantities
+    context: Floats
+    seconds: float
+
+    @property
+    def to_measure(self) -> bool:
+        """Whether it is drawn until it has as much as was asked; a length alone is kept by the decoder."""
+        return bool(self.asked.amounts.keys() - {"seconds"})
+
+
+class Piece(NamedTuple):
+    """Frames (T, D) that become final, the number of the part drawn with them, its action, and by how many frames that
+    part becomes longer. The first piece of a part comes before its frames."""
+
+    number: int
+    action: int
+    frames: Array
+    longer: int
+
+
+@dataclass(frozen=True, eq=False)
+class Teller:
+    """Draws the parts of a story. settings: of the loop. seconds: of a motion's end that the next part continues."""
+
+    source: Source
+    codec: Codec
+    contract: MotionContract
+    noise: Sequence[Noise]
+    settings: Mapping[str, Any]
+    seconds: float
+
+    def pieces(self, parts: Sequence[Part], context: Context | None) -> Iterator[Piece]:
+        """The pieces of all parts. context: the end of the motion that they continue."""
+        runs = [[*run] for alone, group in groupby(enumerate(parts), lambda one: one[1].to_measure)
+                for run in ([[one] for one in group] if alone else [group])]  # fmt: skip
+        for run in runs:
+            tail = [] if context is None else [context.frames]
+            for piece in (self._measured if run[0][1].to_measure else self._flowing)(run, context):
+                yield piece
+                tail = [np.concatenate([*tail, piece.frames])[-self._kept :]] if run is not runs[-1] else []
+            if tail:
+                frames = tail[0][len(tail[0]) % self.codec.field.hop :]
+                context = Context(frames, self.codec.codes_of(frames))
+
+    @property
+    def _kept(self) -> int:
+        return self.codec.steps(self.seconds) * self.codec.field.hop
+
+    def _writer(self, context: Context | None) -> Writer:
+        writer = Writer(self.source, self.noise, CodesSettings(**self.settings))
+        if context is not None:
+            writer.see(context.codes)
+        return writer
+
+    def _action(self, part: Part) -> Ids:
+        return drawn_actions(self.source, part.context[None], self.noise, self.settings["certainty"])
+
+    def _flowing(self, parts: Sequence[tuple[int, Part]], context: Context | None) -> Iterator[Piece]:
+        """Pieces of a step of codes of parts without numbers; then the remaining frames."""
+        writer, decoder, fps = self._writer(context), StreamingDecoder(self.codec, context), self.contract.fps
+        done, given, end, limit = 0, 0, 0.0, None
+        for number, part in parts:
+            action = self._action(part)
+            yield Piece(number, int(action[0]), np.empty((0, len(self.contract.channels))), 0)
+            end += part.seconds
+            longest = self.codec.steps(end) - done if part.seconds else self.codec.steps(self.settings["max_seconds"])
+            limit = max(1, round(end * fps)) if part.seconds else None
+            for _, step in drawn_steps(writer, action, longest, exactly=part.seconds > 0):
+                done += 1
+                frames = decoder.push(step)[: None if limit is None else limit - given]
+                given += len(frames)
+                yield Piece(number, int(action[0]), frames, self.codec.field.hop)
+            end = end if part.seconds else done * self.codec.seconds
+        rest = decoder.finish()[: None if limit is None else limit - given]
+        yield Piece(number, int(action[0]), rest, given + len(rest) - done * self.codec.field.hop)
+
+    def _measured(self, parts: Sequence[tuple[int, Part]], context: Context | None) -> Iterator[Piece]:
+        """The whole of a part: drawn again and again until it has as much as was asked, and fitted."""
+        ((number, part),) = parts
+        writer, action, codes = self._writer(context), self._action(part), np.empty((0, self.source.parts), np.int64)
+        rounds = 1 if part.asked.act else int(part.asked.amounts.get("times", 1))
+        slow = sum(abs(part.asked.amounts.get(kind, 0)) / least for kind, least in SLOWEST.items())
+        most, steps = (
+            self.codec.steps(min(LONGEST, 10 + slow)),
+            self.codec.steps(part.seconds or self.settings["max_seconds"]),
+        )
+        exactly, looked = part.seconds > 0 and "seconds" not in part.asked.amounts, 0
+        while True:
+            drawn = [step for _, step in drawn_steps(writer, action, steps, exactly)]
+            codes, rounds = np.concatenate([codes, *drawn]), rounds - 1
+            over = exactly or len(codes) >= most
+            if over or (rounds < 1 and len(codes) >= 1.2 * looked):  # a long one is not looked at after each draw
+                frames, looked = self._decoded(codes, context), len(codes)
+                if over or enough(Seen.of(self.contract, frames), part.asked):
+                    break
+        frames = fitted(self.contract, frames, part.asked)
+        yield Piece(number, int(action[0]), frames, len(frames))
+
+    def _decoded(self, codes: Ids, context: Context | None) -> Array:
+        decoder = StreamingDecoder(self.codec, context)
+        return np.concatenate([decoder.push(codes), decoder.finish()])

@@ -1,0 +1,136 @@
+"""Numbers in sentences become quantities, and motions have as much as was asked."""
+
+import numpy as np
+import pytest
+
+from motet.errors import TextError, TextWarning
+from motet.models.amounts import Seen, played, short, spells
+from motet.models.generate_codes import CodesModel, Story
+from motet.models.load import load_as
+from motet.models.quantities import quantities_of
+
+
+@pytest.fixture(scope="module")
+def model() -> CodesModel:
+    return load_as(CodesModel, "generate")
+
+
+@pytest.mark.parametrize(
+    ("sentence", "amounts"),
+    [
+        ("turn left 30 degrees", {"degrees": 30}),
+        ("turns clockwise by one hundred and twenty degrees", {"degrees": -120}),
+        ("he makes a quarter turn to the right", {"degrees": -90}),
+        ("walk in a circle", {"degrees": 360}),
+        ("spins around twice", {"degrees": 720}),
+        ("turn 720°", {"degrees": 720}),
+        ("walk 1.5 m", {"metres": 1.5}),
+        ("walk two and a half metres", {"metres": 2.5}),
+        ("go ten feet forward", {"metres": 3.048}),
+        ("walk half a metre", {"metres": 0.5}),
+        ("take a couple of steps back", {"steps": 2}),
+        ("a few paces", {"steps": 3}),
+        ("step to the left three times", {"steps": 3}),
+        ("jump three times", {"times": 3}),
+        ("two quick bows", {"times": 2, "pace": 1.3}),
+        ("does 4 cartwheels", {"times": 4}),
+        ("waits for a minute", {"seconds": 60}),
+        ("a five-second walk", {"seconds": 5}),
+        ("walks slowly for 3 s", {"seconds": 3, "pace": 0.75}),
+        ("turn left 90 degrees in 2 seconds", {"degrees": 90, "seconds": 2}),
+    ],
+)
+def test_numbers_are_quantities(sentence: str, amounts: dict[str, float]) -> None:
+    found = quantities_of(sentence)
+    if found.amounts.get("pace") and "pace" not in amounts:
+        pytest.fail(f"a pace in {sentence}")
+    assert found.amounts == pytest.approx(amounts)
+
+
+@pytest.mark.parametrize(
+    "sentence",
+    [
+        "a person walks forward",
+        "hops on one foot",
+        "stands with both feet on two lines",
+        "picks up two boxes",
+        "raises the arm 90 degrees",
+        "jumps 50 cm high",
+        "turns the head by 30 degrees",
+        "a man and two women dance",
+        "",
+        "läuft drei Meter",
+    ],
+)
+def test_what_is_no_quantity_of_the_whole_figure_stays_as_it_is(sentence: str) -> None:
+    found = quantities_of(sentence)
+    assert found.amounts == {}
+    assert found.text == sentence
+
+
+@pytest.mark.parametrize("sentence", ["-3 jumps", "10^9 steps", "0 steps", "walk -2 metres", "jump 1.5 times", "5 km"])
+def test_numbers_that_make_no_sense_are_refused(sentence: str, model: CodesModel) -> None:
+    with pytest.raises(TextError, match="cannot be shown"):
+        model.generate(sentence)
+
+
+def test_what_remains_is_what_is_done() -> None:
+    assert quantities_of("a person takes two steps back").text == "a person walks back"
+    assert quantities_of("she walks 3 metres").text == "she walks forward"
+    assert quantities_of("the man turns right 30 degrees").text == "the man walks and turns right"
+    assert quantities_of("five jumping jacks").text == "jumping jacks"
+
+
+@pytest.mark.parametrize(
+    "sentence", ["a person walks 4 metres forward", "walk and turn right 70 degrees", "walk three steps", "jump twice"]
+)
+def test_a_motion_has_as_much_as_was_asked(sentence: str, model: CodesModel) -> None:
+    (made,) = model.generate(sentence, seed=3)
+    ((kind, amount),) = made.asked.items()
+    assert not short(made.asked, made.measured, either=False)
+    seen = Seen.of(model.contract, made.features.values)  # with feet that are planted
+    assert seen.measured(kind, quantities_of(sentence).act) == pytest.approx(
+        amount, rel=0.1, abs=1 if kind == "steps" else 0
+    )
+
+
+def test_parts_of_a_story_keep_their_numbers(model: CodesModel) -> None:
+    (made,) = model.generate("walk 3 metres, then jump twice, then stand still for 2 seconds", seed=1)
+    assert isinstance(made, Story)
+    assert [dict(one.asked) for one in made.passages] == [{"metres": 3}, {"times": 2}, {"seconds": 2}]
+    assert made.asked == {}
+    assert made.passages[-1].stop == pytest.approx(len(made.frames) / model.fps)
+    assert made.passages[-1].measured["seconds"] == pytest.approx(2, abs=0.1)
+    leaps = np.abs(np.diff(made.frames[:, 4:], axis=0)).max(axis=1)
+    joined = round(made.passages[0].stop * model.fps)
+    assert leaps[joined - 2 : joined + 2].max() < 0.35  # of an axis' number in a frame
+    pieces = list(model.stream("walk 3 metres, then jump twice, then stand still for 2 seconds", seed=1))
+    assert sum(map(len, pieces)) == len(made.frames)
+
+
+def test_numbers_can_be_words(model: CodesModel) -> None:
+    (made,) = model.generate("a person walks 4 metres forward", numbers=False)
+    assert made.asked == {}
+    assert not isinstance(made, Story)
+
+
+def test_what_is_not_met_is_told(model: CodesModel) -> None:
+    with pytest.warns(TextWarning, match=r"asks for 150 metres; shown: \d"):
+        (made,) = model.generate("a person walks 150 metres", seconds=4)
+    assert len(made.frames) == 4 * model.fps
+    assert made.measured["metres"] < 20
+
+
+def test_seconds_alone_are_the_length(model: CodesModel) -> None:
+    (made,) = model.generate("a person walks for two and a half seconds")
+    assert len(made.frames) == 75
+    np.testing.assert_array_equal(made.frames, model.generate("a person walks forward", seconds=2.5)[0].frames)
+
+
+def test_frames_are_played_faster_over_the_same_way() -> None:
+    frames = np.random.default_rng(0).normal(size=(60, 7))
+    frames[:, :3] = 1.0
+    fast = played(frames, 1.5)
+    assert len(fast) == 40
+    assert fast[:, :3].sum() == pytest.approx(frames[:, :3].sum())
+    assert spells(np.array([True, False, True])) == [(0, 1), (2, 3)]

@@ -1,0 +1,38 @@
+"""The judge of sentences with numbers, on motions of which the numbers are known."""
+
+import numpy as np
+import pytest
+from says_figures import standing, walking
+
+from motet.motion.humanoid import HUMANOID
+from motet_train.evaluate.text_adherence import numbers
+from motet_train.evaluate.text_adherence.track import Track
+
+
+def test_degrees_metres_and_seconds_of_a_walk() -> None:
+    track = Track(walking(seconds=4))
+    metres = numbers.measured(track, "metres")
+    assert numbers.met(track, {"text": "", "metres": metres * 1.09})
+    assert not numbers.met(track, {"text": "", "metres": metres * 1.2})
+    assert numbers.met(track, {"text": "", "seconds": 4.1})
+    assert not numbers.met(track, {"text": "", "seconds": 4.2})
+    assert not numbers.met(track, {"text": "", "degrees": 30})
+
+
+def test_jumps_and_dips_are_counted() -> None:
+    time = np.arange(120) / 30
+    hops, dips = standing(4)[:120], standing(4)[:120]
+    hops[..., 1] += np.maximum(0, 0.2 * np.sin(2 * np.pi * time))[:, None]
+    dips[:, HUMANOID.index("hips"), 1] -= 0.3 * np.sin(np.pi * time / 2) ** 2
+    assert numbers.met(Track(hops), {"text": "", "times": 4, "act": "jumps"})
+    assert not numbers.met(Track(hops), {"text": "", "times": 3, "act": "jumps"})
+    assert numbers.ACTS["dips"](Track(dips)) == 2
+
+
+def test_the_table_has_eight_of_each_kind() -> None:
+    for kind in numbers.BARS:
+        rows = [row for row in numbers.table() if kind in row]
+        assert len(rows) == 8
+        assert {row.get("act") for row in rows} <= ({*numbers.ACTS} if kind == "times" else {None})
+    with pytest.raises(StopIteration):
+        numbers.met(Track(standing(1)), {"text": "nothing"})
