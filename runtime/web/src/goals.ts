@@ -1,90 +1,117 @@
 /* The rows that a gait may jump to, searched for the nearest one: an exact search that passes over boxes of rows. */
 
-/** Consecutive goals that share a box: they follow each other in a recording, so they are alike. */
-const BOX = 8;
+/** What is asked, and features of rows, are whole numbers of 1/256 of a scaled unit, so that costs are exact sums. */
+export const STEPS = 256;
+/** Consecutive goals that share a box, and a larger one: they follow each other in a recording, so they are alike. */
+const SIZES = [8, 32] as const;
 /** The two features of where a row leads at the last of the horizons. */
 const [LEFT, FORWARD] = [4, 5];
 
-/** What is asked is rounded, so that costs are exact sums: each runtime finds the same row. */
-export function rounded(value: number): number {
-  return Math.round(256 * value) / 256;
+/** Of each box of rows the least and the largest of each feature. */
+interface Boxes {
+  low: Int16Array;
+  high: Int16Array;
 }
 
-/** Features of rows, and for each box of them the least and the largest of each. */
+/** Features of rows, and boxes of them. Costs are in units of 1 / (2 STEPS^2). */
 export class Goals {
-  private readonly features: Float32Array;
-  private readonly low: Float32Array;
-  private readonly high: Float32Array;
+  private readonly features: Int16Array;
+  private readonly small: Boxes;
+  private readonly large: Boxes;
 
+  /** width: an even number of features. */
   constructor(
-    features: Float32Array,
+    features: Int16Array,
     private readonly width: number,
     readonly rows: number[],
     private readonly mean: Float32Array,
     private readonly scale: Float32Array,
     private readonly lag: number,
   ) {
-    this.features = new Float32Array(rows.length * width);
+    this.features = new Int16Array(rows.length * width);
     rows.forEach((row, at) => this.features.set(features.subarray(row * width, (row + 1) * width), at * width));
-    const boxes = Math.ceil(rows.length / BOX);
-    this.low = new Float32Array(boxes * width).fill(Infinity);
-    this.high = new Float32Array(boxes * width).fill(-Infinity);
+    [this.small, this.large] = [this.boxes(SIZES[0]), this.boxes(SIZES[1])];
+  }
+
+  private boxes(size: number): Boxes {
+    const count = Math.ceil(this.rows.length / size) * this.width;
+    const [low, high] = [new Int16Array(count).fill(32767), new Int16Array(count).fill(-32768)];
     this.features.forEach((value, at) => {
-      const place = Math.floor(at / width / BOX) * width + (at % width);
-      this.low[place] = Math.min(this.low[place]!, value);
-      this.high[place] = Math.max(this.high[place]!, value);
+      const place = Math.floor(at / this.width / size) * this.width + (at % this.width);
+      low[place] = Math.min(low[place]!, value);
+      high[place] = Math.max(high[place]!, value);
     });
+    return { low, high };
   }
 
   /** What the features at a place of an array cost: half the squared distance to those asked, and the lag. */
-  cost(asked: Float64Array, features: Float32Array, at: number): number {
+  cost(asked: Int16Array, features: Int16Array, at: number): number {
     const way = this.way(asked);
-    const lag = way[2] - way[0] * features[at + LEFT]! - way[1] * features[at + FORWARD]!;
-    let cost = lag > 0 ? lag : 0;
-    for (let i = 0; i < this.width; i++) cost += (features[at + i]! - asked[i]!) ** 2 / 2;
+    let cost = Math.max(0, way[2] - way[0] * features[at + LEFT]! - way[1] * features[at + FORWARD]!);
+    for (let i = 0; i < this.width; i++) cost += (features[at + i]! - asked[i]!) ** 2;
     return cost;
   }
 
   /** The row that costs the least, less than `bound`, as it is or as its mirror image; none if there is none. */
-  nearest(asked: Float64Array, image: Float64Array, bound: number): { row: number; mirror: boolean; cost: number } | null {
+  nearest(asked: Int16Array, image: Int16Array, bound: number): { row: number; mirror: boolean; cost: number } | null {
     const own = this.least(asked, bound);
     const other = this.least(image, own.cost);
     const at = other.at < 0 ? own.at : other.at;
     return at < 0 ? null : { row: this.rows[at]!, mirror: other.at >= 0, cost: other.cost };
   }
 
-  /** By how much it costs to lead less than half as far: of the scaled left and forward, and of being there. */
-  private way(asked: Float64Array): [left: number, forward: number, half: number] {
+  /** By how much it costs to lead less than half as far: of the steps left and forward, and of being there. */
+  private way(asked: Int16Array): [left: number, forward: number, half: number] {
     const { mean, scale, lag } = this;
-    const [left, forward] = [asked[LEFT]! / scale[LEFT]! + mean[LEFT]!, asked[FORWARD]! / scale[FORWARD]! + mean[FORWARD]!];
+    const left = asked[LEFT]! / STEPS / scale[LEFT]! + mean[LEFT]!;
+    const forward = asked[FORWARD]! / STEPS / scale[FORWARD]! + mean[FORWARD]!;
     const far = Math.hypot(left, forward);
     const [x, z] = [(lag * left) / Math.max(far, 1e-6), (lag * forward) / Math.max(far, 1e-6)];
     const half = (lag * far) / 2 - x * mean[LEFT]! - z * mean[FORWARD]!;
-    return [rounded(x / scale[LEFT]!), rounded(z / scale[FORWARD]!), rounded(half)];
+    return [2 * Math.round((STEPS * x) / scale[LEFT]!), 2 * Math.round((STEPS * z) / scale[FORWARD]!), 2 * STEPS * Math.round(STEPS * half)];
   }
 
-  private least(asked: Float64Array, bound: number): { at: number; cost: number } {
-    const { width, low, high, features, rows } = this;
+  private least(asked: Int16Array, bound: number): { at: number; cost: number } {
+    const { width, features, small, large, rows } = this;
     const [left, forward, half] = this.way(asked);
     let [best, cost] = [-1, bound];
-    for (let box = 0, from = 0; from < rows.length; box += width, from += BOX) {
-      const nearer = left * (left > 0 ? high : low)[box + LEFT]! + forward * (forward > 0 ? high : low)[box + FORWARD]!;
-      let least = Math.max(half - nearer, 0);
-      for (let i = 0; i < width && least < cost; i++) {
-        const off = Math.max(low[box + i]! - asked[i]!, asked[i]! - high[box + i]!, 0);
-        least += (off * off) / 2;
-      }
-      if (least * (1 - 1e-12) >= cost) continue; // a little is left for rounding
-      for (let at = from; at < Math.min(from + BOX, rows.length); at++) {
-        const lag = half - left * features[at * width + LEFT]! - forward * features[at * width + FORWARD]!;
-        let own = lag > 0 ? lag : 0;
-        for (let i = 0, place = at * width; i < width && own < cost; i++, place++) {
-          const off = features[place]! - asked[i]!;
-          own += (off * off) / 2;
+    for (let first = 0, outer = 0; first < rows.length; first += SIZES[1], outer += width) {
+      if (outside(asked, large, outer, width, left, forward, half, cost) >= cost) continue;
+      const last = Math.min(first + SIZES[1], rows.length);
+      for (let from = first, inner = (first / SIZES[0]) * width; from < last; from += SIZES[0], inner += width) {
+        if (outside(asked, small, inner, width, left, forward, half, cost) >= cost) continue;
+        const end = Math.min(from + SIZES[0], last);
+        for (let at = from, place = from * width; at < end; at++, place += width) {
+          const lag = half - left * features[place + LEFT]! - forward * features[place + FORWARD]!;
+          let own = lag > 0 ? lag : 0;
+          for (let i = 0; i < width && own < cost; i += 2) {
+            const off = features[place + i]! - asked[i]!;
+            const next = features[place + i + 1]! - asked[i + 1]!;
+            own += off * off + next * next;
+          }
+          if (own < cost) {
+            best = at;
+            cost = own;
+          }
         }
-        if (own < cost) [best, cost] = [at, own];
       }
     }
     return { at: best, cost };
   }
+}
+
+/** What the rows of a box cost at least, or a part of that which is as much as `cost`. */
+function outside(asked: Int16Array, { low, high }: Boxes, at: number, width: number, left: number, forward: number, half: number, cost: number): number {
+  const lag = half - left * (left > 0 ? high : low)[at + LEFT]! - forward * (forward > 0 ? high : low)[at + FORWARD]!;
+  let least = lag > 0 ? lag : 0;
+  for (let i = 0; i < width && least < cost; i += 2) {
+    const under = low[at + i]! - asked[i]!;
+    const over = asked[i]! - high[at + i]!;
+    const below = low[at + i + 1]! - asked[i + 1]!;
+    const above = asked[i + 1]! - high[at + i + 1]!;
+    const off = under > 0 ? under : over > 0 ? over : 0;
+    const next = below > 0 ? below : above > 0 ? above : 0;
+    least += off * off + next * next;
+  }
+  return least;
 }

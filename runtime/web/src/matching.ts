@@ -1,5 +1,5 @@
 /* Motion matching, which recorded frame a figure plays next: docs/bundle.md, the loop `matching`. Metres, seconds, radians. */
-import { Goals, rounded } from "./goals.js";
+import { Goals, STEPS } from "./goals.js";
 import type { Pose as Ground } from "./planar.js";
 import { clamp, damped, dampedPath, dampingOf, wrapped } from "./springs.js";
 import type { Steering } from "./steeringSettings.js";
@@ -44,7 +44,7 @@ export interface Playback {
 export const TRAJECTORY = 13;
 export const FEATURES = TRAJECTORY + 21;
 /** In which tables hold a scaled unit of a feature. */
-const STEPS = 16;
+const TABLE_STEPS = 16;
 /** Features that are asked are no larger, on either side of 0. */
 const LARGEST = 16;
 
@@ -63,10 +63,10 @@ export class Matcher {
   readonly reserve: number;
   /** Of each code of a mirror image its sign. */
   private readonly codeSigns: Float64Array;
-  private readonly features: Float32Array;
+  private readonly features: Int16Array;
   readonly goals: Goals[];
-  private readonly asked = new Float64Array(FEATURES);
-  private readonly image = new Float64Array(FEATURES);
+  private readonly asked = new Int16Array(FEATURES);
+  private readonly image = new Int16Array(FEATURES);
 
   constructor(
     readonly tables: Tables,
@@ -80,7 +80,7 @@ export class Matcher {
     this.dt = 1 / fps;
     this.reserve = Math.ceil((how.search_every + 1) * how.fastest) + 2;
     this.codeSigns = Float64Array.from({ length: this.codes }, (_, k) => (k < this.codes - odd ? 1 : -1));
-    this.features = Float32Array.from(tables.features, (step) => step / STEPS);
+    this.features = Int16Array.from(tables.features, (step) => (step * STEPS) / TABLE_STEPS);
     const lasts = (row: number) => tables.left[row]! >= Math.max(this.reserve, how.lasting) && !this.flies(row);
     const all = [...Array(this.rows).keys()].filter(lasts);
     this.goals = Array.from({ length: gaits }, (_, gait) => {
@@ -134,7 +134,7 @@ export class Matcher {
     if (!stays || ahead < -how.jump_back || ahead > how.jump_ahead) this.jump(figure, found.row, found.mirror);
   }
 
-  /** What is asked for, as features, and their mirror image: the row's own but for where it goes. */
+  /** What is asked for, as steps of features, and their mirror image: the row's own but for where it goes. */
   private ask(figure: Playback, row: number, target: Target): void {
     const { asked, image } = this;
     const { feature_mean: mean, feature_scale: scale } = this.tables;
@@ -143,9 +143,8 @@ export class Matcher {
       asked[i] = figure.mirror ? this.features[at + COLUMNS[i]!]! * SIGNS[i]! : this.features[at + i]!;
     }
     this.trajectory(figure, target).forEach((value, i) => {
-      asked[i] = Math.fround((value - mean[i]!) * scale[i]!);
+      asked[i] = Math.round(STEPS * clamp(Math.fround((value - mean[i]!) * scale[i]!), -LARGEST, LARGEST));
     });
-    for (let i = 0; i < FEATURES; i++) asked[i] = rounded(clamp(asked[i]!, -LARGEST, LARGEST));
     for (let i = 0; i < FEATURES; i++) image[i] = asked[COLUMNS[i]!]! * SIGNS[i]!;
   }
 
