@@ -1,12 +1,17 @@
 """How fast a model runs here: complete calls, as a user makes them."""
 
 import itertools
+import os
+import platform
+import re
 import tempfile
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import singledispatch
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +20,7 @@ import numpy as np
 from motet.bundle.graph import Arrays, Graph
 from motet.errors import TextWarning
 from motet.formats import read_motion, write_motion
+from motet.jobs import cores
 from motet.models.base import BundleModel
 from motet.models.describe import DescribeModel
 from motet.models.fill import FillModel
@@ -39,6 +45,9 @@ Call = Callable[[], object]
 Figure = tuple[float, str]
 Figures = dict[str, Figure]
 
+ROUNDS = 3
+"""How often all figures are measured, in turn with those of torch, so that what else runs disturbs both alike."""
+
 
 @dataclass(frozen=True)
 class Row:
@@ -51,14 +60,62 @@ class Row:
     ratio: float | None = None
 
 
-def rows(figures: Figures, baseline: Figures | None) -> list[Row]:
-    """Figures beside those of the baseline; a ratio above 1 favours the figure, for times and rates alike."""
+def compared(models: Sequence[BundleModel], seconds: float, file: Path | None = None) -> list[Row]:
+    """The figures of a model and of a baseline, if there is one, measured in turn: medians of :data:`ROUNDS`, and the
+    median of the rounds' ratios. A ratio above 1 favours the model, for times and rates alike."""
+    rounds = [[figures(model, seconds / ROUNDS, file) for model in models] for _ in range(ROUNDS)]
     result = []
-    for name, (value, unit) in figures.items():
-        other = baseline[name][0] if baseline else None
-        ratio = None if other is None or unit == "characters" else (other / value if unit in SCALE else value / other)
-        result.append(Row(name, value, unit, other, ratio))
+    for name, (_, unit) in rounds[0][0].items():
+        values = np.array([[one[name][0] for one in found] for found in rounds])
+        middle = np.median(values, axis=0).tolist()
+        if len(models) < 2:
+            result.append(Row(name, middle[0], unit))
+            continue
+        ratio = better(np.median(values[:, 0] / values[:, 1]), unit)
+        result.append(Row(name, middle[0], unit, middle[1], ratio))
     return result
+
+
+def better(quotient: float, unit: str) -> float | None:
+    """How much better a figure is than another one, of their quotient; None where more is neither better nor worse."""
+    return None if unit == "characters" else float(1 / quotient if unit in SCALE else quotient)
+
+
+@dataclass(frozen=True)
+class Machine:
+    """Where figures were measured, and its ceilings in the same run: float32 products in GFLOP/s and copies in GB/s, by
+    numpy. load: processes that wanted a core when it began, beside this one; None where the system does not tell."""
+
+    processor: str
+    cores: int
+    versions: dict[str, str]
+    load: float | None
+    gflops: float
+    gigabytes: float
+
+    @property
+    def busy(self) -> bool:
+        """Whether others work here, so that figures may be far too low."""
+        return self.load is not None and self.load > 0.3
+
+    @staticmethod
+    def here() -> "Machine":
+        """This one, measured for half a second."""
+        load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None
+        one, much = np.ones((768, 768), np.float32), np.ones(16_000_000, np.float32)
+        product, copy = durations(lambda: one @ one, 0.25).min(), durations(much.copy, 0.25).min()
+        versions = {name: version(name) for name in ("motet", "onnxruntime", "numpy")}
+        ceilings = 2 * 768**3 / product / 1e9, 2 * much.nbytes / copy / 1e9
+        return Machine(processor(), cores(), versions, load, *ceilings)
+
+
+def processor() -> str:
+    """The processor's name, as far as the system tells it."""
+    with suppress(OSError):
+        found = re.search(r"model name\s*:\s*(.+)", Path("/proc/cpuinfo").read_text(encoding="utf-8"))
+        if found:
+            return found[1]
+    return platform.processor() or platform.machine()
 
 
 def durations(call: Call, seconds: float, least: int = 3) -> np.ndarray[tuple[int], np.dtype[np.float64]]:

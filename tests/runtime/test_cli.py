@@ -115,17 +115,11 @@ def test_bundle_commands(tmp_path: Path) -> None:
     assert (tmp_path / "b.zip").read_bytes() == list_bundles()["cmu-control"].read_bytes()
 
 
-def test_bench_prints_rows() -> None:
-    rows = json.loads(run("bench", "--seconds", 0.01, "--json").stdout)
-    assert {"name", "value", "unit", "baseline", "ratio"} == set(rows[0])
-    assert all(row["value"] > 0 for row in rows)
-
-
 def test_bench_describes_a_file_and_says_where_it_ran(clips: Path) -> None:
     for threads, motion in ((1, []), (2, ["--motion", clips / WALK])):
         given = ("--bundle", "describe", "--seconds", 0.001, "--threads", threads, "--no-torch", *motion)
         lines = run("bench", *given).stdout.splitlines()
-        assert lines[0] == f"on CPUExecutionProvider, threads: {threads}"
+        assert lines[0] == f"describe on CPUExecutionProvider, threads: {threads}"
         assert any(line.startswith("describe.file") for line in lines)
         assert not any("torch" in line for line in lines)
 

@@ -62,7 +62,7 @@ def test_append_writes_the_motion_before_what_follows(tmp_path: Path, clips: Pat
 
 
 def test_bench_says_how_long_a_frame_takes() -> None:
-    rows = json.loads(run("bench", "--bundle", "predict", "--seconds", 0.01, "--json").stdout)
+    rows = json.loads(run("bench", "--bundle", "predict", "--seconds", 0.01, "--json").stdout)["bundles"]["predict"]
     names = ["predict.first_frame", "predict.frame", "predict.motion", "predict.horizons"]
     assert [row["name"] for row in rows] == names
     assert all(row["value"] > 0 for row in rows)
