@@ -207,6 +207,10 @@ def test_a_word_is_known_by_its_stem_or_with_a_letter_wrong(word: str, meant: st
     assert KNOWN.meant(word) == meant
 
 
+def test_without_common_words_nothing_counts_as_misspelt() -> None:
+    assert [Vocabulary((*SPECIALS, "touches")).meant(word) for word in ("torches", "touched")] == ["", "touches"]
+
+
 @pytest.mark.parametrize("common", [{"walks": "jumps"}, {"UNK": "jumps"}, {"strolls": "hops"}])
 def test_what_are_no_common_words(common: dict[str, str]) -> None:
     with pytest.raises(TextError):

@@ -181,7 +181,9 @@ class Vocabulary:
         (:func:`motet.models.spelling.corrected`); "" where there is none."""
         if word in self.ids or len(word) < 4:
             return word if word in self.ids else ""
-        return self._stems.get(stem(word)) or corrected(word, self.words[len(SPECIALS) :], self.common)
+        if (of_stem := self._stems.get(stem(word), "")) or not self.common:  # else "torches" were read as "touches"
+            return of_stem
+        return corrected(word, self.words[len(SPECIALS) :], self.common)
 
     def near(self, word: str) -> str:
         """The one of ``words`` that a word is (:meth:`meant`), or that is nearest to it; "" where there is none."""

@@ -49,7 +49,8 @@ export class Vocabulary {
   /** The known word that a word is, or the first of its stem, or of which it is a misspelling; "" where there is none. */
   meant(word: string): string {
     if (this.ids.has(word) || [...word].length < 4) return this.ids.has(word) ? word : "";
-    return this.stems.get(stem(word)) ?? corrected(word, this.words.slice(UNK! + 1), Object.keys(this.common));
+    const common = Object.keys(this.common); // without them "torches" were read as "touches"
+    return this.stems.get(stem(word)) ?? (common.length ? corrected(word, this.words.slice(UNK! + 1), common) : "");
   }
 
   /** The one of `words` that a word is, or that is nearest to it; "" where there is none. */
