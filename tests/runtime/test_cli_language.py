@@ -162,7 +162,7 @@ def test_each_text_is_tried_and_those_that_fail_are_named(tmp_path: Path) -> Non
     assert result.exit_code == 1
     assert [line.partition(";")[0] for line in result.stderr.splitlines()] == [
         "motet: the sentence '' has no words",
-        "motet: the model knows no word of 'zebra'",
+        "motet: the model, for English, knows no word of 'zebra'",
     ]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out-2.npz", "out-4.npz"]
     # the seed goes by the place among all texts
