@@ -207,12 +207,13 @@ def _(model: DescribeModel, seconds: float, file: Path | None = None) -> Figures
 
 
 def describe_figures(model: DescribeModel, seconds: float) -> Figures:
-    """Descriptions of :data:`WORDS` words a second, many at once and one alone; encoder and step of one alone. By beam
-    search; and one by consensus of 100 draws."""
+    """Descriptions of :data:`WORDS` words a second that the net writes, many at once and one alone; encoder and step of
+    one alone. By beam search; and one by consensus of 100 draws."""
     end, motion = model.vocabulary.ids[EOS], _noise(model.contract, model.fps)
     never = {"log_probabilities": lambda found: np.where(np.arange(found.shape[1]) == end, np.float32(-1e9), found)}
     manifest = replace(model.manifest, defaults={"beams": BEAMS, "max_words": WORDS}, loop="beam")
-    steady = DescribeModel(manifest, {**model.graphs, "step": _Steady(model.graphs["step"], never)})
+    graphs = {name: graph for name, graph in model.graphs.items() if name != "space"}  # it writes nothing
+    steady = DescribeModel(manifest, {**graphs, "step": _Steady(model.graphs["step"], never)})
     return {
         "describe.descriptions": rate(128, lambda: steady.describe([motion] * 128), seconds, "motions/s"),
         "describe.one": timed(lambda: steady.describe(motion), seconds),

@@ -192,8 +192,7 @@ class CodesModel(GenerateModel):
         return self._understood(sentence, self.embed(sentence))
 
     def _understood(self, sentence: str, context: Floats) -> Understood:
-        words = self.vocabulary.rules.words(sentence)
-        asked, unheard = {self.vocabulary.meant(word) or word for word in words}, math.log(1 + len(self._sentences))
+        asked, unheard = set(self.vocabulary.rules.words(sentence)), math.log(1 + len(self._sentences))
         heard = sum(self._rare.get(word, 0.0) for word in asked)
         share = heard / (sum(self._rare.get(word, unheard) for word in asked) or 1.0)
         order, how = np.argsort(-context, kind="stable"), self._familiar

@@ -132,9 +132,9 @@ class Known:
         """For each motion up to ``count`` sentences about different kinds of action, the likeliest first; one of
         :data:`NOTHING` where the motion is too short, or like none that is known."""
         how, found = self.settings, list[list[Answer]]()
-        counted, alike = self.near(np.stack([one.vector for one in seen]))
-        shares = self.shares(counted)
-        for one, row, share, similarity in zip(seen, counted, shares, alike, strict=True):
+        for one in seen:  # one by one, so that each gets the very bits that it gets alone
+            counted, (similarity,) = self.near(one.vector[None])
+            (row,), (share,) = counted, self.shares(counted)
             if one.seconds < how.shortest or similarity < how.outside:
                 found.append([Answer(NOTHING, 0.0)])
                 continue

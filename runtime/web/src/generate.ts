@@ -161,7 +161,7 @@ export class GenerateModel extends LanguageModel {
     for (const { words } of actions) for (const word of new Set(words)) said.set(word, (said.get(word) ?? 0) + 1);
     const rare = (word: string) => Math.log((1 + actions.length) / said.get(word)!);
     const unheard = Math.log(1 + actions.length);
-    const asked = [...new Set(this.vocabulary.split(text).map((word) => this.vocabulary.meant(word) || word))];
+    const asked = [...new Set(this.vocabulary.split(text))];
     const heard = asked.reduce((sum, word) => sum + (said.has(word) ? rare(word) : 0), 0);
     const all = asked.reduce((sum, word) => sum + (said.has(word) ? rare(word) : unheard), 0);
     const order = Array.from(context.keys()).sort((a, b) => context[b]! - context[a]! || a - b);
