@@ -80,6 +80,18 @@ def understood(model: CodesModel) -> list[dict[str, Any]]:
     ]
 
 
+def taken(model: CodesModel) -> dict[str, Any]:
+    """The actions that sentences, and their parts, are taken for, with the words that those lack; and the warnings."""
+    texts = ("a person walks forward", "he plays slowly while kicking a ball", "she jumps over a wall and then waves")
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", TextWarning)
+        found = {text: model.generate(text, 2, seed=1, seconds=1, numbers=False) for text in texts}
+    said = {str(one.message) for one in caught if str(one.message).startswith("nothing of")}
+    own = {text: [one for each in row for one in (each, *getattr(each, "passages", ()))] for text, row in found.items()}
+    rows = {text: [[one.action, one.lacking] for one in row] for text, row in own.items()}
+    return {"taken": rows, "lacking": sorted(said)}
+
+
 def known() -> dict[str, Any]:
     """A small vocabulary, and what words are taken for: themselves, their stem, a misspelling, and what is near."""
     words = (*SPECIALS, "walks", "walking", "jumps", "waves", "person", "backflips", "7")
@@ -193,6 +205,7 @@ def answers() -> dict[str, Any]:
         "story": told(generate),
         "after": continued(generate),
         "understood": understood(generate),
+        **taken(generate),
         "parts": parted(generate),
         "known": known(),
         **described(describe),

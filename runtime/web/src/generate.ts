@@ -36,8 +36,26 @@ export interface StorySettings extends Partial<Drawing> {
   after?: Frames;
 }
 
+/** What a text is shown as. */
+export interface Shown {
+  /** A sentence of the known action that is shown; "" where there are several. */
+  action: string;
+  /** Known words of the text that no sentence of that action has; the console is warned of them. */
+  lacking: string[];
+}
+
+/** A motion that was drawn: frames (T, D) of `root_sixd`, those that Python draws with the same seed, before feet are held. */
+export interface Generated extends Shown {
+  frames: Float32Array[];
+}
+
+/** A motion of several sentences. */
+export interface Story extends Generated {
+  passages: Passage[];
+}
+
 /** A sentence of a story, shown from `start` to `stop` in seconds. */
-export interface Passage {
+export interface Passage extends Shown {
   text: string;
   start: number;
   stop: number;
@@ -60,6 +78,15 @@ interface Told {
   noise: Noise;
 }
 
+/** Frames of a story that become final, with which sentence, and so many steps of it. */
+interface Piece {
+  sentence: number;
+  /** Of the first piece of a sentence. */
+  shown?: Shown;
+  frames: Float32Array[];
+  steps: number;
+}
+
 const STANDING = { text: "a person stands still", seconds: 0.8 };
 
 /** Motions for a sentence, drawn as codes. */
@@ -76,13 +103,13 @@ export class GenerateModel extends LanguageModel {
     this.verbs = verbsOf((manifest.actions ?? []).flatMap(({ words }) => words));
   }
 
-  /** Motions as frames (T, D) of `root_sixd`: those that Python draws with the same seed, before feet are held. */
-  async generate(text: string, settings: GenerateSettings = {}): Promise<Float32Array[][]> {
+  /** Motions for a text; of one that asks for several things in a row each is a `Story`. */
+  async generate(text: string, settings: GenerateSettings = {}): Promise<(Generated | Story)[]> {
     const seed = this.setting("seed", settings.seed ?? 0);
     const count = this.setting("hypotheses", settings.hypotheses ?? 1);
     if (!settings.whole && (await this.parts(text)).length > 1) {
-      const motions: Float32Array[][] = [];
-      for (const one of [seed, ...stateOf(seed, count - 1)]) motions.push((await this.story(text, { ...settings, seed: one })).frames);
+      const motions: Story[] = [];
+      for (const one of [seed, ...stateOf(seed, count - 1)]) motions.push(await this.story(text, { ...settings, seed: one }));
       return motions;
     }
     const noise = Array.from({ length: count }, (_, at) => (at ? new Pcg64(seed, at - 1) : new Pcg64(seed)));
@@ -100,48 +127,66 @@ export class GenerateModel extends LanguageModel {
     return found.length > 1 ? found : [text];
   }
 
-  /** Whether no sentence of the likeliest action has any form of a known word that is no function word. */
+  /** Whether the likeliest action lacks something of a sentence. */
   private async lacks(sentence: string): Promise<boolean> {
     const context = await this.context(sentence);
-    const have = new Set(this.manifest.actions![context.indexOf(Math.max(...context))]!.words.map(stem));
-    const words = this.vocabulary.split(sentence).map((word) => this.vocabulary.meant(word));
-    return words.some((word) => word && !FUNCTION_WORDS.has(word) && ![word, this.vocabulary.near(word)].some((one) => have.has(stem(one))));
+    return this.lacking(sentence, context.indexOf(Math.max(...context))).length > 0;
+  }
+
+  /** The known words of a sentence, but for function words, of which no sentence of an action has any form. */
+  private lacking(sentence: string, action: number): string[] {
+    const have = new Set(this.manifest.actions![action]!.words.map(stem));
+    const words = new Set(this.vocabulary.split(sentence).map((word) => this.vocabulary.meant(word)));
+    const lacks = (word: string) => word && !FUNCTION_WORDS.has(word) && ![word, this.vocabulary.near(word)].some((one) => have.has(stem(one)));
+    return [...words].filter(lacks).sort();
+  }
+
+  /** What a sentence is taken for. */
+  private shown(sentence: string, action: number): Shown {
+    const [taken, lacking] = [this.manifest.actions![action]!.sentence, this.lacking(sentence, action)];
+    const words = lacking.map((word) => `'${word}'`).join(", ");
+    if (lacking.length) console.warn(`nothing of ${words} in what '${sentence}' is taken for: '${taken}'`);
+    return { action: taken, lacking };
   }
 
   /** The same by noise that is given for each motion. */
-  async drawn(text: string, noise: Noise[], given: GenerateSettings): Promise<Float32Array[][]> {
+  async drawn(text: string, noise: Noise[], given: GenerateSettings): Promise<Generated[]> {
     const drawing = this.drawing(given);
     const seconds = given.seconds === undefined ? 0 : this.setting("seconds", given.seconds);
     const longest = Math.max(1, this.steps(seconds || this.setting("max_seconds", given.max_seconds)));
     const context = await this.context(text);
     const actions = noise.map((one) => drawnAction(this.source, context, one, drawing.certainty));
     const codes = await drawCodes(new Writer(this.source, noise, drawing), actions, longest, seconds > 0);
-    const motions: Float32Array[][] = [];
-    for (const one of codes) {
+    const shown = new Map([...new Set(actions)].map((action) => [action, this.shown(text, action)]));
+    const motions: Generated[] = [];
+    for (const [at, one] of codes.entries()) {
       const frames = await new StreamingDecoder(this.codec).push(one, true);
-      motions.push(seconds ? frames.slice(0, Math.max(1, Math.round(seconds * this.fps))) : frames);
+      const last = seconds ? Math.max(1, Math.round(seconds * this.fps)) : frames.length;
+      motions.push({ frames: frames.slice(0, last), ...shown.get(actions[at]!)! });
     }
     return motions;
   }
 
   /** One motion for several sentences, each from where the last one ends, and when each is shown. */
-  async story(sentences: string | string[], settings: StorySettings = {}): Promise<{ frames: Float32Array[]; passages: Passage[] }> {
+  async story(sentences: string | string[], settings: StorySettings = {}): Promise<Story> {
     const told = await this.parted(this.told(sentences, settings));
     const steps = told.texts.map(() => 0);
+    const shown: Shown[] = [];
     const frames: Float32Array[] = [];
     for await (const piece of this.pieces(told, settings.after)) {
       frames.push(...piece.frames);
-      if (!piece.last) steps[piece.sentence]!++;
+      if (piece.shown) shown.push(piece.shown);
+      steps[piece.sentence]! += piece.steps;
     }
-    let start = 0;
-    let shown = 0;
-    const passages = told.texts.map((text, at) => {
-      shown += steps[at]! * this.codec.hop;
-      const passage = { text, start, stop: Math.min(shown, frames.length) / this.fps };
+    let [start, over] = [0, 0];
+    const passages = told.texts.map((text, at): Passage => {
+      over += steps[at]! * this.codec.hop;
+      const passage = { text, start, stop: Math.min(over, frames.length) / this.fps, ...shown[at]! };
       start = passage.stop;
       return passage;
     });
-    return { frames, passages };
+    const action = passages.length > 1 ? "" : passages[0]!.action;
+    return { frames, action, lacking: passages.flatMap((one) => one.lacking), passages };
   }
 
   /** The frames of `story` in pieces, as they are drawn; what cannot be told is refused before the first one. */
@@ -215,8 +260,8 @@ export class GenerateModel extends LanguageModel {
     return { ...told, texts: parts.flat(), seconds: parts.flatMap((own, at) => own.map(() => told.seconds[at]! / own.length)) };
   }
 
-  /** For each step of codes the frames that become final with it, and its sentence; then the remaining frames. */
-  private async *pieces({ texts, seconds, longest, drawing, noise }: Told, after?: Frames) {
+  /** What each sentence is shown as, then for each step of codes the frames that become final with it; at last the remaining frames. */
+  private async *pieces({ texts, seconds, longest, drawing, noise }: Told, after?: Frames): AsyncGenerator<Piece, void> {
     const writer = new Writer(this.source, [noise], drawing);
     const before = after && (await this.continued(after));
     if (before) await writer.see(before.codes);
@@ -224,6 +269,7 @@ export class GenerateModel extends LanguageModel {
     let [done, given, end, limit] = [0, 0, 0, Infinity];
     for (const [sentence, text] of texts.entries()) {
       const action = drawnAction(this.source, await this.context(text), noise, drawing.certainty);
+      yield { sentence, shown: this.shown(text, action), frames: [], steps: 0 };
       const length = seconds[sentence]!;
       end += length;
       limit = length ? Math.max(1, Math.round(end * this.fps)) : Infinity;
@@ -231,11 +277,11 @@ export class GenerateModel extends LanguageModel {
         done++;
         const frames = (await decoder.push(codes)).slice(0, limit - given);
         given += frames.length;
-        yield { sentence, frames, last: false };
+        yield { sentence, frames, steps: 1 };
       }
       if (!length) end = (done * this.codec.hop) / this.fps;
     }
-    yield { sentence: texts.length - 1, frames: (await decoder.push([], true)).slice(0, limit - given), last: true };
+    yield { sentence: texts.length - 1, frames: (await decoder.push([], true)).slice(0, limit - given), steps: 0 };
   }
 
   /** The last seconds, whole steps of codes, of a motion. */

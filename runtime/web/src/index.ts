@@ -4,7 +4,9 @@ export { ControlModel, type StartSettings } from "./control.js";
 export { ControlSession, type ControlSnapshot, type SteeredPose, type Told } from "./controlSession.js";
 export { DescribeModel, type Description, type DescribeSettings } from "./describe.js";
 export { FillModel } from "./fill.js";
-export { GenerateModel, type GenerateSettings, type Passage, type StorySettings, type Understood } from "./generate.js";
+export {
+  type Generated, GenerateModel, type GenerateSettings, type Passage, type Shown, type Story, type StorySettings, type Understood,
+} from "./generate.js";
 export type { Frames } from "./model.js";
 export { type AnyModel, load } from "./models.js";
 export { PredictModel } from "./predict.js";

@@ -71,7 +71,7 @@ async function generate(read: Read): Promise<void> {
   const noise = new Recorded(rows(golden.get("run.in.uniform") as NumberArray<Float32Array>)[Symbol.iterator]());
   const [best] = await model.drawn(String(run.text), Array(Number(run.hypotheses)).fill(noise), { seconds: Number(run.seconds) });
   const { mean, std } = model.manifest.motion;
-  const normalised = best!.map((frame) => frame.map((value, at) => (std[at] ? Math.max(-50, Math.min(50, (value - mean[at]!) / std[at]!)) : 0)));
+  const normalised = best!.frames.map((frame) => frame.map((value, at) => (std[at] ? Math.max(-50, Math.min(50, (value - mean[at]!) / std[at]!)) : 0)));
   close(flat(normalised), wanted("frames").data, "frames");
 }
 
@@ -102,16 +102,34 @@ function shown(frames: ArrayLike<number>[], wanted: { count: number; every: numb
 async function seeds(read: Read): Promise<void> {
   const { model } = await loaded(read, "generate", GenerateModel);
   const [walk] = await model.generate("a person walks forward", { seed: 3, seconds: 2.5 });
-  shown(walk!, python.walk, "walk");
+  shown(walk!.frames, python.walk, "walk");
   const jumps = await model.generate("someone jumps twice", { seed: 11, hypotheses: 2 });
-  jumps.forEach((one, at) => shown(one, python.jumps[at]!, `jump ${at}`));
-  shown((await model.story("a person runs", { after: walk!, seed: 2, seconds: 1.5 })).frames, python.after, "after");
+  jumps.forEach((one, at) => shown(one.frames, python.jumps[at]!, `jump ${at}`));
+  shown((await model.story("a person runs", { after: walk!.frames, seed: 2, seconds: 1.5 })).frames, python.after, "after");
   for (const [text, parts] of Object.entries(python.parts)) equal(await model.parts(text), parts, text);
   for (const { text, confidence, ...rest } of python.understood) {
     const { confidence: found, ...other } = await model.understood(text);
     equal(other, { confident: rest.confident, nearest: rest.nearest }, text);
     close([found], [confidence], text);
   }
+}
+
+/** The actions that are shown, and what of a text they lack. */
+async function taken(read: Read): Promise<void> {
+  const { model } = await loaded(read, "generate", GenerateModel);
+  const { warn } = console;
+  const said: string[] = [];
+  console.warn = (text: string) => said.push(text);
+  try {
+    for (const [text, wanted] of Object.entries(python.taken)) {
+      const found = await model.generate(text, { hypotheses: 2, seed: 1, seconds: 1 });
+      const own = found.flatMap((one) => [one, ...("passages" in one ? one.passages : [])]);
+      equal(own.map(({ action, lacking }) => [action, lacking]), wanted, text);
+    }
+  } finally {
+    console.warn = warn;
+  }
+  equal([...new Set(said)].sort(), python.lacking, "warnings");
 }
 
 async function story(read: Read): Promise<void> {
@@ -198,6 +216,7 @@ export const cases: Case[] = [
   { name: "control runs along targets as Python does", run: steersTargets },
   { name: "control steers as Python does, with feet held and without", run: steers },
   { name: "a seed generates the motion that it does in Python", run: seeds },
+  { name: "motions say what is shown, and what that lacks, as in Python", run: taken },
   { name: "a story, and its stream, are those of Python", run: story },
   { name: "draws agree on what they do in Python", run: agreed },
   { name: "errors are expected as in Python", run: expected },
