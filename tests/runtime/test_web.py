@@ -6,11 +6,13 @@
 import json
 import warnings
 from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from web_cases import texts
 
 import motet
 from motet.bundle.bundle import Bundle
@@ -18,13 +20,16 @@ from motet.bundle.golden import read
 from motet.decode.codec import Context
 from motet.decode.loops import LOOPS
 from motet.decode.words import noise_of, score_words
-from motet.errors import ControlWarning, TextWarning
+from motet.errors import ControlWarning, TextWarning, TravelWarning
+from motet.formats import read_motion
 from motet.models.describe import DescribeModel
 from motet.models.generate_codes import CodesModel
 from motet.models.language import EOS, SOS, SPECIALS, Vocabulary
 from motet.models.predict import PredictModel
 from motet.models.search import SearchModel
 from motet.models.steer import SteerModel
+from motet.motion import in_place, is_in_place, with_travel
+from motet.motion.kinematics import local_translations
 from motet.motion.motion import Motion
 from motet.motion.rotations import quat_product
 
@@ -169,6 +174,26 @@ def parted(model: CodesModel) -> dict[str, list[str]]:
     return {text: model.parts(text) for text in texts}
 
 
+def travelled(model: DescribeModel) -> dict[str, Any]:
+    """Walks of :mod:`web_cases` at two frame rates, and the same in place: whether they are in place, the path of the
+    root that their feet imply, and the first channels of frames for a model."""
+    found = {}
+    for name, text in texts().items():
+        own = read_motion(BytesIO(text.encode()), format="bvh")
+        for fps in (own.fps, 60.0):
+            motion = own.continuous().resample(fps)
+            still = in_place(motion)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", TravelWarning)
+                frames = model.frames(still)
+            found[f"{name}, {fps:g}"] = {
+                "inPlace": [is_in_place(motion), is_in_place(still)],
+                "path": np.round(local_translations(with_travel(still))[::4, 0], 4).tolist(),
+                "root": np.round(frames[:, :6], 5).tolist(),
+            }
+    return found
+
+
 STEERED: list[dict[str, Any]] = [
     {"control": {"gait": "walk", "velocity": [[1.2, 0.4], [0.3, -1.1]]}},
     {"control": {"gait": ["run", "walk"], "speed": 2.5, "direction": [80.0, -40.0], "facing": [80.0, -20.0]}},
@@ -213,6 +238,7 @@ def answers() -> dict[str, Any]:
         "answered": answered(describe),
         "expected": expected(motet.load("predict")),
         "long": long(motet.load("search")),
+        "travel": travelled(describe),
         "steering": STEERED,
         "steered": steered(control, hold_feet=False),
         "held": steered(control, hold_feet=True),

@@ -17,15 +17,21 @@ import {
 } from "./rotations.js";
 import { toHumanoid } from "./retarget.js";
 import { Skeleton } from "./skeleton.js";
+import { travelling } from "./treadmill.js";
 
 const RADIANS = Math.PI / 180;
 const KINDS: Record<string, string> = { root_angles: "r", root_vectors: "e", root_sixd: "x" };
 
-/** The frames of `describe`, `search`, `predict` or `generate` of a motion of any human figure; those of `predict` end with it. */
+/**
+ * The frames of `describe`, `search`, `predict` or `generate` of a motion of any human figure; those of `predict` end
+ * with it. A clip in place gets the path that its feet imply, but for `generate`.
+ */
 export function framesFor(motion: Motion, manifest: Manifest): number[][] {
   const { representation, fps } = manifest.motion;
   const bones = bonesOf(manifest);
-  const given = manifest.loop === "free_run" ? resampled(checked(motion), fps, true) : checked(motion);
+  const prepared = manifest.verb !== "predict" && motion.fps === fps && isHumanoid(motion.skeleton);
+  const whole = manifest.verb === "generate" || prepared ? checked(motion) : travelling(checked(motion));
+  const given = manifest.loop === "free_run" ? resampled(whole, fps, true) : whole;
   const found = resampled(onFigure(given, fps), fps);
   const metres = found.skeleton.metresPerUnit!;
   const places = found.translations.map((moves) => times(moves[0]!, metres));

@@ -22,4 +22,5 @@ export { atRest, type Motion, resampled, type World, worldOf } from "./motion.js
 export { type Figure, figureOf, fromHumanoid, type Humanoid, type Like, type NamedJoints, toHumanoid } from "./retarget.js";
 export { type Joint, Skeleton } from "./skeleton.js";
 export { type Avatar, type Clip, toThree, type Track } from "./three.js";
+export { isInPlace, withTravel } from "./treadmill.js";
 export { clipsOf, readGLB } from "./gltfMotion.js";

@@ -31,6 +31,8 @@ export interface Humanoid {
   /** Sentences about what was assumed. */
   notes: string[];
   figure: Figure;
+  /** The rotation that turned the file's world upright. */
+  turn: Quaternion;
 }
 
 /** Retarget a motion of a human figure to the humanoid. MotionError, with the reason, for what is no human's. */
@@ -50,6 +52,7 @@ export function toHumanoid(motion: Motion, joints?: NamedJoints): Humanoid {
     unit: unit.metres,
     notes: [...fitted.notes, unit.note, note, folded].filter((text) => text !== undefined),
     figure: { fitted, first: cut(motion, 0, 1) },
+    turn,
   };
 }
 
