@@ -182,7 +182,7 @@ class DescribeModel(LanguageModel):
         least, found = self.known.settings.sure, list[list[Description]]()
         for start in range(0, len(motions), AT_ONCE):
             frames = [self.frames(motion) for motion in motions[start : start + AT_ONCE]]
-            vectors = self.contexts(frames, "space")
+            vectors = [self.contexts([one], "space")[0] for one in frames]  # one by one: padding changes how sums round
             lengths = [len(one) / self.fps for one in frames]
             turns = [turn_of(one, self.contract) for one in frames]
             for row in self.known.answers(list(map(Seen, vectors, lengths, turns)), count):
