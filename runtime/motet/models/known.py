@@ -109,6 +109,13 @@ class Known:
         right: Array = (shows & ~wrong).astype(np.float64)
         return right
 
+    @cached_property
+    def _told(self) -> Array:
+        """Which sets of kinds sentences about which actions name (A, Q)."""
+        told = np.zeros(self._right.shape)
+        told[self.said, self._kinds[1]] = 1
+        return told
+
     def near(self, vectors: Floats) -> tuple[Array, Array]:
         """How much each action counts (N, A), 1 in all, by the motions near vectors (N, E); and the greatest
         similarity (N,)."""
@@ -124,9 +131,7 @@ class Known:
     def shares(self, counted: Array) -> Array:
         """Of each set of kinds (N, Q) the share of near motions that it is right about; 0 where none of them is said to
         show it."""
-        asked = np.zeros((len(self.shown), self._right.shape[1]))
-        asked[self.said, self._kinds[1]] = 1
-        return np.where(counted @ asked > 0, counted @ self._right, 0.0)
+        return np.where(counted @ self._told > 0, counted @ self._right, 0.0)
 
     def answers(self, seen: Sequence[Seen], count: int = 1) -> list[list[Answer]]:
         """For each motion up to ``count`` sentences about different kinds of action, the likeliest first; one of
