@@ -5,13 +5,15 @@ from typing import Any
 
 import click
 
+from motet.corpus.parts import Shard
 from motet.representation.contract import named
 from motet_train import distributed
 from motet_train.cli.train_options import unit_in, with_options
 from motet_train.data.corpus import Corpus, Record, read_corpus
 from motet_train.data.errors import DataError
+from motet_train.data.merging import merge_stores
 from motet_train.data.preparation import ALL, FIGURES, Preparation, preparation
-from motet_train.data.store import INDEX, Store, prepare_parts
+from motet_train.data.store import INDEX, Store, is_store, prepare_parts
 from motet_train.data.table import read_gaits, read_people
 from motet_train.plan import kind_for, store_for
 from motet_train.progress import preparing
@@ -58,8 +60,17 @@ def corpus_of(
     help="Models to train on it: describe, search; codes, fill, matching; predict; or all.",
 )
 @click.option("--fps", type=click.FloatRange(1, 240), help="Frames per second. [default: 10; for codes, predict 30]")
+@click.option("--shard", metavar="I/N", help="A store of one of N parts of the corpus, such as 3/16.")
 @corpus_options
-def prepare(data: tuple[Path, ...], out: Path, verb: str, fps: float | None, figure: str | None, **source: Any) -> None:
+def prepare(
+    data: tuple[Path, ...],
+    out: Path,
+    verb: str,
+    fps: float | None,
+    figure: str | None,
+    shard: str | None = None,
+    **source: Any,
+) -> None:
     """Prepare the corpus DATA once: folders or zips of motions with sentences become a store to train on.
 
     DATA is the KIT Motion-Language data, or motion files .amc (with .asf) .bvh .npz .glb .vrma with a
@@ -67,21 +78,34 @@ def prepare(data: tuple[Path, ...], out: Path, verb: str, fps: float | None, fig
     is named FILE#CLIP there. Of two files of one name, the one in the later DATA is used. Every human figure is
     retargeted to the humanoid. Unusable motions are named and skipped; those over 30 s are cut into pieces that share
     their sentences.
+
+    Where DATA are the stores of all shards of a corpus, they are merged.
     """
+    if all(map(is_store, data)):
+        merge_stores(data, out)
+        _say(out)
+        return
     corpus = corpus_of(data, **source, described=verb != "predict")
     if verb == "all" and (figure or fps):
         raise click.UsageError("--figure and --fps apply to a store of one kind: add --for")
     parts = ALL if verb == "all" else {".": preparation(verb, corpus.kit, figure, fps)}
     for one in parts.values():
         _check_unit(corpus, one)
+    part = None if shard is None else Shard.parse(shard)
+    corpus = corpus if part is None else corpus.shard(part)
     with preparing(len(corpus)) as done:
-        prepare_parts(corpus, out, parts, done)
-    for name in parts:
-        store = Store.open(out / name)
+        prepare_parts(corpus, out, parts, done, part)
+    _say(out)
+
+
+def _say(out: Path) -> None:
+    """What a store has, of each representation."""
+    for index in sorted(out.rglob(INDEX)):
+        store = Store.open(index.parent)
         seconds = sum(stop - start for entry in store.records for start, stop in entry.spans[:1]) / store.fps
         texts = sum(len(entry.sentences) for entry in store.records)
         click.echo(
-            f"{out / name}: {len(store.records)} motions of {seconds:.0f} s with {texts} sentences, "
+            f"{index.parent}: {len(store.records)} motions of {seconds:.0f} s with {texts} sentences, "
             f"{len(store.channels)} channels at {store.fps:g} fps; {len(store.skipped)} skipped"
         )
         if len(store.skipped) > len(store.records):

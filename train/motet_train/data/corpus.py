@@ -6,6 +6,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
+from motet.corpus.parts import Shard
 from motet.formats import CLIPPED, MOCAP, clips, mmm, read_motion
 from motet.formats.text import MARK
 from motet.motion.motion import Motion
@@ -15,6 +16,9 @@ from motet_train.data.table import Described, Gait, Person, person, read_table
 
 KIT_MOTION, KIT_SENTENCES = "_mmm.xml", "_annotations.json"
 """Ends of the names of KIT's files."""
+
+NO_MOTION = "no motion file of this name"
+"""Why a clip of the table is skipped that none of the files is."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,13 +69,20 @@ class Corpus:
         """The number of motion files: each gives one Record or Skipped, or one for each of its clips."""
         return len(self.names)
 
+    def shard(self, shard: Shard) -> "Corpus":
+        """A part of it: files in a row, as many as of every other shard but for one; DataError if that is none."""
+        start, stop = (len(self) * number // shard.count for number in (shard.number - 1, shard.number))
+        if start == stop:
+            raise DataError(f"{len(self)} motion files are too few for {shard.count} shards")
+        return replace(self, names=self.names[start:stop])
+
     def __iter__(self) -> Iterator[Record | Skipped]:
         with Archive(*self.paths) as archive:
             if self.kit:
-                found = kit_recordings(archive)
+                found = kit_recordings(archive, self.names)
             else:
                 said = None if self.table is None else read_table(self.table)
-                found = recordings(archive, self.unit, said, self.people)
+                found = recordings(archive, self.unit, said, self.people, self.names)
             for item in found:
                 if isinstance(item, Record):
                     action = item.action or item.take or item.name
@@ -128,19 +139,20 @@ def recordings(
     unit: str | float | None = None,
     table: Mapping[str, Described] | None = None,
     people: tuple[Person, ...] = (),
+    files: Sequence[str] | None = None,
 ) -> Iterator[Record | Skipped]:
     """The motion of each file of an archive, one of each clip's name; Skipped where it cannot be read or used.
 
     A file of several motions gives each by the file's name and its own: "people#Walk".
     unit: the length unit of files that do not state theirs, as in :func:`motet.read`. table: what is said of each clip,
     without which a motion is skipped, as is a clip without a motion; by default all motions are given, without
-    sentences. A clip's subject is what the table says, or else what ``people`` say.
+    sentences. A clip's subject is what the table says, or else what ``people`` say. files: which, by default all.
     """
     for name in archive.names:
         if name.lower().endswith(".asf"):
             archive.place(name)  # the reader of an AMC file looks for its skeleton near it
     seen: set[str] = set()
-    for file, own in _motions(archive):
+    for file, own in _motions(archive, motion_files(archive) if files is None else files):
         path, behind = PurePosixPath(file), "" if own is None else f"{MARK}{own}"
         whole = path.with_suffix("").as_posix() + behind
         clip = whole if whole in (table or {}) else path.stem + behind
@@ -159,12 +171,12 @@ def recordings(
                 found = Skipped(clip, archive.reason(error))
         yield found
         seen.add(clip)
-    yield from (Skipped(clip, "no motion file of this name") for clip in table or () if clip not in seen)
+    yield from (Skipped(clip, NO_MOTION) for clip in table or () if clip not in seen)
 
 
-def _motions(archive: Archive) -> Iterator[tuple[str, str | None]]:
-    """The motion files of an archive; one of several motions with the name of each."""
-    for file in motion_files(archive):
+def _motions(archive: Archive, files: Sequence[str]) -> Iterator[tuple[str, str | None]]:
+    """Motion files of an archive; one of several motions with the name of each."""
+    for file in files:
         names: tuple[str, ...] = ()
         if PurePosixPath(file).suffix.lower() in CLIPPED:
             with suppress(*BROKEN), archive.opened(file) as place:  # reading it will say what is wrong
@@ -172,10 +184,11 @@ def _motions(archive: Archive) -> Iterator[tuple[str, str | None]]:
         yield from ((file, name) for name in (names if len(names) > 1 else (None,)))
 
 
-def kit_recordings(archive: Archive) -> Iterator[Record | Skipped]:
-    """NNNNN_mmm.xml with the sentences of NNNNN_annotations.json; Skipped where there are none or a file is damaged."""
+def kit_recordings(archive: Archive, files: Sequence[str]) -> Iterator[Record | Skipped]:
+    """NNNNN_mmm.xml with the sentences of NNNNN_annotations.json; Skipped where there are none or a file is damaged.
+    files: the NNNNN_mmm.xml."""
     names = frozenset(archive.names)
-    for stem in (name.removesuffix(KIT_MOTION) for name in archive.names if name.endswith(KIT_MOTION)):
+    for stem in (name.removesuffix(KIT_MOTION) for name in files):
         found: Record | Skipped = Skipped(stem, "no sentence")
         try:
             if sentences := _kit_sentences(archive, stem + KIT_SENTENCES) if stem + KIT_SENTENCES in names else ():

@@ -16,6 +16,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from motet.corpus.parts import Shard
 from motet.errors import MotetError, MotionError
 from motet.files import new_folder
 from motet.motion.motion import Motion
@@ -153,11 +154,13 @@ def prepare_parts(
     path: Path,
     parts: Mapping[str, Preparation],
     progress: Callable[[Item], object] = lambda item: None,
+    shard: Shard | None = None,
 ) -> None:
     """Write stores of a corpus into the new folder ``path``, whole or not at all, one motion in memory at a time.
 
     parts: the preparation of each, by its folder inside. progress: called with each item when it is done; what some
-    part could not use comes as Skipped.
+    part could not use comes as Skipped. shard: which of the corpus the items are; the index says so for
+    :func:`motet_train.data.merging.merge_stores`.
 
     The first usable motion sets channels and the joints' axes; others are converted to these, and one that lacks
     channels, or whose bones point elsewhere at rest, is skipped, as is any that the representation refuses.
@@ -167,24 +170,69 @@ def prepare_parts(
         writers = []
         for name, preparation in parts.items():
             (folder / name).mkdir(exist_ok=True)
-            writers.append(_Writer(files.enter_context((folder / name / FRAMES).open("wb")), preparation))
+            writers.append(_Preparing(files.enter_context((folder / name / FRAMES).open("wb")), preparation))
         for item in items:
             added = [writer.add(item) for writer in writers]
             progress(next((one for one in added if isinstance(one, Skipped)), item))
         for name, writer in zip(parts, writers, strict=True):
-            (folder / name / INDEX).write_text(json.dumps(writer.finish()), encoding="utf-8")
+            index = writer.finish() | ({} if shard is None else {"shard": str(shard)})
+            (folder / name / INDEX).write_text(json.dumps(index), encoding="utf-8")
 
 
-class _Writer:
-    """Puts one item after the other into ``frames.npy``."""
+class StoreWriter:
+    """Writes ``frames.npy``, one sequence after the other, and gathers what ``store.json`` says."""
 
-    def __init__(self, file: BinaryIO, preparation: Preparation) -> None:
-        self.file, self.preparation = file, preparation
+    def __init__(self, file: BinaryIO, representation: str) -> None:
+        self.file, self.representation = file, representation
         self.first: Motion | None = None
         self.skeletons: dict[Skeleton, int] = {}
         self.entries: list[Entry] = []
         self.skipped: list[Skipped] = []
         self.frames = 0
+
+    def put(self, features: Motion) -> tuple[int, int]:
+        """Write a sequence; its span of frames."""
+        if self.first is None:
+            self.first = features
+            self._header()
+        self.file.write(features.values.astype("<f4").tobytes())
+        self.frames += len(features)
+        return self.frames - len(features), self.frames
+
+    def skeleton(self, skeleton: Skeleton) -> int:
+        """The number of a figure."""
+        return self.skeletons.setdefault(skeleton, len(self.skeletons))
+
+    def _header(self) -> None:
+        """Write the header of an NPY file, whose length does not depend on the number of frames."""
+        assert self.first is not None
+        header = {"descr": "<f4", "fortran_order": False, "shape": (self.frames, len(self.first.channels))}
+        np.lib.format.write_array_header_1_0(self.file, header)
+
+    def finish(self) -> dict[str, Any]:
+        """Write the header, now that the number of frames is known; the content of ``store.json``."""
+        if self.first is None:
+            reasons = "; ".join(f"{item.name}: {item.reason}" for item in self.skipped[:3])
+            raise DataError(f"no motion can be used, {len(self.skipped)} were skipped: {reasons}")
+        self.file.seek(0)
+        self._header()
+        return {
+            "representation": self.representation,
+            "channels": self.first.channels,
+            "units": self.first.units,
+            "fps": self.first.fps,
+            "skeletons": [skeleton.to_json() for skeleton in self.skeletons],
+            "records": [asdict(entry) for entry in self.entries],
+            "skipped": [asdict(item) for item in self.skipped],
+        }
+
+
+class _Preparing(StoreWriter):
+    """Prepares one item after the other."""
+
+    def __init__(self, file: BinaryIO, preparation: Preparation) -> None:
+        super().__init__(file, preparation.representation)
+        self.preparation = preparation
 
     def add(self, item: Item) -> Item:
         try:
@@ -201,46 +249,22 @@ class _Writer:
         pieces = how.pieces(record.motion)
         found = [list(sequences(how.representation, piece, how.fps, self.first)) for piece in pieces]
         for number, phases in enumerate(found, start=1):
-            spans = []
-            for features in phases:
-                if self.first is None:
-                    self.first = features
-                    self._header()
-                self.file.write(features.values.astype("<f4").tobytes())
-                spans.append((self.frames, self.frames + len(features)))
-                self.frames += len(features)
-            own, skeleton = None, features.skeleton
+            spans = tuple(map(self.put, phases))
+            own, skeleton = None, phases[-1].skeleton
             if skeleton is not None:
-                skeleton = skeleton if skeleton.metres_per_unit is None else skeleton.scaled(1.0)
-                own = self.skeletons.setdefault(skeleton, len(self.skeletons))
+                own = self.skeleton(skeleton if skeleton.metres_per_unit is None else skeleton.scaled(1.0))
             name = record.name if len(found) == 1 else f"{record.name}.{number}"
             place = record.take or record.name, number == len(found), number == 1
-            said = record.sentences, tuple(spans), own, record.unseen, *place, record.action, record.gaits
+            said = record.sentences, spans, own, record.unseen, *place, record.action, record.gaits
             self.entries.append(Entry(name, record.subject, *said))
 
-    def _header(self) -> None:
-        """Write the header of an NPY file, whose length does not depend on the number of frames."""
-        assert self.first is not None
-        header = {"descr": "<f4", "fortran_order": False, "shape": (self.frames, len(self.first.channels))}
-        np.lib.format.write_array_header_1_0(self.file, header)
-
     def finish(self) -> dict[str, Any]:
-        """Write the header, now that the number of frames is known; the content of ``store.json``."""
-        if self.first is None:
-            reasons = "; ".join(f"{item.name}: {item.reason}" for item in self.skipped[:3])
-            other = "; figures that are not human need --figure own" if self.preparation.humanoid else ""
-            raise DataError(f"no motion can be used, {len(self.skipped)} were skipped: {reasons}{other}")
-        self.file.seek(0)
-        self._header()
-        return {
-            "representation": self.preparation.representation,
-            "channels": self.first.channels,
-            "units": self.first.units,
-            "fps": self.first.fps,
-            "skeletons": [skeleton.to_json() for skeleton in self.skeletons],
-            "records": [asdict(entry) for entry in self.entries],
-            "skipped": [asdict(item) for item in self.skipped],
-        }
+        """As of any writer, with a hint where no figure is human."""
+        try:
+            return super().finish()
+        except DataError as error:
+            hint = "; figures that are not human need --figure own" if self.preparation.humanoid else ""
+            raise DataError(f"{error}{hint}") from error
 
 
 SPLITS = ("trial", "subject", "none")
