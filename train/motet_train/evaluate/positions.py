@@ -65,11 +65,20 @@ def stances(points: Array, root: Array, fps: float) -> list[Array]:
     return [points[start:stop, k] for k, start, stop in runs if stop - start >= 0.1 * fps]
 
 
+def slides(stances: Iterable[Array]) -> Array:
+    """How far points slide in stances, metres: of each stance (N, 3) the largest distance over the ground between two
+    of a point's places."""
+    return np.array([length(place[:, None, [0, 2]] - place[:, [0, 2]]).max() for place in stances])
+
+
 def slide(stances: Iterable[Array]) -> float:
-    """How far points slide in a stance, metres: the mean over stances (N, 3) of the largest distance over the ground
-    between two of a point's places. NaN without a stance."""
-    across = [place[:, None, [0, 2]] - place[:, [0, 2]] for place in stances]
-    return float(np.mean([length(apart).max() for apart in across])) if across else np.nan
+    """The mean of :func:`slides`; NaN without a stance."""
+    return mean_and_tail(slides(stances))[0]
+
+
+def mean_and_tail(values: Array) -> tuple[float, float]:
+    """The mean and the 95th percentile of values (N,); NaN without one."""
+    return (float(values.mean()), float(np.percentile(values, 95))) if len(values) else (np.nan, np.nan)
 
 
 def speed(points: Array, root: Array, fps: float) -> float:

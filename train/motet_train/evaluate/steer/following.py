@@ -27,8 +27,10 @@ from motet_train.evaluate.positions import (
     acceleration,
     arrival,
     length,
+    mean_and_tail,
     running_mean,
     slide,
+    slides,
     speed,
     spells,
     stances,
@@ -46,6 +48,11 @@ MEASURED_SPEEDS = {"walk": 1.4, "run": 3.0}
 PACES = (0.0, 0.6, 1.0, 1.4, 1.8, 2.0, 2.5, 3.0, 3.5, 4.0)
 """Speeds in m/s between which is changed."""
 
+WAYS = np.arange(-165.0, 195.0, 15.0)
+"""24 directions of travel, in degrees from the facing."""
+
+WAYS_PACES = {"walk": (0.8, 1.28), "run": (2.0, 3.0)}
+"""m/s at which a gait goes there."""
 
 Asked = dict[str, Any]
 """What N figures are told: all that :meth:`SteerSession.control` takes of them."""
@@ -128,7 +135,7 @@ def stretches(track: Track, pace: float) -> list[Track]:
 def standing(tracks: Sequence[Track]) -> dict[str, float]:
     """By the measures of :mod:`motet_train.evaluate.positions`: how far the balls of the feet and the points of the
     soles slide in a stance, cm; how fast the balls are while they stand, m/s; and the acceleration of all joints,
-    m/s^2. Means over stances or frames."""
+    m/s^2. Means over stances or frames, and of the balls' slide the 95th percentile."""
     stood, soles_stood, speeds, calm, frames = list[Array](), list[Array](), list[float](), list[float](), list[int]()
     for track in tracks:
         for figure in range(track.height.shape[1]):
@@ -139,12 +146,20 @@ def standing(tracks: Sequence[Track]) -> dict[str, float]:
             speeds.append(speed(places[:, BALLS], root, track.fps))
             calm.append(acceleration(places, root, track.fps))
             frames.append(len(places))
+    mean, tail = mean_and_tail(100 * slides(stood))
     return {
-        "slide_cm": 100 * slide(stood),
+        "slide_cm": mean,
+        "slide_p95_cm": tail,
         "sole_slide_cm": 100 * slide(soles_stood),
         "toe_speed": _mean(speeds, frames),
         "acceleration": _mean(calm, frames),
     }
+
+
+def slide_of(tracks: Sequence[Track]) -> dict[str, float]:
+    """The part of :func:`standing` about how far the balls of the feet slide."""
+    found = standing(tracks)
+    return {name: found[name] for name in ("slide_cm", "slide_p95_cm")}
 
 
 def _mean(values: Sequence[float], weights: Sequence[int]) -> float:
@@ -248,8 +263,8 @@ def turn_errors(model: SteerModel, gait: str, pace: float) -> dict[str, float]:
     """Turns by 45 to 180 degrees to both sides at a speed, and the facing with it.
 
     s: mean seconds until the direction of travel is there (:meth:`Ground.seconds`) in 4 s; worst_s. direction, facing:
-    mean degrees off, from 2 to 3 s after the change. slide_cm: as :func:`standing` has it, in all turns and the seconds
-    after them.
+    mean degrees off, from 2 to 3 s after the change. slide_cm, slide_p95_cm: as :func:`standing` has them, in all turns
+    and the seconds after them.
     """
     turns, calm = (45, 90, 135, 180), 0.5
     angles = np.array([side * turn for turn in turns for side in (1, -1)], dtype=np.float64)
@@ -258,7 +273,7 @@ def turn_errors(model: SteerModel, gait: str, pace: float) -> dict[str, float]:
     ground, asked = Ground.of(tracks), np.tile(angles, PHASES)
     seconds = ground.seconds(asked, calm)
     way, facing = ground.way_off(asked, 2.0, 3.0), ground.facing_off(asked, 2.0, 3.0)
-    found = {"slide_cm": standing(tracks)["slide_cm"]}
+    found = slide_of(tracks)
     for turn in turns:
         own: NDArray[np.bool_] = np.abs(asked) == turn
         found |= {f"s_{turn}": seconds[own].mean(), f"worst_s_{turn}": seconds[own].max()}
@@ -282,6 +297,27 @@ def aside_errors(model: SteerModel) -> dict[str, float]:
     return _floats(
         {f"{name}_{key}": of[asked == angle].mean() for name, angle in ways.items() for key, of in off.items()}
     )
+
+
+def ways_errors(model: SteerModel, gait: str) -> dict[str, float]:
+    """Going in each of :data:`WAYS` with the facing kept, at each of :data:`WAYS_PACES`, from standing and from going
+    ahead as fast: degrees that the direction is off, a mean, the 95th percentile and the largest; degrees that the
+    facing is off; and the error of the speed, as a share of what the gait allows that way; from 2 to 6 s after the
+    change. slide_cm, slide_p95_cm: as :func:`standing` has them, in all these seconds.
+    """
+    asked, paces, moves = (part.ravel() for part in np.meshgrid(WAYS, WAYS_PACES[gait], (0.0, 1.0)))
+    before = {**AHEAD, "gait": (gait,) * len(asked), "speed": paces * moves}
+    after = {**before, "speed": paces, "direction": asked}
+    session = model.start(gait, characters=len(asked))
+    session.control(**after)
+    allowed = np.tile(length(session.target[:, :2]), PHASES)
+    tracks = responses(model, before, after, 6.0, hold_feet=True)
+    ground, asked = Ground.of(tracks), np.tile(asked, PHASES)
+    way = ground.way_off(asked, 2.0, 6.0)
+    found = {"direction": way.mean(), "direction_p95": np.percentile(way, 95), "direction_worst": way.max()}
+    found["facing"] = ground.facing_off(np.zeros_like(asked), 2.0, 6.0).mean()
+    found["speed"] = np.abs(ground.pace(2.0, 6.0) / allowed - 1).mean()
+    return _floats(found | slide_of(tracks))
 
 
 def _floats(found: Mapping[str, float]) -> dict[str, float]:

@@ -25,6 +25,7 @@ from motet_train.data.store import Store
 from motet_train.evaluate.positions import Flags, length
 from motet_train.evaluate.steer.following import (
     MEASURED_SPEEDS,
+    WAYS_PACES,
     Track,
     aside_errors,
     gait_figures,
@@ -33,6 +34,7 @@ from motet_train.evaluate.steer.following import (
     stretches,
     tracks_of,
     turn_errors,
+    ways_errors,
 )
 from motet_train.evaluate.tables import Goals, Report, gathered, report_table
 
@@ -45,6 +47,10 @@ STEER_GOALS: Goals = {
     "turn_walk.s_90": (None, 1.2),
     "turn_walk.direction_90": (None, 5),
     "turn_walk.facing_90": (None, 5),
+    "ways_walk.direction": (None, 2),
+    "ways_walk.direction_worst": (None, 6),
+    "ways_run.direction": (None, 3),
+    "ways_run.direction_worst": (None, 8),
     "random.broken": (None, 0),
     "random.frozen": (None, 0),
     "random.leaps": (None, 0),
@@ -260,6 +266,7 @@ def _parts(model: SteerModel, recorded: Recorded, minutes: float, characters: in
         "speed": speed_errors,
         **{f"turn_{gait}": partial(turn_errors, gait=gait, pace=pace) for gait, pace in MEASURED_SPEEDS.items()},
         "aside": aside_errors,
+        **{f"ways_{gait}": partial(ways_errors, gait=gait) for gait in WAYS_PACES},
         "random": partial(wandering, limits=limits, seconds=60 * minutes, characters=characters),
     }
     rivals = {"_seldom": seldom(model)} if hasattr(model, "matcher") else {}  # what stands for one does not search
