@@ -14,8 +14,12 @@ from motet.decode.matching import (
     Table,
     horizons,
     mirrored_features,
+    stride_velocities,
 )
 from motet.decode.steering import PoseCodes
+from motet.decode.warping import warped
+from motet.motion.humanoid import BONES, HUMANOID
+from motet.motion.pose import Pose
 from motet.motion.rotations import conjugate, quat_product, quat_rotated, quat_to_rotmat, wrapped
 
 SETTINGS = SteeringSettings()
@@ -85,6 +89,57 @@ def test_a_mirror_image_of_a_mirror_image_is_the_row(table: Table) -> None:
     np.testing.assert_array_equal(again.features, table.features[::-1])
     row, image = table.frames[:, 7]
     np.testing.assert_array_equal(image, row[[0, 1, 2, 3, 4, 5, 6, 7, 9, 8]] * [1, 1, -1, -1, 1, -1, -1, 1, 1, 1])
+
+
+def test_a_row_goes_where_its_recording_goes_for_a_stride(table: Table) -> None:
+    moves = table.frames[0, :, -6:-4]
+    expected = [
+        moves[max(n // 100 * 100, n - 15) : min(n // 100 * 100 + 100, n + 16)].mean(axis=0) for n in range(ROWS)
+    ]
+    np.testing.assert_allclose(stride_velocities(moves, table.left), expected, atol=1e-6)
+    forward, left = np.array(expected).T
+    np.testing.assert_allclose(table.way, [np.arctan2(left, forward), -np.arctan2(left, forward)], atol=1e-5)
+
+
+def test_hips_and_legs_are_turned_and_what_the_spine_carries_stays() -> None:
+    model = motet.load("control")
+    session = model.start(characters=3)
+    session.control(gait="run", speed=3.0)
+    pose = [session.tick() for _ in range(40)][-1]
+    angles = np.array([0.8, 0.0, -0.5])
+    turned = Pose(pose.ground, warped(pose.rotations, angles), pose.height, pose.contacts)
+    (quats, places), (before, old) = turned.global_transforms(), pose.global_transforms()
+    about = np.stack([0 * angles, np.sin(angles / 2), 0 * angles, np.cos(angles / 2)], axis=1)
+    hips = old[:, :1]
+    for name in BONES:
+        bone = HUMANOID.index(name)
+        if name == "hips" or name.endswith(("Leg", "Foot", "Toes")):
+            expected = quat_product(about, before[:, bone])
+            np.testing.assert_allclose(
+                places[:, bone], (hips + quat_rotated(about, old[:, bone] - hips[:, 0])[:, None])[:, 0], atol=1e-5
+            )
+        elif name in ("spine", "chest"):
+            continue  # on the way back
+        else:
+            expected = before[:, bone]
+        np.testing.assert_allclose(np.abs((quats[:, bone] * expected).sum(axis=1)), 1, atol=1e-5)
+    np.testing.assert_array_equal(turned.rotations[1], pose.rotations[1])
+    for one in range(3):  # the same bits alone
+        np.testing.assert_array_equal(
+            warped(pose.rotations[one : one + 1], angles[one : one + 1])[0], turned.rotations[one]
+        )
+
+
+@pytest.mark.filterwarnings("ignore::motet.errors.ControlWarning")
+@pytest.mark.parametrize(("gait", "speed", "most"), [("walk", 1.28, 6.0), ("run", 2.0, 8.0)])
+def test_figures_that_face_ahead_go_where_they_are_told(gait: str, speed: float, most: float) -> None:
+    asked = np.arange(-180.0, 180.0, 15.0)
+    session = motet.load("control").start(gait, characters=len(asked), phases=0)
+    session.control(speed=speed, direction=asked, facing=0.0)
+    ground = np.stack([session.tick().ground for _ in range(180)])
+    x, z = (ground[-1] - ground[60])[:, :2].T
+    off = np.abs(np.degrees(wrapped(np.arctan2(x, z) - np.radians(asked))))
+    assert (off.max() < most, off.mean() < 2) == (True, True), off
 
 
 def test_a_jump_is_not_seen_and_fades(matcher: Matcher) -> None:

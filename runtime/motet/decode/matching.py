@@ -48,8 +48,10 @@ class SteeringSettings(Settings):
         longest: limits of the stride, relative to the recorded one. idle: speed below which a row is played as it is.
         turn: half-life of the error of the facing; turn_still, turn_moving, turn_turning: limits of its correction, in
         rad/s at a standstill, for each m/s up to turn_speed, and for each rad/s of the recorded turn.
-        veer: the largest correction of the direction of travel; veer_within: it is made where the cosine of the angle
-        is above this share of its sine.
+        warp: the largest turn of hips and legs towards the direction of travel, while the shoulders stay (orientation
+        warping); there is none towards what is more than a right angle off.
+        veer: the largest correction of the direction of travel that is left, of the root alone; veer_within: it is made
+        where the cosine of the angle is above this share of its sine.
 
     What gaits can do:
         aside, back: angles from the facing at which going sideways and going backwards begin. ahead: how far from its
@@ -80,6 +82,7 @@ class SteeringSettings(Settings):
     turn_moving: Factor = 1.0
     turn_speed: Annotated[float, Range(0, 100, "m/s")] = 1.5
     turn_turning: Factor = 0.5
+    warp: Radians = 1.0
     veer: Radians = 0.35
     veer_within: Factor = 0.4
     aside: Radians = 1.0471975511965976
@@ -100,7 +103,8 @@ class Playback:
     whether a figure searches in its turn alone, or whenever it is told something.
     root: (B, 3) x, z in metres and facing in radians. spring, spring_rate: (B, 3) the springs that approach the target:
     velocity along x and z in m/s and facing in radians, and how fast they change. offset, offset_rate: (B, K) the
-    inertialization offset of the codes, and how fast it changes.
+    inertialization offset of the codes, and how fast it changes. warp, warp_rate: (B,) radians by which hips and legs
+    are turned towards the direction of travel, and how fast that changes.
     """
 
     row: Rows
@@ -114,6 +118,8 @@ class Playback:
     spring_rate: Array
     offset: Array
     offset_rate: Array
+    warp: Array
+    warp_rate: Array
 
     @staticmethod
     def at(row: int, figures: int, codes: int, phases: Rows | None = None) -> "Playback":
@@ -122,7 +128,7 @@ class Playback:
         whole, ground, pose = (np.zeros(shape) for shape in (figures, (figures, 3), (figures, codes)))
         rows, count = np.full(figures, row, dtype=np.int64), np.zeros(figures, dtype=np.int64)
         ticks, in_turn = count if phases is None else phases, np.full(figures, phases is not None)
-        return Playback(rows, whole, count, whole + 1, ticks, in_turn, ground, ground, ground, pose, pose).copy()
+        return Playback(rows, whole, count, whole + 1, ticks, in_turn, *[ground] * 3, *[pose] * 2, *[whole] * 2).copy()
 
     def hasten(self, who: NDArray[np.bool_]) -> None:
         """Let those of figures (B,) that wait for no turn search in the next tick."""
@@ -167,33 +173,53 @@ def speed_feature(speed: NDArray[Any], settings: SteeringSettings) -> NDArray[An
     return found
 
 
+STRIDE_ROWS = 15
+"""Rows before and after a row that are a stride, over which the hips' sway is none."""
+
+
+def stride_velocities(moves: NDArray[Any], left: Rows) -> Array:
+    """The mean of a recording's velocities (N, 2), forward and left, over the stride around each row. left: as in
+    :class:`Table`."""
+    rows = np.arange(len(left))
+    last = rows + left
+    first = np.maximum(np.searchsorted(last, last), rows - STRIDE_ROWS).clip(max=rows)
+    stop = np.minimum(last, rows + STRIDE_ROWS) + 1
+    sums = np.concatenate([np.zeros((1, 2)), np.cumsum(moves, axis=0, dtype=np.float64)])
+    found: Array = (sums[stop] - sums[first]) / (stop - first)[:, None]
+    return found
+
+
 @dataclass(frozen=True, eq=False)
 class Table:
     """What is recorded. frames and features begin with an axis of 2: the rows, and their mirror images.
 
     frames: (2, N, K + 6) float32 codes of the pose, velocity over the ground (forward, left, turn), speed, and how much
     the left and the right foot stand. features: (2, N, F) float32, from which ``mean`` (F,) has been subtracted, times
-    ``scale`` (F,). shows: (N, G) whether a row shows a gait. left: (N,) rows that follow in the same recording.
+    ``scale`` (F,). way: (2, N) the angle from the facing to where a recording goes in the stride around a row.
+    shows: (N, G) whether a row shows a gait. left: (N,) rows that follow in the same recording.
     """
 
     frames: Floats
     features: Floats
+    way: Array
     shows: NDArray[np.bool_]
     left: Rows
     mean: Array
     scale: Array
 
     @staticmethod
-    def of(frames: Floats, features: Floats, odd: int, **others: Any) -> "Table":
+    def of(frames: Floats, features: Floats, odd: int, left: Rows, **others: Any) -> "Table":
         """The table of frames (N, K + 6) and features (N, F): the last ``odd`` codes of a mirror image have the other
-        sign. others: the other fields."""
+        sign. left, others: the other fields."""
         columns, signs = mirrored_features()
         width = frames.shape[1]
         turned = np.ones(width, dtype=np.float32)
         turned[width - 6 - odd : width - 6] = turned[[-5, -4]] = -1
         image = (frames * turned)[:, [*range(width - 2), width - 1, width - 2]]
         both = np.stack([features, features[:, columns] * signs])
-        return Table(np.stack([frames, image]), both, **others)
+        forward, aside = stride_velocities(frames[:, -6:-4], left).T
+        way = np.arctan2(aside, forward)
+        return Table(np.stack([frames, image]), both, np.stack([way, -way]), left=left, **others)
 
     @property
     def codes(self) -> int:
@@ -364,6 +390,7 @@ class Matcher:
         """Let all figures have the codes (B, K) of another pose; they come back to what they play."""
         now, _ = self._codes(playback)
         playback.offset, playback.offset_rate = codes - now, np.zeros_like(now)
+        playback.warp, playback.warp_rate = np.zeros((2, len(now)))
 
     def _codes(self, playback: Playback, who: Rows | slice = ALL) -> tuple[Array, Array]:
         """The codes (n, K) that figures (n,) play, and how fast they change, a second."""

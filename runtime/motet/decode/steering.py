@@ -1,8 +1,9 @@
 """The loop of a steered figure: recorded frames are played in turn and matched with the target.
 
 What is asked, a velocity and a facing, is approached by critically damped springs. Recordings are played a little
-slower or faster, with shorter or longer strides, and turned a little, to go as fast and where the springs are. Letters
-as in :mod:`motet.decode.matching`, which says what is played; and J bones, P = 4 J + 1 numbers of a pose.
+slower or faster, with shorter or longer strides, to go as fast as the springs, and hips and legs are turned
+(:mod:`motet.decode.warping`), to go where they do. Letters as in :mod:`motet.decode.matching`, which says what is
+played; and J bones, P = 4 J + 1 numbers of a pose.
 """
 
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ import numpy as np
 
 from motet.bundle.graph import Floats
 from motet.decode.matching import Matcher, Playback, Rows, SteeringSettings
+from motet.decode.warping import warped
 from motet.motion.pose import Pose, damped, damping_of
 from motet.motion.rotations import Array, wrapped
 
@@ -70,10 +72,22 @@ def tick(matcher: Matcher, poses: PoseCodes, playback: Playback, target: Array, 
     damping = np.array([damping_of(how.velocity)] * 2 + [damping_of(how.facing)])
     off, playback.spring_rate = damped(off, playback.spring_rate, damping, dt)
     playback.spring = target + off
+    calm, warp = damping_of(how.blend), _warp(playback, matcher.table.way[playback.mirror, playback.row], recorded, how)
+    off, playback.warp_rate = damped(playback.warp - warp, playback.warp_rate, calm, dt)
+    playback.warp = warp + off
     playback.root, playback.rate = _moved(playback, moves, recorded, how, dt)
-    playback.offset, playback.offset_rate = damped(playback.offset, playback.offset_rate, damping_of(how.blend), dt)
+    playback.offset, playback.offset_rate = damped(playback.offset, playback.offset_rate, calm, dt)
     rotations, height = poses.decode(codes + playback.offset)
-    return Pose(playback.root, rotations, height, played[:, -2:].astype(np.float32))
+    return Pose(playback.root, warped(rotations, playback.warp), height, played[:, -2:].astype(np.float32))
+
+
+def _warp(playback: Playback, way: Array, recorded: Array, how: SteeringSettings) -> Array:
+    """By how many radians (B,) rows that go a way (B,) from the facing, at recorded speeds (B,), are to be turned to go
+    where the springs do; 0 for those that stand, or go elsewhere until the next search."""
+    x, z = playback.spring[:, :2].T
+    angle = wrapped(np.arctan2(x, z) - playback.root[:, 2] - way)
+    warps = (np.minimum(recorded, np.hypot(x, z)) > how.idle) & (np.abs(angle) <= np.pi / 2)
+    return np.where(warps, angle.clip(-how.warp, how.warp), 0.0)
 
 
 def _moved(playback: Playback, moves: Array, recorded: Array, how: SteeringSettings, dt: float) -> tuple[Array, Array]:
@@ -87,7 +101,7 @@ def _moved(playback: Playback, moves: Array, recorded: Array, how: SteeringSetti
     most = (how.turn_still + how.turn_moving * np.minimum(pace, how.turn_speed)) * dt + how.turn_turning * np.abs(turn)
     turned = wrapped(facing + turn + (error * (1 - 0.5 ** (dt / how.turn))).clip(-most, most))
     stride = np.where(moving, (ratio / rate).clip(how.shortest, how.longest), 1)
-    sin, cos = np.sin(facing) * stride, np.cos(facing) * stride
+    sin, cos = np.sin(facing + playback.warp) * stride, np.cos(facing + playback.warp) * stride
     step_x, step_z = sin * forward + cos * left, cos * forward - sin * left
     # turned towards the velocity by a small angle, where the two do not go apart
     along, across = step_x * velocity_x + step_z * velocity_z, step_z * velocity_x - step_x * velocity_z

@@ -38,6 +38,9 @@ export interface Playback {
   /** The inertialization offset of the codes, and how fast it changes. */
   offset: Float64Array;
   offsetRate: Float64Array;
+  /** Radians by which hips and legs are turned towards the direction of travel, and how fast that changes. */
+  warp: number;
+  warpRate: number;
 }
 
 /** Features of where a row goes: places and facings in thirds of the horizon, and the speed. Those of how it is now follow. */
@@ -54,6 +57,25 @@ const COLUMNS = [...Array(TRAJECTORY).keys(), ...SWAPPED.flatMap((three) => [0, 
 /** To the left is the first of a pair or a triple. */
 const SIGNS = COLUMNS.map((_, i) => (i < TRAJECTORY ? (i % 2 || i === TRAJECTORY - 1 ? 1 : -1) : (i - TRAJECTORY) % 3 ? 1 : -1));
 
+/** Rows before and after a row that are a stride, over which the hips' sway is none. */
+const STRIDE_ROWS = 15;
+
+/** Of each row the angle from the facing to where its recording goes in the stride around it. */
+function waysOf({ moves, left }: Tables): Float64Array {
+  const rows = left.length;
+  const [forward, aside] = [new Float64Array(rows + 1), new Float64Array(rows + 1)];
+  for (let row = 0; row < rows; row++) {
+    forward[row + 1] = forward[row]! + moves[6 * row]!;
+    aside[row + 1] = aside[row]! + moves[6 * row + 1]!;
+  }
+  let start = 0; // of the recording
+  return Float64Array.from({ length: rows }, (_, row) => {
+    if (row && row + left[row]! !== row - 1 + left[row - 1]!) start = row;
+    const [first, stop] = [Math.max(start, row - STRIDE_ROWS), Math.min(row + left[row]!, row + STRIDE_ROWS) + 1];
+    return Math.atan2(aside[stop]! - aside[first]!, forward[stop]! - forward[first]!);
+  });
+}
+
 /** Searches the tables for a gait's best row, and jumps there. */
 export class Matcher {
   readonly rows: number;
@@ -63,6 +85,7 @@ export class Matcher {
   readonly reserve: number;
   /** Of each code of a mirror image its sign. */
   private readonly codeSigns: Float64Array;
+  private readonly ways: Float64Array;
   private readonly features: Int16Array;
   readonly goals: Goals[];
   private readonly asked = new Int16Array(FEATURES);
@@ -78,6 +101,7 @@ export class Matcher {
     this.rows = tables.left.length;
     this.codes = tables.codes.length / this.rows;
     this.dt = 1 / fps;
+    this.ways = waysOf(tables);
     this.reserve = Math.ceil((how.search_every + 1) * how.fastest) + 2;
     this.codeSigns = Float64Array.from({ length: this.codes }, (_, k) => (k < this.codes - odd ? 1 : -1));
     this.features = Int16Array.from(tables.features, (step) => (step * STEPS) / TABLE_STEPS);
@@ -104,11 +128,16 @@ export class Matcher {
     const [offset, offsetRate] = [new Float64Array(this.codes), new Float64Array(this.codes)];
     const springs = { spring: [0, 0, facing] as Target, springRate: [0, 0, 0] as Target, offset, offsetRate };
     const turn = { ticksToSearch: phase ?? 0, inTurn: phase !== undefined };
-    return { row, part: 0, mirror: false, rate: 1, ...turn, root: [x, z, facing], ...springs };
+    return { row, part: 0, mirror: false, rate: 1, ...turn, root: [x, z, facing], ...springs, warp: 0, warpRate: 0 };
   }
 
   shows(row: number, gait: number): boolean {
     return this.tables.shows[row * this.gaits + gait]! > 0;
+  }
+
+  /** The angle from the facing to where a figure's row goes. */
+  way({ row, mirror }: Playback): number {
+    return mirror ? -this.ways[row]! : this.ways[row]!;
   }
 
   /** Whether no foot stands. */

@@ -3,6 +3,7 @@ import type { Matcher, Playback, Target } from "./matching.js";
 import type { Pose as Ground } from "./planar.js";
 import type { Quaternion } from "./rotations.js";
 import { clamp, damped, dampingOf, wrapped } from "./springs.js";
+import { warped } from "./warping.js";
 
 /** A pose on the humanoid: the hips' rotation is in the frame of the facing. */
 export interface Played {
@@ -41,17 +42,32 @@ export class Steerer {
     figure.part = at - Math.floor(at);
     const moves = this.moves(figure);
     approach(figure, target, dampingOf(how.velocity), dampingOf(how.facing), dt);
+    this.warp(figure, moves[3]!);
     this.move(figure, moves);
     this.fade(figure, dampingOf(how.blend));
     matcher.played(figure, this.codes);
     const contacts: [number, number] = figure.mirror ? [moves[5]!, moves[4]!] : [moves[4]!, moves[5]!];
-    return { ground: figure.root, ...this.pose(), contacts };
+    const { rotations, height } = this.pose();
+    return { ground: figure.root, rotations: warped(rotations, figure.warp), height, contacts };
   }
 
   /** Velocity over the ground (forward, left, turn), speed, and how much each foot stands, of the row as recorded. */
   private moves({ row, part }: Playback): number[] {
     const { moves } = this.matcher.tables;
     return [0, 1, 2, 3, 4, 5].map((i) => moves[6 * row + i]! + part * (moves[6 * row + 6 + i]! - moves[6 * row + i]!));
+  }
+
+  /** By how much hips and legs are turned towards where the springs go, a tick later; by nothing if the row stands or goes elsewhere. */
+  private warp(figure: Playback, recorded: number): void {
+    const { matcher } = this;
+    const { how } = matcher;
+    const [x, z] = figure.spring;
+    const angle = wrapped(Math.atan2(x, z) - figure.root[2] - matcher.way(figure));
+    const warps = Math.min(recorded, Math.hypot(x, z)) > how.idle && Math.abs(angle) <= Math.PI / 2;
+    const target = warps ? clamp(angle, -how.warp, how.warp) : 0;
+    const [off, rate] = damped(figure.warp - target, figure.warpRate, dampingOf(how.blend), matcher.dt);
+    figure.warp = target + off;
+    figure.warpRate = rate;
   }
 
   /** The next root and rate of playback. */
@@ -68,7 +84,7 @@ export class Steerer {
     const error = wrapped(spring[2] - facing);
     const most = (how.turn_still + how.turn_moving * Math.min(pace, how.turn_speed)) * dt + how.turn_turning * Math.abs(turn);
     const turned = wrapped(facing + turn + clamp(error * (1 - 0.5 ** (dt / how.turn)), -most, most));
-    const [sin, cos] = [Math.sin(facing), Math.cos(facing)];
+    const [sin, cos] = [Math.sin(facing + figure.warp), Math.cos(facing + figure.warp)];
     const [stepX, stepZ] = [sin * forward + cos * left, cos * forward - sin * left];
     // turned towards the velocity by a small angle, where the two do not go apart
     const along = stepX * spring[0] + stepZ * spring[1];

@@ -29,6 +29,7 @@ const STEERING = {
   turn_moving: [1, 0, 100],
   turn_speed: [1.5, 0, 100],
   turn_turning: [0.5, 0, 100],
+  warp: [1, ...RADIANS],
   veer: [0.35, ...RADIANS],
   veer_within: [0.4, 0, 100],
   aside: [Math.PI / 3, ...RADIANS],

@@ -8,7 +8,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from motet.decode.matching import SteeringSettings
+from motet.decode.matching import SteeringSettings, stride_velocities
 from motet.models.steer import FEATURE_STEPS
 from motet.motion.feet.lock import FootLockSettings
 from motet.motion.rotations import Array
@@ -135,8 +135,9 @@ def _reach(tree: Tree) -> Array:
 def _speeds(rows: MatchingRows, shown: NDArray[np.bool_], how: SteeringSettings) -> Speeds:
     """Those that a gait can be asked for, as its rows can be played slower and faster; all 0 if they cannot.
 
-    They go from the 30th percentile of its moving rows, with shorter strides, to the 90th of each direction; directions
-    with a second of rows or less have none.
+    They go from the 30th percentile of its moving rows, with shorter strides, to the 90th of each direction, or to that
+    of means over a stride, with the longest strides, if it is less, as it is of side steps; directions with a second of
+    rows or less have none.
     """
     speed = rows.speed[shown]
     moving = speed > how.idle
@@ -145,7 +146,15 @@ def _speeds(rows: MatchingRows, shown: NDArray[np.bool_], how: SteeringSettings)
     angle = np.abs(np.arctan2(rows.moves[shown, 1], rows.moves[shown, 0]))  # from the facing
     low = np.percentile(speed[moving], 30.0) * how.slowest * how.shortest
     sectors = [moving & (np.digitize(angle, (how.aside, how.back), right=True) == sector) for sector in range(3)]
-    fastest = [np.percentile(speed[part], 90.0) * how.fastest if part.sum() > 30 else 0.0 for part in sectors]
+    going = stride_velocities(rows.moves[:, :2], rows.left)[shown]
+    paces, ways = np.hypot(*going.T), np.abs(np.arctan2(going[:, 1], going[:, 0]))
+    strides = [paces[(paces > how.idle) & (np.digitize(ways, (how.aside, how.back)) == sector)] for sector in range(3)]
+    fastest = [
+        min(np.percentile(speed[part], 90.0), np.percentile(own, 90.0) * how.longest) * how.fastest
+        if part.sum() > 30 and len(own)
+        else 0.0
+        for part, own in zip(sectors, strides, strict=True)
+    ]
     forward, aside, back = (round(float(one), 2) for one in fastest)
     return round(float(low), 2), round(float(np.median(speed[sectors[0]])), 2), forward, aside, back
 
