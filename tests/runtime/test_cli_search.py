@@ -1,15 +1,18 @@
 """``motet search`` over a small model whose graphs are numpy."""
 
 import json
-from dataclasses import asdict
+import shutil
+from dataclasses import asdict, replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from command_line import check_refused, run
 from fake_models import moving, search_model
 
 from motet.formats import read_motion, write_motion
-from motet.models.search import INDEX_FILE, Index
+from motet.models.load import load_as
+from motet.models.search import INDEX_FILE, Index, IndexSettings, SearchModel
 
 
 @pytest.fixture(autouse=True)
@@ -65,9 +68,59 @@ def test_the_unit_of_files_that_do_not_state_it(tmp_path: Path) -> None:
     assert Index.open(tmp_path, search_model(), unit="m").unit == "m"
 
 
+def test_a_unit_loses_no_file_that_states_its_own(clips: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """AMC files state their unit, BVH files of the same trial in centimetres do not."""
+    monkeypatch.undo()
+    for file in (*clips.glob("*.amc"), *clips.glob("*.asf")):
+        shutil.copy(file, tmp_path)
+    walk = read_motion(clips / "39_14.amc").scaled(0.01)
+    write_motion(tmp_path / "39_14.bvh", walk)
+    found = Index.open(tmp_path, load_as(SearchModel, "search"), unit="cm")
+    assert not found.failed
+    hits = found.search(walk, 10)
+    assert len(hits) == len(list(clips.glob("*.amc"))) + 1
+    assert {hit.path.name for hit in hits[:2]} == {"39_14.amc", "39_14.bvh"}
+    assert min(hit.score for hit in hits[:2]) > 0.99
+
+
+def test_a_pose_and_what_is_not_there_are_like_nothing(
+    clips: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.undo()
+    kept = tmp_path / "kept.npz"
+    index = Index.open(clips, load_as(SearchModel, "search"), kept)
+    walk = index.model.prepared(read_motion(clips / "39_14.amc"))
+    pose = np.zeros((40, len(walk.channels)))
+    pose[:, walk.channels.index("root.height")] = 0.95
+    assert index.search(walk)[0].like
+    assert not index.search(replace(walk, values=pose))[0].like
+    assert index.search("a person walks")[0].like
+    for absent in ("a person lies down", "somebody climbs a ladder"):
+        assert not index.search(absent)[0].like
+    result = run("search", "a person lies down", kept)
+    assert result.exit_code == 0
+    assert result.stderr == f"motet: nothing like 'a person lies down' is in {kept}\n"
+
+
 def test_unknown_words_are_said_once(folder: Path) -> None:
     result = run("search", "a person limps", folder)
-    assert result.stderr == "motet: the model does not know limps (in 'a person limps')\n"
+    assert result.stderr.count("motet: the model does not know limps (in 'a person limps')\n") == 1
+    assert result.stderr.count("limps") == 2 + ("nothing like 'a person limps'" in result.stderr)
+
+
+def test_what_is_only_nearest_is_after_a_question_mark(folder: Path) -> None:
+    """Each sentence is like the hits with at least the score of the setting; with none, nothing is like it."""
+    least = search_model().settings(IndexSettings).like_text
+    seen = set()
+    for sentence in ("a person walks", "walks left", "left", "a person", "a person walks left"):
+        result = run("search", sentence, folder, "--count", 4)
+        rows = json.loads(run("search", sentence, folder, "--count", 4, "--json").stdout)
+        assert [row["like"] for row in rows] == [row["score"] >= least for row in rows]
+        assert ["?" in line for line in result.stdout.splitlines()] == [not row["like"] for row in rows]
+        assert ("nothing like" in result.stderr) == (not rows[0]["like"])
+        seen |= {row["like"] for row in rows}
+        assert result.exit_code == 0
+    assert seen == {True, False}
 
 
 def test_refusals(folder: Path, tmp_path: Path) -> None:

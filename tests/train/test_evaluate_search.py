@@ -73,6 +73,11 @@ def test_a_perfect_model_finds_all_at_once(corpus: SplitStore) -> None:
     # whoever turns right in training swings the legs as whoever walks in the test: by looks that is nearer
     assert report["words_text"] == {**first, "first_1": 0.8}
     assert report["motion"] == {"alike": 1, "features_alike": 1, "of": 5}
+    like = report["like"]
+    assert {name: like[name] for name in ("text_kept", "text_told", "motion_told")} == dict.fromkeys(
+        ("text_kept", "text_told", "motion_told"), 1
+    )
+    assert like["text_least"] == pytest.approx(1)
     assert "text.first_5" in report_table({"fake": report}, SEARCH_GOALS)
 
 

@@ -91,7 +91,7 @@ def _save(out: Path, vectors: Floats) -> None:
 @jobs_option
 @session_options
 @click.option(
-    "--json", "as_json", is_flag=True, help="Print a list with path, clip, times, score and in_place of each."
+    "--json", "as_json", is_flag=True, help="Print a list with path, clip, times, score, in_place and like of each."
 )
 def search(
     query: str,
@@ -107,8 +107,8 @@ def search(
     """Find the motions in FOLDER that are nearest to QUERY, a sentence or a motion file; FOLDER may be an index file.
 
     Each is printed with how near it is (1 is the same) and the seconds in which it is so; of files of several clips,
-    each clip is a motion of its own. The first search reads and embeds all motion files, and later ones those that are
-    new or have changed.
+    each clip is a motion of its own. Those after "?" are the nearest, but not like it. The first search reads and
+    embeds all motion files, and later ones those that are new or have changed.
     """
     model = load_as(SearchModel, bundle, session)
     motion = read_motion(query, unit=unit_in) if names_motion(query) else None
@@ -124,7 +124,10 @@ def search(
     else:
         for hit in hits:
             said = ", in place: compared with the path that its feet imply" if hit.in_place else ""
-            click.echo(f"{hit.score:6.2f}  {hit.place}  {hit.start:.1f} to {hit.stop:.1f} s{said}")
+            doubt = "" if hit.like else "? "
+            click.echo(f"{hit.score:6.2f}  {doubt}{hit.place}  {hit.start:.1f} to {hit.stop:.1f} s{said}")
+    if not hits[0].like:
+        click.echo(f"motet: nothing like {query!r} is in {folder}", err=True)
     for path, fault in index.failed.items():
         click.echo(f"motet: {path}: {fault}", err=True)
     sys.exit(1 if index.failed else 0)

@@ -42,10 +42,16 @@ VERSION = 3  # of its format
 
 @dataclass(frozen=True)
 class IndexSettings(Settings):
-    """window: longest motion for one vector; longer ones are cut, so that a hit has a time."""
+    """window: longest motion for one vector; longer ones are cut, so that a hit has a time.
+
+    like_text, like_motion: the score from which a hit is like a sentence or a motion, which 95 % of the first hits that
+    are right have for people kept back (docs/search.md).
+    """
 
     FEATURE: ClassVar[str] = "index"
     window: Annotated[float, Range(0.5, MAX_SECONDS, "s")] = 10.0
+    like_text: Annotated[float, Range(-1, 1)] = 0.45
+    like_motion: Annotated[float, Range(-1, 1)] = 0.87
 
 
 class SearchModel(LanguageModel):
@@ -87,7 +93,7 @@ class Hit:
     """A motion file, the seconds in which it matches the query, and how well: 1 is identical.
 
     clip: its name in a file that holds several; else empty. in_place: whether it is a clip in place, which is compared
-    with the path that its feet imply.
+    with the path that its feet imply. like: whether it is like the query at all, and not only nearer than the others.
     """
 
     path: Path
@@ -96,6 +102,7 @@ class Hit:
     score: float
     clip: str = ""
     in_place: bool = False
+    like: bool = True
 
     @property
     def place(self) -> str:
@@ -190,7 +197,7 @@ class Index:
     def search(self, queries: Sequence[Query], count: int | None = None) -> list[list[Hit]]: ...
     def search(self, queries: Query | Sequence[Query], count: int | None = None) -> list[Hit] | list[list[Hit]]:
         """The ``count`` files or clips nearest to a sentence or a motion, best first, each with its best window; for
-        several queries, a list for each.
+        several queries, a list for each. Where the first is not ``like`` the query, nothing is.
 
         count: the bundle's by default. TextError for a sentence without a known word, MotionError for a motion that
         the model cannot take, DecodingError for a count that is not between 1 and 1,000.
@@ -205,14 +212,18 @@ class Index:
         return [(member, *window) for member in self.members for window in member.windows]
 
     def _nearest(self, query: Query, wanted: int) -> list[Hit]:
-        vector = self.model.embed_text(query) if isinstance(query, str) else direction(self.model, query)
+        how = self.model.settings(IndexSettings)
+        if isinstance(query, str):
+            vector, least = self.model.embed_text(query), how.like_text
+        else:
+            vector, least = direction(self.model, query), how.like_motion
         scores = self.vectors @ vector
         found: dict[str, Hit] = {}
         for row in self.model.loop.run(scores, len(scores)):
             member, start, stop = self._windows[row]
             if member.name not in found:
-                place = self.folder / member.path
-                found[member.name] = Hit(place, start, stop, float(scores[row]), member.clip, member.in_place)
+                place, score = self.folder / member.path, float(scores[row])
+                found[member.name] = Hit(place, start, stop, score, member.clip, member.in_place, score >= least)
             if len(found) == wanted:
                 break
         return list(found.values())

@@ -29,15 +29,16 @@ def search_report(model: SearchModel, corpus: SplitStore, describe: DescribeMode
     "text": the sentences of test motions whose wordings no training saw ask for their own among all test motions:
     shares that are among the first, and the median rank. "text_alike": any motion counts of which the same was said.
     "words_": the floor of them: the training motion with the most similar sentence (TF-IDF), and the test motions that
-    are nearest to it. "likelihood_": by a describe model of the same split, where one is given. "motion": the share of
-    test motions whose nearest training motion is one of which the same was said, of those ("of") that have any.
+    are nearest to it. "like": :func:`_likeness`. "likelihood_": by a describe model of the same split,
+    where one is given. "motion": the share of test motions whose nearest training motion is one of which the same was
+    said, of those ("of") that have any.
     """
     return corpus.origin(model.manifest) | gathered(_found(model, corpus, describe), model.manifest.name)
 
 
 def _found(model: SearchModel, corpus: SplitStore, describe: DescribeModel | None) -> Iterator[Report]:
     entries, parts, looks = corpus.store.records, corpus.parts, Looks(corpus)
-    rows, sentences = _asked(corpus)
+    rows, sentences = _asked(corpus, parts.test)
     said = np.array(alike([[*map(RULES.normalise, (*entry.sentences, *entry.unseen))] for entry in entries]))
     test, train = said[list(parts.test)], said[list(parts.train)]  # numbers of what was said of each
     takes = np.array([entries[record].take or entries[record].name for record in parts.test])
@@ -68,14 +69,52 @@ def _found(model: SearchModel, corpus: SplitStore, describe: DescribeModel | Non
     index = _index(model, corpus, parts.train)
     by_model = [int(index.search(motion, 1)[0].path.name) for motion in corpus.motions(parts.test)]
     by_features = cdist(seen, known_looks).argmin(axis=1)
+    yield {"like": _likeness(model, corpus, said)}
     yield {"motion": _shares({"alike": train[by_model], "features_alike": train[by_features]}, test, train)}
 
 
-def _asked(corpus: SplitStore) -> tuple[list[int], list[str]]:
-    """The sentences that ask, with a word that a training sentence has, and of which test motion each is."""
-    test, known = corpus.parts.test, corpus.words(corpus.parts.train)
-    kept = [corpus.kept(record) for record in test]
-    said = kept if any(kept) else corpus.unseen(test)
+def _likeness(model: SearchModel, corpus: SplitStore, said: Numbers) -> dict[str, float]:
+    """How well a score tells that nothing found is like what was asked for: sentences for motions of their own part,
+    motions for training motions. Each asks twice, the second time where none has the same description.
+
+    "_least": the score that 95 % of the first hits that are right have in the validation part. Of the test part's first
+    hits, with the model's settings: the share of right ones that are like what was asked for ("_kept"), and of wrong
+    ones that are not ("_told").
+    """
+    how, found = model.settings(IndexSettings), dict[str, float]()
+    for kind, least in (("text", how.like_text), ("motion", how.like_motion)):
+        if corpus.parts.validation:
+            score, right = _firsts(model, corpus, corpus.parts.validation, said, kind)
+            found[f"{kind}_least"] = float(np.percentile(score[right], 5)) if right.any() else np.nan
+        score, right = _firsts(model, corpus, corpus.parts.test, said, kind)
+        found[f"{kind}_kept"] = float((score[right] >= least).mean()) if right.any() else np.nan
+        found[f"{kind}_told"] = float((score[~right] < least).mean()) if not right.all() else np.nan
+    return found
+
+
+def _firsts(
+    model: SearchModel, corpus: SplitStore, part: Sequence[int], said: Numbers, kind: str
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """The scores of the first hits of a part's sentences or motions (Q,), and whether they are right."""
+    held = part if kind == "text" else corpus.parts.train
+    rows, queries = _asked(corpus, part) if kind == "text" else (range(len(part)), corpus.motions(part))
+    index, groups = _index(model, corpus, held), said[list(held)]
+    with unknown_words_allowed():
+        found = [index.search(query, len(index.members)) for query in queries]
+    firsts = []
+    for row, hits in zip(rows, found, strict=True):
+        alike = [bool(groups[int(hit.path.name)] == said[part[row]]) for hit in hits]
+        firsts.append((hits[0].score, alike[0]))
+        firsts += [(hit.score, False) for hit, same in zip(hits, alike, strict=True) if not same][:1]
+    scores, right = zip(*firsts, strict=True)
+    return np.array(scores), np.array(right)
+
+
+def _asked(corpus: SplitStore, part: Sequence[int]) -> tuple[list[int], list[str]]:
+    """The sentences that ask, with a word that a training sentence has, and of which motion of a part each is."""
+    known = corpus.words(corpus.parts.train)
+    kept = [corpus.kept(record) for record in part]
+    said = kept if any(kept) else corpus.unseen(part)
     rows = [(row, s) for row, own in enumerate(said) for s in own if not known.isdisjoint(s.split())]
     return [row for row, _ in rows], [sentence for _, sentence in rows]
 
