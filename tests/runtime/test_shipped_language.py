@@ -7,11 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import run
+from memory import traced
 
 from motet.errors import MotionError
 from motet.formats import read_motion
 from motet.models.known import NOTHING
 from motet.models.load import load
+from motet.motion.motion import Motion
 from motet.representation.root_block import to_root_block
 
 
@@ -102,3 +104,40 @@ def test_a_motion_scores_what_the_search_gave_it() -> None:
     assert model.score("a person runs", best.contract.features(best.frames)) == pytest.approx(
         best.log_likelihood, rel=1e-4
     )
+
+
+def upright(motion: Motion, frames: int) -> np.ndarray:
+    """Frames of a stiff figure on the channels of a motion."""
+    values = np.zeros((frames, len(motion.channels)))
+    values[:, motion.channels.index("root.height")] = 0.95
+    return values
+
+
+def test_who_lies_from_the_first_frame_and_a_beast_are_not_described_surely(clips: Path) -> None:
+    """Lying on the back, on the face and on a side; and on all fours with a human's names, striding as in a walk."""
+    model = load("describe")
+    walk = model.prepared(read_motion(clips / "39_14.amc"))
+    column = walk.channels.index
+    for pitch, roll in ((90.0, 0.0), (-90.0, 0.0), (0.0, 90.0)):
+        lying = upright(walk, 40)
+        lying[:, column("root.height")] = 0.15
+        lying[:, column("root.pitch")], lying[:, column("root.roll")] = pitch, roll
+        motion = replace(walk, values=lying)
+        assert not model.describe(motion)[0].confident
+        assert [part.confident for part in model.timeline(motion)] == [False]
+    beast = walk.values.copy()
+    beast[:, column("root.height")], beast[:, column("root.pitch")] = 0.6, 80.0
+    assert not any(found.confident for found in model.describe(replace(walk, values=beast)))
+
+
+def test_hours_of_standing_take_no_more_memory_than_minutes(clips: Path) -> None:
+    """Beside the motion itself, of which there is a view for each window: 24 hours, shortened."""
+    model = load("describe")
+    pose = model.prepared(read_motion(clips / "39_14.amc"))
+    held = []
+    for frames in (3000, 12_000):
+        motion = replace(pose, values=upright(pose, frames))
+        held.append(traced(lambda motion=motion: model.timeline(motion)))
+        (part,) = model.timeline(motion)
+        assert (part.start, part.stop, part.confident) == (0, frames / pose.fps, False)
+    assert held[1] - held[0] < 9000 * 8 * len(pose.channels) / 5

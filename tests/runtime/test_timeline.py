@@ -1,6 +1,7 @@
 """Where a long motion changes, beside the most literal way to find out."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise, product
 from pathlib import Path
@@ -8,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fake_models import CHANNELS, CONTRACT, FPS, SKELETON, VOCABULARY, describe_model, moving
+from memory import traced
 
 from motet.bundle.manifest import Manifest
 from motet.errors import MotionError
@@ -43,8 +45,21 @@ def test_the_best_path_is_that_of_all_paths() -> None:
 
         found = best_path(scores, change)
         assert worth(tuple(found)) == pytest.approx(max(map(worth, product(range(3), repeat=6))))
+        assert all(best_path(scores, change, at_once) == found for at_once in (1, 2, 4))
         lengths.add(sum(a != b for a, b in pairwise(found)))
     assert len(lengths) > 2
+
+
+def test_a_path_that_is_decided_is_not_kept() -> None:
+    """A path through as many windows as 24 hours have, found in the memory of a few hundred."""
+
+    def rows(count: int) -> Iterator[np.ndarray]:
+        likely = np.random.default_rng(1).normal(size=(7, 200))
+        return (likely[place // 100 % 7] for place in range(count))
+
+    assert best_path(rows(1000), 3.0, 100) == best_path(list(rows(1000)), 3.0, 10_000)
+    found = traced(lambda: best_path(rows(20_000), 3.0, 100))
+    assert found < traced(lambda: best_path(rows(1000), 3.0, 100)) + 20_000 * 16 + 100_000
 
 
 def test_parts_meet_in_the_middle_between_windows() -> None:

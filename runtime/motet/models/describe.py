@@ -5,12 +5,13 @@ are sentences and whose changes all cost the same.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Literal, SupportsIndex, TypedDict, Unpack, overload
 
 import numpy as np
+from numpy.typing import NDArray
 
 from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
@@ -21,6 +22,7 @@ from motet.errors import DecodingError
 from motet.models.known import AnswerSettings, Known, Seen, known_of, turn_of
 from motet.models.language import EOS, MAX_SECONDS, PAD, SOS, UNK, LanguageModel, padded
 from motet.motion.motion import Motion
+from motet.motion.rotations import Array
 from motet.settings import Progress, Range, Settings, seeds_of, silent
 
 Decoding = Literal["known", "beam", "consensus"]
@@ -205,8 +207,8 @@ class DescribeModel(LanguageModel):
         settings, beam = self.settings(TimelineSettings), LOOPS["beam"]
         spans = windows(len(motion), motion.fps, settings)
         if self.known is not None:
-            scores = self._kinds([motion[start:stop] for start, stop in spans], progress)
-            return self._parts(motion, edges(spans, best_path(scores, self.known.settings.change)))
+            rows = self._kinds(motion, spans, progress)
+            return self._parts(motion, edges(spans, best_path(rows, self.known.settings.change)))
         contexts = self.embed([motion[start:stop] for start, stop in spans])
         likeliest = self._hypotheses(beam, contexts, beam.defaults(self.manifest.defaults))
         ids = self.vocabulary.ids
@@ -214,17 +216,14 @@ class DescribeModel(LanguageModel):
         scores = near_scores(self.graphs["step"], contexts, said, round(settings.near / settings.hop), progress)
         return self._parts(motion, edges(spans, best_path(scores, settings.change)))
 
-    def _kinds(self, parts: Sequence[Motion], progress: Progress) -> Scores:
-        """Log-probabilities (W, Q) of the sets of kinds of action that are the likeliest of some part."""
+    def _kinds(self, motion: Motion, spans: Sequence[tuple[int, int]], progress: Progress) -> Iterator[Array]:
+        """Of each window in turn the log-probabilities (Q,) of the sets of kinds of action."""
         assert self.known is not None
-        found = []
-        for start in range(0, len(parts), AT_ONCE):
-            frames = [self.frames(part) for part in parts[start : start + AT_ONCE]]
+        for start in range(0, len(spans), AT_ONCE):
+            frames = [self.frames(motion[a:b]) for a, b in spans[start : start + AT_ONCE]]
             counted, _ = self.known.near(self.contexts(frames, "space"))
-            found.append(self.known.shares(counted).astype(np.float32))
-            progress(start + len(frames), len(parts))
-        shares = np.concatenate(found)
-        return np.log(0.02 + shares[:, np.unique(shares.argmax(axis=1))].astype(np.float64))
+            yield from np.log(0.02 + self.known.shares(counted))
+            progress(start + len(frames), len(spans))
 
     def _parts(self, motion: Motion, cuts: list[int]) -> list[Part]:
         """Parts of a motion between cuts; a cut between two equal descriptions is dropped."""
@@ -313,18 +312,42 @@ def near_scores(
     return found
 
 
-def best_path(scores: Scores, change: float) -> list[int]:
-    """For each window the column of (W, S) such that the sum, less ``change`` for each change of column, is largest."""
-    best, back = scores[0], []
-    for row in scores[1:]:
+def best_path(scores: Iterable[Array], change: float, at_once: int = AT_ONCE) -> list[int]:
+    """For each window (S,) the column such that the sum, less ``change`` for each change of column, is largest.
+
+    at_once: windows after which what is behind them is decided as far as all paths agree on it, so that memory does not
+    grow with the length.
+    """
+    rows = iter(scores)
+    best, back, path = next(rows), list[NDArray[np.intp]](), list[int]()
+    for row in rows:
         leader = int(best.argmax())
         stays = best >= best[leader] - change
         back.append(np.where(stays, np.arange(len(best)), leader))
         best = np.where(stays, best, best[leader] - change) + row
-    path = [int(best.argmax())]
+        if len(back) % at_once == 0:
+            path += _agreed(back, len(best))
+    return path + _traced(back, int(best.argmax()))
+
+
+def _traced(back: Sequence[NDArray[np.intp]], last: int) -> list[int]:
+    """The path that ends in a column."""
+    path = [last]
     for before in reversed(back):
         path.append(int(before[path[-1]]))
     return path[::-1]
+
+
+def _agreed(back: list[NDArray[np.intp]], columns: int) -> list[int]:
+    """The beginning that all paths share, which is taken from ``back``."""
+    ends = np.arange(columns)
+    for place in range(len(back) - 1, -1, -1):
+        ends = back[place][ends]
+        if (ends == ends[0]).all():
+            found = _traced(back[:place], int(ends[0]))
+            del back[: place + 1]
+            return found
+    return []
 
 
 def edges(spans: Sequence[tuple[int, int]], path: Sequence[int]) -> list[int]:
