@@ -13,6 +13,7 @@ from motet.models.describe import DescribeModel
 from motet.models.known import NOTHING
 from motet.models.language import RULES
 from motet_train.data.store import Store
+from motet_train.evaluate.language.actions import error_by_chance
 from motet_train.runs import Run
 
 NETS = "[model]\nencoder_units = [4, 4]\ndecoder_units = [6, 6]\nembedding = 4\n"
@@ -63,6 +64,7 @@ def test_descriptions_are_judged_by_action(folder: Path) -> None:
         assert report["actions"]["of"] == count
         assert 0 <= report["actions"]["right"] <= 1
         assert 0 <= report["lookup"]["right"] <= 1
+        assert 0 <= report["actions"]["calibration_by_chance"] <= 1
     assert "--actions takes describe models" in motet("evaluate", "search", "--actions", "test").output
 
 
@@ -72,3 +74,10 @@ def test_known_motions_need_a_net_that_writes(folder: Path) -> None:
     assert result.exit_code != 0
     assert "known motions need a run of describe (--writer)" in result.output
     assert not (folder / "none" / "run.json").exists()
+
+
+def test_probabilities_that_are_right_err_by_chance_alone() -> None:
+    chances = np.random.default_rng(0).random(20_000)
+    assert error_by_chance(np.array([0.0, 1.0])) == 0
+    assert error_by_chance(np.full(1, 0.5)) == pytest.approx(0.5)
+    assert 0.2 > error_by_chance(chances[:60], 100) > 4 * error_by_chance(chances, 20) > 0

@@ -34,15 +34,17 @@ def actions_report(model: DescribeModel, corpus: SplitStore) -> Report:
 
     "actions": how many there are ("of"); the shares that are right by action (:class:`motet_train.data.kinds.Shown`),
     that are sure, of these that are right and wrong, and of which nothing is said; and the expected calibration error
-    of the probability. "lookup": the share of the sentences about the nearest training motions that are right, by mean
-    and deviation of positions, speeds and path. "turns": of motions of which half of the sentences tell a turn and its
-    side, how many there are and the share whose description tells it. "timeline": see :func:`timelines`.
+    of the probability, beside that of probabilities that are exactly right, of as many motions. "lookup": the share of
+    the sentences about the nearest training motions that are right, by mean and deviation of positions, speeds and
+    path. "turns": of motions of which half of the sentences tell a turn and its side, how many there are and the share
+    whose description tells it. "timeline": see :func:`timelines`.
     """
     test = corpus.described(corpus.parts.test)
     motions, shown = corpus.motions(test), [_shown(corpus, record) for record in test]
     found = [row[0] for row in model.describe(motions)]
     right = np.array([one.right(said.text) for one, said in zip(shown, found, strict=True)])
     sure = np.array([said.confident for said in found])
+    chances = np.array([said.probability for said in found])
     near = corpus.references(nearest_motions(corpus, motions))
     copied = [np.mean([one.right(text) for text in texts]) for one, texts in zip(shown, near, strict=True)]
     actions = {
@@ -52,7 +54,8 @@ def actions_report(model: DescribeModel, corpus: SplitStore) -> Report:
         "right_if_sure": _share(right[sure]),
         "wrong_if_sure": _share(~right[sure]),
         "nothing": _share(np.array([said.text == NOTHING for said in found])),
-        "calibration_error": calibration_error(np.array([said.probability for said in found]), right),
+        "calibration_error": calibration_error(chances, right),
+        "calibration_by_chance": error_by_chance(chances),
     }
     report = {"actions": actions, "lookup": {"right": float(np.mean(copied))}, "turns": _turns(corpus, test, found)}
     return report | {"timeline": timelines(model, corpus, test)}
@@ -103,6 +106,12 @@ def calibration_error(probability: NDArray[np.float64], right: Truths) -> float:
     bins = np.minimum((probability * BINS).astype(int), BINS - 1)
     errors = [abs(probability[bins == one].sum() - right[bins == one].sum()) for one in range(BINS)]
     return float(sum(errors) / len(right))
+
+
+def error_by_chance(probability: NDArray[np.float64], times: int = 1000) -> float:
+    """The mean calibration error where each probability (N,) is exactly right: what too few motions leave."""
+    drawn = np.random.default_rng(0).random((times, len(probability))) < probability
+    return float(np.mean([calibration_error(probability, right) for right in drawn]))
 
 
 def _share(truths: Truths) -> float:
