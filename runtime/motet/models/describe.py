@@ -205,10 +205,12 @@ class DescribeModel(LanguageModel):
         """
         motion = self.on_figure(motion).resample(self.fps)
         settings, beam = self.settings(TimelineSettings), LOOPS["beam"]
-        spans = windows(len(motion), motion.fps, settings)
         if self.known is not None:
-            rows = self._kinds(motion, spans, progress)
-            return self._parts(motion, edges(spans, best_path(rows, self.known.settings.change)))
+            how = self.known.settings
+            spans = windows(len(motion), motion.fps, TimelineSettings(how.window, how.hop))
+            path = best_path(self._kinds(motion, spans, progress), how.change * 0.5 / how.hop)
+            return self._parts(motion, edges(spans, path))
+        spans = windows(len(motion), motion.fps, settings)
         contexts = self.embed([motion[start:stop] for start, stop in spans])
         likeliest = self._hypotheses(beam, contexts, beam.defaults(self.manifest.defaults))
         ids = self.vocabulary.ids

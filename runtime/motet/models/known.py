@@ -31,10 +31,11 @@ class AnswerSettings(Settings):
     """How known motions answer. Training finds the last four (docs/language.md).
 
     near: how many of the nearest motions count. temperature: a motion this much less similar counts e times less.
-    turned, straight: from how many degrees on a path turns, and up to how many it is straight. change: the cost of
-    another action in a timeline. shortest: what is shorter is not described. sure: least probability of a description
-    that is trusted. outside: least similarity of the nearest motion; below it nothing is said. bias, share: of the
-    logistic function that gives the probability, see :meth:`Known.probability`.
+    turned, straight: from how many degrees on a path turns, and up to how many it is straight. window, hop: of a
+    timeline, as in :class:`motet.models.describe.TimelineSettings`. change: the cost of another action in it, where
+    there are two windows a second, and as much more as there are more. shortest: what is shorter is not described.
+    sure: least probability of a description that is trusted. outside: least similarity of the nearest motion; below it
+    nothing is said. bias, share: of the logistic function that gives the probability, see :meth:`Known.probability`.
     """
 
     FEATURE: ClassVar[str] = "answer"
@@ -42,6 +43,8 @@ class AnswerSettings(Settings):
     temperature: Annotated[float, Range(0.001, 10)] = 0.07
     turned: Annotated[float, Range(0, 360, "degrees")] = 45.0
     straight: Annotated[float, Range(0, 360, "degrees")] = 25.0
+    window: Annotated[float, Range(0.1, 30, "s")] = 1.0
+    hop: Annotated[float, Range(0.1, 30, "s")] = 0.2
     change: Annotated[float, Range(0, 1000, "nats")] = 3.0
     shortest: Annotated[float, Range(0, 30, "s")] = 0.5
     sure: Annotated[float, Range(0, 1)] = 0.8
