@@ -72,6 +72,11 @@ class Browser:
         )
         assert self.value(waiting), self.errors
 
+    def emulate(self, **features: str) -> None:
+        """Media features of the next pages, such as ``prefers_reduced_motion="reduce"``."""
+        named = [{"name": name.replace("_", "-"), "value": value} for name, value in features.items()]
+        self._call("Emulation.setEmulatedMedia", features=named)
+
     def value(self, expression: str) -> Any:
         """What a JavaScript expression gives, as JSON; promises are awaited."""
         found = self._call("Runtime.evaluate", expression=expression, awaitPromise=True, returnByValue=True)

@@ -34,8 +34,8 @@ def test_a_page_needs_no_other_file(tmp_path: Path, steer_model: SteerModel) -> 
 
 
 def test_what_cannot_be_steered_is_refused(tmp_path: Path, steer_model: SteerModel) -> None:
-    for characters in (0, 9, 2.5):
-        with pytest.raises(ControlError, match="characters must be a whole number from 1 to 8"):
+    for characters in (0, 51, 2.5):
+        with pytest.raises(ControlError, match="characters must be a whole number from 1 to 50"):
             motet.write_live_page(tmp_path / "live.html", steer_model, characters)  # type: ignore[arg-type]
     with pytest.raises(BundleError, match="is not steered"):
         motet.live_page(motet.load("cmu-control"))
@@ -89,6 +89,7 @@ def page(tmp_path_factory: pytest.TempPathFactory, steer_model: SteerModel) -> A
     folder = tmp_path_factory.mktemp("live")
     motet.write_live_page(folder / "live.html", steer_model, 3)
     with Browser(folder / "profile") as browser:
+        browser.emulate(prefers_reduced_motion="reduce")
         browser.open(folder / "live.html", ready="window.motet")
         yield browser
 
@@ -128,8 +129,8 @@ def test_keys_steer_the_figure(page: Browser) -> None:
 
 
 RUNS = """new Promise((done) => {
-  const start = motet.figures[0].trail.length;
-  const look = () => (motet.figures[0].trail.length >= start + 10 ? done(true) : setTimeout(look, 10));
+  const start = motet.ticks;
+  const look = () => (motet.ticks >= start + 10 ? done(true) : setTimeout(look, 10));
   look();
 })"""
 
@@ -149,6 +150,7 @@ def test_buttons_and_the_stick(page: Browser) -> None:
     page.key("Digit2", "2", down=True)
     page.key("Digit2", "2", down=False)
     assert page.value("[...document.querySelectorAll('#gaits button')].map((b) => b.ariaPressed)")[1] == "true"
+    page.value("document.querySelector('#more').open = true")
     page.value("document.querySelector('#others').value = 1, document.querySelector('#others').onchange()")
     assert page.value("motet.figures.length") == 2
     page.value("document.querySelector('#others').focus()")  # letters steer there, too

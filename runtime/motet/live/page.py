@@ -35,16 +35,15 @@ def write_live_page(file: File, model: SteerModel, characters: int = 1, title: s
 def live_page(model: SteerModel, characters: int = 1, title: str = "motet") -> str:
     """The HTML of a page in which a figure is steered with keys, a gamepad or a finger, and others go with it.
 
-    characters: how many figures there are at first, 1 to 8. ControlError for another number, BundleError for another
+    characters: how many figures there are at first, 1 to 50. ControlError for another number, BundleError for another
     model.
     """
     if not isinstance(model, SteerModel):
         raise BundleError(f"{model} is not steered: a page needs a model such as motet.load('control')")
-    most = 8
+    most = 50
     characters = checked_int("characters", characters, 1, most, ControlError)
     data = {"net": net_data(model), "body": body_data(), "characters": characters, "most": most}
-    scripts = {"CONTROL": source("motet.live", "control.js"), "OTHERS": source("motet.live", "others.js")}
-    return filled(source("motet.live", "page.html"), title, data, **scripts)
+    return filled(source("motet.live", "page.html"), title, data, CONTROL=source("motet.live", "control.js"))
 
 
 def net_data(model: SteerModel) -> dict[str, Any]:

@@ -10,7 +10,24 @@ export interface Node {
   scale?: Vector;
   matrix?: number[];
   mesh?: number;
+  skin?: number;
   camera?: number;
+}
+
+/** A part of a mesh: accessors by what they hold. */
+export interface MeshPart {
+  attributes: Record<string, number>;
+  indices?: number;
+  material?: number;
+  mode?: number;
+  extensions?: object;
+}
+
+export interface Material {
+  pbrMetallicRoughness?: { baseColorFactor?: number[]; baseColorTexture?: { index: number } };
+  alphaMode?: string;
+  alphaCutoff?: number;
+  doubleSided?: boolean;
 }
 
 export interface Animation {
@@ -19,10 +36,14 @@ export interface Animation {
   samplers: { input: number; output: number; interpolation?: string }[];
 }
 
-interface Document {
+export interface Document {
   asset: { version: string };
   nodes?: Node[];
-  skins?: { joints: number[] }[];
+  skins?: { joints: number[]; inverseBindMatrices?: number }[];
+  meshes?: { primitives: MeshPart[] }[];
+  materials?: Material[];
+  textures?: { source?: number }[];
+  images?: { bufferView?: number; uri?: string; mimeType?: string }[];
   animations?: Animation[];
   accessors?: { bufferView?: number; byteOffset?: number; componentType: number; count: number; type: string; normalized?: boolean; sparse?: object }[];
   bufferViews?: { buffer: number; byteOffset?: number; byteLength: number; byteStride?: number; extensions?: object }[];
@@ -163,6 +184,12 @@ export class Gltf {
         return normalized ? Math.max(value / most, -1) : value;
       }),
     );
+  }
+
+  /** The bytes of a view of a buffer. */
+  bytes(view: number): Uint8Array {
+    const { buffer, byteOffset = 0, byteLength } = this.document.bufferViews![view]!;
+    return this.buffers[buffer]!.subarray(byteOffset, byteOffset + byteLength);
   }
 
   /** Some nodes and all their ancestors. */

@@ -118,6 +118,15 @@ function top(gltf: Gltf, part: Set<number>): number {
   return at;
 }
 
+/** The figure of a parsed file at rest: the one with the most joints, the node of each joint, and where nodes are. */
+export function restOf(gltf: Gltf): { skeleton: Skeleton; joints: number[]; rest: Map<number, Placed> } {
+  return guarded(() => {
+    const joints = jointsOf(gltf, figures(gltf).reduce((best, one) => (one.size > best.size ? one : best)));
+    const rest = gltf.world(new Set(gltf.order));
+    return { skeleton: skeletonOf(gltf, joints, rest), joints, rest };
+  });
+}
+
 /** The figure that an animation moves most, counting its ancestors, else that with the most joints, in the animation's frames. */
 function taken(gltf: Gltf, found: Set<number>[], animation?: Animation): Motion {
   const moved = animation ? moves(animation) : new Set<number>();

@@ -1,0 +1,75 @@
+/* Files that are dropped on the page: a motion that the figure does, or an avatar that it becomes. */
+import { readBVH } from "../bvh.js";
+import { FormatError, MotionError } from "../errors.js";
+import { Gltf } from "../gltf.js";
+import { clipsOf, readGLB } from "../gltfMotion.js";
+import { isHumanoid } from "../humanoid.js";
+import { type Motion, resampled } from "../motion.js";
+import { toHumanoid } from "../retarget.js";
+import { wrapped } from "../springs.js";
+import { Avatar } from "./avatar.js";
+
+const LARGEST = 200e6;
+const MOST_SECONDS = 60;
+const RADIANS = Math.PI / 180;
+
+/** What is in a file; told: a sentence about it. The motion is of the humanoid, at the page's rate. */
+export interface Dropped {
+  told: string;
+  motion?: Motion;
+  avatar?: Avatar;
+}
+
+/** Read a dropped file; a sentence with its name is thrown as an Error where it is neither a motion nor an avatar. */
+export async function dropped(file: File, fps: number): Promise<Dropped> {
+  try {
+    if (file.size > LARGEST) throw new FormatError(`it has ${Math.round(file.size / 1e6)} MB, and at most ${LARGEST / 1e6} are read`);
+    return await opened(file.name, new Uint8Array(await file.arrayBuffer()), fps);
+  } catch (error) {
+    if (!(error instanceof FormatError || error instanceof MotionError)) throw error;
+    throw new Error(`${file.name} cannot be used: ${error.message}`, { cause: error });
+  }
+}
+
+async function opened(name: string, content: Uint8Array, fps: number): Promise<Dropped> {
+  const start = new TextDecoder().decode(content.subarray(0, 200)).trimStart();
+  if (/^\ufeff?HIERARCHY/i.test(start)) return played(name, readBVH(content), fps);
+  if (!start.startsWith("glTF") && !start.startsWith("{")) {
+    throw new FormatError("it is neither a motion (.bvh, .glb, .vrma) nor an avatar (.vrm, .glb)");
+  }
+  const { document } = Gltf.parse(content);
+  const moves = document.animations?.length ? clipsOf(content).length > 0 : false;
+  if (!document.meshes?.length || document.extensions?.VRMC_vrm_animation) return played(name, readGLB(content), fps);
+  const avatar = await Avatar.read(content);
+  const told = `${name} is who moves now.`;
+  if (!moves) return { avatar, told };
+  const motion = played(name, readGLB(content), fps);
+  return { avatar, ...motion, told: `${told} ${motion.told}` };
+}
+
+function played(name: string, given: Motion, fps: number): Dropped {
+  const { rotations: { length }, fps: rate } = given;
+  if (length < 3) throw new MotionError("it has a figure but no motion");
+  const own = isHumanoid(given.skeleton);
+  const cut = { ...given, rotations: given.rotations.slice(0, MOST_SECONDS * rate), translations: given.translations.slice(0, MOST_SECONDS * rate) };
+  const found = own ? { motion: cut, convention: "motet's humanoid", notes: [] } : toHumanoid(cut.fps > fps ? resampled(cut, fps) : cut);
+  const motion = resampled(found.motion, fps);
+  const figure = `${given.skeleton.joints.length} joints${own || found.convention ? `, ${found.convention}` : ""}`;
+  const shown = length > cut.rotations.length ? `, of which the first ${MOST_SECONDS} s are shown` : "";
+  const told = `${name}: a figure of ${figure}; ${(length / rate).toFixed(1)} s at ${Math.round(rate)} frames a second${shown}. ${way(motion)}`;
+  return { motion, told };
+}
+
+/** How far a motion of the humanoid goes and how it turns, in words. */
+export function way({ translations, rotations, fps }: Motion): string {
+  const places = translations.map((moves) => moves[0]!);
+  const half = Math.round(fps / 2); // twice a second, so that swaying hips go nowhere
+  const stops = places.filter((_, at) => at % half === 0);
+  const gone = stops.slice(1).reduce((sum, [x, , z], at) => sum + Math.hypot(x - stops[at]![0], z - stops[at]![2]), 0);
+  const facings = rotations.map(([hips]) => Math.atan2(2 * (hips![0] * hips![2] + hips![1] * hips![3]), 1 - 2 * (hips![0] ** 2 + hips![1] ** 2)));
+  const turned = facings.slice(1).reduce((sum, facing, at) => sum + wrapped(facing - facings[at]!), 0) / RADIANS;
+  const seconds = places.length / fps;
+  const goes = gone < 0.5 ? "It stays in its place" : `It goes ${gone.toFixed(1)} m, ${(gone / seconds).toFixed(1)} m/s`;
+  const turns = Math.abs(turned) < 30 ? "" : `, and turns ${Math.round(Math.abs(turned))} degrees to the ${turned > 0 ? "left" : "right"}`;
+  return `${goes}${turns}.`;
+}

@@ -1,0 +1,144 @@
+/* The model of a live page, and its figures. */
+import { halves } from "../arrays.js";
+import { ControlModel } from "../control.js";
+import type { Manifest } from "../bundle.js";
+import { BONES, HUMANOID, SIDES } from "../humanoid.js";
+import type { Tables } from "../matching.js";
+import { type Motion, worldOf } from "../motion.js";
+import type { Pose as Ground } from "../planar.js";
+import { about, product, type Quaternion, STILL, type Vector, Y } from "../rotations.js";
+import { damped, dampedPath, dampingOf, wrapped } from "../springs.js";
+import { standing, type Steered, tell, tick } from "../steered.js";
+import { between, type Played } from "../steering.js";
+
+/** Joints of the foot and of the toes, left and right. */
+export const FEET = SIDES.map((side) => ["Foot", "Toes"].map((part) => HUMANOID.index(side + part)));
+
+const KINDS = { f4: Float32Array, i1: Int8Array, u1: Uint8Array, i4: Int32Array, f2: Uint16Array };
+
+/** The numbers of a bundle, as motet/live/page.py writes them. */
+export interface Given {
+  manifest: Manifest;
+  tables: Record<string, { kind: keyof typeof KINDS; shape: [rows: number, width: number] }>;
+}
+
+/** Where a figure goes: which gait, its velocity along x and z in m/s, and its facing in radians. */
+export interface Asked {
+  gait: number;
+  x: number;
+  z: number;
+  facing: number;
+}
+
+/** The model of a page, whose tables are gzipped. */
+export async function modelOf({ manifest, tables }: Given, bytes: BufferSource): Promise<ControlModel> {
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return new ControlModel(manifest, unpacked(new Uint8Array(await new Response(stream).arrayBuffer()), tables));
+}
+
+/** The tables row by row. They come one after the other, column by column, of each first all first bytes of its numbers. */
+function unpacked(bytes: Uint8Array, tables: Given["tables"]): Tables {
+  const found: Record<string, unknown> = {};
+  let at = 0;
+  for (const [name, { kind, shape: [rows, width] }] of Object.entries(tables)) {
+    const size = KINDS[kind].BYTES_PER_ELEMENT;
+    const target = new Uint8Array(rows * width * size);
+    for (let column = 0; column < width; column++) {
+      for (let byte = 0; byte < size; byte++) {
+        for (let row = 0; row < rows; row++) target[(row * width + column) * size + byte] = bytes[at++]!;
+      }
+    }
+    found[name] = kind === "f2" ? halves(new Uint16Array(target.buffer)) : new KINDS[kind](target.buffer);
+  }
+  return found as unknown as Tables;
+}
+
+/** A figure of the page, and the last two ticks, between which it is shown. */
+export class Figure {
+  private readonly steered: Steered;
+  private before: Played;
+  private now: Played;
+
+  /** With a phase it searches in its turn alone: a crowd costs the same in each tick. */
+  constructor(
+    private readonly model: ControlModel,
+    place: Ground,
+    phase?: number,
+  ) {
+    this.steered = standing(model, 0, place, phase);
+    this.before = this.now = tick(model, this.steered, true);
+  }
+
+  /** x and z in metres, and the facing in radians. */
+  get root(): Ground {
+    return this.steered.playback.root;
+  }
+
+  /** Along x and z in m/s. */
+  get velocity(): [x: number, z: number] {
+    const [x, z] = this.steered.playback.spring;
+    return [x, z];
+  }
+
+  /** What it was asked, within the limits of its gait. */
+  get asked(): Asked {
+    const [x, z, facing] = this.steered.target;
+    return { gait: this.steered.command.gait, x, z, facing };
+  }
+
+  /** A tick later, asked anew. */
+  tick({ gait, x, z, facing }: Asked): void {
+    const command = { gait, speed: Math.hypot(x, z), direction: Math.atan2(x, z), facing, facesWay: false };
+    tell(this.steered, command, this.model.abilities.target(command).target);
+    [this.before, this.now] = [this.now, tick(this.model, this.steered, true)];
+  }
+
+  /** Where it is asked to be so many seconds from now: what its springs lead to. */
+  later(seconds: number): Ground {
+    const { playback: { root, spring, springRate }, target } = this.steered;
+    const { velocity, facing } = this.model.steerer.matcher.how;
+    const slow = dampingOf(velocity);
+    const [x, z] = [0, 1].map((i) => root[i]! + target[i]! * seconds + dampedPath(spring[i]! - target[i]!, springRate[i]!, slow, seconds));
+    const [off] = damped(wrapped(spring[2] - target[2]), springRate[2], dampingOf(facing), seconds);
+    return [x!, z!, target[2] + off];
+  }
+
+  /** The pose of the last tick. */
+  get pose(): Played {
+    return this.now;
+  }
+
+  /** As it is at a part of the way from the last tick but one to the last. */
+  shown(part: number): Shown {
+    return shownOf(between(this.before, this.now, part));
+  }
+}
+
+/** A pose with rotations and places in the world of the humanoid's joints. */
+export interface Shown extends Played {
+  turned: Quaternion[];
+  places: Vector[];
+}
+
+/** A pose in the world. */
+export function shownOf(pose: Played): Shown {
+  const { turns, places } = worldOf(motionOf([pose]));
+  return { ...pose, turned: turns[0]!, places: places[0]! };
+}
+
+/** Poses, a tick after each other, as a motion of the humanoid. */
+export function motionOf(poses: Played[], fps = 30): Motion {
+  const rotations = poses.map((pose) => {
+    const own = HUMANOID.names.map((name): Quaternion => pose.rotations[BONES.indexOf(name)] ?? STILL);
+    own[0] = product(about(Y, pose.ground[2]), own[0]!);
+    return own;
+  });
+  const translations = poses.map(({ ground: [x, z], height }) => HUMANOID.joints.map(({ offset }, at): Vector => (at ? offset : [x, height, z])));
+  return { skeleton: HUMANOID, fps, rotations, translations, travels: true };
+}
+
+/** A speed that a gait has at an angle from the facing; 0 is always one. */
+export function inRange({ abilities }: ControlModel, gait: number, speed: number, aside = 0): number {
+  const [x, z] = abilities.target({ gait, speed, direction: aside, facing: 0, facesWay: false }).target;
+  return Math.hypot(x, z);
+}

@@ -1,0 +1,158 @@
+/* The page of `motet live`: figures, who steers them, time, and what is drawn. Metres, seconds and radians. */
+import { fastest, type Net, ownControl, placeBehind, usual } from "./crowd.js";
+import { addControls } from "./controls.js";
+import type { Dropped } from "./drop.js";
+import { type Asked, Figure, type Given as GivenNet, inRange, modelOf } from "./figure.js";
+import { Hands } from "./hands.js";
+import { eight, type Pilot } from "./pilots.js";
+import { Recorder } from "./record.js";
+import { Scene } from "./scene.js";
+import type { Stage } from "./stage.js";
+import { orderOf } from "./words.js";
+
+/** What motet/live/page.py writes into a page. bytes: base64. */
+export interface Given {
+  net: GivenNet & { bytes: string };
+  body: { height: number };
+  characters: number;
+  most: number;
+}
+
+const RADIANS = Math.PI / 180;
+/** Seconds that a frame counts for, at most. */
+const LATEST = 0.1;
+
+export class Page {
+  readonly figures: Figure[] = [];
+  readonly state = { gait: 0, hurry: false, strafe: false, trails: true, contacts: false, follows: true, pause: false, pace: 1 };
+  /** Who steers while no hand does. */
+  pilot: Pilot | null = null;
+  /** Since the page was opened. */
+  ticks = 0;
+  private ahead = 0;
+  private last: number | null = null;
+
+  constructor(
+    readonly net: Net,
+    readonly stage: Stage,
+    readonly scene: Scene,
+    readonly hands: Hands,
+    readonly recorder: Recorder,
+    private readonly say: (text: string) => void,
+  ) {}
+
+  get view() {
+    return this.stage.view;
+  }
+
+  /** So many figures in all; those that come stand behind the first one. */
+  setFigures(count: number): void {
+    const { figures, net } = this;
+    figures.length = Math.min(figures.length, count);
+    for (let n = figures.length; n < count; n++) {
+      const [x, z, facing] = figures[0]?.root ?? [0, 0, 0];
+      const [behind, left] = n ? placeBehind(n) : [0, 0];
+      const [sin, cos] = [Math.sin(facing), Math.cos(facing)];
+      const phase = n ? n % net.model.steerer.matcher.how.search_every : undefined;
+      figures.push(new Figure(net.model, [x - behind * sin + left * cos, z - behind * cos - left * sin, facing], phase));
+    }
+  }
+
+  /** A figure of eight until somebody steers. */
+  startByItself(): void {
+    this.pilot = eight(this.figures[0]!);
+  }
+
+  /** Do what a sentence says; what is to be answered. */
+  told(text: string): string {
+    const leader = this.figures[0]!;
+    const order = orderOf(text, this.net, leader);
+    if (!order) return `? It knows ${this.net.gaits.join(", ")}, stop, turn left or right, faster and slower.`;
+    this.pilot = order;
+    return order.speed ? `${this.net.gaits[order.gait]}, ${order.speed.toFixed(1)} m/s` : "standing";
+  }
+
+  /** Take what was dropped; what is to be said of it. */
+  show({ told, avatar }: Dropped): string {
+    if (avatar) this.scene.become(avatar);
+    return told;
+  }
+
+  /** What the first figure is asked: by hand, or else by its pilot, or else to stand. */
+  asked(): Asked {
+    const [x, y] = this.hands.pushed;
+    if (x || y) this.pilot = null;
+    else if (this.pilot) {
+      const found = this.pilot.ask(this.net, this.figures[0]!);
+      if (found) return found;
+      this.pilot = null;
+    }
+    return this.byHand(x, y);
+  }
+
+  private byHand(x: number, y: number): Asked {
+    const { net, state } = this;
+    const strength = Math.hypot(x, y);
+    const away = this.view.yaw * RADIANS + Math.PI;
+    const gait = (state.hurry || this.hands.hurries) && state.gait === 0 ? fastest(net) : state.gait;
+    const way = away - Math.atan2(x, y);
+    const facing = state.strafe ? away : strength ? way : this.figures[0]!.asked.facing;
+    const speed = strength ? inRange(net.model, gait, strength * usual(net, gait), way - facing) : 0;
+    return { gait, x: speed * Math.sin(way), z: speed * Math.cos(way), facing };
+  }
+
+  /** A tick of all figures, the first of them with a control. */
+  tick(control: Asked): void {
+    const { figures, net, state } = this;
+    figures.forEach((figure, n) => figure.tick(n ? ownControl(net, figures, n, state.follows) : control));
+    this.ticks++;
+    this.scene.keep(figures);
+    this.recorder.keep(figures[0]!.pose);
+  }
+
+  /** A picture at a moment in milliseconds, and the ticks before it. */
+  frame(now: number): void {
+    const passed = this.last === null ? 0 : Math.min((now - this.last) / 1000, LATEST);
+    this.last = now;
+    this.hands.look(passed);
+    if (!this.state.pause) this.ahead += passed * this.net.fps * this.state.pace;
+    for (; this.ahead >= 1; this.ahead--) this.tick(this.asked());
+    const poses = this.figures.map((figure) => figure.shown(this.ahead));
+    this.scene.draw(poses, passed, this.figures, this.pilot?.goal, this.state);
+    this.tell();
+  }
+
+  private tell(): void {
+    const { velocity, asked } = this.figures[0]!;
+    this.say(`${this.net.gaits[asked.gait]} · ${Math.hypot(...velocity).toFixed(1)} m/s`);
+  }
+}
+
+/** Open the page of what motet/live/page.py has written. */
+export async function open(given: Given, stage: Stage): Promise<Page> {
+  const bytes = Uint8Array.from(atob(given.net.bytes), (letter) => letter.charCodeAt(0));
+  const model = await modelOf(given.net, bytes);
+  const speeds = Object.fromEntries(model.gaits.map((gait, n) => [gait, model.abilities.speeds[n]!]));
+  const net: Net = { model, gaits: model.gaits, fps: model.fps, speeds, rows: model.steerer.matcher.rows };
+  const element = (id: string) => document.getElementById(id)!;
+  const canvas = element("canvas") as HTMLCanvasElement;
+  const scene = new Scene(stage, canvas, given.body, given.body.height);
+  const page = new Page(net, stage, scene, new Hands(stage, element("stick")), new Recorder(net.fps, scene, canvas), said(element("speed")));
+  page.setFigures(given.characters);
+  addControls(page, given.most);
+  if (!matchMedia("(prefers-reduced-motion: reduce)").matches) page.startByItself();
+  const frame = (now: number) => {
+    page.frame(now);
+    requestAnimationFrame(frame);
+  };
+  requestAnimationFrame(frame);
+  return page;
+}
+
+/** Writes what changes into an element. */
+function said(element: HTMLElement): (text: string) => void {
+  let last = "";
+  return (text) => {
+    if (text !== last) element.textContent = last = text;
+  };
+}

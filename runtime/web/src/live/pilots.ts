@@ -1,0 +1,68 @@
+/* Who steers the first figure while no hand does: a figure of eight, a point to go to, or an order. */
+import { type Asked, type Figure, inRange } from "./figure.js";
+import { fastest, type Net, towards, usual } from "./crowd.js";
+import { dampedPath, dampingOf } from "../springs.js";
+
+/** Asks a figure each tick; null when it is done. goal: where it goes, x and z in metres. */
+export interface Pilot {
+  readonly goal?: readonly [number, number];
+  ask(net: Net, figure: Figure): Asked | null;
+}
+
+/** Half the length of an eight, how far ahead its point is, and a step along it; metres, metres, radians. */
+const [HALF, AHEAD, STEP] = [3.2, 0.9, 0.02];
+/** m/s at which the second round is run. */
+const RUNS = 2.6;
+/** Metres from its point at which a figure has arrived, and from which on it runs there; the slowest that it goes, m/s. */
+const [NEAR, FAR_AWAY, SLOWEST] = [0.3, 5, 0.5];
+
+/** A figure of eight about where a figure stands, Gerono's lemniscate: walked, then run, in turns. */
+export function eight({ root: [x, z, facing] }: Figure): Pilot {
+  let along = 0;
+  const turned = facing - Math.PI / 4; // it starts at an angle of 45 degrees to its length
+  const point = (): [number, number] => {
+    const [ahead, aside] = [HALF * Math.sin(along), HALF * Math.sin(along) * Math.cos(along)];
+    return [x + ahead * Math.sin(turned) + aside * Math.cos(turned), z + ahead * Math.cos(turned) - aside * Math.sin(turned)];
+  };
+  const away = ({ root }: Figure) => Math.hypot(point()[0] - root[0], point()[1] - root[1]);
+  return {
+    ask(net, figure) {
+      while (away(figure) < AHEAD) along += STEP;
+      const runs = Math.floor(along / (2 * Math.PI)) % 2 === 1;
+      return towards(net, [figure], 0, point(), runs ? RUNS : usual(net, 0));
+    },
+  };
+}
+
+/** Go to a point and stop there; run where it is far. */
+export function goTo(goal: readonly [number, number]): Pilot {
+  return {
+    goal,
+    ask(net, figure) {
+      const [x, z] = figure.root;
+      const away = Math.hypot(goal[0] - x, goal[1] - z);
+      if (away < Math.max(NEAR, stopping(net, figure))) return null;
+      const most = away > FAR_AWAY ? usual(net, fastest(net)) : usual(net, 0);
+      return towards(net, [figure], 0, goal, Math.min(most, Math.max(SLOWEST, 1.5 * away)));
+    },
+  };
+}
+
+/** How far a figure goes on if it is asked to stop: by its spring, from its speed. */
+function stopping({ model }: Net, figure: Figure): number {
+  return dampedPath(Math.hypot(...figure.velocity), 0, dampingOf(model.steerer.matcher.how.velocity), 2);
+}
+
+/** An order that stays: a gait, its speed, and the way, which is faced. */
+export class Order implements Pilot {
+  constructor(
+    public gait: number,
+    public speed: number,
+    public way: number,
+  ) {}
+
+  ask({ model }: Net): Asked {
+    const speed = this.speed ? inRange(model, this.gait, this.speed) : 0;
+    return { gait: this.gait, x: speed * Math.sin(this.way), z: speed * Math.cos(this.way), facing: this.way };
+  }
+}

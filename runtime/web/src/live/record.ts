@@ -1,0 +1,59 @@
+/* The last seconds of the steered figure as a file. */
+import { toVRMA } from "../glbWrite.js";
+import type { Played } from "../steering.js";
+import { motionOf, shownOf } from "./figure.js";
+import { toGIF } from "./gif.js";
+import type { Scene } from "./scene.js";
+
+/** Seconds that are kept, pixels of a GIF's sides, and ticks between two of its pictures. */
+const [KEPT, SIZE, EVERY] = [8, 320, 3];
+
+/** Keeps what a figure did last. */
+export class Recorder {
+  private poses: Played[] = [];
+
+  constructor(
+    private readonly fps: number,
+    private readonly scene: Scene,
+    private readonly canvas: HTMLCanvasElement,
+  ) {}
+
+  keep(pose: Played): void {
+    this.poses.push(pose);
+    if (this.poses.length > KEPT * this.fps) this.poses.shift();
+  }
+
+  get seconds(): number {
+    return this.poses.length / this.fps;
+  }
+
+  /** The bytes of a file of that kind. */
+  file(kind: string): Uint8Array<ArrayBuffer> {
+    return kind === "gif" ? this.gif() : (toVRMA(motionOf(this.poses, this.fps)) as Uint8Array<ArrayBuffer>);
+  }
+
+  private gif(): Uint8Array<ArrayBuffer> {
+    const small = new OffscreenCanvas(SIZE, SIZE);
+    const ink = small.getContext("2d", { willReadFrequently: true })!;
+    ink.fillStyle = getComputedStyle(document.documentElement).getPropertyValue("--back");
+    const side = Math.min(this.canvas.width, this.canvas.height);
+    const [x, y] = [(this.canvas.width - side) / 2, (this.canvas.height - side) / 2];
+    const poses = this.poses.filter((_, at) => at % EVERY === 0);
+    const pictures = poses.map((pose) => {
+      this.scene.draw([shownOf(pose)], EVERY / this.fps, [], undefined, { trails: false, contacts: false });
+      ink.fillRect(0, 0, SIZE, SIZE);
+      ink.drawImage(this.canvas, x, y, side, side, 0, 0, SIZE, SIZE);
+      return ink.getImageData(0, 0, SIZE, SIZE).data;
+    });
+    return toGIF(pictures, SIZE, SIZE, (100 * EVERY) / this.fps);
+  }
+}
+
+/** Hand a file to the browser's downloads. */
+export function download(content: Uint8Array<ArrayBuffer>, name: string, type: string): void {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(new Blob([content], { type }));
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+}

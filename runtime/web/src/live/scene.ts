@@ -1,0 +1,118 @@
+/* What is seen: figures as they are between two ticks, the ways they have gone and are asked to go, feet that stand. */
+import { SIDES } from "../humanoid.js";
+import type { Vector } from "../rotations.js";
+import { FEET, type Figure, type Shown } from "./figure.js";
+import type { Avatar } from "./avatar.js";
+import type { Camera, Drawn, Painter, Spot, Stage, Strip } from "./stage.js";
+
+/** What a figure looks like: what is drawn of it in a pose. */
+type Looks = (shown: Shown, n: number) => Drawn;
+
+/** Ticks of a way gone that are kept. */
+const TRAIL = 300;
+/** Seconds of the asked path, and between its points. */
+const [SOON, APART] = [1.4, 0.1];
+/** Seconds in which the camera comes half of the way after a figure, and how far it steps back for each further row. */
+const [LATE, STEP_BACK] = [0.12, 0.28];
+
+export interface Shows {
+  trails: boolean;
+  contacts: boolean;
+}
+
+export class Scene {
+  readonly painter: Painter;
+  private camera: Camera | null = null;
+  private target: Vector | null = null;
+  private readonly trails = new WeakMap<Figure, [x: number, z: number][]>();
+  private looks: Looks;
+  private avatar: unknown = null;
+
+  /** height: of the usual body, in metres, by which all is drawn. */
+  constructor(
+    private readonly stage: Stage,
+    canvas: HTMLCanvasElement,
+    body: unknown,
+    private readonly height: number,
+  ) {
+    const painter = stage.openStage(canvas);
+    if (!painter) throw new Error("it has no WebGL2");
+    this.painter = painter;
+    const own = painter.body(body);
+    const colours = stage.FIGURE_COLOURS;
+    this.looks = ({ turned, places }, n) => ({ body: own, turned, places, unit: 1 / height, ...(n ? { colour: colours[n % colours.length]! } : {}) });
+  }
+
+  /** From now on the first figure is an avatar. */
+  become(avatar: Avatar): void {
+    if (this.avatar) this.painter.drop(this.avatar);
+    const body = (this.avatar = this.painter.avatar(avatar.mesh));
+    const others = this.looks;
+    this.looks = (shown, n) => (n ? others(shown, n) : { body, matrices: avatar.matrices(shown), unit: avatar.scale / this.height });
+  }
+
+  /** Remember where figures are, once a tick. */
+  keep(figures: Figure[]): void {
+    for (const figure of figures) {
+      const trail = this.trails.get(figure) ?? [];
+      trail.push([figure.root[0] / this.height, figure.root[1] / this.height]);
+      if (trail.length > TRAIL) trail.shift();
+      this.trails.set(figure, trail);
+    }
+  }
+
+  /** Draw figures in poses, so many seconds after the last picture; their ways where these are given. */
+  draw(poses: Shown[], passed: number, figures: Figure[], goal: readonly [number, number] | undefined, shows: Shows): void {
+    const { width, height } = this.painter.begin();
+    if (!width || !height) return;
+    this.camera = this.follow(poses, passed, width, height);
+    const ways = shows.trails ? [...figures.map((figure, n) => this.gone(figure, n)), ...(figures[0] ? [this.asked(figures[0])] : [])] : [];
+    const spots = [...(shows.contacts ? poses.flatMap((pose) => this.standing(pose)) : []), ...(goal ? [this.spot(goal, 0.09, this.accent, 0.6)] : [])];
+    this.painter.draw(this.camera, { figures: poses.map((pose, n) => this.looks(pose, n)), strips: ways, spots });
+  }
+
+  /** x and z in metres where a pixel of the canvas shows the ground. */
+  groundAt(x: number, y: number): [x: number, z: number] | null {
+    const found = this.camera && this.stage.onGround(this.camera, x, y);
+    return found ? [found[0] * this.height, found[1] * this.height] : null;
+  }
+
+  /** The camera comes after the first figure without its sway, further away where there are many. */
+  private follow(poses: Shown[], passed: number, width: number, height: number): Camera {
+    const [x, z] = poses[0]!.ground;
+    const goal: Vector = [x / this.height, 0.5, z / this.height];
+    const part = this.target ? 1 - 0.5 ** (passed / LATE) : 1;
+    this.target = (this.target ?? goal).map((value, i) => value + part * (goal[i]! - value)) as Vector;
+    return this.stage.cameraAt([...this.target], 0, STEP_BACK * Math.sqrt(4 * (poses.length - 1)), width, height);
+  }
+
+  private gone(figure: Figure, n: number): Strip {
+    const points = [...(this.trails.get(figure) ?? [])].reverse(); // from the figure on, so that its end fades
+    return { points, colour: this.accent, alpha: n ? 0.15 : 0.4, fade: true };
+  }
+
+  private asked(figure: Figure): Strip {
+    const points = Array.from({ length: SOON / APART + 1 }, (_, at): [number, number] => {
+      const [x, z] = figure.later(at * APART);
+      return [x / this.height, z / this.height];
+    });
+    return { points, colour: this.stage.COLOURS.left, alpha: 0.7, width: 0.035, arrows: true };
+  }
+
+  private standing({ contacts, places }: Shown): Spot[] {
+    return SIDES.flatMap((side, at) => {
+      const [ankle, toes] = FEET[at]!.map((joint) => places[joint]!) as [Vector, Vector];
+      const middle = [0, 2].map((i) => ankle[i]! + 0.6 * (toes[i]! - ankle[i]!)) as [number, number];
+      return contacts[at]! < 0.5 ? [] : [this.spot(middle, 0.1, this.stage.COLOURS[side], 0.45)];
+    });
+  }
+
+  private spot([x, z]: readonly [number, number], radius: number, colour: readonly number[], alpha: number): Spot {
+    return { x: x / this.height, z: z / this.height, radius, colour, alpha };
+  }
+
+  private get accent(): readonly number[] {
+    return this.stage.COLOURS.right;
+  }
+}
+

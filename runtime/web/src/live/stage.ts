@@ -1,0 +1,85 @@
+/* What a page is given by the script that all pages share, motet/draw/stage.js: the view and what draws. */
+import type { Quaternion, Vector } from "../rotations.js";
+
+/** Angles in degrees. */
+export interface View {
+  yaw: number;
+  pitch: number;
+  zoom: number;
+}
+
+/** From where is looked; only the stage looks into it. */
+export type Camera = { readonly camera: unique symbol };
+
+/** What is drawn of a figure: a body of the stage with rotations and places, or with matrices, of its joints. unit: heights of one unit. */
+export interface Drawn {
+  body: unknown;
+  unit: number;
+  turned?: Quaternion[];
+  places?: Vector[];
+  matrices?: Float32Array;
+  colour?: readonly number[];
+}
+
+/** A strip on the ground, in heights. fade: towards its end; arrows: little heads along it. */
+export interface Strip {
+  points: (readonly [x: number, z: number])[];
+  colour: readonly number[];
+  alpha: number;
+  width?: number;
+  fade?: boolean;
+  arrows?: boolean;
+}
+
+/** A disc on the ground. */
+export interface Spot {
+  x: number;
+  z: number;
+  radius: number;
+  colour: readonly number[];
+  alpha: number;
+}
+
+/** A part of the mesh of an avatar, as glTF has it; a vertex hangs on four joints. */
+export interface Primitive {
+  positions: Float32Array;
+  normals: Float32Array | null;
+  uvs: Float32Array | null;
+  joints: Uint16Array;
+  weights: Float32Array;
+  indices: Uint32Array;
+  colour: readonly number[];
+  image: ImageBitmap | null;
+  cut: number;
+  twoSided: boolean;
+}
+
+export interface Mesh {
+  primitives: Primitive[];
+  inverseBind: Float32Array;
+}
+
+/** Draws on one canvas. */
+export interface Painter {
+  body(given: unknown): unknown;
+  avatar(mesh: Mesh): unknown;
+  drop(body: unknown): void;
+  begin(): { width: number; height: number };
+  draw(camera: Camera, scene: { figures: Drawn[]; strips: Strip[]; spots: Spot[] }, box?: { x: number; y: number; width: number; height: number }): void;
+}
+
+export interface Stage {
+  view: View;
+  FIRST_VIEW: View;
+  COLOURS: Record<"left" | "right" | "middle", readonly number[]>;
+  FIGURE_COLOURS: (readonly number[])[];
+  openStage(canvas: HTMLCanvasElement): Painter | null;
+  cameraAt(target: Vector, heading: number, away: number, width: number, height: number): Camera;
+  onGround(camera: Camera, x: number, y: number): readonly [x: number, z: number] | null;
+  listen(canvas: HTMLCanvasElement): void;
+  turn(yaw: number, pitch: number): void;
+  zoom(factor: number): void;
+  resetView(): void;
+  setTheme(dark: boolean): void;
+  isDark(): boolean;
+}

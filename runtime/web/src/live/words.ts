@@ -1,0 +1,85 @@
+/* What a typed sentence asks for: an order such as "run" or "turn left", or one of the acts that a page knows. */
+import { FUNCTION_WORDS, stem } from "../composition.js";
+import { corrected } from "../spelling.js";
+import { type Net, usual } from "./crowd.js";
+import type { Figure } from "./figure.js";
+import { Order } from "./pilots.js";
+
+/** Words that add nothing to an order or an act. */
+const IDLE = new Set([...FUNCTION_WORDS, ..."ahead can degrees do does figure forward going keep let now please spot start starts straight you your".split(" ")]);
+const TURNS: Record<string, number> = { left: 90, right: -90, around: 180, back: 180, backwards: 180 };
+const STOPS = new Set(["stop", "stand", "halt", "wait", "stay", "freeze", "still"].map(stem));
+const PACES: Record<string, number> = { faster: 1.4, quicker: 1.4, slower: 0.7 };
+const ALL = new Set(["all", "everybody", "everyone"]);
+const RADIANS = Math.PI / 180;
+/** Of what a sentence says an act has to have so much, by how rare the words are. */
+const ENOUGH = 0.6;
+
+/** The words of a sentence in lower case, and numbers. */
+export function wordsOf(text: string): string[] {
+  return text.toLowerCase().match(/\d+|\p{L}+/gu) ?? [];
+}
+
+/** Whether a sentence is said to all figures. */
+export function saysAll(text: string): boolean {
+  return wordsOf(text).some((word) => ALL.has(word));
+}
+
+/** The order that a sentence is: a gait, a way, a pace or to stop, from what a figure does now; null for any other sentence. */
+export function orderOf(text: string, net: Net, { asked, root }: Figure): Order | null {
+  const words = wordsOf(text).filter((word) => !IDLE.has(word) && !ALL.has(word));
+  const found = new Order(asked.gait, Math.hypot(asked.x, asked.z), root[2]);
+  const gaits = net.gaits.map(stem);
+  const side = words.find((word) => word in TURNS);
+  for (const word of words) {
+    const gait = gaits.indexOf(stem(word));
+    if (gait >= 0) Object.assign(found, { gait, speed: usual(net, gait) });
+    else if (STOPS.has(stem(word))) Object.assign(found, { gait: 0, speed: 0 });
+    else if (word in PACES) found.speed *= PACES[word]!;
+    else if (!(word in TURNS || stem(word) === "turn" || (side && /^\d+$/.test(word)))) return null;
+  }
+  if (!words.length || (!side && words.every((word) => stem(word) === "turn"))) return null;
+  const degrees = Number(words.find((word) => /^\d+$/.test(word)) ?? 0);
+  if (side) found.way += RADIANS * (degrees ? Math.sign(TURNS[side]!) * degrees : TURNS[side]!);
+  return found;
+}
+
+/** Finds what a sentence asks for among sentences with further words that are said of the same. */
+export class Phrases {
+  private readonly stems: Set<string>[];
+  private readonly known: string[];
+
+  constructor(private readonly phrases: readonly { sentence: string; words: readonly string[] }[]) {
+    this.stems = phrases.map(({ sentence, words }) => new Set([...wordsOf(sentence), ...words].filter((word) => !IDLE.has(word)).map(stem)));
+    this.known = [...new Set(phrases.flatMap(({ sentence, words }) => [...wordsOf(sentence), ...words]))];
+  }
+
+  /** The number of the phrase; -1 if none has enough of what is said. */
+  find(text: string): number {
+    const asked = wordsOf(text).filter((word) => !IDLE.has(word) && !ALL.has(word)).map((word) => this.read(word));
+    const all = asked.reduce((sum, word) => sum + this.weight(word), 0);
+    const scores = this.stems.map((own, at) => {
+      const shared = asked.reduce((sum, word) => sum + (own.has(word) ? this.weight(word) : 0), 0);
+      return { at, share: all ? shared / all : 0, rest: this.rest(at, asked) };
+    });
+    const [best] = scores.sort((a, b) => b.share - a.share || a.rest - b.rest || a.at - b.at);
+    return best && best.share >= ENOUGH ? best.at : -1;
+  }
+
+  /** The stem of a word, or of the known one that it is a misspelling of. */
+  private read(word: string): string {
+    const own = stem(word);
+    if (this.stems.some((stems) => stems.has(own))) return own;
+    return stem(corrected(word, this.known) || word);
+  }
+
+  /** How rare a stem is: greatest where no phrase has it. */
+  private weight(word: string): number {
+    return Math.log((this.stems.length + 1) / (this.stems.filter((own) => own.has(word)).length + 1)) + 0.1;
+  }
+
+  /** How many words of its own sentence are not asked for. */
+  private rest(at: number, asked: string[]): number {
+    return wordsOf(this.phrases[at]!.sentence).filter((word) => !IDLE.has(word) && !asked.includes(stem(word))).length;
+  }
+}
