@@ -7,12 +7,12 @@ from motet.errors import MotionError
 from motet.formats import read_motion
 from motet.motion import HUMANOID, global_transforms, hold_feet, positions, to_humanoid
 from motet.motion.feet.hold import HoldSettings
-from motet.motion.feet.leg import Leg
 from motet.motion.humanoid.bones import LEFT_RIGHT, LEG, ground_under, sole_points
 from motet.motion.motion import Motion
 from motet.motion.parts import parts
 from motet.motion.rotations import euler_to_rotmat, quat_to_rotmat
 from motet.motion.skeleton import Joint, Skeleton
+from motet.motion.two_bones import TwoBones
 
 BALLS = [HUMANOID.index(side + "Toes") for side in LEFT_RIGHT]
 LEGS = [[HUMANOID.index(side + part) for part in LEG[:3]] for side in LEFT_RIGHT]
@@ -191,7 +191,7 @@ def legs(rng, count):
 
 def test_ankles_come_to_where_they_shall_and_bones_keep_their_lengths():
     places, along = legs(np.random.default_rng(0), 500)
-    (hip, knee, ankle, _), leg = places, Leg(*map(parts, places))
+    (hip, knee, ankle, _), leg = places, TwoBones(*map(parts, places))
     away = ankle - hip + 0.05 * along / np.linalg.norm(along, axis=-1, keepdims=True)
     length = np.linalg.norm(away, axis=-1, keepdims=True)
     target = hip + away * np.clip(length, 0.3, 0.8) / length
@@ -213,7 +213,7 @@ def test_a_leg_eases_into_and_out_of_full_length():
     zero = np.zeros((len(wanted), 3))
     for bend in (0.0, 5.0, 20.0):
         upper, lower = (0.42 * np.array([0, -np.cos(a), np.sin(a)]) for a in np.radians([bend / 2, -bend / 2]))
-        leg = Leg(*(parts(zero + place) for place in (0, upper, upper + lower, [1.0, 0, 0])))
+        leg = TwoBones(*(parts(zero + place) for place in (0, upper, upper + lower, [1.0, 0, 0])))
         length = -leg.eased(parts(np.outer(wanted, [0, -1.0, 0])))[1]
         now = np.linalg.norm(upper + lower)
         assert length.max() <= (now + 0.84) / 2 + 1e-9

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.errors import ControlError, ControlWarning, MotetError, quoted
+from motet.models.guided import LARGEST_COMMAND
 from motet.models.steer import SteerModel
-from motet.models.steer_session import LARGEST_COMMAND
 from motet.motion.humanoid import BONES, HUMANOID
 from motet.motion.pose import Pose
 from motet.settings import checked_int

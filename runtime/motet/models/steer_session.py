@@ -11,6 +11,7 @@ from motet.bundle.fields import Fields
 from motet.decode.matching import Playback, Rows, SteeringSettings
 from motet.decode.steering import tick
 from motet.errors import BundleError, ControlError, ControlWarning, warn
+from motet.models.guided import Guidance, Guided
 from motet.models.scripts import Order, parse_orders
 from motet.motion.feet.lock import FootLock, FootLockSettings
 from motet.motion.humanoid import BONES
@@ -20,8 +21,6 @@ from motet.motion.rotations import Array, quat_to_rotmat, wrapped
 
 if TYPE_CHECKING:
     from motet.models.steer import SteerModel
-
-LARGEST_COMMAND = 1e6  # number of a command: metres, m/s, degrees
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,17 +99,19 @@ class SteerSnapshot:
     lock: FootLock | None
     poses: tuple[Pose, Pose] | None
     ahead: float
+    guidance: Guidance
 
     def __repr__(self) -> str:
         return f"SteerSnapshot({len(self.command.gait)} characters)"
 
 
-class SteerSession:
+class SteerSession(Guided):
     """Characters that move in one batch, each steered separately; holds their whole state. A tick is 1 / ``model.fps``
     seconds. Angles are degrees about the vertical: 0 along z, positive to the left."""
 
     def __init__(self, model: "SteerModel", playback: Playback, gait: int, hold_feet: bool, strict: bool) -> None:
-        self.model, self.characters, self.strict = model, len(playback.row), strict
+        super().__init__(len(playback.row))
+        self.model, self.strict = model, strict
         self._playback, zero = playback, np.zeros(self.characters)
         self._command = Command(np.full(self.characters, gait), zero, zero, zero, zero > 0)
         self._target = np.zeros((self.characters, 3))
@@ -175,21 +176,6 @@ class SteerSession:
         self._playback.hasten(changed)
         self._target, self._command = target, command
 
-    def _numbers(self, needed: str, values: ArrayLike, *columns: int) -> Array:
-        """Numbers for all characters or for each, as a new (characters, *columns)."""
-        try:
-            found = np.array(values, dtype=np.float64)
-            if found.shape not in (columns, (1, *columns), (self.characters, *columns)):
-                raise ValueError(found.shape)
-        except (TypeError, ValueError) as error:
-            one = ", for all or" if columns else " or one"
-            raise ControlError(f"{needed}{one} for each of {self.characters} characters") from error
-        if not (np.abs(found) <= LARGEST_COMMAND).all():
-            raise ControlError(
-                f"{needed.partition(' need')[0]} must be finite numbers, no larger than {LARGEST_COMMAND:g}"
-            )
-        return np.array(np.broadcast_to(found, (self.characters, *columns)))
-
     def _gaits(self, names: str | Sequence[str]) -> Rows:
         each = list(names) if isinstance(names, Iterable) and not isinstance(names, str) else [names] * self.characters
         if len(each) != self.characters:
@@ -203,7 +189,9 @@ class SteerSession:
     def tick_to(self, target: Array) -> Pose:
         """A tick with a raw target (characters, 3): velocity along x and z in m/s, facing in radians; not checked."""
         pose = tick(self.model.matcher, self.model.pose_codes, self._playback, target, self._command.gait)
-        return pose if self._lock is None else self._lock.held(pose)
+        pose = pose if self._lock is None else self._lock.held(pose)
+        self._guidance, pose = self._guidance.after(pose, 1 / self.model.fps)
+        return pose
 
     def advance(self, seconds: float) -> Pose:
         """The pose ``seconds`` later, for a display of any frame rate: interpolated between two ticks. A command shows
@@ -287,7 +275,7 @@ class SteerSession:
     def snapshot(self) -> SteerSnapshot:
         """The whole state, to be restored later."""
         lock = None if self._lock is None else replace(self._lock)  # its arrays are replaced, never written into
-        return SteerSnapshot(self._playback.copy(), self._command, lock, self._poses, self._ahead)
+        return SteerSnapshot(self._playback.copy(), self._command, lock, self._poses, self._ahead, self._guidance)
 
     def restore(self, snapshot: SteerSnapshot) -> None:
         """Go back to a snapshot of this session or of one like it: the same model, as many characters, and the same
@@ -300,4 +288,5 @@ class SteerSession:
             raise ControlError(f"a snapshot {has} held feet does not fit a session {lacks} them (hold_feet)")
         self._playback, self._poses, self._ahead = snapshot.playback.copy(), snapshot.poses, snapshot.ahead
         self._command, (self._target, _) = command, self.model.abilities.target(command)
+        self._guidance = snapshot.guidance
         self._lock = None if snapshot.lock is None else replace(snapshot.lock)

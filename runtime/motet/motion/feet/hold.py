@@ -4,7 +4,7 @@ A foot stands while its heel, ball or toe tip is low and slow. The contact of ea
 movement over the ground is removed from the foot: the heel's after landing, that of all three while the sole is flat,
 the ball's and toes' as the foot rolls off. The removed movement adds up to a shift of the foot; over a stance its
 median is 0, so the foot stands where it stood on average. Before and after, the shift blends in and out smoothly. Hip,
-knee and ankle follow by two-bone inverse kinematics (:class:`motet.motion.feet.leg.Leg`).
+knee and ankle follow by two-bone inverse kinematics (:class:`motet.motion.two_bones.TwoBones`).
 """
 
 from dataclasses import dataclass, replace
@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from motet.errors import MotionError
 from motet.motion.feet.contacts import SOLES, ContactSettings, contacts_of, rise, smoothed
-from motet.motion.feet.leg import Leg
 from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, LEG, Figure, ground_under, leg_length, sided, sole_points
 from motet.motion.kinematics import AXES, global_transforms, posed, skeleton_of, with_channels
 from motet.motion.motion import Motion
 from motet.motion.parts import Quaternion, Vector, parts
 from motet.motion.rotations import Array, inverse, product, quat_to_rotmat, rotated
+from motet.motion.two_bones import TwoBones
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def hold_feet(
     turned = np.array(rotations)
     for (joints, hinge), points in zip(legs, np.split(soles, 2, axis=1), strict=True):
         hip, knee, ankle = (places[:, i] * scale for i in joints)
-        leg = Leg(*map(parts, (hip, knee, ankle, rotated(rotations[:, joints[1]], hinge))))
+        leg = TwoBones(*map(parts, (hip, knee, ankle, rotated(rotations[:, joints[1]], hinge))))
         turns = map(_matrices, leg.turns(_target(leg, points, motion.fps, settings)))
         for i, turn in zip(joints, (*turns, np.eye(3)), strict=True):
             hanging = list(skeleton.subtree(skeleton.names[i]))
@@ -110,7 +110,7 @@ def _measured(
     return [(joints, fitted.aligned[joints[1]][:, 0]) for joints in sides], scale, soles
 
 
-def _target(leg: Leg, points: Array, fps: float, settings: HoldSettings) -> Vector:
+def _target(leg: TwoBones, points: Array, fps: float, settings: HoldSettings) -> Vector:
     """The ankle's target in T frames, from points (T, K, 3) of the sole over ground at 0."""
     (shift_x, shift_z), (x, y, z) = _shift(points, fps, settings).T, leg.ankle
     to_x, to_y, to_z = leg.eased((x + shift_x, y, z + shift_z))

@@ -2,8 +2,8 @@
 
 Contacts come from the table being played, by :func:`motet.motion.feet.contacts.contacts_of` of the recordings. While a
 foot stands, the movement of its lowest point over the ground is removed, tick by tick; when it lifts off, the
-correction fades. Hip, knee and ankle follow (:class:`motet.motion.feet.leg.Leg`). The offline twin, which knows how
-long a foot will stand, is :mod:`motet.motion.feet.hold`.
+correction fades. Hip, knee and ankle follow (:class:`motet.motion.two_bones.TwoBones`). The offline twin, which knows
+how long a foot will stand, is :mod:`motet.motion.feet.hold`.
 """
 
 import math
@@ -13,7 +13,6 @@ from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 
-from motet.motion.feet.leg import Leg
 from motet.motion.humanoid import BONES, HUMANOID, LEFT_RIGHT, LEG, SOLE, sided
 from motet.motion.parts import (
     Part,
@@ -29,6 +28,7 @@ from motet.motion.parts import (
     where,
 )
 from motet.motion.pose import Pose, damping_of
+from motet.motion.two_bones import TwoBones
 from motet.settings import Range, Settings
 
 
@@ -162,7 +162,7 @@ def _reached(hips: Quaternion, turned: list[Quaternion], places: list[Vector], t
     """Rotations of thigh, shin and foot in their parents' frames, of a leg with its ankle at a target; the foot stays
     as it is in the world."""
     thigh, shin, foot = turned[:3]
-    leg = Leg(places[0], places[1], places[2], rotated(shin, (1.0, 0.0, 0.0)))
+    leg = TwoBones(places[0], places[1], places[2], rotated(shin, (1.0, 0.0, 0.0)))
     turn_thigh, turn_shin = leg.turns(leg.eased(target))
     thigh, shin = product(turn_thigh, thigh), product(turn_shin, shin)
     return [product(inverse(hips), thigh), product(inverse(thigh), shin), product(inverse(shin), foot)]

@@ -1,4 +1,4 @@
-"""A leg that reaches for a place: two-bone inverse kinematics, of one leg or of many at once."""
+"""A leg or an arm that reaches for a place: two-bone inverse kinematics, of one limb or of many at once."""
 
 from motet.motion.parts import (
     Part,
@@ -23,9 +23,10 @@ from motet.motion.parts import (
 )
 
 
-class Leg:
-    """A thigh and a shin: positions of hip, knee and ankle, and the knee's axis, about which the shin turns back when
-    the knee bends. Any unit of length; all of them vectors as :mod:`motet.motion.parts` has them."""
+class TwoBones:
+    """A thigh and a shin, or an upper arm and a forearm: positions of hip, knee and ankle, and the knee's axis, about
+    which the shin turns when the knee bends; or of shoulder, elbow and hand. Any unit of length; all of them vectors
+    as :mod:`motet.motion.parts` has them."""
 
     SHORTEST = -0.95
     """The cosine of the largest bend of a knee, 162 degrees: targets beyond it are not reached."""
@@ -45,7 +46,7 @@ class Leg:
         # the part of the shin in the plane of the bend
         in_plane = larger(1 - dot(down, self._axis) ** 2 / lower, 1e-12)
         self._squares, self._twice = upper + lower, 2 * root(upper * lower * in_plane)
-        self._longest = root(self._squares + self._twice)
+        self.longest = root(self._squares + self._twice)
 
     def eased(self, target: Vector) -> Vector:
         """The position near a target, on the line to the hip, that the ankle reaches without a snap.
@@ -55,10 +56,10 @@ class Leg:
         """
         away = minus(target, self.hip)
         now, wanted = length(minus(self.ankle, self.hip)), length(away)
-        left = larger(self._longest - now, 1e-9)
+        left = larger(self.longest - now, 1e-9)
         longer = -self.EASED_SHARE * left * expm1(-larger(wanted - now, 0.0) / (self.EASED_SHARE * left))
         less = larger(now - wanted, 0.0)
-        give, fade = (part * self._longest for part in self.GIVES)
+        give, fade = (part * self.longest for part in self.GIVES)
         shorter = less * less / larger(less + give * exp(-left / fade), 1e-12)
         return plus(self.hip, times(away, (now + longer - shorter) / larger(wanted, 1e-12)))
 
