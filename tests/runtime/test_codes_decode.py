@@ -279,17 +279,63 @@ def test_all_from_memory_is_a_remembered_motion_to_its_end() -> None:
     assert len(played) == len(MOTIONS)
 
 
+def particular() -> list[tuple[int, Array]]:
+    """Motions of which only those of action 1 have the last code of the body."""
+    return [(of, np.where((of != 1) & (np.arange(PARTS) > 0), np.minimum(codes, 2), codes)) for of, codes in MOTIONS]
+
+
+def naive_acts(motions: list[tuple[int, Array]]) -> list[list[float]]:
+    """The share of what is particular in each motion that is over before each of its steps, and after the last."""
+    every = [step.tolist() for _, codes in motions for step in codes if step[0] != END]
+
+    def rarity(step: list[int]) -> float:
+        having = [
+            {action for action, codes in motions if any(one[0] != END and one[part] == step[part] for one in codes)}
+            for part in (1, 2)
+        ]
+        return sum(math.log(ACTIONS / len(actions)) for actions in having)
+
+    mean, spread, found = np.mean([*map(rarity, every)]), np.std([*map(rarity, every)]), []
+    for _, codes in motions:
+        counts = []
+        for before, step in zip([codes[0], *codes], codes, strict=False):
+            body = numbers_of(np.stack([before, step]))[:, 1:]
+            rare = math.exp((rarity(step.tolist()) - mean) / spread) if step[0] != END else 0.0
+            counts.append((1.0 + float(((body[1] - body[0]) ** 2).sum())) * rare)
+        found.append([sum(counts[:at]) / sum(counts) for at in range(len(counts) + 1)])
+    return found
+
+
 @pytest.mark.parametrize("steps", [1, 2, 4, 6])
-def test_of_a_longer_action_what_moves_most_is_shown(steps: int) -> None:
-    known = memory()
-    best = set()
-    for start, (action, codes) in zip(STARTS.tolist(), MOTIONS, strict=False):
-        parts = naive_parts(codes)
-        shown = [parts[at + steps] - parts[at] for at in range(len(codes) - steps)]
+def test_of_a_longer_action_the_most_of_its_act_is_shown(steps: int) -> None:
+    motions = particular()
+    known, best = Memory.of(*memory_tables(motions)), set()
+    for start, (action, codes), acts in zip(STARTS.tolist(), motions, naive_acts(motions), strict=False):
+        np.testing.assert_allclose(known.acts[start : start + len(codes)], acts[:-1])
+        shown = [acts[at + steps] - acts[at] for at in range(len(codes) - steps)]
+        good = [start + at for at, one in enumerate(shown) if one >= 0.95 * max(shown)]
         if action == 1:
-            best.add(start + max(at for at, one in enumerate(shown) if one >= 0.9 * max(shown)))
+            best.add(good[len(good) // 2])
     assert {known.busiest(1, [], steps, uniform) for uniform in np.linspace(0, 0.99, 20)} == best
     assert known.busiest(1, [], 50, 0.0) == STARTS[1]  # as long as it is: from the start
+
+
+def test_an_act_is_played_a_little_faster_or_slower() -> None:
+    motions = particular()
+    known = Memory.of(*memory_tables(motions))
+    for action in range(ACTIONS):
+        wholes, acts = [], []
+        for (of, codes), over in zip(motions, naive_acts(motions), strict=True):
+            if of == action:
+                wholes.append(sum(codes[:, 0] != END))
+                acts.append(
+                    min(b - a for a in range(len(over)) for b in range(a, len(over)) if over[b] - over[a] >= 0.8)
+                )
+        act, whole = int(np.median(acts)), int(np.median(wholes))
+        for steps in range(1, 20):
+            found = act if act / 1.2 <= steps < act else whole if whole < steps <= 1.2 * whole else steps
+            assert known.paced(action, steps) == found
+    assert known.paced(ACTIONS, 7) == 7  # of which nothing is remembered
 
 
 def test_a_short_motion_begins_where_its_action_shows_most() -> None:

@@ -256,6 +256,26 @@ def test_two_seconds_show_the_act(model: CodesModel, seed: int) -> None:
     (jump,) = model.generate("a person jumps", seed=seed, seconds=2)
     height = positions(jump.motion)[:, 0, 1]
     assert np.ptp(height) > 0.3
+    (bow,) = model.generate("a person bows", seed=seed, seconds=2)  # who walks first
+    trunk = np.diff(positions(bow.motion)[:, [HUMANOID.names.index(name) for name in ("hips", "neck")]], axis=1)[:, 0]
+    assert (trunk[:, 1] / np.linalg.norm(trunk, axis=1)).min() < np.cos(np.radians(20))
+
+
+def test_the_length_comes_before_other_numbers(model: CodesModel) -> None:
+    with pytest.warns(TextWarning, match="asks for 2 metres; shown: "):
+        (walk,) = model.generate("walk 2 metres forward", seconds=4)
+    (turn,) = model.generate("turn left 90 degrees", seconds=3)
+    assert [len(one.frames) for one in (walk, turn)] == [4 * model.fps, 3 * model.fps]
+
+
+def test_an_act_a_little_longer_is_played_faster(model: CodesModel) -> None:
+    action = int(model.embed("he does a cartwheel").argmax())
+    steps = next(one for one in range(10, 40) if model.source.memory.paced(action, one) > one)
+    seconds = steps * model.codec.seconds
+    (act,) = model.generate("he does a cartwheel", seconds=seconds)
+    (plain,) = model.generate("he does a cartwheel", seconds=seconds, numbers=False)
+    assert len(act.frames) == len(plain.frames) == round(seconds * model.fps)
+    assert np.abs(act.frames - plain.frames).max() > 0.1
 
 
 @pytest.mark.parametrize("seed", range(3))

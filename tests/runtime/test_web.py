@@ -56,7 +56,7 @@ def generated(model: CodesModel) -> dict[str, Any]:
 
 def told(model: CodesModel) -> dict[str, Any]:
     texts = ["a person walks forward", "someone waves"]
-    story = model.story(texts, seed=5, seconds=[1.3, None], stand="both")
+    story = model.story(texts, seed=5, seconds=[1.3, None], stand="both", numbers=False)
     passages = [{"text": one.text, "start": one.start, "stop": one.stop} for one in story.passages]
     return {**shown(story.frames), "passages": passages}
 

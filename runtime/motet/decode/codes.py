@@ -30,6 +30,15 @@ LEAP = 0.3
 REST = 0.125
 """What a step without movement counts beside the squared differences of codes' numbers."""
 
+POSE = 1.0
+"""What the codes of a step count beside the squared differences of their numbers, where an act is looked for."""
+
+ACT = 0.8
+"""The share of a motion's act that shows it."""
+
+QUICKEST = 1.2
+"""How much faster or slower an action is played at most to have the length asked for."""
+
 WINDOW = 64
 """Steps that a writer looks back at most, those of the windows that writers are trained on: a stream may last for ever.
 """
@@ -38,7 +47,8 @@ WINDOW = 64
 @dataclass(frozen=True, eq=False)
 class Memory:
     """M remembered steps. codes: (M, P) int64. ages: (M,) int64 steps since its motion began. parts: (M,) which share
-    of its motion's movement was over before it, 0 to 1. lasts: (M,) int64 the last step of its motion.
+    of its motion's movement was over before it, 0 to 1. acts: (M,) likewise of what is particular to its action: poses
+    and movements count more the fewer other actions have their codes. lasts: (M,) int64 the last step of its motion.
 
     rows: of each action the remembered steps (R,), and keys: their (R, K L) float32 numbers of the K steps before each.
     """
@@ -46,6 +56,7 @@ class Memory:
     codes: Ids
     ages: Ids
     parts: Scores
+    acts: Scores
     lasts: Ids
     rows: dict[int, Ids]
     keys: dict[int, Floats]
@@ -74,13 +85,13 @@ class Memory:
         keys = np.concatenate(past, axis=1).astype(np.float32)[order]
         rows, own = (dict(zip(names.tolist(), np.split(one, begins[1:]), strict=True)) for one in (order, keys))
         starts = np.flatnonzero(np.diff(ages, prepend=ages[:1] + 1) != 1)
-        lengths = np.diff(starts, append=len(ages))
+        lasts = np.repeat(starts + (lengths := np.diff(starts, append=len(ages))) - 1, lengths)
         body = numbers[:, moves.shape[1] :].astype(np.float64)
-        change = REST + (np.diff(body, axis=0, prepend=body[:1]) ** 2).sum(axis=1) * real[:, 0]
-        change[starts] = REST  # as if the figure had stood in it before
-        over, lasts = np.cumsum(change), np.repeat(starts + lengths - 1, lengths)
-        before = np.repeat(over[starts] - change[starts], lengths)
-        return Memory(codes, ages, (over - change - before) / (over[lasts] - before), lasts, rows, own)
+        change = (np.diff(body, axis=0, prepend=body[:1]) ** 2).sum(axis=1) * real[:, 0]
+        change[starts] = 0  # as if the figure had stood in it before
+        particular = (POSE + change) * np.exp(_rarity(codes[:, 1:], done, codes[:, 0] < end)) * real[:, 0]
+        parts, acts = (_over(one, starts, lasts) for one in (REST + change, particular))
+        return Memory(codes, ages, parts, acts, lasts, rows, own)
 
     def next(
         self, action: int, recent: Sequence[Floats], age: int, ends: bool, uniform: float, done: float = 0.0
@@ -103,19 +114,34 @@ class Memory:
     def busiest(self, action: int, recent: Sequence[Floats], steps: int, uniform: float) -> int:
         """The place at which an action is taken up to show the most of it in a number of steps.
 
-        It is one of each remembered motion: the last from which nearly as much is shown as from any. A motion that is
-        not longer is shown from its start. recent: as for :meth:`next`.
+        It is one of each remembered motion: the middle of those from which nearly as much of its act is shown as from
+        any. A motion that is not longer is shown from its start. recent: as for :meth:`next`.
         """
         rows = self.rows[action]
         found = []
         for last in np.unique(self.lasts[rows]):
             motion = rows[self.lasts[rows] == last]
             starts = motion[: max(1, len(motion) - steps)]
-            shown = self.parts[np.minimum(starts + steps, last)] - self.parts[starts]
-            found.append(starts[np.flatnonzero(shown >= 0.9 * shown.max())[-1]])
+            shown = self.acts[np.minimum(starts + steps, last)] - self.acts[starts]
+            good = np.flatnonzero(shown >= 0.95 * shown.max())
+            found.append(starts[good[len(good) // 2]])
         if not recent:
             return int(found[int(uniform * len(found))])
         return self._near(action, recent, 0, False, uniform, np.isin(rows, found))
+
+    def paced(self, action: int, steps: int) -> int:
+        """The steps of an action to be played in the time of so many: of one that is a little longer its act, of one
+        that is a little shorter all, by no more than QUICKEST; else as many as there are."""
+        acts, wholes = [], []
+        for last in np.unique(self.lasts[self.rows.get(action, np.empty(0, np.int64))]):
+            over = np.append(self.acts[last - self.ages[last] : last + 1], 1.0)
+            starts, stops = np.arange(len(over)), np.searchsorted(over, over + ACT)
+            acts.append(int((stops - starts)[stops < len(over)].min()))
+            wholes.append(int(np.searchsorted(over, 1.0)))
+        act, whole = (int(np.median(found)) for found in (acts, wholes)) if acts else (steps, steps)
+        if steps < act <= QUICKEST * steps:
+            return act
+        return whole if steps > whole >= steps / QUICKEST else steps
 
     def _near(
         self, action: int, recent: Sequence[Floats], age: int, ends: bool, uniform: float, fitting: NDArray[np.bool_]
@@ -130,6 +156,26 @@ class Memory:
         off[~fitting & fitting.any()] = np.inf
         shares = np.cumsum(np.exp((off.min() - off) / 0.5))
         return int(rows[np.searchsorted(shares, uniform * shares[-1], side="right")])
+
+
+def _over(counts: Scores, starts: Ids, lasts: Ids) -> Scores:
+    """The share of what the steps (M,) of each motion count that is over before each."""
+    over = np.cumsum(counts)
+    before = (over - counts)[starts].repeat(lasts[starts] - starts + 1)
+    found: Scores = (over - counts - before) / np.maximum(over[lasts] - before, 1e-12)
+    return found
+
+
+def _rarity(codes: Ids, actions: Ids, real: NDArray[np.bool_]) -> Scores:
+    """How rare the codes (M, B) of each step are among actions (M,), in standard deviations of the ``real`` ones: the
+    sum of the logarithms of inverse document frequencies (Spaerck Jones 1972)."""
+    found, count = np.zeros(len(codes)), len(np.unique(actions))
+    for code in codes.T:
+        has = np.zeros((code.max() + 1, actions.max() + 1), dtype=np.bool_)
+        has[code[real], actions[real]] = True
+        found += np.log(count / np.maximum(has.sum(axis=1), 1))[code]
+    found -= found[real].mean()
+    return found / max(float(found[real].std()), 1e-12)
 
 
 @dataclass(frozen=True)

@@ -174,12 +174,18 @@ def enough(seen: Seen, asked: Quantities) -> bool:
     )
 
 
-def fitted(contract: MotionContract, frames: Array, asked: Quantities) -> Array:
-    """Frames (T', D) of a motion that is cut, turned and played to have what was asked as far as may be."""
-    seen = Seen.of(contract, frames)
-    frames = frames[: min(cut(seen, asked, kind) for kind in ("metres", "steps", "times", "degrees"))]
+def fitted(contract: MotionContract, frames: Array, asked: Quantities, length: int = 0) -> Array:
+    """Frames (T', D) of a motion that is cut, turned and played to have what was asked as far as may be.
+
+    length: where it is not cut, the frames that it is to last.
+    """
+    if not length:
+        seen = Seen.of(contract, frames)
+        frames = frames[: min(cut(seen, asked, kind) for kind in ("metres", "steps", "times", "degrees"))]
     if "degrees" in asked.amounts:
         frames = turned(contract, frames, asked)
+    if length:
+        return played(frames, len(frames) / length)
     pace = asked.amounts.get("pace", 1.0)
     if "seconds" in asked.amounts:
         pace = len(frames) / (asked.amounts["seconds"] * contract.fps)

@@ -165,7 +165,7 @@ class GenerateModel(LanguageModel):
         texts = [sentences] if isinstance(sentences, str) else list(sentences)
         own = {"hypotheses": hypotheses, **cast(Mapping[str, float | None], settings)}
         read, seeds = {**own, "numbers": numbers, "whole": whole}, seeds_of(seed, len(texts), DecodingError)
-        composed = {i for i, text in enumerate(texts) if self._composed(text, numbers, whole)}
+        composed = {i for i, text in enumerate(texts) if self._composed(text, numbers, whole, own)}
         single = [i for i in range(len(texts)) if i not in composed]
         drawn = self._drawn([texts[i] for i in single], [seeds[i] for i in single], strict, own)
         found: dict[int, list[Generated]] = {}
@@ -174,8 +174,8 @@ class GenerateModel(LanguageModel):
             progress(len(found), len(texts))
         return found[0] if isinstance(sentences, str) else [found[i] for i in range(len(texts))]
 
-    def _composed(self, sentence: str, numbers: bool, whole: bool) -> bool:
-        """Whether a sentence is told as a story: of its parts, or of its numbers."""
+    def _composed(self, sentence: str, numbers: bool, whole: bool, settings: Mapping[str, float | None]) -> bool:
+        """Whether a sentence is told as a story: of its parts, or of its numbers, or of the seconds that are given."""
         return (not whole and len(self.parts(sentence)) > 1) or (numbers and bool(self.quantities(sentence).amounts))
 
     def _drawn(

@@ -25,7 +25,7 @@ from motet.models.generate import Generated, GenerateModel, LoopSettings
 from motet.models.plans import Moment
 from motet.models.quantities import PACES, Quantities, known_turns, quantities_of
 from motet.models.steer import SteerModel
-from motet.models.telling import Part, Piece, Teller
+from motet.models.telling import Part, Piece, Teller, pace_of
 from motet.motion.humanoid import HUMANOID
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
@@ -180,6 +180,13 @@ class CodesModel(GenerateModel):
         words = set(map(self.vocabulary.meant, self.vocabulary.rules.words(sentence))) - FUNCTION_WORDS - {""}
         return sorted(one for one in words if have.isdisjoint({stem(one), stem(self.vocabulary.near(one))}))
 
+    def _composed(self, sentence: str, numbers: bool, whole: bool, settings: Mapping[str, float | None]) -> bool:
+        seconds, told = self._settled(settings)["seconds"], super()._composed(sentence, numbers, whole, settings)
+        if told or not (numbers and seconds):
+            return told
+        part = Part(sentence, Quantities(sentence), self.contexts([self.vocabulary.encode(sentence)[0]])[0], seconds)
+        return pace_of(part, self.source, self.codec) != 1
+
     def composed(self, sentence: str, seed: int, strict: bool, settings: Mapping[str, Any]) -> list[Generated]:
         """See :meth:`GenerateModel.composed`; the first motion is the :meth:`story` of this seed."""
         own: dict[str, Any] = {name: value for name, value in settings.items() if name != "hypotheses"}
@@ -300,8 +307,8 @@ class CodesModel(GenerateModel):
         """The motion of :meth:`story` in pieces, as they are drawn: each continues the last one.
 
         Feet are as drawn, since planting them requires knowing how long they stand. Memory and the time of a piece stay
-        constant, however long the stream lasts; but what is asked for by a number other than of seconds comes as one
-        piece. Errors like :meth:`story`.
+        constant, however long the stream lasts; but what is asked for by a number other than of seconds, or played
+        faster or slower for its seconds, comes as one piece. Errors like :meth:`story`.
         """
         parts, after, drawn = self._told(sentences, **settings)  # what cannot be told is refused before the first piece
 
@@ -354,6 +361,7 @@ class CodesModel(GenerateModel):
             Part(text, one, context, length or one.amounts.get("seconds", 0.0))
             for text, one, context, length in zip(texts, asked, contexts, each, strict=True)
         ]
+        told = [replace(part, pace=pace_of(part, self.source, self.codec)) for part in told] if numbers else told
         teller = Teller(self.source, self.codec, self.contract, noise, chosen, self.continuation.context)
         return told, figure, teller.pieces(told, None if figure is None else self.context(figure))
 

@@ -25,18 +25,34 @@ SLOWEST: Mapping[Kind, float] = {"degrees": 20.0, "metres": 0.3, "steps": 0.5, "
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A part of a story: its sentence, what that asks for in numbers, its context (A,), and seconds, 0 where it ends by
-    itself."""
+    """A part of a story: its sentence, what that asks for in numbers, its context (A,), seconds, 0 where it ends by
+    itself, and how many times as fast as drawn it is played to last so long."""
 
     text: str
     asked: Quantities
     context: Floats
     seconds: float
+    pace: float = 1.0
 
     @property
     def to_measure(self) -> bool:
         """Whether it is drawn until it has as much as was asked; a length alone is kept by the decoder."""
-        return bool(self.asked.amounts.keys() - {"seconds"})
+        return bool(self.asked.amounts.keys() - {"seconds"}) or self.pace != 1
+
+    @property
+    def exactly(self) -> bool:
+        """Whether its length comes first."""
+        told = self.asked.amounts.keys()
+        return self.seconds > 0 and ("seconds" not in told or not told - {"seconds", "pace"})
+
+
+def pace_of(part: Part, source: Source, codec: Codec) -> float:
+    """How many times as fast as drawn a part is played: as its sentence says, or as shows its act in its seconds
+    (:meth:`motet.decode.codes.Memory.paced`)."""
+    if not part.exactly:
+        return 1.0
+    steps = codec.steps(part.seconds)
+    return part.asked.amounts.get("pace") or source.memory.paced(int(part.context.argmax()), steps) / steps
 
 
 class Piece(NamedTuple):
@@ -111,20 +127,19 @@ class Teller:
         writer, action, codes = self._writer(context), self._action(part), np.empty((0, self.source.parts), np.int64)
         rounds = 1 if part.asked.act else int(part.asked.amounts.get("times", 1))
         slow = sum(abs(part.asked.amounts.get(kind, 0)) / least for kind, least in SLOWEST.items())
-        most, steps = (
-            self.codec.steps(min(LONGEST, 10 + slow)),
-            self.codec.steps(part.seconds or self.settings["max_seconds"]),
-        )
-        exactly, looked = part.seconds > 0 and "seconds" not in part.asked.amounts, 0
+        most, steps = self.codec.steps(min(LONGEST, 10 + slow)), self.codec.steps(self.settings["max_seconds"])
+        steps, looked = self.codec.steps(part.seconds * part.pace) if part.seconds else steps, 0
         while True:
-            drawn = [step for _, step in drawn_steps(writer, action, steps, exactly)]
+            drawn = [step for _, step in drawn_steps(writer, action, steps, part.exactly)]
             codes, rounds = np.concatenate([codes, *drawn]), rounds - 1
-            over = exactly or len(codes) >= most
+            over = part.exactly or len(codes) >= most
             if over or (rounds < 1 and len(codes) >= 1.2 * looked):  # a long one is not looked at after each draw
                 frames, looked = self._decoded(codes, context), len(codes)
                 if over or enough(Seen.of(self.contract, frames), part.asked):
                     break
-        frames = fitted(self.contract, frames, part.asked)
+        length = max(1, round(part.seconds * self.contract.fps)) if part.exactly else 0
+        most = round(length * part.pace) or len(frames)
+        frames = fitted(self.contract, frames[:most], part.asked, length)
         yield Piece(number, int(action[0]), frames, len(frames))
 
     def _decoded(self, codes: Ids, context: Context | None) -> Array:

@@ -14,14 +14,17 @@ const EARLY = 0.3;
 const LEAP = 0.3;
 /** What a step without movement counts beside the squared differences of codes' numbers. */
 const REST = 0.125;
+/** What the codes of a step count beside the squared differences of their numbers, where an act is looked for. */
+const POSE = 1;
 /** The share of the most that a number of steps can show from which on a start is as good. */
-const GOOD = 0.9;
+const GOOD = 0.95;
 
 /** Remembered steps of codes: docs/bundle.md, the loop `codes`. */
 export class Memory {
   readonly steps: number;
   readonly ages: Int32Array;
   private readonly parts: Float64Array;
+  private readonly acts: Float64Array;
   private readonly lasts: Int32Array;
   /** Numbers of the codes of all steps, and how many a step has. */
   private readonly numbers: Float32Array;
@@ -37,25 +40,59 @@ export class Memory {
     this.ages = Int32Array.from({ length: steps }, (_, row) => Number(table.data[(row + 1) * columns - 1]));
     for (let row = 0; row < steps; row++) this.remember(row, moves, body, actions);
     this.lasts = lastsOf(this.ages);
-    this.parts = this.partsOf(moves.shape[1]!, moves.shape[0]!);
+    const changes = this.changes(moves.shape[1]!, moves.shape[0]!);
+    this.parts = this.over(changes.map((change) => REST + change));
+    const rare = this.rarity(body.shape[0]!, moves.shape[0]!);
+    this.acts = this.over(changes.map((change, row) => (POSE + change) * Math.exp(rare[row]!)));
   }
 
-  /** The share of the movement of its motion that was over before each step, 0 to 1. */
-  private partsOf(ways: number, end: number): Float64Array {
+  /** How much the numbers of the body change before each step, squared; none before a motion's first and its end. */
+  private changes(ways: number, end: number): Float64Array {
+    const found = new Float64Array(this.steps);
+    for (let row = 0; row < this.steps; row++) {
+      for (let at = ways; at < this.width && this.ages[row]! > 0 && this.column(row, 0) !== end; at++) {
+        found[row]! += (this.numbers[row * this.width + at]! - this.numbers[(row - 1) * this.width + at]!) ** 2;
+      }
+    }
+    return found;
+  }
+
+  /** The share of what the steps of each motion count that is over before each step, 0 to 1. */
+  private over(counts: Float64Array): Float64Array {
     const parts = new Float64Array(this.steps);
     for (let start = 0; start < this.steps; start = this.lasts[start]! + 1) {
       let over = 0;
       for (let row = start; row <= this.lasts[start]!; row++) {
         parts[row] = over;
-        over += REST;
-        const ends = Number(this.table.data[row * this.table.shape[1]!]) === end;
-        for (let at = ways; at < this.width && row > start && !ends; at++) {
-          over += (this.numbers[row * this.width + at]! - this.numbers[(row - 1) * this.width + at]!) ** 2;
-        }
+        over += counts[row]!;
       }
-      for (let row = start; row <= this.lasts[start]!; row++) parts[row]! /= over;
+      for (let row = start; row <= this.lasts[start]!; row++) parts[row]! /= Math.max(over, 1e-12);
     }
     return parts;
+  }
+
+  /**
+   * How rare the body's codes of each step are among actions, in standard deviations: the sum of the logarithms of
+   * inverse document frequencies. -Infinity for an end, which counts nothing.
+   */
+  private rarity(values: number, end: number): Float64Array {
+    const columns = this.table.shape[1]!;
+    const found = new Float64Array(this.steps);
+    const real = [...found.keys()].filter((row) => this.column(row, 0) !== end);
+    for (let column = 1; column < columns - 2; column++) {
+      const has = Array.from({ length: values }, () => new Set<number>());
+      for (const row of real) has[this.column(row, column)]!.add(this.column(row, columns - 2));
+      for (const row of real) found[row]! += Math.log(this.rows.size / has[this.column(row, column)]!.size);
+    }
+    const mean = real.reduce((sum, row) => sum + found[row]!, 0) / real.length;
+    const spread = Math.sqrt(real.reduce((sum, row) => sum + (found[row]! - mean) ** 2, 0) / real.length);
+    const rare = new Float64Array(this.steps).fill(-Infinity);
+    for (const row of real) rare[row] = (found[row]! - mean) / Math.max(spread, 1e-12);
+    return rare;
+  }
+
+  private column(row: number, column: number): number {
+    return Number(this.table.data[row * this.table.shape[1]! + column]);
   }
 
   private remember(row: number, moves: NumberArray, body: NumberArray, actions: number): void {
@@ -117,9 +154,10 @@ export class Memory {
     for (let at = 0; at < all.length; ) {
       const [start, last] = [all[at]!, this.lasts[all[at]!]!];
       const starts = Array.from({ length: Math.max(1, last + 1 - start - steps) }, (_, i) => start + i);
-      const shown = starts.map((row) => this.parts[Math.min(row + steps, last)]! - this.parts[row]!);
+      const shown = starts.map((row) => this.acts[Math.min(row + steps, last)]! - this.acts[row]!);
       const most = shown.reduce((a, b) => Math.max(a, b));
-      found.push(starts[shown.findLastIndex((one) => one >= GOOD * most)]!);
+      const good = starts.filter((_, at) => shown[at]! >= GOOD * most);
+      found.push(good[Math.floor(good.length / 2)]!);
       while (at < all.length && all[at]! <= last) at++;
     }
     if (!recent.length) return found[Math.floor(uniform * found.length)]!;
