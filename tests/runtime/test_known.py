@@ -8,7 +8,7 @@ from fake_models import CONTRACT, FakeGraph, describe_model, moving, spec
 
 from motet.errors import BundleError, DecodingError
 from motet.models.describe import DescribeModel
-from motet.models.known import NOTHING, AnswerSettings, Known, Seen, turn_of
+from motet.models.known import NOTHING, AnswerSettings, Known, Seen, path_of
 from motet.representation.contract import MotionContract
 from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS
 
@@ -35,8 +35,10 @@ TABLES = {
 }
 
 
-def said(vector: np.ndarray, turn: float | None = None, seconds: float = 3.0, count: int = 1) -> list[str]:
-    (row,) = KNOWN.answers([Seen(vector.astype(np.float32), seconds, turn)], count)
+def said(
+    vector: np.ndarray, turn: float | None = None, seconds: float = 3.0, count: int = 1, ahead: float = 0.0
+) -> list[str]:
+    (row,) = KNOWN.answers([Seen(vector.astype(np.float32), seconds, turn, ahead)], count)
     return [answer.text for answer in row]
 
 
@@ -65,6 +67,16 @@ def test_turns_are_measured_and_told() -> None:
     assert said(SIT, 100) == ["somebody sits"]
 
 
+def test_who_goes_backwards_is_told_to() -> None:
+    assert said(WALK, ahead=-0.3)[0].endswith(", backwards")
+    assert said(WALK, -90, ahead=-0.3)[0].endswith(", backwards, turning right")
+    assert not said(WALK, ahead=-0.1)[0].endswith("backwards")
+    assert said(SIT, ahead=-0.3) == ["somebody sits"]
+    told = replace(KNOWN, sentences=("he retreats", "a person walks backwards", *SENTENCES[2:]))
+    (row,) = told.answers([Seen(WALK, 3.0, 0.0, -0.3)])
+    assert row[0].text in told.sentences[:2]
+
+
 def test_what_is_short_or_far_gets_no_answer() -> None:
     assert said(WALK, seconds=0.4) == [NOTHING]
     assert said(-WALK - RUN - SIT) == [NOTHING]
@@ -76,14 +88,16 @@ def test_the_probability_is_a_logistic_function() -> None:
     assert found[0] == pytest.approx(1 / (1 + np.exp(-score)))
 
 
-def test_the_turn_of_a_path() -> None:
+def test_the_turn_and_the_speed_of_a_path() -> None:
     contract = MotionContract("root_angles", ROOT_BLOCK, ROOT_BLOCK_UNITS, 10.0, np.zeros(6), np.ones(6), None)
     frames = np.zeros((21, 6))
     frames[:, 2] = np.radians(45.0) if ROOT_BLOCK_UNITS[2].startswith("rad") else 45.0
-    assert turn_of(frames, contract) == pytest.approx(90.0)
+    frames[1:, 0] = np.linspace(-0.6, 0.2, 20)
+    assert path_of(frames, contract) == (pytest.approx(90.0), pytest.approx(-0.2))
+    assert path_of(frames[:1], contract) == (0.0, 0.0)
     frames[3, 4] = np.radians(80.0) if ROOT_BLOCK_UNITS[4].startswith("rad") else 80.0
-    assert turn_of(frames, contract) is None
-    assert turn_of(frames[:, :3], CONTRACT) is None
+    assert path_of(frames, contract) == (None, 0.0)
+    assert path_of(frames[:, :3], CONTRACT) == (None, 0.0)
 
 
 def knowing(**tables: np.ndarray) -> DescribeModel:

@@ -26,7 +26,7 @@ from motet.models.describe import DescribeModel
 from motet.models.generate_codes import CodesModel
 from motet.models.language import EOS, SOS, SPECIALS, Vocabulary
 from motet.models.predict import PredictModel
-from motet.models.search import SearchModel
+from motet.models.search import Index, IndexSettings, Member, SearchModel
 from motet.models.steer import SteerModel
 from motet.motion import in_place, is_in_place, with_travel
 from motet.motion.kinematics import local_translations
@@ -161,6 +161,26 @@ def long(model: SearchModel) -> list[float]:
     return (found / np.linalg.norm(found)).tolist()
 
 
+def searched(model: SearchModel) -> dict[str, Any]:
+    """What is nearest to sentences and to the frames of the golden run among parts of these, and whether it is like
+    them."""
+    frames, texts = golden("search"), ["a person walks", "somebody jumps up and down", "he sits down on a chair"]
+    vectors = model.contexts([frames[:10], frames[5:], frames], "motion")
+    members = tuple(Member(str(place), 0, 0, ((0.0, 1.0),)) for place in range(len(vectors)))
+    hits = [
+        [[int(hit.path.name), hit.like] for hit in row] for row in Index(model, Path(), members, vectors).search(texts)
+    ]
+    scores, least = vectors @ vectors[2], model.settings(IndexSettings).like_motion
+    return {"texts": texts, "hits": [*hits, [[int(row), bool(scores[row] >= least)] for row in np.argsort(-scores)]]}
+
+
+def backwards(model: DescribeModel) -> dict[str, Any]:
+    """The frames of a walk of :mod:`web_cases` that is played backwards, and what is said of it."""
+    walk = read_motion(BytesIO(texts()["walk"].encode()), format="bvh")
+    back = replace(walk, values=walk.values[::-1].copy())
+    return {"frames": np.round(model.frames(back), 5).tolist(), "text": model.describe(back, beams=1)[0].text}
+
+
 def parted(model: CodesModel) -> dict[str, list[str]]:
     """What texts ask for one after another."""
     texts = [
@@ -238,6 +258,8 @@ def answers() -> dict[str, Any]:
         "answered": answered(describe),
         "expected": expected(motet.load("predict")),
         "long": long(motet.load("search")),
+        "searched": searched(motet.load("search")),
+        "backwards": backwards(describe),
         "travel": travelled(describe),
         "steering": STEERED,
         "steered": steered(control, hold_feet=False),

@@ -19,7 +19,7 @@ from motet.decode.loop import Loop, Scores
 from motet.decode.loops import LOOPS
 from motet.decode.words import Hypothesis, Limits, noise_of, score_words
 from motet.errors import DecodingError
-from motet.models.known import AnswerSettings, Known, Seen, known_of, turn_of
+from motet.models.known import AnswerSettings, Known, Seen, known_of, path_of
 from motet.models.language import EOS, MAX_SECONDS, PAD, SOS, UNK, LanguageModel, padded
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
@@ -186,8 +186,9 @@ class DescribeModel(LanguageModel):
             frames = [self.frames(motion) for motion in motions[start : start + AT_ONCE]]
             vectors = [self.contexts([one], "space")[0] for one in frames]  # one by one: padding changes how sums round
             lengths = [len(one) / self.fps for one in frames]
-            turns = [turn_of(one, self.contract) for one in frames]
-            for row in self.known.answers(list(map(Seen, vectors, lengths, turns)), count):
+            paths = [path_of(one, self.contract) for one in frames]
+            seen = [Seen(*row) for row in zip(vectors, lengths, *zip(*paths, strict=True), strict=True)]
+            for row in self.known.answers(seen, count):
                 said = [(text, math.log(max(chance, LEAST)), chance) for text, chance in row]
                 found.append([Description(*one, one[2] >= least) for one in said])
             progress(len(found), len(motions))

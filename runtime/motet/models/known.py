@@ -4,6 +4,7 @@ Sentences are not compared with each other: all wordings of one kind of action c
 good as the share of near motions that it would be right about (minimum Bayes risk, Kumar and Byrne 2004).
 """
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -25,13 +26,17 @@ NOTHING = "no human motion that it knows"
 LEFT, RIGHT, STRAIGHT = 1, -1, 2
 """Where a sentence says that somebody goes; 0 if it does not say."""
 
+BACKWARDS = re.compile("backward|in reverse|retreat")
+"""What a sentence says that somebody goes backwards by."""
+
 
 @dataclass(frozen=True)
 class AnswerSettings(Settings):
     """How known motions answer. Training finds the last four (docs/language.md).
 
     near: how many of the nearest motions count. temperature: a motion this much less similar counts e times less.
-    turned, straight: from how many degrees on a path turns, and up to how many it is straight. window, hop: of a
+    turned, straight: from how many degrees on a path turns, and up to how many it is straight. backwards: mean speed
+    from which a path leads backwards, which CMU's motions reach only where that is said of them. window, hop: of a
     timeline, as in :class:`motet.models.describe.TimelineSettings`. change: the cost of another action in it, where
     there are two windows a second, and as much more as there are more. shortest: what is shorter is not described.
     sure: least probability of a description that is trusted. outside: least similarity of the nearest motion; below it
@@ -43,9 +48,10 @@ class AnswerSettings(Settings):
     temperature: Annotated[float, Range(0.001, 10)] = 0.07
     turned: Annotated[float, Range(0, 360, "degrees")] = 45.0
     straight: Annotated[float, Range(0, 360, "degrees")] = 25.0
+    backwards: Annotated[float, Range(0, 100, "m/s")] = 0.2
     window: Annotated[float, Range(0.1, 30, "s")] = 1.0
     hop: Annotated[float, Range(0.1, 30, "s")] = 0.2
-    change: Annotated[float, Range(0, 1000, "nats")] = 3.0
+    change: Annotated[float, Range(0, 1000, "nats")] = 4.5
     shortest: Annotated[float, Range(0, 30, "s")] = 0.5
     sure: Annotated[float, Range(0, 1)] = 0.8
     outside: Annotated[float, Range(-1, 1)] = 0.0
@@ -55,11 +61,12 @@ class AnswerSettings(Settings):
 
 class Seen(NamedTuple):
     """What is known of a motion. vector: its place in the space (E,). seconds: its length. turn: of its path in
-    degrees, to the left; None where it is not told."""
+    degrees, to the left; None where it is not told. ahead: mean speed forward in m/s, 0 where it is not told."""
 
     vector: Floats
     seconds: float
     turn: float | None
+    ahead: float = 0.0
 
 
 class Answer(NamedTuple):
@@ -148,7 +155,7 @@ class Known:
                 continue
             best = [int(q) for q in np.argsort(-share, kind="stable")[:count] if share[q] > 0]
             chances = self.probability(share[best])
-            said = [self._sentence(q, row, one.turn) for q in best]
+            said = [self._sentence(q, row, one) for q in best]
             found.append([Answer(text, float(chance)) for text, chance in zip(said, chances, strict=True)])
         return found
 
@@ -160,15 +167,17 @@ class Known:
         score: Array = self.settings.bias + self.settings.share * log_odds(share)
         return 1 / (1 + np.exp(-score))
 
-    def _sentence(self, kinds: int, counted: Array, turn: float | None) -> str:
+    def _sentence(self, kinds: int, counted: Array, seen: Seen) -> str:
         """The sentence that names a set of kinds: one whose way fits if there is any, and of these the one of the
-        action that counts most."""
+        action that counts most. If it is about going, what it lacks of the way is added."""
         rows = np.flatnonzero((self._kinds[1] == kinds) & (counted[self.said] > 0))
-        fits, side = self._fits(rows, turn)
+        fits, side = self._fits(rows, seen.turn)
         best = int(rows[np.lexsort((-counted[self.said[rows]], -fits))[0]])
-        text = self.sentences[best]
-        if side and self.ways[best, 2] and self.ways[best, 0] != side:
-            return f"{text}, turning {'left' if side == LEFT else 'right'}"
+        text, (way, _, going) = self.sentences[best], self.ways[best]
+        if going and seen.ahead <= -self.settings.backwards and not BACKWARDS.search(text):
+            text += ", backwards"
+        if going and side and way != side:
+            text += f", turning {'left' if side == LEFT else 'right'}"
         return text
 
     def _fits(self, rows: NDArray[np.intp], turn: float | None) -> tuple[Array, int]:
@@ -196,16 +205,18 @@ def log_odds(share: Array) -> Array:
     return odds
 
 
-def turn_of(frames: Array, contract: MotionContract) -> float | None:
-    """By how many degrees a figure turns to the left in frames (T, D) of a contract; None where the channels do not
-    tell, or it does not stay upright."""
+def path_of(frames: Array, contract: MotionContract) -> tuple[float | None, float]:
+    """By how many degrees a figure turns to the left in frames (T, D) of a contract, and its mean speed forward in m/s;
+    None and 0 where the channels do not tell, or it does not stay upright."""
     at = {name: column for column, name in enumerate(contract.channels)}
-    if not {"root.turn", "root.pitch", "root.roll"} <= at.keys():
-        return None
+    if not {"root.forward", "root.turn", "root.pitch", "root.roll"} <= at.keys():
+        return None, 0.0
     factor = np.degrees(1.0) if contract.units[at["root.turn"]].startswith("rad") else 1.0
     leant = np.abs(frames[:, [at["root.pitch"], at["root.roll"]]]).max(initial=0) * factor
+    if leant >= 70:
+        return None, 0.0
     turned = float(frames[1:, at["root.turn"]].sum() / contract.fps * factor)
-    return turned if leant < 70 else None
+    return turned, float(frames[1:, at["root.forward"]].mean()) if len(frames) > 1 else 0.0
 
 
 def known_of(model: BundleModel) -> Known:

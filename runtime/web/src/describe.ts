@@ -4,7 +4,7 @@ import type { Manifest } from "./bundle.js";
 import { consensus } from "./consensus.js";
 import { DecodingError } from "./errors.js";
 import type { Graph } from "./graph.js";
-import { type Known, turnOf } from "./known.js";
+import { type Known, pathOf } from "./known.js";
 import { type Frames, LanguageModel } from "./model.js";
 import { type Noise, Pcg64 } from "./random.js";
 import { Vocabulary } from "./text.js";
@@ -62,7 +62,7 @@ export class DescribeModel extends LanguageModel {
     const beams = this.setting("beams", settings.beams ?? this.manifest.defaults.beams ?? 5);
     const { vector } = await this.graphs.space!.run(this.motion(frames));
     const { known, manifest } = this;
-    const found = known.answers(vector!.data as Float32Array, frames.length / this.fps, turnOf(frames, manifest.motion), beams);
+    const found = known.answers(vector!.data as Float32Array, frames.length / this.fps, pathOf(frames, manifest.motion), beams);
     return found.map(({ text, probability }) => {
       const logProbability = Math.log(Math.max(probability, LEAST));
       return { text, logProbability, score: probability, confident: probability >= known.settings.sure };

@@ -10,7 +10,7 @@ export {
 export type { Frames } from "./model.js";
 export { type AnyModel, load } from "./models.js";
 export { PredictModel } from "./predict.js";
-export { SearchModel } from "./search.js";
+export { type Hit, SearchModel } from "./search.js";
 export { framesOf, type Pose, poser, posesOf } from "./poses.js";
 export { readBVH, toBVH } from "./bvh.js";
 export { FormatError, MotionError } from "./errors.js";

@@ -9,9 +9,18 @@ export const NOTHING = "no human motion that it knows";
 /** Where a sentence says that somebody goes; 0 if it does not say. */
 const [LEFT, RIGHT, STRAIGHT] = [1, -1, 2];
 
+/** What a sentence says that somebody goes backwards by. */
+const BACKWARDS = /backward|in reverse|retreat/;
+
+/** By how many degrees a path turns to the left, undefined where that is not told, and the mean speed forward in m/s. */
+export interface Path {
+  turn: number | undefined;
+  ahead: number;
+}
+
 /** The settings of `answer`, with the values of bundles that do not say them. */
 const SETTINGS = {
-  near: 40, temperature: 0.07, turned: 45, straight: 25, shortest: 0.5, sure: 0.8, outside: 0, bias: 0, share: 1,
+  near: 40, temperature: 0.07, turned: 45, straight: 25, backwards: 0.2, shortest: 0.5, sure: 0.8, outside: 0, bias: 0, share: 1,
 };
 
 /** The tables, row after row. */
@@ -60,14 +69,14 @@ export class Known {
     return new Known({ ...Object.fromEntries(tables), sentences } as Tables, vectors!.shape, kinds, bundle.manifest.settings.answer);
   }
 
-  /** Up to `count` sentences about a motion at a place of the space, of so many seconds, that turns so far (degrees). */
-  answers(vector: ArrayLike<number>, seconds: number, turn: number | undefined, count: number): { text: string; probability: number }[] {
+  /** Up to `count` sentences about a motion at a place of the space, of so many seconds, with such a path. */
+  answers(vector: ArrayLike<number>, seconds: number, path: Path, count: number): { text: string; probability: number }[] {
     const { counted, similarity } = this.near(vector);
     if (seconds < this.settings.shortest || similarity < this.settings.outside) return [{ text: NOTHING, probability: 0 }];
     const shares = this.shares(counted).map((share, set) => ({ share, set }));
     const best = shares.filter(({ share }) => share > 0).sort((a, b) => b.share - a.share || a.set - b.set);
     return best.slice(0, count).map(({ share, set }) => {
-      return { text: this.sentence(set, counted, turn), probability: this.probability(share) };
+      return { text: this.sentence(set, counted, path), probability: this.probability(share) };
     });
   }
 
@@ -112,8 +121,8 @@ export class Known {
     return 1 / (1 + Math.exp(-(this.settings.bias + this.settings.share * Math.log(kept / (1 - kept)))));
   }
 
-  /** The sentence that names a set of kinds: one whose way fits if there is any, and then the one that counts most. */
-  private sentence(set: number, counted: number[], turn: number | undefined): string {
+  /** The sentence that names a set of kinds: one whose way fits if there is any, and then the one that counts most. If it is about going, what it lacks of the way is added. */
+  private sentence(set: number, counted: number[], { turn, ahead }: Path): string {
     const { said, ways, sentences } = this.tables;
     const side = turn === undefined || Math.abs(turn) < this.settings.turned ? 0 : turn > 0 ? LEFT! : RIGHT!;
     const rows = this.named.flatMap((one, row) => (one === set && counted[said[row]!]! > 0 ? [row] : []));
@@ -121,8 +130,10 @@ export class Known {
       .map((row) => ({ row, fit: this.fit(row, turn, side), counts: counted[said[row]!]! }))
       .sort((a, b) => b.fit - a.fit || b.counts - a.counts || a.row - b.row);
     const text = sentences[best!.row]!;
-    const unsaid = side && ways[3 * best!.row + 2] && ways[3 * best!.row] !== side;
-    return unsaid ? `${text}, turning ${side === LEFT ? "left" : "right"}` : text;
+    if (!ways[3 * best!.row + 2]) return text;
+    const back = ahead <= -this.settings.backwards && !BACKWARDS.test(text) ? ", backwards" : "";
+    const turning = side && ways[3 * best!.row] !== side ? `, turning ${side === LEFT ? "left" : "right"}` : "";
+    return text + back + turning;
   }
 
   /** How well the way of a sentence fits a path that turns by so many degrees to a side. */
@@ -136,12 +147,14 @@ export class Known {
   }
 }
 
-/** By how many degrees a figure turns to the left in frames; undefined where they do not tell, or it does not stay upright. */
-export function turnOf(frames: Frames, motion: Manifest["motion"]): number | undefined {
-  const [turn, pitch, roll] = ["root.turn", "root.pitch", "root.roll"].map((name) => motion.channels.indexOf(name));
-  if (Math.min(turn!, pitch!, roll!) < 0) return undefined;
-  const factor = motion.units[turn!]!.startsWith("rad") ? 180 / Math.PI : 1;
-  const leant = Math.max(...Array.from(frames, (frame) => Math.max(Math.abs(frame[pitch!]!), Math.abs(frame[roll!]!)))) * factor;
-  const turned = frames.slice(1).reduce((sum, frame) => sum + frame[turn!]!, 0);
-  return leant < 70 ? (turned / motion.fps) * factor : undefined;
+/** The path of a figure in frames; nothing is told where its channels are missing, or it does not stay upright. */
+export function pathOf(frames: Frames, motion: Manifest["motion"]): Path {
+  const columns = ["root.forward", "root.turn", "root.pitch", "root.roll"].map((name) => motion.channels.indexOf(name));
+  const [forward, turn, pitch, roll] = columns as [number, number, number, number];
+  if (Math.min(...columns) < 0) return { turn: undefined, ahead: 0 };
+  const factor = motion.units[turn]!.startsWith("rad") ? 180 / Math.PI : 1;
+  const leant = Math.max(...Array.from(frames, (frame) => Math.max(Math.abs(frame[pitch]!), Math.abs(frame[roll]!)))) * factor;
+  if (leant >= 70) return { turn: undefined, ahead: 0 };
+  const sum = (column: number): number => frames.slice(1).reduce((all, frame) => all + frame[column]!, 0);
+  return { turn: (sum(turn) / motion.fps) * factor, ahead: frames.length > 1 ? sum(forward) / (frames.length - 1) : 0 };
 }

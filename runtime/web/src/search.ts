@@ -2,6 +2,13 @@ import type { Manifest } from "./bundle.js";
 import type { Graph } from "./graph.js";
 import { type Frames, LanguageModel } from "./model.js";
 
+/** The index of a vector, how near it is (1 is the same), and whether it is like what was asked for at all, and not only nearer than others. */
+export interface Hit {
+  index: number;
+  score: number;
+  like: boolean;
+}
+
 /** Motions and sentences as vectors of length 1, near where they mean the same. */
 export class SearchModel extends LanguageModel {
   constructor(manifest: Manifest, private readonly graphs: Record<string, Graph>) {
@@ -26,6 +33,14 @@ export class SearchModel extends LanguageModel {
   /** The vector (E) of a sentence. */
   async embedText(text: string): Promise<Float32Array> {
     return (await this.graphs.text!.run(this.words(text))).vector!.data;
+  }
+
+  /** The vectors of motions that are nearest to a sentence or to frames (T, D), best first; where the first is not `like` it, none is. */
+  async search(query: string | Frames, vectors: Float32Array[], count = this.setting("count")): Promise<Hit[]> {
+    const { like_text = 0.45, like_motion = 0.87 } = this.manifest.settings.index ?? {};
+    const least = typeof query === "string" ? like_text : like_motion;
+    const vector = await (typeof query === "string" ? this.embedText(query) : this.embedMotion(query));
+    return this.nearest(vector, vectors, count).map((hit) => ({ ...hit, like: hit.score >= least }));
   }
 
   /** The indices of the vectors nearest to one, and their scores, best first. */

@@ -160,6 +160,13 @@ async function agreed(read: Read): Promise<void> {
   }
 }
 
+/** A walk that is played backwards. */
+async function backwards(read: Read): Promise<void> {
+  const { model } = await loaded(read, "describe", DescribeModel);
+  const { frames, text } = python.backwards;
+  equal((await model.describe(frames.map((row) => Float32Array.from(row)), { beams: 1 }))[0]!.text, text, "text");
+}
+
 async function expected(read: Read): Promise<void> {
   const { model, frames } = await loaded(read, "predict", PredictModel);
   close(await model.expectedErrors(frames("frames")), python.expected.map((metres) => 100 * metres), "centimetres");
@@ -205,6 +212,15 @@ async function words(): Promise<void> {
   equal(known.encode(Object.keys(read).join(" ")).ids, ids, "ids");
 }
 
+/** What is nearest to sentences and to frames among their parts, and whether it is like them. */
+async function searched(read: Read): Promise<void> {
+  const { model, frames } = await loaded(read, "search", SearchModel);
+  const all = frames("frames");
+  const parts = await Promise.all([all.slice(0, 10), all.slice(5), all].map((part) => model.embedMotion(part)));
+  const hits = await Promise.all([...python.searched.texts, all].map((query) => model.search(query, parts)));
+  equal(hits.map((row) => row.map(({ index, like }) => [index, like])), python.searched.hits, "hits");
+}
+
 export const cases: Case[] = [
   ...graphs,
   { name: "describe says what Python says", run: describe },
@@ -221,4 +237,6 @@ export const cases: Case[] = [
   { name: "draws agree on what they do in Python", run: agreed },
   { name: "errors are expected as in Python", run: expected },
   { name: "long motions are embedded as in Python", run: long },
+  { name: "what is found is like what was asked for where it is in Python", run: searched },
+  { name: "a walk that is played backwards is told to be, as in Python", run: backwards },
 ];
