@@ -13,15 +13,20 @@ CHROMIUM = next(
 )
 OPTIONS = ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--remote-debugging-pipe")
 
-COLOURED = """(() => {
-  const canvas = document.querySelector("canvas"), counts = [0, 0];
-  const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
-  for (let i = 0; i < data.length; i += 4) {
-    if (data[i] > data[i + 2] + 60) counts[0]++;
-    if (data[i + 2] > data[i] + 60) counts[1]++;
-  }
-  return counts;
-})()"""
+COLOURED = """new Promise((done) => {
+  view.dirty = true;
+  requestAnimationFrame(() => {  // after the page's own, while what it drew is still there
+    const drawn = document.querySelector("canvas"), copy = document.createElement("canvas"), counts = [0, 0];
+    const ink = Object.assign(copy, { width: drawn.width, height: drawn.height }).getContext("2d");
+    ink.drawImage(drawn, 0, 0);
+    const { data } = ink.getImageData(0, 0, copy.width, copy.height);
+    for (let i = 0; i < data.length; i += 4) {
+      if (data[i] > data[i + 2] + 60) counts[0]++;
+      if (data[i + 2] > data[i] + 60) counts[1]++;
+    }
+    done(counts);
+  });
+})"""
 
 
 class Browser:

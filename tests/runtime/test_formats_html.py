@@ -11,22 +11,44 @@ from test_retarget import SKELETONS
 
 from motet.draw import page as html
 from motet.draw.figure import Body, figure_of
+from motet.draw.skinned import person
 from motet.errors import MotionError, OutputError
 from motet.formats import read_motion, write_motion
-from motet.motion.kinematics import positions
+from motet.motion.humanoid import HUMANOID, to_humanoid
+from motet.motion.kinematics import global_transforms, positions
 from motet.motion.motion import Motion
+from motet.motion.rotations import product, quat_to_rotmat, rotated
 from motet.motion.skeleton import Joint, Skeleton
+
+
+def person_moving():
+    """A motion of a person on another skeleton than the humanoid."""
+    return read_motion(SKELETONS / "mixamo.bvh")
 
 
 def data_of(path):
     text = path.read_text(encoding="utf-8")
-    return json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.S)[1])["figures"]
+    return json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.S)[1])
 
 
-def points_of(figure):
-    root = np.frombuffer(b64decode(figure["root"]), "<f4").reshape(-1, 1, 3)
-    steps = np.frombuffer(b64decode(figure["points"]), "<i2").reshape(len(root), -1, 3)
-    return root + figure["step"] * steps
+def array_of(text, kind, *shape):
+    return np.frombuffer(b64decode(text), kind).reshape(*shape)
+
+
+def frames_of(figure):
+    """What a page does with a figure's data: rotations and places of its joints in the world."""
+    frames, joints = figure["frames"], len(figure["parents"])
+    turns = np.tile([0.0, 0.0, 0.0, 1.0], (frames, joints, 1))
+    turns[:, figure["turning"]] = array_of(figure["turns"], "<i2", frames, len(figure["turning"]), 4) / 32767
+    places = np.tile(np.array(figure["offsets"]), (frames, 1, 1))
+    moved = array_of(figure["moves"], "<i2", frames, len(figure["moving"]), 3)
+    places[:, figure["moving"]] = moved * figure["step"]
+    places[:, 0] = array_of(figure["root"], "<f4", frames, 3)
+    turned = quat_to_rotmat(turns / np.linalg.norm(turns, axis=-1, keepdims=True))
+    for joint, parent in list(enumerate(figure["parents"]))[1:]:
+        places[:, joint] = places[:, parent] + rotated(turned[:, parent], places[:, joint])
+        turned[:, joint] = product(turned[:, parent], turned[:, joint])
+    return turned, places
 
 
 def expected(motion):
@@ -34,14 +56,29 @@ def expected(motion):
 
 
 @pytest.mark.parametrize("scale", [1.0, 39.37])
-def test_page_holds_the_positions_in_heights(tmp_path, scale):
+def test_page_holds_the_joints_of_no_person_in_heights(tmp_path, scale):
     motion = walker(scale=scale)
     write_motion(tmp_path / "walk.html", motion)
-    (figure,) = data_of(tmp_path / "walk.html")
-    joints = len(motion.skeleton.joints)
-    assert (figure["fps"], figure["frames"], figure["step"]) == (40.0, 40, 1e-4)
-    assert points_of(figure).shape == (40, joints + 2, 3)
-    assert np.abs(points_of(figure)[:, :joints] - expected(motion)).max() < 0.6 * figure["step"]
+    data = data_of(tmp_path / "walk.html")
+    (figure,), (body,) = data["figures"], data["bodies"]
+    assert (figure["fps"], figure["frames"], figure["moving"]) == (40.0, 40, [])
+    turned, places = frames_of(figure)
+    assert np.abs(places - expected(motion)).max() < 3e-4
+    assert np.abs(turned - global_transforms(motion)[0]).max() < 3e-4
+    assert "coarse" not in body
+
+
+def test_page_holds_a_person_on_the_humanoid(tmp_path):
+    motion = to_humanoid(person_moving()).motion
+    write_motion(tmp_path / "walk.html", motion)
+    data = data_of(tmp_path / "walk.html")
+    turned, places = frames_of(data["figures"][0])
+    assert np.abs(places - positions(motion) / Body(HUMANOID).height).max() < 3e-4
+    assert np.abs(turned - global_transforms(motion)[0]).max() < 3e-4
+    assert data["figures"][0]["scales"] == np.ones((27, 3)).tolist()
+    corners = array_of(data["bodies"][0]["places"], "<i2", -1, 3) * data["bodies"][0]["step"]
+    assert np.abs(corners - person().places).max() < 2e-5
+    assert "coarse" in data["bodies"][0]
 
 
 def test_page_needs_no_other_file(tmp_path):
@@ -58,23 +95,29 @@ def test_a_minute_is_small(tmp_path):
     assert (tmp_path / "long.html").stat().st_size < 400_000
 
 
-def test_joint_far_from_the_root_takes_a_larger_step():
+def test_joint_that_moves_far_takes_a_larger_step(tmp_path):
     skeleton = Skeleton((Joint("root", -1, (0, 0, 0)), Joint("a", 0, (0, 1, 0)), Joint("kite", 1, (0, 1, 0))))
     motion = Motion([[0.0, 30.0], [0.0, -40.0]], ("root.ty", "kite.ty"), ("length", "length"), 10, skeleton)
-    figure = html.figure_data(motion, "")
-    assert figure["step"] == pytest.approx(19.5 / 32767, rel=2e-3)
+    html.write(tmp_path / "kite.html", motion)
+    (figure,) = data_of(tmp_path / "kite.html")["figures"]
+    assert figure["step"] == pytest.approx(20 / 32767, rel=1e-3)
     lifted = expected(motion) + np.array([0, 19.5, 0])
-    assert np.abs(points_of(figure)[:, :3] - lifted).max() < 0.6 * figure["step"]
+    assert np.abs(frames_of(figure)[1] - lifted).max() < 0.6 * figure["step"]
 
 
 def test_captions_and_many(tmp_path):
     html.write(tmp_path / "one.html", walker(), [(0, "walk"), (0.5, "walk > run 40 %")], "title")
-    assert data_of(tmp_path / "one.html")[0]["captions"] == [[0, "walk"], [0.5, "walk > run 40 %"]]
+    assert data_of(tmp_path / "one.html")["figures"][0]["captions"] == [[0, "walk"], [0.5, "walk > run 40 %"]]
     html.write_many(tmp_path / "two.html", [walker(), walker(20, 10)], ["first", "</script>"])
-    assert [(f["name"], f["frames"], f["fps"]) for f in data_of(tmp_path / "two.html")] == [
-        ("first", 40, 40),
-        ("</script>", 20, 10),
+    data = data_of(tmp_path / "two.html")
+    assert [(f["name"], f["frames"], f["fps"], f["body"]) for f in data["figures"]] == [
+        ("first", 40, 40, 0),
+        ("</script>", 20, 10, 1),
     ]
+    html.write_many(tmp_path / "people.html", [person_moving(), to_humanoid(person_moving()).motion], ["one", "other"])
+    data = data_of(tmp_path / "people.html")
+    assert [figure["body"] for figure in data["figures"]] == [0, 0]
+    assert len(data["bodies"]) == 1
     with pytest.raises(MotionError, match="must not decrease"):
         html.write(tmp_path / "bad.html", walker(), [(1.0, "b"), (0.0, "a")])
     with pytest.raises(MotionError, match="must not decrease"):
@@ -105,7 +148,7 @@ def test_place_that_cannot_be_written(tmp_path):
 
 @pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium")
 def test_the_page_plays_in_a_browser(tmp_path):
-    html.write(tmp_path / "walk.html", walker())
+    html.write_many(tmp_path / "walk.html", [person_moving(), walker()], ["a person", "none"])
     with Browser(tmp_path / "profile") as page:
         page.open(tmp_path / "walk.html", ready="typeof state === 'object' && state.time > 0.1")
         page.key(" ", " ", down=True)
@@ -114,6 +157,33 @@ def test_the_page_plays_in_a_browser(tmp_path):
         page.key("KeyD", "d", down=True)
         assert page.value("[view.yaw, state.time]") == [yaw + 5, at]
         assert min(page.coloured()) > 300
+        page.value(LOSE)  # as browsers do when the graphics card is needed elsewhere
+        assert page.value("stage.begin().width") == 0
+        page.value(REGAIN)
+        assert min(page.coloured()) > 300
+        assert page.errors == []
+
+
+LOSE = """new Promise((done) => {
+  stage.canvas.addEventListener("webglcontextlost", () => done(), { once: true });
+  window.extension = stage.gl.getExtension("WEBGL_lose_context");
+  extension.loseContext();
+})"""
+REGAIN = """new Promise((done) => {
+  stage.canvas.addEventListener("webglcontextrestored", () => done(), { once: true });
+  extension.restoreContext();
+})"""
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium")
+def test_a_browser_without_webgl_says_so(tmp_path):
+    html.write(tmp_path / "walk.html", walker())
+    text = (tmp_path / "walk.html").read_text(encoding="utf-8")
+    stand_in = "<script>HTMLCanvasElement.prototype.getContext = () => null;</script><script type"
+    (tmp_path / "walk.html").write_text(text.replace("<script type", stand_in, 1), encoding="utf-8")
+    with Browser(tmp_path / "profile") as page:
+        page.open(tmp_path / "walk.html", ready="typeof state === 'object' && state.time > 0.1")
+        assert "no WebGL 2" in page.value("document.querySelector('[role=alert]').textContent")
         assert page.errors == []
 
 
@@ -159,8 +229,10 @@ def test_body_gets_thinner_towards_its_tips():
 def test_skeleton_without_extent_is_a_dot(tmp_path):
     point = Motion([[0.0], [1.0]], ("a.tx",), ("length",), 10, Skeleton((Joint("a", -1, (0, 0, 0)),)))
     html.write(tmp_path / "dot.html", point)
-    (figure,) = data_of(tmp_path / "dot.html")
-    assert [bone[:2] for bone in figure["bones"]] == [[0, 0]]
+    data = data_of(tmp_path / "dot.html")
+    assert len(data["figures"][0]["parents"]) == 1
+    corners = array_of(data["bodies"][0]["places"], "<i2", -1, 3) * data["bodies"][0]["step"]
+    assert np.linalg.norm(corners, axis=1).max() == pytest.approx(0.07, abs=0.01)
 
 
 def test_shoulders_of_a_motion_capture_skeleton_belong_to_the_trunk():

@@ -13,9 +13,9 @@ from browser import CHROMIUM, Browser
 import motet
 from motet.draw.page import source
 from motet.errors import BundleError, ControlError, OutputError
-from motet.live.page import body_data, net_data
+from motet.live.page import live_body, net_data
 from motet.models.steer import SteerModel
-from motet.motion.humanoid.bones import HUMANOID
+from motet.motion.humanoid import T_POSE
 
 NODE = shutil.which("node")
 PLAN = [("walk", 1.3, 0, 0), ("walk", 1.2, 80, 80), ("run", 3, 80, 80), ("run", 1.5, -120, -60), ("walk", 0, 0, -70)]
@@ -44,14 +44,10 @@ def test_what_cannot_be_steered_is_refused(tmp_path: Path, steer_model: SteerMod
     assert not list(tmp_path.iterdir())
 
 
-def test_the_body_has_its_skull_on_its_neck() -> None:
-    body = body_data()
-    rest = HUMANOID.rest_positions + HUMANOID.offsets[0]
-    jaw, crown = rest[body["carrier"]] + np.array(body["skull"])
-    assert body["height"] == pytest.approx(1.7, abs=0.1)
-    assert HUMANOID.names[body["carrier"]] == "head"
-    assert rest[HUMANOID.index("neck")][1] < jaw[1] < crown[1] < body["height"] < crown[1] + 0.1
-    assert max(end for bone in body["bones"] for end in bone[:2]) == len(HUMANOID.names) + 1
+def test_the_body_stands_where_the_humanoid_does() -> None:
+    body = live_body()
+    assert np.array(body["rest"]) * body["height"] == pytest.approx(T_POSE, abs=1e-4)
+    assert body["height"] == pytest.approx(1.76)
 
 
 @pytest.mark.skipif(NODE is None, reason="there is no node")

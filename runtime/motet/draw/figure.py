@@ -152,9 +152,10 @@ def figure_of(motion: Motion) -> Figure:
     skeleton = skeleton_of(motion)
     if not len(motion):
         raise MotionError("this motion has no frames to show")
-    skeleton, places = _moving_part(motion, skeleton)
+    first = first_of(motion)
+    skeleton = below(skeleton, first)
     body = Body(skeleton)
-    points = places / body.height
+    points = positions(motion)[:, first:] / body.height
     if not np.abs(points).max() < 1e6:
         raise MotionError("joints are over 1e+06 body heights from the origin: too far to show")
     lowest = float(points[..., 1].min())
@@ -168,12 +169,12 @@ def figure_of(motion: Motion) -> Figure:
     return Figure(body.points(points), body.bones, heading, motion.fps)
 
 
-def _moving_part(motion: Motion, skeleton: Skeleton) -> tuple[Skeleton, Array]:
-    """The skeleton from the joint on that carries the figure about, and the positions (T, J, 3) of its joints.
+def first_of(motion: Motion) -> int:
+    """The joint from which on a figure is drawn: the one that carries it about.
 
     Some programs put a joint above the hips that stays at the origin: it is not a part of the figure.
     """
-    places, first = positions(motion), 0
+    skeleton, places, first = skeleton_of(motion), positions(motion), 0
     travelled = {name.rpartition(".")[0] for name in motion.channels if name[-3:-1] == ".t"}
     while (
         skeleton.children[first] == (first + 1,)
@@ -181,5 +182,10 @@ def _moving_part(motion: Motion, skeleton: Skeleton) -> tuple[Skeleton, Array]:
         and skeleton.names[first + 1] in travelled
     ):
         first += 1
+    return first
+
+
+def below(skeleton: Skeleton, first: int) -> Skeleton:
+    """The skeleton from a joint on, on which all later ones hang."""
     joints = (replace(joint, parent=max(joint.parent - first, -1)) for joint in skeleton.joints[first:])
-    return replace(skeleton, joints=tuple(joints)), places[:, first:]
+    return replace(skeleton, joints=tuple(joints))

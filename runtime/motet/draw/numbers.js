@@ -12,6 +12,20 @@ function dot(a, b) {
   return sum;
 }
 
+/** The product of quaternions x, y, z, w: first the right turn, then the left. */
+function product([ax, ay, az, aw], [bx, by, bz, bw]) {
+  return [
+    aw * bx + bw * ax + ay * bz - az * by, aw * by + bw * ay + az * bx - ax * bz,
+    aw * bz + bw * az + ax * by - ay * bx, aw * bw - ax * bx - ay * by - az * bz,
+  ];
+}
+
+/** A vector turned by a quaternion. */
+function turnedBy([qx, qy, qz, w], [x, y, z]) {
+  const [a, b, c] = [qy * z - qz * y + w * x, qz * x - qx * z + w * y, qx * y - qy * x + w * z];
+  return [x + 2 * (qy * c - qz * b), y + 2 * (qz * a - qx * c), z + 2 * (qx * b - qy * a)];
+}
+
 function bytesOf(base64) {
   return Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0)).buffer;
 }

@@ -1,9 +1,11 @@
 """Self-contained pages: a template with the parts that all pages share, and the data for its script.
 
-A motion is written as one HTML page with a player: no network, no other file, any browser. The page is ``player.html``
-with the figures inserted as JSON. A figure holds the path of its root as float32 (T, 3) and its points relative to the
-root as int16 (T, P, 3) in steps of ``step`` body heights, both base64 of little-endian bytes. A step is 0.0001 heights
-(0.2 mm for a person) unless a point is further than 3.2 heights from the root.
+A motion is written as one HTML page with a player: no network, no other file, any browser with WebGL 2. The page is
+``player.html`` with bodies and figures inserted as JSON; arrays are base64 of little-endian bytes. A body is a mesh
+(:mod:`motet.draw.mesh`) in body heights: corners as int16 in steps of ``step``, normals as int8, the weight of a
+corner's first joint as uint8. A figure holds the path of its root as float32 (T, 3); of each joint that turns its
+quaternion x, y, z, w in the parent's frame as int16 (T, N, 4); and of each joint that moves in its parent's frame its
+place there as int16 (T, M, 3) in steps of ``step`` heights.
 """
 
 import json
@@ -16,11 +18,23 @@ from importlib.resources import files
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from motet.draw.figure import Bone, figure_of
+from motet.draw.mesh import Mesh
+from motet.draw.skinned import Skinned, person, skinned
 from motet.errors import MotionError
 from motet.files import File, place_of, write_whole
 from motet.motion.motion import Motion
+from motet.motion.rotations import Array, rotmat_to_quat
+
+COARSE = 0.4
+"""How much of the detail the coarse body of people has."""
+
+SHORT = 32767
+"""The largest int16."""
+
+SCOPE = "const {{ openStage, FIGURE_COLOURS }} = (() => {{\n{}\nreturn {{ openStage, FIGURE_COLOURS }};\n}})();"
+"""What keeps the names of the stage's scripts apart from those of a page."""
 
 Captions = Sequence[tuple[float, str]]
 """Timed captions: (start in seconds, text), each shown until the next starts."""
@@ -31,47 +45,82 @@ def write(file: File, motion: Motion, captions: Captions | None = None, title: s
 
     MotionError for a motion without skeleton or frames, OutputError if the file cannot be written.
     """
-    _write(file, [figure_data(motion, "", captions)], title)
+    _write(file, [(motion, "", captions)], title)
 
 
 def write_many(file: File, motions: Sequence[Motion], names: Sequence[str], title: str | None = None) -> None:
     """Write one page of several motions side by side on one clock, each with its name; errors like :func:`write`."""
     if not motions or len(motions) != len(names):
         raise MotionError(f"a page needs motions and a name for each, not {len(motions)} and {len(names)} names")
-    _write(file, [figure_data(motion, name) for motion, name in zip(motions, names, strict=True)], title)
+    _write(file, [(motion, name, None) for motion, name in zip(motions, names, strict=True)], title)
 
 
-def _write(file: File, figures: list[dict[str, Any]], title: str | None) -> None:
+def _write(file: File, shown: Sequence[tuple[Motion, str, Captions | None]], title: str | None) -> None:
     title = place_of(file).stem if title is None else title
-    write_whole(file, filled(source("motet.draw", "player.html"), title, {"figures": figures}))
+    found = [(skinned(motion), name, captions) for motion, name, captions in shown]
+    meshes = list(dict.fromkeys(figure.mesh for figure, _, _ in found))
+    bodies = [body_data(mesh, next(one.rest for one, _, _ in found if one.mesh is mesh)) for mesh in meshes]
+    figures = [{"body": meshes.index(one.mesh), **figure_data(one, name, captions)} for one, name, captions in found]
+    write_whole(file, filled(source("motet.draw", "player.html"), title, {"bodies": bodies, "figures": figures}))
 
 
-def figure_data(motion: Motion, name: str, captions: Captions | None = None) -> dict[str, Any]:
-    """A motion in the player's format, ready for JSON; see the module's docstring."""
-    figure, starts = figure_of(motion), [start for start, _ in captions or ()]
-    root = figure.points[:, 0].astype("<f4")
-    relative = figure.points - root[:, None]
-    step = max(1e-4, float(np.abs(relative).max()) / 32767)
+def figure_data(figure: Skinned, name: str, captions: Captions | None = None) -> dict[str, Any]:
+    """A figure in the player's format, ready for JSON; see the module's docstring."""
+    starts = [start for start, _ in captions or ()]
     if not all(math.isfinite(start) for start in starts) or starts != sorted(starts):
         raise MotionError(f"caption start times must not decrease: {starts}")
+    still = np.abs(figure.turns - np.eye(3)).max(axis=(0, 2, 3)) < 1e-6
+    quaternions = rotmat_to_quat(figure.turns[:, ~still])
+    moving = np.flatnonzero(np.ptp(figure.moves[:, 1:], axis=0).max(axis=-1) > 1e-5) + 1
+    step = float(max(1e-4, np.abs(figure.moves[:, moving]).max(initial=0) / SHORT))
     return {
         "name": name,
         "fps": figure.fps,
-        "frames": len(motion),
+        "frames": len(figure.turns),
         "heading": figure.heading,
-        "bones": [bone_data(bone) for bone in figure.bones],
         "captions": [[float(start), text] for start, text in captions or ()],
+        "parents": list(figure.parents),
+        "offsets": np.round(figure.moves[0], 5).tolist(),
+        "scales": np.round(figure.scales, 4).tolist(),
+        "root": _text(figure.moves[:, 0].astype("<f4")),
+        "turning": np.flatnonzero(~still).tolist(),
+        "turns": _text(np.round(quaternions * SHORT).astype("<i2")),
         "step": step,
-        "root": b64encode(root.tobytes()).decode(),
-        "points": b64encode(np.round(relative / step).astype("<i2").tobytes()).decode(),
+        "moving": moving.tolist(),
+        "moves": _text(np.round(figure.moves[:, moving] / step).astype("<i2")),
     }
+
+
+def body_data(mesh: Mesh, rest: Array) -> dict[str, Any]:
+    """A mesh in heights and where its joints rest (K, 3), as pages hold them, see the module's docstring; of the body
+    of people also the coarse one, for shadows and for figures that are small."""
+    found = {"rest": np.round(rest, 5).tolist(), **_mesh_data(mesh)}
+    return {**found, "coarse": _mesh_data(person(COARSE))} if mesh is person() else found
+
+
+def _mesh_data(mesh: Mesh) -> dict[str, Any]:
+    step = float(np.abs(mesh.places).max() / SHORT)
+    return {
+        "step": step,
+        "places": _text(np.round(mesh.places / step).astype("<i2")),
+        "normals": _text(np.round(mesh.normals * 127).astype("<i1")),
+        "joints": _text(mesh.joints.astype("<u2")),
+        "weights": _text(np.round(mesh.weights[:, 0] * 255).astype("<u1")),
+        "parts": _text(mesh.parts.astype("<u1")),
+        "triangles": _text(mesh.triangles.astype("<u4")),
+    }
+
+
+def _text(values: NDArray[Any]) -> str:
+    return b64encode(np.ascontiguousarray(values).tobytes()).decode()
 
 
 def filled(template: str, title: str, data: dict[str, Any], **parts: str) -> str:
     """The HTML of a template: ``{{TITLE}}``, ``{{DATA}}`` (as JSON), the parts of all pages, and ``parts`` by name."""
     text = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-    shared = {"STYLE": "page.css", "NUMBERS": "numbers.js", "STAGE": "stage.js"}
-    found = {name: source("motet.draw", file) for name, file in shared.items()}
+    stage = "\n".join(source("motet.draw", file) for file in ("gl.js", "skin.js", "ground.js", "scene.js"))
+    found = {name: source("motet.draw", file) for name, file in (("STYLE", "page.css"), ("NUMBERS", "numbers.js"))}
+    found["STAGE"] = f"{source('motet.draw', 'stage.js')}\n{SCOPE.format(stage)}"
     found |= {"TITLE": escape(title), "DATA": text, **parts}
     return re.sub(r"\{\{([A-Z]+)\}\}", lambda place: found[place[1]], template)
 
@@ -79,8 +128,3 @@ def filled(template: str, title: str, data: dict[str, Any], **parts: str) -> str
 def source(package: str, file: str) -> str:
     """A text file of a package."""
     return (files(package) / file).read_text(encoding="utf-8").rstrip("\n")
-
-
-def bone_data(bone: Bone) -> list[int | float | str]:
-    """A bone as ``stage.js`` draws it: start, end, their radii, side."""
-    return [bone.start, bone.end, round(bone.start_radius, 4), round(bone.end_radius, 4), bone.side]

@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 
 from motet.decode.matching import SteeringSettings
 from motet.draw.figure import Body
-from motet.draw.page import bone_data, filled, source
+from motet.draw.page import body_data, filled, source
+from motet.draw.skinned import person
 from motet.errors import BundleError, ControlError
 from motet.files import File, place_of, write_whole
 from motet.models.steer import SteerModel
 from motet.motion.feet.lock import FootLockSettings
-from motet.motion.humanoid import HUMANOID
+from motet.motion.humanoid import HUMANOID, T_POSE
 from motet.settings import checked_int
 
 
@@ -42,7 +43,7 @@ def live_page(model: SteerModel, characters: int = 1, title: str = "motet") -> s
         raise BundleError(f"{model} is not steered: a page needs a model such as motet.load('control')")
     most = 50
     characters = checked_int("characters", characters, 1, most, ControlError)
-    data = {"net": net_data(model), "body": body_data(), "characters": characters, "most": most}
+    data = {"net": net_data(model), "body": live_body(), "characters": characters, "most": most}
     return filled(source("motet.live", "page.html"), title, data, CONTROL=source("motet.live", "control.js"))
 
 
@@ -61,15 +62,10 @@ def net_data(model: SteerModel) -> dict[str, Any]:
     }
 
 
-def body_data() -> dict[str, Any]:
-    """The body that is drawn on the humanoid. height: in metres. skull: jaw and crown (2, 3) in metres, in the frame of
-    the joint ``carrier``. bones: as ``stage.js`` has them, between the humanoid's joints, jaw and crown."""
-    body = Body(HUMANOID)
-    carrier = HUMANOID.joints[body.head].parent
-    points = body.points(HUMANOID.rest_positions / body.height) * body.height
-    skull = points[len(HUMANOID.joints) :] - points[carrier]
-    bones = [bone_data(bone) for bone in body.bones]
-    return {"height": body.height, "carrier": carrier, "skull": skull.tolist(), "bones": bones}
+def live_body() -> dict[str, Any]:
+    """The body that is drawn on the humanoid, and its height in metres."""
+    height = Body(HUMANOID).height
+    return {"height": height, **body_data(person(), T_POSE / height)}
 
 
 def _shuffled(values: NDArray[Any]) -> bytes:

@@ -1,0 +1,280 @@
+// The stage of a page: ground, figures and their shadows on a canvas, as sharp as the machine draws them in time.
+
+const SUN = unit([0.42, 1, 0.5]), REACH = 7, CAST_REACH = 12;
+const THEMES = {
+  light: { fog: [226, 230, 237], sky: [246, 248, 251], light: [240, 242, 246], dark: [218, 223, 232], shade: 0.42, night: 0 },
+  dark: { fog: [30, 34, 42], sky: [18, 20, 26], light: [62, 68, 80], dark: [50, 55, 66], shade: 0.6, night: 1 },
+};
+/** From sharp to fast: at most how many pixels of the screen for one of the page, the size of the shadow map, how often it
+ *  is looked at, up to how many pixels a coarse body is fine enough, and how many figures cast a shadow. */
+const QUALITIES = [
+  { ratio: 2, map: 2048, taps: 8, coarse: 70, casters: 100 }, { ratio: 1, map: 1024, taps: 8, coarse: 90, casters: 100 },
+  { ratio: 1, map: 1024, taps: 4, coarse: 140, casters: 60 }, { ratio: 0.8, map: 1024, taps: 4, coarse: 200, casters: 30 },
+  { ratio: 0.65, map: 512, taps: 4, coarse: 300, casters: 16 }, { ratio: 0.5, map: 512, taps: 2, coarse: 400, casters: 8 },
+];
+
+/** The stage of a canvas; null where the browser cannot draw it, which the page then says. */
+function openStage(canvas) {
+  const gl = contextOf(canvas);
+  return gl && new Stage(canvas, gl);
+}
+
+class Stage {
+  constructor(canvas, gl) {
+    Object.assign(this, { canvas, gl, bodies: new Set(), lost: false, least: gl.getContextAttributes().antialias ? (window.devicePixelRatio > 1 ? 0 : 1) : 2 });
+    this.quality = this.least;
+    this.pace = { last: 0, mean: 16, frames: 0 };
+    canvas.addEventListener("webglcontextlost", (event) => { event.preventDefault(); this.lost = true; });
+    canvas.addEventListener("webglcontextrestored", () => { this.lost = false; this.prepare(); view.dirty = true; });
+    this.prepare();
+  }
+
+  /** All that lies on the graphics card, at first and after it was lost. */
+  prepare() {
+    const { gl } = this;
+    this.programs = {};
+    this.shadows = null;
+    this.marks = gl.createVertexArray();
+    this.markBuffer = gl.createBuffer();
+    gl.bindVertexArray(this.marks);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.markBuffer);
+    [[4, 0], [4, 4], [1, 8]].forEach(([size, from], place) => {
+      gl.enableVertexAttribArray(place);
+      gl.vertexAttribPointer(place, size, gl.FLOAT, false, 4 * MARK_NUMBERS, 4 * from);
+    });
+    gl.bindVertexArray(null);
+    this.white = textureOf(gl, null);
+    for (const body of this.bodies) upload(gl, body);
+  }
+
+  body(data) {
+    return this.keep(decodedBody(data));
+  }
+
+  avatar(data) {
+    return this.keep(decodedAvatar(data));
+  }
+
+  keep(body) {
+    if (!this.lost) upload(this.gl, body);
+    this.bodies.add(body);
+    return body;
+  }
+
+  drop(body) {
+    const { gl } = this;
+    if (body.simple) this.drop(body.simple);
+    this.bodies.delete(body);
+    for (const { slots, triangles, paints, texture } of body.primitives) {
+      for (const { array } of slots) gl.deleteVertexArray(array);
+      for (const buffer of [...slots.map((slot) => slot.buffer), triangles, paints]) gl.deleteBuffer(buffer);
+      gl.deleteTexture(texture ?? null);
+    }
+  }
+
+  program(name, vertex, fragment, defined) {
+    const { taps } = QUALITIES[this.quality], key = `${name} ${taps} ${JSON.stringify(defined)}`;
+    return (this.programs[key] ??= programOf(this.gl, vertex, fragment, { TAPS: taps, ...defined }));
+  }
+
+  /** Before the boxes of a frame: the canvas gets its size. Its size in pixels of the page, 0 where nothing is seen. */
+  begin() {
+    const { canvas, gl } = this, width = canvas.clientWidth, height = canvas.clientHeight;
+    if (this.lost || gl.isContextLost() || !width || !height) return { width: 0, height: 0 };
+    this.adapt(performance.now());
+    const ratio = Math.min(window.devicePixelRatio || 1, QUALITIES[this.quality].ratio);
+    const size = [width, height].map((x) => Math.max(1, Math.round(x * ratio)));
+    if (canvas.width !== size[0] || canvas.height !== size[1]) [canvas.width, canvas.height] = size;
+    this.ratio = size[1] / height;
+    return { width, height };
+  }
+
+  /** Coarser if frames are slow for a while, finer if they are quick for long; a pause counts for nothing. */
+  adapt(now) {
+    const { pace } = this, passed = now - pace.last;
+    pace.last = now;
+    if (passed > 300) return;
+    pace.mean += (passed - pace.mean) * 0.06;
+    pace.frames++;
+    const step = pace.mean > 24 && pace.frames > 30 ? 1 : pace.mean < 17.5 && pace.frames > (pace.patience ?? 400) ? -1 : 0;
+    const quality = clamp(this.quality + step, this.least, QUALITIES.length - 1);
+    if (!step || quality === this.quality) return;
+    if (step > 0) pace.patience = Math.min(2 * (pace.patience ?? 400), 20000);
+    Object.assign(this, { quality });
+    Object.assign(pace, { frames: 0, mean: 18 });
+  }
+
+  /** Draw figures, strips and spots as a camera sees them, in a box of the canvas (pixels of the page), or all of it. */
+  draw(camera, { figures = [], strips = [], spots = [] }, box) {
+    const { gl, canvas, ratio } = this;
+    if (this.lost || gl.isContextLost()) return;
+    const { x, y, width, height } = box ?? { x: 0, y: 0, width: canvas.clientWidth, height: canvas.clientHeight };
+    const area = [x, canvas.height / ratio - y - height, width, height].map((part) => Math.round(part * ratio));
+    const theme = THEMES[isDark() ? "dark" : "light"], slots = this.pose(figures, camera);
+    const shared = { ...sharedBy(camera, width, height, theme), ...this.castShadows(slots, camera) };
+    gl.viewport(...area);
+    gl.enable(gl.SCISSOR_TEST);
+    gl.scissor(...area);
+    gl.clear(gl.DEPTH_BUFFER_BIT);
+    gl.activeTexture(gl.TEXTURE1);
+    gl.bindTexture(gl.TEXTURE_2D, this.shadows.texture);
+    this.drawGround(shared, theme, height);
+    this.drawMarks(shared, figures, strips, spots, theme);
+    this.drawFigures(slots.filter(({ shown }) => shown), shared);
+    gl.disable(gl.SCISSOR_TEST);
+  }
+
+  /** Move the corners of figures: of each the mesh that is seen, if any is, the one that casts its shadow, if it is near,
+   *  and which of the body's slots it has. Near ones come first. */
+  pose(figures, camera) {
+    const taken = new Map(), { coarse } = QUALITIES[this.quality];
+    const far = ([x, , z]) => Math.hypot(x - camera.target[0], z - camera.target[2]);
+    const placed = figures.map((figure) => ({ figure, root: rootOf(figure), away: far(rootOf(figure)) }));
+    return placed.sort((a, b) => a.away - b.away).map(({ figure, root, away }) => {
+      const { body } = figure, n = taken.get(body) ?? 0, seen = inSight(camera, root), { simple } = body;
+      const small = project(camera, root).scale * this.ratio < coarse;
+      taken.set(body, n + 1);
+      const shown = seen ? small && simple || body : null, cast = away < CAST_REACH ? simple ?? body : null;
+      const rows = rowsOf(figure);
+      for (const mesh of new Set([shown, cast])) if (mesh) moveCorners(this.gl, mesh, n, rows);
+      return { figure, root, shown, cast, n };
+    });
+  }
+
+  /** The figures as the sun sees them; what the light is looked up with. */
+  castShadows(slots, camera) {
+    const { gl } = this, { map: size, casters } = QUALITIES[this.quality];
+    const own = slots.filter(({ cast }) => cast).slice(0, casters), sees = sunBox(own, camera);
+    if (this.shadows?.size !== size) this.shadows = shadowMap(gl, size, this.shadows);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.shadows.frame);
+    gl.viewport(0, 0, size, size);
+    gl.enable(gl.DEPTH_TEST);
+    gl.clear(gl.DEPTH_BUFFER_BIT);
+    gl.enable(gl.POLYGON_OFFSET_FILL);
+    gl.polygonOffset(1.5, 3);
+    use(gl, this.program("shadow", CAST, SHADOW_ONLY, {}), { clip: sees.clip });
+    for (const { cast, n } of own) this.triangles(cast, n);
+    gl.disable(gl.POLYGON_OFFSET_FILL);
+    gl.disable(gl.DEPTH_TEST);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    const under = sees.middle.map((x, n) => x - 0.4 * SUN[n] / SUN[1]);
+    return { sunClip: sees.clip, under, shadeReach: sees.radius - 0.1, softness: Math.max(0.006 / sees.radius, 1.2 / size), grain: 0.0008 };
+  }
+
+  drawGround(shared, theme, height) {
+    const { gl } = this;
+    const own = { light: rgb(theme.light), dark: rgb(theme.dark), shade: theme.shade, pixel: 2 * shared.tall / height / this.ratio };
+    use(gl, this.program("ground", GROUND_CORNERS, SHADE + GROUND, {}), { ...shared, ...own, shadows: { int: 1 } });
+    gl.bindVertexArray(null);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+
+  drawMarks(shared, figures, strips, spots, theme) {
+    const { gl } = this, marks = new Marks();
+    for (const strip of strips) marks.strip(strip);
+    for (const figure of figures) darken(marks, figure, 0.5 * theme.shade);
+    for (const spot of spots) marks.spot(spot);
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
+    use(gl, this.program("marks", MARKS, MARK, {}), shared);
+    gl.bindVertexArray(this.marks);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.markBuffer);
+    gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(marks.numbers), gl.STREAM_DRAW);
+    gl.drawArrays(gl.TRIANGLES, 0, marks.numbers.length / MARK_NUMBERS);
+    gl.disable(gl.BLEND);
+  }
+
+  drawFigures(slots, shared) {
+    const { gl } = this;
+    gl.enable(gl.DEPTH_TEST);
+    for (const { figure, shown, n } of slots) {
+      const defined = figure.body.primitives[0].textured ? { TEXTURED: 1 } : {};
+      const program = this.program("body", CORNERS, SHADE + SURFACE, defined);
+      use(gl, program, { ...shared, shadows: { int: 1 }, image: { int: 2 } });
+      gl.uniform3fv(program.places["palette[0]"] ?? null, paletteOf(figure));
+      this.triangles(shown, n, program.places);
+    }
+    gl.disable(gl.DEPTH_TEST);
+  }
+
+  /** A figure in its slots. places: of the uniforms that its materials have. */
+  triangles(body, n, places = {}) {
+    const { gl } = this;
+    for (const { slots, indices, texture, colour = [1, 1, 1, 1], cut = 0, twoSided } of body.primitives) {
+      gl[twoSided ? "disable" : "enable"](gl.CULL_FACE);
+      if (texture && places.factor) {
+        gl.activeTexture(gl.TEXTURE2);
+        gl.bindTexture(gl.TEXTURE_2D, texture);
+        gl.uniform4fv(places.factor, colour);
+        gl.uniform1f(places.cut, cut);
+      }
+      gl.bindVertexArray(slots[n].array);
+      gl.drawElements(gl.TRIANGLES, indices.length, gl.UNSIGNED_INT, 0);
+    }
+    gl.disable(gl.CULL_FACE);
+  }
+}
+
+/** Whether some of a figure may be seen: what is within a height of its root. */
+function inSight(camera, root) {
+  const { x, y, depth, scale } = project(camera, root);
+  return depth > -1 && (depth < 1 || (Math.abs(x - camera.x) < camera.x + scale && Math.abs(y - camera.y) < camera.y + scale));
+}
+
+const rgb = (colour) => colour.map((x) => x / 255);
+
+/** What programs know of the camera and the theme. */
+function sharedBy(camera, width, height, theme) {
+  const { target, right, up, toward, distance, focal } = camera;
+  const eye = target.map((x, n) => x + distance * toward[n]), reach = REACH + distance;
+  const rows = [right, up, toward].map((axis) => [...axis, -dot(axis, target)]);
+  const [near, far] = [0.05, 200], slope = (far + near) / (far - near), shift = -2 * far * near / (far - near);
+  const depth = rows[2].map((x, n) => -x + (n === 3 ? distance : 0));
+  const flat = [rows[0].map((x) => x * 2 * focal / width), rows[1].map((x) => x * 2 * focal / height),
+    depth.map((x, n) => slope * x + (n === 3 ? shift : 0)), depth];
+  const clip = Float32Array.from({ length: 16 }, (_, n) => flat[n % 4][Math.floor(n / 4)]);
+  const { fog, sky, night } = theme;
+  return {
+    clip, eye, target, right, up, toward, reach, night, middle: target, sun: SUN, fog: rgb(fog), sky: rgb(sky),
+    tall: height / 2 / focal, wide: width / 2 / focal,
+  };
+}
+
+/** A box along the sun's rays around figures. */
+function sunBox(slots, camera) {
+  const roots = slots.map(({ root }) => root);
+  const [low, high] = [Math.min, Math.max].map((end) => [0, 2].map((axis) => end(...roots.map((root) => root[axis]))));
+  const middle = roots.length ? [(low[0] + high[0]) / 2, 0.4, (low[1] + high[1]) / 2] : camera.target;
+  const radius = 1.05 + (roots.length ? Math.hypot(high[0] - low[0], high[1] - low[1]) / 2 : 0);
+  const side = unit([SUN[2], 0, -SUN[0]]);
+  const upward = [SUN[1] * side[2], SUN[2] * side[0] - SUN[0] * side[2], -SUN[1] * side[0]];
+  const rows = [side, upward, SUN.map((x) => -x)].map((axis, n) => {
+    const size = n === 2 ? radius + 1 : radius;
+    return [...axis.map((x) => x / size), -dot(axis, middle) / size];
+  });
+  rows.push([0, 0, 0, 1]);
+  return { radius, middle, clip: Float32Array.from({ length: 16 }, (_, n) => rows[n % 4][Math.floor(n / 4)]) };
+}
+
+/** Where a figure is, in heights. */
+function rootOf({ places, matrices, unit: size = 1 }) {
+  return (places ? places[0] : [matrices[12], matrices[13], matrices[14]]).map((x) => x * size);
+}
+
+function shadowMap(gl, size, before) {
+  if (before) {
+    gl.deleteTexture(before.texture);
+    gl.deleteFramebuffer(before.frame);
+  }
+  const texture = gl.createTexture(), frame = gl.createFramebuffer();
+  gl.activeTexture(gl.TEXTURE1);
+  gl.bindTexture(gl.TEXTURE_2D, texture);
+  gl.texStorage2D(gl.TEXTURE_2D, 1, gl.DEPTH_COMPONENT24, size, size);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_COMPARE_MODE, gl.COMPARE_REF_TO_TEXTURE);
+  for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, filter, gl.LINEAR);
+  for (const side of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, side, gl.CLAMP_TO_EDGE);
+  gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
+  gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.TEXTURE_2D, texture, 0);
+  gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+  return { size, texture, frame };
+}

@@ -1,0 +1,234 @@
+// Bodies: meshes that joints carry. Corners are moved here, once for a picture and its shadow, not on the graphics card:
+// so a figure costs the same with and without one.
+
+const CLOTHES = { shirt: [112, 148, 190], trousers: [70, 78, 98], skin: [232, 200, 176], dark: [58, 52, 54] };
+const FIGURE_COLOURS = [
+  [112, 148, 190], [196, 140, 120], [134, 168, 130], [170, 146, 190], [202, 172, 110], [110, 168, 172], [188, 128, 150],
+  [142, 150, 166],
+];
+
+const CAST = `
+uniform mat4 clip;
+layout(location = 0) in vec3 place;
+void main() { gl_Position = clip * vec4(place, 1); }`;
+
+const SHADOW_ONLY = "void main() {}";
+
+const CORNERS = `
+uniform mat4 clip;
+uniform vec3 eye;
+uniform vec3 palette[7];
+uniform float reach;
+layout(location = 0) in vec3 place;
+layout(location = 1) in vec3 normal;
+layout(location = 2) in vec2 paint;
+out vec3 at, facing, toEye, own;
+out vec2 uv;
+out float clear;
+void main() {
+  at = place;
+  facing = normal;
+  toEye = eye - place;
+  float far = length(toEye) / (1.6 * reach);
+  clear = exp(-far * far);
+#ifdef TEXTURED
+  uv = paint;
+#else
+  own = palette[int(paint.x)];
+#endif
+  gl_Position = clip * vec4(place, 1);
+}`;
+
+/** How much of the sun reaches a place, 0 to 1: looks at the shadow map around it. */
+const SHADE = `
+uniform sampler2DShadow shadows;
+uniform mat4 sunClip;
+uniform float softness, grain;
+const vec2 AROUND[8] = vec2[8](vec2(.93, .12), vec2(-.75, -.55), vec2(-.35, .87), vec2(.55, -.78), vec2(-.9, .3),
+  vec2(.42, .81), vec2(-.08, -.5), vec2(.18, .25));
+float sunlit(vec3 place) {
+  vec3 seen = (sunClip * vec4(place, 1)).xyz * .5 + .5;
+  if (any(lessThan(seen, vec3(0))) || any(greaterThan(seen, vec3(1)))) return 1.;
+  float sum = 0.;
+  for (int k = 0; k < TAPS; k++) sum += texture(shadows, vec3(seen.xy + softness * AROUND[k], seen.z - grain));
+  return sum / float(TAPS);
+}`;
+
+const SURFACE = `
+uniform vec3 sun, fog;
+uniform float night;
+uniform sampler2D image;
+uniform vec4 factor;
+uniform float cut;
+in vec3 at, facing, toEye, own;
+in vec2 uv;
+in float clear;
+out vec4 ink;
+void main() {
+  if (at.y < -.004) discard;
+  vec3 normal = normalize(facing) * (gl_FrontFacing ? 1. : -1.), away = normalize(toEye);
+#ifdef TEXTURED
+  vec4 paint = factor * texture(image, uv);
+  if (paint.a < cut) discard;
+#else
+  vec4 paint = vec4(own, 1);
+#endif
+  float toSun = dot(normal, sun), key = toSun > 0. ? toSun * sunlit(at + normal * .014) : 0.;
+  float low = mix(.72, 1., clamp((at.y + .12 * normal.y) / .3, 0., 1.));
+  vec3 around = mix(vec3(.44, .41, .40), vec3(.62, .65, .72), .5 + .5 * normal.y) * low;
+  float edge = 1. - max(dot(normal, away), 0.), rim = edge * edge * edge * (.5 + .5 * normal.y);
+  float half_ = max(dot(normal, normalize(sun + away)), 0.), shine = half_ * half_;
+  shine *= shine;
+  shine *= shine;
+  vec3 light = around * mix(.98, .74, night) + vec3(.60, .56, .50) * mix(1., .92, night) * key;
+  vec3 lit = paint.rgb * light + .09 * shine * shine * key + rim * mix(.10, .16, night);
+  ink = vec4(mix(fog, lit, clear), 1);
+}`;
+
+/** The numbers of a body out of the page's data; see motet/draw/page.py. */
+function decodedBody({ rest, coarse, step, places, normals, joints, weights, parts, triangles }) {
+  const shares = new Uint8Array(bytesOf(weights)), part = new Uint8Array(bytesOf(parts));
+  const primitive = {
+    positions: Float32Array.from(new Int16Array(bytesOf(places)), (x) => x * step),
+    normals: Float32Array.from(new Int8Array(bytesOf(normals))),
+    joints: new Uint16Array(bytesOf(joints)), weights: Float32Array.from({ length: 2 * part.length }, (_, n) => (
+      n % 2 ? 255 - shares[n >> 1] : shares[n >> 1]) / 255),
+    paint: Float32Array.from({ length: 2 * part.length }, (_, n) => (n % 2 ? 0 : part[n >> 1])),
+    indices: new Uint32Array(bytesOf(triangles)),
+  };
+  const simple = coarse ? decodedBody({ rest, ...coarse }) : null;
+  return { rest, simple, sided: part.includes(3), joints: rest.length, influences: 2, primitives: [primitive] };
+}
+
+/** A skinned mesh that was handed over, as the stage has bodies. */
+function decodedAvatar({ primitives, inverseBind }) {
+  const made = primitives.map((given) => ({
+    ...given, normals: given.normals ?? normalsOf(given.positions, given.indices), textured: true,
+    paint: given.uvs ?? new Float32Array(2 * given.positions.length / 3),
+  }));
+  return { inverseBind, joints: inverseBind.length / 16, influences: 4, primitives: made };
+}
+
+function normalsOf(places, triangles) {
+  const found = new Float32Array(places.length), at = (n) => [places[3 * n], places[3 * n + 1], places[3 * n + 2]];
+  for (let n = 0; n < triangles.length; n += 3) {
+    const [a, b, c] = [0, 1, 2].map((k) => at(triangles[n + k]));
+    const [u, v] = [b, c].map((end) => end.map((x, axis) => x - a[axis]));
+    const across = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+    for (let k = 0; k < 3; k++) across.forEach((x, axis) => { found[3 * triangles[n + k] + axis] += x; });
+  }
+  return found;
+}
+
+/** What of a body lies on the graphics card and stays so: its images, its triangles and its colours. */
+function upload(gl, body) {
+  if (body.simple) upload(gl, body.simple);
+  for (const primitive of body.primitives) {
+    primitive.slots = [];
+    primitive.triangles = bufferOf(gl, gl.ELEMENT_ARRAY_BUFFER, primitive.indices);
+    primitive.paints = bufferOf(gl, gl.ARRAY_BUFFER, primitive.paint);
+    if (primitive.textured) primitive.texture = textureOf(gl, primitive.image);
+  }
+}
+
+/** Where the n-th figure's corners go: for each its place, 3 floats, and its normal, 3 bytes and one that is not used. */
+function slotOf(gl, primitive, n) {
+  return (primitive.slots[n] ??= (() => {
+    const floats = new Float32Array(4 * primitive.positions.length / 3), buffer = bufferOf(gl, gl.ARRAY_BUFFER, floats, gl.STREAM_DRAW);
+    const array = gl.createVertexArray();
+    gl.bindVertexArray(array);
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+    gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 16, 0);
+    gl.vertexAttribPointer(1, 3, gl.BYTE, true, 16, 12);
+    gl.bindBuffer(gl.ARRAY_BUFFER, primitive.paints);
+    gl.vertexAttribPointer(2, 2, gl.FLOAT, false, 0, 0);
+    for (let place = 0; place < 3; place++) gl.enableVertexAttribArray(place);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, primitive.triangles);
+    gl.bindVertexArray(null);
+    return { array, buffer, floats, bytes: new Int8Array(floats.buffer) };
+  })());
+}
+
+/** The corners of a figure moved by its joints' matrices (3 x 4 each, by rows) into its slots. */
+function moveCorners(gl, body, n, rows) {
+  for (const primitive of body.primitives) {
+    const slot = slotOf(gl, primitive, n);
+    blend(primitive, rows, slot, body.influences);
+    gl.bindBuffer(gl.ARRAY_BUFFER, slot.buffer);
+    gl.bufferSubData(gl.ARRAY_BUFFER, 0, slot.floats);
+  }
+}
+
+const mixed = new Float32Array(12);
+
+function blend({ positions, normals, joints, weights }, rows, { floats, bytes }, influences) {
+  for (let corner = 0, p = 0; p < positions.length; corner++, p += 3) {
+    mixed.fill(0);
+    for (let k = influences * corner; k < influences * (corner + 1); k++) {
+      const weight = weights[k], from = 12 * joints[k];
+      if (weight) for (let i = 0; i < 12; i++) mixed[i] += weight * rows[from + i];
+    }
+    const x = positions[p], y = positions[p + 1], z = positions[p + 2];
+    const a = normals[p], b = normals[p + 1], c = normals[p + 2];
+    const nx = mixed[0] * a + mixed[1] * b + mixed[2] * c, ny = mixed[4] * a + mixed[5] * b + mixed[6] * c;
+    const nz = mixed[8] * a + mixed[9] * b + mixed[10] * c, scale = 127 / Math.sqrt(nx * nx + ny * ny + nz * nz || 1);
+    floats[4 * corner] = mixed[0] * x + mixed[1] * y + mixed[2] * z + mixed[3];
+    floats[4 * corner + 1] = mixed[4] * x + mixed[5] * y + mixed[6] * z + mixed[7];
+    floats[4 * corner + 2] = mixed[8] * x + mixed[9] * y + mixed[10] * z + mixed[11];
+    bytes[16 * corner + 12] = nx * scale;
+    bytes[16 * corner + 13] = ny * scale;
+    bytes[16 * corner + 14] = nz * scale;
+  }
+}
+
+function textureOf(gl, image) {
+  const texture = gl.createTexture();
+  gl.bindTexture(gl.TEXTURE_2D, texture);
+  if (image) gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, image);
+  else gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, 1, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array([255, 255, 255, 255]));
+  gl.generateMipmap(gl.TEXTURE_2D);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR_MIPMAP_LINEAR);
+  return texture;
+}
+
+/** The matrices of a figure's joints (3 x 4 each, by rows), from the mesh to heights in the world. */
+function rowsOf(figure) {
+  const rows = new Float32Array(12 * figure.body.joints);
+  if (figure.matrices) matrixRows(rows, figure.body, figure);
+  else poseRows(rows, figure.body, figure);
+  return rows;
+}
+
+/** The colours of a body's parts, from 0 to 1, in their order. */
+function paletteOf({ colour = CLOTHES.shirt }) {
+  const { left, right, middle } = COLOURS;
+  return [colour, CLOTHES.trousers, CLOTHES.skin, left, right, CLOTHES.dark, middle].flat().map((x) => x / 255);
+}
+
+/** Turned, scaled and moved from where the joints rest: R S (x - rest) + place. */
+function poseRows(row, body, { turned, places, unit: size = 1, scales }) {
+  for (let k = 0; k < body.joints; k++) {
+    const [x, y, z, w] = turned[k], rest = body.rest[k], place = places[k];
+    const [a, b, c] = scales?.[k] ?? [1, 1, 1], at = 12 * k;
+    row[at] = a * (1 - 2 * (y * y + z * z)); row[at + 1] = b * 2 * (x * y - z * w); row[at + 2] = c * 2 * (x * z + y * w);
+    row[at + 4] = a * 2 * (x * y + z * w); row[at + 5] = b * (1 - 2 * (x * x + z * z)); row[at + 6] = c * 2 * (y * z - x * w);
+    row[at + 8] = a * 2 * (x * z - y * w); row[at + 9] = b * 2 * (y * z + x * w); row[at + 10] = c * (1 - 2 * (x * x + y * y));
+    for (let n = 0; n < 3; n++) {
+      const from = at + 4 * n;
+      row[from + 3] = size * place[n] - row[from] * rest[0] - row[from + 1] * rest[1] - row[from + 2] * rest[2];
+    }
+  }
+}
+
+/** Joints' matrices times those that bring the mesh to the joints, columns first both. */
+function matrixRows(row, { inverseBind: bind, joints }, { matrices, unit: size = 1 }) {
+  for (let k = 0; k < joints; k++) {
+    for (let n = 0; n < 3; n++) {
+      for (let column = 0; column < 4; column++) {
+        let sum = 0;
+        for (let inner = 0; inner < 4; inner++) sum += matrices[16 * k + 4 * inner + n] * bind[16 * k + 4 * column + inner];
+        row[12 * k + 4 * n + column] = size * sum;
+      }
+    }
+  }
+}

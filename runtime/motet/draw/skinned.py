@@ -1,0 +1,156 @@
+"""A motion as a skinned body: the mesh, and what its joints do frame by frame.
+
+People have the body of :mod:`motet.draw.body`, with trunk and limbs as long and as wide as theirs; their path and their
+turns are those of the motion on the humanoid. All other figures, and skeletons that are to be seen as they are, have
+the round bones of :mod:`motet.draw.figure`. Lengths are in body heights.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from motet.draw.body import LEFT_PART, MIDDLE_PART, RIGHT_PART, human_mesh
+from motet.draw.figure import SAME_SPOT, Body, Bone, below, figure_of, first_of
+from motet.draw.mesh import Mesh, loft, ring, together
+from motet.errors import MotionError
+from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, SURE_OF_JOINTS, Figure, leg_length, sided, to_humanoid
+from motet.motion.kinematics import global_transforms, local_rotations, local_translations, skeleton_of
+from motet.motion.motion import Motion
+from motet.motion.rotations import Array, angle_of, product, rotated, unit
+from motet.motion.skeleton import LEFT, MIDDLE, RIGHT
+
+PARTS = {LEFT: LEFT_PART, RIGHT: RIGHT_PART, MIDDLE: MIDDLE_PART}
+
+LIMBS = (("UpperArm", "LowerArm", 0), ("LowerArm", "Hand", 0), ("UpperLeg", "LowerLeg", 1), ("LowerLeg", "Foot", 1))
+"""Bones that have lengths of their own: where each ends, and along which axis of its joint."""
+
+WIDTHS = {"UpperLeg": ("hips",), "UpperArm": ("upperChest", "leftShoulder", "rightShoulder")}
+"""Which joints' distance from side to side gives the width of what of the trunk."""
+
+
+@dataclass(frozen=True, eq=False)
+class Skinned:
+    """A motion of T frames on a mesh that K joints carry, of which the first is the root; the ground is y = 0.
+
+    rest: (K, 3) where the joints are in the mesh. scales: (K, 3) how much larger a figure is than the mesh, along the
+    axes of each joint. parents: (K,) of each joint, -1 for the root. turns: (T, K, 3, 3) in the parents' frames.
+    moves: (T, K, 3) places in the parents' frames. heading: where it faces at first, in radians about y, 0 is z.
+    """
+
+    mesh: Mesh
+    rest: Array
+    scales: Array
+    parents: tuple[int, ...]
+    turns: Array
+    moves: Array
+    heading: float
+    fps: float
+
+    def frames(self) -> tuple[Array, Array]:
+        """Rotations (T, K, 3, 3) and places (T, K, 3) of the joints in the world."""
+        turns, places = self.turns.copy(), self.moves.copy()
+        for joint, parent in enumerate(self.parents[1:], start=1):
+            places[:, joint] = places[:, parent] + rotated(turns[:, parent], places[:, joint])
+            turns[:, joint] = product(turns[:, parent], turns[:, joint])
+        return turns, places
+
+    def corners(self, turns: Array, places: Array) -> Array:
+        """Corners (V, 3) of the mesh in one frame of :meth:`frames`: turns (K, 3, 3) and places (K, 3)."""
+        scaled = turns * self.scales[:, None]
+        return self.mesh.carried(scaled, places - np.einsum("kij,kj->ki", scaled, self.rest))
+
+
+def skinned(motion: Motion, as_it_is: bool = False) -> Skinned:
+    """A motion on the body of a person where it is surely one's, or on the bones of its own skeleton.
+
+    as_it_is: on these in any case. MotionError as of :func:`motet.draw.figure.figure_of`.
+    """
+    bones = _on_bones(motion)
+    return bones if as_it_is else _on_person(motion) or bones
+
+
+def _on_person(motion: Motion) -> Skinned | None:
+    """None for what is not surely a person."""
+    scales = np.ones((len(HUMANOID.joints), 3))
+    if motion.skeleton != HUMANOID:
+        try:
+            found = to_humanoid(motion)
+        except MotionError:
+            return None
+        if found.confidence < SURE_OF_JOINTS:
+            return None
+        motion, scales = found.motion, _proportions(found.figure, motion)
+    mesh, height = person(), Body(HUMANOID).height
+    parents = [joint.parent for joint in HUMANOID.joints]
+    turns, root = local_rotations(motion), local_translations(motion)[:, 0]
+    moves = np.tile(HUMANOID.offsets * scales[parents], (len(motion), 1, 1))
+    moves[:, 0] = root
+    rest = (HUMANOID.rest_positions + HUMANOID.offsets[0]) / height
+    heading = float(angle_of(turns[0, 0, 0, 2], turns[0, 0, 2, 2]))
+    return Skinned(mesh, rest, scales, tuple(parents), turns, moves / height, heading, motion.fps)
+
+
+@cache
+def person(detail: float = 1.0) -> Mesh:
+    """The body of people in heights; see :func:`motet.draw.body.human_mesh`."""
+    mesh = human_mesh(detail)
+    return Mesh(mesh.places / Body(HUMANOID).height, mesh.triangles, mesh.joints, mesh.weights, mesh.parts)
+
+
+def _proportions(figure: Figure, motion: Motion) -> Array:
+    """How much longer the bones of a figure are than the humanoid's, if its legs are as long: (J, 3) along the axes of
+    the humanoid's joints, of which those of arms are x and of legs and trunk y."""
+    body = figure.fitted.body
+    places = global_transforms(motion[:: max(1, len(motion) // 100)])[1] * (leg_length() / figure.fitted.leg)
+    usual, scales = HUMANOID.rest_positions, np.ones((len(HUMANOID.joints), 3))
+    for bone, end, axis in LIMBS:
+        for side in (side for side in LEFT_RIGHT if sided(side, end) in body.joints):
+            own = places[:, body.joints[sided(side, bone)]] - places[:, body.joints[sided(side, end)]]
+            whole = usual[HUMANOID.index(sided(side, bone))] - usual[HUMANOID.index(sided(side, end))]
+            scales[HUMANOID.index(sided(side, bone)), axis] = _ratio(own, whole)
+    trunk = np.subtract(*(body.middle(places, part) for part in ("UpperArm", "UpperLeg")))
+    scales[[HUMANOID.index(bone) for bone in ("spine", "chest", "upperChest")], 1] = _ratio(trunk, np.array([0.48]))
+    for part, bones in WIDTHS.items():
+        wide = _ratio(body.to_left(places, part), 2 * usual[HUMANOID.index(sided("left", part)), :1])
+        scales[[HUMANOID.index(bone) for bone in bones], 0] = wide
+    return scales
+
+
+def _ratio(own: Array, usual: Array) -> float:
+    """How much longer vectors (T, 3), where they are nearly longest, are than one (3,); within what a body can be."""
+    longest = np.quantile(np.linalg.norm(own, axis=-1), 0.9)
+    return float(np.clip(longest / np.linalg.norm(usual), 0.75, 1.33))
+
+
+def _on_bones(motion: Motion) -> Skinned:
+    """The round bones of a motion's own skeleton."""
+    figure, first = figure_of(motion), first_of(motion)
+    skeleton = below(skeleton_of(motion), first)
+    body = Body(skeleton)
+    turns, moves = local_rotations(motion)[:, first:], local_translations(motion)[:, first:] / body.height
+    turns[:, 0], moves[:, 0] = global_transforms(motion)[0][:, first], figure.points[:, 0]
+    stretched = np.ptp(moves, axis=0).max(axis=-1) > SAME_SPOT
+    rest = body.points(skeleton.rest_positions / body.height)
+    bones = [
+        _capsule(bone, rest, bone.end if bone.end < len(stretched) and stretched[bone.end] else None)
+        for bone in body.bones
+    ]
+    scales, parents = np.ones((len(skeleton.joints), 3)), tuple(joint.parent for joint in skeleton.joints)
+    return Skinned(together(bones), rest[: len(parents)], scales, parents, turns, moves, figure.heading, figure.fps)
+
+
+def _capsule(bone: Bone, rest: Array, end: int | None, corners: int = 10) -> Mesh:
+    """A bone between points of a skeleton at rest (P, 3); end: the joint that carries its end, None for its carrier."""
+    axis = rest[bone.end] - rest[bone.start]
+    axis = unit(axis) if axis.any() else np.array([0.0, 1.0, 0.0])
+    side = unit(np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))]))
+    around = ring(corners) @ np.stack([side, np.cross(axis, side)])
+    turns = np.radians([-80.0, -50.0, 0.0, 0.0, 50.0, 80.0])[:, None, None]
+    middles = rest[[bone.start] * 3 + [bone.end] * 3][:, None]
+    radii = np.repeat([bone.start_radius, bone.end_radius], 3)[:, None, None]
+    places, triangles = loft(middles + radii * (np.cos(turns) * around + np.sin(turns) * axis))
+    carriers = (bone.carriers[0], bone.carriers[1] if end is None else end)
+    rows = np.repeat(carriers, 3 * corners).tolist() + list(carriers)
+    joints = np.stack([rows, rows], axis=1)
+    return Mesh(places, triangles, joints, np.tile([1.0, 0.0], (len(rows), 1)), np.full(len(rows), PARTS[bone.side]))

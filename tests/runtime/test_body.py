@@ -1,0 +1,98 @@
+from collections import Counter
+
+import numpy as np
+import pytest
+from figures import walker
+from test_retarget import SKELETONS
+
+from motet.draw.body import human_mesh
+from motet.draw.figure import Body, figure_of
+from motet.draw.mesh import loft, normals_of, ring
+from motet.draw.skinned import person, skinned
+from motet.formats import read_motion
+from motet.motion.humanoid import HUMANOID, T_POSE, to_humanoid
+from motet.motion.kinematics import positions
+
+
+def edges_of(triangles):
+    return Counter((one, other) for a, b, c in triangles.tolist() for one, other in ((a, b), (b, c), (c, a)))
+
+
+def volume(places, triangles):
+    a, b, c = places[triangles.T]
+    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
+
+
+@pytest.mark.parametrize(("detail", "most"), [(1.0, 5000), (0.4, 800)])
+def test_the_body_is_closed_and_carried_whole(detail, most):
+    mesh = human_mesh(detail)
+    assert 0.6 * most < len(mesh.triangles) <= most
+    edges = edges_of(mesh.triangles)
+    assert all(count == 1 and edges[b, a] == 1 for (a, b), count in edges.items())
+    assert mesh.weights.min() >= 0
+    np.testing.assert_allclose(mesh.weights.sum(axis=1), 1)
+    assert mesh.joints.max() < len(HUMANOID.joints)
+    assert set(mesh.parts.tolist()) == set(range(6))
+    assert volume(mesh.places, mesh.triangles) == pytest.approx(0.065, abs=0.016)  # cubic metres, as a slim adult
+    np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=1), 1)
+
+
+def test_the_body_stands_on_the_ground_around_its_joints():
+    places = human_mesh().places
+    low, high = places.min(axis=0), places.max(axis=0)
+    assert low == pytest.approx([-0.88, 0, -0.12], abs=0.01)
+    assert high == pytest.approx([0.88, 1.72, 0.21], abs=0.01)
+    np.testing.assert_allclose(np.sort(places[:, 0]), np.sort(-places[:, 0]), atol=1e-12)  # both sides are alike
+
+
+def test_a_loft_of_a_square_is_a_box():
+    flat = ring(4)
+    rings = np.array([[[x, y, height] for x, y in flat] for height in (0.0, 3.0)])
+    places, triangles = loft(rings)
+    assert volume(places, triangles) == pytest.approx(2 * 3)
+    assert normals_of(places, triangles)[[-2, -1], 2] == pytest.approx([-1, 1])
+
+
+def test_ring_is_on_its_superellipse():
+    for power in (2.0, 2.5):
+        assert (np.abs(ring(12, power)) ** power).sum(axis=1) == pytest.approx(np.ones(12))
+
+
+def test_a_person_at_rest_is_the_mesh_itself():
+    figure = skinned(to_humanoid(read_motion(SKELETONS / "mixamo.bvh")).motion)
+    turns, places = np.tile(np.eye(3), (len(HUMANOID.joints), 1, 1)), T_POSE / Body(HUMANOID).height
+    np.testing.assert_allclose(figure.corners(turns, places), person().places, atol=1e-12)
+
+
+def test_limbs_are_as_long_as_those_of_the_figure():
+    """The joints that the mesh is carried by lie where those of the file are, but for the trunk's bend."""
+    motion = read_motion(SKELETONS / "mixamo.bvh")
+    figure, names = skinned(motion), motion.skeleton.names
+    own = positions(motion) * 0.82 / to_humanoid(motion).figure.fitted.leg / Body(HUMANOID).height
+    shown = figure.frames()[1]
+    for bone, end, one, other in (
+        ("leftUpperLeg", "leftLowerLeg", "LeftUpLeg", "LeftLeg"),
+        ("rightLowerLeg", "rightFoot", "RightLeg", "RightFoot"),
+        ("leftUpperArm", "leftLowerArm", "LeftArm", "LeftForeArm"),
+        ("rightLowerArm", "rightHand", "RightForeArm", "RightHand"),
+        ("leftUpperArm", "rightUpperArm", "LeftArm", "RightArm"),
+    ):
+        ends = [next(i for i, name in enumerate(names) if name.rpartition(":")[2] == part) for part in (one, other)]
+        wanted = np.linalg.norm(own[0, ends[0]] - own[0, ends[1]])
+        found = shown[0, HUMANOID.index(bone)] - shown[0, HUMANOID.index(end)]
+        assert np.linalg.norm(found) == pytest.approx(wanted, rel=0.05), bone
+    scaled = figure.corners(*(values[0] for values in figure.frames()))
+    assert scaled[:, 1].min() == pytest.approx(0, abs=0.03)
+    assert np.isfinite(scaled).all()
+
+
+def test_what_is_no_person_has_round_bones_around_its_own():
+    motion = walker()
+    figure, points = skinned(motion), figure_of(motion)
+    turns, places = figure.frames()
+    corners = figure.corners(turns[20], places[20])
+    edges = edges_of(figure.mesh.triangles)
+    assert all(edges[b, a] == 1 for a, b in edges)
+    for bone in points.bones:  # corners lie around each bone's ends
+        away = np.linalg.norm(corners - points.points[20, bone.end], axis=1)
+        assert away.min() < 1.05 * bone.end_radius
