@@ -17,6 +17,7 @@ from web_cases import texts
 import motet
 from motet.bundle.bundle import Bundle
 from motet.bundle.golden import read
+from motet.decode.acts import Act, ActSettings
 from motet.decode.codec import Context
 from motet.decode.loops import LOOPS
 from motet.decode.words import noise_of, score_words
@@ -29,6 +30,7 @@ from motet.models.predict import PredictModel
 from motet.models.search import Index, IndexSettings, Member, SearchModel
 from motet.models.steer import SteerModel
 from motet.motion import in_place, is_in_place, with_travel
+from motet.motion.humanoid import BONES
 from motet.motion.kinematics import local_translations
 from motet.motion.motion import Motion
 from motet.motion.rotations import quat_product
@@ -214,24 +216,46 @@ def travelled(model: DescribeModel) -> dict[str, Any]:
     return found
 
 
+def turning_about(frames: int = 30) -> list[list[float]]:
+    """An act, a turn to the left with a hand up and a knee bent, and rest before it; frames (T, 92), rounded."""
+    rows = []
+    for frame in range(frames):
+        part = max(0.0, (frame - 8) / (frames - 9))
+        lifted, bent = 0.6 * part, 0.3 * np.sin(np.pi * part)  # half of the angles
+        turns = np.tile([0.0, 0.0, 0.0, 1.0], (len(BONES), 1))
+        turns[BONES.index("leftUpperArm"), 2:] = np.sin(lifted), np.cos(lifted)
+        turns[BONES.index("leftLowerLeg"), ::3] = np.sin(bent), np.cos(bent)
+        rows.append([*np.ravel(turns), 0.4 * part, 0.1 * part, 1.2 * part, 0.95])
+    found: list[list[float]] = np.round(rows, 5).tolist()
+    return found
+
+
 STEERED: list[dict[str, Any]] = [
     {"control": {"gait": "walk", "velocity": [[1.2, 0.4], [0.3, -1.1]]}},
     {"control": {"gait": ["run", "walk"], "speed": 2.5, "direction": [80.0, -40.0], "facing": [80.0, -20.0]}},
     {"push": [0.5, -0.3]},
+    {"act": {"who": [0]}},
     {"control": {"speed": 0.0}},
+    {"act": {"who": [1, 0]}},
+    {"act": {"who": [0], "upper": False}},
     {"put": [[1.0, 2.0, 30.0], [-2.0, 0.5, -90.0]], "control": {"gait": "zombie", "direction": 10.0, "speed": 0.4}},
 ]
-"""Calls of two figures' session, one after the other; after each three quarters of a second pass."""
+"""Calls of two figures' session, one after the other; after each three quarters of a second pass. What is acted is
+:func:`turning_about`."""
 
 
 def steered(model: SteerModel, hold_feet: bool) -> list[list[Any]]:
     """Of two figures in every twelfth picture, 48 a second: ground, hips, rotations, contacts."""
     session, found = model.start(characters=2, hold_feet=hold_feet), []
+    act = Act.of("turn", np.array(turning_about(), np.float32), model.fps, model.settings(ActSettings))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ControlWarning)
         for calls in STEERED:
             for name, given in calls.items():
-                session.control(**given) if name == "control" else getattr(session, name)(given)
+                if name == "act":
+                    session.act(act, **given)
+                else:
+                    session.control(**given) if name == "control" else getattr(session, name)(given)
             poses = [session.advance(1 / 48) for _ in range(36)]
             found += poses[::12]
     rows: list[list[Any]] = []
@@ -262,6 +286,7 @@ def answers() -> dict[str, Any]:
         "backwards": backwards(describe),
         "travel": travelled(describe),
         "steering": STEERED,
+        "acted": turning_about(),
         "steered": steered(control, hold_feet=False),
         "held": steered(control, hold_feet=True),
     }

@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from motet.bundle.fields import LARGEST, Fields
-from motet.bundle.graph import Arrays, Graph
+from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
+from motet.decode.acts import Act, ActSettings
 from motet.decode.matching import FEATURES, Matcher, Playback, Rows, SteeringSettings, Table
 from motet.decode.steering import PoseCodes
 from motet.errors import BundleError, ControlError
@@ -16,10 +17,12 @@ from motet.models.base import LARGEST_CROWD, ControlModel
 from motet.models.scripts import captions, parse_orders
 from motet.models.steer_session import Gaits, SteerSession
 from motet.motion.feet.lock import FootLockSettings
+from motet.motion.feet.treadmill import travelling
 from motet.motion.humanoid import BONES
 from motet.motion.motion import Motion
 from motet.motion.pose import Pose
 from motet.motion.rotations import rotmat_to_quat
+from motet.representation.root_block import way
 from motet.representation.root_sixd import ROOT_SIXD, SIXD_KINDS, joint_rotations
 from motet.settings import checked_int
 
@@ -39,7 +42,7 @@ class SteerModel(ControlModel):
 
     LOOPS = ("matching",)
     ROLES = ()
-    SETTINGS = (SteeringSettings, FootLockSettings)
+    SETTINGS = (SteeringSettings, FootLockSettings, ActSettings)
 
     def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:
         super().__init__(manifest, graphs, tables)
@@ -134,10 +137,27 @@ class SteerModel(ControlModel):
     def pose_of(self, motion: Motion) -> Pose:
         """The last pose of a motion, at the origin; MotionError for one that is not of a human figure."""
         features = self.contract.features(self.contract.frames(self.at_own_rate(motion))[-1:])
+        quats, height = self._bodies(features)
+        return Pose(np.zeros((1, 3)), quats, height, np.ones((1, 2), np.float32))
+
+    def act_of(self, motion: Motion, name: str = "act") -> Act:
+        """A motion of any human figure as an act: what a session's ``act`` takes, for many characters and often.
+
+        A clip in place gets the path that its feet imply, and a TravelWarning tells. What rests at both ends is left
+        out. MotionError for one that is not of a human figure, ControlError for one of less than three ticks.
+        """
+        features = self.contract.features(self.contract.frames(self.at_own_rate(travelling(motion))))
+        steps = features.select(ROOT_SIXD[:3]).values / self.fps
+        facing, x, z = way(steps)
+        quats, height = self._bodies(features)
+        numbers = np.column_stack([quats.reshape(len(quats), -1), x, z, facing, height]).astype(np.float32)
+        return Act.of(name, numbers, self.fps, self.settings(ActSettings))
+
+    def _bodies(self, features: Motion) -> tuple[Floats, Floats]:
+        """Quaternions (T, J, 4) and the hips' height (T,) of features."""
         local = joint_rotations(features)
         quats = np.stack([rotmat_to_quat(local[bone]) for bone in BONES], axis=1).astype(np.float32)
-        height = features.select(("root.height",)).values[:, 0].astype(np.float32)
-        return Pose(np.zeros((1, 3)), quats, height, np.ones((1, 2), np.float32))
+        return quats, features.select(("root.height",)).values[:, 0].astype(np.float32)
 
     def run(self, script: str, start: Motion | str | None = None, *, hold_feet: bool = True) -> Motion:
         """The motion of one figure that is steered by a script (:mod:`motet.models.scripts`).

@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from motet.bundle.fields import Fields
+from motet.decode.acting import Acting
+from motet.decode.acts import Act, ActSettings
 from motet.decode.matching import Playback, Rows, SteeringSettings
 from motet.decode.steering import tick
 from motet.errors import BundleError, ControlError, ControlWarning, warn
-from motet.models.guided import Guidance, Guided
+from motet.models.guided import Guidance, Guided, Who
 from motet.models.scripts import Order, parse_orders
 from motet.motion.feet.lock import FootLock, FootLockSettings
 from motet.motion.humanoid import BONES
@@ -95,6 +97,7 @@ class SteerSnapshot:
     """The whole state of a session."""
 
     playback: Playback
+    acting: Acting
     command: Command
     lock: FootLock | None
     poses: tuple[Pose, Pose] | None
@@ -115,10 +118,15 @@ class SteerSession(Guided):
         self._playback, zero = playback, np.zeros(self.characters)
         self._command = Command(np.full(self.characters, gait), zero, zero, zero, zero > 0)
         self._target = np.zeros((self.characters, 3))
+        self._acting = self._no_acts()
         self._lock = self._new_lock() if hold_feet else None
         self._poses: tuple[Pose, Pose] | None = None
         self._ahead = 0.0
         self._said: set[str] = set()
+
+    def _no_acts(self) -> Acting:
+        model = self.model
+        return Acting.of(self._playback, model.matcher, model.pose_codes, model.settings(ActSettings))
 
     def _new_lock(self) -> FootLock:
         return FootLock(self.characters, 1 / self.model.fps, self.model.settings(FootLockSettings))
@@ -188,10 +196,49 @@ class SteerSession(Guided):
 
     def tick_to(self, target: Array) -> Pose:
         """A tick with a raw target (characters, 3): velocity along x and z in m/s, facing in radians; not checked."""
-        pose = tick(self.model.matcher, self.model.pose_codes, self._playback, target, self._command.gait)
+        gait, root = self._command.gait, self._playback.root
+        changed = self._acting.begin(self._playback, target, gait)
+        pose = tick(self.model.matcher, self.model.pose_codes, self._playback, target, gait)
+        pose = self._acting.laid(pose, self._playback, root, changed)
+        self._face_as_acted()
         pose = pose if self._lock is None else self._lock.held(pose)
         self._guidance, pose = self._guidance.after(pose, 1 / self.model.fps)
         return pose
+
+    def _face_as_acted(self) -> None:
+        """Those who act with the whole body and are told to stand go on standing as they do then."""
+        told = self._command
+        who = self._acting.whole & (told.speed == 0)
+        if who.any():
+            facing = np.where(who, self._playback.root[:, 2], told.facing)
+            direction = np.where(who, facing, told.direction)
+            self._command = replace(told, direction=direction, facing=facing)
+            self._target = np.where(who[:, None], np.insert(np.zeros((len(who), 2)), 2, facing, axis=1), self._target)
+
+    def act(self, what: Motion | Act | Sequence[Motion | Act], *, who: Who = None, upper: bool | None = None) -> None:
+        """Do something, from the next tick on, in place of what is being done.
+
+        what: a motion of any human figure, without what it rests at both ends; or an act, which
+            :meth:`motet.models.steer.SteerModel.act_of` makes of one once. One for all, or one for each of ``who``.
+        who: numbers of characters, by default all.
+        upper: by the upper body alone, while the legs go on; or by the whole body (False), which goes its own way over
+            the ground. By default by the whole body where a character stands, whose legs go once it is told to.
+        MotionError for a motion that is not of a human figure, ControlError for one of less than three ticks and for
+        characters that are not there; nothing changes then.
+        """
+        characters = self._who(who).tolist()
+        each = [what] * len(characters) if isinstance(what, Motion | Act) else list(what)
+        if len(each) != len(characters):
+            raise ControlError(f"{len(each)} acts do not fit {len(characters)} characters")
+        made = {id(one): one if isinstance(one, Act) else self.model.act_of(one) for one in each}
+        self._acting.asked |= {i: (made[id(one)], upper) for i, one in zip(characters, each, strict=True)}
+
+    @property
+    def acting(self) -> list[tuple[str, float] | None]:
+        """What each character does: its name and the seconds that are left; None of those that only go or stand."""
+        left = [one and (one.act.name, (len(one.act) - 1 - one.frame) / self.model.fps) for one in self._acting.playing]
+        asked = {i: (act.name, (len(act) - 1) / self.model.fps) for i, (act, _) in self._acting.asked.items()}
+        return [asked.get(i, one) for i, one in enumerate(left)]
 
     def advance(self, seconds: float) -> Pose:
         """The pose ``seconds`` later, for a display of any frame rate: interpolated between two ticks. A command shows
@@ -221,7 +268,7 @@ class SteerSession(Guided):
         direction = np.where(told.speed > 0, told.direction, facing)  # standing ones move the way they face
         self._command = replace(told, direction=direction, facing=facing, faces_way=np.zeros_like(told.faces_way))
         self._target, _ = self.model.abilities.target(self._command)
-        self._poses = None  # nothing lies between there and here
+        self._acting, self._poses = self._no_acts(), None  # nothing lies between there and here
         if self._lock is not None:
             self._lock = self._new_lock()
 
@@ -234,6 +281,7 @@ class SteerSession(Guided):
             raise ControlError("a pose must be finite numbers")
         codes = self.model.pose_codes.encode(pose.rotations, pose.height)
         self.model.matcher.pose(self._playback, np.broadcast_to(codes, (self.characters, codes.shape[1])))
+        self._acting = self._no_acts()
 
     def run(self, script: str) -> list[Motion]:
         """Run a script (:mod:`motet.models.scripts`) for all characters; one motion for each."""
@@ -275,7 +323,8 @@ class SteerSession(Guided):
     def snapshot(self) -> SteerSnapshot:
         """The whole state, to be restored later."""
         lock = None if self._lock is None else replace(self._lock)  # its arrays are replaced, never written into
-        return SteerSnapshot(self._playback.copy(), self._command, lock, self._poses, self._ahead, self._guidance)
+        state = self._playback.copy(), self._acting.copy(), self._command, lock
+        return SteerSnapshot(*state, self._poses, self._ahead, self._guidance)
 
     def restore(self, snapshot: SteerSnapshot) -> None:
         """Go back to a snapshot of this session or of one like it: the same model, as many characters, and the same
@@ -287,6 +336,7 @@ class SteerSession(Guided):
             has, lacks = ("without", "with") if snapshot.lock is None else ("with", "without")
             raise ControlError(f"a snapshot {has} held feet does not fit a session {lacks} them (hold_feet)")
         self._playback, self._poses, self._ahead = snapshot.playback.copy(), snapshot.poses, snapshot.ahead
+        self._acting = snapshot.acting.copy()
         self._command, (self._target, _) = command, self.model.abilities.target(command)
         self._guidance = snapshot.guidance
         self._lock = None if snapshot.lock is None else replace(snapshot.lock)

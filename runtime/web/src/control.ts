@@ -7,7 +7,7 @@ import { BONES } from "./humanoid.js";
 import { FEATURES, Matcher, type Tables } from "./matching.js";
 import { Model } from "./model.js";
 import { Steerer } from "./steering.js";
-import { lockOf, steeringOf, type LockSettings } from "./steeringSettings.js";
+import { type ActSettings, actsOf, lockOf, steeringOf, type LockSettings } from "./steeringSettings.js";
 
 /** A session has at most so many figures. */
 const LARGEST_CROWD = 100_000;
@@ -37,6 +37,7 @@ export class ControlModel extends Model {
   readonly abilities: Gaits;
   readonly steerer: Steerer;
   readonly lock: LockSettings;
+  readonly acts: ActSettings;
 
   constructor(manifest: Manifest, tables: Tables) {
     super(manifest);
@@ -45,6 +46,7 @@ export class ControlModel extends Model {
     this.abilities = new Gaits(names, speeds, steering);
     this.gaits = names;
     this.lock = lockOf(manifest.settings);
+    this.acts = actsOf(manifest.settings);
     const matcher = new Matcher(tables, odd, names.length, steering, this.fps);
     matcher.goals.forEach((goals, gait) => {
       if (!goals.rows.length) throw new BundleError(`table left: no row of ${JSON.stringify(names[gait])} can be jumped to`);

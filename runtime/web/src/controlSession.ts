@@ -1,10 +1,13 @@
 /* A session of steered figures: commands in, within what gaits allow, and a pose a tick out. */
+import { doing, type Doing, noAct } from "./acting.js";
+import { type Act, actOf, numbersOf } from "./acts.js";
 import type { ControlModel } from "./control.js";
 import { ControlError } from "./errors.js";
 import { newLock } from "./footLock.js";
 import { type Command, told } from "./gaits.js";
 import { BONES } from "./humanoid.js";
 import type { Target } from "./matching.js";
+import type { Motion } from "./motion.js";
 import type { Pose } from "./poses.js";
 import { about, product, type Quaternion, Y } from "./rotations.js";
 import { wrapped } from "./springs.js";
@@ -109,6 +112,26 @@ export class ControlSession {
     this.state.figures.forEach((figure, at) => tell(figure, commands[at]!, found[at]!.target));
   }
 
+  /**
+   * Do something, from the next tick on, in place of what is being done: a motion of any human figure, or an act that
+   * `actOf` made of one; one for all, or one for each of `who`, the numbers of the figures. upper: by the upper body alone,
+   * or by the whole body with its own way over the ground; if neither is said, by the whole body where a figure stands, whose
+   * legs go as soon as it is told to. ControlError for figures that are not there, MotionError for what is no human's.
+   */
+  act(what: Motion | Act | readonly (Motion | Act)[], { who, upper }: { who?: readonly number[]; upper?: boolean } = {}): void {
+    const figures = who ?? this.state.figures.map((_, at) => at);
+    if (!figures.every((at) => Number.isInteger(at) && at >= 0 && at < this.characters)) throw new ControlError(`figures are whole numbers from 0 to ${this.characters - 1}, not ${figures.join(", ")}`);
+    const given = (Array.isArray(what) ? what : Array<Motion | Act>(figures.length).fill(what as Motion | Act)) as (Motion | Act)[];
+    if (given.length !== figures.length) throw new ControlError(`${given.length} acts do not fit ${figures.length} figures`);
+    const made = new Map([...new Set(given)].map((one) => [one, "skeleton" in one ? actOf(this.model, "act", numbersOf(this.model, one)) : one]));
+    figures.forEach((at, i) => (this.state.figures[at]!.acting.asked = { act: made.get(given[i]!)!, upper }));
+  }
+
+  /** Of each figure what it does, and the seconds that are left of it; null of one that only stands or goes. */
+  get acting(): (Doing | null)[] {
+    return this.state.figures.map(({ acting }) => doing(acting, this.model.fps));
+  }
+
   /** The next pose of each figure, 1 / fps seconds later. */
   tick(): SteeredPose[] {
     return this.played().map(poseOf);
@@ -156,6 +179,7 @@ export class ControlSession {
       figure.command = { ...command, direction, facing, facesWay: false };
       figure.target = this.model.abilities.target(figure.command).target;
       figure.lock = newLock();
+      figure.acting = noAct(this.model, playback);
     });
     this.state.shown = null; // nothing lies between there and here
   }

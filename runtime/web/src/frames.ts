@@ -13,7 +13,7 @@ import { rounded } from "./numbers.js";
 import { moved, type Pose as Ground, seenFrom } from "./planar.js";
 import { posesOf } from "./poses.js";
 import {
-  about, dot, minus, ofVector, plus, product, type Quaternion, rotated, size, times, type Vector, vectorOf, X, Y,
+  about, dot, minus, nearestTurn, ofVector, product, type Quaternion, rotated, size, times, type Vector, vectorOf, X, Y,
 } from "./rotations.js";
 import { toHumanoid } from "./retarget.js";
 import { Skeleton } from "./skeleton.js";
@@ -91,11 +91,7 @@ function degrees(turns: Quaternion[], bone: string): number[][] {
 function vectors(turns: Quaternion[]): number[][] {
   const found = turns.map(vectorOf);
   for (let at = found.length - 2; at >= 0; at--) {
-    const [own, after] = [found[at]!, found[at + 1]!];
-    const angle = size(own);
-    const axis = angle > 1e-3 ? times(own, 1 / angle) : times(after, 1 / Math.max(size(after), 1e-9));
-    const rounds = Math.round((dot(after, axis) - angle) / (2 * Math.PI));
-    found[at] = plus(own, times(axis, 2 * Math.PI * rounds));
+    found[at] = nearestTurn(found[at]!, found[at + 1]!);
   }
   return found;
 }

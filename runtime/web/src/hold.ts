@@ -83,7 +83,7 @@ function shiftsOf(points: Vector[][], fps: number): [number, number][] {
 }
 
 /** Contact of each point from each frame to the next, 0 to 1: low and slow. */
-function contacts(points: Vector[][], fps: number): number[][] {
+export function contacts(points: Vector[][], fps: number): number[][] {
   const calm = smoothed(points.map((frame) => frame.flatMap(([x, , z]) => [x, z])), CALM * fps);
   return points.slice(1).map((frame, at) =>
     frame.map((point, k) => {

@@ -1,5 +1,7 @@
 export { Bundle, type Manifest } from "./bundle.js";
 export { BundleError, ControlError, DecodingError, TextError } from "./errors.js";
+export type { Doing } from "./acting.js";
+export { type Act, actOf } from "./acts.js";
 export { ControlModel, type StartSettings } from "./control.js";
 export { ControlSession, type ControlSnapshot, type SteeredPose, type Told } from "./controlSession.js";
 export { DescribeModel, type Description, type DescribeSettings } from "./describe.js";

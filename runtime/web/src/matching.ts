@@ -165,15 +165,19 @@ export class Matcher {
 
   /** What is asked for, as steps of features, and their mirror image: the row's own but for where it goes. */
   private ask(figure: Playback, row: number, target: Target): void {
-    const { asked, image } = this;
-    const { feature_mean: mean, feature_scale: scale } = this.tables;
+    const { asked } = this;
     const at = row * FEATURES;
     for (let i = TRAJECTORY; i < FEATURES; i++) {
       asked[i] = figure.mirror ? this.features[at + COLUMNS[i]!]! * SIGNS[i]! : this.features[at + i]!;
     }
-    this.trajectory(figure, target).forEach((value, i) => {
-      asked[i] = Math.round(STEPS * clamp(Math.fround((value - mean[i]!) * scale[i]!), -LARGEST, LARGEST));
-    });
+    this.lead(figure, target);
+  }
+
+  /** Ask for where the springs lead, and for the mirror image of all that is asked. */
+  private lead(figure: Playback, target: Target): void {
+    const { asked, image } = this;
+    const { feature_mean: mean, feature_scale: scale } = this.tables;
+    this.trajectory(figure, target).forEach((value, i) => (asked[i] = stepsOf((value - mean[i]!) * scale[i]!)));
     for (let i = 0; i < FEATURES; i++) image[i] = asked[COLUMNS[i]!]! * SIGNS[i]!;
   }
 
@@ -194,6 +198,28 @@ export class Matcher {
     const soon = (horizon * 2) / 3;
     const speed = Math.hypot(toX + damped(offX, springRate[0], slow, soon)[0], toZ + damped(offZ, springRate[1], slow, soon)[0]);
     return [...places, ...facings, speed / (speed + half_speed)];
+  }
+
+  /** How a figure is: the features after those of the trajectory, scaled. */
+  now({ row, mirror }: Playback): number[] {
+    const value = (i: number) => this.features[row * FEATURES + (mirror ? COLUMNS[i]! : i)]! * (mirror ? SIGNS[i]! : 1);
+    return Array.from({ length: FEATURES - TRAJECTORY }, (_, i) => value(TRAJECTORY + i) / STEPS);
+  }
+
+  /** Features after those of the trajectory, as the table has them. */
+  scaled(features: number[]): number[] {
+    const { feature_mean: mean, feature_scale: scale } = this.tables;
+    return features.map((value, i) => (value - mean[TRAJECTORY + i]!) * scale[TRAJECTORY + i]!);
+  }
+
+  /** Let a figure go on from the row that fits best after being so, features after those of the trajectory, scaled. */
+  follow(figure: Playback, target: Target, gait: number, now: number[]): void {
+    now.forEach((value, i) => (this.asked[TRAJECTORY + i] = stepsOf(value)));
+    this.lead(figure, target);
+    const { row, mirror } = this.goals[gait]!.nearest(this.asked, this.image, Infinity)!;
+    Object.assign(figure, { row, part: 0, mirror, rate: 1, warp: 0, warpRate: 0 });
+    figure.offset.fill(0);
+    figure.offsetRate.fill(0);
   }
 
   /** Go on from another row; what the pose loses by it goes into the inertialization offset. */
@@ -221,4 +247,9 @@ export class Matcher {
       into[k] = (mirror ? this.codeSigns[k]! * value : value) + offset[k]!;
     }
   }
+}
+
+/** A scaled feature in steps. */
+function stepsOf(value: number): number {
+  return Math.round(STEPS * clamp(Math.fround(value), -LARGEST, LARGEST));
 }

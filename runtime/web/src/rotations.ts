@@ -106,6 +106,14 @@ export function vectorOf(q: Quaternion): Vector {
   return times([x, y, z], sine > 1e-12 ? (2 * Math.atan2(sine, w)) / sine : 2);
 }
 
+/** The same turn by the rotation vector that is nearest to another: by an angle about an axis it is also one by less a round. */
+export function nearestTurn(vector: Vector, other: Vector): Vector {
+  const angle = size(vector);
+  const axis = angle > 1e-3 ? times(vector, 1 / angle) : times(other, 1 / Math.max(size(other), 1e-9));
+  const rounds = Math.round((dot(other, axis) - angle) / (2 * Math.PI));
+  return plus(vector, times(axis, 2 * Math.PI * rounds));
+}
+
 /** The turn of a rotation vector. */
 export function ofVector(vector: Vector): Quaternion {
   return about(unit(vector), size(vector));

@@ -1,4 +1,5 @@
 /* One steered figure: what it plays, what it is told, how its feet are held. Sessions and the page of `motet live` have some. */
+import { type Acting, begin, laid, noAct } from "./acting.js";
 import type { ControlModel } from "./control.js";
 import { held, type Lock, newLock } from "./footLock.js";
 import type { Command } from "./gaits.js";
@@ -8,16 +9,19 @@ import type { Played } from "./steering.js";
 
 export interface Steered {
   playback: Playback;
+  acting: Acting;
   lock: Lock;
   command: Command;
   target: Target;
 }
 
 /** A figure that stands still at a place; with a phase it searches in its turn alone, first after so many ticks. */
-export function standing({ steerer: { matcher } }: ControlModel, gait: number, place?: Ground, phase?: number): Steered {
+export function standing(model: ControlModel, gait: number, place?: Ground, phase?: number): Steered {
   const facing = place?.[2] ?? 0;
+  const { matcher } = model.steerer;
+  const playback = matcher.playing(matcher.stillest(gait), place, phase);
   const command = { gait, speed: 0, direction: 0, facing, facesWay: false };
-  return { playback: matcher.playing(matcher.stillest(gait), place, phase), lock: newLock(), command, target: [0, 0, facing] };
+  return { playback, acting: noAct(model, playback), lock: newLock(), command, target: [0, 0, facing] };
 }
 
 /** Set where a figure goes from now on: a command, and the target that its gait makes of it. */
@@ -33,7 +37,19 @@ export function hasten(playback: Playback): void {
 }
 
 /** The next pose, 1 / fps seconds later. */
-export function tick({ steerer, lock: how, fps }: ControlModel, figure: Steered, holdFeet: boolean, target = figure.target): Played {
-  const pose = steerer.tick(figure.playback, target, figure.command.gait);
+export function tick(model: ControlModel, figure: Steered, holdFeet: boolean, target = figure.target): Played {
+  const { playback, acting, command } = figure;
+  const { steerer, lock: how, fps } = model;
+  const { root } = playback;
+  const changed = begin(model, acting, playback, target, command.gait);
+  const pose = laid(model, acting, steerer.tick(playback, target, command.gait), playback, root, changed);
+  if (acting.playing?.whole && !command.speed) stand(figure);
   return holdFeet ? held(figure.lock, pose, how, 1 / fps) : pose;
+}
+
+/** Who acts with the whole body and is told to stand goes on standing as it does then. */
+function stand(figure: Steered): void {
+  const facing = figure.playback.root[2];
+  figure.command = { ...figure.command, direction: facing, facing };
+  figure.target = [0, 0, facing];
 }

@@ -45,10 +45,15 @@ export class Steerer {
     this.warp(figure, moves[3]!);
     this.move(figure, moves);
     this.fade(figure, dampingOf(how.blend));
-    matcher.played(figure, this.codes);
     const contacts: [number, number] = figure.mirror ? [moves[5]!, moves[4]!] : [moves[4]!, moves[5]!];
+    return { ground: figure.root, ...this.body(figure), contacts };
+  }
+
+  /** What a figure plays, with its offset and turned as it goes. */
+  body(figure: Playback): Pick<Played, "rotations" | "height"> {
+    this.matcher.played(figure, this.codes);
     const { rotations, height } = this.pose();
-    return { ground: figure.root, rotations: warped(rotations, figure.warp), height, contacts };
+    return { rotations: warped(rotations, figure.warp), height };
   }
 
   /** Velocity over the ground (forward, left, turn), speed, and how much each foot stands, of the row as recorded. */

@@ -39,10 +39,13 @@ const STEERING = {
 
 const LOCK = { fade: [0.06, 0.001, 10], farthest: [0.2, 0, 1], swings: [1, 0, 100], stands: [0.5, 0, 1] } as const satisfies Record<string, Range>;
 
+const ACTS = { blend: [0.12, ...HALF_LIFE], far: [0.7, 0.01, 3.15], entry: [0.5, 0, 10], rest: [0.25, 0, 100] } as const satisfies Record<string, Range>;
+
 const WHOLE = ["search_every", "lasting", "jump_back", "jump_ahead", "row_step"];
 
 export type Steering = Record<keyof typeof STEERING, number>;
 export type LockSettings = Record<keyof typeof LOCK, number>;
+export type ActSettings = Record<keyof typeof ACTS, number>;
 export type Settings = Record<string, Record<string, number> | undefined>;
 
 /** Those of `settings.steering`; a missing number is the usual one, BundleError names one that is unknown or out of range. */
@@ -53,6 +56,11 @@ export function steeringOf(settings: Settings): Steering {
 /** The same of `settings.foot_lock`. */
 export function lockOf(settings: Settings): LockSettings {
   return read("foot_lock", LOCK, settings.foot_lock ?? {}) as LockSettings;
+}
+
+/** The same of `settings.acting`. */
+export function actsOf(settings: Settings): ActSettings {
+  return read("acting", ACTS, settings.acting ?? {}) as ActSettings;
 }
 
 function read(feature: string, ranges: Record<string, Range>, given: Record<string, number>): Record<string, number> {

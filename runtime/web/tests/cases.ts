@@ -1,7 +1,7 @@
 /* What every runtime has to give, in Node and in a browser: golden vectors, and answers that Python gave (python.json). */
 import { type NumberArray, rows } from "../src/arrays.js";
 import { Bundle, type TextTables } from "../src/bundle.js";
-import { ControlModel, DescribeModel, FillModel, GenerateModel, load, PredictModel, SearchModel, type Told } from "../src/index.js";
+import { actOf, ControlModel, DescribeModel, FillModel, GenerateModel, load, PredictModel, SearchModel, type Told } from "../src/index.js";
 import { framesOf } from "../src/poses.js";
 import { Recorded } from "../src/random.js";
 import { Vocabulary } from "../src/text.js";
@@ -191,7 +191,10 @@ async function steers(read: Read): Promise<void> {
   const { model } = await loaded(read, "control", ControlModel);
   for (const [holdFeet, wanted] of [[false, python.steered], [true, python.held]] as const) {
     const session = model.start({ characters: 2, holdFeet });
-    const found = python.steering.flatMap(({ put, push, control }: { put?: number[][]; push?: number[]; control?: Told }) => {
+    const turn = actOf(model, "turn", python.acted.flat());
+    type Call = { put?: number[][]; push?: number[]; control?: Told; act?: { who: number[]; upper?: boolean } };
+    const found = python.steering.flatMap(({ put, push, control, act }: Call) => {
+      if (act) session.act(turn, act);
       if (put) session.put(put);
       if (push) session.push(push);
       if (control) session.control(control);

@@ -10,9 +10,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from motet.decode.acts import foot_contacts, pose_features, seen
 from motet.decode.matching import HORIZONS, SteeringSettings, horizons, mirrored_features, speed_feature
-from motet.motion.feet.contacts import contacts_of
-from motet.motion.humanoid import BONES, HUMANOID, LEFT_RIGHT, ground_under, sided, sole_points
+from motet.motion.humanoid import BONES
 from motet.motion.kinematics import global_transforms
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, rotmat_to_quat, rotmat_to_rotvec
@@ -137,21 +137,17 @@ def _rows(features: Motion, how: SteeringSettings) -> tuple[Array, Array, Array,
     turned, places = global_transforms(named("root_sixd").motion(features))
     block = features.select(ROOT_SIXD).values
     way = poses_of(block, features.fps)  # x, z, facing
-    soles = sole_points(turned, places)
-    soles[..., 1] -= ground_under(soles)
-    touch = contacts_of(soles, features.fps).reshape(-1, 2, 3).max(axis=2)
-    contacts = np.concatenate([touch[:1], touch])
+    contacts = foot_contacts(turned, places, features.fps)
     speed = np.hypot(block[:, 0], block[:, 1])
     window = np.ones(min(round(0.5 * features.fps), len(speed)))  # half a second
     speed = np.convolve(speed, window, "same") / np.convolve(np.ones(len(speed)), window, "same")
     local = joint_rotations(features)
     quats = np.stack([rotmat_to_quat(local[bone]) for bone in BONES], axis=1)
     poses = np.column_stack([quats.reshape(len(features), -1), block[:, 3]])
-    tracked = ("hips", *(sided(side, part) for part in ("Toes", "Hand") for side in LEFT_RIGHT))
-    points = places[:, [HUMANOID.index(joint) for joint in tracked]]
     times = horizons(how)
     soon = speed[np.minimum(np.arange(len(speed)) + round(times[1] * features.fps), len(speed) - 1)]
-    known = [_trajectory(way, times, features.fps), speed_feature(soon, how)[:, None], _now(points, way, features.fps)]
+    now = pose_features(places, way, features.fps)
+    known = [_trajectory(way, times, features.fps), speed_feature(soon, how)[:, None], now]
     return poses, block[:, :3], speed, contacts, np.concatenate(known, axis=1)
 
 
@@ -167,22 +163,6 @@ def _trajectory(way: Array, times: list[float], fps: float) -> Array:
     places = [seen(step[:, :2], way[:, 2]) for step in found]
     facings = [np.stack([np.sin(step[:, 2]), np.cos(step[:, 2])], axis=1) for step in found]
     return np.concatenate(places + facings, axis=1)
-
-
-def seen(vectors: Array, facing: Array) -> Array:
-    """Vectors (T, 2) over the ground, x and z, as left and forward (T, 2) of a facing (T,)."""
-    cos, sin = np.cos(facing), np.sin(facing)
-    return np.stack([cos * vectors[:, 0] - sin * vectors[:, 1], sin * vectors[:, 0] + cos * vectors[:, 1]], axis=1)
-
-
-def _now(points: Array, way: Array, fps: float) -> Array:
-    """The features (T, 21) of points (T, 5, 3) in the world, of hips, feet and hands."""
-    speeds = np.gradient(points, axis=0) * fps
-    from_root = points - np.insert(way[:, None, :2], 1, 0.0, axis=2)
-    now = np.concatenate([from_root[:, 1:3], speeds[:, 1:3], speeds[:, :1], from_root[:, 3:]], axis=1)
-    for joint in range(now.shape[1]):
-        now[:, joint, [0, 2]] = seen(now[:, joint][:, [0, 2]], way[:, 2])
-    return now.reshape(len(now), -1)
 
 
 def _aligned(poses: Array) -> Array:

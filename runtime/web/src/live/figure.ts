@@ -1,15 +1,19 @@
 /* The model of a live page, and its figures. */
+import { doing, type Doing } from "../acting.js";
+import { type Act, motionOf } from "../acts.js";
 import { halves } from "../arrays.js";
 import { ControlModel } from "../control.js";
 import type { Manifest } from "../bundle.js";
-import { BONES, HUMANOID, SIDES } from "../humanoid.js";
+import { HUMANOID, SIDES } from "../humanoid.js";
 import type { Tables } from "../matching.js";
-import { type Motion, worldOf } from "../motion.js";
+import { worldOf } from "../motion.js";
 import type { Pose as Ground } from "../planar.js";
-import { about, product, type Quaternion, STILL, type Vector, Y } from "../rotations.js";
+import type { Quaternion, Vector } from "../rotations.js";
 import { damped, dampedPath, dampingOf, wrapped } from "../springs.js";
 import { standing, type Steered, tell, tick } from "../steered.js";
 import { between, type Played } from "../steering.js";
+
+export { motionOf };
 
 /** Joints of the foot and of the toes, left and right. */
 export const FEET = SIDES.map((side) => ["Foot", "Toes"].map((part) => HUMANOID.index(side + part)));
@@ -93,6 +97,16 @@ export class Figure {
     [this.before, this.now] = [this.now, tick(this.model, this.steered, true)];
   }
 
+  /** Do something, from the next tick on: `upper` as in a session's `act`. Meanwhile a whole body faces as the act does. */
+  act(act: Act, upper?: boolean): void {
+    this.steered.acting.asked = { act, upper };
+  }
+
+  /** What it does, and the seconds that are left of it. */
+  get acting(): Doing | null {
+    return doing(this.steered.acting, this.model.fps);
+  }
+
   /** Where it is asked to be so many seconds from now: what its springs lead to. */
   later(seconds: number): Ground {
     const { playback: { root, spring, springRate }, target } = this.steered;
@@ -124,17 +138,6 @@ export interface Shown extends Played {
 export function shownOf(pose: Played): Shown {
   const { turns, places } = worldOf(motionOf([pose]));
   return { ...pose, turned: turns[0]!, places: places[0]! };
-}
-
-/** Poses, a tick after each other, as a motion of the humanoid. */
-export function motionOf(poses: Played[], fps = 30): Motion {
-  const rotations = poses.map((pose) => {
-    const own = HUMANOID.names.map((name): Quaternion => pose.rotations[BONES.indexOf(name)] ?? STILL);
-    own[0] = product(about(Y, pose.ground[2]), own[0]!);
-    return own;
-  });
-  const translations = poses.map(({ ground: [x, z], height }) => HUMANOID.joints.map(({ offset }, at): Vector => (at ? offset : [x, height, z])));
-  return { skeleton: HUMANOID, fps, rotations, translations, travels: true };
 }
 
 /** A speed that a gait has at an angle from the facing; 0 is always one. */

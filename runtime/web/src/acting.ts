@@ -1,0 +1,193 @@
+/* What a steered figure is told to do, laid over its steps: docs/bundle.md, "Acts". */
+import { type Act, stepOf } from "./acts.js";
+import type { ControlModel } from "./control.js";
+import { BONES, LEG, SIDES } from "./humanoid.js";
+import { FEATURES, TRAJECTORY, type Playback, type Target } from "./matching.js";
+import type { Pose as Ground } from "./planar.js";
+import { inverse, nearestTurn, ofVector, product, type Quaternion, size, type Vector, vectorOf } from "./rotations.js";
+import { damped, dampingOf, wrapped } from "./springs.js";
+import type { Played } from "./steering.js";
+import type { ActSettings } from "./steeringSettings.js";
+
+const LOWER = ["hips", ...SIDES.flatMap((side) => LEG.map((part) => side + part))];
+/** Whether a bone is of the upper body. */
+const UPPER = BONES.map((bone) => !LOWER.includes(bone));
+const SPINE = BONES.indexOf("spine");
+/** From this feature after the trajectory's on they tell of the hands: how the upper body is. */
+const HANDS = FEATURES - TRAJECTORY - 6;
+/** Radians that a metre of the hips' height counts as. */
+const METRE = 10;
+/** Radians, metres and metres a second of which nothing is seen. */
+const FADED = 1e-4;
+
+/** A pose in its frame of the facing. */
+type Body = Pick<Played, "rotations" | "height">;
+
+/** What is played. frame: that is shown. yields: whether the legs go as soon as they are told to. */
+interface Playing {
+  act: Act;
+  frame: number;
+  whole: boolean;
+  yields: boolean;
+}
+
+/** The act of one figure. */
+export interface Acting {
+  playing: Playing | null;
+  /** Begun in the next tick; upper: by the upper body alone, undefined: by the whole body where it stands. */
+  asked: { act: Act; upper: boolean | undefined } | null;
+  /** Of the last tick without acts; as it was shown; and as it was shown in the tick before. */
+  base: Body;
+  shown: Body;
+  before: Body;
+  /** Whether the act led the whole body in the last tick. */
+  led: boolean;
+  /** What is added, rotation vectors in the parents' frames and height, how fast it changes, and by which damping it fades. */
+  offset: number[];
+  offsetRate: number[];
+  damping: number;
+  /** Velocity over the ground, and the part of it that fades: m/s along x and z, rad/s. */
+  going: Ground;
+  drift: Ground;
+}
+
+/** Of a figure that does nothing but stand or go. */
+export function noAct({ steerer }: ControlModel, playback: Playback): Acting {
+  const base = steerer.body(playback);
+  const none = () => Array<number>(3 * BONES.length + 1).fill(0);
+  const body = { base, shown: base, before: base };
+  return { playing: null, asked: null, ...body, led: false, offset: none(), offsetRate: none(), damping: 0, going: [0, 0, 0], drift: [0, 0, 0] };
+}
+
+/** What a figure does, and the seconds that are left of it. */
+export interface Doing {
+  name: string;
+  left: number;
+}
+
+export function doing({ playing, asked }: Acting, fps: number): Doing | null {
+  if (asked) return { name: asked.act.name, left: (asked.act.height.length - 1) / fps };
+  return playing && { name: playing.act.name, left: (playing.act.height.length - 1 - playing.frame) / fps };
+}
+
+/** Before a tick: go on by a frame, begin what is asked, end what is over. Whether something else is shown from now on. */
+export function begin(model: ControlModel, acting: Acting, playback: Playback, target: Target, gait: number): boolean {
+  const { playing: now, asked } = acting;
+  if (!now && !asked) return false;
+  const goes = Math.hypot(target[0], target[1]) > 0;
+  const after = asked ? entered(model, acting, playback, goes) : next(now!, goes);
+  [acting.playing, acting.asked] = [after, null];
+  if (now?.whole && !after?.whole) {
+    const { steerer } = model;
+    steerer.matcher.follow(playback, target, gait, steerer.matcher.scaled(now.act.features[now.frame]!));
+    acting.base = steerer.body(playback);
+  }
+  return !!asked || !after || after.whole !== now?.whole;
+}
+
+function next(now: Playing, goes: boolean): Playing | null {
+  if (now.frame + 1 >= now.act.height.length) return null;
+  return { ...now, frame: now.frame + 1, whole: now.whole && !(goes && now.yields) };
+}
+
+/** The act that is asked for, at the frame after the one that is most like the figure. */
+function entered({ steerer: { matcher }, acts: how, fps }: ControlModel, { playing, asked }: Acting, playback: Playback, goes: boolean): Playing {
+  const { act, upper } = asked!;
+  const moves = goes || Math.hypot(playback.spring[0], playback.spring[1]) > matcher.how.idle;
+  const whole = upper === undefined ? !moves : !upper;
+  const isNow = matcher.now(playback);
+  if (playing) matcher.scaled(playing.act.features[playing.frame]!).forEach((value, i) => (playing.whole || i >= HANDS) && (isNow[i] = value));
+  const entries = Math.min(Math.round(how.entry * fps), Math.floor((act.height.length - 1) / 3)) + 1;
+  let [best, least] = [0, Infinity];
+  for (let frame = 0; frame < entries; frame++) {
+    const off = matcher.scaled(act.features[frame]!).map((value, i) => value - isNow[i]!);
+    const cost = (whole ? off : off.slice(HANDS)).reduce((sum, value) => sum + value * value, 0);
+    if (cost < least) [best, least] = [frame, cost];
+  }
+  return { act, frame: best + 1, whole, yields: upper === undefined };
+}
+
+/** After a tick: its pose with the act laid over it, and the figure where that leads. root: before the tick. */
+export function laid({ acts: how, steerer: { matcher } }: ControlModel, acting: Acting, pose: Played, playback: Playback, root: Ground, changed: boolean): Played {
+  const { dt } = matcher;
+  const { playing, base } = acting;
+  acting.base = { rotations: pose.rotations, height: pose.height };
+  const step: Ground = playing?.whole
+    ? stepOf(playing.act, playing.frame, root[2])
+    : [playback.root[0] - root[0], playback.root[1] - root[1], wrapped(playback.root[2] - root[2])];
+  if (changed) lose(acting, how, base, step, dt);
+  acting.before = acting.shown;
+  acting.led = !!playing?.whole;
+  if (!playing && !acting.offset.some((value) => value)) {
+    acting.shown = acting.base;
+    acting.going = each((i) => step[i]! / dt);
+    return pose;
+  }
+  fade(acting, how, dt);
+  acting.shown = plus(source(acting, acting.base, 0), acting.offset);
+  acting.going = each((i) => step[i]! / dt + acting.drift[i]!);
+  const to = playing?.whole ? each((i) => root[i]! + step[i]!) : playback.root;
+  playback.root = [to[0] + acting.drift[0] * dt, to[1] + acting.drift[1] * dt, wrapped(to[2] + acting.drift[2] * dt)];
+  if (playing?.whole) {
+    playback.spring = [acting.going[0], acting.going[1], playback.root[2]];
+    playback.springRate = [0, 0, 0];
+  }
+  return { ...acting.shown, ground: playback.root, contacts: playing?.whole ? playing.act.contacts[playing.frame]! : pose.contacts };
+}
+
+function each(value: (i: number) => number): Ground {
+  return [value(0), value(1), value(2)];
+}
+
+/**
+ * What is lost from the last tick to this one is added: of the upper body, and where an act leads the whole body, or led it, of
+ * all of it and of the velocity. base: of the last tick without acts.
+ */
+function lose(acting: Acting, { blend, far }: ActSettings, base: Body, step: Ground, dt: number): void {
+  const { shown, before } = acting;
+  const ahead = since(plus(shown, since(shown, before)), source(acting, acting.base, 0));
+  const off = since(shown, source(acting, base, 1));
+  BONES.forEach((_, bone) => off.splice(3 * bone, 3, ...nearestTurn(vectorAt(off, bone), vectorAt(ahead, bone))));
+  const leads = acting.led || acting.playing?.whole;
+  const isNew = (i: number) => leads || UPPER[Math.floor(i / 3)];
+  acting.offsetRate = ahead.map((value, i) => (isNew(i) ? (value - off[i]!) / dt : acting.offsetRate[i]!));
+  acting.offset = off.map((value, i) => (isNew(i) ? value : acting.offset[i]!));
+  const farthest = Math.max(...BONES.map((_, bone) => size(vectorAt(acting.offset, bone))), METRE * Math.abs(acting.offset.at(-1)!));
+  acting.damping = dampingOf(blend) / Math.max(farthest / far, 1);
+  if (leads) acting.drift = each((i) => acting.going[i]! - step[i]! / dt);
+}
+
+/** What is added, a tick later; nothing once nothing is seen of it. */
+function fade(acting: Acting, { blend }: ActSettings, dt: number): void {
+  const later = acting.offset.map((off, i) => damped(off, acting.offsetRate[i]!, acting.damping, dt));
+  const left = later.some(([off]) => Math.abs(off) > FADED) ? 1 : 0;
+  acting.offset = later.map(([off]) => left * off);
+  acting.offsetRate = later.map(([, rate]) => left * rate);
+  acting.drift = each((i) => acting.drift[i]! * left * 0.5 ** (dt / blend));
+}
+
+/** What is played, over a base, so many frames before. */
+function source({ playing }: Acting, base: Body, back: number): Body {
+  if (!playing) return base;
+  const { act, frame, whole } = playing;
+  const rotations = act.rotations[frame - back]!;
+  if (whole) return { rotations, height: act.height[frame - back]! };
+  const found = base.rotations.map((own, bone) => (UPPER[bone] ? rotations[bone]! : own));
+  found[SPINE] = product(inverse(base.rotations[0]!), product(rotations[0]!, rotations[SPINE]!));
+  return { rotations: found, height: base.height };
+}
+
+function vectorAt(more: number[], bone: number): Vector {
+  return more.slice(3 * bone, 3 * bone + 3) as Vector;
+}
+
+/** What is to be added to another body to make it this one. */
+function since(body: Body, other: Body): number[] {
+  const turns = body.rotations.map((own, bone) => vectorOf(product(own, inverse(other.rotations[bone]!))));
+  return [...turns.flat(), body.height - other.height];
+}
+
+function plus({ rotations, height }: Body, more: number[]): Body {
+  const turned = rotations.map((own, bone): Quaternion => product(ofVector(vectorAt(more, bone)), own));
+  return { rotations: turned, height: height + more.at(-1)! };
+}

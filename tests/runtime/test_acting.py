@@ -1,0 +1,203 @@
+"""Acts of steered figures: begun and left without a leap, by the whole body or the upper body, each by itself."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import motet
+from motet.decode.acting import UPPER
+from motet.decode.acts import WIDTH, Act, ActSettings
+from motet.errors import ControlError, MotionError
+from motet.models.steer import SteerModel
+from motet.models.steer_session import SteerSession
+from motet.motion.humanoid import BONES
+from motet.motion.motion import Motion
+from motet.motion.pose import Pose
+from motet.motion.rotations import quat_product
+
+
+@pytest.fixture(scope="module")
+def model() -> SteerModel:
+    return motet.load("control")
+
+
+def frames_of(frames: int = 45, turn: float = 1.0, ahead: float = 0.5, lift: float = 1.2) -> NDArray[np.float32]:
+    """An act: an arm is lifted and let down again, while the figure goes ahead and turns to the left."""
+    part = np.linspace(0, 1, frames)
+    rows = np.zeros((frames, WIDTH))
+    rows[:, 3 : 4 * len(BONES) : 4] = 1
+    half = lift * np.sin(np.pi * part) / 2
+    arm = 4 * BONES.index("leftUpperArm")
+    rows[:, arm + 2], rows[:, arm + 3] = np.sin(half), np.cos(half)
+    rows[:, -3], rows[:, -2], rows[:, -1] = ahead * part, turn * part, 0.95
+    return rows.astype(np.float32)
+
+
+def act_of(model: SteerModel, name: str = "lift", **made: float) -> Act:
+    return Act.of(name, frames_of(**made), model.fps, model.settings(ActSettings))  # type: ignore[arg-type]
+
+
+def ticks(session: SteerSession, count: int) -> list[Pose]:
+    return [session.tick() for _ in range(count)]
+
+
+def walking(model: SteerModel, **settings: object) -> SteerSession:
+    session = model.start(hold_feet=False, **settings)  # type: ignore[arg-type]
+    session.control(gait="walk", speed=1.3)
+    ticks(session, 40)
+    return session
+
+
+def same_turns(a: NDArray[np.floating], b: NDArray[np.floating], within: float) -> bool:
+    return bool(np.abs(np.abs((a * b).sum(axis=-1)) - 1).max() < within)
+
+
+def test_a_figure_that_stands_acts_with_its_whole_body_and_stands_on_from_there(model: SteerModel) -> None:
+    session, act = model.start(hold_feet=False, places=[1.0, 2.0, 90.0]), act_of(model)
+    ticks(session, 10)
+    session.act(act)
+    assert session.acting == [("lift", 44 / 30)]
+    poses, left = [], []
+    while session.acting[0]:
+        left.append(session.acting[0][1])
+        poses += ticks(session, 1)
+    entry = round(act.height.size - 1 - left[1] * model.fps)
+    assert 1 <= entry <= 15
+    assert left[1:] == sorted(left[1:], reverse=True)
+    last = poses[-2]
+    assert same_turns(last.rotations[0], act.rotations[-1], 1e-4)
+    assert last.height[0] == pytest.approx(0.95, abs=1e-3)
+    # its own way, from the frame at which it is entered, less what it takes to be as fast
+    went, turned = last.ground[0] - [1, 2, np.pi / 2], act.ground[-1] - act.ground[entry - 1]
+    assert np.abs(went[2] - turned[2]) < 0.15
+    assert np.hypot(*went[:2]) == pytest.approx(turned[1], abs=0.1)
+    ticks(session, 60)
+    assert np.degrees(session.tick().ground[0, 2]) == pytest.approx(np.degrees(last.ground[0, 2]), abs=6)
+
+
+def test_while_a_figure_walks_its_upper_body_acts_and_its_legs_go_on(model: SteerModel) -> None:
+    session, plain, act = walking(model), walking(model), act_of(model)
+    session.act(act)
+    frame = 0
+    for step in range(60):
+        acted, walked = session.tick(), plain.tick()
+        assert np.array_equal(acted.ground, walked.ground)
+        assert np.array_equal(acted.height, walked.height)
+        assert np.array_equal(acted.rotations[0, ~UPPER], walked.rotations[0, ~UPPER])
+        playing = session._acting.playing[0]
+        if playing and step > 25:
+            frame = playing.frame
+            arms = UPPER & (np.array(BONES) != "spine")
+            assert same_turns(acted.rotations[0, arms], act.rotations[frame, arms], 1e-4)
+            seen = quat_product(acted.rotations[0, 0], acted.rotations[0, BONES.index("spine")])
+            wanted = quat_product(act.rotations[frame, 0], act.rotations[frame, BONES.index("spine")])
+            assert same_turns(seen, wanted, 1e-4)
+    assert frame == len(act) - 1
+    assert same_turns(session.tick().rotations[0], plain.tick().rotations[0], 1e-4)
+
+
+def test_legs_go_as_soon_as_they_are_told_to_unless_the_whole_body_was_asked_for(model: SteerModel) -> None:
+    for upper, stays in ((None, False), (False, True)):
+        session = model.start()
+        session.act(act_of(model, frames=90, ahead=0.0), upper=upper)
+        ticks(session, 20)
+        assert session._acting.whole.all()
+        session.control(gait="walk", speed=1.3)
+        ticks(session, 2)
+        assert session._acting.whole.all() == stays
+        assert session.acting[0] is not None
+        if not stays:
+            ticks(session, 30)
+            assert np.hypot(*session._playback.spring[0, :2]) > 1
+
+
+def test_acts_ten_times_a_second_do_not_leap(model: SteerModel) -> None:
+    rng, count = np.random.default_rng(0), 8
+    acts = [act_of(model, frames=f, turn=t, lift=v) for f, t, v in ((30, 2.0, 1.5), (60, -1.0, -1.0), (40, 0.0, 2.0))]
+    session = model.start(characters=count)
+    poses = ticks(session, 2)
+    for tick in range(240):
+        if tick % 3 == 0:
+            who = rng.permutation(count)[:4]
+            session.act([acts[i] for i in rng.integers(3, size=4)], who=who, upper=[None, True, False][tick % 9 // 3])
+        if tick % 40 == 0:
+            session.control(
+                gait="walk", speed=np.where(rng.random(count) < 0.5, 0, 1.3), direction=rng.uniform(-180, 180, count)
+            )
+        poses.append(session.tick())
+    places = np.stack([pose.positions() for pose in poses])
+    assert np.linalg.norm(np.diff(places, axis=0), axis=3).max() < 0.3  # of a hand; in recordings of gaits .47
+    assert np.linalg.norm(np.diff(places, n=2, axis=0), axis=3).max() < 0.2
+
+
+def test_each_of_many_acts_as_it_would_alone(model: SteerModel) -> None:
+    acts = [act_of(model, frames=30), act_of(model, "turn", turn=-2.0)]
+    crowd = model.start(characters=3)
+    crowd.control(gait="walk", speed=[0.0, 1.2, 0.0])
+    ticks(crowd, 5)
+    crowd.act(acts, who=[2, 1])
+    alone = [model.start() for _ in range(3)]
+    for i, session in enumerate(alone):
+        session.control(gait="walk", speed=[0.0, 1.2, 0.0][i])
+        ticks(session, 5)
+    alone[2].act(acts[0])
+    alone[1].act(acts[1])
+    for _ in range(70):
+        pose, own = crowd.tick(), [session.tick() for session in alone]
+        assert np.array_equal(pose.rotations, np.concatenate([one.rotations for one in own]))
+        assert np.array_equal(pose.ground, np.concatenate([one.ground for one in own]))
+
+
+def test_a_snapshot_has_acts(model: SteerModel) -> None:
+    session = model.start()
+    ticks(session, 5)
+    session.act(act_of(model))
+    ticks(session, 8)
+    session.act(act_of(model, "again", turn=-1.0))
+    snapshot, doing = session.snapshot(), session.acting
+    first = ticks(session, 60)
+    session.restore(snapshot)
+    assert session.acting == doing == [("again", 44 / 30)]
+    for pose, again in zip(first, ticks(session, 60), strict=True):
+        assert np.array_equal(pose.rotations, again.rotations)
+        assert np.array_equal(pose.ground, again.ground)
+
+
+def test_a_motion_is_an_act_without_its_rest(model: SteerModel) -> None:
+    motion = model.run("stop 1s, walk 2s, stop 2s")
+    act = model.act_of(motion, "walks")
+    assert 45 < len(act) < len(motion) - 20
+    assert same_turns(model.act_of(motion).rotations[-1], act.rotations[-1], 1e-6)
+    again = Act.of("walks", act.numbers, model.fps, model.settings(ActSettings))
+    assert np.allclose(again.ground, act.ground, atol=1e-5)
+    assert same_turns(again.rotations, act.rotations, 1e-6)
+    session = model.start()
+    session.act(motion, upper=False)
+    went = ticks(session, len(act))[-1].ground[0]
+    assert np.hypot(*went[:2]) > 1.5
+
+
+def test_what_cannot_be_acted_is_refused_and_changes_nothing(model: SteerModel) -> None:
+    session, how = model.start(characters=2), model.settings(ActSettings)
+    for who in (2, -1, [0, 5], 0.5, "left", [[0]]):
+        with pytest.raises(ControlError, match="who must be numbers of characters from 0 to 1"):
+            session.act(act_of(model), who=who)
+    with pytest.raises(ControlError, match="3 acts do not fit 2 characters"):
+        session.act([act_of(model)] * 3)
+    with pytest.raises(MotionError):
+        session.act(Motion(np.zeros((30, 1)), ("box.tx",), ("m",), 30.0))
+    for numbers in (frames_of()[:2], frames_of()[:, 1:], frames_of() * np.float32(np.nan), frames_of() * 1e6):
+        with pytest.raises(ControlError):
+            Act.of("wrong", np.asarray(numbers, np.float32), model.fps, how)
+    with pytest.raises(ControlError):
+        session.act(model.run("walk 1s")[:2])
+    assert session.acting == [None, None]
+
+
+def test_putting_a_figure_elsewhere_ends_its_act(model: SteerModel) -> None:
+    session = model.start()
+    session.act(act_of(model))
+    ticks(session, 5)
+    session.put([5.0, 5.0, 0.0])
+    assert session.acting == [None]
+    assert np.abs(session.tick().ground[0, :2] - 5).max() < 0.05
