@@ -273,6 +273,17 @@ def test_a_decoder_is_trained_on_while_its_codes_stay(store: Path, tmp_path: Pat
     assert second.manifest["training"]["start"]["command"] == first.manifest["training"]["command"]
 
 
+def test_a_whole_codec_is_trained_on_but_for_its_moves(store: Path, tmp_path: Path) -> None:
+    first = trained("codec", CODEC, store, tmp_path / "first")
+    small = ("--preset", "wider", "--start", tmp_path / "first")
+    before, after = (
+        first.model.state_dict(),
+        trained("codec", CODEC, store, tmp_path / "second", *small).model.state_dict(),
+    )
+    changed = {name.partition(".")[0] for name in before if not torch.equal(before[name], after[name])}
+    assert changed == {"encoder", "decoder"}
+
+
 def test_only_frames_that_can_be_coded_are_trained_on(tmp_path: Path) -> None:
     angles_store(tmp_path)
     given = ["train", "codec", "--data", str(tmp_path / "store"), "--out", str(tmp_path / "run")]

@@ -21,8 +21,9 @@ LEAST, MOST = 4.0, 12.0
 AHEAD = 0.4
 """Seconds after a pose of which another pose tells what is being done."""
 
-BACK, KNOWN = 0.2, 0.25
-"""Metres, root mean square over joints, by which an act may end off its start, and a pose is off all that it shows."""
+BACK, KNOWN = 0.4, 0.45
+"""Metres, of the joint that is farthest off, by which an act may end off its start, and a pose is off all that it
+shows: one foot that hops is an act of its own."""
 
 SHARE = 0.95
 """Of a take's poses that each of its acts shows: starting and stopping are often shown once."""
@@ -67,8 +68,10 @@ def _seen(motion: Motion) -> Array:
 
 
 def _apart(seen: Array) -> Array:
-    """How far frames (T, J, 3) are from each other (T, T): root mean squares over joints."""
-    flat = seen.reshape(len(seen), -1)
-    squares = (flat**2).sum(axis=1)
-    found: Array = np.sqrt(np.maximum(squares[:, None] + squares - 2 * flat @ flat.T, 0) / seen.shape[1])
-    return found
+    """How far frames (T, J, 3) are from each other (T, T): of each two the joint that is farthest."""
+    found = np.zeros((len(seen), len(seen)))
+    for joint in np.moveaxis(seen, 1, 0):
+        squares = (joint**2).sum(axis=1)
+        np.maximum(found, squares[:, None] + squares - 2 * joint @ joint.T, out=found)
+    apart: Array = np.sqrt(found)
+    return apart

@@ -25,11 +25,12 @@ from motet_train.runs import Run
 @dataclass(frozen=True)
 class CodecVisits:
     """frames: of a window. ends: how many times hands and feet count. sharp: weight of movement being as sharp as it
-    was, which sets the jerk of what is decoded."""
+    was, which sets the jerk of what is decoded. settled: whether the codes of a codec that is trained further stay."""
 
     frames: int = 64
     ends: float = 3.0
     sharp: float = 0.2
+    settled: bool = True
 
 
 CODEC_STEPS = replace(MUON, steps=9000, every=250, warm_up=200, cosine=True)
@@ -42,28 +43,35 @@ DECODER = replace(DEFAULT, training=replace(CODEC_STEPS, steps=4000, learning_ra
 SHARP = replace(DECODER, training=replace(CODEC_STEPS, steps=1000, learning_rate=1e-3, precision="float32"))
 """The last training of the decoder: rounding to bfloat16 adds jerk, from which it learns to be too smooth."""
 
-RECIPES = {"default": DEFAULT, "decoder": DECODER, "sharp": SHARP}
+WIDER = replace(
+    DEFAULT,
+    training=replace(CODEC_STEPS, steps=2000, learning_rate=1e-3, precision="float32"),
+    visits=CodecVisits(frames=48, sharp=1.0, settled=False),
+)
+"""Further training of a whole codec on motions unlike those that it knows, as those keyed by hand; its codes change."""
+
+RECIPES = {"default": DEFAULT, "decoder": DECODER, "sharp": SHARP, "wider": WIDER}
 
 
 def train_codec(store: Store, job: Job, data: str = "", by: str = "trial", start: Run | None = None) -> Run:
     """Train on a store in ``root_sixd``, see :meth:`motet_train.recipes.recipe.Job.run`.
 
-    start: a codec of which only the decoder is trained further; its codes stay.
+    start: a codec to train further; of one whose codes are settled only the decoder.
     """
     recipe = job.recipe
     if store.representation != "root_sixd":
         raise DataError(f"a codec is trained on root_sixd (motet prepare --for codes), not {store.representation}")
     parts = split(store.records, 0, by)
     contract = store.contract(parts.train)
-    settled = None if start is None else _settled(start)
-    config = settled.config if settled else recipe.sized(channels=len(contract.channels), tree=tree_of(contract))
+    started = None if start is None else _started(start, recipe.visits.settled)
+    config = started.config if started else recipe.sized(channels=len(contract.channels), tree=tree_of(contract))
     train, validation = (
         SixdWindows(store, part, recipe.visits.frames, config.hop, frame_mirror(contract))
         for part in (parts.train, parts.validation)
     )
     torch.manual_seed(job.about.seed)
-    net = settled or MotionCodec(config)
-    if settled is None:
+    net = started or MotionCodec(config)
+    if started is None:
         net.measure_by(contract.mean, contract.std)
         fitted = fit_book(train.sequences(), config.hop, config.moves, job.about.seed)
         net.book.copy_(torch.from_numpy(fitted))
@@ -87,14 +95,13 @@ def train_codec(store: Store, job: Job, data: str = "", by: str = "trial", start
     return job.run(net, learner, job.manifest(contract, asdict(config), {}, None, about))
 
 
-def _settled(start: Run) -> MotionCodec:
-    """A codec, or that of a model that writes its codes, of which only the decoder is trained; DataError where the run
-    has none."""
+def _started(start: Run, settled: bool) -> MotionCodec:
+    """A codec, or that of a model that writes its codes, to be trained further; DataError where the run has none."""
     found = start.model.codec if isinstance(start.model, MotionCodes) else start.model
     if not isinstance(found, MotionCodec):
-        raise DataError(f"a decoder is that of a codec (motet train codec), not of {start.manifest['model']}")
+        raise DataError(f"a codec is trained further (motet train codec), not {start.manifest['model']}")
     found.decoder.requires_grad_(True)
-    found.encoder.requires_grad_(False)
+    found.encoder.requires_grad_(not settled)
     return found
 
 
