@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from motet.models.describe import DescribeModel, Description
 from motet.models.known import NOTHING
-from motet_train.data.kinds import Shown, shown_by
+from motet_train.data.kinds import Shown, named, shown_by
 from motet_train.data.store import Split, Store, matches
 from motet_train.evaluate.language.attributes import common_side, side, turning
 from motet_train.evaluate.language.confidence import joined, matched
@@ -33,9 +33,10 @@ def actions_report(model: DescribeModel, corpus: SplitStore) -> Report:
     """How test motions are described.
 
     "actions": how many there are ("of"); the shares that are right by action (:class:`motet_train.data.kinds.Shown`),
-    that are sure, of these that are right and wrong, and of which nothing is said; and the expected calibration error
-    of the probability, beside that of probabilities that are exactly right, of as many motions. "lookup": the share of
-    the sentences about the nearest training motions that are right, by mean and deviation of positions, speeds and
+    about which some sentence of the model's known motions is right ("reachable"), that are sure, of these that are
+    right and wrong, and of which nothing is said; and the expected calibration error of the probability, beside that
+    of probabilities that are exactly right, of as many motions. "lookup": the share of the sentences about the nearest
+    training motions that are right, by mean and deviation of positions, speeds and
     path. "turns": of motions of which half of the sentences tell a turn and its side, how many there are and the share
     whose description tells it. "timeline": see :func:`timelines`.
     """
@@ -45,11 +46,13 @@ def actions_report(model: DescribeModel, corpus: SplitStore) -> Report:
     right = np.array([one.right(said.text) for one, said in zip(shown, found, strict=True)])
     sure = np.array([said.confident for said in found])
     chances = np.array([said.probability for said in found])
+    sayable = {named(text) for text in (model.known.sentences if model.known else ())}
     near = corpus.references(nearest_motions(corpus, motions))
     copied = [np.mean([one.right(text) for text in texts]) for one, texts in zip(shown, near, strict=True)]
     actions = {
         "of": float(len(test)),
         "right": _share(right),
+        "reachable": _share(np.array([any(map(one.right_kinds, sayable)) for one in shown])) if sayable else np.nan,
         "sure": _share(sure),
         "right_if_sure": _share(right[sure]),
         "wrong_if_sure": _share(~right[sure]),
