@@ -10,7 +10,7 @@ import pytest
 
 from motet import to_humanoid
 from motet.bundle.bundle import Bundle
-from motet.decode.matching import SteeringSettings
+from motet.decode.steering_settings import SteeringSettings
 from motet.formats import read_motion
 from motet.models.load import load, load_as, verify
 from motet.models.steer import SteerModel

@@ -46,7 +46,7 @@ def test_a_steered_figure_goes_where_its_script_says(tmp_path: Path) -> None:
     step = root[185] - root[150]
     assert abs(np.degrees(np.arctan2(step[0], step[2])) - 90) < 10
     noted = run("control", "walk 1s speed 9", "-o", out)
-    assert "'walk' allows 0 or 0.67-1.92 m/s in this direction, not 9" in noted.stderr
+    assert "'walk' allows 0 or 0.1-1.92 m/s in this direction, not 9" in noted.stderr
     html = tmp_path / "out.html"
     assert run("control", "walk 1s, turn left 90", "--loose-feet", "-o", html).exit_code == 0
     assert "turn left 90" in html.read_text()

@@ -18,7 +18,14 @@ from motet.models.steer import SteerModel
 from motet.motion.humanoid import T_POSE
 
 NODE = shutil.which("node")
-PLAN = [("walk", 1.3, 0, 0), ("walk", 1.2, 80, 80), ("run", 3, 80, 80), ("run", 1.5, -120, -60), ("walk", 0, 0, -70)]
+PLAN = [
+    ("walk", 1.3, 0, 0),
+    ("walk", 1.2, 80, 80),
+    ("walk", 0.2, 60, 80),
+    ("run", 3, 80, 80),
+    ("run", 1.5, -120, -60),
+    ("walk", 0, 0, -70),
+]
 """Gait, m/s, direction and facing in degrees, for a second and a half each."""
 
 

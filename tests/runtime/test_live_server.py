@@ -325,7 +325,7 @@ def test_a_speed_out_of_range_is_noted(steer_model: SteerModel) -> None:
         async with client(server) as connection:
             await told(connection, "control", gait="walk", speed=LARGEST_COMMAND)
             note = await next_of(connection, "note")
-            assert "'walk' allows 0 or 0.67-1.92 m/s in this direction, not 1e+06" in note["message"]
+            assert "'walk' allows 0 or 0.1-1.92 m/s in this direction, not 1e+06" in note["message"]
             await frames(connection, 2)
 
     serving(steer_model, scenario)

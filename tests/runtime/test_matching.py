@@ -10,14 +10,14 @@ from motet.decode.matching import (
     Matcher,
     Playback,
     Query,
-    SteeringSettings,
     Table,
     horizons,
     mirrored_features,
     stride_velocities,
 )
 from motet.decode.steering import PoseCodes
-from motet.decode.warping import warped
+from motet.decode.steering_settings import SteeringSettings
+from motet.decode.warping import UNDER, strided, warped
 from motet.motion.humanoid import BONES, HUMANOID
 from motet.motion.pose import Pose
 from motet.motion.rotations import conjugate, quat_product, quat_rotated, quat_to_rotmat, wrapped
@@ -130,6 +130,45 @@ def test_hips_and_legs_are_turned_and_what_the_spine_carries_stays() -> None:
         )
 
 
+def test_balls_of_the_feet_go_along_the_way_only_and_soles_keep_their_height() -> None:
+    session = motet.load("control").start(characters=4, hold_feet=False)
+    session.control(speed=1.2)
+    pose = [session.tick() for _ in range(40)][-1]
+    ways, strides = np.array([0.0, 0.7, 0.0, -1.5]), np.array([0.5, 0.2, 1.0, 0.6])
+    rotations = strided(pose.rotations, pose.contacts, ways, strides)
+    zero = np.zeros((4, 3))
+    places, before = (
+        Pose(zero, turns, pose.height, pose.contacts).positions() for turns in (rotations, pose.rotations)
+    )
+    for side, hip in (("left", 0.09), ("right", -0.09)):
+        foot = HUMANOID.index(f"{side}Foot")
+        moved, along = places[:, foot] - before[:, foot], np.stack([np.sin(ways), np.cos(ways)], axis=1)
+        np.testing.assert_allclose(moved[:, 1], 0, atol=0.01)
+        ball = before[:, HUMANOID.index(f"{side}Toes")][:, [0, 2]] - [hip, UNDER]
+        far = ((strides - 1) * (ball * along).sum(axis=1))[:, None] * along
+        np.testing.assert_allclose(moved[:, [0, 2]], far, atol=0.015)  # a knee that is nearly straight gives way
+    np.testing.assert_array_equal(rotations[2], pose.rotations[2])
+    for one in range(4):  # the same bits alone
+        alone = slice(one, one + 1)
+        again = strided(pose.rotations[alone], pose.contacts[alone], ways[alone], strides[alone])[0]
+        np.testing.assert_array_equal(again, rotations[one])
+
+
+def test_a_walk_goes_as_slowly_as_it_is_told_and_its_feet_stay() -> None:
+    asked = np.array([0.1, 0.2, 0.35, 0.5, 0.6])
+    session = motet.load("control").start(characters=len(asked), strict=True)
+    session.control(gait="walk", speed=asked)
+    poses = [session.tick() for _ in range(240)][90:]
+    ground = np.stack([pose.ground for pose in poses])
+    np.testing.assert_allclose((ground[-1, :, 1] - ground[0, :, 1]) / 149 * 30, asked, atol=0.03)
+    balls = np.stack([pose.positions()[:, HUMANOID.index("leftToes")] for pose in poses])
+    steps, rises = np.diff(balls, axis=0), np.diff(balls[..., 1], axis=0)
+    still = (np.hypot(steps[..., 0], steps[..., 2]) < 0.002) & (np.abs(rises) < 0.002)
+    assert (still.mean(axis=0) > 0.2).all()  # feet stand, and do not only slow down
+    lifted = balls[..., 1].max(axis=0) - balls[..., 1].min(axis=0)
+    assert (lifted > 0.03).all()  # and they are steps
+
+
 @pytest.mark.filterwarnings("ignore::motet.errors.ControlWarning")
 @pytest.mark.parametrize(("gait", "speed", "most"), [("walk", 1.28, 6.0), ("run", 2.0, 8.0)])
 def test_figures_that_face_ahead_go_where_they_are_told(gait: str, speed: float, most: float) -> None:
@@ -156,7 +195,7 @@ def test_the_desired_trajectory_is_where_the_springs_lead(matcher: Matcher) -> N
     rng = np.random.default_rng(2)
     playback, target = Playback.at(0, 3, CODES), rng.normal(size=(3, 3))
     playback.root, playback.spring, playback.spring_rate = rng.normal(size=(3, 3, 3))
-    found = matcher.desired_trajectory(playback, target)
+    found = matcher.desired_trajectory(playback, target, np.zeros(3, dtype=bool))
     dt, damping = 1e-4, [2 * np.log(2) / half for half in (SETTINGS.velocity, SETTINGS.facing)]
     for row in range(3):
         *velocity, angle = playback.spring[row]

@@ -202,7 +202,7 @@ def test_it_goes_on_from_a_motion(model: SteerModel) -> None:
 
 def test_a_speed_that_a_gait_does_not_have(model: SteerModel) -> None:
     session = model.start()
-    with pytest.warns(ControlWarning, match="'walk' allows 0 or 0.67-1.92 m/s in this direction, not 20") as caught:
+    with pytest.warns(ControlWarning, match="'walk' allows 0 or 0.1-1.92 m/s in this direction, not 20") as caught:
         session.control(speed=20)
     assert [warning.filename for warning in caught] == [__file__]
     session.control(speed=21)  # said once
@@ -299,7 +299,7 @@ def test_a_side_step_goes_on_after_a_stop(model: SteerModel) -> None:
 
 def test_a_speed_that_one_gait_lacks_is_remembered_for_another(model: SteerModel) -> None:
     session = model.start()
-    with pytest.warns(ControlWarning, match="'walk' allows 0 or 0.67-1.92 m/s"):
+    with pytest.warns(ControlWarning, match="'walk' allows 0 or 0.1-1.92 m/s"):
         session.control(speed=3.0)
     session.control(gait="run")
     assert session.target[0, 1] == pytest.approx(3.0)

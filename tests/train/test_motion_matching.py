@@ -7,8 +7,9 @@ import pytest
 import torch
 
 from motet import to_humanoid
-from motet.decode.matching import TRAJECTORY, Matcher, Playback, SteeringSettings, Table, mirrored_features
+from motet.decode.matching import TRAJECTORY, Matcher, Playback, Table, mirrored_features
 from motet.decode.steering import PoseCodes, tick
+from motet.decode.steering_settings import SteeringSettings
 from motet.formats import read_motion
 from motet.models.steer import FEATURE_STEPS
 from motet.motion.humanoid.bones import BONES, HUMANOID

@@ -8,7 +8,7 @@ import pytest
 from steer_puppets import FPS, Puppets, resting, turned
 
 from motet import to_humanoid
-from motet.decode.matching import SteeringSettings
+from motet.decode.steering_settings import SteeringSettings
 from motet.formats import read_motion
 from motet.motion.humanoid.bones import BONES, HUMANOID
 from motet.motion.kinematics import positions
@@ -23,6 +23,7 @@ from motet_train.evaluate.steer.following import (
     PACES,
     Track,
     aside_errors,
+    creep_errors,
     speed_errors,
     standing,
     stretches,
@@ -127,6 +128,11 @@ def test_ways_are_measured_from_the_facing(monkeypatch: pytest.MonkeyPatch) -> N
     slow = ways_errors(puppets(turning=20.0), "run")
     assert 0 < slow["direction"] < slow["direction_p95"] < slow["direction_worst"]
     assert slow["direction_worst"] == pytest.approx(180 - 20 * 4, abs=2)
+
+
+def test_slow_walks_are_measured_in_metres_a_second() -> None:
+    found = creep_errors(puppets(gain=0.9))
+    assert [found["speed"], found["speed_worst"]] == pytest.approx([0.035, 0.06], abs=1e-4)
 
 
 def test_the_tail_of_slides_is_told_beside_their_mean() -> None:

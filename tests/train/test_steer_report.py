@@ -78,7 +78,7 @@ def report(model: SteerModel, store: Store) -> Any:
 
 
 def test_all_is_measured_beside_recordings_and_the_rival(report: Any) -> None:
-    groups = ["walk", "run", "speed", "turn_walk", "turn_run", "aside", "ways_walk", "ways_run", "random"]
+    groups = ["walk", "run", "speed", "turn_walk", "turn_run", "aside", "creep", "ways_walk", "ways_run", "random"]
     kinds = [f"{gait}_{kind}" for gait in ("walk", "run") for kind in ("recorded", "held")]
     assert list(report) == [*groups, *(f"{group}_seldom" for group in groups), *kinds, "random_held"]
     for group in groups:

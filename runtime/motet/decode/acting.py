@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from motet.decode.acts import Act, ActSettings
 from motet.decode.matching import TRAJECTORY, Matcher, Playback, Rows
-from motet.decode.steering import PoseCodes
-from motet.decode.warping import warped
+from motet.decode.steering import PoseCodes, body
 from motet.motion.humanoid import BONES, LEFT_RIGHT, LEG, sided
 from motet.motion.pose import Pose, damped, damping_of
 from motet.motion.rotations import Array, conjugate, continuous_rotvec, quat_product, wrapped
@@ -116,12 +115,11 @@ class Acting:
     def of(playback: Playback, matcher: Matcher, codes: PoseCodes, how: ActSettings) -> "Acting":
         """Of figures that play none, and stand as they are played."""
         played, _ = matcher.table.at(playback)
-        rotations, height = codes.decode(played[:, : matcher.table.codes] + playback.offset)
-        body = Body(warped(rotations, playback.warp), height)
+        shown = Body(*body(matcher, codes, playback, played))
         off, still = np.zeros((len(played), 3 * len(BONES) + 1)), np.zeros((len(played), 3))
         led, damping = still[:, 0] > 0, still[:, :1]
         return Acting(
-            matcher, codes, how, [None] * len(played), {}, body, body, body, led, off, off, damping, still, still
+            matcher, codes, how, [None] * len(played), {}, shown, shown, shown, led, off, off, damping, still, still
         )
 
     def copy(self) -> "Acting":
@@ -187,13 +185,14 @@ class Acting:
     def _free(self, shown: Array, playback: Playback, target: Array, gait: Rows, who: Rows) -> None:
         """Let the legs of figures (n,) go on from the rows that fit best after what is shown, features of it."""
         matcher, table = self.matcher, self.matcher.table
-        ahead = matcher.desired_trajectory(playback, target, who)
+        ahead = matcher.desired_trajectory(playback, target, matcher.creeping(target[who], gait[who]), who)
         wanted = (ahead - table.mean[:TRAJECTORY]) * table.scale[:TRAJECTORY]
         query = matcher.query(np.concatenate([wanted, self._scaled(shown)], axis=1).astype(np.float32))
         playback.row[who], playback.mirror[who], _ = matcher.best(query, gait[who])
         playback.part[who], playback.rate[who] = 0, 1
         playback.offset[who] = playback.offset_rate[who] = 0
-        playback.warp[who] = playback.warp_rate[who] = 0
+        playback.warp[who] = playback.warp_rate[who] = playback.stride_rate[who] = 0
+        playback.stride[who] = 1
         played, _ = table.at(playback, who)
         self.base = self.base.put(who, Body(*self.codes.decode(played[:, : table.codes])))
 

@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from motet.bundle.graph import Floats
-from motet.decode.matching import HalfLife
+from motet.decode.steering_settings import HalfLife
 from motet.errors import ControlError
 from motet.motion.feet.contacts import contacts_of
 from motet.motion.humanoid import BONES, HUMANOID, LEFT_RIGHT, ground_under, sided, sole_points

@@ -10,85 +10,15 @@ of 0 faces z, and positive ones are to the left (towards x). Units are metres, s
 """
 
 from dataclasses import dataclass, fields
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motet.bundle.graph import Floats
+from motet.decode.steering_settings import SteeringSettings
 from motet.motion.pose import damped, damped_path, damping_of
 from motet.motion.rotations import Array, wrapped
-from motet.settings import Range, Settings
-
-HalfLife = Annotated[float, Range(0.01, 10, "s")]
-Radians = Annotated[float, Range(0, 3.15, "rad")]
-Share = Annotated[float, Range(0, 1)]
-Factor = Annotated[float, Range(0, 100)]
-Count = Annotated[int, Range(0, 10_000, "rows")]
-
-
-@dataclass(frozen=True)
-class SteeringSettings(Settings):
-    """Settings of a figure steered by motion matching.
-
-    The desired trajectory:
-        velocity, facing: half-lives of the springs by which target velocity and facing are approached.
-        horizon: how far ahead rows are compared with it, at each third. half_speed: the speed that is half way from
-        standing to any speed, on the scale on which speeds are compared.
-
-    The search:
-        search_every: ticks between searches. lag: the cost of each metre by which a row covers less than half the
-        desired displacement within the horizon (others start, or turn aside, if not as smoothly). lasting: the fewest
-        rows left after a jump target. jump_back, jump_ahead: jumps within this window are ignored, or playback would
-        loop on the spot. row_step: one in so many rows is a jump target. stands: the least contact of a foot in rows
-        that are jumped to and from, so that flights are played to their end.
-
-    The step:
-        blend: half-life of the inertialization offset. slowest, fastest: limits of the playback rate. shortest,
-        longest: limits of the stride, relative to the recorded one. idle: speed below which a row is played as it is.
-        turn: half-life of the error of the facing; turn_still, turn_moving, turn_turning: limits of its correction, in
-        rad/s at a standstill, for each m/s up to turn_speed, and for each rad/s of the recorded turn.
-        warp: the largest turn of hips and legs towards the direction of travel, while the shoulders stay (orientation
-        warping); there is none towards what is more than a right angle off.
-        veer: the largest correction of the direction of travel that is left, of the root alone; veer_within: it is made
-        where the cosine of the angle is above this share of its sine.
-
-    What gaits can do:
-        aside, back: angles from the facing at which going sideways and going backwards begin. ahead: how far from its
-        facing a gait goes that goes neither way.
-    """
-
-    FEATURE: ClassVar[str] = "steering"
-
-    velocity: HalfLife = 0.22
-    facing: HalfLife = 0.18
-    horizon: Annotated[float, Range(0.1, 10, "s")] = 1.0
-    half_speed: Annotated[float, Range(0.01, 100, "m/s")] = 0.7
-    search_every: Annotated[int, Range(1, 60, "ticks")] = 6
-    lag: Annotated[float, Range(0, 1e6, "per metre")] = 50.0
-    lasting: Count = 20
-    jump_back: Count = 20
-    jump_ahead: Count = 5
-    row_step: Annotated[int, Range(1, 100, "rows")] = 2
-    stands: Share = 0.1
-    blend: HalfLife = 0.13
-    slowest: Annotated[float, Range(0.1, 1)] = 0.8
-    fastest: Annotated[float, Range(1, 10)] = 1.15
-    shortest: Annotated[float, Range(0.1, 1)] = 0.8
-    longest: Annotated[float, Range(1, 10)] = 1.25
-    idle: Annotated[float, Range(0.01, 100, "m/s")] = 0.4
-    turn: HalfLife = 0.15
-    turn_still: Factor = 0.1
-    turn_moving: Factor = 1.0
-    turn_speed: Annotated[float, Range(0, 100, "m/s")] = 1.5
-    turn_turning: Factor = 0.5
-    warp: Radians = 1.0
-    veer: Radians = 0.35
-    veer_within: Factor = 0.4
-    aside: Radians = 1.0471975511965976
-    back: Radians = 2.0943951023931953
-    ahead: Radians = 0.5235987755982988
-
 
 Rows = NDArray[np.int64]
 ALL = slice(None)
@@ -104,7 +34,8 @@ class Playback:
     root: (B, 3) x, z in metres and facing in radians. spring, spring_rate: (B, 3) the springs that approach the target:
     velocity along x and z in m/s and facing in radians, and how fast they change. offset, offset_rate: (B, K) the
     inertialization offset of the codes, and how fast it changes. warp, warp_rate: (B,) radians by which hips and legs
-    are turned towards the direction of travel, and how fast that changes.
+    are turned towards the direction of travel, and how fast that changes. stride, stride_rate: (B,) how long the legs'
+    strides are beside the recorded ones, and how fast that changes.
     """
 
     row: Rows
@@ -120,15 +51,18 @@ class Playback:
     offset_rate: Array
     warp: Array
     warp_rate: Array
+    stride: Array
+    stride_rate: Array
 
     @staticmethod
     def at(row: int, figures: int, codes: int, phases: Rows | None = None) -> "Playback":
         """Figures at the origin that play a row, and search in the next tick; or each after as many as its phase
         (figures,), and from then on in its turn alone."""
-        whole, ground, pose = (np.zeros(shape) for shape in (figures, (figures, 3), (figures, codes)))
+        zero, ground, pose = (np.zeros(shape) for shape in (figures, (figures, 3), (figures, codes)))
         rows, count = np.full(figures, row, dtype=np.int64), np.zeros(figures, dtype=np.int64)
         ticks, in_turn = count if phases is None else phases, np.full(figures, phases is not None)
-        return Playback(rows, whole, count, whole + 1, ticks, in_turn, *[ground] * 3, *[pose] * 2, *[whole] * 2).copy()
+        springs = [ground, ground, ground, pose, pose, zero, zero, zero + 1, zero]
+        return Playback(rows, zero, count, zero + 1, ticks, in_turn, *springs).copy()
 
     def hasten(self, who: NDArray[np.bool_]) -> None:
         """Let those of figures (B,) that wait for no turn search in the next tick."""
@@ -137,6 +71,24 @@ class Playback:
     def copy(self) -> "Playback":
         """One that shares no array."""
         return Playback(*(getattr(self, field.name).copy() for field in fields(self)))
+
+
+LEAST_PACE = 0.1
+"""The slowest that a figure goes, m/s."""
+
+
+def hurries(velocity: Array, creeps: NDArray[np.bool_], creep: float) -> Array:
+    """What velocities over the ground, with a third number that stays, (n, 3) are multiplied by to be as fast as
+    recordings: 1 for those that are, and for figures that do not creep (n,)."""
+    pace = np.hypot(velocity[:, 0], velocity[:, 1])
+    by = np.where(creeps & (pace < creep), creep / np.maximum(pace, min(LEAST_PACE, creep)), 1.0)
+    return np.stack([by, by, np.ones_like(by)], axis=1)
+
+
+def is_faster(speed: NDArray[Any], settings: SteeringSettings) -> bool:
+    """Whether a gait is faster than a creep, by the speeds (n,) of its rows."""
+    moving = np.sort(speed[speed > settings.idle])
+    return len(moving) > 0 and bool(moving[len(moving) // 2] > settings.creep)
 
 
 HORIZONS = 3
@@ -287,8 +239,15 @@ class Matcher:
         half: Floats = (table.features[0] ** 2).sum(axis=1) / 2
         self.costs = np.concatenate([table.features, np.stack([half, half])[..., None]], axis=2)
         self.flies = table.frames[0, :, -2:].max(axis=1) < settings.stands
-        self.goals = []
-        for shows in table.shows.T:
+        self.goals, self.creeps, speed = (
+            list[Goals](),
+            np.zeros(table.shows.shape[1], dtype=np.bool_),
+            table.frames[0, :, -3],
+        )
+        for gait, shows in enumerate(table.shows.T):
+            moving = np.sort(speed[shows & (speed > settings.idle)])
+            # those that are as slow as recorded have no need to
+            self.creeps[gait] = len(moving) and moving[len(moving) // 2] > settings.creep
             rows = np.flatnonzero(shows & (table.left >= self.least_left) & ~self.flies)[:: settings.row_step]
             self.goals.append(Goals.of(rows, self.costs[:, rows].reshape(-1, FEATURES + 1), self.TILE))
 
@@ -309,7 +268,7 @@ class Matcher:
         playback.ticks_to_search[who] = self.settings.search_every - 1
         row, mirror, kind = playback.row[who] + (playback.part[who] > 0.5), playback.mirror[who], gait[who]
         asked = self.table.features[mirror, row]
-        wanted = self.desired_trajectory(playback, target, who)
+        wanted = self.desired_trajectory(playback, target, self.creeping(target[who], kind), who)
         asked[:, :TRAJECTORY] = (wanted - self.table.mean[:TRAJECTORY]) * self.table.scale[:TRAJECTORY]
         query = self.query(asked)
         best, image, cost = self.best(query, kind)
@@ -318,11 +277,22 @@ class Matcher:
         stays &= near | self.flies[row] | (self.cost_at(query, row, mirror) <= cost)
         self.jump(playback, who[~stays], best[~stays], image[~stays])
 
-    def desired_trajectory(self, playback: Playback, target: Array, who: Rows | slice = ALL) -> Array:
-        """Where the springs of figures (n,) lead: features (n, TRAJECTORY), not yet scaled."""
+    def creeping(self, target: Array, gait: Rows) -> NDArray[np.bool_]:
+        """Which figures with targets (n, 3) in gaits (n,) are to go slower than recordings do."""
+        pace = np.hypot(target[:, 0], target[:, 1])
+        found: NDArray[np.bool_] = self.creeps[gait] & (pace >= LEAST_PACE / 2) & (pace < self.settings.creep)
+        return found
+
+    def desired_trajectory(
+        self, playback: Playback, target: Array, creeps: NDArray[np.bool_], who: Rows | slice = ALL
+    ) -> Array:
+        """Where the springs of figures (n,) lead: features (n, TRAJECTORY), not yet scaled. creeps: (n,)."""
         how, facing, target = self.settings, playback.root[who, 2], target[who]
         cos, sin = np.cos(facing), np.sin(facing)
-        off, rate = playback.spring[who] - target, playback.spring_rate[who]
+        spring, rate = playback.spring[who], playback.spring_rate[who]
+        hurry = hurries(spring, creeps, how.creep)
+        target = target * hurries(target, creeps, how.creep)
+        off, rate = spring * hurry - target, rate * hurry
         travel, turns = (off[:, :2], rate[:, :2]), (wrapped(off[:, 2]), rate[:, 2])
         slow, calm = damping_of(how.velocity), damping_of(how.facing)
         places, facings, times = [], [], horizons(how)

@@ -10,10 +10,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from motet.bundle.graph import Floats
-from motet.decode.matching import Matcher, Playback, Rows, SteeringSettings
-from motet.decode.warping import warped
+from motet.decode.matching import LEAST_PACE, Matcher, Playback, Rows
+from motet.decode.steering_settings import SteeringSettings
+from motet.decode.warping import strided, warped
 from motet.motion.pose import Pose, damped, damping_of
 from motet.motion.rotations import Array, wrapped
 
@@ -66,7 +68,7 @@ def tick(matcher: Matcher, poses: PoseCodes, playback: Playback, target: Array, 
     whole, playback.part = np.divmod(playback.part + playback.rate, 1)
     playback.row = playback.row + whole.astype(np.int64)
     played, _ = matcher.table.at(playback)
-    codes, moves, recorded = played[:, :-6], played[:, -6:-3].T, played[:, -3]
+    moves, recorded = played[:, -6:-3].T, played[:, -3]
     off = playback.spring - target
     off[:, 2] = wrapped(off[:, 2])
     damping = np.array([damping_of(how.velocity)] * 2 + [damping_of(how.facing)])
@@ -75,10 +77,21 @@ def tick(matcher: Matcher, poses: PoseCodes, playback: Playback, target: Array, 
     calm, warp = damping_of(how.blend), _warp(playback, matcher.table.way[playback.mirror, playback.row], recorded, how)
     off, playback.warp_rate = damped(playback.warp - warp, playback.warp_rate, calm, dt)
     playback.warp = warp + off
-    playback.root, playback.rate = _moved(playback, moves, recorded, how, dt)
+    creeps = matcher.creeping(target, gait)
+    playback.root, playback.rate, stride = _moved(playback, moves, recorded, creeps, how, dt)
+    off, playback.stride_rate = damped(playback.stride - stride, playback.stride_rate, calm, dt)
+    playback.stride = stride + off
     playback.offset, playback.offset_rate = damped(playback.offset, playback.offset_rate, calm, dt)
-    rotations, height = poses.decode(codes + playback.offset)
-    return Pose(playback.root, warped(rotations, playback.warp), height, played[:, -2:].astype(np.float32))
+    rotations, height = body(matcher, poses, playback, played)
+    return Pose(playback.root, rotations, height, played[:, -2:].astype(np.float32))
+
+
+def body(matcher: Matcher, poses: PoseCodes, playback: Playback, played: Array) -> tuple[Floats, Floats]:
+    """Rotations and height of figures that play numbers (B, K + 6) of the table, with their offset, turned and with
+    strides as they go."""
+    rotations, height = poses.decode(played[:, :-6] + playback.offset)
+    way, contacts = matcher.table.way[playback.mirror, playback.row], played[:, -2:].astype(np.float32)
+    return warped(strided(rotations, contacts, way, playback.stride), playback.warp), height
 
 
 def _warp(playback: Playback, way: Array, recorded: Array, how: SteeringSettings) -> Array:
@@ -90,22 +103,28 @@ def _warp(playback: Playback, way: Array, recorded: Array, how: SteeringSettings
     return np.where(warps, angle.clip(-how.warp, how.warp), 0.0)
 
 
-def _moved(playback: Playback, moves: Array, recorded: Array, how: SteeringSettings, dt: float) -> tuple[Array, Array]:
-    """The next root (B, 3) and playback rate (B,), of recorded moves (3, B) forward, left and turn, and speeds (B,)."""
+def _moved(
+    playback: Playback, moves: Array, recorded: Array, creeps: NDArray[np.bool_], how: SteeringSettings, dt: float
+) -> tuple[Array, Array, Array]:
+    """The next root (B, 3), playback rate (B,) and by how much legs are to make shorter strides (B,); of recorded moves
+    (3, B) forward, left and turn, speeds (B,), and which figures creep (B,)."""
     x, z, facing = playback.root.T
     (velocity_x, velocity_z), rate = playback.spring[:, :2].T, playback.rate
     pace = np.hypot(velocity_x, velocity_z)
-    moving, ratio = np.minimum(recorded, pace) > how.idle, pace / np.maximum(recorded, how.idle)
+    moving = creeps | (np.minimum(recorded, pace) > how.idle)
+    ratio = pace / np.maximum(recorded, np.where(creeps, LEAST_PACE, how.idle))
     forward, left, turn = moves * (rate * dt)
     error = wrapped(playback.spring[:, 2] - facing)
     most = (how.turn_still + how.turn_moving * np.minimum(pace, how.turn_speed)) * dt + how.turn_turning * np.abs(turn)
     turned = wrapped(facing + turn + (error * (1 - 0.5 ** (dt / how.turn))).clip(-most, most))
-    stride = np.where(moving, (ratio / rate).clip(how.shortest, how.longest), 1)
+    stride = np.where(moving, (ratio / rate).clip(np.where(creeps, 0, how.shortest), how.longest), 1)
     sin, cos = np.sin(facing + playback.warp) * stride, np.cos(facing + playback.warp) * stride
     step_x, step_z = sin * forward + cos * left, cos * forward - sin * left
     # turned towards the velocity by a small angle, where the two do not go apart
     along, across = step_x * velocity_x + step_z * velocity_z, step_z * velocity_x - step_x * velocity_z
     veers = moving & (along > how.veer_within * np.abs(across))
     angle = np.where(veers, np.arctan(across / np.maximum(along, 1e-6)).clip(-how.veer, how.veer), 0)
-    rate = np.where(moving, ratio.clip(how.slowest, how.fastest), 1)
-    return np.stack([x + (step_x + angle * step_z), z + (step_z - angle * step_x), turned], axis=1), rate
+    slowest, rate = np.where(creeps, how.creep_slowest, how.slowest), np.where(creeps, np.sqrt(ratio), ratio)
+    rate = np.where(moving, rate.clip(slowest, how.fastest), 1)
+    root = np.stack([x + (step_x + angle * step_z), z + (step_z - angle * step_x), turned], axis=1)
+    return root, rate, np.where(creeps, np.minimum(stride, 1), 1)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.decode.matching import SteeringSettings
+from motet.decode.steering_settings import SteeringSettings
 from motet.draw.figure import Body
 from motet.draw.page import body_data, filled, source
 from motet.draw.skinned import person

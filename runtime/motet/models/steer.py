@@ -10,8 +10,9 @@ from motet.bundle.fields import LARGEST, Fields
 from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
 from motet.decode.acts import Act, ActSettings
-from motet.decode.matching import FEATURES, Matcher, Playback, Rows, SteeringSettings, Table
+from motet.decode.matching import FEATURES, Matcher, Playback, Rows, Table
 from motet.decode.steering import PoseCodes
+from motet.decode.steering_settings import SteeringSettings
 from motet.errors import BundleError, ControlError
 from motet.models.base import LARGEST_CROWD, ControlModel
 from motet.models.scripts import captions, parse_orders

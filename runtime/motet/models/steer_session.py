@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from motet.bundle.fields import Fields
 from motet.decode.acting import Acting
 from motet.decode.acts import Act, ActSettings
-from motet.decode.matching import Playback, Rows, SteeringSettings
+from motet.decode.matching import Playback, Rows
 from motet.decode.steering import tick
+from motet.decode.steering_settings import SteeringSettings
 from motet.errors import BundleError, ControlError, ControlWarning, warn
 from motet.models.guided import Guidance, Guided, Who
 from motet.models.scripts import Order, parse_orders

@@ -6,9 +6,9 @@ import { damped, dampingOf } from "./springs.js";
 import type { LockSettings } from "./steeringSettings.js";
 import type { Played } from "./steering.js";
 
-const LEGS = SIDES.map((side) => LEG.map((part) => BONES.indexOf(side + part)));
+export const LEGS = SIDES.map((side) => LEG.map((part) => BONES.indexOf(side + part)));
 /** Where the joints of a leg begin in their parents' frames. */
-const OFFSETS = LEGS.map((bones) => bones.map((bone) => HUMANOID.joints[HUMANOID.index(BONES[bone]!)]!.offset));
+export const OFFSETS = LEGS.map((bones) => bones.map((bone) => HUMANOID.joints[HUMANOID.index(BONES[bone]!)]!.offset));
 /** Points of a sole, and which joint of a leg carries each. */
 const POINTS = LEG.flatMap((part, joint) => (SOLES[part] ?? []).map((point): [number, Vector] => [joint, point]));
 
@@ -33,7 +33,7 @@ export function held(lock: Lock, pose: Played, how: LockSettings, dt: number): P
   const hips = product(about(Y, facing), pose.rotations[0]!);
   const rotations = [...pose.rotations];
   lock.forEach((foot, side) => {
-    const leg = legOf(pose, side, hips, [x, pose.height, z]);
+    const leg = legOf(pose.rotations, side, hips, [x, pose.height, z]);
     const soles = POINTS.map(([joint, point]) => plus(leg.places[joint]!, rotated(leg.turned[joint]!, point)));
     const lowest = soles.reduce((least, point, at) => (point[1] < soles[least]![1] ? at : least), 0);
     shift(foot, minus(soles[lowest]!, (foot.soles ?? soles)[lowest]!), pose.contacts[side]! > how.stands, how, dt);
@@ -44,13 +44,13 @@ export function held(lock: Lock, pose: Played, how: LockSettings, dt: number): P
   return { ...pose, rotations };
 }
 
-interface Limb {
+export interface Limb {
   turned: Quaternion[];
   places: Vector[];
 }
 
 /** Rotations and places in the world of the joints of a leg. */
-function legOf({ rotations }: Played, side: number, hips: Quaternion, root: Vector): Limb {
+export function legOf(rotations: Quaternion[], side: number, hips: Quaternion, root: Vector): Limb {
   let [above, place] = [hips, root];
   const [turned, places]: [Quaternion[], Vector[]] = [[], []];
   LEGS[side]!.forEach((bone, joint) => {
@@ -76,7 +76,7 @@ function shift(foot: Foot, [x, , z]: Vector, contact: boolean, how: LockSettings
 }
 
 /** Turn thigh, shin and foot of a leg so that the ankle is moved; the foot stays as it is in the world. */
-function reach(rotations: Quaternion[], side: number, hips: Quaternion, { turned, places }: Limb, move: Vector): void {
+export function reach(rotations: Quaternion[], side: number, hips: Quaternion, { turned, places }: Limb, move: Vector): void {
   const [hip, knee, ankle] = places as [Vector, Vector, Vector];
   const [thigh, shin, foot] = turned as [Quaternion, Quaternion, Quaternion];
   const leg = new Leg(hip, knee, ankle, rotated(shin, X));

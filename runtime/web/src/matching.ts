@@ -41,7 +41,13 @@ export interface Playback {
   /** Radians by which hips and legs are turned towards the direction of travel, and how fast that changes. */
   warp: number;
   warpRate: number;
+  /** How long the legs' strides are beside the recorded ones, and how fast that changes. */
+  stride: number;
+  strideRate: number;
 }
+
+/** The slowest that a figure goes, m/s. */
+export const LEAST_PACE = 0.1;
 
 /** Features of where a row goes: places and facings in thirds of the horizon, and the speed. Those of how it is now follow. */
 export const TRAJECTORY = 13;
@@ -88,6 +94,8 @@ export class Matcher {
   private readonly ways: Float64Array;
   private readonly features: Int16Array;
   readonly goals: Goals[];
+  /** Which gaits are faster than a creep. */
+  private readonly creeps: boolean[];
   private readonly asked = new Int16Array(FEATURES);
   private readonly image = new Int16Array(FEATURES);
 
@@ -111,6 +119,24 @@ export class Matcher {
       const rows = all.filter((row) => this.shows(row, gait)).filter((_, at) => at % how.row_step === 0);
       return new Goals(this.features, FEATURES, rows, tables.feature_mean, tables.feature_scale, how.lag);
     });
+    this.creeps = Array.from({ length: gaits }, (_, gait) => {
+      const speeds = Float32Array.from({ length: this.rows }, (_, row) => (this.shows(row, gait) ? tables.moves[6 * row + 3]! : 0));
+      const moving = speeds.filter((speed) => speed > how.idle).sort();
+      return moving.length > 0 && moving[moving.length >> 1]! > how.creep;
+    });
+  }
+
+  /** Whether a figure is to go slower than recordings do. */
+  creeping([x, z]: Target, gait: number): boolean {
+    const pace = Math.hypot(x, z);
+    return this.creeps[gait]! && pace >= LEAST_PACE / 2 && pace < this.how.creep;
+  }
+
+  /** What a velocity over the ground is multiplied by to be as fast as recordings. */
+  private hurry(x: number, z: number): number {
+    const { creep } = this.how;
+    const pace = Math.hypot(x, z);
+    return pace < creep ? creep / Math.max(pace, Math.min(LEAST_PACE, creep)) : 1;
   }
 
   /** The row of a gait with the least speed, the first of them; of those that something follows. */
@@ -128,7 +154,8 @@ export class Matcher {
     const [offset, offsetRate] = [new Float64Array(this.codes), new Float64Array(this.codes)];
     const springs = { spring: [0, 0, facing] as Target, springRate: [0, 0, 0] as Target, offset, offsetRate };
     const turn = { ticksToSearch: phase ?? 0, inTurn: phase !== undefined };
-    return { row, part: 0, mirror: false, rate: 1, ...turn, root: [x, z, facing], ...springs, warp: 0, warpRate: 0 };
+    const legs = { warp: 0, warpRate: 0, stride: 1, strideRate: 0 };
+    return { row, part: 0, mirror: false, rate: 1, ...turn, root: [x, z, facing], ...springs, ...legs };
   }
 
   shows(row: number, gait: number): boolean {
@@ -154,7 +181,7 @@ export class Matcher {
     const stays = this.shows(row, gait) && this.tables.left[row]! >= this.reserve;
     if (stays && this.flies(row)) return; // a flight is played to its end
     const goals = this.goals[gait]!;
-    this.ask(figure, row, target);
+    this.ask(figure, row, target, this.creeping(target, gait));
     const here = figure.mirror ? this.image : this.asked;
     const cost = stays ? goals.cost(here, this.features, row * FEATURES) : Infinity;
     const found = goals.nearest(this.asked, this.image, cost);
@@ -164,39 +191,42 @@ export class Matcher {
   }
 
   /** What is asked for, as steps of features, and their mirror image: the row's own but for where it goes. */
-  private ask(figure: Playback, row: number, target: Target): void {
+  private ask(figure: Playback, row: number, target: Target, creeps: boolean): void {
     const { asked } = this;
     const at = row * FEATURES;
     for (let i = TRAJECTORY; i < FEATURES; i++) {
       asked[i] = figure.mirror ? this.features[at + COLUMNS[i]!]! * SIGNS[i]! : this.features[at + i]!;
     }
-    this.lead(figure, target);
+    this.lead(figure, target, creeps);
   }
 
   /** Ask for where the springs lead, and for the mirror image of all that is asked. */
-  private lead(figure: Playback, target: Target): void {
+  private lead(figure: Playback, target: Target, creeps: boolean): void {
     const { asked, image } = this;
     const { feature_mean: mean, feature_scale: scale } = this.tables;
-    this.trajectory(figure, target).forEach((value, i) => (asked[i] = stepsOf((value - mean[i]!) * scale[i]!)));
+    this.trajectory(figure, target, creeps).forEach((value, i) => (asked[i] = stepsOf((value - mean[i]!) * scale[i]!)));
     for (let i = 0; i < FEATURES; i++) image[i] = asked[COLUMNS[i]!]! * SIGNS[i]!;
   }
 
   /** Where the springs lead, as features that are not yet scaled. */
-  private trajectory({ root, spring, springRate }: Playback, [toX, toZ, toFacing]: Target): number[] {
+  private trajectory({ root, spring, springRate }: Playback, target: Target, creeps: boolean): number[] {
+    const [toFacing, by] = [target[2], creeps ? this.hurry(spring[0], spring[1]) : 1];
+    const more = creeps ? this.hurry(target[0], target[1]) : 1;
+    const [toX, toZ, rateX, rateZ] = [target[0] * more, target[1] * more, springRate[0] * by, springRate[1] * by];
     const { velocity, facing: halfLife, half_speed, horizon } = this.how;
     const [slow, calm] = [dampingOf(velocity), dampingOf(halfLife)];
     const [cos, sin] = [Math.cos(root[2]), Math.sin(root[2])];
-    const [offX, offZ, off] = [spring[0] - toX, spring[1] - toZ, wrapped(spring[2] - toFacing)];
+    const [offX, offZ, off] = [spring[0] * by - toX, spring[1] * by - toZ, wrapped(spring[2] - toFacing)];
     const [places, facings]: [number[], number[]] = [[], []];
     for (const time of [horizon / 3, (horizon * 2) / 3, horizon]) {
-      const x = toX * time + dampedPath(offX, springRate[0], slow, time);
-      const z = toZ * time + dampedPath(offZ, springRate[1], slow, time);
+      const x = toX * time + dampedPath(offX, rateX, slow, time);
+      const z = toZ * time + dampedPath(offZ, rateZ, slow, time);
       const angle = toFacing + damped(off, springRate[2], calm, time)[0] - root[2];
       places.push(cos * x - sin * z, sin * x + cos * z);
       facings.push(Math.sin(angle), Math.cos(angle));
     }
     const soon = (horizon * 2) / 3;
-    const speed = Math.hypot(toX + damped(offX, springRate[0], slow, soon)[0], toZ + damped(offZ, springRate[1], slow, soon)[0]);
+    const speed = Math.hypot(toX + damped(offX, rateX, slow, soon)[0], toZ + damped(offZ, rateZ, slow, soon)[0]);
     return [...places, ...facings, speed / (speed + half_speed)];
   }
 
@@ -215,9 +245,9 @@ export class Matcher {
   /** Let a figure go on from the row that fits best after being so, features after those of the trajectory, scaled. */
   follow(figure: Playback, target: Target, gait: number, now: number[]): void {
     now.forEach((value, i) => (this.asked[TRAJECTORY + i] = stepsOf(value)));
-    this.lead(figure, target);
+    this.lead(figure, target, this.creeping(target, gait));
     const { row, mirror } = this.goals[gait]!.nearest(this.asked, this.image, Infinity)!;
-    Object.assign(figure, { row, part: 0, mirror, rate: 1, warp: 0, warpRate: 0 });
+    Object.assign(figure, { row, part: 0, mirror, rate: 1, warp: 0, warpRate: 0, stride: 1, strideRate: 0 });
     figure.offset.fill(0);
     figure.offsetRate.fill(0);
   }

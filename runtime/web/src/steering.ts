@@ -1,9 +1,9 @@
 /* The step of a steered figure: docs/bundle.md, the loop `matching`. Metres, seconds and radians. */
-import type { Matcher, Playback, Target } from "./matching.js";
+import { LEAST_PACE, type Matcher, type Playback, type Target } from "./matching.js";
 import type { Pose as Ground } from "./planar.js";
 import type { Quaternion } from "./rotations.js";
 import { clamp, damped, dampingOf, wrapped } from "./springs.js";
-import { warped } from "./warping.js";
+import { strided, warped } from "./warping.js";
 
 /** A pose on the humanoid: the hips' rotation is in the frame of the facing. */
 export interface Played {
@@ -43,7 +43,7 @@ export class Steerer {
     const moves = this.moves(figure);
     approach(figure, target, dampingOf(how.velocity), dampingOf(how.facing), dt);
     this.warp(figure, moves[3]!);
-    this.move(figure, moves);
+    this.move(figure, moves, matcher.creeping(target, gait));
     this.fade(figure, dampingOf(how.blend));
     const contacts: [number, number] = figure.mirror ? [moves[5]!, moves[4]!] : [moves[4]!, moves[5]!];
     return { ground: figure.root, ...this.body(figure), contacts };
@@ -53,7 +53,8 @@ export class Steerer {
   body(figure: Playback): Pick<Played, "rotations" | "height"> {
     this.matcher.played(figure, this.codes);
     const { rotations, height } = this.pose();
-    return { rotations: warped(rotations, figure.warp), height };
+    const legs = strided(rotations, this.matcher.way(figure), figure.stride);
+    return { rotations: warped(legs, figure.warp), height };
   }
 
   /** Velocity over the ground (forward, left, turn), speed, and how much each foot stands, of the row as recorded. */
@@ -75,17 +76,18 @@ export class Steerer {
     figure.warpRate = rate;
   }
 
-  /** The next root and rate of playback. */
-  private move(figure: Playback, moves: number[]): void {
+  /** The next root, rate of playback and stride of the legs, of a figure that creeps or does not. */
+  private move(figure: Playback, moves: number[], creeps: boolean): void {
     const { how, dt } = this.matcher;
     const { root: [x, z, facing], rate, spring, mirror } = figure;
     const recorded = moves[3]!;
     const side = mirror ? -1 : 1;
     const pace = Math.hypot(spring[0], spring[1]);
-    const moving = Math.min(recorded, pace) > how.idle;
-    const ratio = pace / Math.max(recorded, how.idle);
-    const stride = rate * dt * (moving ? clamp(ratio / rate, how.shortest, how.longest) : 1);
-    const [forward, left, turn] = [moves[0]! * stride, side * moves[1]! * stride, side * moves[2]! * rate * dt];
+    const moving = creeps || Math.min(recorded, pace) > how.idle;
+    const ratio = pace / Math.max(recorded, creeps ? LEAST_PACE : how.idle);
+    const stride = moving ? clamp(ratio / rate, creeps ? 0 : how.shortest, how.longest) : 1;
+    const by = rate * dt * stride;
+    const [forward, left, turn] = [moves[0]! * by, side * moves[1]! * by, side * moves[2]! * rate * dt];
     const error = wrapped(spring[2] - facing);
     const most = (how.turn_still + how.turn_moving * Math.min(pace, how.turn_speed)) * dt + how.turn_turning * Math.abs(turn);
     const turned = wrapped(facing + turn + clamp(error * (1 - 0.5 ** (dt / how.turn)), -most, most));
@@ -97,7 +99,12 @@ export class Steerer {
     const veers = moving && along > how.veer_within * Math.abs(across);
     const angle = veers ? clamp(Math.atan(across / Math.max(along, 1e-6)), -how.veer, how.veer) : 0;
     figure.root = [x + stepX + angle * stepZ, z + stepZ - angle * stepX, turned];
-    figure.rate = moving ? clamp(ratio, how.slowest, how.fastest) : 1;
+    const slowest = creeps ? how.creep_slowest : how.slowest;
+    figure.rate = moving ? clamp(creeps ? Math.sqrt(ratio) : ratio, slowest, how.fastest) : 1;
+    const target = creeps ? Math.min(stride, 1) : 1;
+    const [off, slower] = damped(figure.stride - target, figure.strideRate, dampingOf(how.blend), dt);
+    figure.stride = target + off;
+    figure.strideRate = slower;
   }
 
   /** The inertialization offset, a tick later. */

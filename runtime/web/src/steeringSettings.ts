@@ -24,6 +24,8 @@ const STEERING = {
   shortest: [0.8, 0.1, 1],
   longest: [1.25, 1, 10],
   idle: [0.4, 0.01, 100],
+  creep: [0.67, 0.01, 100],
+  creep_slowest: [0.5, 0.1, 1],
   turn: [0.15, ...HALF_LIFE],
   turn_still: [0.1, 0, 100],
   turn_moving: [1, 0, 100],

@@ -1,6 +1,7 @@
-/* Orientation warping, hips and legs are turned towards where a figure goes and the spine is turned back: docs/bundle.md, the loop `matching`. */
-import { BONES, SPINE } from "./humanoid.js";
-import { about, inverse, product, type Quaternion, rotated, Y } from "./rotations.js";
+/* Legs go another way, hips turned with them and the spine back, and with other strides: docs/bundle.md, the loop `matching`. */
+import { legOf, OFFSETS, reach } from "./footLock.js";
+import { BONES, HUMANOID, SIDES, SOLES, SPINE } from "./humanoid.js";
+import { about, inverse, plus, product, type Quaternion, rotated, Y } from "./rotations.js";
 
 /** Which bones turn back, each by the same share. */
 const BACK = SPINE.map((name) => BONES.indexOf(name));
@@ -18,5 +19,24 @@ export function warped(rotations: Quaternion[], angle: number): Quaternion[] {
     found[bone] = product(about(rotated(inverse(above), Y), -angle / BACK.length), rotations[bone]!);
     above = product(above, rotations[bone]!);
   }
+  return found;
+}
+
+/** Of the sole, in the frame of the foot. */
+const BALL = SOLES.Foot!.at(-1)!;
+/** How far in front of the hips the balls of a standing figure's feet are. */
+const UNDER = HUMANOID.rest[HUMANOID.index("leftFoot")]![2] + BALL[2];
+
+/** Local rotations with the balls of the feet led so far along a way from the facing that strides are this times as long. */
+export function strided(rotations: Quaternion[], way: number, stride: number): Quaternion[] {
+  if (Math.abs(stride - 1) <= LEAST) return rotations;
+  const found = [...rotations];
+  const [sin, cos] = [Math.sin(way), Math.cos(way)];
+  SIDES.forEach((_, side) => {
+    const leg = legOf(rotations, side, rotations[0]!, [0, 0, 0]);
+    const [x, , z] = plus(leg.places[2]!, rotated(leg.turned[2]!, BALL));
+    const far = ((x - OFFSETS[side]![0]![0]) * sin + (z - UNDER) * cos) * (stride - 1);
+    reach(found, side, rotations[0]!, leg, [far * sin, 0, far * cos]);
+  });
   return found;
 }

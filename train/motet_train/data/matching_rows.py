@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.decode.acts import foot_contacts, pose_features, seen
-from motet.decode.matching import HORIZONS, SteeringSettings, horizons, mirrored_features, speed_feature
+from motet.decode.matching import HORIZONS, horizons, mirrored_features, speed_feature
+from motet.decode.steering_settings import SteeringSettings
 from motet.motion.humanoid import BONES
 from motet.motion.kinematics import global_transforms
 from motet.motion.motion import Motion

@@ -8,7 +8,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from motet.decode.matching import SteeringSettings, stride_velocities
+from motet.decode.matching import LEAST_PACE, is_faster, stride_velocities
+from motet.decode.steering_settings import SteeringSettings
 from motet.models.steer import FEATURE_STEPS
 from motet.motion.feet.lock import FootLockSettings
 from motet.motion.rotations import Array
@@ -135,16 +136,18 @@ def _reach(tree: Tree) -> Array:
 def _speeds(rows: MatchingRows, shown: NDArray[np.bool_], how: SteeringSettings) -> Speeds:
     """Those that a gait can be asked for, as its rows can be played slower and faster; all 0 if they cannot.
 
-    They go from the 30th percentile of its moving rows, with shorter strides, to the 90th of each direction, or to that
-    of means over a stride, with the longest strides, if it is less, as it is of side steps; directions with a second of
-    rows or less have none.
+    They go from the 30th percentile of its moving rows, with shorter strides, or from the slowest pace if that is a
+    creep, to the 90th of each direction, or to that of means over a stride, with the longest strides, if it is less, as
+    it is of side steps; directions with a second of rows or less have none.
     """
     speed = rows.speed[shown]
     moving = speed > how.idle
     if not moving.any():
         return (0.0,) * 5
     angle = np.abs(np.arctan2(rows.moves[shown, 1], rows.moves[shown, 0]))  # from the facing
-    low = np.percentile(speed[moving], 30.0) * how.slowest * how.shortest
+    low = round(float(np.percentile(speed[moving], 30.0)) * how.slowest * how.shortest, 2)
+    if low <= how.creep and is_faster(speed, how):
+        low = LEAST_PACE
     sectors = [moving & (np.digitize(angle, (how.aside, how.back), right=True) == sector) for sector in range(3)]
     going = stride_velocities(rows.moves[:, :2], rows.left)[shown]
     paces, ways = np.hypot(*going.T), np.abs(np.arctan2(going[:, 1], going[:, 0]))
@@ -156,7 +159,7 @@ def _speeds(rows: MatchingRows, shown: NDArray[np.bool_], how: SteeringSettings)
         for part, own in zip(sectors, strides, strict=True)
     ]
     forward, aside, back = (round(float(one), 2) for one in fastest)
-    return round(float(low), 2), round(float(np.median(speed[sectors[0]])), 2), forward, aside, back
+    return low, round(float(np.median(speed[sectors[0]])), 2), forward, aside, back
 
 
 def _loss(net: Matching, rows: Tensor, true: tuple[Tensor, Tensor], weights: Tensor, fps: float) -> Terms:

@@ -9,9 +9,10 @@ how long a foot will stand, is :mod:`motet.motion.feet.hold`.
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from motet.motion.humanoid import BONES, HUMANOID, LEFT_RIGHT, LEG, SOLE, sided
 from motet.motion.parts import (
@@ -27,7 +28,7 @@ from motet.motion.parts import (
     rotated,
     where,
 )
-from motet.motion.pose import Pose, damping_of
+from motet.motion.pose import Floats, Pose, damping_of
 from motet.motion.two_bones import TwoBones
 from motet.settings import Range, Settings
 
@@ -94,23 +95,15 @@ class FootLock:
         """The next pose, one tick later, with standing feet held in place and above ground."""
         hips = product(parts(pose.heading), parts(pose.rotations[:, 0]))
         (x, z, _), (height,) = parts(pose.ground), parts(pose.height[:, None])
-        legs = zip(self.feet, _limbs(pose), strict=False)
+        legs = zip(self.feet, limbs(pose.rotations, pose.contacts), strict=False)
         found = [self._stood(foot, limb, hips, (x, height, z)) for foot, limb in legs]
         self.feet = tuple(foot for foot, _ in found)
-        # joints, their parts, and both sides of each character; or the sides of one, joints, their parts
-        turned = np.array([turns for _, turns in found])
-        rotations = pose.rotations.copy()
-        rotations[:, LEG_BONES[:, :3]] = turned if len(found) == 2 else turned[0].transpose(3, 2, 0, 1)
+        rotations = with_legs(pose.rotations, [turns for _, turns in found])
         return Pose(pose.ground, rotations, pose.height, pose.contacts)
 
     def _stood(self, foot: Foot, limb: Limb, hips: Quaternion, place: Vector) -> tuple[Foot, list[Quaternion]]:
         """A foot a tick later, and the rotations of thigh, shin and foot in their parents' frames."""
-        turned, places, above = [], [], hips
-        for local, offset in zip(limb.local, limb.offsets, strict=True):
-            place = plus(place, rotated(above, offset))
-            above = product(above, local)
-            turned.append(above)
-            places.append(place)
+        turned, places = joints_of(limb, hips, place)
         soles = tuple(plus(places[joint], rotated(turned[joint], point)) for joint, point in POINTS)
         (shift_x, shift_z), drift, height = self._shifted(foot, soles, limb.contact)
         lift, played = larger(-height, 0.0), limb.local[:3]
@@ -118,7 +111,7 @@ class FootLock:
         if moves is False:
             return after, played
         x, y, z = places[2]
-        reached = _reached(hips, turned, places, (x + shift_x, y + lift, z + shift_z))
+        reached = reached_by(hips, turned, places, (x + shift_x, y + lift, z + shift_z))
         if moves is True:
             return after, reached
         return after, [
@@ -147,18 +140,38 @@ class FootLock:
         return (off + rise) * left, (rate - damping * rise) * left
 
 
-def _limbs(pose: Pose) -> Iterator[Limb]:
-    """The left and the right leg of one character, or the legs of all as one."""
-    if len(pose) == 1:
-        for bones, offsets, contact in zip(LEG_BONES, OFFSETS.tolist(), pose.contacts[0].tolist(), strict=True):
-            yield Limb(pose.rotations[0, bones].tolist(), offsets, contact)
+def limbs(rotations: Floats, contacts: Floats) -> Iterator[Limb]:
+    """The left and the right leg of one character, or the legs of all as one; of poses' rotations and contacts."""
+    if len(rotations) == 1:
+        for bones, offsets, contact in zip(LEG_BONES, OFFSETS.tolist(), contacts[0].tolist(), strict=True):
+            yield Limb(rotations[0, bones].tolist(), offsets, contact)
     else:
-        local = np.array(pose.rotations[:, LEG_BONES].transpose(2, 3, 1, 0), dtype=np.float64, order="C")
+        local = np.array(rotations[:, LEG_BONES].transpose(2, 3, 1, 0), dtype=np.float64, order="C")
         offsets = OFFSETS.transpose(1, 2, 0)[..., None]
-        yield Limb([tuple(quats) for quats in local], [tuple(offset) for offset in offsets], pose.contacts.T)
+        yield Limb([tuple(quats) for quats in local], [tuple(offset) for offset in offsets], contacts.T)
 
 
-def _reached(hips: Quaternion, turned: list[Quaternion], places: list[Vector], target: Vector) -> list[Quaternion]:
+def with_legs(rotations: Floats, legs: list[list[Quaternion]]) -> Floats:
+    """Rotations of poses with others of thighs, shins and feet, of legs as :func:`limbs` gives them."""
+    # joints, their parts, and both sides of each character; or the sides of one, joints, their parts
+    turned: NDArray[Any] = np.array(legs)
+    found = rotations.copy()
+    found[:, LEG_BONES[:, :3]] = turned if len(legs) == 2 else turned[0].transpose(3, 2, 0, 1)
+    return found
+
+
+def joints_of(limb: Limb, hips: Quaternion, place: Vector) -> tuple[list[Quaternion], list[Vector]]:
+    """Rotations and places of a leg's joints where the hips are."""
+    turned, places, above = list[Quaternion](), list[Vector](), hips
+    for local, offset in zip(limb.local, limb.offsets, strict=True):
+        place = plus(place, rotated(above, offset))
+        above = product(above, local)
+        turned.append(above)
+        places.append(place)
+    return turned, places
+
+
+def reached_by(hips: Quaternion, turned: list[Quaternion], places: list[Vector], target: Vector) -> list[Quaternion]:
     """Rotations of thigh, shin and foot in their parents' frames, of a leg with its ankle at a target; the foot stays
     as it is in the world."""
     thigh, shin, foot = turned[:3]

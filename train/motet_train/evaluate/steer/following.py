@@ -54,6 +54,9 @@ WAYS = np.arange(-165.0, 195.0, 15.0)
 WAYS_PACES = {"walk": (0.8, 1.28), "run": (2.0, 3.0)}
 """m/s at which a gait goes there."""
 
+CREEPS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
+"""The slowest speeds in m/s, at which a walk is measured."""
+
 Asked = dict[str, Any]
 """What N figures are told: all that :meth:`SteerSession.control` takes of them."""
 
@@ -318,6 +321,18 @@ def ways_errors(model: SteerModel, gait: str) -> dict[str, float]:
     found["facing"] = ground.facing_off(np.zeros_like(asked), 2.0, 6.0).mean()
     found["speed"] = np.abs(ground.pace(2.0, 6.0) / allowed - 1).mean()
     return _floats(found | slide_of(tracks))
+
+
+def creep_errors(model: SteerModel) -> dict[str, float]:
+    """Walking ahead at each of :data:`CREEPS`, from standing and from walking: how far the speed is off, m/s, a mean
+    and the largest, and slide_cm, slide_p95_cm as :func:`standing` has them; from 3 to 6 s after the change.
+    """
+    asked, start = (part.ravel() for part in np.meshgrid(CREEPS, (0.0, MEASURED_SPEEDS["walk"])))
+    before = {**AHEAD, "gait": ("walk",) * len(asked), "speed": start}
+    tracks = responses(model, before, {**before, "speed": asked}, 6.0, hold_feet=True)
+    off = np.abs(Ground.of(tracks).pace(3.0, 6.0) - np.tile(asked, PHASES))
+    settled = [track[round(3.0 * track.fps) :] for track in tracks]
+    return _floats({"speed": off.mean(), "speed_worst": off.max(), **slide_of(settled)})
 
 
 def _floats(found: Mapping[str, float]) -> dict[str, float]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.bundle.graph import Floats
-from motet.decode.matching import SteeringSettings
+from motet.decode.steering_settings import SteeringSettings
 from motet.errors import ControlWarning
 from motet.models.steer import SteerModel
 from motet.motion.humanoid import BONES, HUMANOID
@@ -28,6 +28,7 @@ from motet_train.evaluate.steer.following import (
     WAYS_PACES,
     Track,
     aside_errors,
+    creep_errors,
     gait_figures,
     speed_errors,
     standing,
@@ -51,6 +52,8 @@ STEER_GOALS: Goals = {
     "ways_walk.direction_worst": (None, 6),
     "ways_run.direction": (None, 3),
     "ways_run.direction_worst": (None, 8),
+    "creep.speed_worst": (None, 0.05),
+    "creep.slide_cm": (None, 2),
     "random.broken": (None, 0),
     "random.frozen": (None, 0),
     "random.leaps": (None, 0),
@@ -266,6 +269,7 @@ def _parts(model: SteerModel, recorded: Recorded, minutes: float, characters: in
         "speed": speed_errors,
         **{f"turn_{gait}": partial(turn_errors, gait=gait, pace=pace) for gait, pace in MEASURED_SPEEDS.items()},
         "aside": aside_errors,
+        "creep": creep_errors,
         **{f"ways_{gait}": partial(ways_errors, gait=gait) for gait in WAYS_PACES},
         "random": partial(wandering, limits=limits, seconds=60 * minutes, characters=characters),
     }
