@@ -7,10 +7,12 @@ from numpy.typing import NDArray
 import motet
 from motet.decode.acting import UPPER
 from motet.decode.acts import WIDTH, Act, ActSettings
-from motet.errors import ControlError, MotionError
+from motet.errors import ControlError, MotionError, ScriptError, TextError
+from motet.models.said_acts import SaidActs
+from motet.models.scripts import parse_orders
 from motet.models.steer import SteerModel
 from motet.models.steer_session import SteerSession
-from motet.motion.humanoid import BONES
+from motet.motion.humanoid import BONES, HUMANOID
 from motet.motion.motion import Motion
 from motet.motion.pose import Pose
 from motet.motion.rotations import quat_product
@@ -201,3 +203,47 @@ def test_putting_a_figure_elsewhere_ends_its_act(model: SteerModel) -> None:
     session.put([5.0, 5.0, 0.0])
     assert session.acting == [None]
     assert np.abs(session.tick().ground[0, :2] - 5).max() < 0.05
+
+
+@pytest.fixture(scope="module")
+def said(model: SteerModel) -> SaidActs:
+    return SaidActs(model, motet.load("generate"))
+
+
+def test_a_sentence_is_acted_and_made_once(model: SteerModel, said: SaidActs) -> None:
+    session = model.start(characters=2, words=said)
+    session.act(["wave", "kick"])
+    assert [one and one[0] for one in session.acting] == ["wave", "kick"]
+    assert said.act("wave") is said.act("wave")
+    assert 20 < len(said.act("wave")) <= 3 * model.fps
+    hand = HUMANOID.index("leftHand"), HUMANOID.index("rightHand")
+    highest = max(pose.positions()[0, list(hand), 1].max() for pose in ticks(session, 90))
+    assert highest > model.start().tick().positions()[0, list(hand), 1].max() + 0.2
+
+
+@pytest.mark.parametrize("sentence", ["xyzzy", "a dragon", "", "   "])
+def test_a_sentence_that_is_not_known_is_refused_and_nothing_moves(
+    model: SteerModel, said: SaidActs, sentence: str
+) -> None:
+    session, plain = model.start(words=said), model.start()
+    with pytest.raises(TextError):
+        session.act(sentence)
+    assert session.acting == [None]
+    assert np.array_equal(session.tick().rotations, plain.tick().rotations)
+
+
+def test_a_sentence_needs_a_model_that_makes_its_act(model: SteerModel) -> None:
+    with pytest.raises(ControlError, match="start\\(words="):
+        model.start().act("wave")
+
+
+def test_scripts_have_acts(model: SteerModel, said: SaidActs) -> None:
+    orders = parse_orders("walk 2s, act 'sit down' 1.5s, act wave", model.gaits)
+    assert [(order.act, order.seconds) for order in orders] == [(None, 2.0), ("sit down", 1.5), ("wave", 3.0)]
+    for script in ("act", "act 3s", "act ''"):
+        with pytest.raises(ScriptError):
+            parse_orders(script, model.gaits)
+    acted, plain = model.run("walk 1s, act 'wave' 2s", words=said), model.run("walk 3s")
+    assert len(acted) == len(plain) == 90
+    assert np.allclose(acted.values[:30], plain.values[:30])
+    assert not np.allclose(acted.values[30:], plain.values[30:], atol=1)

@@ -27,7 +27,7 @@ def test_orders_say_what_to_do_in_any_order_of_their_words() -> None:
 @pytest.mark.parametrize(
     ("script", "position", "reason"),
     [
-        ("", 0, "expected an order here: walk, run, turn or stop"),
+        ("", 0, "expected an order here: walk, run, turn, stop or act"),
         ("walk 3s,", 8, "expected an order"),
         ("walk 3s, , run", 9, "expected an order"),
         ("swim 3s", 0, "unknown order 'swim'"),

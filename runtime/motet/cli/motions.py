@@ -18,9 +18,12 @@ from motet.errors import ControlError, MotionError, quoted
 from motet.formats import names_motion
 from motet.models.base import ControlModel
 from motet.models.fill import JOIN_SECONDS, LOOP_SECONDS, FillModel, Gap
+from motet.models.generate import GenerateModel
 from motet.models.generate_codes import CodesModel
 from motet.models.load import load_as
 from motet.models.predict import MAX_SAMPLES, PredictModel
+from motet.models.scripts import parse_orders
+from motet.models.steer import SteerModel
 from motet.motion.motion import Motion
 
 
@@ -270,7 +273,8 @@ def control(
     """Run SCRIPT, such as "walk 3s speed 1.4, turn left 90, run 4s, stop", and write the motion.
 
     Orders are separated by commas: a gait, "turn" or "stop", and in any order seconds ("3s"), a speed in m/s ("speed
-    1.4"), a way ("backwards", "left", "right") and a turn in degrees ("turn left 90").
+    1.4"), a way ("backwards", "left", "right") and a turn in degrees ("turn left 90"). "act 'wave'" does something
+    beside, as the bundle generate shows it.
     With --bundle cmu-control: a label and seconds; a ramp "walk>run 5s"; a mix "walk*.3+run*.7 2s".
     """
     output.check(out)
@@ -281,6 +285,8 @@ def control(
     captions = model.captions(script)
     with naming(start), noted():
         first = read(Path(start)) if start and (Path(start).suffix or names_motion(start)) else start
+        if isinstance(model, SteerModel) and any(order.act for order in parse_orders(script, model.gaits)):
+            chosen["words"] = load_as(GenerateModel, "generate", session)
         motion = model.run(script, first, **chosen)
     motion = output.shaped(motion)
     if out.suffix.lower() == ".html":

@@ -4,7 +4,7 @@ Of steered figures, orders in words: ``walk 3s speed 1.4, turn left 90, run 4s, 
 gait, ``turn`` or ``stop``, followed in any order by a duration (``3s``; else 2 s, or 1.5 s of a turn or stop), a speed
 (``speed 1.4`` in m/s; else the gait's usual one), a way (``backwards``, ``left``, ``right``, relative to the facing,
 which does not change), and an angle in degrees to turn (``turn left 90``, or ``walk 3s turn right 45``). A turn alone
-keeps gait, speed and way.
+keeps gait, speed and way. ``act 'wave'`` is a sentence of what to do beside that, with a duration after it or 3 s.
 
 Of the thesis' net, segments of labels: ``walk 3s`` holds a label, ``walk>run 5s`` goes from one to the other linearly,
 ``walk*.3+run*.7 2s`` mixes labels (a weight is between 0 and 1; labels that are not named have 0).
@@ -35,6 +35,7 @@ class Order:
     """gait: None for the previous one. speed: m/s, None for the gait's usual one, -1 for the previous one.
 
     way: of travel, in degrees from the facing, None for the previous one. turn: degrees to the left. caption: in words.
+    act: a sentence of what is done, beside what was ordered before.
     """
 
     gait: str | None
@@ -43,6 +44,7 @@ class Order:
     turn: float
     seconds: float
     caption: str
+    act: str | None = None
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,7 @@ def parse_orders(script: str, gaits: Sequence[str]) -> list[Order]:
             words.append((word, place))
             continue
         if not words:
-            raise ScriptError(script, place, f"expected an order here: {', '.join(gaits)}, turn or stop")
+            raise ScriptError(script, place, f"expected an order here: {', '.join(gaits)}, turn, stop or act")
         orders.append(_Words(script, words).order(gaits))
         words = []
     if sum(order.seconds for order in orders) > LONGEST_SCRIPT:
@@ -92,8 +94,10 @@ class _Words:
 
     def order(self, gaits: Sequence[str]) -> Order:
         kind = self.take("an order")
+        if kind == "act":
+            return self.act()
         if kind not in (*gaits, "turn", "stop"):
-            raise self.fail(f"unknown order {kind!r}; expected one of {', '.join(gaits)}, turn, stop")
+            raise self.fail(f"unknown order {kind!r}; expected one of {', '.join(gaits)}, turn, stop, act")
         found = self.turn() if kind == "turn" else {}
         while self.left:
             detail = self.detail()
@@ -106,6 +110,14 @@ class _Words:
         if kind == "turn":
             return Order(None, found.get("speed", -1.0), found.get("way"), turn, seconds, self.caption)
         return Order(kind, found.get("speed"), found.get("way", 0.0), turn, seconds, self.caption)
+
+    def act(self) -> Order:
+        words = [self.take("what to do, such as 'wave'"), *(word for word, _ in self.left)]
+        last = re.fullmatch(f"({NUMBER})s", words[-1])
+        said = " ".join(words[:-1] if last else words).strip("'\"")
+        if not said:
+            raise self.fail("expected what to do, such as act 'wave'")
+        return Order(None, -1.0, None, 0.0, float(last[1]) if last else 3.0, said, said)
 
     def detail(self) -> dict[str, float]:
         word = self.take("more")

@@ -15,6 +15,8 @@ from motet.decode.steering import PoseCodes
 from motet.decode.steering_settings import SteeringSettings
 from motet.errors import BundleError, ControlError
 from motet.models.base import LARGEST_CROWD, ControlModel
+from motet.models.generate import GenerateModel
+from motet.models.said_acts import SaidActs
 from motet.models.scripts import captions, parse_orders
 from motet.models.steer_session import Gaits, SteerSession
 from motet.motion.feet.lock import FootLockSettings
@@ -96,6 +98,7 @@ class SteerModel(ControlModel):
         hold_feet: bool = True,
         strict: bool = False,
         phases: ArrayLike | None = None,
+        words: GenerateModel | SaidActs | None = None,
     ) -> SteerSession:
         """A session of ``characters`` figures that stand still, or continue from a motion's last pose.
 
@@ -108,6 +111,8 @@ class SteerModel(ControlModel):
             ``search_every`` ticks, and what it is told waits for that. By default the phases of 32 characters or more
             are 0, 1, 2 and so on in turn, so that each tick costs the same; fewer search after every command. A
             character moves as it would alone with its phase.
+        words: a generate model, which makes what the session's ``act`` is told in sentences; or the
+            :class:`motet.models.said_acts.SaidActs` of one, which sessions share.
         ControlError for values out of range, MotionError for a motion that does not fit.
         """
         characters = checked_int("characters", characters, 1, LARGEST_CROWD, ControlError)
@@ -115,7 +120,8 @@ class SteerModel(ControlModel):
         number = self.abilities.number(gait)
         spread = self._phases(characters, phases)
         playback = Playback.at(self.matcher.stillest(number), characters, self.sizes["K"], spread)
-        session = SteerSession(self, playback, number, hold_feet, strict)
+        said = SaidActs(self, words) if isinstance(words, GenerateModel) else words
+        session = SteerSession(self, playback, number, hold_feet, strict, said)
         if isinstance(start, Motion):
             session.take(self.pose_of(start))
         if places is not None:
@@ -160,13 +166,21 @@ class SteerModel(ControlModel):
         quats = np.stack([rotmat_to_quat(local[bone]) for bone in BONES], axis=1).astype(np.float32)
         return quats, features.select(("root.height",)).values[:, 0].astype(np.float32)
 
-    def run(self, script: str, start: Motion | str | None = None, *, hold_feet: bool = True) -> Motion:
+    def run(
+        self,
+        script: str,
+        start: Motion | str | None = None,
+        *,
+        hold_feet: bool = True,
+        words: GenerateModel | SaidActs | None = None,
+    ) -> Motion:
         """The motion of one figure that is steered by a script (:mod:`motet.models.scripts`).
 
-        start, hold_feet: like :meth:`start`; by default the script's first gait.
+        start, hold_feet, words: like :meth:`start`; by default the script's first gait.
         """
         orders = parse_orders(script, self.gaits)
-        return self.start(orders[0].gait if start is None else start, hold_feet=hold_feet).run(script)[0]
+        first = orders[0].gait if start is None else start
+        return self.start(first, hold_feet=hold_feet, words=words).run(script)[0]
 
     def captions(self, script: str) -> list[tuple[float, str]]:
         """See :meth:`ControlModel.captions`."""

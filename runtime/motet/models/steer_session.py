@@ -23,7 +23,11 @@ from motet.motion.pose import Pose
 from motet.motion.rotations import Array, quat_to_rotmat, wrapped
 
 if TYPE_CHECKING:
+    from motet.models.said_acts import SaidActs
     from motet.models.steer import SteerModel
+
+Doing = Motion | Act | str
+"""What can be acted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,13 +117,21 @@ class SteerSession(Guided):
     """Characters that move in one batch, each steered separately; holds their whole state. A tick is 1 / ``model.fps``
     seconds. Angles are degrees about the vertical: 0 along z, positive to the left."""
 
-    def __init__(self, model: "SteerModel", playback: Playback, gait: int, hold_feet: bool, strict: bool) -> None:
+    def __init__(
+        self,
+        model: "SteerModel",
+        playback: Playback,
+        gait: int,
+        hold_feet: bool,
+        strict: bool,
+        words: "SaidActs | None",
+    ) -> None:
         super().__init__(len(playback.row))
         self.model, self.strict = model, strict
         self._playback, zero = playback, np.zeros(self.characters)
         self._command = Command(np.full(self.characters, gait), zero, zero, zero, zero > 0)
         self._target = np.zeros((self.characters, 3))
-        self._acting = self._no_acts()
+        self._acting, self._words = self._no_acts(), words
         self._lock = self._new_lock() if hold_feet else None
         self._poses: tuple[Pose, Pose] | None = None
         self._ahead = 0.0
@@ -216,23 +228,34 @@ class SteerSession(Guided):
             self._command = replace(told, direction=direction, facing=facing)
             self._target = np.where(who[:, None], np.insert(np.zeros((len(who), 2)), 2, facing, axis=1), self._target)
 
-    def act(self, what: Motion | Act | Sequence[Motion | Act], *, who: Who = None, upper: bool | None = None) -> None:
+    def act(self, what: Doing | Sequence[Doing], *, who: Who = None, upper: bool | None = None) -> None:
         """Do something, from the next tick on, in place of what is being done.
 
-        what: a motion of any human figure, without what it rests at both ends; or an act, which
-            :meth:`motet.models.steer.SteerModel.act_of` makes of one once. One for all, or one for each of ``who``.
+        what: a motion of any human figure, without what it rests at both ends; an act, which
+            :meth:`motet.models.steer.SteerModel.act_of` makes of one once; or a sentence such as "wave", of which the
+            session's ``words`` generate one, once. One for all, or one for each of ``who``.
         who: numbers of characters, by default all.
         upper: by the upper body alone, while the legs go on; or by the whole body (False), which goes its own way over
             the ground. By default by the whole body where a character stands, whose legs go once it is told to.
-        MotionError for a motion that is not of a human figure, ControlError for one of less than three ticks and for
-        characters that are not there; nothing changes then.
+        MotionError for a motion that is not of a human figure, TextError for a sentence that the model does not
+        know, ControlError for a motion of less than three ticks, for characters that are not there, and for a sentence
+        without ``words``; nothing changes then.
         """
         characters = self._who(who).tolist()
-        each = [what] * len(characters) if isinstance(what, Motion | Act) else list(what)
+        each = [what] * len(characters) if isinstance(what, Doing) else list(what)
         if len(each) != len(characters):
             raise ControlError(f"{len(each)} acts do not fit {len(characters)} characters")
-        made = {id(one): one if isinstance(one, Act) else self.model.act_of(one) for one in each}
+        made = {id(one): self._act_of(one) for one in each}
         self._acting.asked |= {i: (made[id(one)], upper) for i, one in zip(characters, each, strict=True)}
+
+    def _act_of(self, what: Doing) -> Act:
+        if isinstance(what, Act):
+            return what
+        if isinstance(what, Motion):
+            return self.model.act_of(what)
+        if self._words is None:
+            raise ControlError("an act in words needs a model that makes it: start(words=motet.load('generate'))")
+        return self._words.act(what)
 
     @property
     def acting(self) -> list[tuple[str, float] | None]:
@@ -297,6 +320,9 @@ class SteerSession(Guided):
                 yield self.tick()
 
     def _obey(self, order: Order) -> None:
+        if order.act is not None:
+            self.act(order.act)
+            return
         told = self._command
         facing, speed = np.where(told.faces_way, told.direction, told.facing), told.speed
         aside = wrapped(told.direction - facing) if order.way is None else np.radians(order.way)
