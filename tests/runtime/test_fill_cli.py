@@ -114,3 +114,15 @@ def test_transitions_that_are_none(tmp_path: Path, clips: Path, seconds: float) 
 def test_a_bundle_of_another_verb_is_refused(tmp_path: Path, clips: Path) -> None:
     result = run("join", clips / WALK, clips / RUN, "--bundle", "predict", "-o", tmp_path / "o.npz")
     check_refused(result, "bundle predict is for 'predict'; need one for 'fill'", tmp_path)
+
+
+def test_pages_say_what_is_filled(tmp_path: Path, clips: Path) -> None:
+    page = tmp_path / "out.html"
+    assert run("fill", clips / WALK, "--gap", "1:1.5", "--gap", ".25:.5", "-o", page).exit_code == 0
+    said = '"captions":[[0.0,"given"],[0.25,"filled"],[0.5,"given"],[1.0,"filled"],[1.5,"given"]]'
+    assert said in page.read_text(encoding="utf-8")
+    assert run("join", clips / WALK, clips / RUN, "-o", page, "--seconds", 0.5).exit_code == 0
+    text = page.read_text(encoding="utf-8")
+    assert '[0.0,"39_14"]' in text
+    assert '"filled"]' in text
+    assert '"09_07"]]' in text

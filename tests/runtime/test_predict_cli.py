@@ -8,6 +8,7 @@ import pytest
 from command_line import check_refused, run
 from figures import WRITTEN, walker
 
+from motet.draw.page import write as write_page
 from motet.formats import read_motion, write_motion
 from motet.models.load import load
 from motet.motion.kinematics import positions
@@ -102,3 +103,13 @@ def test_bad_input_gets_one_message_and_writes_nothing(
     (bad / "nan.bvh").write_text("\n".join([*text[:-1], text[-1].replace(text[-1].split()[7], "nan", 1)]))
     result = run("predict", *(argument.format(out=out, clips=clips, bad=bad) for argument in arguments))
     check_refused(result, said, out, code)
+
+
+def test_a_page_says_where_the_prediction_begins(tmp_path: Path, clips: Path) -> None:
+    page, twin, data = tmp_path / "out.html", tmp_path / "twin.html", tmp_path / "out.npz"
+    for out in (page, data):
+        assert run("predict", clips / WALK, "-o", out, "--frames", 5, "--append").exit_code == 0
+    motion = read_motion(data)
+    start = (len(motion) - 5) / motion.fps
+    write_page(twin, motion, [(0, "given"), (start, "predicted")], "39_14")
+    assert page.read_bytes() == twin.read_bytes()

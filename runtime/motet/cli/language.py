@@ -16,6 +16,7 @@ from motet.cli.reading import read_options
 from motet.cli.writing import Output, out_option, places, size, write_options
 from motet.corpus.answers import Answer, Describe, Timeline, to_json
 from motet.formats import READS, read_motion
+from motet.models.composition import Passage
 from motet.models.generate import PLAYED, Generated, GenerateModel
 from motet.models.generate_codes import CodesModel, Story
 from motet.models.known import NOTHING
@@ -224,13 +225,19 @@ def _written(
     found = []
     for result, place in results:
         motion = result.playable(output.fps or PLAYED, plant)
-        motion = output.write(place, looped(motion) if loop else motion, text)
+        captions = _captions(result.passages) if isinstance(result, Story) else None
+        motion = output.write(place, looped(motion) if loop else motion, text, captions)
         facts = {"frames": len(motion), "fps": motion.fps, "seconds": motion.duration}
         passages = {"passages": list(map(asdict, result.passages))} if isinstance(result, Story) else {}
         told: dict[str, Any] = {"action": result.action or None, "lacking": list(result.lacking)}
         told |= {"asked": dict(result.asked), "measured": dict(result.measured)}
         found.append({"output": str(place), "log_likelihood": result.log_likelihood, **facts, **told, **passages})
     return {"input": text, "hypotheses": found}
+
+
+def _captions(passages: Iterable[Passage]) -> list[tuple[float, str]]:
+    """What a page says when: the sentences of a story."""
+    return [(passage.start, passage.text) for passage in passages]
 
 
 def _lines(rows: list[dict[str, Any]]) -> Iterator[str]:
@@ -286,7 +293,8 @@ def compose(
     model = load_as(CodesModel, bundle, session)
     with noted():
         found = model.compose(moments, seed=seed, strict=strict)
-    motion = output.write(out, found.motion, " / ".join(passage.text for passage in found.passages))
+    told = " / ".join(passage.text for passage in found.passages)
+    motion = output.write(out, found.motion, told, _captions(found.passages))
     output.finish()
     facts = {"output": str(out), "frames": len(motion), "fps": motion.fps, "seconds": motion.duration}
     passages, met = [asdict(one) for one in found.passages], [one._asdict() for one in found.met]

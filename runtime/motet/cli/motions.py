@@ -13,7 +13,6 @@ from motet.bundle.graph import SessionOptions
 from motet.cli.options import Tries, bar, bundle_option, in_place, naming, noted, session_options, warned
 from motet.cli.reading import Read, read_options
 from motet.cli.writing import Output, out_option, places, size, spare, write_options
-from motet.draw.page import write as write_html
 from motet.errors import ControlError, MotionError, quoted
 from motet.formats import names_motion
 from motet.models.base import ControlModel
@@ -130,7 +129,8 @@ def _written(
 ) -> dict[str, Any]:
     """Write the futures of a motion; what is said of them."""
     start = (len(futures[0]) - frames) / futures[0].fps
-    first, *_ = [output.write(place, future, name) for future, place in zip(futures, outs, strict=True)]
+    captions = [(0.0, "given"), (start, "predicted")] if start > 0 else [(0.0, "predicted")]
+    first, *_ = [output.write(place, future, name, captions) for future, place in zip(futures, outs, strict=True)]
     samples = [{"output": str(place), "seed": seed + i} for i, place in enumerate(outs)]
     facts = {"fps": first.fps, "frames": len(first), "seconds": first.duration, "start": round(start * first.fps)}
     return {**facts, "samples": samples}
@@ -151,6 +151,14 @@ def _gaps(context: click.Context, option: click.Parameter, texts: tuple[str, ...
             raise click.BadParameter(f"{quoted(text)} is no gap: give its start and stop in seconds, such as 1.0:2.0")
         gaps.append((float(parts[1]), float(parts[2])))
     return tuple(gaps)
+
+
+def _filled(gaps: Sequence[Gap]) -> list[tuple[float, str]]:
+    """What a page says when: what is filled, and what was given."""
+    told = [(0.0, "given")]
+    for start, stop in sorted(gaps):
+        told += [(start, "filled"), (max(start, stop), "given")]
+    return sorted(told, key=lambda one: one[0])
 
 
 @click.command()
@@ -196,9 +204,10 @@ def fill(
             motion = read(source)
             if loop:
                 found = model.looped(motion, seconds=LOOP_SECONDS if seconds is None else seconds)
+                filled: Sequence[Gap] = [(motion.duration, found.duration)]
             else:
-                found = model.fill(motion, gaps)
-            found = output.write(place, found, source.title)
+                found, filled = model.fill(motion, gaps), gaps
+            found = output.write(place, found, source.title, _filled(filled))
             click.echo(f"{place}: {size(len(found), found.fps)}")
     output.finish()
     tries.finish()
@@ -232,7 +241,8 @@ def join(
     one, other = read(first), read(second)
     with naming(f"{first} and {second}"), warned(f"{first} and {second}"):
         found = model.join(one, other, seconds=seconds)
-    found = output.write(out, found, f"{first.stem} {second.stem}")
+    captions = [(0.0, first.stem), (one.duration, "filled"), (found.duration - other.duration, second.stem)]
+    found = output.write(out, found, f"{first.stem} {second.stem}", captions)
     output.finish()
     click.echo(f"{out}: {size(len(found), found.fps)}")
 
@@ -289,9 +299,6 @@ def control(
             chosen["words"] = load_as(GenerateModel, "generate", session)
         motion = model.run(script, first, **chosen)
     motion = output.shaped(motion)
-    if out.suffix.lower() == ".html":
-        write_html(out, motion, captions=captions, title=script)
-    else:
-        output.save(out, motion, script)
-        output.finish()
+    output.save(out, motion, script, captions)
+    output.finish()
     click.echo(f"{out}: {size(len(motion), motion.fps)}")

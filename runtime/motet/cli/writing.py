@@ -11,6 +11,8 @@ import click
 
 from motet.cli.reading import FPS
 from motet.corpus.sources import Source
+from motet.draw.page import Captions
+from motet.draw.page import write as write_page
 from motet.formats import ONTO, WRITABLE, Character, check_writable, put_onto, read_character, write_all_on, write_on
 from motet.formats.text import Names
 from motet.motion.humanoid import RIGS
@@ -43,18 +45,23 @@ class Output:
         motion = motion.resample(self.fps) if self.fps else motion
         return in_place(motion) if self.in_place else motion
 
-    def save(self, place: Path, motion: Motion, name: str) -> None:
-        """Write a motion that is shaped, or keep it for :meth:`finish` as a clip of this name, or one like it."""
+    def save(self, place: Path, motion: Motion, name: str, captions: Captions | None = None) -> None:
+        """Write a motion that is shaped, or keep it for :meth:`finish` as a clip of this name, or one like it.
+
+        A page has the name as its title, and the captions.
+        """
         if self.onto:
             clips = self._clips.setdefault(place, {})
             clips[Names(clips).unique(name)] = motion
+        elif place.suffix.lower() == ".html":
+            write_page(place, motion, captions, name)
         else:
             write_on(place, motion, self.character)
 
-    def write(self, place: Path, motion: Motion, name: str) -> Motion:
-        """Write a motion, and give what was written."""
+    def write(self, place: Path, motion: Motion, name: str, captions: Captions | None = None) -> Motion:
+        """Write a motion, see :meth:`save`, and give what was written."""
         motion = self.shaped(motion)
-        self.save(place, motion, name)
+        self.save(place, motion, name, captions)
         return motion
 
     def finish(self) -> None:

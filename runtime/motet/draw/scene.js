@@ -23,7 +23,7 @@ class Stage {
   constructor(canvas, gl) {
     Object.assign(this, { canvas, gl, bodies: new Set(), lost: false, least: gl.getContextAttributes().antialias ? (window.devicePixelRatio > 1 ? 0 : 1) : 2 });
     this.quality = this.least;
-    this.pace = { last: 0, mean: 16, frames: 0 };
+    this.pace = { last: 0, mean: 16, time: 0, patience: 6000 }; // milliseconds
     canvas.addEventListener("webglcontextlost", (event) => { event.preventDefault(); this.lost = true; });
     canvas.addEventListener("webglcontextrestored", () => { this.lost = false; this.prepare(); view.dirty = true; });
     this.prepare();
@@ -89,19 +89,19 @@ class Stage {
     return { width, height };
   }
 
-  /** Coarser if frames are slow for a while, finer if they are quick for long; a pause counts for nothing. */
+  /** Coarser if frames are slow for half a second, finer if they are quick for long; a pause counts for nothing. */
   adapt(now) {
     const { pace } = this, passed = now - pace.last;
     pace.last = now;
-    if (passed > 300) return;
-    pace.mean += (passed - pace.mean) * 0.06;
-    pace.frames++;
-    const step = pace.mean > 24 && pace.frames > 30 ? 1 : pace.mean < 17.5 && pace.frames > (pace.patience ?? 400) ? -1 : 0;
+    if (passed > 2500 || passed <= 0) return;
+    pace.mean += (passed - pace.mean) * clamp(passed / 250, 0.05, 0.5);
+    pace.time += passed;
+    const step = pace.mean > 24 && pace.time > 500 ? (pace.mean > 90 ? 2 : 1) : pace.mean < 17.5 && pace.time > pace.patience ? -1 : 0;
     const quality = clamp(this.quality + step, this.least, QUALITIES.length - 1);
     if (!step || quality === this.quality) return;
-    if (step > 0) pace.patience = Math.min(2 * (pace.patience ?? 400), 20000);
-    Object.assign(this, { quality });
-    Object.assign(pace, { frames: 0, mean: 18 });
+    if (step > 0) pace.patience = Math.min(2 * pace.patience, 300000);
+    this.quality = quality;
+    Object.assign(pace, { time: 0, mean: 20 });
   }
 
   /** Draw figures, strips and spots as a camera sees them, in a box of the canvas (pixels of the page), or all of it. */

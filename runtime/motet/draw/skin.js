@@ -80,7 +80,7 @@ void main() {
   float half_ = max(dot(normal, normalize(sun + away)), 0.), shine = half_ * half_;
   shine *= shine;
   shine *= shine;
-  vec3 light = around * mix(.98, .74, night) + vec3(.60, .56, .50) * mix(1., .92, night) * key;
+  vec3 light = around * mix(1., .9, night) + vec3(.60, .56, .50) * key;
   vec3 lit = paint.rgb * light + .09 * shine * shine * key + rim * mix(.10, .16, night);
   ink = vec4(mix(fog, lit, clear), 1);
 }`;
