@@ -24,7 +24,8 @@ COLOURED = """new Promise((done) => {
       if (data[i] > data[i + 2] + 60) counts[0]++;
       if (data[i + 2] > data[i] + 60) counts[1]++;
     }
-    done(counts);
+    const finer = drawn.clientWidth * drawn.clientHeight / (copy.width * copy.height);
+    done(counts.map((count) => count * finer));
   });
 })"""
 
@@ -96,9 +97,9 @@ class Browser:
         """A "mousePressed", "mouseMoved" or "mouseReleased" of the left button."""
         self._call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
 
-    def coloured(self) -> list[int]:
-        """How many pixels of the first canvas have the colour of the left side, and of the right one."""
-        found: list[int] = self.value(COLOURED)
+    def coloured(self) -> list[float]:
+        """How many pixels of the page, in the first canvas, have the colour of the left side, and of the right one."""
+        found: list[float] = self.value(COLOURED)
         return found
 
     def picture(self) -> bytes:

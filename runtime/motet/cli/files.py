@@ -97,11 +97,12 @@ class Look(Check):
         """The one row."""
         (found,), source = super().rows(answer), answer.source
         if source.place is not None:
-            figures = {"as in the file": self.read(answer)}
+            bare = "as in the file"
+            figures = {bare: self.read(answer)}
             if found.refused is None:
-                figures["as the humanoid"] = to_humanoid(figures["as in the file"]).motion
+                figures["as the humanoid"] = to_humanoid(figures[bare]).motion
             title = source.path.name + (f"{MARK}{found.clip}" if found.clip else "")
-            write_many(source.place, list(figures.values()), list(figures), title)
+            write_many(source.place, list(figures.values()), list(figures), title, bare=[bare])
         return [found]
 
 

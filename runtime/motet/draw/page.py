@@ -45,19 +45,24 @@ def write(file: File, motion: Motion, captions: Captions | None = None, title: s
 
     MotionError for a motion without skeleton or frames, OutputError if the file cannot be written.
     """
-    _write(file, [(motion, "", captions)], title)
+    _write(file, [(skinned(motion), "", captions)], title)
 
 
-def write_many(file: File, motions: Sequence[Motion], names: Sequence[str], title: str | None = None) -> None:
-    """Write one page of several motions side by side on one clock, each with its name; errors like :func:`write`."""
+def write_many(
+    file: File, motions: Sequence[Motion], names: Sequence[str], title: str | None = None, bare: Sequence[str] = ()
+) -> None:
+    """Write one page of several motions side by side on one clock, each with its name; errors like :func:`write`.
+
+    bare: names of those that are shown as the bones of their own skeletons, even if they are people.
+    """
     if not motions or len(motions) != len(names):
         raise MotionError(f"a page needs motions and a name for each, not {len(motions)} and {len(names)} names")
-    _write(file, [(motion, name, None) for motion, name in zip(motions, names, strict=True)], title)
+    shown = zip(motions, names, strict=True)
+    _write(file, [(skinned(motion, name in bare), name, None) for motion, name in shown], title)
 
 
-def _write(file: File, shown: Sequence[tuple[Motion, str, Captions | None]], title: str | None) -> None:
+def _write(file: File, found: Sequence[tuple[Skinned, str, Captions | None]], title: str | None) -> None:
     title = place_of(file).stem if title is None else title
-    found = [(skinned(motion), name, captions) for motion, name, captions in shown]
     meshes = list(dict.fromkeys(figure.mesh for figure, _, _ in found))
     bodies = [body_data(mesh, next(one.rest for one, _, _ in found if one.mesh is mesh)) for mesh in meshes]
     figures = [{"body": meshes.index(one.mesh), **figure_data(one, name, captions)} for one, name, captions in found]

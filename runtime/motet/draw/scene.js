@@ -73,19 +73,23 @@ class Stage {
   }
 
   program(name, vertex, fragment, defined) {
-    const { taps } = QUALITIES[this.quality], key = `${name} ${taps} ${JSON.stringify(defined)}`;
+    const { taps } = this.level, key = `${name} ${taps} ${JSON.stringify(defined)}`;
     return (this.programs[key] ??= programOf(this.gl, vertex, fragment, { TAPS: taps, ...defined }));
   }
 
-  /** Before the boxes of a frame: the canvas gets its size. Its size in pixels of the page, 0 where nothing is seen. */
-  begin() {
+  /** Before the boxes of a frame: the canvas gets its size. Its size in pixels of the page, 0 where nothing is seen.
+   *  still: the picture stays for a while, and is drawn as well as it can be. */
+  begin(still = false) {
     const { canvas, gl } = this, width = canvas.clientWidth, height = canvas.clientHeight;
     if (this.lost || gl.isContextLost() || !width || !height) return { width: 0, height: 0 };
-    this.adapt(performance.now());
-    const ratio = Math.min(window.devicePixelRatio || 1, QUALITIES[this.quality].ratio);
+    if (!still) this.adapt(performance.now());
+    this.level = QUALITIES[still ? this.least : this.quality];
+    const ratio = Math.min(window.devicePixelRatio || 1, this.level.ratio);
     const size = [width, height].map((x) => Math.max(1, Math.round(x * ratio)));
     if (canvas.width !== size[0] || canvas.height !== size[1]) [canvas.width, canvas.height] = size;
     this.ratio = size[1] / height;
+    gl.clearColor(...rgb(THEMES[isDark() ? "dark" : "light"].fog), 1);
+    gl.clear(gl.COLOR_BUFFER_BIT);
     return { width, height };
   }
 
@@ -127,7 +131,7 @@ class Stage {
   /** Move the corners of figures: of each the mesh that is seen, if any is, the one that casts its shadow, if it is near,
    *  and which of the body's slots it has. Near ones come first. */
   pose(figures, camera) {
-    const taken = new Map(), { coarse } = QUALITIES[this.quality];
+    const taken = new Map(), { coarse } = this.level;
     const far = ([x, , z]) => Math.hypot(x - camera.target[0], z - camera.target[2]);
     const placed = figures.map((figure) => ({ figure, root: rootOf(figure), away: far(rootOf(figure)) }));
     return placed.sort((a, b) => a.away - b.away).map(({ figure, root, away }) => {
@@ -143,7 +147,7 @@ class Stage {
 
   /** The figures as the sun sees them; what the light is looked up with. */
   castShadows(slots, camera) {
-    const { gl } = this, { map: size, casters } = QUALITIES[this.quality];
+    const { gl } = this, { map: size, casters } = this.level;
     const own = slots.filter(({ cast }) => cast).slice(0, casters), sees = sunBox(own, camera);
     if (this.shadows?.size !== size) this.shadows = shadowMap(gl, size, this.shadows);
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.shadows.frame);
