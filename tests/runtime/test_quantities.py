@@ -4,10 +4,14 @@ import numpy as np
 import pytest
 
 from motet.errors import TextError, TextWarning
-from motet.models.amounts import Seen, played, short, spells
+from motet.models.amounts import Seen, played, short, spells, strokes
+from motet.models.composition import at_odds
 from motet.models.generate_codes import CodesModel, Story
 from motet.models.load import load_as
 from motet.models.quantities import quantities_of
+from motet.motion.humanoid import HUMANOID, T_POSE
+from motet.motion.kinematics import positions
+from motet.motion.rotations import Array
 
 
 @pytest.fixture(scope="module")
@@ -134,3 +138,71 @@ def test_frames_are_played_faster_over_the_same_way() -> None:
     assert len(fast) == 40
     assert fast[:, :3].sum() == pytest.approx(frames[:, :3].sum())
     assert spells(np.array([True, False, True])) == [(0, 1), (2, 3)]
+
+
+def test_strokes_go_there_and_back() -> None:
+    angle = np.linspace(0, 8 * np.pi, 400)
+    assert len(strokes(np.cos(angle), 1.0)) == 4
+    assert len(strokes(0.4 * np.cos(angle), 1.0)) == 0
+    assert strokes(np.array([0.0, 1.0, 0.2, 0.0]), 0.5) == [(1, 4)]  # the last need not come back
+
+
+@pytest.mark.parametrize(
+    ("sentence", "act"),
+    [("waves twice", "waves"), ("nods 3 times", "nods"), ("claps", "claps"), ("ten push-ups", "pushups"),
+     ("pushes a box twice", ""), ("five sit-ups", "")],
+)  # fmt: skip
+def test_what_is_counted_is_read(sentence: str, act: str) -> None:
+    assert quantities_of(sentence).act == act
+
+
+def still() -> Array:
+    return np.repeat(T_POSE[None], 120, axis=0)
+
+
+def test_waves_nods_claps_and_pushups_are_counted() -> None:
+    moved = {act: still() for act in ("waves", "nods", "claps", "pushups")}
+    swing = np.cos(np.linspace(0, 6 * np.pi, 120))  # three times
+    hand, elbow = HUMANOID.index("leftHand"), HUMANOID.index("leftLowerArm")
+    moved["waves"][:, hand] = moved["waves"][:, elbow] + np.stack([0.1 * swing, 0 * swing + 0.25, 0 * swing], axis=1)
+    head, top = HUMANOID.index("head"), HUMANOID.index("head_end")
+    bend, length = np.radians(15 - 15 * swing), np.linalg.norm(T_POSE[top] - T_POSE[head])
+    nod = np.stack([0 * bend, np.cos(bend), np.sin(bend)], axis=1)
+    moved["nods"][:, top] = moved["nods"][:, head] + length * nod
+    for side, sign in (("left", 1), ("right", -1)):
+        wide = sign * (0.2 + 0.15 * swing)
+        moved["claps"][:, HUMANOID.index(f"{side}Hand")] = np.stack([wide, 0 * wide + 1.2, 0 * wide + 0.3], axis=1)
+    body = moved["pushups"][:, :, [0, 2, 1]]  # lying along z
+    body[..., 1] = 0.3 + 0.1 * swing[:, None]
+    body[:, [HUMANOID.index(f"{side}Hand") for side in ("left", "right")], 1] = 0.05
+    moved["pushups"] = body
+    for act, points in moved.items():
+        found = {other: len(Seen(points, 30.0).done(other)) for other in moved}
+        assert found == {other: 3 * (other == act) for other in moved}
+
+
+@pytest.mark.parametrize("sentence", ["turn left 45 degrees", "a half turn to the right", "walk in a circle"])
+def test_a_turn_is_that_of_the_hips_from_first_to_last(sentence: str, model: CodesModel) -> None:
+    (made,) = model.generate(sentence, seed=1)
+    points = positions(made.motion)
+    across = points[:, HUMANOID.index("leftUpperLeg")] - points[:, HUMANOID.index("rightUpperLeg")]
+    turned = np.degrees(np.ptp(np.unwrap(np.arctan2(-across[:, 2], across[:, 0]))[[0, -1]]))
+    assert turned == pytest.approx(abs(made.asked["degrees"]), abs=1)
+
+
+@pytest.mark.parametrize(
+    ("sentence", "warned"),
+    [
+        ("stands still while running", "at once"),
+        ("walks while sitting", "at once"),
+        ("cross your arms", "nothing that"),
+    ],
+)
+def test_what_does_not_fit_is_told(sentence: str, warned: str, model: CodesModel) -> None:
+    with pytest.warns(TextWarning, match=warned):
+        model.generate(sentence, seconds=1)
+
+
+def test_what_goes_together_is_not_at_odds() -> None:
+    for sentence in ("waves while standing", "jumps while running", "stands still, then runs", "swing your arms"):
+        assert at_odds(sentence) is None

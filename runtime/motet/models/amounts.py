@@ -64,12 +64,25 @@ class Seen:
 
     @cached_property
     def heading(self) -> Array:
-        """Degrees (T,) by which hips and shoulders have turned to the left since the first tenths of a second."""
-        pairs = [np.subtract(*np.moveaxis(self.pair(part), 1, 0)) for part in ("UpperLeg", "UpperArm")]
+        """Degrees (T,) by which the hips have turned to the left since the first frame."""
+        return self._heading("UpperLeg")
+
+    def _heading(self, *parts: str) -> Array:
+        places = [self.points[:, [HUMANOID.index(sided(side, part)) for side in LEFT_RIGHT]] for part in parts]
+        pairs = [np.subtract(*np.moveaxis(one, 1, 0)) for one in places]
         across = sum(one / np.maximum(np.linalg.norm(one[:, ::2], axis=1), 1e-9)[:, None] for one in pairs)
-        angle = np.degrees(np.unwrap(np.arctan2(-across[:, 2], across[:, 0])))
-        found: Array = angle - angle[: self.brief].mean()
+        found: Array = np.degrees(np.unwrap(np.arctan2(-across[:, 2], across[:, 0])))
+        found -= found[0]
         return found
+
+    @property
+    def settled(self) -> int:
+        """How many frames to keep, of all but the last 0.6 s or more, for the hips to sway against the whole figure at
+        the end as they do at the start: in a stride they sway by ten degrees."""
+        whole = smoothed(self._heading("UpperLeg", "UpperArm")[:, None, None], 0.15, self.fps)[:, 0, 0]
+        sway, length = self.heading - whole, len(self.points)
+        first = max(length - round(0.6 * self.fps), length // 2)
+        return first + int(np.abs(sway[first:] - sway[0]).argmin()) + 1
 
     @property
     def brief(self) -> int:
@@ -101,6 +114,10 @@ class Seen:
 
     def done(self, act: str) -> Spans:
         """When an act is done, a value of :data:`motet.models.quantities.ACTS`."""
+        if act in (
+            to_and_fro := {"waves": self._waves, "nods": self._nods, "claps": self._claps, "pushups": self._pushups}
+        ):
+            return sorted(to_and_fro[act](), key=lambda one: one[1])
         flags: NDArray[np.bool_] = getattr(self, f"_{act}")
         columns = flags.reshape(len(flags), -1).T
         return sorted((one for column in columns for one in spells(column)), key=lambda one: one[1])
@@ -140,6 +157,35 @@ class Seen:
         trunk = self.joint("neck") - self.joint("hips")
         return np.asarray(np.degrees(np.arctan2(np.linalg.norm(trunk[:, ::2], axis=1), trunk[:, 1])) >= 25)
 
+    def _waves(self) -> Spans:
+        """A hand, higher than its elbow and about as high as the shoulder, goes to one side by 10 cm and back."""
+        hands, elbows, shoulders = map(self.pair, ("Hand", "LowerArm", "UpperArm"))
+        across = np.subtract(*np.moveaxis(self.pair("UpperLeg"), 1, 0))[:, None]
+        beside = ((hands - elbows) * across).sum(axis=2) / np.linalg.norm(across, axis=2)
+        up = hands[..., 1] > np.maximum(elbows[..., 1], shoulders[..., 1] - 0.1)
+        sides = zip(beside.T, up.T, strict=True)
+        return [(a + i, a + j) for one, high in sides for a, b in spells(high) for i, j in strokes(one[a:b], 0.1)]
+
+    def _nods(self) -> Spans:
+        """The head is bent forward by 10 degrees, beside the chest, and raised again."""
+        ups = [self.joint(top) - self.joint(foot) for top, foot in (("head_end", "head"), ("neck", "chest"))]
+        across = np.subtract(*np.moveaxis(self.pair("UpperArm"), 1, 0))
+        ahead = np.cross(across, ups[1])
+        bent = [np.arctan2((up * ahead).sum(axis=1) / np.linalg.norm(ahead, axis=1), (up * ups[1]).sum(axis=1)
+                / np.linalg.norm(ups[1], axis=1)) for up in ups]  # fmt: skip
+        return strokes(-np.degrees(bent[0] - bent[1]), 10.0)
+
+    def _claps(self) -> Spans:
+        """The hands are brought together by 10 cm, to 25 cm or less between the wrists, and apart again."""
+        apart = np.linalg.norm(np.subtract(*np.moveaxis(self.pair("Hand"), 1, 0)), axis=1)
+        return [(i, j) for i, j in strokes(apart, 0.1) if apart[i:j].min() < 0.25]
+
+    def _pushups(self) -> Spans:
+        """The chest sinks by 12 cm and rises again, over hands on the ground and as low as the hips but for 50 cm."""
+        chest, hands = self.joint("chest")[:, 1], self.pair("Hand")[..., 1].max(axis=1)
+        level = (hands < 0.3) & (np.abs(chest - self.joint("hips")[:, 1]) < 0.5)
+        return [(i, j) for i, j in strokes(chest, 0.12) if level[i:j].all()]
+
     @cached_property
     def unrest(self) -> Array:
         """How fast (T,) the joints move on average, m/s."""
@@ -150,7 +196,7 @@ class Seen:
     def measured(self, kind: Kind, act: str = "") -> float:
         """How much of a kind there is; NaN for the times of an act that is not counted, and for a pace."""
         if kind == "degrees":
-            return float(self.heading[-self.brief :].mean())
+            return float(self.heading[-1])
         if kind in ("steps", "times"):
             return float(len(self.steps if kind == "steps" else self.done(act))) if kind == "steps" or act else np.nan
         return {"metres": float(self.away[-1]), "seconds": len(self.points) / self.fps}.get(kind, np.nan)
@@ -160,6 +206,22 @@ def spells(flags: NDArray[np.bool_]) -> Spans:
     """The frames from which to which flags (T,) are true."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]))).tolist()
     return list(zip(edges[::2], edges[1::2], strict=True))
+
+
+def strokes(values: Array, least: float) -> Spans:
+    """From which frame to which one values (T,) fall by ``least`` or more from the highest before, and rise by as much
+    again; the last need not rise."""
+    found, high, low, at, falling = Spans(), -np.inf, np.inf, 0, False
+    for i, value in enumerate(values.tolist()):
+        if falling:
+            low = min(low, value)
+            if value - low >= least:
+                found, high, at, falling = [*found, (at, i + 1)], value, i, False
+        elif value >= high:
+            high, at = value, i
+        elif high - value >= least:
+            low, falling = value, True
+    return [*found, (at, len(values))] if falling else found
 
 
 def enough(seen: Seen, asked: Quantities) -> bool:

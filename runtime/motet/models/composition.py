@@ -14,13 +14,31 @@ OPENING = re.compile(r"((he|she|they|it|someone|somebody|(an?|the)\s+\w+|\w+ly)(
 
 # fmt: off
 FUNCTION_WORDS = frozenset((
-    "a", "after", "afterwards", "along", "an", "and", "are", "as", "at", "be", "before", "by", "finally", "first",
-    "for", "from", "he", "her", "him", "his", "in", "into", "is", "it", "its", "man", "next", "of", "on", "or",
-    "person", "she", "someone", "somebody", "that", "the", "their", "them", "then", "they", "this", "to", "up", "while",
-    "who", "with", "woman",
+    "a", "after", "afterwards", "along", "am", "an", "and", "are", "as", "at", "be", "before", "by", "finally", "first",
+    "for", "from", "he", "her", "him", "his", "i", "in", "into", "is", "it", "its", "man", "my", "next", "of", "on",
+    "or", "person", "she", "someone", "somebody", "that", "the", "their", "them", "then", "they", "this", "to", "up",
+    "while", "who", "with", "woman", "you", "your",
 ))
 """Words that say little about what is done."""
 # fmt: on
+
+
+AT_ONCE = re.compile(
+    r"\b(?:while|whilst|simultaneously|without|as (?:he|she|they|it)|(?:and )?at the same time(?: as)?)\b",
+    re.IGNORECASE,
+)
+POSTURES = {
+    "still": r"stand\w*|motionless|fre?ezes?|freezing",
+    "low": r"sit|sits|sitting|seated|lie|lies|lying|kneel\w*",
+    "going": r"(?:walk|run|jog|sprint|jump|hop|leap|skip|march|climb|crawl)\w*",
+}
+"""What a figure can only do one of at a time."""
+
+OWN = re.compile(
+    r"\b(\w+) (?:your|his|her|their|my|the|both) (?:left |right )?"
+    r"(?:arm|hand|fist|leg|foot|feet|knee|head|shoulder|elbow|hip|finger|toe|leg)s?\b"
+)
+"""A part of the body, and what is done with it."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +67,18 @@ def stem(word: str) -> str:
 def verbs_of(words: Iterable[str]) -> frozenset[str]:
     """The stems of those of some words that have a form in -ing among them."""
     return frozenset(stem(word) for word in words if len(word) > 5 and word.endswith("ing"))
+
+
+def at_odds(sentence: str) -> tuple[str, str] | None:
+    """Two things that a sentence asks for at once and that exclude each other: "stands still while running"."""
+    said = []
+    for clause in AT_ONCE.split(sentence.lower()):
+        found = [
+            (kind, match[0]) for kind, words in POSTURES.items() if (match := re.search(rf"\b(?:{words})\b", clause))
+        ]
+        said += found[:1]
+    pairs = ((one[1], other[1]) for one in said for other in said if one[0] < other[0])
+    return next(pairs, None)
 
 
 def sentences_of(text: str) -> list[str]:

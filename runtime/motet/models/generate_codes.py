@@ -1,6 +1,7 @@
 """Generate motions code by code, of natural or given length, continue them, and show several sentences as a story."""
 
 import math
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -20,7 +21,7 @@ from motet.decode.loop import Noise, Sample, apart
 from motet.errors import BundleError, DecodingError, MotionError, TextError, TextWarning, warn
 from motet.models.amounts import Seen, short
 from motet.models.compose import Composition, compose
-from motet.models.composition import FUNCTION_WORDS, Passage, parts_of, sentences_of, stem, verbs_of
+from motet.models.composition import FUNCTION_WORDS, OWN, Passage, at_odds, parts_of, sentences_of, stem, verbs_of
 from motet.models.generate import Generated, GenerateModel, LoopSettings
 from motet.models.plans import Moment
 from motet.models.quantities import PACES, Quantities, known_turns, quantities_of
@@ -31,6 +32,9 @@ from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.representation.root_sixd import in_world
 from motet.settings import Range, Seed, Settings
+
+DONE = re.compile(r"(?:ing|ed|[^s]s)$")
+"""The ending of a word for what is done."""
 
 Stand = Literal["start", "end", "both"]
 """Where a figure stands briefly."""
@@ -101,12 +105,11 @@ class CodesModel(GenerateModel):
             raise codec.fault("0 or 1 for each of at most 100 layers", ahead, "ahead")
         back = sum(2 - one for one in ahead) + math.ceil(4 / hop)  # the layers at the frame rate look back 4 frames
         self.continuation, field = self.settings(ContinuationSettings), ReceptiveField(back, sum(ahead), hop)
-        joined = self.continuation.half_life
-        self.codec = Codec(graphs["decoder"], graphs["tokens"], field, moves, self.fps, joined)
+        self.codec = Codec(graphs["decoder"], graphs["tokens"], field, moves, self.fps, self.continuation.half_life)
         self.sizes |= {"T": hop, "M": moves}
         memory = self._bound()
         self.source = Source(graphs["step"], graphs["part"], moves, self.sizes["A"], memory)
-        self.continuation, self._familiar = self.settings(ContinuationSettings), self.settings(FamiliaritySettings)
+        self._familiar = self.settings(FamiliaritySettings)
         self._read_actions(Fields(manifest.source).list_of_fields("actions"))
 
     def _bound(self) -> Memory:
@@ -139,6 +142,7 @@ class CodesModel(GenerateModel):
         self._sentences = [entry.text("sentence") for entry in entries]
         self._rare = {word: math.log((1 + len(entries)) / times) for word, times in said.items()}
         self._stems = [frozenset(map(stem, entry.texts("words"))) for entry in entries]
+        self._done = [frozenset(stem(word) for word in entry.texts("words") if DONE.search(word)) for entry in entries]
         self._verbs = verbs_of(said)
 
     def parts(self, sentence: str) -> list[str]:
@@ -212,6 +216,15 @@ class CodesModel(GenerateModel):
 
     def note(self, sentence: str, context: Floats, strict: bool) -> None:
         """See :meth:`GenerateModel.note`."""
+        if odd := at_odds(sentence):
+            warn(f"{sentence!r} asks for {odd[0]!r} and {odd[1]!r} at once, which cannot be: one is shown", TextWarning)
+        likeliest = int(context.argmax())
+        nouns = self._verbs & self._stems[likeliest] - self._done[likeliest]
+        for verb in OWN.findall(self.vocabulary.rules.normalise(sentence)):
+            if stem(verb) in nouns:
+                warn(
+                    f"{verb!r} is nothing that is done in {self._sentences[likeliest]!r} (in {sentence!r})", TextWarning
+                )
         found = self._understood(sentence, context)
         if found.confident:
             return

@@ -84,7 +84,11 @@ ACTS: Mapping[str, str] = {
     **dict.fromkeys(("punch", "jab", "hook", "uppercut", "cross"), "punches"),
     **dict.fromkeys(("squat", "crouch", "kneel", "lung", "sit"), "dips"),
     **dict.fromkeys(("bow",), "bows"),
-    **dict.fromkeys(("cartwheel", "flip", "backflip", "roll", "push", "wave", "nod", "clap", "throw", "swing"), ""),
+    **dict.fromkeys(("wav",), "waves"),
+    **dict.fromkeys(("nod",), "nods"),
+    **dict.fromkeys(("clap", "applaud"), "claps"),
+    **dict.fromkeys(("pushup", "pressup"), "pushups"),
+    **dict.fromkeys(("cartwheel", "flip", "backflip", "roll", "push", "press", "throw", "swing"), ""),
 }
 """Stems of words for what is done so many times, and how that is counted (:mod:`motet.models.amounts`); "" for what is
 counted as often as it is begun."""
@@ -159,7 +163,8 @@ def quantities_of(sentence: str) -> Quantities:
     _turned(said, amounts, ways)
     if pace := PACES.search(said):
         amounts["pace"] = SLOWER if pace[1] else FASTER
-    acts = [ACTS[word] for word in map(stem, re.findall("[a-z]+", said)) if word in ACTS]
+    words = re.findall("[a-z]+", re.sub(r"\b(push|press|sit|pull)[ -]?ups?\b", r"\1up", said))
+    acts = [ACTS[word] for word in map(stem, words) if word in ACTS]
     act = "jacks" if "jacks" in acts else next(filter(None, acts), "")
     text = _plain(said, amounts) if spans or "degrees" in amounts else sentence
     return Quantities(text, amounts, len(ways) != 1, act)

@@ -125,7 +125,8 @@ class Teller:
         """The whole of a part: drawn again and again until it has as much as was asked, and fitted."""
         ((number, part),) = parts
         writer, action, codes = self._writer(context), self._action(part), np.empty((0, self.source.parts), np.int64)
-        rounds = 1 if part.asked.act else int(part.asked.amounts.get("times", 1))
+        times = int(part.asked.amounts.get("times", 1))
+        rounds = 1 if part.asked.act else times
         slow = sum(abs(part.asked.amounts.get(kind, 0)) / least for kind, least in SLOWEST.items())
         most, steps = self.codec.steps(min(LONGEST, 10 + slow)), self.codec.steps(self.settings["max_seconds"])
         steps, looked = self.codec.steps(part.seconds * part.pace) if part.seconds else steps, 0
@@ -135,7 +136,9 @@ class Teller:
             over = part.exactly or len(codes) >= most
             if over or (rounds < 1 and len(codes) >= 1.2 * looked):  # a long one is not looked at after each draw
                 frames, looked = self._decoded(codes, context), len(codes)
-                if over or enough(Seen.of(self.contract, frames), part.asked):
+                seen = Seen.of(self.contract, frames)
+                never = "times" in part.asked.amounts and 1 - rounds >= times and not seen.done(part.asked.act)
+                if over or never or enough(seen, part.asked):
                     break
         length = max(1, round(part.seconds * self.contract.fps)) if part.exactly else 0
         most = round(length * part.pace) or len(frames)

@@ -7,8 +7,8 @@ const OPENING = /^(?:(?:he|she|they|it|someone|somebody|(?:an?|the)\s+\w+|\w+ly)
 /** Words that say little about what is done. */
 export const FUNCTION_WORDS = new Set(
   (
-    "a after afterwards along an and are as at be before by finally first for from he her him his in into is it its man next of on or " +
-    "person she someone somebody that the their them then they this to up while who with woman"
+    "a after afterwards along am an and are as at be before by finally first for from he her him his i in into is it its man my next of " +
+    "on or person she someone somebody that the their them then they this to up while who with woman you your"
   ).split(" "),
 );
 
