@@ -62,7 +62,17 @@ void main() {
   ink = vec4(colour.rgb, colour.a * (1. - smoothstep(edge, 1., length(across))));
 }`;
 
-const MARK_NUMBERS = 9;
+const MARK_NUMBERS = 9, APART = 0.12;
+
+/** Of the points of a way those that are some way apart, and its ends. */
+function apart(points) {
+  let before = points[0];
+  return points.filter((point, n) => {
+    const kept = n === 0 || n === points.length - 1 || Math.hypot(point[0] - before[0], point[1] - before[1]) > APART;
+    if (kept) before = point;
+    return kept;
+  });
+}
 
 /** Corners of what lies on the ground: x, z, place across (2), colour and alpha (4), from where on it fades to its edge. */
 class Marks {
@@ -81,8 +91,8 @@ class Marks {
   }
 
   /** A band along points; fade: it begins with nothing ("start"), or ends so (true). arrows: heads along it. */
-  strip({ points, colour, alpha = 0.5, width = 0.012, fade = false, arrows = false }) {
-    const rgb = colour.map((part) => part / 255), last = points.length - 1;
+  strip({ points: given, colour, alpha = 0.5, width = 0.012, fade = false, arrows = false }) {
+    const points = apart(given), rgb = colour.map((part) => part / 255), last = points.length - 1;
     const beside = points.map((_, n) => {
       const [a, b] = [points[Math.max(n - 1, 0)], points[Math.min(n + 1, last)]];
       const [dx, dz] = unit([b[0] - a[0], b[1] - a[1]]);
