@@ -180,6 +180,11 @@ GAMEPAD = """(async () => {
     for (let n = 0; n < 3; n++) await new Promise(requestAnimationFrame);
   };
   document.querySelector("#gaits button").click();
+  const pushes = [];
+  for (const push of [0.16, 0.7, 1]) {
+    await frames(given([], [0, -push, 0, 0]));
+    pushes.push(motet.asked());
+  }
   await frames(given([], [0, 0.05, 0, 0]));
   const yaw = motet.view.yaw, asked = [motet.asked()];
   await frames(given([7], [0, -0.8, 1, 0]));
@@ -190,9 +195,9 @@ GAMEPAD = """(async () => {
   await frames(given([], [1, 0, 0, 0]));
   await frames([null]);
   asked.push(motet.asked());
-  return { asked, turned, gait };
+  return { asked, turned, gait, pushes };
 })()"""
-"""A gamepad: first at rest, then its trigger and both sticks pushed, then a shoulder button; then it is gone."""
+"""A gamepad: pushed ever farther; at rest; its trigger and both sticks pushed; a shoulder button; then it is gone."""
 
 
 def test_a_gamepad(page: Browser) -> None:
@@ -204,6 +209,9 @@ def test_a_gamepad(page: Browser) -> None:
     assert (gone["x"], gone["z"]) == (0, 0)
     assert gaits[runs["gait"]] == "run"
     assert np.hypot(runs["x"], runs["z"]) == pytest.approx(0.8 * speeds["run"][1])
+    slow, walk, run = (np.hypot(one["x"], one["z"]) for one in found["pushes"])
+    assert [slow, walk, run] == pytest.approx([0.12, speeds["walk"][1], speeds["run"][1]], abs=0.01)
+    assert [gaits[one["gait"]] for one in found["pushes"]] == ["walk", "walk", "run"]
     assert found["turned"] < 0
     assert found["gait"] == 1
     assert page.errors == []

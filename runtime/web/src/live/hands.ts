@@ -1,8 +1,7 @@
 /* What hands do: keys that are held, the round stick, a gamepad. */
 import type { Stage } from "./stage.js";
+import { DEAD } from "./stick.js";
 
-/** A stick that is pushed less asks for nothing; one that is pushed further hurries. */
-const [DEAD, RIM] = [0.15, 0.95];
 /** Degrees a second that Q and E turn the view by, and the right stick of a gamepad aside and up. */
 const [LOOK, PAD_ASIDE, PAD_UP] = [100, 130, 80];
 const KNOB = 44;
@@ -38,7 +37,12 @@ export class Hands {
   }
 
   get hurries(): boolean {
-    return this.keys.has("Shift") || this.pad.hurries || Math.hypot(...this.stick) > RIM;
+    return this.keys.has("Shift") || this.pad.hurries;
+  }
+
+  /** Whether no key goes anywhere. */
+  get byStick(): boolean {
+    return !Object.keys(DIRECTIONS).some((key) => this.keys.has(key));
   }
 
   /** Turn the view by what is held, for so many seconds, and read the gamepad. */
@@ -68,7 +72,8 @@ export class Hands {
       this.pad = { ...this.pad, x: 0, y: 0, hurries: false };
       return;
     }
-    const [x, y, lookX, lookY] = found.axes.map((axis) => (Math.abs(axis) < DEAD ? 0 : axis)) as [number, number, number, number];
+    const [x, y, ...looks] = found.axes as [number, number, number, number];
+    const [lookX, lookY] = looks.map((axis) => (Math.abs(axis) < DEAD ? 0 : axis)) as [number, number];
     const down = found.buttons.map((button) => button.pressed);
     if (lookX || lookY) this.stage.turn(-PAD_ASIDE * seconds * lookX, PAD_UP * seconds * lookY);
     for (const [button, act] of Object.entries(this.buttons)) if (down[Number(button)] && !this.pad.down[Number(button)]) act();

@@ -8,6 +8,7 @@ import { eight, type Pilot } from "./pilots.js";
 import { Recorder } from "./record.js";
 import { Scene } from "./scene.js";
 import type { Stage } from "./stage.js";
+import { stick } from "./stick.js";
 import { orderOf } from "./words.js";
 
 /** What motet/live/page.py writes into a page. bytes: base64. */
@@ -94,11 +95,24 @@ export class Page {
     const { net, state } = this;
     const strength = Math.hypot(x, y);
     const away = this.view.yaw * RADIANS + Math.PI;
-    const gait = (state.hurry || this.hands.hurries) && state.gait === 0 ? fastest(net) : state.gait;
+    const { gait, pace } = this.paced(strength);
     const way = away - Math.atan2(x, y);
     const facing = state.strafe ? away : strength ? way : this.figures[0]!.asked.facing;
-    const speed = strength ? inRange(net.model, gait, strength * usual(net, gait), way - facing) : 0;
+    const speed = strength ? inRange(net.model, gait, pace, way - facing) : 0;
     return { gait, x: speed * Math.sin(way), z: speed * Math.cos(way), facing };
+  }
+
+  /** The gait and speed of keys or a stick pushed so far: a stick alone goes from a creep to a run. */
+  private paced(strength: number): { gait: number; pace: number } {
+    const { net, state, hands } = this;
+    const fast = fastest(net);
+    if (state.gait === 0 && hands.byStick && !state.hurry && !hands.hurries) {
+      const paces = { least: net.speeds[net.gaits[0]!]![0]!, walk: usual(net, 0), run: usual(net, fast) };
+      const { speed, runs } = stick(strength, this.figures[0]!.asked.gait === fast, paces);
+      return { gait: runs ? fast : 0, pace: speed };
+    }
+    const gait = (state.hurry || hands.hurries) && state.gait === 0 ? fast : state.gait;
+    return { gait, pace: strength * usual(net, gait) };
   }
 
   /** A tick of all figures, the first of them with a control. */
