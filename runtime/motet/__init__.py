@@ -46,6 +46,7 @@ from motet.models.search import Hit, Index, SearchModel
 from motet.models.steer import SteerModel
 from motet.models.steer_session import SteerSession, SteerSnapshot
 from motet.models.tdbn_control import TdbnModel, TdbnSession, TdbnSnapshot
+from motet.motion.events import Event
 from motet.motion.humanoid import Humanoid, from_humanoid, read_map, to_humanoid
 from motet.motion.motion import Motion
 from motet.motion.pose import Pose
@@ -55,13 +56,13 @@ __version__ = version("motet")
 # fmt: off
 __all__ = [
     "Bundle", "BundleError", "BundleModel", "Checked", "CodesModel", "Composition", "ControlError", "ControlModel",
-    "ControlWarning", "DecodingError", "DescribeModel", "Description", "FillModel", "FormatError", "GenerateModel",
-    "GenerateSettings", "Generated", "Hit", "Humanoid", "Index", "Met", "MixtureModel", "Moment", "MotetError",
-    "Motion", "MotionError", "OutputError", "Part", "Passage", "Pose", "PredictModel", "PredictSession", "Quantities",
-    "ScriptError", "SearchModel", "SessionOptions", "SettingError", "SteerModel", "SteerSession", "SteerSnapshot",
-    "Story", "StorySettings", "TdbnModel", "TdbnSession", "TdbnSnapshot", "TextError", "TextWarning", "TravelWarning",
-    "Understood", "UnitError", "check", "clips", "from_humanoid", "list_bundles", "live_page", "load", "load_as",
-    "motion", "parse_plan", "read", "read_map", "read_plan", "to_humanoid", "write", "write_live_page",
+    "ControlWarning", "DecodingError", "DescribeModel", "Description", "Event", "FillModel", "FormatError",
+    "GenerateModel", "GenerateSettings", "Generated", "Hit", "Humanoid", "Index", "Met", "MixtureModel", "Moment",
+    "MotetError", "Motion", "MotionError", "OutputError", "Part", "Passage", "Pose", "PredictModel", "PredictSession",
+    "Quantities", "ScriptError", "SearchModel", "SessionOptions", "SettingError", "SteerModel", "SteerSession",
+    "SteerSnapshot", "Story", "StorySettings", "TdbnModel", "TdbnSession", "TdbnSnapshot", "TextError", "TextWarning",
+    "TravelWarning", "Understood", "UnitError", "check", "clips", "from_humanoid", "list_bundles", "live_page", "load",
+    "load_as", "motion", "parse_plan", "read", "read_map", "read_plan", "to_humanoid", "write", "write_live_page",
 ]
 # fmt: on
 

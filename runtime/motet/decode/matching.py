@@ -267,10 +267,8 @@ class Matcher:
             return
         playback.ticks_to_search[who] = self.settings.search_every - 1
         row, mirror, kind = playback.row[who] + (playback.part[who] > 0.5), playback.mirror[who], gait[who]
-        asked = self.table.features[mirror, row]
-        wanted = self.desired_trajectory(playback, target, self.creeping(target[who], kind), who)
-        asked[:, :TRAJECTORY] = (wanted - self.table.mean[:TRAJECTORY]) * self.table.scale[:TRAJECTORY]
-        query = self.query(asked)
+        trajectory = self.desired_trajectory(playback, target, self.creeping(target[who], kind), who)
+        query = self.query(self.asked(trajectory, row, mirror))
         best, image, cost = self.best(query, kind)
         stays = self.table.shows[row, kind] & (self.table.left[row] >= self.reserve)
         near = (best >= row - self.settings.jump_back) & (best <= row + self.settings.jump_ahead)  # on either side
@@ -304,6 +302,12 @@ class Matcher:
         speed = np.hypot(*(target[:, :2] + damped(*travel, slow, times[1])[0]).T)
         return np.stack([*places, *facings, speed_feature(speed, how)], axis=1)
 
+    def asked(self, trajectory: Array, row: Rows, mirror: Rows) -> Floats:
+        """Features (n, F) of trajectories (n, TRAJECTORY) that are not yet scaled, from the poses of rows (n,)."""
+        found = self.table.features[mirror, row]
+        found[:, :TRAJECTORY] = (trajectory - self.table.mean[:TRAJECTORY]) * self.table.scale[:TRAJECTORY]
+        return found
+
     def query(self, asked: Floats) -> Query:
         """What is looked for, of features (n, F) that are asked."""
         asked, scale, mean = self._rounded(asked.clip(-self.LARGEST, self.LARGEST)), self.table.scale, self.table.mean
@@ -320,11 +324,7 @@ class Matcher:
 
     def best(self, query: Query, gait: Rows) -> tuple[Rows, Rows, Floats]:
         """For what n figures look for and gaits (n,) the row (n,), 1 where it is mirrored (n,), and its cost (n,)."""
-        row, mirror, cost = (
-            np.empty(len(gait), np.int64),
-            np.empty(len(gait), np.int64),
-            np.empty(len(gait), np.float32),
-        )
+        (row, mirror), cost = np.empty((2, len(gait)), np.int64), np.empty(len(gait), np.float32)
         for kind in set(gait.tolist()):
             goals, figures = self.goals[kind], np.flatnonzero(gait == kind)
             for start in range(0, len(figures), self.BLOCK):

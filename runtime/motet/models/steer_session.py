@@ -10,12 +10,15 @@ from numpy.typing import ArrayLike, NDArray
 from motet.bundle.fields import Fields
 from motet.decode.acting import Acting
 from motet.decode.acts import Act, ActSettings
+from motet.decode.matched import Matched, matched
 from motet.decode.matching import Playback, Rows
 from motet.decode.steering import tick
 from motet.decode.steering_settings import SteeringSettings
 from motet.errors import BundleError, ControlError, ControlWarning, warn
 from motet.models.guided import Guidance, Guided, Who
+from motet.models.leading import led, speed_of
 from motet.models.scripts import Order, parse_orders
+from motet.motion.events import Event, Happenings
 from motet.motion.feet.lock import FootLock, FootLockSettings
 from motet.motion.humanoid import BONES
 from motet.motion.motion import Motion
@@ -108,6 +111,7 @@ class SteerSnapshot:
     poses: tuple[Pose, Pose] | None
     ahead: float
     guidance: Guidance
+    happenings: Happenings | None
 
     def __repr__(self) -> str:
         return f"SteerSnapshot({len(self.command.gait)} characters)"
@@ -134,6 +138,7 @@ class SteerSession(Guided):
         self._acting, self._words = self._no_acts(), words
         self._lock = self._new_lock() if hold_feet else None
         self._poses: tuple[Pose, Pose] | None = None
+        self._happenings: Happenings | None = None
         self._ahead = 0.0
         self._said: set[str] = set()
 
@@ -196,6 +201,7 @@ class SteerSession(Guided):
         changed = (np.abs(target - self._target).max(axis=1) > 1e-4) | (command.gait != self._command.gait)
         self._playback.hasten(changed)
         self._target, self._command = target, command
+        self._guidance = self._guidance.ended()
 
     def _gaits(self, names: str | Sequence[str]) -> Rows:
         each = list(names) if isinstance(names, Iterable) and not isinstance(names, str) else [names] * self.characters
@@ -205,7 +211,20 @@ class SteerSession(Guided):
 
     def tick(self) -> Pose:
         """The next pose of all characters, 1 / ``model.fps`` seconds later."""
+        self._lead()
         return self.tick_to(self._target)
+
+    def _lead(self) -> None:
+        """Let those that are on a way go on, and those that move keep apart."""
+        if not (self._guidance.going.goes.any() or self._guidance.room):
+            return
+        play, seconds = self._playback, 1 / self.model.fps
+        led_on = led(self._guidance, self.model.abilities, play, self._command, self._target, seconds)
+        self._guidance, self._command, self._target = led_on
+
+    def _start_of(self, gait: str | None, speed: Array | None, who: Rows) -> tuple[Array, Rows, Array]:
+        gaits = self._command.gait[who] if gait is None else np.full(len(who), self.model.abilities.number(gait))
+        return self._playback.root[who, :2], gaits, speed_of(self.model.abilities, gaits, speed)
 
     def tick_to(self, target: Array) -> Pose:
         """A tick with a raw target (characters, 3): velocity along x and z in m/s, facing in radians; not checked."""
@@ -216,7 +235,17 @@ class SteerSession(Guided):
         self._face_as_acted()
         pose = pose if self._lock is None else self._lock.held(pose)
         self._guidance, pose = self._guidance.after(pose, 1 / self.model.fps)
-        return pose
+        return replace(pose, events=self._happened(pose))
+
+    def _happened(self, pose: Pose) -> tuple[Event, ...]:
+        shows, gait, before = self.model.matcher.table.shows[self._playback.row], self._command.gait, self._happenings
+        self._happenings = Happenings.after(before, pose.contacts, gait, shows, self.arrived)
+        return tuple(self._happenings.events(before or self._happenings, self.model.gaits))
+
+    @property
+    def matched(self) -> Matched:
+        """The rows that are played, what they cost, and the path that is asked for."""
+        return matched(self.model.matcher, self._playback, self._target, self._command.gait)
 
     def _face_as_acted(self) -> None:
         """Those who act with the whole body and are told to stand go on standing as they do then."""
@@ -265,18 +294,20 @@ class SteerSession(Guided):
         return [asked.get(i, one) for i, one in enumerate(left)]
 
     def advance(self, seconds: float) -> Pose:
-        """The pose ``seconds`` later, for a display of any frame rate: interpolated between two ticks. A command shows
-        within a tick. ControlError unless 0 <= seconds <= 1."""
+        """The pose ``seconds`` later, for a display of any frame rate: interpolated between two ticks. Its
+        events are those since the pose before. A command shows within a tick. ControlError unless 0 <= seconds <= 1."""
         if not 0 <= seconds <= 1:
             raise ControlError(f"a session advances by 0 to 1 s, not {seconds}")
+        events: tuple[Event, ...] = ()
         if self._poses is None:
             first = self.tick()
-            self._poses = first, self.tick()
+            self._poses, events = (first, self.tick()), first.events
         self._ahead += seconds * self.model.fps
         while self._ahead >= 1:
+            events += self._poses[1].events
             self._poses = self._poses[1], self.tick()
             self._ahead -= 1
-        return self._poses[0].towards(self._poses[1], self._ahead)
+        return replace(self._poses[0].towards(self._poses[1], self._ahead), events=events)
 
     def push(self, velocity: ArrayLike) -> None:
         """Push the characters by a velocity (2,) or (characters, 2) along x and z, m/s, from which they recover."""
@@ -292,7 +323,8 @@ class SteerSession(Guided):
         direction = np.where(told.speed > 0, told.direction, facing)  # standing ones move the way they face
         self._command = replace(told, direction=direction, facing=facing, faces_way=np.zeros_like(told.faces_way))
         self._target, _ = self.model.abilities.target(self._command)
-        self._acting, self._poses = self._no_acts(), None  # nothing lies between there and here
+        self._acting, self._guidance = self._no_acts(), self._guidance.ended()
+        self._poses = None  # nothing lies between there and here
         if self._lock is not None:
             self._lock = self._new_lock()
 
@@ -335,12 +367,8 @@ class SteerSession(Guided):
 
     def frames_of(self, poses: Sequence[Pose]) -> Array:
         """Frames (characters, T, D) in the contract's units of consecutive poses."""
-        ground = np.stack([pose.ground for pose in poses], axis=1)
-        steps = np.diff(ground, axis=1, prepend=ground[:, :1])
-        facing = ground[..., 2] - wrapped(steps[..., 2])
-        sin, cos = np.sin(facing), np.cos(facing)
-        forward, left = sin * steps[..., 0] + cos * steps[..., 1], cos * steps[..., 0] - sin * steps[..., 1]
-        block = np.stack([forward, left, wrapped(steps[..., 2])], axis=-1) * self.model.fps
+        moved = [pose.moved_since(before) for before, pose in zip([*poses[:1], *poses[:-1]], poses, strict=True)]
+        block = np.stack(moved, axis=1) * self.model.fps
         height = np.stack([pose.height for pose in poses], axis=1)[..., None]
         quats = np.stack([pose.rotations for pose in poses], axis=1).astype(np.float64)
         axes = np.swapaxes(quat_to_rotmat(quats)[..., :2], -1, -2).reshape(*height.shape[:2], -1)
@@ -350,8 +378,8 @@ class SteerSession(Guided):
     def snapshot(self) -> SteerSnapshot:
         """The whole state, to be restored later."""
         lock = None if self._lock is None else replace(self._lock)  # its arrays are replaced, never written into
-        state = self._playback.copy(), self._acting.copy(), self._command, lock
-        return SteerSnapshot(*state, self._poses, self._ahead, self._guidance)
+        told = self._playback.copy(), self._acting.copy(), self._command, lock
+        return SteerSnapshot(*told, self._poses, self._ahead, self._guidance, self._happenings)
 
     def restore(self, snapshot: SteerSnapshot) -> None:
         """Go back to a snapshot of this session or of one like it: the same model, as many characters, and the same
@@ -365,5 +393,5 @@ class SteerSession(Guided):
         self._playback, self._poses, self._ahead = snapshot.playback.copy(), snapshot.poses, snapshot.ahead
         self._acting = snapshot.acting.copy()
         self._command, (self._target, _) = command, self.model.abilities.target(command)
-        self._guidance = snapshot.guidance
+        self._guidance, self._happenings = snapshot.guidance, snapshot.happenings
         self._lock = None if snapshot.lock is None else replace(snapshot.lock)

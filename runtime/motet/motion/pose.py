@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from motet.motion.events import Event
 from motet.motion.humanoid import BONES, HUMANOID
 from motet.motion.rotations import Array, quat_product, quat_rotated, wrapped
 
@@ -25,13 +26,14 @@ class Pose:
     ground: (B, 3) x, z, and the facing in radians: 0 along z, positive to the left. rotations: (B, J, 4) quaternions
     (x, y, z, w) of the bones (:data:`motet.motion.BONES`) in their parents' frames; of the hips in the frame of the
     facing. height: (B,) of the hips above the ground. contacts: (B, 2) from 0 to 1, ground contact of the left and the
-    right foot.
+    right foot. events: what has happened since the pose before, such as footsteps.
     """
 
     ground: Array
     rotations: Floats
     height: Floats
     contacts: Floats
+    events: tuple[Event, ...] = ()
 
     def __len__(self) -> int:
         """B."""
@@ -51,6 +53,14 @@ class Pose:
         half = (self.ground[:, 2] / 2).astype(np.float32)
         zero = np.zeros_like(half)
         return np.stack([zero, np.sin(half), zero, np.cos(half)], axis=1)
+
+    def moved_since(self, before: "Pose") -> Array:
+        """Root motion (B, 3) since an earlier pose: forward and to the left in metres, seen from the facing then, and
+        the turn to the left in radians."""
+        step = self.ground - before.ground
+        sin, cos = np.sin(before.ground[:, 2]), np.cos(before.ground[:, 2])
+        forward, left = sin * step[:, 0] + cos * step[:, 1], cos * step[:, 0] - sin * step[:, 1]
+        return np.stack([forward, left, wrapped(step[:, 2])], axis=1)
 
     def positions(self) -> Array:
         """Positions (B, J', 3) of all joints of the humanoid in the world, in the order of ``HUMANOID.names``."""
@@ -74,7 +84,8 @@ class Pose:
         return np.swapaxes(turned, 0, 1), np.swapaxes(places, 0, 1)
 
     def towards(self, other: "Pose", part: float) -> "Pose":
-        """The pose ``part`` (0 to 1) of the way to another nearby pose, for frame rates other than the model's."""
+        """The pose ``part`` (0 to 1) of the way to another nearby pose, for frame rates other than the model's; nothing
+        happens on the way."""
         share = np.float32(part)
         step = other.ground - self.ground
         step[:, 2] = wrapped(step[:, 2])
@@ -86,6 +97,7 @@ class Pose:
             rotations=mixed / np.linalg.norm(mixed, axis=-1, keepdims=True),
             height=self.height + share * (other.height - self.height),
             contacts=self.contacts + share * (other.contacts - self.contacts),
+            events=(),
         )
 
 
