@@ -3,7 +3,7 @@ import { readFileSync } from 'fs';
 
 const { script, net, controls } = JSON.parse(readFileSync(0));
 const { Figure, modelOf } = new Function(`${script}\nreturn motetControl;`)();
-const figure = new Figure(await modelOf(net, Buffer.from(net.bytes, 'base64')), [0, 0, 0]);
+const figure = new Figure(await modelOf(net), [0, 0, 0]);
 const milliseconds = [];
 const poses = controls.map((control) => {
   const start = performance.now();

@@ -4,13 +4,8 @@ The page is ``page.html`` with ``control.js``, built from ``runtime/web`` (``npm
 bundle's own numbers: its settings, and its tables, gzipped.
 """
 
-import gzip
-from base64 import b64encode
 from dataclasses import asdict
 from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from motet.decode.steering_settings import SteeringSettings
 from motet.draw.figure import Body
@@ -18,6 +13,8 @@ from motet.draw.page import body_data, filled, source
 from motet.draw.skinned import person
 from motet.errors import BundleError, ControlError
 from motet.files import File, place_of, write_whole
+from motet.live.packing import packed
+from motet.live.repertoire import repertoire
 from motet.models.steer import SteerModel
 from motet.motion.feet.lock import FootLockSettings
 from motet.motion.humanoid import HUMANOID, T_POSE
@@ -43,22 +40,21 @@ def live_page(model: SteerModel, characters: int = 1, title: str = "motet") -> s
         raise BundleError(f"{model} is not steered: a page needs a model such as motet.load('control')")
     most = 50
     characters = checked_int("characters", characters, 1, most, ControlError)
-    data = {"net": net_data(model), "body": live_body(), "characters": characters, "most": most}
+    data = {"net": net_data(model), "body": live_body(), "characters": characters, "most": most, "acts": repertoire()}
     return filled(source("motet.live", "page.html"), title, data, CONTROL=source("motet.live", "control.js"))
 
 
 def net_data(model: SteerModel) -> dict[str, Any]:
     """All that ``control.js`` steers a figure with, ready for JSON: ``Given`` of ``livePage.ts``, and the bytes."""
-    tables = {name: array.reshape(len(array), -1) for name, array in model.tables.items()}
     manifest, kinds = model.manifest, (SteeringSettings, FootLockSettings)
+    motion = manifest.source["motion"]
     return {
         "manifest": {
-            "motion": {"fps": model.fps, "channels": list(model.contract.channels)},
+            "motion": {name: motion[name] for name in ("representation", "fps", "channels", "skeleton")},
             "settings": {kind.FEATURE: asdict(model.settings(kind)) for kind in kinds},
             "config": {name: manifest.config[name] for name in ("gaits", "speeds", "odd")},
         },
-        "tables": {name: {"kind": array.dtype.str[1:], "shape": array.shape} for name, array in tables.items()},
-        "bytes": b64encode(gzip.compress(b"".join(map(_shuffled, tables.values())), mtime=0)).decode(),
+        **packed(model.tables),
     }
 
 
@@ -66,10 +62,3 @@ def live_body() -> dict[str, Any]:
     """The body that is drawn on the humanoid, and its height in metres."""
     height = Body(HUMANOID).height
     return {"height": height, **body_data(person(), T_POSE / height)}
-
-
-def _shuffled(values: NDArray[Any]) -> bytes:
-    """The bytes of an array, column by column, of each column first all first bytes: so they are pressed best."""
-    columns = np.ascontiguousarray(values.T)
-    split = columns.view(np.uint8).reshape(*columns.shape, -1)
-    return np.ascontiguousarray(np.swapaxes(split, 1, 2)).tobytes()

@@ -94,6 +94,7 @@ function addText(page: Page): void {
     if (text.value.trim()) reply(page.told(text.value));
     text.select();
   };
+  element("known").append(...[...page.net.gaits, "stop", "turn left", "turn right", ...page.repertoire.names].map((name) => new Option(name)));
   text.onkeydown = ({ key }) => { if (key === "Escape") element("canvas").focus(); };
 }
 

@@ -1,7 +1,6 @@
 /* The model of a live page, and its figures. */
 import { doing, type Doing } from "../acting.js";
 import { type Act, motionOf } from "../acts.js";
-import { halves } from "../arrays.js";
 import { ControlModel } from "../control.js";
 import type { Manifest } from "../bundle.js";
 import { HUMANOID, SIDES } from "../humanoid.js";
@@ -10,6 +9,7 @@ import { worldOf } from "../motion.js";
 import type { Pose as Ground } from "../planar.js";
 import type { Quaternion, Vector } from "../rotations.js";
 import { damped, dampedPath, dampingOf, wrapped } from "../springs.js";
+import { type Packed, unpacked } from "./packing.js";
 import { standing, type Steered, tell, tick } from "../steered.js";
 import { between, type Played } from "../steering.js";
 
@@ -18,12 +18,9 @@ export { motionOf };
 /** Joints of the foot and of the toes, left and right. */
 export const FEET = SIDES.map((side) => ["Foot", "Toes"].map((part) => HUMANOID.index(side + part)));
 
-const KINDS = { f4: Float32Array, i1: Int8Array, u1: Uint8Array, i4: Int32Array, f2: Uint16Array };
-
 /** The numbers of a bundle, as motet/live/page.py writes them. */
-export interface Given {
+export interface Given extends Packed {
   manifest: Manifest;
-  tables: Record<string, { kind: keyof typeof KINDS; shape: [rows: number, width: number] }>;
 }
 
 /** Where a figure goes: which gait, its velocity along x and z in m/s, and its facing in radians. */
@@ -34,27 +31,9 @@ export interface Asked {
   facing: number;
 }
 
-/** The model of a page, whose tables are gzipped. */
-export async function modelOf({ manifest, tables }: Given, bytes: BufferSource): Promise<ControlModel> {
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
-  return new ControlModel(manifest, unpacked(new Uint8Array(await new Response(stream).arrayBuffer()), tables));
-}
-
-/** The tables row by row. They come one after the other, column by column, of each first all first bytes of its numbers. */
-function unpacked(bytes: Uint8Array, tables: Given["tables"]): Tables {
-  const found: Record<string, unknown> = {};
-  let at = 0;
-  for (const [name, { kind, shape: [rows, width] }] of Object.entries(tables)) {
-    const size = KINDS[kind].BYTES_PER_ELEMENT;
-    const target = new Uint8Array(rows * width * size);
-    for (let column = 0; column < width; column++) {
-      for (let byte = 0; byte < size; byte++) {
-        for (let row = 0; row < rows; row++) target[(row * width + column) * size + byte] = bytes[at++]!;
-      }
-    }
-    found[name] = kind === "f2" ? halves(new Uint16Array(target.buffer)) : new KINDS[kind](target.buffer);
-  }
-  return found as unknown as Tables;
+/** The model of a page. */
+export async function modelOf(given: Given): Promise<ControlModel> {
+  return new ControlModel(given.manifest, (await unpacked(given)) as unknown as Tables);
 }
 
 /** A figure of the page, and the last two ticks, between which it is shown. */

@@ -6,19 +6,23 @@ import { type Asked, Figure, type Given as GivenNet, inRange, modelOf } from "./
 import { Hands } from "./hands.js";
 import { eight, type Pilot } from "./pilots.js";
 import { Recorder } from "./record.js";
+import { type GivenActs, Repertoire } from "./repertoire.js";
 import { Scene } from "./scene.js";
 import type { Stage } from "./stage.js";
 import { stick } from "./stick.js";
-import { orderOf } from "./words.js";
+import { type Act, actOf, numbersOf } from "../acts.js";
+import { orderOf, saysAll } from "./words.js";
 
 /** What motet/live/page.py writes into a page. bytes: base64. */
 export interface Given {
-  net: GivenNet & { bytes: string };
+  net: GivenNet;
+  acts: GivenActs;
   body: { height: number };
   characters: number;
   most: number;
 }
 
+const KNOWN = "walk, run, stop, turn left, faster and what people do";
 const RADIANS = Math.PI / 180;
 /** Seconds that a frame counts for, at most. */
 const LATEST = 0.1;
@@ -39,6 +43,7 @@ export class Page {
     readonly scene: Scene,
     readonly hands: Hands,
     readonly recorder: Recorder,
+    readonly repertoire: Repertoire,
     private readonly say: (text: string) => void,
   ) {}
 
@@ -66,17 +71,31 @@ export class Page {
 
   /** Do what a sentence says; what is to be answered. */
   told(text: string): string {
-    const leader = this.figures[0]!;
-    const order = orderOf(text, this.net, leader);
-    if (!order) return `? It knows ${this.net.gaits.join(", ")}, stop, turn left or right, faster and slower.`;
-    this.pilot = order;
-    return order.speed ? `${this.net.gaits[order.gait]}, ${order.speed.toFixed(1)} m/s` : "standing";
+    const order = orderOf(text, this.net, this.figures[0]!);
+    if (order) {
+      this.pilot = order;
+      return order.speed ? `${this.net.gaits[order.gait]}, ${order.speed.toFixed(1)} m/s` : "standing";
+    }
+    const found = this.repertoire.find(text);
+    if (!found) return `? It knows ${KNOWN}: type ${this.repertoire.names[0]}, or choose from the list.`;
+    this.act(found.act, found.arms, saysAll(text));
+    return found.act.name;
   }
 
   /** Take what was dropped; what is to be said of it. */
-  show({ told, avatar }: Dropped): string {
+  show({ told, avatar, motion }: Dropped): string {
     if (avatar) this.scene.become(avatar);
+    if (motion) this.act(actOf(this.net.model, told, numbersOf(this.net.model, motion)), false, false);
     return told;
+  }
+
+  /** Begin an act, of all figures or the first; one of the whole body ends what steers it. */
+  private act(act: Act, arms: boolean, all: boolean): void {
+    if (!arms) this.pilot = null;
+    for (const figure of all ? this.figures : [this.figures[0]!]) {
+      const goes = Math.hypot(...figure.velocity) > 0.1;
+      figure.act(act, goes && !arms ? false : undefined);
+    }
   }
 
   /** What the first figure is asked: by hand, or else by its pilot, or else to stand. */
@@ -97,7 +116,9 @@ export class Page {
     const away = this.view.yaw * RADIANS + Math.PI;
     const { gait, pace } = this.paced(strength);
     const way = away - Math.atan2(x, y);
-    const facing = state.strafe ? away : strength ? way : this.figures[0]!.asked.facing;
+    const { acting, asked, root } = this.figures[0]!;
+    const kept = acting ? root[2] : asked.facing; // while the whole body acts, its facing is the act's
+    const facing = state.strafe ? away : strength ? way : kept;
     const speed = strength ? inRange(net.model, gait, pace, way - facing) : 0;
     return { gait, x: speed * Math.sin(way), z: speed * Math.cos(way), facing };
   }
@@ -144,14 +165,14 @@ export class Page {
 
 /** Open the page of what motet/live/page.py has written. */
 export async function open(given: Given, stage: Stage): Promise<Page> {
-  const bytes = Uint8Array.from(atob(given.net.bytes), (letter) => letter.charCodeAt(0));
-  const model = await modelOf(given.net, bytes);
+  const model = await modelOf(given.net);
+  const repertoire = await Repertoire.of(given.acts, model);
   const speeds = Object.fromEntries(model.gaits.map((gait, n) => [gait, model.abilities.speeds[n]!]));
   const net: Net = { model, gaits: model.gaits, fps: model.fps, speeds, rows: model.steerer.matcher.rows };
   const element = (id: string) => document.getElementById(id)!;
   const canvas = element("canvas") as HTMLCanvasElement;
   const scene = new Scene(stage, canvas, given.body, given.body.height);
-  const page = new Page(net, stage, scene, new Hands(stage, element("stick")), new Recorder(net.fps, scene, canvas), said(element("speed")));
+  const page = new Page(net, stage, scene, new Hands(stage, element("stick")), new Recorder(net.fps, scene, canvas), repertoire, said(element("speed")));
   page.setFigures(given.characters);
   addControls(page, given.most);
   if (!matchMedia("(prefers-reduced-motion: reduce)").matches) page.startByItself();

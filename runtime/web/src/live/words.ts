@@ -6,7 +6,7 @@ import type { Figure } from "./figure.js";
 import { Order } from "./pilots.js";
 
 /** Words that add nothing to an order or an act. */
-const IDLE = new Set([...FUNCTION_WORDS, ..."ahead can degrees do does figure forward going keep let now please spot start starts straight you your".split(" ")]);
+const IDLE = new Set([...FUNCTION_WORDS, ..."ahead can degrees do does doing figure forward going keep let now please some something spot start starts straight you your".split(" ")]);
 const TURNS: Record<string, number> = { left: 90, right: -90, around: 180, back: 180, backwards: 180 };
 const STOPS = new Set(["stop", "stand", "halt", "wait", "stay", "freeze", "still"].map(stem));
 const PACES: Record<string, number> = { faster: 1.4, quicker: 1.4, slower: 0.7 };
@@ -29,7 +29,7 @@ export function saysAll(text: string): boolean {
 export function orderOf(text: string, net: Net, { asked, root }: Figure): Order | null {
   const words = wordsOf(text).filter((word) => !IDLE.has(word) && !ALL.has(word));
   const found = new Order(asked.gait, Math.hypot(asked.x, asked.z), root[2]);
-  const gaits = net.gaits.map(stem);
+  const gaits = net.gaits.map((name) => (net.speeds[name]![1]! > 0 ? stem(name) : "")); // a jump on the spot is an act
   const side = words.find((word) => word in TURNS);
   for (const word of words) {
     const gait = gaits.indexOf(stem(word));
@@ -60,9 +60,9 @@ export class Phrases {
     const all = asked.reduce((sum, word) => sum + this.weight(word), 0);
     const scores = this.stems.map((own, at) => {
       const shared = asked.reduce((sum, word) => sum + (own.has(word) ? this.weight(word) : 0), 0);
-      return { at, share: all ? shared / all : 0, rest: this.rest(at, asked) };
+      return { at, share: all ? shared / all : 0, ...this.own(at, asked) };
     });
-    const [best] = scores.sort((a, b) => b.share - a.share || a.rest - b.rest || a.at - b.at);
+    const [best] = scores.sort((a, b) => b.share - a.share || b.said - a.said || a.rest - b.rest || a.at - b.at);
     return best && best.share >= ENOUGH ? best.at : -1;
   }
 
@@ -78,8 +78,10 @@ export class Phrases {
     return Math.log((this.stems.length + 1) / (this.stems.filter((own) => own.has(word)).length + 1)) + 0.1;
   }
 
-  /** How many words of its own sentence are not asked for. */
-  private rest(at: number, asked: string[]): number {
-    return wordsOf(this.phrases[at]!.sentence).filter((word) => !IDLE.has(word) && !asked.includes(stem(word))).length;
+  /** How many words of its own sentence are asked for, and how many are not. */
+  private own(at: number, asked: string[]): { said: number; rest: number } {
+    const words = wordsOf(this.phrases[at]!.sentence).filter((word) => !IDLE.has(word));
+    const said = words.filter((word) => asked.includes(stem(word))).length;
+    return { said, rest: words.length - said };
   }
 }

@@ -1,0 +1,30 @@
+/* Arrays of a page: gzipped, column by column, of each column first all first bytes; as motet/live/packing.py packs them. */
+import { halves } from "../arrays.js";
+
+const KINDS = { f4: Float32Array, i1: Int8Array, u1: Uint8Array, i4: Int32Array, i2: Int16Array, f2: Uint16Array };
+
+/** Tables one after the other. bytes: base64. */
+export interface Packed {
+  tables: Record<string, { kind: keyof typeof KINDS; shape: [rows: number, width: number] }>;
+  bytes: string;
+}
+
+/** The tables, row by row; halves as Float32Array. */
+export async function unpacked({ tables, bytes: text }: Packed): Promise<Record<string, ArrayLike<number>>> {
+  const pressed = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  const stream = new Blob([pressed]).stream().pipeThrough(new DecompressionStream("gzip"));
+  const bytes = new Uint8Array(await new Response(stream).arrayBuffer());
+  const found: Record<string, ArrayLike<number>> = {};
+  let at = 0;
+  for (const [name, { kind, shape: [rows, width] }] of Object.entries(tables)) {
+    const size = KINDS[kind].BYTES_PER_ELEMENT;
+    const target = new Uint8Array(rows * width * size);
+    for (let column = 0; column < width; column++) {
+      for (let byte = 0; byte < size; byte++) {
+        for (let row = 0; row < rows; row++) target[(row * width + column) * size + byte] = bytes[at++]!;
+      }
+    }
+    found[name] = kind === "f2" ? halves(new Uint16Array(target.buffer)) : new KINDS[kind](target.buffer);
+  }
+  return found;
+}

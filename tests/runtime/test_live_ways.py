@@ -1,0 +1,209 @@
+"""What a live page does by itself, with what is typed, clicked, touched, dropped and saved, in Chromium."""
+
+import base64
+import io
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from browser import CHROMIUM, Browser
+from PIL import Image
+
+import motet
+from motet.models.steer import SteerModel
+from motet.motion.humanoid import HUMANOID
+
+TICKS = "(() => {{ for (let n = 0; n < {}; n++) motet.tick(motet.asked()); return motet.figures[0].root; }})()"
+
+DROP = """(async () => {{
+  const file = new File([Uint8Array.from(atob({content}), (letter) => letter.charCodeAt(0))], {name});
+  const data = new DataTransfer(), said = document.querySelector("#reply");
+  data.items.add(file);
+  said.textContent = "";
+  window.dispatchEvent(new DragEvent("drop", {{ dataTransfer: data, cancelable: true }}));
+  while (!said.textContent || said.textContent.startsWith("reading")) await new Promise((done) => setTimeout(done, 10));
+  return said.textContent;
+}})()"""
+
+CAME = "new Promise((done) => setTimeout(() => requestAnimationFrame(done), 800))"
+"""Until the camera has come after the figure."""
+
+SAVED = """(async () => {{
+  let saved = null;
+  const create = URL.createObjectURL;
+  URL.createObjectURL = (blob) => {{ saved = blob; return create(blob); }};
+  HTMLAnchorElement.prototype.click = () => {{}};
+  document.querySelector("#{}").onclick();
+  const bytes = new Uint8Array(await saved.arrayBuffer());
+  return btoa(Array.from(bytes, (byte) => String.fromCharCode(byte)).join(""));
+}})()"""
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory, steer_model: SteerModel) -> Iterator[Browser]:
+    if CHROMIUM is None:
+        pytest.skip("there is no Chromium")
+    folder = tmp_path_factory.mktemp("live")
+    motet.write_live_page(folder / "live.html", steer_model)
+    with Browser(folder / "profile", 844, 390) as browser:
+        browser.open(folder / "live.html", ready="window.motet")
+        browser.value("motet.state.pause = true")
+        yield browser
+        assert browser.errors == []
+
+
+def typed(page: Browser, text: str) -> str:
+    """What is answered to a sentence."""
+    page.value(f"document.querySelector('#text').value = {json.dumps(text)}")
+    page.value("document.querySelector('#say').requestSubmit()")
+    answer: str = page.value("document.querySelector('#reply').textContent")
+    return answer
+
+
+def dropped(page: Browser, name: str, content: bytes) -> str:
+    """What is answered to a file."""
+    text = base64.b64encode(content).decode()
+    answer: str = page.value(DROP.format(content=json.dumps(text), name=json.dumps(name)))
+    return answer
+
+
+def test_it_starts_by_itself_until_somebody_steers(page: Browser) -> None:
+    places = np.array([page.value(TICKS.format(30))[:2] for _ in range(30)])
+    assert np.ptp(places, axis=0).min() > 2
+    assert np.abs(places).max() < 5
+    page.key("KeyW", "w", down=True)
+    page.value(TICKS.format(1))
+    page.key("KeyW", "w", down=False)
+    stood = page.value(TICKS.format(60))
+    assert np.hypot(*np.subtract(page.value(TICKS.format(30)), stood)[:2]) < 0.2
+
+
+def test_orders_are_typed(page: Browser) -> None:
+    x, z, facing = page.value(TICKS.format(60))
+    assert typed(page, "turn left and run").startswith("run")
+    at_x, at_z, turned = page.value(TICKS.format(60))
+    assert np.cos(turned - facing - np.pi / 2) > 0.95
+    assert np.hypot(at_x - x, at_z - z) > 2.5
+    assert typed(page, "stop") == "standing"
+    page.value(TICKS.format(90))
+
+
+def test_acts_are_typed(page: Browser) -> None:
+    hands = "motet.figures[0].shown(1).places.map((place) => place[1])"
+    lowest = min(HUMANOID.index("leftHand"), HUMANOID.index("rightHand"))
+    before = page.value(hands)
+    assert "kick" in typed(page, "kick")
+    acting = page.value("(motet.tick(motet.asked()), motet.figures[0].acting)")
+    assert 1 < acting["left"] < 6
+    feet = [page.value(f"({TICKS.format(2)}, {hands})")[HUMANOID.index("rightFoot")] for _ in range(60)]
+    assert max(feet) > before[lowest] * 0.5
+    page.value(TICKS.format(150))
+    assert page.value("motet.figures[0].acting") is None
+    place = page.value("motet.figures[0].root")
+    answer = typed(page, "play the violin")
+    assert answer.startswith("? It knows walk, run")
+    assert page.value("motet.figures[0].acting") is None
+    assert np.allclose(place[:2], page.value(TICKS.format(30))[:2], atol=0.1)
+    typed(page, "walk")
+    assert "waves" in typed(page, "wave")
+    page.value(TICKS.format(1))
+    assert page.value("motet.pilot !== null && motet.figures[0].acting !== null")  # it waves as it walks
+    typed(page, "stop")
+    page.value(TICKS.format(200))
+
+
+def test_a_click_sends_it_there_and_a_drag_does_not(page: Browser) -> None:
+    page.value(CAME)
+    page.mouse("mousePressed", 600, 160)
+    page.mouse("mouseMoved", 640, 160)
+    page.mouse("mouseReleased", 640, 160)
+    assert page.value("motet.pilot?.goal ?? null") is None
+    page.value(CAME)
+    page.mouse("mousePressed", 600, 160)
+    page.mouse("mouseReleased", 600, 160)
+    goal = page.value("motet.pilot.goal")
+    assert np.hypot(*np.subtract(page.value("motet.figures[0].root")[:2], goal)) > 0.5
+    for _ in range(60):
+        page.value(TICKS.format(30))
+        if page.value("motet.pilot === null"):
+            break
+    assert np.hypot(*np.subtract(page.value(TICKS.format(60))[:2], goal)) < 0.3
+
+
+def test_a_phone_held_sideways_has_all_and_does_not_scroll(page: Browser) -> None:
+    height, wide, canvas = page.value(
+        "[document.documentElement.scrollHeight - innerHeight, document.documentElement.scrollWidth - innerWidth,"
+        " document.querySelector('#canvas').clientHeight / innerHeight]"
+    )
+    assert (height, wide) == (0, 0)
+    assert canvas > 0.75
+    page.value("document.querySelector('#more').open = true")
+    sizes = page.value(
+        "[...document.querySelectorAll('button, select, summary, input')].filter((one) => one.offsetParent)"
+        ".map((one) => [one.offsetWidth, one.offsetHeight])"
+    )
+    assert len(sizes) > 15
+    assert np.min(sizes) >= 44
+    page.value("document.querySelector('#more').open = false")
+
+
+def test_a_dropped_motion_is_told_and_done(page: Browser, tmp_path: Path) -> None:
+    (walk,) = motet.load("generate").generate("a person is walking forward", 1, seconds=3)
+    walk.write(tmp_path / "walk.bvh")
+    answer = dropped(page, "walk.bvh", (tmp_path / "walk.bvh").read_bytes())
+    assert answer.startswith("walk.bvh: a figure of")
+    assert "3.0 s at 30 frames a second" in answer
+    assert "It goes" in answer
+    before = page.value("motet.figures[0].root")
+    assert page.value("(motet.tick(motet.asked()), motet.figures[0].acting)")["left"] > 1.5
+    assert np.hypot(*np.subtract(page.value(TICKS.format(90)), before)[:2]) > 1
+
+
+def test_a_dropped_avatar_is_who_moves(page: Browser, tmp_path: Path) -> None:
+    (still,) = motet.load("generate").generate("the person holds a quiet upright pose", 1, seconds=1)
+    still.write(tmp_path / "someone.glb")  # with a body
+    assert "someone.glb is who moves now" in dropped(page, "someone.glb", (tmp_path / "someone.glb").read_bytes())
+    page.value(TICKS.format(60))
+    looks = "(() => {{ const pose = motet.figures[0].shown(1), drawn = motet.scene.looks(pose, 0); return {}; }})()"
+    matrices = np.array(page.value(looks.format("[...drawn.matrices]"))).reshape(-1, 4, 4)
+    places = np.array(page.value(looks.format("pose.places")))
+    rest = HUMANOID.rest_positions + HUMANOID.offsets[0]
+    moved = np.einsum("jba,jb->ja", matrices, np.column_stack([rest, np.ones(len(rest))]))[:, :3]
+    np.testing.assert_allclose(moved, places, atol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("notes.txt", b"hello", "notes.txt cannot be used: it is neither a motion"),
+        ("cut.bvh", b"HIERARCHY\nROOT a\n{\n", "cut.bvh cannot be used: not a BVH file, or cut short"),
+        ("cut.glb", b"glTF\2\0\0\0\0\0\0\0", "cut.glb cannot be used: cut short"),
+        ("no.vrm", json.dumps({"asset": {"version": "2.0"}, "meshes": [{"primitives": []}], "nodes": [{"mesh": 0}],
+            "extensions": {"VRMC_vrm": {"humanoid": {"humanBones": {}}}}}).encode(), "this VRM file has no humanoid"),
+    ],
+)  # fmt: skip
+def test_what_is_no_motion_and_no_avatar_is_named(page: Browser, name: str, content: bytes, said: str) -> None:
+    place = page.value("motet.figures[0].root")
+    assert said in dropped(page, name, content)
+    assert page.value("motet.figures[0].root") == place
+
+
+def saved(page: Browser, kind: str) -> bytes:
+    return base64.b64decode(page.value(SAVED.format(kind)))
+
+
+def test_what_was_done_is_saved(page: Browser, tmp_path: Path) -> None:
+    typed(page, "walk")
+    ended: Any = page.value(TICKS.format(300))
+    (tmp_path / "out.vrma").write_bytes(saved(page, "vrma"))
+    motion = motet.read(tmp_path / "out.vrma")
+    assert len(motion) == 8 * 30
+    hips = [motion.values[-1, motion.channels.index(f"hips.t{axis}")] for axis in "xz"]
+    np.testing.assert_allclose(hips, ended[:2], atol=0.15)  # hips sway beside the root
+    with Image.open(io.BytesIO(saved(page, "gif"))) as picture:
+        assert (picture.size, picture.n_frames, picture.info["duration"]) == ((320, 320), 80, 100)  # type: ignore[attr-defined]
+        picture.seek(79)
+        assert np.ptp(np.asarray(picture.convert("L"))[100:220, 100:220]) > 60  # somebody is in it
