@@ -40,7 +40,7 @@ export class Recorder {
     const [x, y] = [(this.canvas.width - side) / 2, (this.canvas.height - side) / 2];
     const poses = this.poses.filter((_, at) => at % EVERY === 0);
     const pictures = poses.map((pose) => {
-      this.scene.draw([shownOf(pose)], EVERY / this.fps, [], undefined, { trails: false, contacts: false });
+      this.scene.draw([shownOf(pose)], EVERY / this.fps, [], undefined, { trails: false, contacts: false, pause: true });
       ink.fillRect(0, 0, SIZE, SIZE);
       ink.drawImage(this.canvas, x, y, side, side, 0, 0, SIZE, SIZE);
       return ink.getImageData(0, 0, SIZE, SIZE).data;

@@ -18,6 +18,7 @@ const [LATE, STEP_BACK] = [0.12, 0.28];
 export interface Shows {
   trails: boolean;
   contacts: boolean;
+  pause: boolean;
 }
 
 export class Scene {
@@ -63,7 +64,7 @@ export class Scene {
 
   /** Draw figures in poses, so many seconds after the last picture; their ways where these are given. */
   draw(poses: Shown[], passed: number, figures: Figure[], goal: readonly [number, number] | undefined, shows: Shows): void {
-    const { width, height } = this.painter.begin();
+    const { width, height } = this.painter.begin(shows.pause);
     if (!width || !height) return;
     this.camera = this.follow(poses, passed, width, height);
     const ways = shows.trails ? [...figures.map((figure, n) => this.gone(figure, n)), ...(figures[0] ? [this.asked(figures[0])] : [])] : [];

@@ -64,7 +64,7 @@ export interface Painter {
   body(given: unknown): unknown;
   avatar(mesh: Mesh): unknown;
   drop(body: unknown): void;
-  begin(): { width: number; height: number };
+  begin(still: boolean): { width: number; height: number };
   draw(camera: Camera, scene: { figures: Drawn[]; strips: Strip[]; spots: Spot[] }, box?: { x: number; y: number; width: number; height: number }): void;
 }
 

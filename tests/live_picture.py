@@ -1,0 +1,39 @@
+"""The picture of README, docs/figures/live.png, from the page itself: python tests/live_picture.py. Needs Chromium."""
+
+import sys
+import tempfile
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent / "runtime"))
+from browser import Browser
+
+import motet
+from motet.models.steer import SteerModel
+
+FIGURE = Path(__file__).parents[1] / "docs" / "figures" / "live.png"
+STEPS = """(() => {
+  motet.stage.view.yaw += 150;
+  motet.stage.zoom(1.7);
+  const walk = { gait: 0, x: 0, z: 1.2, facing: 0 };
+  for (let i = 0; i < 120; i++) motet.tick(walk);
+  motet.told(document.getElementById("text").value = "wave");
+  for (let i = 0; i < 70; i++) motet.tick(walk);
+  document.getElementById("pause").click();
+})()"""
+"""Five figures walk ahead, and the first one waves."""
+
+
+def main() -> None:
+    """Draw it anew."""
+    with tempfile.TemporaryDirectory() as folder:
+        page = Path(folder) / "live.html"
+        motet.write_live_page(page, motet.load_as(SteerModel, "control"), characters=5)
+        with Browser(Path(folder) / "profile", 1100, 860) as browser:
+            browser.open(page, "window.motet")
+            browser.value(STEPS)
+            browser.value("new Promise((done) => setTimeout(done, 5000))")
+            FIGURE.write_bytes(browser.picture())
+
+
+if __name__ == "__main__":
+    main()
