@@ -75,8 +75,9 @@ def going(before: Message, after: Message) -> Any:
 
 
 def test_every_message_of_the_page_does_what_it_says() -> None:
-    run, velocity, start, put, push = of_a_client()
-    assert [one["type"] for one in (run, velocity, start, put, push)] == ["control", "control", "start", "put", "push"]
+    run, velocity, start, put, push, go, look, reach = of_a_client()
+    kinds = [one["type"] for one in (run, velocity, start, put, push, go, look, reach)]
+    assert kinds == ["control", "control", "start", "put", "push", "go_to", "look_at", "reach"]
 
     async def scenario(tell: Tell, hello: Message) -> None:
         shown = of_the_server()["hello"]
@@ -103,7 +104,7 @@ def test_every_message_of_the_page_does_what_it_says() -> None:
         assert np.shape(frame["characters"][0]["positions"]) == (len(hello["joints"]), 3)
         assert np.shape(frame["characters"][0]["rotations"]) == (len(hello["bones"]), 4)
         shown = of_the_server()["frame"]
-        assert frame.keys() == shown.keys()
+        assert frame.keys() - {"events"} == shown.keys()
         assert frame["characters"][0].keys() == shown["characters"][0].keys() | {"positions"}
 
         frame = await tell(put, 0)
@@ -111,6 +112,19 @@ def test_every_message_of_the_page_does_what_it_says() -> None:
             np.testing.assert_allclose([one["position"][0], one["position"][2]], put["places"][:2], atol=0.3)
         pushed = await tell(push, 3)
         assert pushed["characters"][0]["position"][0] > frame["characters"][0]["position"][0] + 0.01
+
+        await tell(start)
+        held = (await tell(reach))["characters"][0]["positions"]
+        hand = held[[joint["name"] for joint in hello["joints"]].index("leftHand_end")]
+        np.testing.assert_allclose(hand, reach["points"], atol=0.15)
+        head = hello["bones"].index("head")
+        ahead = (await tell({"type": "reach", "hand": "left"}))["characters"][0]["rotations"][head]
+        aside = (await tell(look))["characters"][0]["rotations"][head]
+        assert aside[1] > ahead[1] + 0.05  # to the left
+        gone = (await tell(go, 240))["characters"][0]
+        np.testing.assert_allclose(np.array(gone["position"])[[0, 2]], go["points"], atol=0.08)
+        x, y, z, w = gone["rotation"]
+        assert abs(np.degrees(2 * np.arctan2(y, w)) - go["facing"]) < 10
 
     with_server(scenario)
 

@@ -23,7 +23,7 @@ pytest.importorskip("websockets", reason="the extra live is not installed")
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from motet.live.protocol import CLIENT_FIGURES, LARGEST_COMMAND
+from motet.live.protocol import CLIENT_FIGURES, LARGEST_COMMAND, ClientSession
 from motet.live.server import LIMITS, LiveServer
 
 Message = dict[str, Any]
@@ -132,6 +132,27 @@ def test_many_characters_placed_put_and_pushed(steer_model: SteerModel) -> None:
     serving(steer_model, scenario)
 
 
+def test_points_are_gone_to_looked_at_and_reached_for_and_events_told(steer_model: SteerModel) -> None:
+    live, session, happened = ClientSession(steer_model), steer_model.start(), list[Any]()
+
+    def same_for(ticks: int, told: dict[str, dict[str, Any]]) -> None:
+        for kind, given in told.items():
+            assert live.handle(json.dumps({"type": kind, **given})) == []
+            getattr(session, kind)(**{"points": None, **given})
+        for _ in range(ticks):
+            frame, pose = json.loads(live.frame(live.tick())), session.tick()
+            check_same(frame["characters"][0], pose)
+            assert frame.get("events") != []
+            assert [(*event, "")[:3] for event in frame.get("events", ())] == list(map(tuple, pose.events))
+            happened.extend(kind for kind, *_ in frame.get("events", ()))
+
+    hand = {"hand": "left", "points": [0.4, 1.2, 1.8]}
+    same_for(120, {"go_to": {"points": [0, 1.5], "facing": 30}, "look_at": {"points": [2, 1, 2]}, "reach": hand})
+    assert session.arrived.all()
+    assert {"left foot", "right foot", "arrived"} <= set(happened)
+    same_for(20, {"look_at": {}, "reach": {"hand": "left"}, "go_to": {}})
+
+
 def test_clients_do_not_touch_each_other(steer_model: SteerModel) -> None:
     async def scenario(server: LiveServer) -> None:
         async with client(server) as first, client(server) as second:
@@ -165,6 +186,10 @@ def test_clients_do_not_touch_each_other(steer_model: SteerModel) -> None:
         ("[1, 2]", 'whose "type" is one of control, start, put, push'),
         ("[" * 5000, "must be JSON"),
         ('{"type": "push"}', "push: expected velocity"),
+        ('{"type": "reach", "points": [0, 1, 0]}', "reach: expected hand"),
+        ('{"type": "reach", "hand": "third"}', "reach, hand: expected left or right"),
+        ('{"type": "look_at", "points": [0, 1]}', "points need x, y and z"),
+        ('{"type": "go_to", "points": "home"}', "go_to, points: expected numbers"),
         ('{"type": "put", "places": [1, 2]}', "places need x, z and facing"),
         ('{"type": "put", "places": [[1]]}', "places need x, z and facing"),
         ('{"type": "put", "places": [1000001, 0, 0]}', "put, places: expected numbers up to 1e+06"),

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from motet.errors import ControlError, ControlWarning, MotetError, quoted
 from motet.models.guided import LARGEST_COMMAND
 from motet.models.steer import SteerModel
-from motet.motion.humanoid import BONES, HUMANOID
+from motet.motion.humanoid import BONES, HUMANOID, LEFT_RIGHT
 from motet.motion.pose import Pose
 from motet.settings import checked_int
 
@@ -26,8 +26,14 @@ KEYS = {
     "start": ("characters", "gait", "places", "hold_feet", "positions"),
     "put": ("places",),
     "push": ("velocity",),
+    "go_to": ("points", "facing", "gait", "speed"),
+    "look_at": ("points",),
+    "reach": ("hand", "points"),
 }
 """Type of a client's message -> what may stand in it."""
+
+NEEDED = {"put": "places", "push": "velocity", "reach": "hand"}
+"""What a message needs."""
 
 
 class ProtocolError(MotetError, ValueError):
@@ -52,7 +58,8 @@ class ClientSession:
             if kind == "start":
                 self._start(given)
             else:
-                getattr(self.session, kind)(**given)
+                nowhere = {"points": None} if "points" in KEYS[kind] else {}
+                getattr(self.session, kind)(**{**nowhere, **given})
         self.heard += 1
         return [str(warning.message) for warning in caught]
 
@@ -80,7 +87,9 @@ class ClientSession:
         rows = {name: np.round(values.astype(np.float64), 5).tolist() for name, values in parts.items()}
         characters = [{name: values[i] for name, values in rows.items()} for i in range(len(pose))]
         time = round(self.ticks / self.model.fps, 5)
-        return message("frame", tick=self.ticks, time=time, heard=self.heard, characters=characters)
+        events = [[event.kind, event.character, *([event.name] if event.name else [])] for event in pose.events]
+        happened = {"events": events} if events else {}
+        return message("frame", tick=self.ticks, time=time, heard=self.heard, characters=characters, **happened)
 
 
 def hello(model: SteerModel) -> str:
@@ -116,18 +125,20 @@ def parsed(text: str | bytes) -> tuple[str, dict[str, Any]]:
             raise ProtocolError(f"{kind}: {quoted(name)} is unknown; expected one of {', '.join(KEYS[kind])}")
         if wanted := _unfit(kind, name, value):
             raise ProtocolError(f"{kind}, {name}: expected {wanted}")
-    if kind in ("put", "push") and not given:
-        raise ProtocolError(f"{kind}: expected {KEYS[kind][0]}")
+    if kind in NEEDED and NEEDED[kind] not in given:
+        raise ProtocolError(f"{kind}: expected {NEEDED[kind]}")
     return kind, given
 
 
 def _unfit(kind: str, name: str, value: Any) -> str | None:
     """What a value should be, where it is not."""
-    if name in ("speed", "direction", "facing", "velocity", "places") and not _numeric(value, depth=2):
+    if name in ("speed", "direction", "facing", "velocity", "places", "points") and not _numeric(value, depth=2):
         return f"numbers up to {LARGEST_COMMAND:g}, or lists of them"
     one_for_each = kind == "control" and isinstance(value, list) and all(isinstance(gait, str) for gait in value)
     if name == "gait" and not (isinstance(value, str) or one_for_each):
         return "the name of a gait"
+    if name == "hand" and value not in LEFT_RIGHT:
+        return " or ".join(LEFT_RIGHT)
     if name in ("hold_feet", "positions") and not isinstance(value, bool):
         return "true or false"
     return None
