@@ -115,6 +115,24 @@ def test_acts_are_typed(page: Browser) -> None:
     page.value(TICKS.format(200))
 
 
+def test_keys_and_orders_break_an_act_off(page: Browser) -> None:
+    for start in ("stop", "walk"):
+        typed(page, start)
+        page.value(TICKS.format(60))
+        typed(page, "kick")
+        page.value(TICKS.format(20))
+        assert page.value("motet.figures[0].acting")
+        if start == "stop":
+            typed(page, "walk")
+        else:
+            page.value("document.querySelector('#canvas').focus()")
+            page.key("KeyW", "w", down=True)
+        place = page.value(TICKS.format(20))
+        assert page.value("motet.figures[0].acting") is None
+        assert np.hypot(*np.subtract(page.value(TICKS.format(60)), place)[:2]) > 1.0
+        page.key("KeyW", "w", down=False)
+
+
 def test_a_click_sends_it_there_and_a_drag_does_not(page: Browser) -> None:
     page.value(CAME)
     page.mouse("mousePressed", 600, 160)

@@ -88,19 +88,19 @@ class Playing(NamedTuple):
 class Acting:
     """The acts of B figures.
 
-    playing: what each plays. asked: the act that a figure begins in the next tick, and whether by the upper body alone;
-    None: by the whole body where it stands. base: bodies of the last tick without acts. shown, before: as they were
-    shown in the last tick and in the one before. led: (B,) whether an act led the whole body in the last tick. offset,
-    offset_rate: (B, 3 J + 1) what is added, as :meth:`Body.since` gives it, and how fast it changes. damping: (B, 1) by
-    which it fades. going: (B, 3) velocity over the ground, m/s along x and z and rad/s. drift: (B, 3) the part of it
-    that fades.
+    playing: what each plays. asked: the act that a figure begins in the next tick, None to end what it plays, and
+    whether by the upper body alone; None: by the whole body where it stands. base: bodies of the last tick without
+    acts. shown, before: as they were shown in the last tick and in the one before. led: (B,) whether an act led the
+    whole body in the last tick. offset, offset_rate: (B, 3 J + 1) what is added, as :meth:`Body.since` gives it, and
+    how fast it changes. damping: (B, 1) by which it fades. going: (B, 3) velocity over the ground, m/s along x and z
+    and rad/s. drift: (B, 3) the part of it that fades.
     """
 
     matcher: Matcher
     codes: PoseCodes
     how: ActSettings
     playing: list[Playing | None]
-    asked: dict[int, tuple[Act, bool | None]]
+    asked: dict[int, tuple[Act | None, bool | None]]
     base: Body
     shown: Body
     before: Body
@@ -157,14 +157,14 @@ class Acting:
         """What a figure plays in the next tick."""
         now = self.playing[figure]
         if figure in self.asked:
-            return self._asked(figure, playback, goes)
+            act, upper = self.asked[figure]
+            return None if act is None else self._entered(figure, act, upper, playback, goes)
         if now is None or now.frame + 1 >= len(now.act):
             return None
         return now._replace(frame=now.frame + 1, whole=now.whole and not (goes and now.yields))
 
-    def _asked(self, figure: int, playback: Playback, goes: bool) -> Playing:
+    def _entered(self, figure: int, act: Act, upper: bool | None, playback: Playback, goes: bool) -> Playing:
         """The act that is asked for, at the frame after the one that is most like the figure."""
-        act, upper = self.asked[figure]
         now, table, how = self.playing[figure], self.matcher.table, self.how
         moves = goes or np.hypot(*playback.spring[figure, :2]) > self.matcher.settings.idle
         whole = not moves if upper is None else not upper

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from motet.models.said_acts import SaidActs
     from motet.models.steer import SteerModel
 
-Doing = Motion | Act | str
+Doing = Motion | Act | str | None
 """What can be acted."""
 
 
@@ -262,7 +262,7 @@ class SteerSession(Guided):
 
         what: a motion of any human figure, without what it rests at both ends; an act, which
             :meth:`motet.models.steer.SteerModel.act_of` makes of one once; or a sentence such as "wave", of which the
-            session's ``words`` generate one, once. One for all, or one for each of ``who``.
+            session's ``words`` generate one, once; None ends what is done. One for all, or one for each of ``who``.
         who: numbers of characters, by default all.
         upper: by the upper body alone, while the legs go on; or by the whole body (False), which goes its own way over
             the ground. By default by the whole body where a character stands, whose legs go once it is told to.
@@ -277,8 +277,8 @@ class SteerSession(Guided):
         made = {id(one): self._act_of(one) for one in each}
         self._acting.asked |= {i: (made[id(one)], upper) for i, one in zip(characters, each, strict=True)}
 
-    def _act_of(self, what: Doing) -> Act:
-        if isinstance(what, Act):
+    def _act_of(self, what: Doing) -> Act | None:
+        if what is None or isinstance(what, Act):
             return what
         if isinstance(what, Motion):
             return self.model.act_of(what)
@@ -290,7 +290,8 @@ class SteerSession(Guided):
     def acting(self) -> list[tuple[str, float] | None]:
         """What each character does: its name and the seconds that are left; None of those that only go or stand."""
         left = [one and (one.act.name, (len(one.act) - 1 - one.frame) / self.model.fps) for one in self._acting.playing]
-        asked = {i: (act.name, (len(act) - 1) / self.model.fps) for i, (act, _) in self._acting.asked.items()}
+        begun = {i: act for i, (act, _) in self._acting.asked.items()}
+        asked = {i: act if act is None else (act.name, (len(act) - 1) / self.model.fps) for i, act in begun.items()}
         return [asked.get(i, one) for i, one in enumerate(left)]
 
     def advance(self, seconds: float) -> Pose:

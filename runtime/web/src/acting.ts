@@ -34,8 +34,8 @@ interface Playing {
 /** The act of one figure. */
 export interface Acting {
   playing: Playing | null;
-  /** Begun in the next tick; upper: by the upper body alone, undefined: by the whole body where it stands. */
-  asked: { act: Act; upper: boolean | undefined } | null;
+  /** Begun in the next tick, null to end what is played; upper: by the upper body alone, undefined: by the whole body where it stands. */
+  asked: { act: Act | null; upper: boolean | undefined } | null;
   /** Of the last tick without acts; as it was shown; and as it was shown in the tick before. */
   base: Body;
   shown: Body;
@@ -66,7 +66,7 @@ export interface Doing {
 }
 
 export function doing({ playing, asked }: Acting, fps: number): Doing | null {
-  if (asked) return { name: asked.act.name, left: (asked.act.height.length - 1) / fps };
+  if (asked) return asked.act && { name: asked.act.name, left: (asked.act.height.length - 1) / fps };
   return playing && { name: playing.act.name, left: (playing.act.height.length - 1 - playing.frame) / fps };
 }
 
@@ -75,7 +75,7 @@ export function begin(model: ControlModel, acting: Acting, playback: Playback, t
   const { playing: now, asked } = acting;
   if (!now && !asked) return false;
   const goes = Math.hypot(target[0], target[1]) > 0;
-  const after = asked ? entered(model, acting, playback, goes) : next(now!, goes);
+  const after = !asked ? next(now!, goes) : asked.act && entered(model, acting, asked.act, asked.upper, playback, goes);
   [acting.playing, acting.asked] = [after, null];
   if (now?.whole && !after?.whole) {
     const { steerer } = model;
@@ -91,8 +91,7 @@ function next(now: Playing, goes: boolean): Playing | null {
 }
 
 /** The act that is asked for, at the frame after the one that is most like the figure. */
-function entered({ steerer: { matcher }, acts: how, fps }: ControlModel, { playing, asked }: Acting, playback: Playback, goes: boolean): Playing {
-  const { act, upper } = asked!;
+function entered({ steerer: { matcher }, acts: how, fps }: ControlModel, { playing }: Acting, act: Act, upper: boolean | undefined, playback: Playback, goes: boolean): Playing {
   const moves = goes || Math.hypot(playback.spring[0], playback.spring[1]) > matcher.how.idle;
   const whole = upper === undefined ? !moves : !upper;
   const isNow = matcher.now(playback);

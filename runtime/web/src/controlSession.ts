@@ -114,16 +114,16 @@ export class ControlSession {
 
   /**
    * Do something, from the next tick on, in place of what is being done: a motion of any human figure, or an act that
-   * `actOf` made of one; one for all, or one for each of `who`, the numbers of the figures. upper: by the upper body alone,
+   * `actOf` made of one, or null to end what is done; one for all, or one for each of `who`, the numbers of the figures. upper: by the upper body alone,
    * or by the whole body with its own way over the ground; if neither is said, by the whole body where a figure stands, whose
    * legs go as soon as it is told to. ControlError for figures that are not there, MotionError for what is no human's.
    */
-  act(what: Motion | Act | readonly (Motion | Act)[], { who, upper }: { who?: readonly number[]; upper?: boolean } = {}): void {
+  act(what: Motion | Act | null | readonly (Motion | Act | null)[], { who, upper }: { who?: readonly number[]; upper?: boolean } = {}): void {
     const figures = who ?? this.state.figures.map((_, at) => at);
     if (!figures.every((at) => Number.isInteger(at) && at >= 0 && at < this.characters)) throw new ControlError(`figures are whole numbers from 0 to ${this.characters - 1}, not ${figures.join(", ")}`);
-    const given = (Array.isArray(what) ? what : Array<Motion | Act>(figures.length).fill(what as Motion | Act)) as (Motion | Act)[];
+    const given = (Array.isArray(what) ? what : Array<typeof what>(figures.length).fill(what)) as (Motion | Act | null)[];
     if (given.length !== figures.length) throw new ControlError(`${given.length} acts do not fit ${figures.length} figures`);
-    const made = new Map([...new Set(given)].map((one) => [one, "skeleton" in one ? actOf(this.model, "act", numbersOf(this.model, one)) : one]));
+    const made = new Map([...new Set(given)].map((one) => [one, one && "skeleton" in one ? actOf(this.model, "act", numbersOf(this.model, one)) : one]));
     figures.forEach((at, i) => (this.state.figures[at]!.acting.asked = { act: made.get(given[i]!)!, upper }));
   }
 

@@ -76,8 +76,8 @@ export class Figure {
     [this.before, this.now] = [this.now, tick(this.model, this.steered, true)];
   }
 
-  /** Do something, from the next tick on: `upper` as in a session's `act`. Meanwhile a whole body faces as the act does. */
-  act(act: Act, upper?: boolean): void {
+  /** Do something, from the next tick on, or null: end what it does. `upper` as in a session's `act`. Meanwhile a whole body faces as the act does. */
+  act(act: Act | null, upper?: boolean): void {
     this.steered.acting.asked = { act, upper };
   }
 

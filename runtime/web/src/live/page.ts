@@ -33,6 +33,9 @@ export class Page {
   /** Who steers while no hand does. */
   pilot: Pilot | null = null;
   /** Since the page was opened. */
+  /** Whether the first figure was told an act of the whole body, and whether what steered it then is held still. */
+  private whole = false;
+  private held = false;
   ticks = 0;
   private ahead = 0;
   private last: number | null = null;
@@ -92,6 +95,7 @@ export class Page {
   /** Begin an act, of all figures or the first; one of the whole body ends what steers it. */
   private act(act: Act, arms: boolean, all: boolean): void {
     if (!arms) this.pilot = null;
+    this.whole = this.held = !arms;
     for (const figure of all ? this.figures : [this.figures[0]!]) {
       const goes = Math.hypot(...figure.velocity) > 0.1;
       figure.act(act, goes && !arms ? false : undefined);
@@ -101,7 +105,13 @@ export class Page {
   /** What the first figure is asked: by hand, or else by its pilot, or else to stand. */
   asked(): Asked {
     const [x, y] = this.hands.pushed;
-    if (x || y) this.pilot = null;
+    const pushed = x !== 0 || y !== 0;
+    this.held &&= pushed;
+    if (this.whole && !this.held && (pushed || this.pilot)) {
+      this.figures[0]!.act(null);
+      this.whole = false;
+    }
+    if (pushed) this.pilot = null;
     else if (this.pilot) {
       const found = this.pilot.ask(this.net, this.figures[0]!);
       if (found) return found;
