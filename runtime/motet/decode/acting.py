@@ -127,6 +127,11 @@ class Acting:
         return replace(self, playing=list(self.playing), asked=dict(self.asked))
 
     @property
+    def acts(self) -> bool:
+        """Whether any figure plays an act."""
+        return self.playing.count(None) < len(self.playing)
+
+    @property
     def whole(self) -> NDArray[np.bool_]:
         """Which figures (B,) play an act with the whole body."""
         return np.array([one is not None and one.whole for one in self.playing])
@@ -137,6 +142,8 @@ class Acting:
 
         target: (B, 3) velocity along x and z, and facing. gait: (B,).
         """
+        if not self.asked and not self.acts:
+            return np.empty(0, dtype=np.int64)
         changed, freed = list[int](), list[int]()
         goes, before = np.hypot(*target[:, :2].T) > 0, list(self.playing)
         for i, now in enumerate(before):
@@ -202,8 +209,12 @@ class Acting:
         root: (B, 3) before the tick. changed: (n,) as :meth:`begin` gave them.
         """
         dt, base, self.base = 1 / self.matcher.fps, self.base, Body(pose.rotations, pose.height)
-        step, contacts = playback.root - root, pose.contacts.copy()
+        step = playback.root - root
         step[:, 2] = wrapped(step[:, 2])
+        if not (len(changed) or self.acts or self.led.any() or self.offset.any()):
+            self.before, self.shown, self.going = self.shown, self.base, step / dt
+            return pose
+        contacts = pose.contacts.copy()
         for i in np.flatnonzero(self.whole).tolist():
             one = cast(Playing, self.playing[i])
             step[i], contacts[i] = one.act.step(one.frame, root[i, 2]), one.act.contacts[one.frame]

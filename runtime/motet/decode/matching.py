@@ -239,15 +239,10 @@ class Matcher:
         half: Floats = (table.features[0] ** 2).sum(axis=1) / 2
         self.costs = np.concatenate([table.features, np.stack([half, half])[..., None]], axis=2)
         self.flies = table.frames[0, :, -2:].max(axis=1) < settings.stands
-        self.goals, self.creeps, speed = (
-            list[Goals](),
-            np.zeros(table.shows.shape[1], dtype=np.bool_),
-            table.frames[0, :, -3],
-        )
-        for gait, shows in enumerate(table.shows.T):
-            moving = np.sort(speed[shows & (speed > settings.idle)])
-            # those that are as slow as recorded have no need to
-            self.creeps[gait] = len(moving) and moving[len(moving) // 2] > settings.creep
+        self.goals, speed = list[Goals](), table.frames[0, :, -3]
+        # gaits that are recorded as slow as a creep have no need to
+        self.creeps = np.array([is_faster(speed[shows], settings) for shows in table.shows.T], dtype=np.bool_)
+        for shows in table.shows.T:
             rows = np.flatnonzero(shows & (table.left >= self.least_left) & ~self.flies)[:: settings.row_step]
             self.goals.append(Goals.of(rows, self.costs[:, rows].reshape(-1, FEATURES + 1), self.TILE))
 

@@ -250,8 +250,7 @@ class SteerSession(Guided):
     def _face_as_acted(self) -> None:
         """Those who act with the whole body and are told to stand go on standing as they do then."""
         told = self._command
-        who = self._acting.whole & (told.speed == 0)
-        if who.any():
+        if self._acting.acts and (who := self._acting.whole & (told.speed == 0)).any():
             facing = np.where(who, self._playback.root[:, 2], told.facing)
             direction = np.where(who, facing, told.direction)
             self._command = replace(told, direction=direction, facing=facing)

@@ -64,6 +64,7 @@ class Happenings:
             "gait": self.gait != before.gait,
             "arrived": self.arrived & ~before.arrived,
         }
-        for kind in get_args(Happening):
-            for character in np.flatnonzero(flags[kind]).tolist():
-                yield Event(kind, character, gaits[self.gait[character]] if kind == "gait" else "")
+        kinds = get_args(Happening)
+        for number, character in np.argwhere([flags[kind] for kind in kinds]).tolist():
+            kind = kinds[number]
+            yield Event(kind, character, gaits[self.gait[character]] if kind == "gait" else "")

@@ -6,8 +6,10 @@ Each bone from there to the head takes its share of both, so the head looks at t
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from motet.motion.follower import Follower
 from motet.motion.humanoid import BONES, HUMANOID
@@ -54,10 +56,16 @@ class Look:
         """Of figures that look at nothing."""
         return Look(np.full((figures, 3), np.nan), Follower.at(np.zeros((figures, 2))))
 
+    @cached_property
+    def _looks(self) -> NDArray[np.bool_] | None:
+        """Which heads (B,) are turned, or about to be; None for no one's."""
+        looks = ~np.isnan(self.points[:, 0]) | (np.abs(self.turn.shown) > LEAST).any(axis=1)
+        return looks if looks.any() else None
+
     def after(self, pose: Pose, seconds: float) -> tuple["Look", Pose]:
         """A tick later, and the pose of that tick with the heads turned."""
-        looks = ~np.isnan(self.points[:, 0]) | (np.abs(self.turn.shown) > LEAST).any(axis=1)
-        if not looks.any():
+        looks = self._looks
+        if looks is None:
             return self, pose
         bones, points = _seen(pose, self.points)
         now = _angles(rotated(bones[-1], (0.0, 0.0, 1.0)))

@@ -6,6 +6,7 @@ one the joints are mixed.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,12 +79,17 @@ class Reach:
         none, aim, weight = np.full((figures, 3), np.nan), np.zeros((figures, 3)), np.zeros((figures, 1))
         return Reach(side, none, Follower.at(aim), Follower.at(weight), np.zeros(figures, dtype=bool))
 
+    @cached_property
+    def _rests(self) -> bool:
+        """Whether no hand reaches for anything, or is still on its way back."""
+        return bool(np.isnan(self.points[:, 0]).all() and (self.weight.shown < LEAST).all())
+
     def after(self, pose: Pose, seconds: float) -> tuple["Reach", Pose]:
         """A tick later, and the pose of that tick with the hand there."""
+        if self._rests:
+            return self, pose
         told, rests = ~np.isnan(self.points[:, 0]), self.weight.shown < LEAST
         reaches = told | ~rests[:, 0]
-        if not reaches.any():
-            return self, pose
         wanted = np.where(told[:, None], self.points, self.aim.wanted)
         # an arm that does not reach yet goes to the point by its weight alone
         before, off, rate = np.where(rests, [wanted, 0 * wanted, 0 * wanted], [*vars(self.aim).values()])
