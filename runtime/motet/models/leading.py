@@ -1,19 +1,15 @@
 """Commands of characters that are on their way to a point, and of those that keep apart, tick by tick."""
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from motet.decode.apart import kept_apart
 from motet.decode.matching import Playback, Rows
 from motet.errors import ControlError
+from motet.models.gaits import Command, Gaits
 from motet.models.guided import Guidance
 from motet.motion.rotations import Array
-
-if TYPE_CHECKING:
-    from motet.models.steer_session import Command, Gaits
-
 
 SUDDEN = 0.2
 """m/s or radians by which a target changes in a tick, before rows are searched for it at once."""
@@ -23,8 +19,8 @@ WAITS = 0.2
 
 
 def led(
-    guidance: Guidance, gaits: "Gaits", playback: Playback, told: "Command", before: Array, seconds: float
-) -> tuple[Guidance, "Command", Array]:
+    guidance: Guidance, gaits: Gaits, playback: Playback, told: Command, before: Array, seconds: float
+) -> tuple[Guidance, Command, Array]:
     """A tick later, the command to those that are on their way, and the targets (B, 3) of all, as :meth:`Gaits.target`
     has them. Those that come to rest are moved by what their steps leave. before: (B, 3) their last targets."""
     gait = told.gait
@@ -49,7 +45,7 @@ def led(
     return guidance, told, target
 
 
-def speed_of(gaits: "Gaits", which: Rows, speed: Array | None) -> Array:
+def speed_of(gaits: Gaits, which: Rows, speed: Array | None) -> Array:
     """The speeds (n,) at which characters go in gaits (n,), by default the usual ones; ControlError for a gait that
     goes nowhere."""
     _, usual, high = gaits.speeds[which, :3].T
@@ -59,7 +55,7 @@ def speed_of(gaits: "Gaits", which: Rows, speed: Array | None) -> Array:
     return found
 
 
-def _slowed(gaits: "Gaits", gait: Rows, now: Rows, speed: Array) -> Rows:
+def _slowed(gaits: Gaits, gait: Rows, now: Rows, speed: Array) -> Rows:
     """The gaits (B,) of figures that are to go at a speed in gaits (B,): the slowest that goes any way, where theirs is
     too fast for it; and what they have now, where they stand."""
     low = gaits.speeds[:, 0]
@@ -68,7 +64,7 @@ def _slowed(gaits: "Gaits", gait: Rows, now: Rows, speed: Array) -> Rows:
     return np.where(speed > 0, slower, now)
 
 
-def _aside(guidance: Guidance, playback: Playback, told: "Command", target: Array) -> "Command":
+def _aside(guidance: Guidance, playback: Playback, told: Command, target: Array) -> Command:
     """The command by which those that move keep apart; they go no faster for it."""
     change = kept_apart(playback.root[:, :2], playback.spring[:, :2], guidance.room)
     velocity = target[:, :2] + np.where(told.speed[:, None] > 0, change, 0.0)

@@ -15,10 +15,11 @@ from motet.decode.steering import PoseCodes
 from motet.decode.steering_settings import SteeringSettings
 from motet.errors import BundleError, ControlError
 from motet.models.base import LARGEST_CROWD, ControlModel
+from motet.models.gaits import Gaits
 from motet.models.generate import GenerateModel
 from motet.models.said_acts import SaidActs
 from motet.models.scripts import captions, parse_orders
-from motet.models.steer_session import Gaits, SteerSession
+from motet.models.steer_session import SteerSession
 from motet.motion.feet.lock import FootLockSettings
 from motet.motion.feet.treadmill import travelling
 from motet.motion.humanoid import BONES
