@@ -26,7 +26,7 @@ from motet_train.data.sixd_windows import SixdWindows, poses_of, window_of, with
 from motet_train.data.store import Store
 from motet_train.models.codec import CodecConfig, MotionCodec, places_in_world
 from motet_train.models.kinematics import SixdPlaces, tree_of
-from motet_train.recipes.codec import fit_book
+from motet_train.recipes.codec import badly_shown, fit_book
 from motet_train.runs import MODELS
 
 BONES = [name for name in HUMANOID.names if not name.endswith(END_SUFFIX)]
@@ -235,6 +235,27 @@ def test_windows_of_rare_actions_are_drawn_oftener(store: Path) -> None:
     # where nothing is said of actions, each recording is one
     alone = SixdWindows(without_actions(opened), chosen, 16, 4, mirror).chances
     np.testing.assert_allclose(alone, np.sqrt(lengths) / np.sqrt(lengths).sum())
+
+
+def test_windows_of_what_is_badly_shown_are_drawn_oftener(store: Path) -> None:
+    opened = Store.open(store)
+    windows = SixdWindows(opened, (0, 4, 8), 16, 4, opened.contract(range(20)).mirror)
+    book, before = fit_book(windows.sequences(), 4, 8, 0), windows.chances
+    middles = list(windows.middles(book))
+    for record, window in zip((0, 4, 8), middles, strict=True):
+        sequence = opened.sequence(record)
+        np.testing.assert_array_equal(window.given[0], sequence[(len(sequence) - 16) // 2 :][:16])
+    windows.favour(np.array([1.0, 4.0, 9.0]))
+    np.testing.assert_allclose(windows.chances / before, np.array([1, 4, 9]) / (before @ [1, 4, 9]))
+    tree = tree_of(opened.contract(range(20)))
+    net = MotionCodec(CodecConfig(middles[0].given.shape[-1], tree, moves=8, width=12, blocks=1, fine=6)).eval()
+    net.book.copy_(torch.from_numpy(book))
+    off = []
+    for window in middles:
+        places = (net.decode(window.moves, net.encode(window.given)), window.frames)
+        found, true = (places_in_world(net, one, window.way).detach().numpy()[0] for one in places)
+        off.append(np.linalg.norm((found - found[:, :1]) - (true - true[:, :1]), axis=-1).mean() ** 2)
+    np.testing.assert_allclose(badly_shown(net, windows), off, rtol=1e-4)
 
 
 def test_a_run_learns_and_comes_back(store: Path, tmp_path: Path) -> None:

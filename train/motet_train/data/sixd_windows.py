@@ -4,7 +4,7 @@ A window's chance goes by the root of how long its action is shown in total, so 
 Letters in shapes: B windows, T frames, D channels, N steps of codes, P parts of a step (the root move first).
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,6 +56,17 @@ class SixdWindows:
         """The poses of every span, to fit the book of root moves."""
         store = self.store
         return [poses_of(np.array(store.frames[slice(*span)], np.float64), store.fps) for span in self.spans]
+
+    def middles(self, book: Array) -> Iterator[Window]:
+        """One window from the middle of every span, not mirrored."""
+        for start, stop in self.spans:
+            first = (start + stop - self.frames) // 2
+            frames = np.array(self.store.frames[first : first + self.frames + 1], np.float64)
+            yield window_of(frames[None], self.store.fps, book, self.hop)
+
+    def favour(self, times: Array) -> None:
+        """Draw windows of each span so many times as often."""
+        self.chances = self.chances * times / (self.chances * times).sum()
 
     def draw(self, batch: int, book: Array, rng: np.random.Generator) -> Window:
         """A batch of windows, their moves by a book (K, 3)."""
