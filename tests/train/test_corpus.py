@@ -13,6 +13,8 @@ from motet.formats import read_motion, write_motion
 from motet.formats.glb import container
 from motet.formats.gltf_data import parse
 from motet.formats.mmm import read
+from motet.motion import in_place
+from motet.motion.feet.treadmill import with_travel
 from motet_train.data import matching_rows
 from motet_train.data.archive import Archive
 from motet_train.data.cmu_trials import CMU_FOLDER
@@ -179,6 +181,23 @@ def test_a_column_or_a_table_of_patterns_says_which_gaits_are_shown(own: Path) -
         read_gaits(patterns)
 
 
+def test_clips_in_place_travel_and_periods_repeat(own: Path) -> None:
+    standing = in_place(read_motion(CMU_FOLDER / "39_14.amc"))
+    write_motion(own / "stroll.npz", standing)
+    rows = ("stroll\tA man walks.\tyes\tno", "stroll\tSomebody walks.\t\tyes")
+    table(own / "texts.tsv", *rows, header="clip\tsentence\tin_place\tloops")
+    found = of(read_corpus(own))[0]["stroll"]
+    assert found.loops
+    np.testing.assert_array_equal(found.motion.values, with_travel(read_motion(own / "stroll.npz")).values)
+    short = replace(found, motion=found.motion[: round(1.2 * found.motion.fps)])
+    once, often = (
+        prepare([replace(short, loops=loops)], own.parent / f"loops-{loops}", SIXD) for loops in (False, True)
+    )
+    period, sequence = once.sequence(0), often.sequence(0)
+    np.testing.assert_array_equal(sequence, np.concatenate([period, period[1:], period[1:]]))
+    assert 105 < len(sequence) < 105 + len(period)
+
+
 def test_recordings_need_no_table(own: Path) -> None:
     (own / "02_06.npz").write_bytes(b"no motion")
     with Archive(own) as archive:
@@ -236,6 +255,7 @@ def test_each_clip_of_a_file_is_a_motion_of_its_own(tmp_path: Path) -> None:
         ((), "clip,sentence", "line 1: the header needs the columns clip and sentence"),
         (("a\tb\tc",), "clip\tsentence", "line 2: 3 columns where the header has 2"),
         (("a\tb", "", "c"), "clip\tsentence", "line 4: 1 columns"),
+        (("a\tb\tno", "a\tb\tperhaps"), "clip\tsentence\tloops", "line 3: loops is yes or no, not 'perhaps'"),
     ],
 )
 def test_a_table_that_is_none_is_refused_with_its_line(

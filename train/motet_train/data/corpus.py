@@ -9,6 +9,7 @@ from pathlib import Path, PurePosixPath
 from motet.corpus.parts import Shard
 from motet.formats import CLIPPED, MOCAP, clips, mmm, read_motion
 from motet.formats.text import MARK
+from motet.motion.feet.treadmill import with_travel
 from motet.motion.motion import Motion
 from motet_train.data.archive import BROKEN, Archive
 from motet_train.data.errors import DataError
@@ -27,7 +28,8 @@ class Record:
 
     subject: who moved, if the corpus tells. unseen: sentences whose wordings are for measuring, never for training.
     take: what it is a part of that must not be divided; "" where it is a take of its own. action: what it shows, named
-    alike for all motions that show it; "" where that is not said. gaits: the ways of moving that it shows.
+    alike for all motions that show it; "" where that is not said. gaits: the ways of moving that it shows. loops:
+    whether it is one period of what repeats.
     """
 
     name: str
@@ -38,6 +40,7 @@ class Record:
     take: str = ""
     action: str = ""
     gaits: tuple[str, ...] = ()
+    loops: bool = False
 
 
 @dataclass(frozen=True)
@@ -166,7 +169,9 @@ def recordings(
             try:
                 with archive.opened(file) as place:
                     motion = read_motion(place, unit=unit, clip=own)
-                found = Record(clip, said.subject or who.subject, motion, *told, who.take, said.action, said.gaits)
+                motion = with_travel(motion) if said.in_place else motion
+                subject = said.subject or who.subject
+                found = Record(clip, subject, motion, *told, who.take, said.action, said.gaits, said.loops)
             except BROKEN as error:
                 found = Skipped(clip, archive.reason(error))
         yield found

@@ -55,6 +55,14 @@ def _brought(motion: Motion, humanoid: bool, trimmed: bool, floor: bool) -> Moti
     return trim(motion) if trimmed else motion
 
 
+def repeated(features: Motion, seconds: float = 3.5) -> Motion:
+    """Features (T, D) of one period, whose last frame is the first again, as often as fills so many seconds. Their root
+    channels are changes, so its path goes on."""
+    period = features.values[1:]
+    more = max(0, math.ceil(seconds * features.fps / max(1, len(period))) - 1)
+    return replace(features, values=np.concatenate([features.values, *[period] * more]))
+
+
 def trim(motion: Motion) -> Motion:
     """The motion without a lead-in that leaps to the action, and with at most half a second of stillness at its ends.
 

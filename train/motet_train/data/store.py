@@ -24,7 +24,7 @@ from motet.motion.skeleton import Skeleton
 from motet.representation.contract import MotionContract, living, sequences
 from motet_train.data.corpus import Record, Skipped
 from motet_train.data.errors import DataError
-from motet_train.data.preparation import Preparation
+from motet_train.data.preparation import Preparation, repeated
 
 Floats = NDArray[np.float32]
 Item = Record | Skipped
@@ -248,6 +248,8 @@ class _Preparing(StoreWriter):
         how = self.preparation
         pieces = how.pieces(record.motion)
         found = [list(sequences(how.representation, piece, how.fps, self.first)) for piece in pieces]
+        if record.loops:
+            found = [list(map(repeated, phases)) for phases in found]
         for number, phases in enumerate(found, start=1):
             spans = tuple(map(self.put, phases))
             own, skeleton = None, phases[-1].skeleton

@@ -18,6 +18,8 @@ class Described:
     subject: str = ""
     action: str = ""
     gaits: tuple[str, ...] = ()
+    in_place: bool = False
+    loops: bool = False
 
 
 def read_table(path: Path) -> dict[str, Described]:
@@ -26,7 +28,8 @@ def read_table(path: Path) -> dict[str, Described]:
     Several lines of a clip give several sentences; empty ones are left out, as are clips without any. The other columns
     are optional. ``pool``: "train" or empty for sentences to train on, "test" for those to measure by. ``subject``: who
     moved, once for each clip or the same each time. ``description``: which action is shown. ``gait``: which ways of
-    moving, such as "walk" or "walk, run". DataError names the line that does not fit.
+    moving, such as "walk" or "walk, run". ``in_place``, ``loops``: "yes" or "no", whether the clip's root stays though
+    its feet go somewhere, and whether it is one period of what repeats. DataError names the line that does not fit.
     """
     found: dict[str, Described] = {}
     for number, row in _rows(path, "clip", "sentence"):
@@ -43,7 +46,17 @@ def read_table(path: Path) -> dict[str, Described]:
         said.subject = subject or said.subject
         said.action = row.get("description", "") or said.action
         said.gaits = tuple(filter(None, map(str.strip, row.get("gait", "").split(",")))) or said.gaits
+        said.in_place |= _yes(row, "in_place", f"{path}, line {number}")
+        said.loops |= _yes(row, "loops", f"{path}, line {number}")
     return {clip: said for clip, said in found.items() if clip and said.sentences}
+
+
+def _yes(row: dict[str, str], column: str, place: str) -> bool:
+    """What an optional column says; DataError where that is neither yes nor no."""
+    said = row.get(column, "") or "no"
+    if said not in ("yes", "no"):
+        raise DataError(f"{place}: {column} is yes or no, not {said!r}")
+    return said == "yes"
 
 
 @dataclass(frozen=True)

@@ -72,13 +72,13 @@ def train_codec(store: Store, job: Job, data: str = "", by: str = "trial", start
     )
     torch.manual_seed(job.about.seed)
     net = started or MotionCodec(config)
-    if started and not recipe.visits.settled:
-        train.favour(badly_shown(started, train))
     if started is None:
         net.measure_by(contract.mean, contract.std)
         fitted = fit_book(train.sequences(), config.hop, config.moves, job.about.seed)
         net.book.copy_(torch.from_numpy(fitted))
         net.book_scale.copy_(torch.from_numpy(fitted.std(axis=0)))
+    elif not recipe.visits.settled:
+        train.favour(badly_shown(net, train))
     book = net.book.numpy().astype(np.float64)
     weights = joint_weights(contract, ("Foot", "Toes", "LowerArm", "Hand"), recipe.visits.ends).to(job.device)
     seen = validation.draw(128, book, np.random.default_rng(0))
@@ -89,10 +89,8 @@ def train_codec(store: Store, job: Job, data: str = "", by: str = "trial", start
         lambda rng: (train.draw(job.training.batch, book, rng),),
         lambda: _measured(net, seen),
     )
-    about: dict[str, Any] = {
-        "data": {"name": data, "motions": len(store.records)},
-        "split": {"by": by, "train": len(parts.train)},
-    }
+    about: dict[str, Any] = {"data": {"name": data, "motions": len(store.records)}}
+    about["split"] = {"by": by, "train": len(parts.train)}
     if start is not None:
         about["start"] = start.manifest["training"]
     return job.run(net, learner, job.manifest(contract, asdict(config), {}, None, about))
