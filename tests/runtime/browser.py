@@ -53,6 +53,7 @@ class Browser:
         )
         os.close(to_browser)
         os.close(from_browser)
+        self.pid = self._process.pid
         self._rest, self._count, self._session = b"", 0, ""
         self.errors: list[str] = []
 

@@ -23,7 +23,7 @@ def volume(places, triangles):
     return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
 
 
-@pytest.mark.parametrize(("detail", "most"), [(1.0, 5000), (0.4, 800)])
+@pytest.mark.parametrize(("detail", "most"), [(1.0, 5000), (0.6, 2000), (0.3, 500)])
 def test_the_body_is_closed_and_carried_whole(detail, most):
     mesh = human_mesh(detail)
     assert 0.6 * most < len(mesh.triangles) <= most

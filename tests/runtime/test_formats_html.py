@@ -78,7 +78,12 @@ def test_page_holds_a_person_on_the_humanoid(tmp_path):
     assert data["figures"][0]["scales"] == np.ones((27, 3)).tolist()
     corners = array_of(data["bodies"][0]["places"], "<i2", -1, 3) * data["bodies"][0]["step"]
     assert np.abs(corners - person().places).max() < 2e-5
-    assert "coarse" in data["bodies"][0]
+    sizes, mesh = [], data["bodies"][0]
+    while mesh:
+        sizes.append(len(mesh["triangles"]))
+        mesh = mesh.get("coarse")
+    assert sizes == sorted(sizes, reverse=True)
+    assert len(sizes) == 3
 
 
 def test_page_needs_no_other_file(tmp_path):

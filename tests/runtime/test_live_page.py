@@ -145,6 +145,33 @@ def test_the_page_runs_and_draws(page: Browser) -> None:
     assert page.picture().startswith(b"\x89PNG")
 
 
+DRAWN = """(async () => {
+  const { painter } = motet.scene, draw = painter.draw.bind(painter);
+  const wait = (time) => new Promise((done) => setTimeout(done, time));
+  let count = 0;
+  painter.draw = (...given) => { draw(...given); count++; };
+  motet.state.pause = true;
+  await wait(1500);
+  const counts = [];
+  for (const done of [() => {}, () => motet.stage.turn(5, 0), () => document.body.click()]) {
+    count = 0;
+    done();
+    await wait(200);
+    counts.push(count);
+    await wait(1200);
+  }
+  delete painter.draw;
+  return counts;
+})()"""
+"""Pictures that are drawn while a paused page is left alone, is turned, and is clicked."""
+
+
+def test_a_paused_page_draws_only_what_changes(page: Browser) -> None:
+    still, turned, clicked = page.value(DRAWN)
+    assert still == 0
+    assert min(turned, clicked) > 0
+
+
 def test_buttons_and_the_stick(page: Browser) -> None:
     page.value("motet.state.pause = true")
     assert page.value("[...document.querySelectorAll('button')].every((b) => b.textContent.trim() || b.ariaLabel)")

@@ -116,7 +116,7 @@ FACE = (
 def human_mesh(detail: float = 1.0) -> Mesh:
     """The body on the humanoid in its T-pose: metres, y up, facing z, the soles at y = 0.
 
-    detail: how many of the corners and rings there are; 1 is the whole body, .5 one for crowds and shadows.
+    detail: how many of the corners and rings there are: 1 is the whole body; below .5 it has no face and no thumbs.
     """
     sides = [mesh for side in LEFT_RIGHT for mesh in _limbs(side, detail)]
     return together([_trunk(detail), _neck(detail), *_head(detail), *sides])
@@ -138,8 +138,17 @@ def _flat(corners: int, power: float, across: tuple[int, int], rows: Array, deta
     corners = max(4, 2 * round(corners * detail / 2))
     rows = rows[np.unique(np.linspace(0, len(rows) - 1, max(4, round(len(rows) * detail))).round().astype(int))]
     rings = np.repeat(rows[:, None, :3], corners, axis=1)
-    rings[:, :, across] += ring(corners, power) * rows[:, None, 3:]
+    rings[:, :, across] += _as_large(ring(corners, power), ring(64, power)) * rows[:, None, 3:]
     return rings
+
+
+def _as_large(coarse: Array, fine: Array) -> Array:
+    """A ring (C, 2) widened so far that it takes as much room as one of more corners."""
+    of_fine, of_coarse = (
+        np.linalg.det(np.stack([one, np.roll(one, -1, axis=0)], axis=1)).sum() for one in (fine, coarse)
+    )
+    widened: Array = coarse * np.sqrt(of_fine / of_coarse)
+    return widened
 
 
 def _trunk(detail: float) -> Mesh:
@@ -172,8 +181,9 @@ def _head(detail: float) -> list[Mesh]:
     height, wide, front, back = np.array(HEAD).T
     rows = np.stack([0 * height, height, (front + back) / 2, (front - back) / 2, wide], axis=1)
     rings = _flat(14, 2.3, (2, 0), rows, detail)
-    meshes = [_on_head(loft(rings), SKIN), _on_head(loft(_hair(rings)), DARK)]
-    for ball in FACE if detail == 1 else ():
+    hair = _hair(rings)[:: 1 if detail >= 0.5 else 3]
+    meshes = [_on_head(loft(rings), SKIN), _on_head(loft(hair), DARK)]
+    for ball in FACE if detail >= 0.5 else ():
         for sign in (1, -1) if ball.twice else (1,):
             meshes.append(_on_head(_ellipsoid(np.array(ball.middle) * [sign, 1, 1], np.array(ball.half)), ball.part))
     return meshes
@@ -223,10 +233,11 @@ def _limbs(side: str, detail: float) -> list[Mesh]:
     meshes = [
         _carried(arms, 0, arm, SHIRT),
         _carried(hand, 0, arm, own),
-        _carried(_thumb(detail), 0, ((joint["Hand"], 0.0, 0.0),), own),
         _leg(leg, detail),
         _carried(_shoe(detail), 2, ((joint["Foot"], 0.0, 0.0), (joint["Toes"], 0.13, 0.05)), own),
     ]
+    if detail >= 0.5:
+        meshes.insert(2, _carried(_thumb(detail), 0, ((joint["Hand"], 0.0, 0.0),), own))
     return meshes if side == "left" else [_mirrored(mesh) for mesh in meshes]
 
 

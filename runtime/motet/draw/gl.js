@@ -60,3 +60,24 @@ function bufferOf(gl, kind, values, use_ = gl.STATIC_DRAW) {
   gl.bufferData(kind, values, use_);
   return buffer;
 }
+
+/** Corners that are new in every picture. sizes: of their attributes, in numbers. */
+function streamOf(gl, sizes) {
+  const array = gl.createVertexArray(), buffer = gl.createBuffer(), all = sizes.reduce((sum, size) => sum + size, 0);
+  gl.bindVertexArray(array);
+  gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+  sizes.forEach((size, place) => {
+    gl.enableVertexAttribArray(place);
+    gl.vertexAttribPointer(place, size, gl.FLOAT, false, 4 * all, 4 * sizes.slice(0, place).reduce((sum, before) => sum + before, 0));
+  });
+  gl.bindVertexArray(null);
+  return { array, buffer, all };
+}
+
+/** Draw triangles of corners, one after the other. */
+function drawStream(gl, { array, buffer, all }, numbers) {
+  gl.bindVertexArray(array);
+  gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+  gl.bufferData(gl.ARRAY_BUFFER, numbers, gl.STREAM_DRAW);
+  gl.drawArrays(gl.TRIANGLES, 0, numbers.length / all);
+}

@@ -27,8 +27,8 @@ from motet.files import File, place_of, write_whole
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, rotmat_to_quat
 
-COARSE = 0.4
-"""How much of the detail the coarse body of people has."""
+COARSER = (0.6, 0.3)
+"""How much of the detail coarser bodies of people have."""
 
 SHORT = 32767
 """The largest int16."""
@@ -98,9 +98,12 @@ def figure_data(figure: Skinned, name: str, captions: Captions | None = None) ->
 
 def body_data(mesh: Mesh, rest: Array) -> dict[str, Any]:
     """A mesh in heights and where its joints rest (K, 3), as pages hold them, see the module's docstring; of the body
-    of people also the coarse one, for shadows and for figures that are small."""
-    found = {"rest": np.round(rest, 5).tolist(), **_mesh_data(mesh)}
-    return {**found, "coarse": _mesh_data(person(COARSE))} if mesh is person() else found
+    of people also coarser ones, each within the last, for shadows and for figures that are small."""
+    found: dict[str, Any] = {"rest": np.round(rest, 5).tolist(), **_mesh_data(mesh)}
+    if mesh is person():
+        middle, coarse = (_mesh_data(person(detail)) for detail in COARSER)
+        found["coarse"] = {**middle, "coarse": coarse}
+    return found
 
 
 def _mesh_data(mesh: Mesh) -> dict[str, Any]:

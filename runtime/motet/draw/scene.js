@@ -6,11 +6,12 @@ const THEMES = {
   dark: { fog: [30, 34, 42], sky: [18, 20, 26], light: [62, 68, 80], dark: [50, 55, 66], shade: 0.6, night: 1 },
 };
 /** From sharp to fast: at most how many pixels of the screen for one of the page, the size of the shadow map, how often it
- *  is looked at, up to how many pixels a coarse body is fine enough, and how many figures cast a shadow. */
+ *  is looked at, up to how many pixels the middle and the coarse body are fine enough, how many figures cast a shadow, and
+ *  whether bodies are lit at their corners alone. */
 const QUALITIES = [
-  { ratio: 2, map: 2048, taps: 8, coarse: 70, casters: 100 }, { ratio: 1, map: 1024, taps: 8, coarse: 90, casters: 100 },
-  { ratio: 1, map: 1024, taps: 4, coarse: 140, casters: 60 }, { ratio: 0.8, map: 1024, taps: 4, coarse: 200, casters: 30 },
-  { ratio: 0.65, map: 512, taps: 4, coarse: 300, casters: 16 }, { ratio: 0.5, map: 512, taps: 2, coarse: 400, casters: 8 },
+  { ratio: 2, map: 2048, taps: 8, sizes: [160, 50], casters: 100 }, { ratio: 1, map: 1024, taps: 8, sizes: [180, 60], casters: 100 },
+  { ratio: 1, map: 1024, taps: 2, sizes: [320, 120], casters: 16, quick: true }, { ratio: 0.8, map: 1024, taps: 2, sizes: [320, 110], casters: 12, quick: true },
+  { ratio: 0.65, map: 512, taps: 2, sizes: [400, 110], casters: 8, quick: true }, { ratio: 0.5, map: 512, taps: 1, sizes: [400, 110], casters: 6, quick: true },
 ];
 
 /** The stage of a canvas; null where the browser cannot draw it, which the page then says. */
@@ -34,15 +35,8 @@ class Stage {
     const { gl } = this;
     this.programs = {};
     this.shadows = null;
-    this.marks = gl.createVertexArray();
-    this.markBuffer = gl.createBuffer();
-    gl.bindVertexArray(this.marks);
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.markBuffer);
-    [[4, 0], [4, 4], [1, 8]].forEach(([size, from], place) => {
-      gl.enableVertexAttribArray(place);
-      gl.vertexAttribPointer(place, size, gl.FLOAT, false, 4 * MARK_NUMBERS, 4 * from);
-    });
-    gl.bindVertexArray(null);
+    this.marks = streamOf(gl, [4, 4, 1]);
+    this.shades = streamOf(gl, [2]);
     this.white = textureOf(gl, null);
     for (const body of this.bodies) upload(gl, body);
   }
@@ -83,7 +77,7 @@ class Stage {
     const { canvas, gl } = this, width = canvas.clientWidth, height = canvas.clientHeight;
     if (this.lost || gl.isContextLost() || !width || !height) return { width: 0, height: 0 };
     if (!still) this.adapt(performance.now());
-    this.level = QUALITIES[still ? this.least : this.quality];
+    this.level = QUALITIES[still ? Math.min(this.least, 1) : this.quality];
     const ratio = Math.min(window.devicePixelRatio || 1, this.level.ratio);
     const size = [width, height].map((x) => Math.max(1, Math.round(x * ratio)));
     if (canvas.width !== size[0] || canvas.height !== size[1]) [canvas.width, canvas.height] = size;
@@ -100,7 +94,7 @@ class Stage {
     if (passed > 2500 || passed <= 0) return;
     pace.mean += (passed - pace.mean) * clamp(passed / 250, 0.05, 0.5);
     pace.time += passed;
-    const step = pace.mean > 24 && pace.time > 500 ? (pace.mean > 90 ? 2 : 1) : pace.mean < 17.5 && pace.time > pace.patience ? -1 : 0;
+    const step = pace.mean > 20 && pace.time > 500 ? (pace.mean > 90 ? 2 : 1) : pace.mean < 17.5 && pace.time > pace.patience ? -1 : 0;
     const quality = clamp(this.quality + step, this.least, QUALITIES.length - 1);
     if (!step || quality === this.quality) return;
     if (step > 0) pace.patience = Math.min(2 * pace.patience, 300000);
@@ -122,7 +116,7 @@ class Stage {
     gl.clear(gl.DEPTH_BUFFER_BIT);
     gl.activeTexture(gl.TEXTURE1);
     gl.bindTexture(gl.TEXTURE_2D, this.shadows.texture);
-    this.drawGround(shared, theme, height);
+    this.drawGround(shared, theme, height, slots);
     this.drawMarks(shared, figures, strips, spots, theme);
     this.drawFigures(slots.filter(({ shown }) => shown), shared);
     gl.disable(gl.SCISSOR_TEST);
@@ -131,14 +125,14 @@ class Stage {
   /** Move the corners of figures: of each the mesh that is seen, if any is, the one that casts its shadow, if it is near,
    *  and which of the body's slots it has. Near ones come first. */
   pose(figures, camera) {
-    const taken = new Map(), { coarse } = this.level;
+    const taken = new Map(), { sizes, casters, quick } = this.level;
     const far = ([x, , z]) => Math.hypot(x - camera.target[0], z - camera.target[2]);
     const placed = figures.map((figure) => ({ figure, root: rootOf(figure), away: far(rootOf(figure)) }));
-    return placed.sort((a, b) => a.away - b.away).map(({ figure, root, away }) => {
-      const { body } = figure, n = taken.get(body) ?? 0, seen = inSight(camera, root), { simple } = body;
-      const small = project(camera, root).scale * this.ratio < coarse;
+    return placed.sort((a, b) => a.away - b.away).map(({ figure, root, away }, order) => {
+      const { body } = figure, n = taken.get(body) ?? 0, size = project(camera, root).scale * this.ratio;
       taken.set(body, n + 1);
-      const shown = seen ? small && simple || body : null, cast = away < CAST_REACH ? simple ?? body : null;
+      const shown = inSight(camera, root) ? simpler(body, sizes.filter((least) => size < least).length) : null;
+      const cast = order < casters && away < CAST_REACH ? simpler(body, quick ? 2 : 1) : null;
       const rows = rowsOf(figure);
       for (const mesh of new Set([shown, cast])) if (mesh) moveCorners(this.gl, mesh, n, rows);
       return { figure, root, shown, cast, n };
@@ -147,8 +141,7 @@ class Stage {
 
   /** The figures as the sun sees them; what the light is looked up with. */
   castShadows(slots, camera) {
-    const { gl } = this, { map: size, casters } = this.level;
-    const own = slots.filter(({ cast }) => cast).slice(0, casters), sees = sunBox(own, camera);
+    const { gl } = this, { map: size } = this.level, own = slots.filter(({ cast }) => cast), sees = sunBox(own, camera);
     if (this.shadows?.size !== size) this.shadows = shadowMap(gl, size, this.shadows);
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.shadows.frame);
     gl.viewport(0, 0, size, size);
@@ -161,16 +154,32 @@ class Stage {
     gl.disable(gl.POLYGON_OFFSET_FILL);
     gl.disable(gl.DEPTH_TEST);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-    const under = sees.middle.map((x, n) => x - 0.4 * SUN[n] / SUN[1]);
-    return { sunClip: sees.clip, under, shadeReach: sees.radius - 0.1, softness: Math.max(0.006 / sees.radius, 1.2 / size), grain: 0.0008 };
+    return { sunClip: sees.clip, softness: Math.max(0.006 / sees.radius, 1.2 / size), grain: 0.0008 };
   }
 
-  drawGround(shared, theme, height) {
-    const { gl } = this;
-    const own = { light: rgb(theme.light), dark: rgb(theme.dark), shade: theme.shade, pixel: 2 * shared.tall / height / this.ratio };
-    use(gl, this.program("ground", GROUND_CORNERS, SHADE + GROUND, {}), { ...shared, ...own, shadows: { int: 1 } });
+  /** Sky and ground, and over it the shadows where they may lie: to look for them takes most of the time. */
+  drawGround(shared, theme, height, slots) {
+    const { gl } = this, pixel = 2 * shared.tall / height / this.ratio;
     gl.bindVertexArray(null);
-    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    use(gl, this.program("sky", SKY, PLAIN, {}), shared);
+    gl.drawArrays(gl.TRIANGLES, 0, 6 * SKY_ROWS);
+    const own = { light: rgb(theme.light), dark: rgb(theme.dark), sharp: 4 * shared.eye[1] / pixel / FINE };
+    use(gl, this.program("ground", GROUND, CHECKS, {}), { ...shared, ...own });
+    gl.drawArrays(gl.TRIANGLES, 0, 6 * SECTORS * RINGS);
+    const boxes = slots.filter(({ cast }) => cast).flatMap(({ figure }) => shadeOf(figure));
+    this.blended(() => {
+      use(gl, this.program("shade", SHADED, SHADE + SHADOW, {}), { ...shared, shade: theme.shade, shadows: { int: 1 } });
+      drawStream(gl, this.shades, covered(boxes));
+    });
+  }
+
+  /** Draw over what is there, by how clear it is. */
+  blended(draw) {
+    const { gl } = this;
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
+    draw();
+    gl.disable(gl.BLEND);
   }
 
   drawMarks(shared, figures, strips, spots, theme) {
@@ -178,22 +187,18 @@ class Stage {
     for (const strip of strips) marks.strip(strip);
     for (const figure of figures) darken(marks, figure, 0.5 * theme.shade);
     for (const spot of spots) marks.spot(spot);
-    gl.enable(gl.BLEND);
-    gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
-    use(gl, this.program("marks", MARKS, MARK, {}), shared);
-    gl.bindVertexArray(this.marks);
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.markBuffer);
-    gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(marks.numbers), gl.STREAM_DRAW);
-    gl.drawArrays(gl.TRIANGLES, 0, marks.numbers.length / MARK_NUMBERS);
-    gl.disable(gl.BLEND);
+    this.blended(() => {
+      use(gl, this.program("marks", MARKS, MARK, {}), shared);
+      drawStream(gl, this.marks, marks.made());
+    });
   }
 
   drawFigures(slots, shared) {
     const { gl } = this;
     gl.enable(gl.DEPTH_TEST);
     for (const { figure, shown, n } of slots) {
-      const defined = figure.body.primitives[0].textured ? { TEXTURED: 1 } : {};
-      const program = this.program("body", CORNERS, SHADE + SURFACE, defined);
+      const defined = figure.body.primitives[0].textured ? { TEXTURED: 1 } : this.level.quick ? { QUICK: 1, TAPS: shown === simpler(figure.body, 2) ? 0 : 1 } : {};
+      const program = this.program("body", SHADE + LIGHT + CORNERS, SHADE + LIGHT + SURFACE, defined);
       use(gl, program, { ...shared, shadows: { int: 1 }, image: { int: 2 } });
       gl.uniform3fv(program.places["palette[0]"] ?? null, paletteOf(figure));
       this.triangles(shown, n, program.places);
@@ -218,6 +223,9 @@ class Stage {
     gl.disable(gl.CULL_FACE);
   }
 }
+
+/** A body, or the coarser one of it, so many times over. */
+const simpler = (body, times) => (times && body.simple ? simpler(body.simple, times - 1) : body);
 
 /** Whether some of a figure may be seen: what is within a height of its root. */
 function inSight(camera, root) {
@@ -261,8 +269,14 @@ function sunBox(slots, camera) {
 }
 
 /** Where a figure is, in heights. */
-function rootOf({ places, matrices, unit: size = 1 }) {
-  return (places ? places[0] : [matrices[12], matrices[13], matrices[14]]).map((x) => x * size);
+const rootOf = ({ places, unit: size = 1 }) => places[0].map((x) => x * size);
+
+/** Boxes on the ground, from [x, z] to [x, z], in which a figure's shadow lies: around each joint of people, whose bones
+ *  are short, and around all of other bodies. */
+function shadeOf({ body, places, unit: size = 1 }) {
+  const spots = places.map(([x, y, z]) => [size * (x - y * SUN[0] / SUN[1]), size * (z - y * SUN[2] / SUN[1])]);
+  const end = (of) => [0, 1].map((axis) => of(...spots.map((spot) => spot[axis])));
+  return body.simple || body.inverseBind ? spots.map((spot) => [spot, spot]) : [[end(Math.min), end(Math.max)]];
 }
 
 function shadowMap(gl, size, before) {

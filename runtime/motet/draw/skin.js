@@ -14,6 +14,38 @@ void main() { gl_Position = clip * vec4(place, 1); }`;
 
 const SHADOW_ONLY = "void main() {}";
 
+/** How much of the sun reaches a place, 0 to 1: looks so often at the shadow map around it, or never and takes all. */
+const SHADE = `
+uniform sampler2DShadow shadows;
+uniform mat4 sunClip;
+uniform float softness, grain;
+const vec2 AROUND[8] = vec2[8](vec2(.93, .12), vec2(-.75, -.55), vec2(-.35, .87), vec2(.55, -.78), vec2(-.9, .3),
+  vec2(.42, .81), vec2(-.08, -.5), vec2(.18, .25));
+float sunlit(vec3 place) {
+  if (TAPS == 0) return 1.;
+  vec3 seen = (sunClip * vec4(place, 1)).xyz * .5 + .5;
+  float sum = 0.;
+  for (int k = 0; k < TAPS; k++) sum += texture(shadows, vec3(seen.xy + softness * AROUND[k], seen.z - grain));
+  return sum / float(TAPS);
+}`;
+
+/** The colour of a place on a body in this light, and behind the fog. */
+const LIGHT = `
+uniform vec3 sun, fog;
+uniform float night;
+vec3 shown(vec3 paint, vec3 at, vec3 normal, vec3 away, float clear) {
+  float key = max(dot(normal, sun), 0.) * sunlit(at + normal * .014);
+  float low = mix(.72, 1., clamp((at.y + .12 * normal.y) / .3, 0., 1.));
+  vec3 around = mix(vec3(.44, .41, .40), vec3(.62, .65, .72), .5 + .5 * normal.y) * low;
+  float edge = 1. - max(dot(normal, away), 0.), rim = edge * edge * edge * (.5 + .5 * normal.y);
+  float half_ = max(dot(normal, normalize(sun + away)), 0.), shine = half_ * half_;
+  shine *= shine;
+  shine *= shine;
+  vec3 light = around * mix(1., .9, night) + vec3(.60, .56, .50) * key;
+  return mix(fog, paint * light + .09 * shine * shine * key + rim * mix(.10, .16, night), clear);
+}`;
+
+/** QUICK: light is found at corners, not for each pixel. */
 const CORNERS = `
 uniform mat4 clip;
 uniform vec3 eye;
@@ -35,28 +67,14 @@ void main() {
   uv = paint;
 #else
   own = palette[int(paint.x)];
+#ifdef QUICK
+  own = shown(own, at, normalize(normal), normalize(toEye), clear);
+#endif
 #endif
   gl_Position = clip * vec4(place, 1);
 }`;
 
-/** How much of the sun reaches a place, 0 to 1: looks at the shadow map around it. */
-const SHADE = `
-uniform sampler2DShadow shadows;
-uniform mat4 sunClip;
-uniform float softness, grain;
-const vec2 AROUND[8] = vec2[8](vec2(.93, .12), vec2(-.75, -.55), vec2(-.35, .87), vec2(.55, -.78), vec2(-.9, .3),
-  vec2(.42, .81), vec2(-.08, -.5), vec2(.18, .25));
-float sunlit(vec3 place) {
-  vec3 seen = (sunClip * vec4(place, 1)).xyz * .5 + .5;
-  if (any(lessThan(seen, vec3(0))) || any(greaterThan(seen, vec3(1)))) return 1.;
-  float sum = 0.;
-  for (int k = 0; k < TAPS; k++) sum += texture(shadows, vec3(seen.xy + softness * AROUND[k], seen.z - grain));
-  return sum / float(TAPS);
-}`;
-
 const SURFACE = `
-uniform vec3 sun, fog;
-uniform float night;
 uniform sampler2D image;
 uniform vec4 factor;
 uniform float cut;
@@ -66,23 +84,16 @@ in float clear;
 out vec4 ink;
 void main() {
   if (at.y < -.004) discard;
-  vec3 normal = normalize(facing) * (gl_FrontFacing ? 1. : -1.), away = normalize(toEye);
-#ifdef TEXTURED
-  vec4 paint = factor * texture(image, uv);
-  if (paint.a < cut) discard;
-#else
   vec4 paint = vec4(own, 1);
+#ifdef TEXTURED
+  paint = factor * texture(image, uv);
+  if (paint.a < cut) discard;
 #endif
-  float toSun = dot(normal, sun), key = toSun > 0. ? toSun * sunlit(at + normal * .014) : 0.;
-  float low = mix(.72, 1., clamp((at.y + .12 * normal.y) / .3, 0., 1.));
-  vec3 around = mix(vec3(.44, .41, .40), vec3(.62, .65, .72), .5 + .5 * normal.y) * low;
-  float edge = 1. - max(dot(normal, away), 0.), rim = edge * edge * edge * (.5 + .5 * normal.y);
-  float half_ = max(dot(normal, normalize(sun + away)), 0.), shine = half_ * half_;
-  shine *= shine;
-  shine *= shine;
-  vec3 light = around * mix(1., .9, night) + vec3(.60, .56, .50) * key;
-  vec3 lit = paint.rgb * light + .09 * shine * shine * key + rim * mix(.10, .16, night);
-  ink = vec4(mix(fog, lit, clear), 1);
+#ifndef QUICK
+  vec3 normal = normalize(facing) * (gl_FrontFacing ? 1. : -1.);
+  paint.rgb = shown(paint.rgb, at, normal, normalize(toEye), clear);
+#endif
+  ink = vec4(paint.rgb, 1);
 }`;
 
 /** The numbers of a body out of the page's data; see motet/draw/page.py. */

@@ -5,7 +5,7 @@ import { restOf } from "../gltfMotion.js";
 import { LEG_LENGTH } from "../humanoid.js";
 import { worldOf } from "../motion.js";
 import { type Figure as Measured, figureOf, fromHumanoid } from "../retarget.js";
-import { minus, plus, rotated, type Vector, X, Y, Z } from "../rotations.js";
+import { minus, plus, rotated, times, type Vector, X, Y, Z } from "../rotations.js";
 import { motionOf, type Shown } from "./figure.js";
 import type { Mesh, Primitive } from "./stage.js";
 
@@ -41,8 +41,8 @@ export class Avatar {
     return new Avatar(mesh, skeleton.rest.map((place) => plus(place, skeleton.joints[0]!.offset)), slots.movers, figureOf(skeleton));
   }
 
-  /** A matrix for each slot of the mesh, columns first: from where it is at rest to where a pose has it. */
-  matrices(shown: Shown): Float32Array {
+  /** Of a pose a matrix for each slot of the mesh, columns first, from where it is at rest; and where the humanoid's joints are. */
+  posed(shown: Shown): { matrices: Float32Array; places: Vector[] } {
     const { turns, places } = worldOf(fromHumanoid(motionOf([shown]), this.measured));
     const found = new Float32Array(16 * this.movers.length);
     this.movers.forEach((joint, slot) => {
@@ -50,7 +50,7 @@ export class Avatar {
       const move = minus(places[0]![joint]!, rotated(turn, this.rest[joint]!));
       found.set(columns(AXES.map((axis) => rotated(turn, axis)), move), 16 * slot);
     });
-    return found;
+    return { matrices: found, places: shown.places.map((place) => times(place, 1 / this.scale)) };
   }
 }
 

@@ -24,20 +24,24 @@ export interface Given {
 
 const KNOWN = "walk, run, stop, turn left, faster and what people do";
 const RADIANS = Math.PI / 180;
-/** Seconds that a frame counts for, at most. */
-const LATEST = 0.1;
+/** Seconds that a frame counts for, at most, and for which a page is drawn after something was done. */
+const [LATEST, AWAKE] = [0.1, 1];
+/** What may change the picture though time stands still. */
+const DONE = ["click", "change", "input", "keydown", "drop"];
 
 export class Page {
   readonly figures: Figure[] = [];
   readonly state = { gait: 0, hurry: false, strafe: false, trails: true, contacts: false, follows: true, pause: false, pace: 1 };
   /** Who steers while no hand does. */
   pilot: Pilot | null = null;
-  /** Since the page was opened. */
   /** Whether the first figure was told an act of the whole body, and whether what steered it then is held still. */
   private whole = false;
   private held = false;
+  /** Since the page was opened. */
   ticks = 0;
   private ahead = 0;
+  /** Seconds for which it draws on though time stands still: until the camera has come. */
+  private awake = 0;
   private last: number | null = null;
 
   constructor(
@@ -87,6 +91,7 @@ export class Page {
 
   /** Take what was dropped; what is to be said of it. */
   show({ told, avatar, motion }: Dropped): string {
+    this.view.dirty = true;
     if (avatar) this.scene.become(avatar);
     if (motion) this.act(actOf(this.net.model, told, numbersOf(this.net.model, motion)), false, false);
     return told;
@@ -160,6 +165,9 @@ export class Page {
     const passed = this.last === null ? 0 : Math.min((now - this.last) / 1000, LATEST);
     this.last = now;
     this.hands.look(passed);
+    this.awake = this.view.dirty || !this.state.pause ? AWAKE : this.awake - passed;
+    this.view.dirty = false;
+    if (this.awake < 0) return;
     if (!this.state.pause) this.ahead += passed * this.net.fps * this.state.pace;
     for (; this.ahead >= 1; this.ahead--) this.tick(this.asked());
     const poses = this.figures.map((figure) => figure.shown(this.ahead));
@@ -186,6 +194,7 @@ export async function open(given: Given, stage: Stage): Promise<Page> {
   page.setFigures(given.characters);
   addControls(page, given.most);
   if (!matchMedia("(prefers-reduced-motion: reduce)").matches) page.startByItself();
+  for (const done of DONE) addEventListener(done, () => (stage.view.dirty = true));
   const frame = (now: number) => {
     page.frame(now);
     requestAnimationFrame(frame);

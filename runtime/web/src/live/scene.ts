@@ -8,8 +8,8 @@ import type { Camera, Drawn, Painter, Spot, Stage, Strip } from "./stage.js";
 /** What a figure looks like: what is drawn of it in a pose. */
 type Looks = (shown: Shown, n: number) => Drawn;
 
-/** Ticks of a way gone that are kept. */
-const TRAIL = 300;
+/** Points of a way gone that are kept, ticks from one to the next, and how many figures' ways are shown. */
+const [TRAIL, SPARSE, TRACED] = [60, 5, 12];
 /** Seconds of the asked path, and between its points. */
 const [SOON, APART] = [1.4, 0.1];
 /** Seconds in which the camera comes half of the way after a figure, and how far it steps back for each further row. */
@@ -28,6 +28,7 @@ export class Scene {
   private readonly trails = new WeakMap<Figure, [x: number, z: number][]>();
   private looks: Looks;
   private avatar: unknown = null;
+  private ticks = 0;
 
   /** height: of the usual body, in metres, by which all is drawn. */
   constructor(
@@ -49,14 +50,15 @@ export class Scene {
     if (this.avatar) this.painter.drop(this.avatar);
     const body = (this.avatar = this.painter.avatar(avatar.mesh));
     const others = this.looks;
-    this.looks = (shown, n) => (n ? others(shown, n) : { body, matrices: avatar.matrices(shown), unit: avatar.scale / this.height });
+    this.looks = (shown, n) => (n ? others(shown, n) : { body, ...avatar.posed(shown), unit: avatar.scale / this.height });
   }
 
   /** Remember where figures are, once a tick. */
   keep(figures: Figure[]): void {
+    if (this.ticks++ % SPARSE) return;
     for (const figure of figures) {
       const trail = this.trails.get(figure) ?? [];
-      trail.push([figure.root[0] / this.height, figure.root[1] / this.height]);
+      trail.push(this.placeOf(figure));
       if (trail.length > TRAIL) trail.shift();
       this.trails.set(figure, trail);
     }
@@ -67,7 +69,7 @@ export class Scene {
     const { width, height } = this.painter.begin(shows.pause);
     if (!width || !height) return;
     this.camera = this.follow(poses, passed, width, height);
-    const ways = shows.trails ? [...figures.map((figure, n) => this.gone(figure, n)), ...(figures[0] ? [this.asked(figures[0])] : [])] : [];
+    const ways = shows.trails ? [...figures.slice(0, TRACED).map((figure, n) => this.gone(figure, n)), ...(figures[0] ? [this.asked(figures[0])] : [])] : [];
     const spots = [...(shows.contacts ? poses.flatMap((pose) => this.standing(pose)) : []), ...(goal ? [this.spot(goal, 0.09, this.accent, 0.6)] : [])];
     this.painter.draw(this.camera, { figures: poses.map((pose, n) => this.looks(pose, n)), strips: ways, spots });
   }
@@ -88,8 +90,12 @@ export class Scene {
   }
 
   private gone(figure: Figure, n: number): Strip {
-    const points = [...(this.trails.get(figure) ?? [])].reverse(); // from the figure on, so that its end fades
+    const points = [this.placeOf(figure), ...[...(this.trails.get(figure) ?? [])].reverse()]; // from the figure on, so that its end fades
     return { points, colour: this.accent, alpha: n ? 0.15 : 0.4, fade: true };
+  }
+
+  private placeOf({ root: [x, z] }: Figure): [x: number, z: number] {
+    return [x / this.height, z / this.height];
   }
 
   private asked(figure: Figure): Strip {

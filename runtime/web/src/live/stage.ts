@@ -1,8 +1,9 @@
 /* What a page is given by the script that all pages share, motet/draw/stage.js: the view and what draws. */
 import type { Quaternion, Vector } from "../rotations.js";
 
-/** Angles in degrees. */
+/** Angles in degrees. dirty: something has changed that is to be drawn. */
 export interface View {
+  dirty: boolean;
   yaw: number;
   pitch: number;
   zoom: number;
@@ -11,12 +12,12 @@ export interface View {
 /** From where is looked; only the stage looks into it. */
 export type Camera = { readonly camera: unique symbol };
 
-/** What is drawn of a figure: a body of the stage with rotations and places, or with matrices, of its joints. unit: heights of one unit. */
+/** What is drawn of a figure: a body of the stage, where its joints are, and their rotations, or matrices instead of both. unit: heights of one unit. */
 export interface Drawn {
   body: unknown;
   unit: number;
   turned?: Quaternion[];
-  places?: Vector[];
+  places: Vector[];
   matrices?: Float32Array;
   colour?: readonly number[];
 }
