@@ -11,6 +11,7 @@ from motet import motion
 from motet.bundle.bundle import Bundle, list_bundles
 from motet.bundle.graph import SessionOptions
 from motet.checked import Checked, check
+from motet.demo import write_demo
 from motet.errors import (
     BundleError,
     ControlError,
@@ -62,7 +63,8 @@ __all__ = [
     "Quantities", "ScriptError", "SearchModel", "SessionOptions", "SettingError", "SteerModel", "SteerSession",
     "SteerSnapshot", "Story", "StorySettings", "TdbnModel", "TdbnSession", "TdbnSnapshot", "TextError", "TextWarning",
     "TravelWarning", "Understood", "UnitError", "check", "clips", "from_humanoid", "list_bundles", "live_page", "load",
-    "load_as", "motion", "parse_plan", "read", "read_map", "read_plan", "to_humanoid", "write", "write_live_page",
+    "load_as", "motion", "parse_plan", "read", "read_map", "read_plan", "to_humanoid", "write", "write_demo",
+    "write_live_page",
 ]
 # fmt: on
 

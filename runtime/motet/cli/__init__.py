@@ -22,6 +22,7 @@ COMMANDS = {
     "join": ("motet.cli.motions", "", "Join two motions by a transition."),
     "control": ("motet.cli.motions", "", "Run a script such as 'walk 3s, run 3s'."),
     "live": ("motet.cli.live", "", "Steer figures live: in a page, by a server, onto an avatar."),
+    "demo": ("motet.cli.live", "", "Write a folder of pages that show what the models do."),
     "serve": ("motet.cli.serve", "serve", "Serve models over HTTP."),
     "search": ("motet.cli.vectors", "", "Find motions in a folder by a sentence or a motion."),
     "embed": ("motet.cli.vectors", "", "Write context vectors of motions or sentences."),

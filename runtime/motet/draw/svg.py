@@ -1,0 +1,66 @@
+"""A motion as a strip of poses in SVG: the player's body in a few moments, beside each other, with its shadow."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from motet.draw.body import DARK, LEFT_PART, MIDDLE_PART, RIGHT_PART, SHIRT, SKIN, TROUSERS
+from motet.draw.figure import COLOURS
+from motet.draw.skinned import Skinned, person, skinned
+from motet.motion.motion import Motion
+from motet.motion.rotations import Array, unit
+from motet.motion.skeleton import LEFT, MIDDLE, RIGHT
+
+CLOTHES = {SHIRT: (112, 148, 190), TROUSERS: (70, 78, 98), SKIN: (232, 200, 176), DARK: (58, 52, 54)}
+INKS = {**CLOTHES, LEFT_PART: COLOURS[LEFT], RIGHT_PART: COLOURS[RIGHT], MIDDLE_PART: COLOURS[MIDDLE]}
+"""The colours of a body's parts, as of the player."""
+
+SUN = unit(np.array([0.42, 1.0, 0.5]))
+YAW, PITCH = np.radians(40.0), np.radians(12.0)
+"""From where it is seen: from which side of what it faces at first, and how far from above."""
+
+WIDE, TALL, APART = 110, 190, 0.75
+"""Pixels of a pose, and heights from one to the next."""
+
+
+def strip(motion: Motion, poses: int = 5) -> str:
+    """The SVG of a motion in so many moments from its first frame to its last. MotionError as of the player's page."""
+    figure = skinned(motion)
+    figure = replace(figure, mesh=person(0.6)) if figure.mesh is person() else figure
+    turns, places = figure.frames()
+    places = places - places[:, :1] * [1, 0, 1]
+    moments = np.linspace(0, len(turns) - 1, poses).round().astype(int)
+    drawn = [_pose(figure, figure.corners(turns[at], places[at]), n) for n, at in enumerate(moments)]
+    return f'<svg viewBox="0 0 {WIDE * poses} {TALL}" xmlns="http://www.w3.org/2000/svg">{"".join(drawn)}</svg>'
+
+
+def _pose(figure: Skinned, corners: Array, n: int) -> str:
+    """The n-th figure with corners (V, 3) in heights, and before it its shadow."""
+    yaw = figure.heading + YAW
+    toward = np.array([np.cos(PITCH) * np.sin(yaw), np.sin(PITCH), np.cos(PITCH) * np.cos(yaw)])
+    right = np.array([np.cos(yaw), 0.0, -np.sin(yaw)])
+    axes, scale = np.stack([right, np.cross(toward, right)]), WIDE / APART
+    middle = [WIDE * (n + 0.5), TALL - 14]
+
+    def seen(places: Array) -> Array:
+        found: Array = middle + scale * (places @ axes.T) * [1, -1]
+        return found
+
+    triangles = figure.mesh.triangles
+    a, b, c = corners[triangles.T]
+    normals = unit(np.cross(b - a, c - a))
+    order = np.argsort((a + b + c) @ toward)
+    flat = seen(corners - corners[:, 1:2] * SUN / SUN[1])
+    shadow = _paths(flat[triangles[normals @ SUN > 0]])
+    light = 0.55 + 0.1 * normals[:, 1] + 0.45 * np.maximum(normals @ SUN, 0)
+    inks = np.array([INKS[part] for part in range(len(INKS))])[figure.mesh.parts[triangles[:, 0]]]
+    inks = np.clip(inks * light[:, None], 0, 255).astype(int)
+    shown = order[(normals @ toward)[order] > 0]
+    paths = zip(_paths(seen(corners)[triangles[shown]]), inks[shown].tolist(), strict=True)
+    body = (f'<path d="{path}" style="--c:#{red:02x}{green:02x}{blue:02x}"/>' for path, (red, green, blue) in paths)
+    return f'<path d="{"".join(shadow)}" opacity=".2"/><g class="body">{"".join(body)}</g>'
+
+
+def _paths(corners: Array) -> list[str]:
+    """Triangles (F, 3, 2) as the commands of paths, to a tenth of a pixel."""
+    return [f"M{a:.1f} {b:.1f}L{c:.1f} {d:.1f} {e:.1f} {f:.1f}Z" for a, b, c, d, e, f in corners.reshape(-1, 6)]
