@@ -54,16 +54,35 @@ class Browser:
         os.close(to_browser)
         os.close(from_browser)
         self.pid = self._process.pid
-        self._rest, self._count, self._session = b"", 0, ""
+        self._rest, self._count, self.session = b"", 0, ""
         self.errors: list[str] = []
 
     def __enter__(self) -> Self:
         targets = self._call("Target.getTargets")["targetInfos"]
-        page = next(target["targetId"] for target in targets if target["type"] == "page")
-        self._session = self._call("Target.attachToTarget", targetId=page, flatten=True)["sessionId"]
+        self._attach(next(target["targetId"] for target in targets if target["type"] == "page"))
+        return self
+
+    def _attach(self, page: str) -> None:
+        self.session = ""
+        self.session = self._call("Target.attachToTarget", targetId=page, flatten=True)["sessionId"]
         self._call("Runtime.enable")
         self._call("Page.enable")
-        return self
+
+    def tab(self) -> str:
+        """Go on in a new tab; the session of the one before, to which setting ``session`` leads back."""
+        before, self.session = self.session, ""
+        self._attach(self._call("Target.createTarget", url="about:blank")["targetId"])
+        return before
+
+    def accessible(self) -> list[dict[str, Any]]:
+        """What screen readers are told: of each node its role, its name, and its properties."""
+        nodes = self._call("Accessibility.getFullAXTree")["nodes"]
+        return [
+            {name: node.get(name, {}).get("value") for name in ("role", "name")}
+            | {own["name"]: own["value"].get("value") for own in node.get("properties", ())}
+            for node in nodes
+            if not node["ignored"]
+        ]
 
     def __exit__(self, *_: object) -> None:
         self._process.kill()
@@ -110,7 +129,7 @@ class Browser:
     def _call(self, method: str, **parameters: Any) -> dict[str, Any]:
         self._count += 1
         wanted = {"id": self._count, "method": method, "params": parameters}
-        text = json.dumps({**wanted, "sessionId": self._session} if self._session else wanted)
+        text = json.dumps({**wanted, "sessionId": self.session} if self.session else wanted)
         os.write(self._write, text.encode() + b"\0")
         while (found := self._next()).get("id") != self._count:
             if found.get("method") == "Runtime.exceptionThrown":

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from browser import CHROMIUM, Browser
+from small_character import character, packed
 
 import motet
 from motet.models.steer import SteerModel
@@ -29,6 +30,9 @@ DROP = """(async () => {{
 
 CAME = "new Promise((done) => setTimeout(() => requestAnimationFrame(done), 800))"
 """Until the camera has come after the figure."""
+
+PIXEL = "R0lGODlhAQABAIAAAAAAAP///ywAAAAAAQABAAACAUwAOw=="
+"""A GIF of one pixel."""
 
 SAVED = """(async () => {{
   let saved = null;
@@ -177,6 +181,22 @@ def test_a_dropped_motion_is_told_and_done(page: Browser, tmp_path: Path) -> Non
     before = page.value("motet.figures[0].root")
     assert page.value("(motet.tick(motet.asked()), motet.figures[0].acting)")["left"] > 1.5
     assert np.hypot(*np.subtract(page.value(TICKS.format(90)), before)[:2]) > 1
+
+
+def test_an_avatar_has_its_colours_and_pictures(page: Browser, tmp_path: Path) -> None:
+    content = character(tmp_path / "small.glb").read_bytes()
+    length = int.from_bytes(content[12:16], "little")
+    document = json.loads(content[20 : 20 + length])
+    material = document["materials"][0]
+    material["pbrMetallicRoughness"]["baseColorFactor"] = [0.5, 0.2, 0.0, 1.0]
+    material |= {"alphaMode": "MASK", "doubleSided": True}
+    document["images"] = [{"uri": f"data:image/gif;base64,{PIXEL}", "mimeType": "image/gif"}]
+    assert "small.glb is who moves now" in dropped(page, "small.glb", packed(document, content[28 + length :]))
+    found = page.value("""(({ colour, cut, twoSided, image }) => [colour, cut, twoSided, [image.width, image.height]])(
+      [...motet.scene.painter.bodies].pop().primitives[0])""")
+    linear = np.array([0.5, 0.2, 0.0])
+    assert found[0] == pytest.approx([*linear ** (1 / 2.2), 1])
+    assert found[1:] == [0.5, True, [1, 1]]
 
 
 def test_a_dropped_avatar_is_who_moves(page: Browser, tmp_path: Path) -> None:

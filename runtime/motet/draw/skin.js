@@ -116,6 +116,7 @@ function decodedAvatar({ primitives, inverseBind }) {
   const made = primitives.map((given) => ({
     ...given, normals: given.normals ?? normalsOf(given.positions, given.indices), textured: true,
     paint: given.uvs ?? new Float32Array(2 * given.positions.length / 3),
+    colour: given.colour.map((x, n) => (n < 3 ? x ** (1 / 2.2) : x)), // glTF has it linear
   }));
   return { inverseBind, joints: inverseBind.length / 16, influences: 4, primitives: made };
 }

@@ -120,7 +120,7 @@ export class Gltf {
     const buffers = (document.buffers ?? []).map(({ uri, byteLength }) => {
       if (uri === undefined) return binary.subarray(0, byteLength);
       if (!uri.startsWith("data:")) throw new FormatError(`its buffer ${JSON.stringify(uri.slice(0, 60))} is a file of its own: export one .glb`);
-      return Uint8Array.from(atob(uri.slice(uri.indexOf(",") + 1)), (letter) => letter.charCodeAt(0)).subarray(0, byteLength);
+      return inlined(uri).subarray(0, byteLength);
     });
     return new Gltf(document, buffers);
   }
@@ -202,6 +202,11 @@ export class Gltf {
 
 function mapped(linear: Placed["linear"], [x, y, z]: Vector): Vector {
   return plus(plus(times(linear[0], x), times(linear[1], y)), times(linear[2], z));
+}
+
+/** The bytes of a data: URI. */
+export function inlined(uri: string): Uint8Array {
+  return Uint8Array.from(atob(uri.slice(uri.indexOf(",") + 1)), (letter) => letter.charCodeAt(0));
 }
 
 /** The JSON text and the binary part of a GLB file. */

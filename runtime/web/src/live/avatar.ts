@@ -1,6 +1,6 @@
 /* Avatars: the mesh of a .vrm or .glb file, and its joints in the poses of the humanoid. */
 import { FormatError, MotionError } from "../errors.js";
-import { Gltf, type MeshPart, type Placed } from "../gltf.js";
+import { Gltf, inlined, type MeshPart, type Placed } from "../gltf.js";
 import { restOf } from "../gltfMotion.js";
 import { LEG_LENGTH } from "../humanoid.js";
 import { worldOf } from "../motion.js";
@@ -144,9 +144,9 @@ async function primitiveOf(gltf: Gltf, part: MeshPart, array: (at: number) => nu
 function imageOf(gltf: Gltf, texture: number | undefined, images: Images): Promise<ImageBitmap | null> {
   const { document } = gltf;
   const source = document.textures?.[texture ?? -1]?.source;
-  const view = document.images?.[source ?? -1]?.bufferView;
-  if (source === undefined || view === undefined) return Promise.resolve(null);
-  const type = document.images![source]!.mimeType ?? "image/png";
-  const read = () => createImageBitmap(new Blob([gltf.bytes(view) as BlobPart], { type })).catch(() => null);
+  const { bufferView, uri, mimeType: type = "image/png" } = document.images?.[source ?? -1] ?? {};
+  if (source === undefined || (bufferView === undefined && !uri?.startsWith("data:"))) return Promise.resolve(null);
+  const content = bufferView === undefined ? inlined(uri!) : gltf.bytes(bufferView);
+  const read = () => createImageBitmap(new Blob([content as BlobPart], { type })).catch(() => null);
   return images.get(source) ?? images.set(source, read()).get(source)!;
 }
