@@ -1,11 +1,14 @@
-"""A motion as a strip of poses in SVG: the player's body in a few moments, beside each other, with its shadow."""
+"""A motion as a strip of poses: the player's body in a few moments with its shadow, as triangles, and in SVG."""
 
+from collections.abc import Iterator
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from motet.draw.body import DARK, LEFT_PART, MIDDLE_PART, RIGHT_PART, SHIRT, SKIN, TROUSERS
 from motet.draw.figure import COLOURS
+from motet.draw.mesh import normals_of
 from motet.draw.skinned import Skinned, person, skinned
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, unit
@@ -23,41 +26,58 @@ WIDE, TALL, APART = 110, 190, 0.75
 """Pixels of a pose, and heights from one to the next."""
 
 
+class Shape(NamedTuple):
+    """A pose as it is seen, from the ground under its root: triangles (F, 3, 2) in heights, y up, those behind first;
+    their colours (F, 3), 0 to 255; and the triangles of its shadow (S, 3, 2)."""
+
+    triangles: Array
+    inks: Array
+    shadow: Array
+
+
 def strip(motion: Motion, poses: int = 5) -> str:
     """The SVG of a motion in so many moments from its first frame to its last. MotionError as of the player's page."""
+    drawn = "".join(_drawn(shape, n) for n, shape in enumerate(shapes(motion, poses)))
+    return f'<svg viewBox="0 0 {WIDE * poses} {TALL}" xmlns="http://www.w3.org/2000/svg">{drawn}</svg>'
+
+
+def shapes(motion: Motion, poses: int) -> Iterator[Shape]:
+    """The shapes of :func:`strip`."""
     figure = skinned(motion)
     figure = replace(figure, mesh=person(0.6)) if figure.mesh is person() else figure
     turns, places = figure.frames()
     places = places - places[:, :1] * [1, 0, 1]
-    moments = np.linspace(0, len(turns) - 1, poses).round().astype(int)
-    drawn = [_pose(figure, figure.corners(turns[at], places[at]), n) for n, at in enumerate(moments)]
-    return f'<svg viewBox="0 0 {WIDE * poses} {TALL}" xmlns="http://www.w3.org/2000/svg">{"".join(drawn)}</svg>'
+    for at in np.linspace(0, len(turns) - 1, poses).round().astype(int):
+        yield _shape(figure, figure.corners(turns[at], places[at]))
 
 
-def _pose(figure: Skinned, corners: Array, n: int) -> str:
-    """The n-th figure with corners (V, 3) in heights, and before it its shadow."""
+def _shape(figure: Skinned, corners: Array) -> Shape:
+    """A figure with corners (V, 3) in heights."""
     yaw = figure.heading + YAW
     toward = np.array([np.cos(PITCH) * np.sin(yaw), np.sin(PITCH), np.cos(PITCH) * np.cos(yaw)])
     right = np.array([np.cos(yaw), 0.0, -np.sin(yaw)])
-    axes, scale = np.stack([right, np.cross(toward, right)]), WIDE / APART
-    middle = [WIDE * (n + 0.5), TALL - 14]
-
-    def seen(places: Array) -> Array:
-        found: Array = middle + scale * (places @ axes.T) * [1, -1]
-        return found
-
+    axes = np.stack([right, np.cross(toward, right)], axis=1)
     triangles = figure.mesh.triangles
     a, b, c = corners[triangles.T]
     normals = unit(np.cross(b - a, c - a))
     order = np.argsort((a + b + c) @ toward)
-    flat = seen(corners - corners[:, 1:2] * SUN / SUN[1])
-    shadow = _paths(flat[triangles[normals @ SUN > 0]])
-    light = 0.55 + 0.1 * normals[:, 1] + 0.45 * np.maximum(normals @ SUN, 0)
-    inks = np.array([INKS[part] for part in range(len(INKS))])[figure.mesh.parts[triangles[:, 0]]]
-    inks = np.clip(inks * light[:, None], 0, 255).astype(int)
     shown = order[(normals @ toward)[order] > 0]
-    paths = zip(_paths(seen(corners)[triangles[shown]]), inks[shown].tolist(), strict=True)
-    body = (f'<path d="{path}" style="--c:#{red:02x}{green:02x}{blue:02x}"/>' for path, (red, green, blue) in paths)
+    flat = corners - corners[:, 1:2] * SUN / SUN[1]
+    round_ = unit(normals_of(corners, triangles)[triangles].sum(axis=1))
+    light = 0.55 + 0.1 * round_[:, 1] + 0.45 * np.maximum(round_ @ SUN, 0)
+    inks = np.array([INKS[part] for part in range(len(INKS))])[figure.mesh.parts[triangles[:, 0]]]
+    lit = np.clip(inks * light[:, None], 0, 255)
+    return Shape((corners @ axes)[triangles[shown]], lit[shown], (flat @ axes)[triangles[normals @ SUN > 0]])
+
+
+def _drawn(shape: Shape, n: int) -> str:
+    """The n-th pose, after its shadow."""
+    scale = WIDE / APART * np.array([1, -1])
+    triangles, shadow = (
+        _paths([WIDE * (n + 0.5), TALL - 14] + scale * part) for part in (shape.triangles, shape.shadow)
+    )
+    inks = (f"#{red:02x}{green:02x}{blue:02x}" for red, green, blue in shape.inks.astype(int).tolist())
+    body = (f'<path d="{path}" style="--c:{ink}"/>' for path, ink in zip(triangles, inks, strict=True))
     return f'<path d="{"".join(shadow)}" opacity=".2"/><g class="body">{"".join(body)}</g>'
 
 

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 
-from motet.draw.figure import COLOURS, figure_of
+from motet.draw.svg import shapes
 from motet.errors import OutputError
 from motet.files import write_whole
 from motet.motion.motion import Motion
@@ -79,20 +79,18 @@ def stick_figures(axes: Axes, points: Array, bones: Bones, colours: Sequence[Any
 
 
 def strips(motions: Sequence[Motion], titles: Sequence[str], title: str, count: int = 9) -> Figure:
-    """Motions that can be played, each as a strip of ``count`` stick figures under its title.
+    """Motions that can be played, each as a strip of ``count`` poses of the player's body under its title.
 
     They stand at even times from left to right, seen from a little in front of the side they first turn to.
     """
     picture, rows = panels(len(motions), 1, (9, 2.0 * len(motions)), title)
     for axes, motion, text in zip(rows, motions, titles, strict=True):
-        figure = figure_of(motion)
-        view = figure.heading + np.radians(60)
-        points = figure.points[np.linspace(0, len(figure.points) - 1, count).round().astype(int)]
-        across = (points - points[:, :1])[..., [0, 2]] @ [np.sin(view), np.cos(view)]
-        colours = [np.array(COLOURS[bone.side]) / 255 for bone in figure.bones]
-        bones = [(bone.start, bone.end) for bone in figure.bones]
-        stick_figures(axes, np.stack([across, points[..., 1]], axis=-1), bones, [colours] * count, width=1.2)
-        axes.set(xlim=(-SPACING, SPACING * count), ylim=(-0.05, 1.25))
+        for n, (triangles, inks, shadow) in enumerate(shapes(motion, count)):
+            for parts, colours in ((shadow, "0.85"), (triangles, inks / 255)):
+                placed = list(np.add(parts, [SPACING * n, 0]))
+                axes.add_collection(PolyCollection(placed, facecolors=colours, edgecolors=colours, linewidths=0.3))
+        axes.set(xlim=(-SPACING, SPACING * count), ylim=(-0.15, 1.25), aspect="equal")
+        axes.axis("off")
         axes.set_title(text, fontsize=8, loc="left")
     return picture
 
