@@ -15,7 +15,7 @@ import onnxruntime
 import pytest
 from click.testing import CliRunner
 
-from motet.bench import figures
+from motet.bench.cases import cases
 from motet.bundle.bundle import FORMAT, Bundle, list_bundles, write_bundle
 from motet.bundle.graph import SessionOptions
 from motet.cli import main
@@ -62,7 +62,7 @@ def test_the_type_of_a_bundle_loaded_by_name_is_known() -> None:
 
 
 def test_every_kind_of_model_is_measured_and_has_loops_of_its_own() -> None:
-    assert all(figures.dispatch(kind) is not figures.dispatch(object) for kind in KINDS)
+    assert all(cases.dispatch(kind) is not cases.dispatch(object) for kind in KINDS)
     assert sorted(loop for kind in KINDS for loop in kind.LOOPS) == sorted(LOOPS)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from fake_models import CHANNELS, CONTRACT, VOCABULARY, FakeGraph, describe_model, moving
 
-from motet.bench import WORDS, describe_figures, figures
+from motet.bench.cases import WORDS, cases
 from motet.errors import BundleError, DecodingError, MotionError, TextError, TextWarning
 from motet.formats import write_motion
 from motet.models.describe import DescribeModel, Description
@@ -243,13 +243,14 @@ def test_padding() -> None:
 def test_the_benchmark_measures_sentences_of_one_length(tmp_path: Path) -> None:
     model = describe_model()
     write_motion(tmp_path / "a.npz", moving(20))
-    found = figures(model, 0.001, tmp_path / "a.npz")
-    parts = ("descriptions", "one", "consensus", "encoder", "step", "file")
-    assert set(found) == {f"describe.{part}" for part in parts}
-    assert all(value > 0 for value, _ in found.values())
+    found = cases(model, tmp_path / "a.npz")
+    parts = ("descriptions", "descriptions", "one", "consensus", "encoder", "step", "file")
+    assert [case.name for case in found] == [f"describe.{part}" for part in parts]
+    assert [case.count for case in found] == [32, 128, 1, 1, 1, 1, 1]
     step = model.graphs["step"]
     assert isinstance(step, FakeGraph)
-    step.calls = 0
-    describe_figures(model, 0.0)
-    whole = 1 + 2 + 2 * (1 + 3)  # searches: warm-up and two of a batch, warm-up and three of one motion, both ways
-    assert step.calls == whole * (WORDS + 1) + 4
+    for case, calls in zip(found, [WORDS + 1] * 4 + [0, 1], strict=False):
+        step.calls = 0
+        case.call()
+        assert step.calls == calls, case.name
+    assert found[-1].call() == model.describe(moving(20))

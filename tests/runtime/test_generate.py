@@ -7,7 +7,7 @@ import pytest
 from fake_models import CONTRACT, generate_model, moving
 from figures import walker
 
-from motet.bench import figures
+from motet.bench.cases import SECONDS, cases
 from motet.decode.mixture import Sample
 from motet.errors import DecodingError, MotionError, TextError, TextWarning
 from motet.formats import read_motion
@@ -182,6 +182,9 @@ def test_a_result_is_written_as_it_is(monkeypatch: pytest.MonkeyPatch, tmp_path:
 
 
 def test_the_benchmark_measures_motions_of_one_length(model: GenerateModel) -> None:
-    found = figures(model, 0.001)
-    assert set(found) == {"generate.motions", "generate.one", "generate.encoder", "generate.step"}
-    assert all(value > 0 for value, _ in found.values())
+    found = {case.name: case for case in cases(model)}
+    assert list(found) == ["generate.motions", "generate.one", "generate.encoder", "generate.step"]
+    many, one = found["generate.motions"], found["generate.one"]
+    made = [row[0].motion for row in [one.call(), *many.call()]]  # type: ignore[misc,index]
+    assert len(made) == 1 + many.count
+    assert {(len(motion) - 1) / motion.fps for motion in made} == {SECONDS - 1 / model.fps}

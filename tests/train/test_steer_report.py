@@ -12,7 +12,8 @@ from click.testing import CliRunner
 from codes_data import PREPARATION, trained
 
 from motet import to_humanoid
-from motet.bench import figures
+from motet.bench.cases import cases
+from motet.bench.measure import compared
 from motet.bundle.manifest import Manifest
 from motet.cli import main
 from motet.formats import read_motion
@@ -150,13 +151,10 @@ def test_the_command_prints_and_saves(folder: Path, monkeypatch: pytest.MonkeyPa
 
 
 def test_bench_measures_a_tick_and_a_crowd(model: SteerModel) -> None:
-    kinds = ("tick", "tick_locked", "crowd", "crowd_locked")
-    names = [*(f"{kind}{of}" for kind in kinds for of in ("", "_mean", "_p99")), "crowd_positions"]
-    for one in (model,):
-        found = figures(one, 0.001)
-        assert list(found) == [f"control.{name}" for name in names]
-        assert all(value > 0 for value, _ in found.values())
-        assert found["control.tick"][0] < found["control.tick_locked"][0]
+    found = compared({"motet": cases(model)}, 0.001)
+    names = ("tick", "tick_locked", "crowd", "crowd_locked", "crowd_positions")
+    assert [row.name for row in found] == [f"control.{name}" for name in names]
+    assert 0 < found[0].value < 1e3 * found[3].value
 
 
 def test_soles_of_quaternions_are_those_of_matrices(store: Store) -> None:

@@ -122,10 +122,16 @@ class Run:
         return Run(manifest, model)
 
 
-def eager_model(manifest: Manifest, threads: int) -> BundleModel:
-    """A bundle's model with the same sizes in torch, its weights untrained: the baseline of ``motet bench``."""
+def torch_model(manifest: Manifest, threads: int, compiled: bool = False) -> BundleModel:
+    """A bundle's model with the same sizes in torch, its weights untrained, eager or by ``torch.compile``, which fails
+    at the first call where there is no C++ compiler: the baselines of ``motet bench``."""
     torch.set_num_threads(threads)
-    return Run(manifest.source, MODELS[manifest.model](manifest.config)).bundle_model()
+    model = Run(manifest.source, MODELS[manifest.model](manifest.config)).bundle_model()
+    if compiled:
+        for graph in model.graphs.values():
+            if isinstance(graph, TorchGraph):
+                graph.module.compile(dynamic=True)
+    return model
 
 
 def to_bytes(state: Any) -> bytes:

@@ -31,7 +31,7 @@ COMMANDS = {
     "merge": ("motet.cli.many", "", "Merge the answers that --parts wrote."),
     "view": ("motet.cli.files", "", "Write a web page that plays a motion."),
     "bundle": ("motet.cli.bundles", "", "List, inspect, verify and pack models (bundles)."),
-    "bench": ("motet.cli.bundles", "", "Measure how fast a model runs here."),
+    "bench": ("motet.cli.bench", "", "Measure how fast a model runs here."),
     "prepare": ("motet_train.cli.prepare", "train", "Turn motions and sentences into a store to train on."),
     "train": ("motet_train.cli.train", "train", "Train a model."),
     "evaluate": ("motet_train.cli.evaluate", "evaluate", "Measure a trained run or a bundle."),

@@ -1,0 +1,1 @@
+"""How fast models run here: complete calls, as a user makes them, beside torch and beside what the machine can do."""
