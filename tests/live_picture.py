@@ -15,9 +15,9 @@ STEPS = """(() => {
   motet.stage.view.yaw += 150;
   motet.stage.zoom(1.7);
   const walk = { gait: 0, x: 0, z: 1.2, facing: 0 };
-  for (let i = 0; i < 120; i++) motet.tick(walk);
+  for (let i = 0; i < 60; i++) motet.tick(walk);
   motet.told(document.getElementById("text").value = "wave");
-  for (let i = 0; i < 70; i++) motet.tick(walk);
+  for (let i = 0; i < 60; i++) motet.tick(walk);
   document.getElementById("pause").click();
 })()"""
 """Five figures walk ahead, and the first one waves."""
@@ -25,7 +25,7 @@ STEPS = """(() => {
 
 def main() -> None:
     """Draw it anew."""
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         page = Path(folder) / "live.html"
         motet.write_live_page(page, motet.load_as(SteerModel, "control"), characters=5)
         with Browser(Path(folder) / "profile", 1100, 860) as browser:
