@@ -34,6 +34,11 @@ def larger(one: Part, other: Part) -> Part:
     return max(one, other) if isinstance(one, float) else np.maximum(one, other)
 
 
+def smaller(one: Part, other: Part) -> Part:
+    """The smaller of two."""
+    return min(one, other) if isinstance(one, float) else np.minimum(one, other)
+
+
 def root(value: Part) -> Part:
     """The square root."""
     return math.sqrt(value) if isinstance(value, float) else np.sqrt(value)

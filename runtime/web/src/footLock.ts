@@ -9,8 +9,9 @@ import type { Played } from "./steering.js";
 export const LEGS = SIDES.map((side) => LEG.map((part) => BONES.indexOf(side + part)));
 /** Where the joints of a leg begin in their parents' frames. */
 export const OFFSETS = LEGS.map((bones) => bones.map((bone) => HUMANOID.joints[HUMANOID.index(BONES[bone]!)]!.offset));
-/** Points of a sole, and which joint of a leg carries each. */
+/** Points of a sole, heel, ball and tip, and which joint of a leg carries each. */
 const POINTS = LEG.flatMap((part, joint) => (SOLES[part] ?? []).map((point): [number, Vector] => [joint, point]));
+const BALL = 1;
 
 /** Of one foot: by how much it is moved along x and z and how fast that changes, and where the points of its sole were. */
 interface Foot {
@@ -36,9 +37,12 @@ export function held(lock: Lock, pose: Played, how: LockSettings, dt: number): P
     const leg = legOf(pose.rotations, side, hips, [x, pose.height, z]);
     const soles = POINTS.map(([joint, point]) => plus(leg.places[joint]!, rotated(leg.turned[joint]!, point)));
     const lowest = soles.reduce((least, point, at) => (point[1] < soles[least]![1] ? at : least), 0);
-    shift(foot, minus(soles[lowest]!, (foot.soles ?? soles)[lowest]!), pose.contacts[side]! > how.stands, how, dt);
+    const bears = soles[lowest]![1] < soles[BALL]![1] - how.bears ? lowest : BALL;
+    const contact = pose.contacts[side]!;
+    const moved = shift(foot, minus(soles[bears]!, (foot.soles ?? soles)[bears]!), contact > how.stands, how, dt);
     foot.soles = soles;
-    const lift = Math.max(0, -soles[lowest]![1]);
+    const steps = contact * how.steps * Math.min(1, moved / (how.swings * dt));
+    const lift = Math.max(0, steps - soles[lowest]![1]);
     if (foot.shift[0] || foot.shift[1] || lift) reach(rotations, side, hips, leg, [foot.shift[0], lift, foot.shift[1]]);
   });
   return { ...pose, rotations };
@@ -62,17 +66,18 @@ export function legOf(rotations: Quaternion[], side: number, hips: Quaternion, r
   return { turned, places };
 }
 
-/** By how much a foot is moved now, whose lowest point was `moved` since the last tick. */
-function shift(foot: Foot, [x, , z]: Vector, contact: boolean, how: LockSettings, dt: number): void {
+/** Move a foot whose point that bears it was moved since the last tick; how far that is then shown to move. */
+function shift(foot: Foot, [x, , z]: Vector, contact: boolean, how: LockSettings, dt: number): number {
   const stay: [number, number] = [foot.shift[0] - x, foot.shift[1] - z];
   if (contact && Math.hypot(x, z) < how.swings * dt && Math.hypot(...stay) < how.farthest) {
     [foot.shift, foot.drift] = [stay, [0, 0]];
-    return;
+    return 0;
   }
   const damping = dampingOf(how.fade);
   const [offX, rateX] = damped(foot.shift[0], foot.drift[0], damping, dt);
   const [offZ, rateZ] = damped(foot.shift[1], foot.drift[1], damping, dt);
   [foot.shift, foot.drift] = [[offX, offZ], [rateX, rateZ]];
+  return Math.hypot(offX - stay[0], offZ - stay[1]);
 }
 
 /** Turn thigh, shin and foot of a leg so that the ankle is moved; the foot stays as it is in the world. */

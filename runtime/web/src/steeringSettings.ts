@@ -39,7 +39,14 @@ const STEERING = {
   ahead: [Math.PI / 6, ...RADIANS],
 } as const satisfies Record<string, Range>;
 
-const LOCK = { fade: [0.06, 0.001, 10], farthest: [0.2, 0, 1], swings: [1, 0, 100], stands: [0.5, 0, 1] } as const satisfies Record<string, Range>;
+const LOCK = {
+  fade: [0.1, 0.001, 10],
+  farthest: [0.2, 0, 1],
+  swings: [1, 0.01, 100],
+  stands: [0.5, 0, 1],
+  bears: [0.02, 0, 1],
+  steps: [0.08, 0, 1],
+} as const satisfies Record<string, Range>;
 
 const ACTS = { blend: [0.12, ...HALF_LIFE], far: [0.7, 0.01, 3.15], entry: [0.5, 0, 10], rest: [0.25, 0, 100] } as const satisfies Record<string, Range>;
 

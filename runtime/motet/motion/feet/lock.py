@@ -26,6 +26,7 @@ from motet.motion.parts import (
     product,
     root,
     rotated,
+    smaller,
     where,
 )
 from motet.motion.pose import Floats, Pose, damping_of
@@ -37,14 +38,17 @@ from motet.settings import Range, Settings
 class FootLockSettings(Settings):
     """fade: half-life in which a released foot comes back to where it is played. farthest: largest correction; beyond
     it the foot is released. swings: above this speed a foot is swinging, even if a clip that was just jumped to marks a
-    contact. stands: contact above which a foot stands."""
+    contact. stands: contact above which a foot stands. bears: how much lower than the ball heel or tip are where they
+    bear the foot. steps: how high a foot is lifted that swings while its contact is 1; a slower one less."""
 
     FEATURE: ClassVar[str] = "foot_lock"
 
-    fade: Annotated[float, Range(0.001, 10, "s")] = 0.06
+    fade: Annotated[float, Range(0.001, 10, "s")] = 0.1
     farthest: Annotated[float, Range(0, 1, "m")] = 0.2
-    swings: Annotated[float, Range(0, 100, "m/s")] = 1.0
+    swings: Annotated[float, Range(0.01, 100, "m/s")] = 1.0
     stands: Annotated[float, Range(0, 1)] = 0.5
+    bears: Annotated[float, Range(0, 1, "m")] = 0.02
+    steps: Annotated[float, Range(0, 1, "m")] = 0.08
 
 
 LEG_BONES = np.array([[BONES.index(sided(side, part)) for part in LEG] for side in LEFT_RIGHT])
@@ -54,7 +58,7 @@ OFFSETS = HUMANOID.offsets[[[HUMANOID.index(BONES[bone]) for bone in leg] for le
 """Where they begin in their parents' frames (2, 4, 3), the hips' for the first."""
 
 POINTS = [(LEG.index(part), point) for part, points in SOLE.items() for point in points]
-"""Points of a sole, and which joint of a leg carries each."""
+"""Points of a sole, heel, ball and tip, and which joint of a leg carries each."""
 
 Pair = tuple[Part, Part]
 """Along x and z."""
@@ -105,8 +109,8 @@ class FootLock:
         """A foot a tick later, and the rotations of thigh, shin and foot in their parents' frames."""
         turned, places = joints_of(limb, hips, place)
         soles = tuple(plus(places[joint], rotated(turned[joint], point)) for joint, point in POINTS)
-        (shift_x, shift_z), drift, height = self._shifted(foot, soles, limb.contact)
-        lift, played = larger(-height, 0.0), limb.local[:3]
+        (shift_x, shift_z), drift, lift = self._shifted(foot, soles, limb.contact)
+        played = limb.local[:3]
         moves, after = (shift_x != 0) | (shift_z != 0) | (lift > 0), Foot((shift_x, shift_z), drift, soles)
         if moves is False:
             return after, played
@@ -120,18 +124,22 @@ class FootLock:
         ]
 
     def _shifted(self, foot: Foot, soles: tuple[Vector, ...], contact: Part) -> tuple[Pair, Pair, Part]:
-        """The shift of a foot and how fast it changes, a tick later, and the height of the lowest point of its sole."""
+        """The shift of a foot and how fast it changes, a tick later, and by how much it is lifted."""
         how, before = self.settings, soles if foot.soles is None else foot.soles
-        height, x, z = soles[0][1], soles[0][0] - before[0][0], soles[0][2] - before[0][2]
-        for (to_x, y, to_z), (from_x, _, from_z) in zip(soles[1:], before[1:], strict=True):
-            lower = y < height
+        (x, lowest, z), (from_x, _, from_z) = soles[1], before[1]
+        x, z, height = x - from_x, z - from_z, lowest - how.bears
+        for (to_x, y, to_z), (from_x, _, from_z) in zip(soles[::2], before[::2], strict=True):
+            lower, lowest = y < height, smaller(lowest, y)
             height, x, z = where(lower, y, height), where(lower, to_x - from_x, x), where(lower, to_z - from_z, z)
         held_x, held_z = foot.shift[0] - x, foot.shift[1] - z
         stands = (contact > how.stands) & (root(held_x * held_x + held_z * held_z) < how.farthest)
         stands = stands & (root(x * x + z * z) < how.swings * self.dt)
         (faded_x, slower_x), (faded_z, slower_z) = map(self._faded, foot.shift, foot.drift)
-        shift = where(stands, held_x, faded_x), where(stands, held_z, faded_z)
-        return shift, (where(stands, 0.0, slower_x), where(stands, 0.0, slower_z)), height
+        shift_x, shift_z = where(stands, held_x, faded_x), where(stands, held_z, faded_z)
+        x, z = shift_x - held_x, shift_z - held_z  # over the ground
+        steps = contact * smaller(root(x * x + z * z) * (how.steps / (how.swings * self.dt)), how.steps)
+        drift = where(stands, 0.0, slower_x), where(stands, 0.0, slower_z)
+        return (shift_x, shift_z), drift, larger(steps - lowest, 0.0)
 
     def _faded(self, off: Part, rate: Part) -> Pair:
         """A shift and its rate, as the spring of its half-life takes it back."""

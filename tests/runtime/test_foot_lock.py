@@ -1,0 +1,44 @@
+"""The lock of live figures: feet turn on the ball, and are lifted where they cannot stand."""
+
+import numpy as np
+import pytest
+
+from motet.motion.feet.lock import FootLock
+from motet.motion.humanoid import BONES, sole_points
+from motet.motion.pose import Pose
+from motet.motion.rotations import Array, quat_to_rotmat
+
+DT, HEIGHT = 1 / 30, 0.98
+
+
+def soles_of(steps: Array, contact: float, characters: int) -> Array:
+    """Points (T, 6, 3) of the soles of the last of some figures in the rest pose, that go through places (T, 3) over
+    the ground, x, z and facing."""
+    rest = np.tile(np.array([0, 0, 0, 1], np.float32), (characters, len(BONES), 1))
+    lock, found = FootLock(characters, DT), []
+    for step in steps:
+        ground, high = np.tile(step, (characters, 1)), np.full(characters, HEIGHT, np.float32)
+        pose = lock.held(Pose(ground, rest, high, np.full((characters, 2), contact, np.float32)))
+        turned, places = pose.global_transforms()
+        found.append(sole_points(quat_to_rotmat(turned.astype(np.float64)), places)[-1])
+    return np.stack(found)
+
+
+@pytest.mark.parametrize("characters", [1, 3])
+def test_a_foot_that_stands_turns_on_its_ball(characters: int) -> None:
+    turns = np.linspace([0, 0, 0], [0, 0, 0.5], 8)
+    heel, ball = soles_of(turns, 1.0, characters)[:, :2, [0, 2]].swapaxes(0, 1)
+    assert np.ptp(ball, axis=0).max() < 1e-3
+    assert np.ptp(heel, axis=0).max() > 0.05
+
+
+@pytest.mark.parametrize("characters", [1, 3])
+def test_a_foot_that_swings_although_it_should_stand_is_lifted(characters: int) -> None:
+    def lifted(speed: float, contact: float) -> float:
+        goes = np.linspace([0, 0, 0], [0, speed * 5 * DT, 0], 6)
+        return float(soles_of(goes, contact, characters)[-1, :, 1].min())
+
+    assert 0.06 < lifted(2.0, 1.0) < 0.08  # legs that are straight bend less than they are asked to
+    assert 0.03 < lifted(2.0, 0.5) < 0.04
+    assert abs(lifted(2.0, 0.0)) < 1e-6  # it may swing
+    assert abs(lifted(0.2, 1.0)) < 0.002  # it stands
