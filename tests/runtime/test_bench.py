@@ -142,13 +142,15 @@ def test_times_are_those_of_numpy_and_the_processors_are_counted(monkeypatch: py
 def test_the_fastest_batch_counts_and_the_ratio_is_of_things(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = Clock(monkeypatch)
 
-    def batches(*seconds: float) -> list[Case]:
-        return [Case("a", clock.call(one), "things/s", count) for one, count in zip(seconds, (10, 100), strict=True)]
+    def batches(work: float, *seconds: float) -> list[Case]:
+        sizes = zip(seconds, (10, 100), strict=True)
+        return [Case("a", clock.call(one, work=work), "things/s", count) for one, count in sizes]
 
-    (row,) = compared({"motet": batches(0.1, 0.5), "eager": batches(0.2, 4.0)}, 3.0)
+    (row,) = compared({"motet": batches(2, 0.1, 0.5), "eager": batches(5, 0.2, 4.0)}, 3.0)
     assert (row.value, row.batch) == (pytest.approx(200), 100)
     assert row.beside["eager"].value == pytest.approx(50)
     assert row.beside["eager"].ratio == pytest.approx(4)
+    assert row.beside["eager"].processor_ratio == pytest.approx(4 * 5 / 2)
 
 
 def test_rounds_are_in_turn_and_the_median_one_tells_the_ratio(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -58,10 +58,12 @@ class Times:
 
 @dataclass(frozen=True)
 class Beside:
-    """The same row of torch: its value, how much better ours is (above 1: ours), and its 99th percentile in ms."""
+    """The same row of torch: its value, how much better ours is by the clock and by time of the processors, which other
+    programs disturb least (above 1: ours), and its 99th percentile in ms."""
 
     value: float
     ratio: float
+    processor_ratio: float
     p99: float
 
 
@@ -118,10 +120,12 @@ def _row(cases: Mapping[str, Sequence[Case]], seconds: float) -> Row:
     rounds = [{who: taken(case.call, seconds / ROUNDS) for who, case in chosen.items()} for _ in range(ROUNDS)]
     middle = [{who: np.median(one.wall) / chosen[who].count for who, one in of.items()} for of in rounds]
     times = {who: Times.of(_joined([of[who] for of in rounds])) for who in chosen}
+    worked = {who: times[who].processor / case.count for who, case in chosen.items()}
     beside = {
         who: Beside(
             case.value(times[who].median / 1e3),
             float(np.median([of[who] / of[us] for of in middle])),
+            worked[who] / max(worked[us], 1e-9),  # its clock may be a coarse one
             times[who].p99,
         )
         for who, case in chosen.items()

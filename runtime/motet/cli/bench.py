@@ -90,7 +90,7 @@ def _print(rows: list[Row], before: dict[str, float], profile: bool) -> None:
             times = row.times
             line += f"  p95 {times.p95:,.3g} p99 {times.p99:,.3g} mean {times.mean:,.3g} cpu {times.processor:,.3g} ms"
         for who, one in row.beside.items():
-            line += f"  x{one.ratio:.2f} of {who} {one.value:,.1f}"
+            line += f"  x{one.ratio:.2f} (cpu x{one.processor_ratio:.2f}) of {who} {one.value:,.1f}"
         if row.share is not None:
             line += f"  {row.gflop:.3g} GFLOP, {100 * row.share:.0f} % of peak"
         if before.get(row.name):
