@@ -7,11 +7,25 @@ shapes: B figures, J bones.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from motet.bundle.graph import Floats
 from motet.motion.feet.lock import joints_of, limbs, reached_by, with_legs
 from motet.motion.humanoid import BONES, HUMANOID, LEG, SOLE, SPINE
-from motet.motion.parts import Part, Quaternion, inverse, parts, plus, product, rotated
+from motet.motion.parts import (
+    Quaternion,
+    computed,
+    inverse,
+    joined,
+    parts,
+    plus,
+    product,
+    rotated,
+    rotated_axis,
+    single,
+    times,
+    yawed,
+)
 from motet.motion.rotations import Array
 
 BACK = [BONES.index(name) for name in SPINE]
@@ -24,17 +38,18 @@ LEAST = 1e-4
 def warped(rotations: Floats, angles: Array) -> Floats:
     """Local quaternions (B, J, 4) with hips and legs turned to the left by angles (B,) in radians; all that the
     spine carries stays as it is."""
-    who = np.flatnonzero(np.abs(angles) > LEAST)
-    if not len(who):
+    who = _those(np.abs(angles) > LEAST)
+    if who is None:
         return rotations
-    found, half = rotations.copy(), parts(angles[who, None] / 2)[0]
+    found, half = rotations.copy("K"), single(angles[who] / 2)
     above: Quaternion = parts(rotations[who, 0])
-    found[who, 0] = np.array(product(_about((0.0, 1.0, 0.0), half), above)).T
+    found[who, 0] = joined(yawed(above, computed(np.sin, half), computed(np.cos, half)))
+    back = half / -len(BACK)
+    sine, cosine = computed(np.sin, back), computed(np.cos, back)
     for bone in BACK:
         own: Quaternion = parts(rotations[who, bone])
-        # about the vertical, as the parent has it
-        back = _about(rotated(inverse(above), (0.0, 1.0, 0.0)), -half / len(BACK))
-        found[who, bone] = np.array(product(back, own)).T
+        up = rotated_axis(inverse(above), 1)  # as the parent has it
+        found[who, bone] = joined(product((*times(up, sine), cosine), own))
         above = product(above, own)
     return found
 
@@ -49,8 +64,8 @@ UNDER = HUMANOID.rest_positions[HUMANOID.index("leftFoot"), 2] + BALL[2]
 def strided(rotations: Floats, contacts: Floats, ways: Array, strides: Array) -> Floats:
     """Local quaternions (B, J, 4) with the balls of the feet led so far along ways (B,), in radians from the facing,
     that strides are these times (B,) as long."""
-    who = np.flatnonzero(np.abs(strides - 1) > LEAST)
-    if not len(who):
+    who = _those(np.abs(strides - 1) > LEAST)
+    if who is None:
         return rotations
     sin, cos, by = parts(np.stack([np.sin(ways[who]), np.cos(ways[who]), strides[who] - 1], axis=1))
     hips: Quaternion = parts(rotations[who, 0])
@@ -60,12 +75,12 @@ def strided(rotations: Floats, contacts: Floats, ways: Array, strides: Array) ->
         x, _, z = plus(places[2], rotated(turned[2], BALL))
         far = ((x - limb.offsets[0][0]) * sin + (z - UNDER) * cos) * by
         legs.append(reached_by(hips, turned, places, plus(places[2], (far * sin, 0.0, far * cos))))
-    found = rotations.copy()
+    found = rotations.copy("K")
     found[who] = with_legs(rotations[who], legs)
     return found
 
 
-def _about(axis: tuple[Part, Part, Part], half: Part) -> Quaternion:
-    """The turn about a unit axis by twice an angle."""
-    sine, (x, y, z) = np.sin(half), axis
-    return x * sine, y * sine, z * sine, np.cos(half)
+def _those(which: NDArray[np.bool_]) -> NDArray[np.intp] | slice | None:
+    """Those (B,) for which it holds, for indices; None for none."""
+    (found,) = which.nonzero()
+    return None if not len(found) else slice(None) if len(found) == len(which) else found

@@ -5,10 +5,13 @@ number, and on many along the figures. Both give the same bits.
 """
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
 
 Part = Any
 """A float or a float64 array."""
@@ -20,6 +23,22 @@ Quaternion = tuple[Part, Part, Part, Part]
 def parts(values: NDArray[Any]) -> tuple[Part, ...]:
     """The parts of vectors (n, k): floats of one, arrays (n,) of more."""
     return tuple(values[0].tolist()) if len(values) == 1 else tuple(np.array(values.T, dtype=np.float64, order="C"))
+
+
+def joined(values: Sequence[Part]) -> Array:
+    """Vectors (n, k) of their parts."""
+    return np.array(values).reshape(len(values), -1).T
+
+
+def single(values: NDArray[Any]) -> Part:
+    """Values (n,) as a part: of one what it is to Python."""
+    return values.tolist()[0] if len(values) == 1 else values
+
+
+def computed(function: np.ufunc, *values: Part) -> Part:
+    """A function of numpy's, of floats a float, rounded as it is in arrays."""
+    found = function(*values)
+    return float(found) if isinstance(found, float) else found
 
 
 def where(condition: Any, yes: Part, no: Part) -> Part:
@@ -39,19 +58,20 @@ def smaller(one: Part, other: Part) -> Part:
     return min(one, other) if isinstance(one, float) else np.minimum(one, other)
 
 
+def clipped(value: Part, low: Part, high: Part) -> Part:
+    """A value within limits."""
+    return smaller(larger(value, low), high)
+
+
+def wrapped(angle: Part) -> Part:
+    """An angle in radians, between -pi and pi."""
+    turns = angle / (2 * math.pi)
+    return angle - 2 * math.pi * (round(turns) if isinstance(turns, float) else np.rint(turns))
+
+
 def root(value: Part) -> Part:
     """The square root."""
     return math.sqrt(value) if isinstance(value, float) else np.sqrt(value)
-
-
-def exp(value: Part) -> Part:
-    """The exponential, of a float rounded as numpy does it."""
-    return float(np.exp(value)) if isinstance(value, float) else np.exp(value)
-
-
-def expm1(value: Part) -> Part:
-    """The exponential less 1."""
-    return float(np.expm1(value)) if isinstance(value, float) else np.expm1(value)
 
 
 def plus(a: Vector, b: Vector) -> Vector:
@@ -105,6 +125,20 @@ def rotated(quat: Quaternion, vector: Vector) -> Vector:
     (x, y, z, w), (a, b, c) = quat, vector
     p, q, r = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
     return a + w * p + y * r - z * q, b + w * q + z * p - x * r, c + w * r + x * q - y * p
+
+
+def yawed(quat: Quaternion, sine: Part, cosine: Part) -> Quaternion:
+    """The product of a turn about the vertical, of which these are of half the angle, and a rotation."""
+    x, y, z, w = quat
+    return cosine * x + sine * z, cosine * y + sine * w, cosine * z - sine * x, cosine * w - sine * y
+
+
+def rotated_axis(quat: Quaternion, axis: int) -> Vector:
+    """A unit vector along x, y or z (0, 1 or 2), rotated by a unit quaternion."""
+    i, j, k, w = quat[axis], quat[(axis + 1) % 3], quat[(axis + 2) % 3], quat[3]
+    p, q = 2 * j, 2 * k
+    found = 1 - j * p - k * q, i * p + w * q, i * q - w * p
+    return found[-axis], found[1 - axis], found[2 - axis]
 
 
 def inverse(quat: Quaternion) -> Quaternion:

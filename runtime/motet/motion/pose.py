@@ -6,6 +6,7 @@ A critically damped spring is the fastest return to rest without overshoot. The 
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from motet.motion.events import Event
 from motet.motion.humanoid import BONES, HUMANOID
+from motet.motion.parts import Part
 from motet.motion.rotations import Array, quat_product, quat_rotated, wrapped
 
 Floats = NDArray[np.float32]
@@ -106,10 +108,16 @@ def damping_of(half_life: float) -> float:
     return 2 * math.log(2) / half_life
 
 
-def damped(off: Values, rate: Values, damping: float | Values, seconds: float) -> tuple[Values, Values]:
-    """A distance from rest and its rate, of one shape, ``seconds`` later (exact); the damping broadcasts."""
-    rise, left = (rate + damping * off) * seconds, np.exp(-damping * seconds).astype(off.dtype)
+def damped(off: Part, rate: Part, damping: Part, seconds: float) -> tuple[Part, Part]:
+    """A distance from rest and its rate, of one shape or floats, ``seconds`` later (exact); the damping broadcasts."""
+    left = _left(damping, seconds) if isinstance(damping, float) else np.exp(-damping * seconds)
+    rise = (rate + damping * off) * seconds
     return (off + rise) * left, (rate - damping * rise) * left
+
+
+@lru_cache
+def _left(damping: float, seconds: float) -> float:
+    return float(np.exp(-damping * seconds))
 
 
 def damped_path(off: Values, rate: Values, damping: float, seconds: float) -> Values:

@@ -296,4 +296,4 @@ def conjugate(quats: NDArray[Any]) -> NDArray[Any]:
 
 def wrapped(angle: NDArray[Any]) -> NDArray[Any]:
     """Angles in radians, between -pi and pi."""
-    return angle - 2 * np.pi * np.round(angle / (2 * np.pi))
+    return angle - 2 * np.pi * np.rint(angle / (2 * np.pi))

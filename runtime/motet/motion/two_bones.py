@@ -1,13 +1,14 @@
 """A leg or an arm that reaches for a place: two-bone inverse kinematics, of one limb or of many at once."""
 
+import numpy as np
+
 from motet.motion.parts import (
     Part,
     Quaternion,
     Vector,
+    computed,
     cross,
     dot,
-    exp,
-    expm1,
     larger,
     length,
     minus,
@@ -57,10 +58,10 @@ class TwoBones:
         away = minus(target, self.hip)
         now, wanted = length(minus(self.ankle, self.hip)), length(away)
         left = larger(self.longest - now, 1e-9)
-        longer = -self.EASED_SHARE * left * expm1(-larger(wanted - now, 0.0) / (self.EASED_SHARE * left))
+        longer = -self.EASED_SHARE * left * computed(np.expm1, -larger(wanted - now, 0.0) / (self.EASED_SHARE * left))
         less = larger(now - wanted, 0.0)
         give, fade = (part * self.longest for part in self.GIVES)
-        shorter = less * less / larger(less + give * exp(-left / fade), 1e-12)
+        shorter = less * less / larger(less + give * computed(np.exp, -left / fade), 1e-12)
         return plus(self.hip, times(away, (now + longer - shorter) / larger(wanted, 1e-12)))
 
     def turns(self, target: Vector) -> tuple[Quaternion, Quaternion]:
