@@ -324,13 +324,13 @@ class Matcher:
             goals, figures = self.goals[kind], np.flatnonzero(gait == kind)
             for start in range(0, len(figures), self.BLOCK):
                 who = figures[start : start + self.BLOCK]
-                costs = query.features[who] @ goals.costs  # (T, n, W)
-                costs += np.maximum(query.lags[who] @ goals.lags, 0)
-                column = costs.argmin(axis=2)
-                least = np.take_along_axis(costs, column[..., None], axis=2)[..., 0]
-                tile, each = least.argmin(axis=0), np.arange(len(who))
-                mirror[who], place = np.divmod(tile * self.TILE + column[tile, each], len(goals.rows))
-                row[who], cost[who] = goals.rows[place], least[tile, each]
+                costs, lags = np.empty((2, len(who), len(goals.costs), self.TILE), np.float32)
+                np.matmul(query.features[who], goals.costs, out=costs.swapaxes(0, 1))
+                np.matmul(query.lags[who], goals.lags, out=lags.swapaxes(0, 1))
+                costs = np.add(costs, np.maximum(lags, 0, out=lags), out=costs).reshape(len(who), -1)
+                column = costs.argmin(axis=1)
+                mirror[who], place = np.divmod(column, len(goals.rows))
+                row[who], cost[who] = goals.rows[place], costs[np.arange(len(who)), column]
         return row, mirror, cost
 
     def cost_at(self, query: Query, row: Rows, mirror: Rows) -> Floats:

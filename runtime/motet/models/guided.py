@@ -52,7 +52,8 @@ class Guidance:
         look, pose = self.look.after(pose, seconds)
         left, pose = self.hands[0].after(pose, seconds)
         right, pose = self.hands[1].after(pose, seconds)
-        return replace(self, look=look, hands=(left, right)), pose
+        rests = look is self.look and (left, right) == self.hands
+        return self if rests else replace(self, look=look, hands=(left, right)), pose
 
 
 class Guided(ABC):

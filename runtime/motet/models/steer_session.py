@@ -170,7 +170,8 @@ class SteerSession(Guided):
         return replace(pose, events=self._happened(pose))
 
     def _happened(self, pose: Pose) -> tuple[Event, ...]:
-        shows, gait, before = self.model.matcher.table.shows[self._playback.row], self._command.gait, self._happenings
+        gait, before = self._command.gait, self._happenings
+        shows = self.model.matcher.table.shows[self._playback.row, gait]
         self._happenings = Happenings.after(before, pose.contacts, gait, shows, self.arrived)
         return tuple(self._happenings.events(before or self._happenings, self.model.gaits))
 

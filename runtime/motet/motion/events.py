@@ -44,27 +44,28 @@ class Happenings:
         shows: NDArray[np.bool_],
         arrived: NDArray[np.bool_],
     ) -> "Happenings":
-        """Those of the next tick, of contacts (B, 2) and gaits (B,) that are asked for; shows: (B, G) which gaits are
-        played, where a gait begins. before: None in the first tick."""
+        """Those of the next tick, of contacts (B, 2) and gaits (B,) that are asked for; shows: (B,) whether these are
+        played. before: None in the first tick."""
+        down = contacts > DOWN
         if before is None:
-            down = contacts > DOWN
-            return Happenings(down, np.where(down.any(axis=1), 0, FLIES), gait, arrived)
-        down = np.where(before.down, contacts >= UP, contacts > DOWN)
-        seen = np.where(shows[np.arange(len(gait)), gait], gait, before.gait)
-        return Happenings(down, np.where(down.any(axis=1), 0, before.air + 1), seen, arrived)
+            return Happenings(down, np.where(down[:, 0] | down[:, 1], 0, FLIES), gait, arrived)
+        down |= before.down & (contacts >= UP)
+        air = np.where(down[:, 0] | down[:, 1], 0, before.air + 1)
+        return Happenings(down, air, np.where(shows, gait, before.gait), arrived)
 
     def events(self, before: "Happenings", gaits: Sequence[str]) -> Iterator[Event]:
         """What has happened since the tick before; ``gaits`` are the names of all."""
-        left, right = (self.down & ~before.down).T
+        flies, flew = self.air >= FLIES, before.air >= FLIES
         flags = {
-            "take-off": (self.air >= FLIES) & (before.air < FLIES),
-            "landing": (self.air == 0) & (before.air >= FLIES),
-            "left foot": left,
-            "right foot": right,
+            "left foot": self.down[:, 0] > before.down[:, 0],
+            "right foot": self.down[:, 1] > before.down[:, 1],
+            "take-off": flies > flew,
+            "landing": (self.air == 0) & flew,
             "gait": self.gait != before.gait,
-            "arrived": self.arrived & ~before.arrived,
+            "arrived": self.arrived > before.arrived,
         }
         kinds = get_args(Happening)
-        for number, character in np.argwhere([flags[kind] for kind in kinds]).tolist():
+        numbers, characters = np.array([flags[kind] for kind in kinds]).nonzero()
+        for number, character in zip(numbers.tolist(), characters.tolist(), strict=True):
             kind = kinds[number]
             yield Event(kind, character, gaits[self.gait[character]] if kind == "gait" else "")

@@ -160,10 +160,12 @@ def swing(start: Vector, end: Vector) -> Quaternion:
     cosine = both + dot(start, end)
     half = cosine < 1e-6 * both
     a, b, c = cross(start, end)
-    tall = abs(x) > abs(z)
-    a, b, c = (
-        where(half, where(tall, -y, 0.0), a),
-        where(half, where(tall, x, -z), b),
-        where(half, where(tall, 0.0, y), c),
-    )
-    return normalised((a, b, c, where(half, 0.0, cosine) + (both == 0)))
+    if half is not False and np.any(half):
+        tall = abs(x) > abs(z)
+        a, b, c = (
+            where(half, where(tall, -y, 0.0), a),
+            where(half, where(tall, x, -z), b),
+            where(half, where(tall, 0.0, y), c),
+        )
+        cosine = where(half, 0.0, cosine)
+    return normalised((a, b, c, cosine + (both == 0)))

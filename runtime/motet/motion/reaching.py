@@ -176,9 +176,8 @@ def _within(way: Vector, side: int, longest: Part) -> Vector:
     x, y, z = (where(inside, own, other) for own, other in zip(way, edge, strict=True))
     nearest, straight, more = (share * longest for share in (NEAREST, STRAIGHT, STRETCHED))
     over = larger(far - straight, 0.0)
-    by = where(over > 0, straight + more * (1 - computed(np.exp, -over / more)), larger(far, nearest)) / larger(
-        far, 1e-12
-    )
+    eased = straight + more * (1 - computed(np.exp, -over / more))
+    by = where(over > 0, eased, larger(far, nearest)) / larger(far, 1e-12)
     return x * by, y * by, z * by
 
 

@@ -26,8 +26,10 @@ from motet.motion.parts import (
     product,
     root,
     rotated,
+    rotated_axis,
     smaller,
     where,
+    yawed,
 )
 from motet.motion.pose import Floats, Pose, damping_of
 from motet.motion.two_bones import TwoBones
@@ -97,7 +99,8 @@ class FootLock:
 
     def held(self, pose: Pose) -> Pose:
         """The next pose, one tick later, with standing feet held in place and above ground."""
-        hips = product(parts(pose.heading), parts(pose.rotations[:, 0]))
+        half = (pose.ground[:, 2] / 2).astype(np.float32)
+        hips = yawed(parts(pose.rotations[:, 0]), *parts(np.array([np.sin(half), np.cos(half)]).T))
         (x, z, _), (height,) = parts(pose.ground), parts(pose.height[:, None])
         legs = zip(self.feet, limbs(pose.rotations, pose.contacts), strict=False)
         found = [self._stood(foot, limb, hips, (x, height, z)) for foot, limb in legs]
@@ -116,7 +119,7 @@ class FootLock:
             return after, played
         x, y, z = places[2]
         reached = reached_by(hips, turned, places, (x + shift_x, y + lift, z + shift_z))
-        if moves is True:
+        if moves is True or moves.all():
             return after, reached
         return after, [
             (where(moves, a, e), where(moves, b, f), where(moves, c, g), where(moves, d, h))
@@ -154,7 +157,7 @@ def limbs(rotations: Floats, contacts: Floats) -> Iterator[Limb]:
         for bones, offsets, contact in zip(LEG_BONES, OFFSETS.tolist(), contacts[0].tolist(), strict=True):
             yield Limb(rotations[0, bones].tolist(), offsets, contact)
     else:
-        local = np.array(rotations[:, LEG_BONES].transpose(2, 3, 1, 0), dtype=np.float64, order="C")
+        local = np.array(rotations.transpose(1, 2, 0)[LEG_BONES].transpose(1, 2, 0, 3), dtype=np.float64, order="C")
         offsets = OFFSETS.transpose(1, 2, 0)[..., None]
         yield Limb([tuple(quats) for quats in local], [tuple(offset) for offset in offsets], contacts.T)
 
@@ -163,8 +166,10 @@ def with_legs(rotations: Floats, legs: list[list[Quaternion]]) -> Floats:
     """Rotations of poses with others of thighs, shins and feet, of legs as :func:`limbs` gives them."""
     # joints, their parts, and both sides of each character; or the sides of one, joints, their parts
     turned: NDArray[Any] = np.array(legs)
-    found = rotations.copy()
-    found[:, LEG_BONES[:, :3]] = turned if len(legs) == 2 else turned[0].transpose(3, 2, 0, 1)
+    found = rotations.copy("K")
+    found.transpose(1, 2, 0)[LEG_BONES[:, :3]] = (
+        turned[..., None] if len(legs) == 2 else turned[0].transpose(2, 0, 1, 3)
+    )
     return found
 
 
@@ -183,7 +188,7 @@ def reached_by(hips: Quaternion, turned: list[Quaternion], places: list[Vector],
     """Rotations of thigh, shin and foot in their parents' frames, of a leg with its ankle at a target; the foot stays
     as it is in the world."""
     thigh, shin, foot = turned[:3]
-    leg = TwoBones(places[0], places[1], places[2], rotated(shin, (1.0, 0.0, 0.0)))
+    leg = TwoBones(places[0], places[1], places[2], rotated_axis(shin, 0))
     turn_thigh, turn_shin = leg.turns(leg.eased(target))
     thigh, shin = product(turn_thigh, thigh), product(turn_shin, shin)
     return [product(inverse(hips), thigh), product(inverse(thigh), shin), product(inverse(shin), foot)]
