@@ -12,10 +12,7 @@ from fake_codes import ACTIONS, END, KNOWN, NULL_ACTION, PARTS, memory_tables, n
 from numpy.typing import NDArray
 
 from motet.decode.codes import (
-    LEAP,
-    PAST,
     CodesSettings,
-    Memory,
     Source,
     Writer,
     draw_codes,
@@ -23,6 +20,7 @@ from motet.decode.codes import (
     drawn_steps,
     nucleus,
 )
+from motet.decode.memory import LEAP, PAST, Memory
 
 Array = NDArray[Any]
 PLAIN = CodesSettings()

@@ -15,9 +15,10 @@ from motet.bundle.fields import Fields
 from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
 from motet.decode.codec import Codec, Context, ReceptiveField, StreamingDecoder
-from motet.decode.codes import CodesSettings, Memory, Source, Writer, draw_codes, drawn_actions
+from motet.decode.codes import CodesSettings, Source, Writer, draw_codes, drawn_actions
 from motet.decode.continue_codes import ContinuationSettings
 from motet.decode.loop import Noise, Sample, apart
+from motet.decode.memory import Memory
 from motet.errors import BundleError, DecodingError, MotionError, TextError, TextWarning, warn
 from motet.models.amounts import Seen, short
 from motet.models.compose import Composition, compose
@@ -222,9 +223,8 @@ class CodesModel(GenerateModel):
         nouns = self._verbs & self._stems[likeliest] - self._done[likeliest]
         for verb in OWN.findall(self.vocabulary.rules.normalise(sentence)):
             if stem(verb) in nouns:
-                warn(
-                    f"{verb!r} is nothing that is done in {self._sentences[likeliest]!r} (in {sentence!r})", TextWarning
-                )
+                shown = self._sentences[likeliest]
+                warn(f"{verb!r} is nothing that is done in {shown!r} (in {sentence!r})", TextWarning)
         found = self._understood(sentence, context)
         if found.confident:
             return

@@ -76,22 +76,29 @@ export class Writer {
 
   /**
    * The next step (B, P) of rows with the given actions; an action that would end begins again unless it may end.
-   * steps: of this and those to come, where they are to show the most of an action that begins; else 0.
+   * steps: of this and those to come, where they are to show the most of an action that begins; else 0. whole: as for
+   * the memory's `next`.
    */
-  async draw(actions: number[], ends: boolean, steps: number): Promise<number[][]> {
+  async draw(actions: number[], ends: boolean, steps: number, whole: boolean): Promise<number[][]> {
     const known = await this.known(actions);
     const uniform = this.noise.map((one) => one.uniform(this.source.parts + 2));
     const { memory } = this.source;
-    const places = actions.map((action, row) => this.remembered(action, row, ends, steps, uniform[row]!));
+    const places = actions.map((action, row) => this.remembered(action, row, ends, steps, whole, uniform[row]!));
     const from = places.map((place, row) => (steps && place !== undefined ? memory.ages[place]! : this.now.age[row]!));
     this.now = { ...this.now, age: from };
-    const given = places.map((place) => (place === undefined ? undefined : memory.codes(place)));
+    const after = places.map((place, row) => (place === undefined ? undefined : memory.after(actions[row]!, place, whole)));
+    const given = places.map((place, row) => (place === undefined ? undefined : this.step(place, ends && after[row]!.end)));
     const { codes, again } = await this.drawn(known, uniform.map((block) => block.slice(2)), given, ends);
     const age = from.map((one, row) => (again[row] ? 0 : one + 1));
-    const over = places.map((place, row) => (place === undefined ? this.now.done[row]! : memory.after(place)));
-    const done = over.map((one, row) => (again[row] ? 0 : one));
+    const done = after.map((one, row) => (again[row] ? 0 : (one?.done ?? this.now.done[row]!)));
     this.now = { ...this.now, last: [...codes, ...codes], age, done };
     return codes;
+  }
+
+  /** The codes of a remembered step, or of an end. */
+  private step(place: number, end: boolean): number[] {
+    const [move, ...body] = this.source.memory.codes(place);
+    return [end ? this.source.end : move!, ...body];
   }
 
   /** Undo the last draw, such as that of an end. */
@@ -131,13 +138,15 @@ export class Writer {
   }
 
   /** A row of the memory that is gone on with, or none where the net draws the step. */
-  private remembered(action: number, row: number, ends: boolean, steps: number, uniform: number[]): number | undefined {
+  private remembered(
+    action: number, row: number, ends: boolean, steps: number, whole: boolean, uniform: number[],
+  ): number | undefined {
     const { memory } = this.source;
     const { age, done, recent } = this.now;
     const share = this.drawing.memory;
     if (!(uniform[0]! < share || (steps && share > 0)) || !memory.knows(action)) return undefined;
     if (steps) return memory.busiest(action, recent[row]!, steps, uniform[1]!);
-    return memory.next(action, recent[row]!, age[row]!, ends, uniform[1]!, done[row]!);
+    return memory.next(action, recent[row]!, age[row]!, ends, uniform[1]!, done[row]!, whole);
   }
 
   /** The codes of rows, one after the other where they are not given; and which rows begin their action again. */
@@ -189,7 +198,7 @@ export async function* drawnSteps(writer: Writer, actions: number[], longest: nu
   writer.begin();
   for (let length = 0; length < longest; length++) {
     const steps = exactly && !length ? longest : 0;
-    const codes = await writer.draw(rows.map((row) => actions[row]!), !exactly && length > 0, steps);
+    const codes = await writer.draw(rows.map((row) => actions[row]!), !exactly && length > 0, steps, exactly);
     const going = codes.flatMap((step, at) => (step[0] === writer.source.end ? [] : [at]));
     if (!going.length) return writer.takeBack();
     if (going.length < rows.length) writer.keep(going);

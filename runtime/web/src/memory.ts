@@ -19,17 +19,36 @@ const POSE = 1;
 /** The share of the most that a number of steps can show from which on a start is as good. */
 const GOOD = 0.95;
 
+/** Steps of the shortest act: a recording that is not longer counts as one. */
+const WHOLE = 45;
+/** The share of a recording's act that shows it. */
+const ALL = 0.95;
+/** The squared distance of two places up to which the one shows what the other shows. */
+const ALIKE = 8.03;
+/** Steps that an act may be longer to begin, or end, as its recording does. */
+const UNLIKE = 30;
+/** The age of what is not shown. */
+const FAR = 2 ** 20;
+
+/** Of each row of an action its age, and the share of the action that is over before it. */
+interface Course {
+  ages: number[];
+  over: number[];
+}
+
 /** Remembered steps of codes: docs/bundle.md, the loop `codes`. */
 export class Memory {
   readonly steps: number;
   readonly ages: Int32Array;
   private readonly parts: Float64Array;
+  private readonly particular: Float64Array;
   private readonly acts: Float64Array;
   private readonly lasts: Int32Array;
   /** Numbers of the codes of all steps, and how many a step has. */
   private readonly numbers: Float32Array;
   private readonly width: number;
   private readonly rows = new Map<number, number[]>();
+  private readonly shown = new Map<number, Course>();
 
   /** table: (M, P + 2) codes, action, age. moves: (E, 3). body: (V, L). actions: how many there are. */
   constructor(private readonly table: NumberArray, moves: NumberArray, body: NumberArray, actions: number) {
@@ -43,7 +62,8 @@ export class Memory {
     const changes = this.changes(moves.shape[1]!, moves.shape[0]!);
     this.parts = this.over(changes.map((change) => REST + change));
     const rare = this.rarity(body.shape[0]!, moves.shape[0]!);
-    this.acts = this.over(changes.map((change, row) => (POSE + change) * Math.exp(rare[row]!)));
+    this.particular = changes.map((change, row) => (POSE + change) * Math.exp(rare[row]!));
+    this.acts = this.over(this.particular);
   }
 
   /** How much the numbers of the body change before each step, squared; none before a motion's first and its end. */
@@ -125,26 +145,100 @@ export class Memory {
     return Array.from(this.table.data.subarray(row * columns, (row + 1) * columns - 2), Number);
   }
 
-  /** The share of the movement of its motion that is over after a step. */
-  after(row: number): number {
-    return this.parts[Math.min(row + 1, this.lasts[row]!)]!;
+  /** Whether an act ends at a row, and the share of it that is over after it. whole: as for `next`. */
+  after(action: number, row: number, whole: boolean): { end: boolean; done: number } {
+    const { over } = this.course(action, whole);
+    const at = this.rows.get(action)!.indexOf(row);
+    return { end: over[at] === 1, done: over[row < this.lasts[row]! ? at + 1 : at]! };
   }
 
   /**
    * The row at which an action continues. recent: numbers of the last steps, the latest first. ends: whether it may end
-   * where remembered motions do. done: the share of the movement that is over.
+   * where remembered motions do. done: the share of it that is over. whole: all of it is shown; else, of long
+   * recordings, an act.
    */
-  next(action: number, recent: Float32Array[], age: number, ends: boolean, uniform: number, done: number): number {
+  next(
+    action: number, recent: Float32Array[], age: number, ends: boolean, uniform: number, done: number, whole: boolean,
+  ): number {
     const all = this.rows.get(action)!;
+    const { ages, over } = this.course(action, whole);
     if (!recent.length) {
-      const least = all.reduce((found, row) => Math.min(found, this.ages[row]!), Infinity);
-      const starts = all.filter((row) => this.ages[row] === least);
+      const least = ages.reduce((a, b) => Math.min(a, b));
+      const starts = all.filter((_, at) => ages[at] === least);
       return starts[Math.floor(uniform * starts.length)]!;
     }
-    const fitting = all.filter(
-      (row) => (age ? this.ages[row]! > 0 : this.parts[row]! < EARLY) && this.parts[row]! <= done + LEAP,
-    );
-    return this.near(fitting.length ? fitting : all, recent, age, ends, uniform);
+    const places = [...all.keys()];
+    const fitting = places.filter((at) => (age ? ages[at]! > 0 : over[at]! < EARLY) && over[at]! <= done + LEAP);
+    const used = fitting.length ? fitting : places;
+    return this.near(used.map((at) => all[at]!), used.map((at) => ages[at]!), recent, age, ends, uniform);
+  }
+
+  /** The ages of an action's rows and the shares that are over; unless all is shown those of its acts, which end at 1. */
+  private course(action: number, whole: boolean): Course {
+    const rows = this.rows.get(action)!;
+    const found = { ages: rows.map((row) => this.ages[row]!), over: rows.map((row) => this.parts[row]!) };
+    if (whole) return found;
+    const known = this.shown.get(action);
+    if (known) return known;
+    for (const { take, pieces } of this.takes(rows)) {
+      const [first, last] = this.act(take);
+      if (last + 1 - first === take.length) continue;
+      rows.forEach((row, at) => {
+        if (!pieces.has(this.lasts[row]!)) return;
+        const age = this.ages[row]! - this.ages[take[first]!]!;
+        const inside = age >= 0 && age <= last - first;
+        found.ages[at] = inside ? age : FAR;
+        found.over[at] = inside ? age / (last - first) : Infinity;
+      });
+    }
+    this.shown.set(action, found);
+    return found;
+  }
+
+  /** The rows of each recording, and the last rows of its pieces, each of which begins within the one before. */
+  private takes(rows: number[]): { take: number[]; pieces: Set<number> }[] {
+    const motions = [...new Set(rows.map((row) => this.lasts[row]!))].map((last) => rows.filter((row) => this.lasts[row] === last));
+    const found: { take: number[]; pieces: Set<number> }[] = [];
+    for (const piece of motions.sort((a, b) => this.ages[a[0]!]! - this.ages[b[0]!]!)) {
+      const codes = (some: number[]) => some.map((row) => this.codes(row)).join();
+      const place = (take: number[]) => this.ages[piece[0]!]! - this.ages[take[0]!]!;
+      const begin = codes(piece.slice(0, PAST.length));
+      const before = found.find(({ take }) => place(take) > 0 && codes(take.slice(place(take), place(take) + PAST.length)) === begin);
+      const last = this.lasts[piece[0]!]!;
+      if (!before) found.push({ take: piece, pieces: new Set([last]) });
+      else {
+        before.take = [...before.take, ...piece.slice(before.take.length - place(before.take))];
+        before.pieces.add(last);
+      }
+    }
+    return found;
+  }
+
+  /** From which to which place the rows of a recording are an act: what shows most of it, is short, and begins and ends as it. */
+  private act(take: number[]): [number, number] {
+    const end = take.length - 1;
+    let best: [number, number] = [0, end];
+    if (end <= WHOLE) return best;
+    const past = take.map((row) => PAST.map((_, back) => this.past(row, back)));
+    const apart = take.map((row) => Float64Array.from(past, (seen) => this.distance(row, seen)));
+    const enough = ALL * take.reduce((sum, row) => sum + this.particular[row]!, 0);
+    const edge = (to: number, at: number) => Math.min(apart[to]![at]! / ALIKE, 1);
+    const shown = take.map(() => end + 1); // where each step is first shown, from a place on
+    let least = Infinity;
+    const found: [number, number, number][] = [];
+    for (let first = end; first >= 0; first--) {
+      take.forEach((_, at) => (shown[at] = apart[first]![at]! <= ALIKE ? first : shown[at]!));
+      const order = [...take.keys()].sort((a, b) => shown[a]! - shown[b]! || a - b);
+      let [sum, k] = [0, 0];
+      while (k < end && (sum += this.particular[take[order[k]!]!]!) < enough) k++;
+      for (let last = Math.max(shown[order[k]!]! + 1, first + WHOLE); last <= end; last++) {
+        found.push([last - first + UNLIKE * (edge(0, first) + Math.min(edge(0, last), edge(end, last))), first, last]);
+      }
+    }
+    for (const [cost, first, last] of found.sort((a, b) => a[1] - b[1] || a[2] - b[2])) {
+      if (cost < least) [least, best] = [cost, [first, last]];
+    }
+    return best;
   }
 
   /** The row at which an action is taken up to show the most of it in a number of steps. recent: as for `next`. */
@@ -161,14 +255,14 @@ export class Memory {
       while (at < all.length && all[at]! <= last) at++;
     }
     if (!recent.length) return found[Math.floor(uniform * found.length)]!;
-    return this.near(found, recent, 0, false, uniform);
+    return this.near(found, found.map((row) => this.ages[row]!), recent, 0, false, uniform);
   }
 
   /** A row whose past resembles the present. */
-  private near(rows: number[], recent: Float32Array[], age: number, ends: boolean, uniform: number): number {
+  private near(rows: number[], ages: number[], recent: Float32Array[], age: number, ends: boolean, uniform: number): number {
     const off = new Float64Array(rows.length);
     for (let at = 0; at < rows.length; at++) {
-      const later = LATER * (this.ages[rows[at]!]! - age) ** 2;
+      const later = LATER * (ages[at]! - age) ** 2;
       off[at] = this.distance(rows[at]!, recent) + (ends ? later : Math.min(later, LATEST));
     }
     const least = off.reduce((a, b) => Math.min(a, b));
@@ -177,14 +271,20 @@ export class Memory {
     return rows[shares.findIndex((share) => share > uniform * sum)] ?? rows.at(-1)!;
   }
 
+  /** The numbers of the step so many before a row and the one before it, of its own motion. */
+  private past(row: number, back: number): Float32Array {
+    const start = (row - Math.min(this.ages[row]!, back + 1)) * this.width;
+    return this.numbers.subarray(start, start + this.width);
+  }
+
   private distance(row: number, recent: Float32Array[]): number {
     let sum = 0;
     for (let back = 0; back < PAST.length; back++) {
       const seen = recent[Math.min(back, recent.length - 1)]!;
-      const start = (row - Math.min(this.ages[row]!, back + 1)) * this.width;
+      const own = this.past(row, back);
       let apart = 0;
       for (let at = 0; at < this.width; at++) {
-        const off = this.numbers[start + at]! - seen[at]!;
+        const off = own[at]! - seen[at]!;
         apart += off * off;
       }
       sum += PAST[back]! * apart;
