@@ -93,7 +93,7 @@ class Writer:
             self._known(np.full(len(self.noise), self.source.null_action))
             self.last = np.tile(step, (len(self.last), 1))
 
-    def draw(self, actions: Ids, ends: bool = True, steps: int = 0, whole: bool = False) -> Ids:
+    def draw(self, actions: Ids, ends: bool = True, steps: int = 0, whole: bool = True) -> Ids:
         """The next step (B, P) of rows with the given actions (B,).
 
         ends: whether a motion may end; else an action that would end begins again. steps: of this and those to come,
