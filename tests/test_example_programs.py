@@ -39,8 +39,9 @@ def test_captions(tmp_path: Path, walk: Motion) -> None:
 
 
 def test_game_loop() -> None:
-    ticks, x, z = map(float, re.findall(r"-?[\d.]+", run("game_loop.py", "2"))[:3])
+    ticks, x, z, away = map(float, re.findall(r"-?[\d.]+", run("game_loop.py", "2"))[:4])
     assert ticks == 60
+    assert 0.3 < away < 2.5  # the friend comes along
     assert x > 0.5  # it went to its left
     assert z > 0.5
 

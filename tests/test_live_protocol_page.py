@@ -47,7 +47,7 @@ def with_server(scenario: Callable[[Tell, Message], Awaitable[None]]) -> None:
     """Run what a client says beside a server that is five times as fast as life."""
 
     async def both() -> None:
-        server = LiveServer(motet.load("control"), port=0, rate=150)
+        server = LiveServer(motet.load("control"), port=0, rate=150, words=motet.load("generate"))
         async with server, connect(f"ws://127.0.0.1:{server.port}", max_queue=None) as client, asyncio.timeout(60):
             count = 0
 
@@ -75,9 +75,9 @@ def going(before: Message, after: Message) -> Any:
 
 
 def test_every_message_of_the_page_does_what_it_says() -> None:
-    run, velocity, start, put, push, go, look, reach = of_a_client()
-    kinds = [one["type"] for one in (run, velocity, start, put, push, go, look, reach)]
-    assert kinds == ["control", "control", "start", "put", "push", "go_to", "look_at", "reach"]
+    run, velocity, start, put, push, go, look, act, reach = of_a_client()
+    kinds = [one["type"] for one in (run, velocity, start, put, push, go, look, act, reach)]
+    assert kinds == ["control", "control", "start", "put", "push", "go_to", "look_at", "act", "reach"]
 
     async def scenario(tell: Tell, hello: Message) -> None:
         shown = of_the_server()["hello"]
@@ -121,6 +121,11 @@ def test_every_message_of_the_page_does_what_it_says() -> None:
         ahead = (await tell({"type": "reach", "hand": "left"}))["characters"][0]["rotations"][head]
         aside = (await tell(look))["characters"][0]["rotations"][head]
         assert aside[1] > ahead[1] + 0.05  # to the left
+        before, waving = await tell({"type": "look_at"}), await tell(act, 30)
+        arms = [hello["bones"].index(f"{side}UpperArm") for side in ("left", "right")]
+        turned = np.subtract(*(np.array(one["characters"][0]["rotations"])[arms] for one in (before, waving)))
+        assert np.abs(turned).max() > 0.2
+        await tell({"type": "act"})
         gone = (await tell(go, 240))["characters"][0]
         np.testing.assert_allclose(np.array(gone["position"])[[0, 2]], go["points"], atol=0.08)
         x, y, z, w = gone["rotation"]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from motet import ControlError, SteerModel, SteerSession, load
+from motet.models.scripts import parse_orders
 from motet.motion import looking, reaching
 from motet.motion.humanoid import BONES, HUMANOID
 from motet.motion.pose import Pose
@@ -194,3 +195,12 @@ def test_points_that_make_no_sense_are_refused(model: SteerModel, points: Any, w
     assert session.snapshot().guidance is before
     with pytest.raises(ControlError, match="unknown hand 'both'; expected left or right"):
         session.reach("both", (0, 1, 2))  # type: ignore[arg-type]
+
+
+def test_a_script_sends_a_figure_to_a_point(model: SteerModel) -> None:
+    session = model.start()
+    poses = list(session.follow(parse_orders("walk 1s, go to 1 3 facing 90 8s, stop 1s", model.gaits)))
+    assert len(poses) == 300
+    x, z, facing = poses[-1].ground[0]
+    assert np.hypot(x - 1, z - 3) < 0.1
+    assert abs(np.degrees(facing) - 90) < 10

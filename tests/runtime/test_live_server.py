@@ -9,12 +9,13 @@ import time
 from collections.abc import Callable, Coroutine
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
-from motet.errors import OutputError
+from motet.decode.acts import Act, ActSettings
+from motet.errors import ControlError, OutputError, TextError
 from motet.models.steer import SteerModel
 from motet.motion.humanoid.bones import BONES, HUMANOID
 from motet.motion.pose import Pose
@@ -23,7 +24,7 @@ pytest.importorskip("websockets", reason="the extra live is not installed")
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from motet.live.protocol import CLIENT_FIGURES, LARGEST_COMMAND, ClientSession
+from motet.live.protocol import CLIENT_FIGURES, LARGEST_COMMAND, ClientSession, sentences
 from motet.live.server import LIMITS, LiveServer
 
 Message = dict[str, Any]
@@ -153,6 +154,56 @@ def test_points_are_gone_to_looked_at_and_reached_for_and_events_told(steer_mode
     same_for(20, {"look_at": {}, "reach": {"hand": "left"}, "go_to": {}})
 
 
+class Said:
+    """Makes one act, slowly; a sentence that it does not know is refused."""
+
+    def __init__(self, model: SteerModel) -> None:
+        raised = np.tile(np.float32([0, 0, 0, 1]), (40, len(BONES), 1))
+        raised[:, BONES.index("leftUpperArm"), 2] = np.linspace(0, 1, 40)
+        numbers = np.column_stack([raised.reshape(40, -1), np.zeros((40, 3), np.float32), np.full(40, 0.95)])
+        self.made = Act.of("wave", numbers.astype(np.float32), model.fps, model.settings(ActSettings))
+
+    def act(self, sentence: str) -> Act:
+        if sentence != "wave":
+            raise TextError(f"the model knows no word of {sentence!r}")
+        time.sleep(0.05)
+        return self.made
+
+
+def test_acts_are_told_in_words_and_what_is_not_known_is_said(steer_model: SteerModel) -> None:
+    async def scenario(server: LiveServer) -> None:
+        server.words = cast(Any, Said(steer_model))
+        async with client(server) as connection:
+            await told(connection, "act", motion="fly")
+            assert "knows no word of 'fly'" in (await next_of(connection, "note"))["message"]
+            await told(connection, "act", motion="wave", upper=True)
+            seen = await frames(connection, 30, lambda frame: frame["heard"] == 2)
+        session = steer_model.start()
+        for _ in range(seen[0]["tick"] - 1):
+            session.tick()
+        session.act(Said(steer_model).made, upper=True)
+        for frame in seen:
+            check_same(frame["characters"][0], session.tick())
+        assert session.acting[0] is not None
+
+    serving(steer_model, scenario)
+
+
+def test_a_client_ends_an_act_and_acts_need_words(steer_model: SteerModel) -> None:
+    one = ClientSession(steer_model, 2, cast(Any, Said(steer_model)))
+    assert one.handle('{"type": "act", "motion": ["wave", null]}') == []
+    one.tick()
+    assert [act and act[0] for act in one.session.acting] == ["wave", None]
+    one.handle('{"type": "start", "characters": 1}')
+    one.handle('{"type": "act", "motion": "wave"}')
+    one.handle('{"type": "act"}')
+    assert one.session.acting == [None]
+    assert sentences('{"type": "act", "motion": ["wave", null, "bow"]}') == ["wave", "bow"]
+    assert sentences('{"type": "put", "places": [0, 0, 0]}') == sentences('{"type": "act"}') == []
+    with pytest.raises(ControlError, match="an act in words needs a model"):
+        ClientSession(steer_model).handle('{"type": "act", "motion": "wave"}')
+
+
 def test_clients_do_not_touch_each_other(steer_model: SteerModel) -> None:
     async def scenario(server: LiveServer) -> None:
         async with client(server) as first, client(server) as second:
@@ -188,6 +239,8 @@ def test_clients_do_not_touch_each_other(steer_model: SteerModel) -> None:
         ('{"type": "push"}', "push: expected velocity"),
         ('{"type": "reach", "points": [0, 1, 0]}', "reach: expected hand"),
         ('{"type": "reach", "hand": "third"}', "reach, hand: expected left or right"),
+        ('{"type": "act", "motion": ["wave", 3]}', "act, motion: expected a sentence, or a list of sentences and null"),
+        ('{"type": "act", "motion": "wave"}', "an act in words needs a model that makes it"),
         ('{"type": "look_at", "points": [0, 1]}', "points need x, y and z"),
         ('{"type": "go_to", "points": "home"}', "go_to, points: expected numbers"),
         ('{"type": "put", "places": [1, 2]}', "places need x, z and facing"),

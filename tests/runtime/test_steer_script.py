@@ -17,6 +17,10 @@ def test_orders_say_what_to_do_in_any_order_of_their_words() -> None:
         Order("run", None, 0.0, -45.0, 4.0, "run turn right 45 4s"),
         Order(None, 0.0, None, 0.0, 1.5, "stop"),
     ]
+    assert parse_orders("go to 2 -3.5, go to -.5 0 speed 1.2 facing -90 4s", GAITS) == [
+        Order(None, None, None, 0.0, 5.0, "go to 2 -3.5", goal=(2.0, -3.5)),
+        Order(None, 1.2, None, 0.0, 4.0, "go to -.5 0 speed 1.2 facing -90 4s", goal=(-0.5, 0.0), facing=-90.0),
+    ]
     assert captions(parse_orders("walk, turn left 90 2s,stop 1s", GAITS)) == [
         (0.0, "walk"),
         (2.0, "turn left 90 2s"),
@@ -27,7 +31,7 @@ def test_orders_say_what_to_do_in_any_order_of_their_words() -> None:
 @pytest.mark.parametrize(
     ("script", "position", "reason"),
     [
-        ("", 0, "expected an order here: walk, run, turn, stop or act"),
+        ("", 0, "expected an order here: walk, run, turn, stop, act, go"),
         ("walk 3s,", 8, "expected an order"),
         ("walk 3s, , run", 9, "expected an order"),
         ("swim 3s", 0, "unknown order 'swim'"),
@@ -39,6 +43,13 @@ def test_orders_say_what_to_do_in_any_order_of_their_words() -> None:
         ("walk 3s 4s", 8, "gives its seconds twice"),
         ("walk 9999s", 0, "at most 3600 s"),
         ("walk -3s", 5, "expected seconds"),
+        ("walk 3s facing 90", 8, "expected seconds"),
+        ("go 2 3", 3, "expected to, such as go to 2 3.5"),
+        ("go to 2", 6, "expected z in metres after this"),
+        ("go to 2 far", 8, "expected z in metres, such as"),
+        ("go to 2 3 facing ahead", 17, "expected degrees, such as"),
+        ("go to 2 3 backwards", 10, "takes seconds, speed and facing, each once"),
+        ("go to 2 3 facing 4 facing 5", 26, "takes seconds, speed and facing, each once"),
         ("walk>run 3s", 0, "unknown order 'walk>run'"),
     ],
 )

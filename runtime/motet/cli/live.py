@@ -11,6 +11,7 @@ from motet.cli.options import bundle_option, session_options
 from motet.demo import write_demo
 from motet.files import check_place
 from motet.live.page import write_live_page
+from motet.models.generate import GenerateModel
 from motet.models.load import load_as
 from motet.models.steer import SteerModel
 
@@ -59,7 +60,8 @@ def live(
     target = None if osc is None else _address(osc)
     model = load_as(SteerModel, bundle, session)
     if port is not None:
-        _serve(model, target, host, port=port, characters=characters, origins=origins)
+        words = load_as(GenerateModel, "generate", session)
+        _serve(model, target, host, port=port, characters=characters, origins=origins, words=words)
     elif target is not None and script is not None:
         _follow(model, target, script)
 

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.errors import ControlError, ControlWarning, MotetError, quoted
+from motet.errors import ControlError, ControlWarning, MotetError, TextError, quoted
 from motet.models.guided import LARGEST_COMMAND
+from motet.models.said_acts import SaidActs
 from motet.models.steer import SteerModel
 from motet.motion.humanoid import BONES, HUMANOID, LEFT_RIGHT
 from motet.motion.pose import Pose
@@ -29,6 +30,7 @@ KEYS = {
     "go_to": ("points", "facing", "gait", "speed"),
     "look_at": ("points",),
     "reach": ("hand", "points"),
+    "act": ("motion", "upper"),
 }
 """Type of a client's message -> what may stand in it."""
 
@@ -41,10 +43,11 @@ class ProtocolError(MotetError, ValueError):
 
 
 class ClientSession:
-    """The characters of one client. heard: how many of its messages they have obeyed. ticks: since they started."""
+    """The characters of one client. words: makes the acts that it tells in sentences. heard: how many of its messages
+    they have obeyed. ticks: since they started."""
 
-    def __init__(self, model: SteerModel, characters: int = 1) -> None:
-        self.model, self.heard = model, 0
+    def __init__(self, model: SteerModel, characters: int = 1, words: SaidActs | None = None) -> None:
+        self.model, self.words, self.heard = model, words, 0
         self._start({"characters": characters})
 
     def handle(self, text: str | bytes) -> list[str]:
@@ -55,18 +58,28 @@ class ClientSession:
         kind, given = parsed(text)
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", ControlWarning)
-            if kind == "start":
-                self._start(given)
-            else:
-                nowhere = {"points": None} if "points" in KEYS[kind] else {}
-                getattr(self.session, kind)(**{**nowhere, **given})
+            unknown = self._obey(kind, given)
         self.heard += 1
-        return [str(warning.message) for warning in caught]
+        return [*unknown, *(str(warning.message) for warning in caught)]
+
+    def _obey(self, kind: str, given: dict[str, Any]) -> list[str]:
+        """Do what a message says; why an act is not known."""
+        if kind == "start":
+            self._start(given)
+        elif kind == "act":
+            try:
+                self.session.act(given.pop("motion", None), **given)
+            except TextError as error:
+                return [str(error)]
+        else:
+            nowhere = {"points": None} if "points" in KEYS[kind] else {}
+            getattr(self.session, kind)(**{**nowhere, **given})
+        return []
 
     def _start(self, given: dict[str, Any]) -> None:
         characters, positions = given.pop("characters", 1), given.pop("positions", False)
         checked_int("characters", characters, 1, CLIENT_FIGURES, ControlError)
-        self.session = self.model.start(given.pop("gait", None), characters=characters, **given)
+        self.session = self.model.start(given.pop("gait", None), characters=characters, words=self.words, **given)
         self.positions, self.ticks = positions, 0
 
     def tick(self) -> Pose:
@@ -139,9 +152,21 @@ def _unfit(kind: str, name: str, value: Any) -> str | None:
         return "the name of a gait"
     if name == "hand" and value not in LEFT_RIGHT:
         return " or ".join(LEFT_RIGHT)
-    if name in ("hold_feet", "positions") and not isinstance(value, bool):
+    if name == "motion" and not all(one is None or isinstance(one, str) for one in _each(value)):
+        return "a sentence, or a list of sentences and null"
+    if name in ("hold_feet", "positions", "upper") and not isinstance(value, bool):
         return "true or false"
     return None
+
+
+def sentences(text: str | bytes) -> list[str]:
+    """What a client's message tells its figures to do in words, so that it can be made before it is obeyed."""
+    kind, given = parsed(text)
+    return [one for one in _each(given.get("motion")) if one] if kind == "act" else []
+
+
+def _each(value: Any) -> list[Any]:
+    return value if isinstance(value, list) else [value]
 
 
 def _numeric(value: Any, depth: int) -> bool:

@@ -8,12 +8,15 @@ import logging
 import re
 import socket
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Protocol, Self
 
-from motet.errors import MotetError, OutputError
+from motet.errors import MotetError, OutputError, TextError
 from motet.live import protocol
 from motet.live.protocol import ClientSession, ProtocolError
+from motet.models.generate import GenerateModel
+from motet.models.said_acts import SaidActs
 from motet.models.steer import SteerModel
 from motet.motion.pose import Pose
 
@@ -106,7 +109,8 @@ class LiveClients:
     """The clients of a server, whichever way they come: :meth:`client` is all of one.
 
     characters: that a client has at first. rate: ticks a second, by default the model's, which is life's speed. watch:
-    called with each pose of the client that is here the longest. ControlError for a number of characters that a client
+    called with each pose of the client that is here the longest. words: makes the acts that clients tell in sentences;
+    without it these are refused. ControlError for a number of characters that a client
     cannot have.
     """
 
@@ -117,8 +121,10 @@ class LiveClients:
         rate: float | None = None,
         watch: Callable[[Pose, float], None] | None = None,
         limits: Limits = LIMITS,
+        words: GenerateModel | None = None,
     ) -> None:
         self.model, self.characters = model, characters
+        self.words = None if words is None else SaidActs(model, words)
         self.rate, self.watch, self.limits = rate or model.fps, watch, limits
         ClientSession(model, characters)  # refuses now what it would refuse every client
         self._clients: list[ClientSession] = []
@@ -129,7 +135,7 @@ class LiveClients:
             said = f"there are {len(self._clients)} clients already, of {self._figures()} figures"
             await connection.close(1013, said)  # try again later
             return
-        client, fault = ClientSession(self.model, self.characters), None
+        client, fault = ClientSession(self.model, self.characters, self.words), None
         self._clients.append(client)
         try:
             await connection.send(protocol.hello(self.model))
@@ -156,11 +162,20 @@ class LiveClients:
             tick, count = client.ticks, (count + 1 if tick == client.ticks else 1)
             if count > self.limits.messages:
                 raise ProtocolError(f"more than {self.limits.messages} messages between two frames")
+            await self._made(text)
             notes = client.handle(text)
             if self._figures() > self.limits.figures:
                 raise ProtocolError(f"all clients together may have {self.limits.figures} figures")
             for said in notes:
                 await self._send(connection, protocol.message("note", message=said))
+
+    async def _made(self, text: str | bytes) -> None:
+        """Make the acts that a message tells, in a thread: the figures of all go on meanwhile."""
+        if (words := self.words) is None:
+            return
+        for sentence in protocol.sentences(text):
+            with suppress(TextError):  # of which the client is told
+                await asyncio.to_thread(words.act, sentence)
 
     async def _tick(self, connection: Wire, client: ClientSession) -> None:
         clock = asyncio.get_running_loop().time
@@ -209,8 +224,9 @@ class LiveServer(LiveClients):
         origins: Sequence[str] = (),
         watch: Callable[[Pose, float], None] | None = None,
         limits: Limits = LIMITS,
+        words: GenerateModel | None = None,
     ) -> None:
-        super().__init__(model, characters, rate, watch, limits)
+        super().__init__(model, characters, rate, watch, limits, words)
         self.host, self.port = host, port
         self._origins = [None, LOCAL, *map(Origin, origins)]
         self._server: Server | None = None

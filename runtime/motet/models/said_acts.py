@@ -14,6 +14,10 @@ SECONDS = 3.0
 """That are generated: of a motion that lasts longer the act that its sentence means."""
 
 
+KEPT = 256
+"""Acts, after which the one that was made first is forgotten."""
+
+
 class SaidActs:
     """Acts for a model, each made once: sessions can share it."""
 
@@ -27,6 +31,8 @@ class SaidActs:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", TextWarning)  # of a sentence that was checked
                 (found,) = self.words.generate(self._known(sentence), 1, seconds=SECONDS)
+            if len(self._made) >= KEPT:
+                del self._made[next(iter(self._made))]
             self._made[sentence] = self.model.act_of(found.motion, sentence)
         return self._made[sentence]
 

@@ -5,6 +5,8 @@ gait, ``turn`` or ``stop``, followed in any order by a duration (``3s``; else 2 
 (``speed 1.4`` in m/s; else the gait's usual one), a way (``backwards``, ``left``, ``right``, relative to the facing,
 which does not change), and an angle in degrees to turn (``turn left 90``, or ``walk 3s turn right 45``). A turn alone
 keeps gait, speed and way. ``act 'wave'`` is a sentence of what to do beside that, with a duration after it or 3 s.
+``go to 2 -3.5`` goes to x and z in metres and stands there, facing as it comes or ``facing 90``; with a speed, or the
+gait's usual one, until the next order, after its duration or 5 s.
 
 Of the thesis' net, segments of labels: ``walk 3s`` holds a label, ``walk>run 5s`` goes from one to the other linearly,
 ``walk*.3+run*.7 2s`` mixes labels (a weight is between 0 and 1; labels that are not named have 0).
@@ -22,8 +24,10 @@ from numpy.typing import NDArray
 from motet.errors import ControlError, ScriptError, quoted
 
 LONGEST_SCRIPT = 3600.0  # seconds: it is laid out in memory before it runs
+OTHERS = ("turn", "stop", "act", "go")  # orders besides gaits
 WAYS = {"forward": 0.0, "left": 90.0, "backwards": 180.0, "right": -90.0}  # degrees from the facing to the left
 NUMBER = r"\d+\.?\d*|\.\d+"
+SIGNED = f"-?({NUMBER})"
 TOKEN = re.compile(
     r"\s*+(?:(?P<number>\d++\.?\d*+|\.\d++)(?![\w.])|(?P<seconds>\d++\.?\d*+s|\.\d++s)\b"
     r"|(?P<label>[^\W\d][\w-]*+)|(?P<sign>[,>+*])|(?P<end>\Z))"
@@ -35,7 +39,8 @@ class Order:
     """gait: None for the previous one. speed: m/s, None for the gait's usual one, -1 for the previous one.
 
     way: of travel, in degrees from the facing, None for the previous one. turn: degrees to the left. caption: in words.
-    act: a sentence of what is done, beside what was ordered before.
+    act: a sentence of what is done, beside what was ordered before. goal: x and z in metres to go to; facing: there, in
+    degrees, None for any.
     """
 
     gait: str | None
@@ -45,6 +50,8 @@ class Order:
     seconds: float
     caption: str
     act: str | None = None
+    goal: tuple[float, float] | None = None
+    facing: float | None = None
 
 
 @dataclass(frozen=True)
@@ -77,7 +84,7 @@ def parse_orders(script: str, gaits: Sequence[str]) -> list[Order]:
             words.append((word, place))
             continue
         if not words:
-            raise ScriptError(script, place, f"expected an order here: {', '.join(gaits)}, turn, stop or act")
+            raise ScriptError(script, place, f"expected an order here: {', '.join(gaits)}, {', '.join(OTHERS)}")
         orders.append(_Words(script, words).order(gaits))
         words = []
     if sum(order.seconds for order in orders) > LONGEST_SCRIPT:
@@ -96,8 +103,10 @@ class _Words:
         kind = self.take("an order")
         if kind == "act":
             return self.act()
-        if kind not in (*gaits, "turn", "stop"):
-            raise self.fail(f"unknown order {kind!r}; expected one of {', '.join(gaits)}, turn, stop, act")
+        if kind == "go":
+            return self.go()
+        if kind not in (*gaits, *OTHERS):
+            raise self.fail(f"unknown order {kind!r}; expected one of {', '.join((*gaits, *OTHERS))}")
         found = self.turn() if kind == "turn" else {}
         while self.left:
             detail = self.detail()
@@ -119,6 +128,23 @@ class _Words:
             raise self.fail("expected what to do, such as act 'wave'")
         return Order(None, -1.0, None, 0.0, float(last[1]) if last else 3.0, said, said)
 
+    def go(self) -> Order:
+        if self.take("to") != "to":
+            raise self.fail("expected to, such as go to 2 3.5")
+        goal = self.number("x in metres", SIGNED), self.number("z in metres", SIGNED)
+        found = dict[str, float]()
+        while self.left:
+            if self.left[0][0] == "facing":
+                self.take("facing")
+                more = {"facing": self.number("degrees", SIGNED)}
+            else:
+                more = self.detail()
+            if more.keys() & (found.keys() | {"turn", "way"}):
+                raise self.fail("go to takes seconds, speed and facing, each once")
+            found |= more
+        seconds = found.get("seconds", 5.0)
+        return Order(None, found.get("speed"), None, 0.0, seconds, self.caption, None, goal, found.get("facing"))
+
     def detail(self) -> dict[str, float]:
         word = self.take("more")
         if re.fullmatch(f"({NUMBER})s", word):
@@ -138,9 +164,9 @@ class _Words:
         degrees = self.number("degrees")
         return {"turn": degrees if side == "left" else -degrees}
 
-    def number(self, wanted: str) -> float:
+    def number(self, wanted: str, pattern: str = NUMBER) -> float:
         word = self.take(wanted)
-        if not re.fullmatch(NUMBER, word):
+        if not re.fullmatch(pattern, word):
             raise self.fail(f"expected {wanted}, such as 1.4 or 90")
         return float(word)
 

@@ -288,6 +288,9 @@ class SteerSession(Guided):
         if order.act is not None:
             self.act(order.act)
             return
+        if order.goal is not None:
+            self.go_to(order.goal, order.facing, speed=order.speed)
+            return
         told = self._command
         facing, speed = np.where(told.faces_way, told.direction, told.facing), told.speed
         aside = wrapped(told.direction - facing) if order.way is None else np.radians(order.way)

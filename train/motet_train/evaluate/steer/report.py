@@ -37,7 +37,10 @@ from motet_train.evaluate.steer.following import (
     turn_errors,
     ways_errors,
 )
+from motet_train.evaluate.steer.told import act_figures, going_figures, said_acts
 from motet_train.evaluate.tables import Goals, Report, gathered, report_table
+
+GOING_GOALS = {"never": 0, "off_worst_cm": 8}
 
 STEER_GOALS: Goals = {
     "walk.slide_cm": (None, 2.5),
@@ -54,6 +57,10 @@ STEER_GOALS: Goals = {
     "ways_run.direction_worst": (None, 8),
     "creep.speed_worst": (None, 0.05),
     "creep.slide_cm": (None, 2),
+    "act_standing.begun_worst": (None, 0.4),
+    "act_walk.begun_worst": (None, 0.4),
+    **{f"act_{who}.leaps": (None, 0) for who in ("standing", "walk", "run")},
+    **{f"going_{gait}.{name}": (None, most) for gait in MEASURED_SPEEDS for name, most in GOING_GOALS.items()},
     "random.broken": (None, 0),
     "random.frozen": (None, 0),
     "random.leaps": (None, 0),
@@ -273,6 +280,11 @@ def _parts(model: SteerModel, recorded: Recorded, minutes: float, characters: in
         **{f"ways_{gait}": partial(ways_errors, gait=gait) for gait in WAYS_PACES},
         "random": partial(wandering, limits=limits, seconds=60 * minutes, characters=characters),
     }
+    if hasattr(model, "matcher"):
+        acts = said_acts(model)
+        gaits = {"act_standing": None, **{f"act_{gait}": gait for gait in MEASURED_SPEEDS}}
+        measures |= {name: partial(act_figures, acts=acts, leap=limits.leap, gait=of) for name, of in gaits.items()}
+        measures |= {f"going_{gait}": partial(going_figures, gait=gait) for gait in MEASURED_SPEEDS}
     rivals = {"_seldom": seldom(model)} if hasattr(model, "matcher") else {}  # what stands for one does not search
     for ending, one in {"": model, **rivals}.items():
         yield from ({f"{name}{ending}": measure(one)} for name, measure in measures.items())
