@@ -239,14 +239,20 @@ STEERED: list[dict[str, Any]] = [
     {"act": {"who": [1, 0]}},
     {"act": {"who": [0], "upper": False}},
     {"put": [[1.0, 2.0, 30.0], [-2.0, 0.5, -90.0]], "control": {"gait": "zombie", "direction": 10.0, "speed": 0.4}},
+    {"keep_apart": 0.8, "go_to": {"points": [[-2.0, 1.0], [1.5, 2.5]], "facing": [90.0, -45.0], "gait": "walk"}},
+    *[{}] * 6,
+    {"go_along": {"points": [[1.0, 4.0], [3.0, 4.0]], "gait": "run", "speed": 2.5, "who": [1]}},
+    *[{}] * 4,
+    {"keep_apart": None, "go_to": {"points": None}},
 ]
 """Calls of two figures' session, one after the other; after each three quarters of a second pass. What is acted is
 :func:`turning_about`."""
 
 
-def steered(model: SteerModel, hold_feet: bool) -> list[list[Any]]:
-    """Of two figures in every twelfth picture, 48 a second: ground, hips, rotations, contacts."""
-    session, found = model.start(characters=2, hold_feet=hold_feet), []
+def steered(model: SteerModel, hold_feet: bool) -> tuple[list[list[Any]], list[list[Any]]]:
+    """Of two figures in every twelfth picture, 48 a second: ground, hips, rotations, contacts; and what happens to each
+    after each call."""
+    session, found, happened = model.start(characters=2, hold_feet=hold_feet), [], []
     act = Act.of("turn", np.array(turning_about(), np.float32), model.fps, model.settings(ActSettings))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ControlWarning)
@@ -254,21 +260,26 @@ def steered(model: SteerModel, hold_feet: bool) -> list[list[Any]]:
             for name, given in calls.items():
                 if name == "act":
                     session.act(act, **given)
+                elif isinstance(given, dict):
+                    getattr(session, name)(**given)
                 else:
-                    session.control(**given) if name == "control" else getattr(session, name)(given)
+                    getattr(session, name)(given)
             poses = [session.advance(1 / 48) for _ in range(36)]
             found += poses[::12]
+            events = [event for pose in poses for event in pose.events]
+            happened.append([[[one.kind, one.name] for one in events if one.character == n] for n in range(2)])
     rows: list[list[Any]] = []
     for pose in found:
         rotations = pose.rotations.copy()
         rotations[:, 0] = quat_product(pose.heading, rotations[:, 0])
         parts = (pose.ground, pose.height[:, None], rotations.reshape(2, -1), pose.contacts)
         rows.append(np.round(np.concatenate(parts, axis=1, dtype=np.float64), 6).tolist())
-    return rows
+    return rows, happened
 
 
 def answers() -> dict[str, Any]:
     generate, describe, control = motet.load("generate"), motet.load("describe"), motet.load("control")
+    held, happened = steered(control, hold_feet=True)
     return {
         **generated(generate),
         "story": told(generate),
@@ -287,8 +298,9 @@ def answers() -> dict[str, Any]:
         "travel": travelled(describe),
         "steering": STEERED,
         "acted": turning_about(),
-        "steered": steered(control, hold_feet=False),
-        "held": steered(control, hold_feet=True),
+        "steered": steered(control, hold_feet=False)[0],
+        "held": held,
+        "happened": happened,
     }
 
 

@@ -1,11 +1,14 @@
 /* A session of steered figures: commands in, within what gaits allow, and a pose a tick out. */
 import { doing, type Doing, noAct } from "./acting.js";
 import { type Act, actOf, numbersOf } from "./acts.js";
+import { type Point, sent } from "./arriving.js";
 import type { ControlModel } from "./control.js";
 import { ControlError } from "./errors.js";
+import { after, eventsOf, type FigureEvent } from "./events.js";
 import { newLock } from "./footLock.js";
 import { type Command, told } from "./gaits.js";
 import { BONES } from "./humanoid.js";
+import { lead } from "./leading.js";
 import type { Target } from "./matching.js";
 import type { Motion } from "./motion.js";
 import type { Pose } from "./poses.js";
@@ -17,6 +20,8 @@ import { between, type Played } from "./steering.js";
 /** A number of a command at most: metres, m/s, degrees. */
 const LARGEST = 1e6;
 const RADIANS = Math.PI / 180;
+/** Points of a path. */
+const LONGEST_PATH = 10_000;
 
 /** A pose as `posesOf` gives it, and where its figure is. */
 export interface SteeredPose extends Pose {
@@ -24,6 +29,8 @@ export interface SteeredPose extends Pose {
   ground: [x: number, z: number, facing: number];
   /** From 0 to 1, how much the left and the right foot stand. */
   contacts: [left: number, right: number];
+  /** What has happened to it since the pose before. */
+  events: FigureEvent[];
 }
 
 /** A value for all figures, or one for each. */
@@ -43,10 +50,29 @@ export interface Told {
   velocity?: readonly number[] | readonly (readonly number[])[];
 }
 
+/** How figures go to points. Angles are in degrees. */
+export interface Way {
+  /** At the end; by default as they come. */
+  facing?: ForAll<number>;
+  /** By default the one that they have. */
+  gait?: string;
+  /** m/s, by default the gait's usual one. */
+  speed?: ForAll<number>;
+  /** The numbers of the figures that are meant, by default all. */
+  who?: readonly number[];
+}
+
+/** Of a tick, and what has happened since the one before. */
+interface Ticked extends Played {
+  events: FigureEvent[];
+}
+
 interface State {
   figures: Steered[];
+  /** Metres that figures keep apart, 0 for none. */
+  room: number;
   /** The last two ticks, between which `advance` shows a pose, and how far it is. */
-  shown: [Played[], Played[]] | null;
+  shown: [Ticked[], Ticked[]] | null;
   ahead: number;
 }
 
@@ -70,7 +96,7 @@ export class ControlSession {
     phases: readonly number[] | null,
   ) {
     const figures = Array.from({ length: characters }, (_, at) => standing(model, gait, undefined, phases?.[at]));
-    this.state = { figures, shown: null, ahead: 0 };
+    this.state = { figures, room: 0, shown: null, ahead: 0 };
   }
 
   /** Of each figure the velocity along x and z, m/s, and the facing, radians, within the limits of its gait. */
@@ -119,12 +145,57 @@ export class ControlSession {
    * legs go as soon as it is told to. ControlError for figures that are not there, MotionError for what is no human's.
    */
   act(what: Motion | Act | null | readonly (Motion | Act | null)[], { who, upper }: { who?: readonly number[]; upper?: boolean } = {}): void {
-    const figures = who ?? this.state.figures.map((_, at) => at);
-    if (!figures.every((at) => Number.isInteger(at) && at >= 0 && at < this.characters)) throw new ControlError(`figures are whole numbers from 0 to ${this.characters - 1}, not ${figures.join(", ")}`);
+    const figures = this.who(who);
     const given = (Array.isArray(what) ? what : Array<typeof what>(figures.length).fill(what)) as (Motion | Act | null)[];
     if (given.length !== figures.length) throw new ControlError(`${given.length} acts do not fit ${figures.length} figures`);
     const made = new Map([...new Set(given)].map((one) => [one, one && "skeleton" in one ? actOf(this.model, "act", numbersOf(this.model, one)) : one]));
     figures.forEach((at, i) => (this.state.figures[at]!.acting.asked = { act: made.get(given[i]!)!, upper }));
+  }
+
+  /**
+   * Let figures go to points on the ground and stand there: one for all, or one for each, x and z in metres; null: stand where
+   * they are. They slow down to the end, and `arrived` tells when they are there; `control` ends it. ControlError for what
+   * does not fit, and for a gait that goes nowhere; nothing changes then.
+   */
+  goTo(points: readonly number[] | readonly (readonly number[])[] | null, how: Way = {}): void {
+    const figures = this.who(how.who);
+    const ends = points === null ? figures.map((at) => this.state.figures[at]!.playback.root.slice(0, 2)) : this.rows("points", points, ["x", "z"], figures.length);
+    this.send(figures, ends.map((end) => [end]), how);
+  }
+
+  /** The same along a path, from where they are to its first point, and so on to its last: of 1 to 10,000 points, for all. */
+  goAlong(path: readonly (readonly number[])[], how: Way = {}): void {
+    if (!Array.isArray(path) || path.length < 1 || path.length > LONGEST_PATH) throw new ControlError(`a path needs 1 to ${LONGEST_PATH} points of x and z`);
+    const points = path.map((point) => this.rows("points", point, ["x", "z"], 1)[0]!);
+    const figures = this.who(how.who);
+    this.send(figures, figures.map(() => points), how);
+  }
+
+  private send(figures: number[], paths: (readonly (readonly number[])[])[], { facing, gait, speed }: Way): void {
+    const { abilities } = this.model;
+    const facings = this.each("facing", facing, figures.length);
+    const speeds = this.each("speed", speed, figures.length);
+    if (speeds?.some((one) => !(one > 0))) throw new ControlError("speed must be above 0 m/s; points of null let figures stand");
+    const gaits = figures.map((at) => (gait === undefined ? this.state.figures[at]!.command.gait : abilities.number(gait)));
+    const nowhere = gaits.find((one) => !abilities.speeds[one]![2]);
+    if (nowhere !== undefined) throw new ControlError(`${JSON.stringify(this.model.gaits[nowhere])} goes nowhere: give a gait such as ${JSON.stringify(this.model.gaits[0])}`);
+    figures.forEach((at, i) => {
+      const figure = this.state.figures[at]!;
+      const [x, z] = figure.playback.root;
+      const told = { gait: gaits[i]!, speed: speeds?.[i] ?? abilities.speeds[gaits[i]!]![1], facing: facings ? wrapped(facings[i]! * RADIANS) : null };
+      figure.going = sent([[x, z], ...(paths[i] as unknown as Point[])], told);
+    });
+  }
+
+  /** Of each figure whether it stands, within 8 cm and 8 degrees, where it was told to go last. */
+  get arrived(): boolean[] {
+    return this.state.figures.map(({ going }) => going?.arrived ?? false);
+  }
+
+  /** Let figures that move keep `room` metres from all others, 0.1 to 5, by going around them; null: they go through each other. */
+  keepApart(room: number | null = 0.8): void {
+    if (room !== null && !(typeof room === "number" && room >= 0.1 && room <= 5)) throw new ControlError(`figures keep 0.1 to 5 m apart, or null, not ${room}`);
+    this.state.room = room ?? 0;
   }
 
   /** Of each figure what it does, and the seconds that are left of it; null of one that only stands or goes. */
@@ -142,19 +213,38 @@ export class ControlSession {
     return this.played(targets).map(poseOf);
   }
 
-  private played(targets?: Target[]): Played[] {
-    return this.state.figures.map((figure, at) => tick(this.model, figure, this.holdFeet, targets?.[at]));
+  private played(targets?: Target[]): Ticked[] {
+    const { figures, room } = this.state;
+    if (!targets && (room || figures.some(({ going }) => going))) lead(this.model, figures, room);
+    return figures.map((figure, at) => this.happened(figure, tick(this.model, figure, this.holdFeet, targets?.[at])));
+  }
+
+  private happened(figure: Steered, pose: Played): Ticked {
+    const { gaits, steerer: { matcher } } = this.model;
+    const { happenings: before, command: { gait }, playback: { row }, going } = figure;
+    const shows = matcher.tables.shows[row * gaits.length + gait]! > 0;
+    const now = after(before, pose.contacts, gait, shows, going?.arrived ?? false);
+    figure.happenings = now;
+    return { ...pose, events: eventsOf(now, before ?? now, gaits) };
   }
 
   /** The poses `seconds` later, 0 to 1, for a display of any frame rate: between two ticks. A command shows within a tick. */
   advance(seconds: number): SteeredPose[] {
     if (!(seconds >= 0 && seconds <= 1)) throw new ControlError(`a session advances by 0 to 1 s, not ${seconds}`);
     const { state } = this;
-    state.shown ??= [this.played(), this.played()];
+    const events = state.figures.map((): FigureEvent[] => []);
+    const pass = (poses: Ticked[]) => poses.forEach((pose, at) => events[at]!.push(...pose.events));
+    if (!state.shown) {
+      state.shown = [this.played(), this.played()];
+      pass(state.shown[0]);
+    }
     state.ahead += seconds * this.model.fps;
-    for (; state.ahead >= 1; state.ahead--) state.shown = [state.shown[1], this.played()];
-    const [before, after] = state.shown;
-    return before.map((pose, at) => poseOf(between(pose, after[at]!, state.ahead)));
+    for (; state.ahead >= 1; state.ahead--) {
+      pass(state.shown[1]);
+      state.shown = [state.shown[1], this.played()];
+    }
+    const [before, next] = state.shown;
+    return before.map((pose, at) => poseOf({ ...between(pose, next[at]!, state.ahead), events: events[at]! }));
   }
 
   /** Push the figures by a velocity along x and z, m/s, from which they recover. */
@@ -178,6 +268,7 @@ export class ControlSession {
       const direction = command.speed > 0 ? command.direction : facing; // standing ones move the way they face
       figure.command = { ...command, direction, facing, facesWay: false };
       figure.target = this.model.abilities.target(figure.command).target;
+      figure.going = null;
       figure.lock = newLock();
       figure.acting = noAct(this.model, playback);
     });
@@ -199,6 +290,14 @@ export class ControlSession {
     this.state = structuredClone(state);
   }
 
+  /** The numbers of figures. */
+  private who(given?: readonly number[]): number[] {
+    const figures = given ? [...given] : this.state.figures.map((_, at) => at);
+    const fits = figures.length === new Set(figures).size && figures.every((at) => Number.isInteger(at) && at >= 0 && at < this.characters);
+    if (!fits) throw new ControlError(`figures are whole numbers from 0 to ${this.characters - 1}, none twice, not ${figures.join(", ")}`);
+    return figures;
+  }
+
   private gaits(given: ForAll<string>): number[] {
     const names = Array.isArray(given) ? (given as string[]) : Array<string>(this.characters).fill(given as string);
     if (names.length !== this.characters) throw new ControlError(`${names.length} gaits do not fit ${this.characters} characters`);
@@ -206,21 +305,21 @@ export class ControlSession {
   }
 
   /** A number for each figure; none if none is given. */
-  private each(name: string, given?: ForAll<number>): number[] | undefined {
+  private each(name: string, given?: ForAll<number>, count = this.characters): number[] | undefined {
     if (given === undefined) return undefined;
     const values = (Array.isArray(given) ? given : [given]) as number[];
-    return this.rows(name, values.map((value) => [value]), [name]).map(([value]) => value!);
+    return this.rows(name, values.map((value) => [value]), [name], count).map(([value]) => value!);
   }
 
   /** A row of numbers for each figure, of one for all or one for each. */
-  private rows(what: string, given: readonly number[] | readonly (readonly number[])[], columns: string[]): readonly (readonly number[])[] {
+  private rows(what: string, given: readonly number[] | readonly (readonly number[])[], columns: string[], count = this.characters): readonly (readonly number[])[] {
     const rows = (Array.isArray(given?.[0]) ? given : [given]) as readonly (readonly number[])[];
-    const fits = rows.every((row) => row?.length === columns.length) && (rows.length === 1 || rows.length === this.characters);
-    if (!fits) throw new ControlError(`${what} needs ${columns.join(", ")}, for all or for each of ${this.characters} characters`);
+    const fits = rows.every((row) => row?.length === columns.length) && (rows.length === 1 || rows.length === count);
+    if (!fits) throw new ControlError(`${what} needs ${columns.join(", ")}, for all or for each of ${count} characters`);
     if (!rows.every((row) => Array.from(row).every((value) => typeof value === "number" && Math.abs(value) <= LARGEST))) {
       throw new ControlError(`${what} must be finite numbers, no larger than ${LARGEST}`);
     }
-    return rows.length === this.characters ? rows : Array<readonly number[]>(this.characters).fill(rows[0]!);
+    return rows.length === count ? rows : Array<readonly number[]>(count).fill(rows[0]!);
   }
 }
 
@@ -231,9 +330,9 @@ function byVelocity(command: Command, given: Partial<Command>, [x, z]: readonly 
   return given.facing === undefined ? { ...found, facesWay: command.facesWay || speed > 0 } : found;
 }
 
-function poseOf({ ground, rotations: own, height, contacts }: Played): SteeredPose {
+function poseOf({ ground, rotations: own, height, contacts, events }: Ticked): SteeredPose {
   const rotations: Record<string, Quaternion> = {};
   for (let at = 0; at < BONES.length; at++) rotations[BONES[at]!] = own[at]!;
   rotations.hips = product(about(Y, ground[2]), own[0]!);
-  return { hips: [ground[0], height, ground[1]], rotations, ground: [...ground], contacts };
+  return { hips: [ground[0], height, ground[1]], rotations, ground: [...ground], contacts, events };
 }

@@ -3,8 +3,9 @@ export { BundleError, ControlError, DecodingError, TextError } from "./errors.js
 export type { Doing } from "./acting.js";
 export { type Act, actOf } from "./acts.js";
 export { ControlModel, type StartSettings } from "./control.js";
-export { ControlSession, type ControlSnapshot, type SteeredPose, type Told } from "./controlSession.js";
+export { ControlSession, type ControlSnapshot, type SteeredPose, type Told, type Way } from "./controlSession.js";
 export { DescribeModel, type Description, type DescribeSettings } from "./describe.js";
+export type { FigureEvent } from "./events.js";
 export { FillModel } from "./fill.js";
 export {
   type Generated, GenerateModel, type GenerateSettings, type Passage, type Shown, type Story, type StorySettings, type Understood,

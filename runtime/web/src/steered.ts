@@ -1,6 +1,8 @@
 /* One steered figure: what it plays, what it is told, how its feet are held. Sessions and the page of `motet live` have some. */
 import { type Acting, begin, laid, noAct } from "./acting.js";
+import type { Going } from "./arriving.js";
 import type { ControlModel } from "./control.js";
+import type { Happenings } from "./events.js";
 import { held, type Lock, newLock } from "./footLock.js";
 import type { Command } from "./gaits.js";
 import type { Playback, Target } from "./matching.js";
@@ -13,6 +15,10 @@ export interface Steered {
   lock: Lock;
   command: Command;
   target: Target;
+  /** The path that it is on, if any. */
+  going: Going | null;
+  /** Of its last tick. */
+  happenings: Happenings | null;
 }
 
 /** A figure that stands still at a place; with a phase it searches in its turn alone, first after so many ticks. */
@@ -21,14 +27,14 @@ export function standing(model: ControlModel, gait: number, place?: Ground, phas
   const { matcher } = model.steerer;
   const playback = matcher.playing(matcher.stillest(gait), place, phase);
   const command = { gait, speed: 0, direction: 0, facing, facesWay: false };
-  return { playback, acting: noAct(model, playback), lock: newLock(), command, target: [0, 0, facing] };
+  return { playback, acting: noAct(model, playback), lock: newLock(), command, target: [0, 0, facing], going: null, happenings: null };
 }
 
-/** Set where a figure goes from now on: a command, and the target that its gait makes of it. */
+/** Set where a figure goes from now on, off any path: a command, and the target that its gait makes of it. */
 export function tell(figure: Steered, command: Command, target: Target): void {
   const changed = target.some((value, i) => Math.abs(value - figure.target[i]!) > 1e-4) || command.gait !== figure.command.gait;
   if (changed) hasten(figure.playback);
-  Object.assign(figure, { command, target });
+  Object.assign(figure, { command, target, going: null });
 }
 
 /** Let a figure that waits for no turn search in the next tick. */

@@ -1,7 +1,7 @@
 /* What every runtime has to give, in Node and in a browser: golden vectors, and answers that Python gave (python.json). */
 import { type NumberArray, rows } from "../src/arrays.js";
 import { Bundle, type TextTables } from "../src/bundle.js";
-import { actOf, ControlModel, DescribeModel, FillModel, GenerateModel, load, PredictModel, SearchModel, type Told } from "../src/index.js";
+import { actOf, ControlModel, DescribeModel, FillModel, GenerateModel, load, PredictModel, SearchModel, type Told, type Way } from "../src/index.js";
 import { framesOf } from "../src/poses.js";
 import { Recorded } from "../src/random.js";
 import { Vocabulary } from "../src/text.js";
@@ -192,13 +192,20 @@ async function steers(read: Read): Promise<void> {
   for (const [holdFeet, wanted] of [[false, python.steered], [true, python.held]] as const) {
     const session = model.start({ characters: 2, holdFeet });
     const turn = actOf(model, "turn", python.acted.flat());
-    type Call = { put?: number[][]; push?: number[]; control?: Told; act?: { who: number[]; upper?: boolean } };
-    const found = python.steering.flatMap(({ put, push, control, act }: Call) => {
+    type Go = Way & { points: number[][] | null };
+    type Call = { put?: number[][]; push?: number[]; control?: Told; act?: { who: number[]; upper?: boolean }; keep_apart?: number | null; go_to?: Go; go_along?: Go };
+    const found = (python.steering as Call[]).flatMap(({ put, push, control, act, keep_apart, go_to, go_along }, call) => {
       if (act) session.act(turn, act);
       if (put) session.put(put);
       if (push) session.push(push);
       if (control) session.control(control);
-      return Array.from({ length: 36 }, () => session.advance(1 / 48)).filter((_, at) => at % 12 === 0);
+      if (keep_apart !== undefined) session.keepApart(keep_apart);
+      if (go_to) session.goTo(go_to.points, go_to);
+      if (go_along) session.goAlong(go_along.points!, go_along);
+      const pictures = Array.from({ length: 36 }, () => session.advance(1 / 48));
+      const happened = [0, 1].map((figure) => pictures.flatMap((poses) => poses[figure]!.events.map(({ kind, name }) => [kind, name ?? ""])));
+      if (holdFeet) equal(happened, python.happened[call], `events after call ${call}`);
+      return pictures.filter((_, at) => at % 12 === 0);
     });
     equal(found.length, wanted.length, "pictures");
     found.forEach((poses, at) => poses.forEach(({ ground, hips, rotations, contacts }, figure) => {

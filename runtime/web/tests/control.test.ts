@@ -37,6 +37,39 @@ test("what cannot be followed is refused, and changes nothing", () => {
   assert.throws(() => session.restore(model.start({ characters: 2, holdFeet: false }).snapshot()), ControlError);
 });
 
+test("ways that cannot be gone are refused, and change nothing", () => {
+  const session = model.start({ characters: 2 });
+  session.goTo([[0, 0.02], [3, 0]]);
+  const before = session.snapshot();
+  const refused: [() => void, RegExp][] = [
+    [() => session.goTo([1]), /points needs x, z, for all or for each of 2/],
+    [() => session.goTo([[1, 0], [0, NaN]]), /points must be finite/],
+    [() => session.goTo([[1, 0], [0, 1]], { who: [1] }), /for each of 1/],
+    [() => session.goTo([1, 0], { who: [2] }), /whole numbers from 0 to 1/],
+    [() => session.goTo([1, 0], { who: [1, 1] }), /none twice/],
+    [() => session.goTo([1, 0], { speed: 0 }), /speed must be above 0/],
+    [() => session.goTo([1, 0], { facing: NaN }), /facing must be finite/],
+    [() => session.goTo([1, 0], { gait: "fly" }), /unknown gait "fly"/],
+    [() => session.goAlong([]), /a path needs 1 to 10000 points/],
+    [() => session.goAlong([[1, 0], [2]]), /points needs x, z/],
+    ...[0, 0.05, 6, NaN].map((room): [() => void, RegExp] => [() => session.keepApart(room), /keep 0.1 to 5 m apart/]),
+  ];
+  for (const [call, said] of refused) assert.throws(call, (error) => error instanceof ControlError && said.test(error.message), String(said));
+  assert.deepEqual(session.snapshot(), before);
+});
+
+test("a figure arrives, says so once, and a command takes it off its path", () => {
+  const session = model.start({ characters: 2 });
+  session.goTo([0.5, 2], { who: [1] });
+  const happened = Array.from({ length: 480 }, () => session.advance(1 / 60)).flatMap((poses) => poses.map(({ events }) => events.filter(({ kind }) => kind === "arrived").length));
+  assert.deepEqual(session.arrived, [false, true]);
+  assert.equal(happened.reduce((sum, count) => sum + count), 1);
+  const [x, z] = session.advance(0)[1]!.ground;
+  assert.ok(Math.hypot(x - 0.5, z - 2) < 0.08, `${x}, ${z}`);
+  session.control({ speed: 0 });
+  assert.deepEqual(session.arrived, [false, false]);
+});
+
 test("a session is restored, and figures move as each would alone", () => {
   const session = model.start({ characters: 2 });
   session.control({ gait: ["walk", "run"], velocity: [[1, 0.5], [-2, 1]] });

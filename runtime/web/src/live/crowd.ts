@@ -1,5 +1,6 @@
 /* Figures that go by themselves: they follow the first one, wander about, or go to a point. Metres, seconds, radians. */
 import { type Asked, type Figure, inRange } from "./figure.js";
+import { aside, keptApart } from "../apart.js";
 import type { ControlModel } from "../control.js";
 
 /** What figures keep between them, how far they go from the first one, and the room of one in the rows behind it. */
@@ -74,14 +75,8 @@ export function towards(net: Net, figures: Figure[], n: number, [toX, toZ]: read
   const figure = figures[n]!;
   const [x, z] = figure.root;
   const away = Math.hypot(toX - x, toZ - z) || 1;
-  let [vx, vz] = [((toX - x) / away) * pace, ((toZ - z) / away) * pace];
-  figures.forEach((other, at) => {
-    const [dx, dz] = [x - other.root[0], z - other.root[1]];
-    const gap = Math.hypot(dx, dz);
-    if (at === n || gap > ROOM || gap < 1e-6) return;
-    vx += (dx / gap) * (ROOM - gap) * 2;
-    vz += (dz / gap) * (ROOM - gap) * 2;
-  });
+  const change = keptApart(figure, figures, ROOM);
+  const [vx, vz] = aside([((toX - x) / away) * pace, ((toZ - z) / away) * pace], change);
   const wanted = Math.hypot(vx, vz);
   const fast = fastest(net);
   const gait = wanted > (figure.asked.gait === fast ? 0.8 : 1) * net.speeds[net.gaits[0]!]![2]! ? fast : 0;
