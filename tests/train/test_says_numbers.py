@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from says_figures import standing, walking
+from says_figures import led, part, standing, walking
 
 from motet.motion.humanoid import HUMANOID
 from motet_train.evaluate.text_adherence import numbers
@@ -17,6 +17,21 @@ def test_degrees_metres_and_seconds_of_a_walk() -> None:
     assert numbers.met(track, {"text": "", "seconds": 4.1})
     assert not numbers.met(track, {"text": "", "seconds": 4.2})
     assert not numbers.met(track, {"text": "", "degrees": 30})
+
+
+@pytest.mark.parametrize("degrees", [30, -135, 450])
+def test_degrees_are_those_of_the_hips_from_the_first_to_the_last_frame(degrees: float) -> None:
+    still, turned = standing(4), led(standing(4), 0, degrees)
+    hips = still.copy()
+    for name in ("UpperLeg", "LowerLeg", "Foot", "Toes"):
+        hips[:, part(name)] = turned[:, part(name)]
+    shoulders = turned.copy()
+    shoulders[:, part("UpperLeg")] = still[:, part("UpperLeg")]
+    assert numbers.measured(Track(hips), "degrees") == pytest.approx(degrees)
+    assert numbers.measured(Track(turned), "degrees") == pytest.approx(degrees)
+    assert numbers.measured(Track(shoulders), "degrees") == pytest.approx(0)
+    assert numbers.met(Track(hips), {"text": "", "degrees": degrees})
+    assert not numbers.met(Track(shoulders), {"text": "", "degrees": degrees})
 
 
 def test_jumps_and_dips_are_counted() -> None:

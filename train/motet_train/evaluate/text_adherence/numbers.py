@@ -61,7 +61,7 @@ def met(track: Track, row: Mapping[str, Any]) -> bool:
 def measured(track: Track, kind: str, act: str = "") -> float:
     """How much of a kind a motion has, or how often it does an act."""
     if kind == "degrees":
-        return track.turn
+        return float(track.heading[-1] - track.heading[0])  # of the hips, from the first to the last frame
     if kind == "metres":
         return float(np.linalg.norm(track.path[-1] - track.path[0]))
     if kind == "seconds":

@@ -84,6 +84,14 @@ class Track:
         found: Array = np.degrees(np.unwrap(np.arctan2(-across[:, 1], across[:, 0])))
         return found
 
+    @cached_property
+    def heading(self) -> Array:
+        """The angle (T,) about y that the hips alone face, in degrees, unwrapped; 0 is along z, 90 along x."""
+        left, right = map(self.joint, pair("UpperLeg"))
+        across = left - right
+        found: Array = np.degrees(np.unwrap(np.arctan2(-across[:, 2], across[:, 0])))
+        return found
+
     @property
     def turn(self) -> float:
         """Degrees that the figure turns to the left, negative to the right, from its first to its last 0.3 s; more than
