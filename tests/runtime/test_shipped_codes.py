@@ -94,6 +94,21 @@ def test_a_writer_looks_back_at_a_window_of_steps(model: CodesModel) -> None:
         np.testing.assert_array_equal(writer.state["past"], past[:, :, :, -WINDOW:])
 
 
+def test_what_is_counted_is_drawn_from_whole_recordings(model: CodesModel, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One act of a recording may be too little to count in."""
+    asked, draw = set(), Writer.draw
+
+    def seen(self: Writer, *given: Any, whole: bool, **more: Any) -> Any:
+        asked.add(whole)
+        return draw(self, *given, whole=whole, **more)
+
+    monkeypatch.setattr(Writer, "draw", seen)
+    for text, whole in (("a person jumps", False), ("a person jumps twice", True)):
+        asked.clear()
+        model.generate(text)
+        assert asked == {whole}
+
+
 def test_a_stream_may_last(model: CodesModel) -> None:
     """It keeps no more after a while than at first."""
     noise = [np.random.Generator(np.random.PCG64(1))]

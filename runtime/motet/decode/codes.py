@@ -202,9 +202,12 @@ def draw_codes(writer: Writer, actions: Ids, longest: int, exactly: bool = False
     return [np.array(row, dtype=np.int64).reshape(-1, writer.source.parts) for row in steps]
 
 
-def drawn_steps(writer: Writer, actions: Ids, longest: int, exactly: bool = False) -> Iterator[tuple[Ids, Ids]]:
+def drawn_steps(
+    writer: Writer, actions: Ids, longest: int, exactly: bool = False, whole: bool = False
+) -> Iterator[tuple[Ids, Ids]]:
     """Step by step what :func:`draw_codes` gives: the rows (R,) that have not ended, and their codes (R, P).
 
+    whole: all of an action is shown, as where ``exactly`` so many steps are asked for, not one act of a long recording.
     A writer whose rows have all ended can draw other actions from there.
     """
     rows = np.arange(len(actions))
@@ -212,7 +215,7 @@ def drawn_steps(writer: Writer, actions: Ids, longest: int, exactly: bool = Fals
     for length in range(longest):
         first = length == 0
         steps = longest if exactly and first else 0
-        codes = writer.draw(actions[rows], ends=not exactly and not first, steps=steps, whole=exactly)
+        codes = writer.draw(actions[rows], ends=not exactly and not first, steps=steps, whole=whole or exactly)
         going = codes[:, 0] != writer.source.end
         if not going.any():
             writer.take_back()

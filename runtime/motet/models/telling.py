@@ -131,7 +131,7 @@ class Teller:
         most, steps = self.codec.steps(min(LONGEST, 10 + slow)), self.codec.steps(self.settings["max_seconds"])
         steps, looked = self.codec.steps(part.seconds * part.pace) if part.seconds else steps, 0
         while True:
-            drawn = [step for _, step in drawn_steps(writer, action, steps, part.exactly)]
+            drawn = [step for _, step in drawn_steps(writer, action, steps, part.exactly, whole=True)]
             codes, rounds = np.concatenate([codes, *drawn]), rounds - 1
             over = part.exactly or len(codes) >= most
             if over or (rounds < 1 and len(codes) >= 1.2 * looked):  # a long one is not looked at after each draw
