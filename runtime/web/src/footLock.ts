@@ -12,11 +12,15 @@ export const OFFSETS = LEGS.map((bones) => bones.map((bone) => HUMANOID.joints[H
 /** Points of a sole, heel, ball and tip, and which joint of a leg carries each. */
 const POINTS = LEG.flatMap((part, joint) => (SOLES[part] ?? []).map((point): [number, Vector] => [joint, point]));
 const BALL = 1;
+/** Half-life in seconds in which a foot is lifted and let down: at once, the knee of a straight leg would pop forward. */
+const LIFTS = 0.035;
 
-/** Of one foot: by how much it is moved along x and z and how fast that changes, and where the points of its sole were. */
+/** Of one foot: by how much it is moved along x and z and how high it steps, how fast these change, and where the points of its
+ *  sole were. */
 interface Foot {
   shift: [number, number];
   drift: [number, number];
+  height: [off: number, rate: number];
   soles: Vector[] | null;
 }
 
@@ -24,7 +28,7 @@ interface Foot {
 export type Lock = [Foot, Foot];
 
 export function newLock(): Lock {
-  const foot = (): Foot => ({ shift: [0, 0], drift: [0, 0], soles: null });
+  const foot = (): Foot => ({ shift: [0, 0], drift: [0, 0], height: [0, 0], soles: null });
   return [foot(), foot()];
 }
 
@@ -42,7 +46,9 @@ export function held(lock: Lock, pose: Played, how: LockSettings, dt: number): P
     const moved = shift(foot, minus(soles[bears]!, (foot.soles ?? soles)[bears]!), contact > how.stands, how, dt);
     foot.soles = soles;
     const steps = contact * how.steps * Math.min(1, moved / (how.swings * dt));
-    const lift = Math.max(0, steps - soles[lowest]![1]);
+    const [off, rise] = damped(foot.height[0] - steps, foot.height[1], dampingOf(LIFTS), dt);
+    foot.height = [steps + off, rise];
+    const lift = Math.max(0, steps + off - soles[lowest]![1]);
     if (foot.shift[0] || foot.shift[1] || lift) reach(rotations, side, hips, leg, [foot.shift[0], lift, foot.shift[1]]);
   });
   return { ...pose, rotations };

@@ -62,16 +62,20 @@ OFFSETS = HUMANOID.offsets[[[HUMANOID.index(BONES[bone]) for bone in leg] for le
 POINTS = [(LEG.index(part), point) for part, points in SOLE.items() for point in points]
 """Points of a sole, heel, ball and tip, and which joint of a leg carries each."""
 
+LIFTS = 0.035
+"""Half-life (s) in which a foot is lifted and let down: at once, the knee of a straight leg would pop forward."""
+
 Pair = tuple[Part, Part]
 """Along x and z."""
 
 
 class Foot(NamedTuple):
-    """By how much a foot is moved and how fast that changes, and where the points of its sole were, None before the
-    first tick."""
+    """By how much a foot is moved and how fast that changes, how high it steps and how fast that changes, and where the
+    points of its sole were, None before the first tick."""
 
     shift: Pair = (0.0, 0.0)
     drift: Pair = (0.0, 0.0)
+    height: Pair = (0.0, 0.0)
     soles: tuple[Vector, ...] | None = None
 
 
@@ -112,9 +116,9 @@ class FootLock:
         """A foot a tick later, and the rotations of thigh, shin and foot in their parents' frames."""
         turned, places = joints_of(limb, hips, place)
         soles = tuple(plus(places[joint], rotated(turned[joint], point)) for joint, point in POINTS)
-        (shift_x, shift_z), drift, lift = self._shifted(foot, soles, limb.contact)
-        played = limb.local[:3]
-        moves, after = (shift_x != 0) | (shift_z != 0) | (lift > 0), Foot((shift_x, shift_z), drift, soles)
+        after, lift = self._shifted(foot, soles, limb.contact)
+        played, (shift_x, shift_z) = limb.local[:3], after.shift
+        moves = (shift_x != 0) | (shift_z != 0) | (lift > 0)
         if moves is False:
             return after, played
         x, y, z = places[2]
@@ -126,8 +130,8 @@ class FootLock:
             for (a, b, c, d), (e, f, g, h) in zip(reached, played, strict=True)
         ]
 
-    def _shifted(self, foot: Foot, soles: tuple[Vector, ...], contact: Part) -> tuple[Pair, Pair, Part]:
-        """The shift of a foot and how fast it changes, a tick later, and by how much it is lifted."""
+    def _shifted(self, foot: Foot, soles: tuple[Vector, ...], contact: Part) -> tuple[Foot, Part]:
+        """A foot a tick later, and by how much it is lifted."""
         how, before = self.settings, soles if foot.soles is None else foot.soles
         (x, lowest, z), (from_x, _, from_z) = soles[1], before[1]
         x, z, height = x - from_x, z - from_z, lowest - how.bears
@@ -137,16 +141,19 @@ class FootLock:
         held_x, held_z = foot.shift[0] - x, foot.shift[1] - z
         stands = (contact > how.stands) & (root(held_x * held_x + held_z * held_z) < how.farthest)
         stands = stands & (root(x * x + z * z) < how.swings * self.dt)
-        (faded_x, slower_x), (faded_z, slower_z) = map(self._faded, foot.shift, foot.drift)
+        (faded_x, slower_x), (faded_z, slower_z) = (
+            self._faded(*one, how.fade) for one in zip(foot.shift, foot.drift, strict=True)
+        )
         shift_x, shift_z = where(stands, held_x, faded_x), where(stands, held_z, faded_z)
         x, z = shift_x - held_x, shift_z - held_z  # over the ground
         steps = contact * smaller(root(x * x + z * z) * (how.steps / (how.swings * self.dt)), how.steps)
+        off, rise = self._faded(foot.height[0] - steps, foot.height[1], LIFTS)
         drift = where(stands, 0.0, slower_x), where(stands, 0.0, slower_z)
-        return (shift_x, shift_z), drift, larger(steps - lowest, 0.0)
+        return Foot((shift_x, shift_z), drift, (steps + off, rise), soles), larger(steps + off - lowest, 0.0)
 
-    def _faded(self, off: Part, rate: Part) -> Pair:
-        """A shift and its rate, as the spring of its half-life takes it back."""
-        damping = damping_of(self.settings.fade)
+    def _faded(self, off: Part, rate: Part, half_life: float) -> Pair:
+        """What a foot is off and its rate, as the spring of a half-life takes it back."""
+        damping = damping_of(half_life)
         rise, left = (rate + damping * off) * self.dt, math.exp(-damping * self.dt)
         return (off + rise) * left, (rate - damping * rise) * left
 
