@@ -56,9 +56,18 @@ def in_batches(
     """The results of a function of batches, of at most ``most`` things each, one for each thing; else as
     :func:`in_order`."""
     jobs = 1 if len(given) < FEW else cores() if jobs is None else jobs
-    size = most if jobs == 1 else max(1, min(most, len(given) // (4 * jobs)))
-    batches = (given[start : start + size] for start in range(0, len(given), size))
-    yield from chain.from_iterable(in_order(function, batches, jobs, few=1))
+    yield from chain.from_iterable(in_order(function, batches(given, jobs, most), jobs, few=1))
+
+
+def batches(given: Sequence[T], jobs: int, most: int) -> Iterator[Sequence[T]]:
+    """Things in batches of at most ``most``, and for several processes of a quarter of each one's share of the rest,
+    so that all end at once."""
+    start = 0
+    while start < len(given):
+        share = most if jobs == 1 else (len(given) - start) // (4 * jobs)
+        stop = start + max(1, min(most, share))
+        yield given[start:stop]
+        start = stop
 
 
 def cores() -> int:

@@ -2,6 +2,7 @@
 
 import json
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -126,3 +127,24 @@ def test_a_file_of_a_damaged_zip_is_named(folder: Path, packed: Path, tmp_path: 
 
 def test_an_unknown_bundle_is_one_message_also_from_other_processes(folder: Path, tmp_path: Path) -> None:
     check_refused(run("describe", folder, "--bundle", "nobody", "--jobs", 2), "nobody", tmp_path)
+
+
+class Two(Describe):
+    """Answers two at once."""
+
+    most = 2  # type: ignore[assignment]
+
+
+def test_of_long_motions_no_more_windows_than_needed_are_in_memory(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    walk = motet.read(folder / "0.bvh").resample(10)
+    for number, times in enumerate((1, 40, 1, 40)):  # 40 times are longer than a window
+        motet.write(tmp_path / f"{number}.bvh", replace(walk, values=np.concatenate([walk.values] * times)))
+    sources = [Source(path) for path in files_of([tmp_path])]
+    at_once, verb = list[int](), Two({})
+    whole, describe = Describe({})(sources), verb.model.describe
+    monkeypatch.setattr(verb.model, "describe", lambda found, **k: at_once.append(len(found)) or describe(found, **k))
+    assert [len(answer.rows) for answer in whole] == [1, 2, 1, 2]
+    assert [answer.rows for answer in verb(sources)] == [answer.rows for answer in whole]
+    assert at_once == [3, 3, 0]

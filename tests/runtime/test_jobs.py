@@ -13,7 +13,7 @@ from command_line import run
 from figures import walker
 
 import motet
-from motet.jobs import FEW, in_order
+from motet.jobs import FEW, batches, in_order
 
 
 def late(number: int) -> tuple[int, int]:
@@ -62,3 +62,14 @@ def test_an_interrupt_ends_it_quietly(tmp_path: Path) -> None:
     started.send_signal(signal.SIGINT)
     assert started.communicate(timeout=8)[1] == ""
     assert started.returncode == 130
+
+
+@pytest.mark.parametrize(("count", "jobs"), [(0, 2), (1, 2), (9, 1), (628, 2), (628, 16), (10_000, 3)])
+def test_batches_are_all_things_in_order_and_the_last_ones_small(count: int, jobs: int) -> None:
+    found = list(batches(range(count), jobs, 64))
+    assert [thing for batch in found for thing in batch] == list(range(count))
+    sizes = [len(batch) for batch in found]
+    assert max(sizes, default=1) <= 64
+    if jobs > 1:
+        assert sizes == sorted(sizes, reverse=True)
+        assert sizes[-jobs:] == [1] * len(sizes[-jobs:])

@@ -23,6 +23,7 @@ from motet.models.load import load_as
 from motet.motion.motion import Motion
 
 Kind = TypeVar("Kind")
+_Window = tuple["Answer", float, float, Motion]
 
 
 @dataclass
@@ -167,16 +168,23 @@ class Describe(OfModel[DescribeModel]):
 
     def __call__(self, sources: Sequence[Source]) -> list[Answer]:
         """The answers, in order; a row for each window, with input, in_place, start, stop and hypotheses."""
-        answers, windows = list(map(Answer, sources)), []
+        answers, windows = list(map(Answer, sources)), list[_Window]()
         for answer in answers:
             with answer.tried():
                 cut = self.model.windows(self.read(answer))
                 windows += [(answer, start, part.duration, self.model.prepared(part)) for start, part in cut]
+            if len(windows) >= self.most:  # long motions have many, which must not all be in memory
+                self._say(windows)
+                windows.clear()
+        self._say(windows)
+        return answers
+
+    def _say(self, windows: Sequence[_Window]) -> None:
+        """Describe windows, each a row of its answer."""
         found = self.model.describe([part for *_, part in windows], **self.settings)
         for (answer, start, seconds, _), descriptions in zip(windows, found, strict=True):
             said = {"input": str(answer.source), "in_place": answer.in_place, "start": start, "stop": start + seconds}
             answer.rows.append({**said, "hypotheses": [one.to_json() for one in descriptions]})
-        return answers
 
     def about(self) -> dict[str, Any]:
         """Also the settings."""
