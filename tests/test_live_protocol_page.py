@@ -7,13 +7,14 @@ import re
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
 
 import motet
 from motet.live.protocol import KEYS, parsed
+from motet.motion.events import Happening
 
 pytest.importorskip("websockets", reason="the extra live is not installed")
 from websockets.asyncio.client import connect
@@ -139,6 +140,11 @@ def test_the_page_names_all_that_a_client_may_say() -> None:
     for message in of_a_client():
         said.setdefault(message.pop("type"), set()).update(message)
     assert said == {kind: set(names) for kind, names in KEYS.items()}
+
+
+def test_the_page_names_all_that_may_happen() -> None:
+    (listed,) = re.findall(r'Kinds are (".*?")\.', PAGE.replace("\n", " "))
+    assert re.findall(r'"(.*?)"', listed) == list(get_args(Happening))
 
 
 def test_a_note_and_an_error_are_as_the_page_says() -> None:

@@ -223,6 +223,45 @@ def test_putting_a_figure_elsewhere_ends_its_act(model: SteerModel) -> None:
     assert np.abs(session.tick().ground[0, :2] - 5).max() < 0.05
 
 
+def happened(poses: list[Pose]) -> list[tuple[int, str, int, str]]:
+    """Beginnings and ends of acts: which pose, what, whose and the act's name."""
+    return [(at, *event) for at, pose in enumerate(poses) for event in pose.events if event.kind.startswith("act")]
+
+
+def test_beginnings_and_ends_of_acts_are_told_once(model: SteerModel) -> None:
+    session, lift, wave = model.start(characters=2), act_of(model), act_of(model, "wave", lift=0.8)
+    session.act([lift, wave], who=[0, 1])
+    assert happened(ticks(session, 1)) == [(0, "act begun", 0, "lift"), (0, "act begun", 1, "wave")]
+    session.act(lift, who=0)  # in its own place
+    session.act(None, who=1)
+    told = [(0, "act ended", 0, "lift"), (0, "act begun", 0, "lift"), (0, "act ended", 1, "wave")]
+    assert happened(ticks(session, 10)) == told
+    left = session.acting[0]
+    assert left
+    assert happened(ticks(session, 60)) == [(round(left[1] * model.fps), "act ended", 0, "lift")]
+    session.act(None)
+    assert not happened(ticks(session, 5))
+    session.act(wave, who=1)
+    ticks(session, 5)
+    session.put([3, 2, 10])
+    assert happened(ticks(session, 5)) == [(0, "act ended", 1, "wave")]
+
+
+def test_no_event_is_lost_where_a_figure_is_put_elsewhere(model: SteerModel) -> None:
+    session, lift = model.start(), act_of(model)
+    session.act(lift)
+    poses = [session.advance(1 / 60) for _ in range(3)]
+    while session.acting[0]:
+        poses.append(session.advance(1 / 60))
+    assert [kind for _, kind, _, _ in happened(poses)] == ["act begun"]  # its end is to be shown next
+    session.put([3, 2, 10])
+    before = session.snapshot()
+    for _ in range(2):
+        after = [session.advance(1 / 60) for _ in range(5)]
+        assert happened(after) == [(0, "act ended", 0, "lift")]
+        session.restore(before)
+
+
 @pytest.fixture(scope="module")
 def said(model: SteerModel) -> SaidActs:
     return SaidActs(model, motet.load("generate"))

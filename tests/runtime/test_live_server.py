@@ -185,6 +185,7 @@ def test_acts_are_told_in_words_and_what_is_not_known_is_said(steer_model: Steer
         for frame in seen:
             check_same(frame["characters"][0], session.tick())
         assert session.acting[0] is not None
+        assert ["act begun", 0, "wave"] in seen[0]["events"]
 
     serving(steer_model, scenario)
 
@@ -194,6 +195,8 @@ def test_a_client_ends_an_act_and_acts_need_words(steer_model: SteerModel) -> No
     assert one.handle('{"type": "act", "motion": ["wave", null]}') == []
     one.tick()
     assert [act and act[0] for act in one.session.acting] == ["wave", None]
+    one.handle('{"type": "act"}')
+    assert ["act ended", 0, "wave"] in json.loads(one.frame(one.tick()))["events"]
     one.handle('{"type": "start", "characters": 1}')
     one.handle('{"type": "act", "motion": "wave"}')
     one.handle('{"type": "act"}')

@@ -244,6 +244,11 @@ STEERED: list[dict[str, Any]] = [
     {"go_along": {"points": [[1.0, 4.0], [3.0, 4.0]], "gait": "run", "speed": 2.5, "who": [1]}},
     *[{}] * 4,
     {"keep_apart": None, "go_to": {"points": None}},
+    {"look_at": {"points": [[3.0, 1.2, 3.0], [1.0, 2.5, 9.0]]}},
+    {"reach": {"hand": "left", "points": [[-1.8, 1.3, 1.2], [3.0, 1.2, 9.0]]}, "act": {"who": [0]}},
+    {"look_at": {"points": [-2.0, 0.4, -3.0], "who": [1]}, "control": {"gait": "walk", "velocity": [0.8, -0.6]}},
+    {"reach": {"hand": "right", "points": [2.5, 1.6, 3.0], "who": [1]}},
+    {"look_at": {"points": None}, "reach": {"hand": "left", "points": None, "who": [0]}, "end": {"who": [0]}},
 ]
 """Calls of two figures' session, one after the other; after each three quarters of a second pass. What is acted is
 :func:`turning_about`."""
@@ -258,8 +263,8 @@ def steered(model: SteerModel, hold_feet: bool) -> tuple[list[list[Any]], list[l
         warnings.simplefilter("ignore", ControlWarning)
         for calls in STEERED:
             for name, given in calls.items():
-                if name == "act":
-                    session.act(act, **given)
+                if name in ("act", "end"):
+                    session.act(act if name == "act" else None, **given)
                 elif isinstance(given, dict):
                     getattr(session, name)(**given)
                 else:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from motet.decode.acts import Act, ActSettings
 from motet.decode.matching import TRAJECTORY, Matcher, Playback, Rows
 from motet.decode.steering import PoseCodes, body
+from motet.motion.events import Done
 from motet.motion.humanoid import BONES, LEFT_RIGHT, LEG, sided
 from motet.motion.pose import Pose, damped, damping_of
 from motet.motion.rotations import Array, conjugate, continuous_rotvec, quat_product, wrapped
@@ -75,11 +76,12 @@ class Body(NamedTuple):
 
 
 class Playing(NamedTuple):
-    """What a figure plays. frame: that is shown. whole: whether by the whole body. yields: whether the legs go as soon
-    as they are told to."""
+    """What a figure plays. frame: that is shown. age: ticks since it was begun. whole: whether by the whole body.
+    yields: whether the legs go as soon as they are told to."""
 
     act: Act
     frame: int
+    age: int
     whole: bool
     yields: bool
 
@@ -133,6 +135,13 @@ class Acting:
         return self.playing.count(None) < len(self.playing)
 
     @property
+    def done(self) -> tuple[Done | None, ...]:
+        """What each figure does."""
+        if not self.acts:
+            return (None,) * len(self.playing)
+        return tuple(one and Done(one.act.name, one.age) for one in self.playing)
+
+    @property
     def whole(self) -> NDArray[np.bool_]:
         """Which figures (B,) play an act with the whole body."""
         return np.array([one is not None and one.whole for one in self.playing])
@@ -169,7 +178,7 @@ class Acting:
             return None if act is None else self._entered(figure, act, upper, playback, goes)
         if now is None or now.frame + 1 >= len(now.act):
             return None
-        return now._replace(frame=now.frame + 1, whole=now.whole and not (goes and now.yields))
+        return now._replace(frame=now.frame + 1, age=now.age + 1, whole=now.whole and not (goes and now.yields))
 
     def _entered(self, figure: int, act: Act, upper: bool | None, playback: Playback, goes: bool) -> Playing:
         """The act that is asked for, at the frame after the one that is most like the figure."""
@@ -183,7 +192,7 @@ class Acting:
         entries = min(round(how.entry * self.matcher.fps), (len(act) - 1) // 3) + 1
         off = self._scaled(act.features[:entries]) - is_now
         cost = (off[:, slice(None) if whole else HANDS] ** 2).sum(axis=1)
-        return Playing(act, int(cost.argmin()) + 1, whole, upper is None)
+        return Playing(act, int(cost.argmin()) + 1, 0, whole, upper is None)
 
     def _scaled(self, features: Array) -> Array:
         """Features of how figures are (..., F - TRAJECTORY) as the table has them."""

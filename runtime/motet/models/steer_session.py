@@ -44,6 +44,7 @@ class SteerSnapshot:
     ahead: float
     guidance: Guidance
     happenings: Happenings | None
+    late: tuple[Event, ...]
 
     def __repr__(self) -> str:
         return f"SteerSnapshot({len(self.command.gait)} characters)"
@@ -71,6 +72,7 @@ class SteerSession(Guided):
         self._lock = self._new_lock() if hold_feet else None
         self._poses: tuple[Pose, Pose] | None = None
         self._happenings: Happenings | None = None
+        self._late: tuple[Event, ...] = ()  # of a tick that was to be shown next, when characters were put elsewhere
         self._ahead = 0.0
         self._said: set[str] = set()
 
@@ -172,8 +174,8 @@ class SteerSession(Guided):
     def _happened(self, pose: Pose) -> tuple[Event, ...]:
         gait, before = self._command.gait, self._happenings
         shows = self.model.matcher.table.shows[self._playback.row, gait]
-        self._happenings = Happenings.after(before, pose.contacts, gait, shows, self.arrived)
-        return tuple(self._happenings.events(before or self._happenings, self.model.gaits))
+        self._happenings = Happenings.after(before, pose.contacts, gait, shows, self.arrived, self._acting.done)
+        return tuple(self._happenings.events(before, self.model.gaits))
 
     @property
     def matched(self) -> Matched:
@@ -231,10 +233,10 @@ class SteerSession(Guided):
         events are those since the pose before. A command shows within a tick. ControlError unless 0 <= seconds <= 1."""
         if not 0 <= seconds <= 1:
             raise ControlError(f"a session advances by 0 to 1 s, not {seconds}")
-        events: tuple[Event, ...] = ()
+        events, self._late = self._late, ()
         if self._poses is None:
             first = self.tick()
-            self._poses, events = (first, self.tick()), first.events
+            self._poses, events = (first, self.tick()), events + first.events
         self._ahead += seconds * self.model.fps
         while self._ahead >= 1:
             events += self._poses[1].events
@@ -257,6 +259,8 @@ class SteerSession(Guided):
         self._command = replace(told, direction=direction, facing=facing, faces_way=np.zeros_like(told.faces_way))
         self._target, _ = self.model.abilities.target(self._command)
         self._acting, self._guidance = self._no_acts(), self._guidance.ended()
+        if self._poses is not None:
+            self._late += self._poses[1].events
         self._poses = None  # nothing lies between there and here
         if self._lock is not None:
             self._lock = self._new_lock()
@@ -315,7 +319,7 @@ class SteerSession(Guided):
         """The whole state, to be restored later."""
         lock = None if self._lock is None else replace(self._lock)  # its arrays are replaced, never written into
         told = self._playback.copy(), self._acting.copy(), self._command, lock
-        return SteerSnapshot(*told, self._poses, self._ahead, self._guidance, self._happenings)
+        return SteerSnapshot(*told, self._poses, self._ahead, self._guidance, self._happenings, self._late)
 
     def restore(self, snapshot: SteerSnapshot) -> None:
         """Go back to a snapshot of this session or of one like it: the same model, as many characters, and the same
@@ -329,5 +333,5 @@ class SteerSession(Guided):
         self._playback, self._poses, self._ahead = snapshot.playback.copy(), snapshot.poses, snapshot.ahead
         self._acting = snapshot.acting.copy()
         self._command, (self._target, _) = command, self.model.abilities.target(command)
-        self._guidance, self._happenings = snapshot.guidance, snapshot.happenings
+        self._guidance, self._happenings, self._late = snapshot.guidance, snapshot.happenings, snapshot.late
         self._lock = None if snapshot.lock is None else replace(snapshot.lock)

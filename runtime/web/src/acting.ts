@@ -23,10 +23,11 @@ const FADED = 1e-4;
 /** A pose in its frame of the facing. */
 type Body = Pick<Played, "rotations" | "height">;
 
-/** What is played. frame: that is shown. yields: whether the legs go as soon as they are told to. */
+/** What is played. frame: that is shown. age: ticks since it was begun. yields: whether the legs go as soon as they are told to. */
 interface Playing {
   act: Act;
   frame: number;
+  age: number;
   whole: boolean;
   yields: boolean;
 }
@@ -87,7 +88,7 @@ export function begin(model: ControlModel, acting: Acting, playback: Playback, t
 
 function next(now: Playing, goes: boolean): Playing | null {
   if (now.frame + 1 >= now.act.height.length) return null;
-  return { ...now, frame: now.frame + 1, whole: now.whole && !(goes && now.yields) };
+  return { ...now, frame: now.frame + 1, age: now.age + 1, whole: now.whole && !(goes && now.yields) };
 }
 
 /** The act that is asked for, at the frame after the one that is most like the figure. */
@@ -103,7 +104,7 @@ function entered({ steerer: { matcher }, acts: how, fps }: ControlModel, { playi
     const cost = (whole ? off : off.slice(HANDS)).reduce((sum, value) => sum + value * value, 0);
     if (cost < least) [best, least] = [frame, cost];
   }
-  return { act, frame: best + 1, whole, yields: upper === undefined };
+  return { act, frame: best + 1, age: 0, whole, yields: upper === undefined };
 }
 
 /** After a tick: its pose with the act laid over it, and the figure where that leads. root: before the tick. */

@@ -7,12 +7,12 @@ import { ControlError } from "./errors.js";
 import { after, eventsOf, type FigureEvent } from "./events.js";
 import { newLock } from "./footLock.js";
 import { type Command, told } from "./gaits.js";
-import { BONES } from "./humanoid.js";
+import { BONES, SIDES } from "./humanoid.js";
 import { lead } from "./leading.js";
 import type { Target } from "./matching.js";
 import type { Motion } from "./motion.js";
 import type { Pose } from "./poses.js";
-import { about, product, type Quaternion, Y } from "./rotations.js";
+import { about, product, type Quaternion, type Vector, Y } from "./rotations.js";
 import { wrapped } from "./springs.js";
 import { hasten, standing, type Steered, tell, tick } from "./steered.js";
 import { between, type Played } from "./steering.js";
@@ -74,6 +74,8 @@ interface State {
   /** The last two ticks, between which `advance` shows a pose, and how far it is. */
   shown: [Ticked[], Ticked[]] | null;
   ahead: number;
+  /** Of each figure what happened in a tick that was to be shown next, when figures were put elsewhere. */
+  late: FigureEvent[][];
 }
 
 /** The whole state of a session. */
@@ -96,7 +98,7 @@ export class ControlSession {
     phases: readonly number[] | null,
   ) {
     const figures = Array.from({ length: characters }, (_, at) => standing(model, gait, undefined, phases?.[at]));
-    this.state = { figures, room: 0, shown: null, ahead: 0 };
+    this.state = { figures, room: 0, shown: null, ahead: 0, late: figures.map(() => []) };
   }
 
   /** Of each figure the velocity along x and z, m/s, and the facing, radians, within the limits of its gait. */
@@ -198,6 +200,37 @@ export class ControlSession {
     this.state.room = room ?? 0;
   }
 
+  /**
+   * Let figures look at points in the world from now on: one for all, or one for each, x, y and z in metres; null: ahead, as they
+   * are recorded. Head, neck and upper spine share the turn, up to 85 degrees aside and 50 up or down; what is nearer to the eyes
+   * than 20 cm is not looked at. ControlError for what does not fit; nothing changes then.
+   */
+  lookAt(points: readonly number[] | readonly (readonly number[])[] | null, { who }: { who?: readonly number[] } = {}): void {
+    this.pointed(points, who).forEach(([at, point]) => (this.state.figures[at]!.look.point = point));
+  }
+
+  /**
+   * Let a hand of figures be at points in the world from now on, for the middle of the hand; null: as it is recorded. Only the arm
+   * moves. A hand goes as near as it can to a point that is too far or behind the back, and `outOfReach` tells. Otherwise like `lookAt`.
+   */
+  reach(hand: "left" | "right", points: readonly number[] | readonly (readonly number[])[] | null, { who }: { who?: readonly number[] } = {}): void {
+    const side = SIDES.indexOf(hand);
+    if (side < 0) throw new ControlError(`unknown hand ${JSON.stringify(hand)}; expected left or right`);
+    this.pointed(points, who).forEach(([at, point]) => (this.state.figures[at]!.hands[side]!.point = point));
+  }
+
+  /** Of each figure whether what its left and its right hand reach for was out of reach in the last tick. */
+  get outOfReach(): [left: boolean, right: boolean][] {
+    return this.state.figures.map(({ hands: [left, right] }) => [left.beyond, right.beyond]);
+  }
+
+  /** Numbers of figures, and a point in the world for each; null for none. */
+  private pointed(points: readonly number[] | readonly (readonly number[])[] | null, who?: readonly number[]): [number, Vector | null][] {
+    const figures = this.who(who);
+    const rows = points && this.rows("points", points, ["x", "y", "z"], figures.length);
+    return figures.map((at, i) => [at, rows && ([...rows[i]!] as Vector)]);
+  }
+
   /** Of each figure what it does, and the seconds that are left of it; null of one that only stands or goes. */
   get acting(): (Doing | null)[] {
     return this.state.figures.map(({ acting }) => doing(acting, this.model.fps));
@@ -221,18 +254,20 @@ export class ControlSession {
 
   private happened(figure: Steered, pose: Played): Ticked {
     const { gaits, steerer: { matcher } } = this.model;
-    const { happenings: before, command: { gait }, playback: { row }, going } = figure;
+    const { happenings: before, command: { gait }, playback: { row }, going, acting: { playing } } = figure;
     const shows = matcher.tables.shows[row * gaits.length + gait]! > 0;
-    const now = after(before, pose.contacts, gait, shows, going?.arrived ?? false);
+    const act = playing && { name: playing.act.name, age: playing.age };
+    const now = after(before, pose.contacts, gait, shows, going?.arrived ?? false, act);
     figure.happenings = now;
-    return { ...pose, events: eventsOf(now, before ?? now, gaits) };
+    return { ...pose, events: eventsOf(now, before, gaits) };
   }
 
   /** The poses `seconds` later, 0 to 1, for a display of any frame rate: between two ticks. A command shows within a tick. */
   advance(seconds: number): SteeredPose[] {
     if (!(seconds >= 0 && seconds <= 1)) throw new ControlError(`a session advances by 0 to 1 s, not ${seconds}`);
     const { state } = this;
-    const events = state.figures.map((): FigureEvent[] => []);
+    const events = state.late;
+    state.late = state.figures.map(() => []);
     const pass = (poses: Ticked[]) => poses.forEach((pose, at) => events[at]!.push(...pose.events));
     if (!state.shown) {
       state.shown = [this.played(), this.played()];
@@ -272,6 +307,7 @@ export class ControlSession {
       figure.lock = newLock();
       figure.acting = noAct(this.model, playback);
     });
+    this.state.shown?.[1].forEach((pose, at) => this.state.late[at]!.push(...pose.events));
     this.state.shown = null; // nothing lies between there and here
   }
 

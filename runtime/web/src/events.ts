@@ -1,9 +1,10 @@
 /* What happens to a live figure from one tick to the next: feet come down, it leaves the ground and lands; as motet/motion/events.py says. */
 
 /** A foot came down, both feet left the ground ("take-off", also between the steps of a run), one came down again, the figure
- *  now moves in another gait, whose name is told, or it has arrived where it was to go. */
+ *  now moves in another gait, whose name is told, it has arrived where it was to go, or an act, whose name is told, was begun or is
+ *  over: played to its end, ended or replaced. */
 export interface FigureEvent {
-  kind: "left foot" | "right foot" | "take-off" | "landing" | "gait" | "arrived";
+  kind: "left foot" | "right foot" | "take-off" | "landing" | "gait" | "arrived" | "act ended" | "act begun";
   name?: string;
 }
 
@@ -12,25 +13,33 @@ const [DOWN, UP] = [0.5, 0.2];
 /** Ticks without a foot on the ground after which a figure has taken off. */
 const FLIES = 2;
 
+/** What a figure does, and for how many ticks it has. */
+export interface Act {
+  name: string;
+  age: number;
+}
+
 /** Of a tick. air: ticks since a foot was down. gait: the number of the one that is played. */
 export interface Happenings {
   down: readonly [left: boolean, right: boolean];
   air: number;
   gait: number;
   arrived: boolean;
+  act: Act | null;
 }
 
 /** Those of the next tick; shows: whether the gait that is asked for is played, where it begins. before: null in the first tick. */
-export function after(before: Happenings | null, contacts: readonly [number, number], gait: number, shows: boolean, arrived: boolean): Happenings {
+export function after(before: Happenings | null, contacts: readonly [number, number], gait: number, shows: boolean, arrived: boolean, act: Act | null): Happenings {
   const foot = (side: 0 | 1) => (before?.down[side] ? contacts[side] >= UP : contacts[side] > DOWN);
   const down: [boolean, boolean] = [foot(0), foot(1)];
   const flies = !down[0] && !down[1];
-  if (!before) return { down, air: flies ? FLIES : 0, gait, arrived };
-  return { down, air: flies ? before.air + 1 : 0, gait: shows ? gait : before.gait, arrived };
+  if (!before) return { down, air: flies ? FLIES : 0, gait, arrived, act };
+  return { down, air: flies ? before.air + 1 : 0, gait: shows ? gait : before.gait, arrived, act };
 }
 
-/** What has happened since the tick before. */
-export function eventsOf(now: Happenings, before: Happenings, gaits: readonly string[]): FigureEvent[] {
+/** What has happened since the tick before; null: in the first tick. */
+export function eventsOf(now: Happenings, earlier: Happenings | null, gaits: readonly string[]): FigureEvent[] {
+  const before = earlier ?? { ...now, act: null };
   const found: FigureEvent[] = [];
   if (now.down[0] && !before.down[0]) found.push({ kind: "left foot" });
   if (now.down[1] && !before.down[1]) found.push({ kind: "right foot" });
@@ -38,5 +47,8 @@ export function eventsOf(now: Happenings, before: Happenings, gaits: readonly st
   if (now.air === 0 && before.air >= FLIES) found.push({ kind: "landing" });
   if (now.gait !== before.gait) found.push({ kind: "gait", name: gaits[now.gait]! });
   if (now.arrived && !before.arrived) found.push({ kind: "arrived" });
+  const begun = now.act?.age === 0 ? now.act : null;
+  if (before.act && (begun || !now.act)) found.push({ kind: "act ended", name: before.act.name });
+  if (begun) found.push({ kind: "act begun", name: begun.name });
   return found;
 }

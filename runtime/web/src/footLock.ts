@@ -1,6 +1,6 @@
 /* A foot lock for live figures, standing feet stay in place without look-ahead: docs/bundle.md, "The foot lock". */
 import { BONES, HUMANOID, LEG, SIDES, SOLES } from "./humanoid.js";
-import { Leg } from "./leg.js";
+import { TwoBones } from "./twoBones.js";
 import { about, inverse, minus, plus, product, type Quaternion, rotated, type Vector, X, Y } from "./rotations.js";
 import { damped, dampingOf } from "./springs.js";
 import type { LockSettings } from "./steeringSettings.js";
@@ -90,7 +90,7 @@ function shift(foot: Foot, [x, , z]: Vector, contact: boolean, how: LockSettings
 export function reach(rotations: Quaternion[], side: number, hips: Quaternion, { turned, places }: Limb, move: Vector): void {
   const [hip, knee, ankle] = places as [Vector, Vector, Vector];
   const [thigh, shin, foot] = turned as [Quaternion, Quaternion, Quaternion];
-  const leg = new Leg(hip, knee, ankle, rotated(shin, X));
+  const leg = new TwoBones(hip, knee, ankle, rotated(shin, X));
   const turns = leg.turns(leg.eased(plus(ankle, move)));
   const [above, below] = [product(turns.thigh, thigh), product(turns.shin, shin)];
   const bones = LEGS[side]!;

@@ -1,6 +1,6 @@
 /* Holding the feet of a whole motion: docs/retargeting.md, "Planting of feet". */
 import { groundUnder, HUMANOID, isHumanoid, LEG, SIDES, solePoints } from "./humanoid.js";
-import { Leg } from "./leg.js";
+import { TwoBones } from "./twoBones.js";
 import { type Motion, motionFrom, worldOf } from "./motion.js";
 import { median, rise, rounded, smoothed, windows } from "./numbers.js";
 import { MotionError } from "./errors.js";
@@ -32,7 +32,7 @@ export function holdFeet(motion: Motion): Motion {
     const joints = LEG.slice(0, 3).map((part) => HUMANOID.index(side + part));
     const points = soles.map((frame) => frame.slice(3 * at, 3 * at + 3).map(([x, y, z]): Vector => [x, y - ground, z]));
     const [hip, knee, ankle] = joints.map((joint) => world.places.map((pose) => pose[joint]!)) as [Vector[], Vector[], Vector[]];
-    const legs = hip.map((place, frame) => new Leg(place, knee[frame]!, ankle[frame]!, rotated(world.turns[frame]![joints[1]!]!, X)));
+    const legs = hip.map((place, frame) => new TwoBones(place, knee[frame]!, ankle[frame]!, rotated(world.turns[frame]![joints[1]!]!, X)));
     targets(legs, points, motion.fps).forEach((target, frame) => {
       const { thigh, shin } = legs[frame]!.turns(target);
       // the foot keeps its direction
@@ -45,7 +45,7 @@ export function holdFeet(motion: Motion): Motion {
 }
 
 /** Where the ankle shall be, of points of the sole over ground at 0. */
-function targets(legs: Leg[], points: Vector[][], fps: number): Vector[] {
+function targets(legs: TwoBones[], points: Vector[][], fps: number): Vector[] {
   const shifts = shiftsOf(points, fps);
   const found = legs.map((leg, at) => leg.eased([leg.ankle[0] + shifts[at]![0], leg.ankle[1], leg.ankle[2] + shifts[at]![1]]));
   const depth = found.map((target, at) => Math.max(0, -(Math.min(...points[at]!.map((point) => point[1])) + target[1] - legs[at]!.ankle[1])));

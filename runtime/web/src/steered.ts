@@ -5,8 +5,10 @@ import type { ControlModel } from "./control.js";
 import type { Happenings } from "./events.js";
 import { held, type Lock, newLock } from "./footLock.js";
 import type { Command } from "./gaits.js";
+import { ahead, type Look, looked } from "./looking.js";
 import type { Playback, Target } from "./matching.js";
 import type { Pose as Ground } from "./planar.js";
+import { idle, type Reach, reached } from "./reaching.js";
 import type { Played } from "./steering.js";
 
 export interface Steered {
@@ -17,6 +19,9 @@ export interface Steered {
   target: Target;
   /** The path that it is on, if any. */
   going: Going | null;
+  look: Look;
+  /** Of the left and the right hand. */
+  hands: [Reach, Reach];
   /** Of its last tick. */
   happenings: Happenings | null;
 }
@@ -27,7 +32,8 @@ export function standing(model: ControlModel, gait: number, place?: Ground, phas
   const { matcher } = model.steerer;
   const playback = matcher.playing(matcher.stillest(gait), place, phase);
   const command = { gait, speed: 0, direction: 0, facing, facesWay: false };
-  return { playback, acting: noAct(model, playback), lock: newLock(), command, target: [0, 0, facing], going: null, happenings: null };
+  const told: Pick<Steered, "going" | "look" | "hands"> = { going: null, look: ahead(), hands: [idle(), idle()] };
+  return { playback, acting: noAct(model, playback), lock: newLock(), command, target: [0, 0, facing], ...told, happenings: null };
 }
 
 /** Set where a figure goes from now on, off any path: a command, and the target that its gait makes of it. */
@@ -50,7 +56,12 @@ export function tick(model: ControlModel, figure: Steered, holdFeet: boolean, ta
   const changed = begin(model, acting, playback, target, command.gait);
   const pose = laid(model, acting, steerer.tick(playback, target, command.gait), playback, root, changed);
   if (acting.playing?.whole && !command.speed) stand(figure);
-  return holdFeet ? held(figure.lock, pose, how, 1 / fps) : pose;
+  return guided(figure, holdFeet ? held(figure.lock, pose, how, 1 / fps) : pose, 1 / fps);
+}
+
+/** A pose with head and arms as the figure is told. */
+function guided({ look, hands }: Steered, pose: Played, seconds: number): Played {
+  return hands.reduce((found, hand, side) => reached(hand, side, found, seconds), looked(look, pose, seconds));
 }
 
 /** Who acts with the whole body and is told to stand goes on standing as it does then. */

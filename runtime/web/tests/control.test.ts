@@ -42,6 +42,11 @@ test("ways that cannot be gone are refused, and change nothing", () => {
   session.goTo([[0, 0.02], [3, 0]]);
   const before = session.snapshot();
   const refused: [() => void, RegExp][] = [
+    [() => session.lookAt([0, 1]), /points needs x, y, z, for all or for each of 2/],
+    [() => session.lookAt([0, 1, NaN]), /points must be finite/],
+    [() => session.lookAt([0, 1, 1], { who: [2] }), /whole numbers from 0 to 1/],
+    [() => session.reach("left", [[0, 1, 1], [0, 1]]), /points needs x, y, z/],
+    [() => session.reach("both" as "left", [0, 1, 1]), /unknown hand "both"; expected left or right/],
     [() => session.goTo([1]), /points needs x, z, for all or for each of 2/],
     [() => session.goTo([[1, 0], [0, NaN]]), /points must be finite/],
     [() => session.goTo([[1, 0], [0, 1]], { who: [1] }), /for each of 1/],
@@ -68,6 +73,32 @@ test("a figure arrives, says so once, and a command takes it off its path", () =
   assert.ok(Math.hypot(x - 0.5, z - 2) < 0.08, `${x}, ${z}`);
   session.control({ speed: 0 });
   assert.deepEqual(session.arrived, [false, false]);
+});
+
+test("what is out of reach is told, and what a figure no longer reaches for is not", () => {
+  const session = model.start({ characters: 2 });
+  session.reach("left", [[0.3, 1.4, 5], [0.2, 1.3, 0.4]]);
+  for (let at = 0; at < 60; at++) session.tick();
+  assert.deepEqual(session.outOfReach, [[true, false], [false, false]]);
+  session.reach("left", null);
+  session.tick();
+  assert.deepEqual(session.outOfReach, [[false, false], [false, false]]);
+});
+
+test("a look and a reach leave nothing once they are over, and a restored session has them", () => {
+  const [guided, plain] = [model.start(), model.start()];
+  const both = (count: number) => Array.from({ length: count }, () => [guided.tick(), plain.tick()]).at(-1)!;
+  guided.lookAt([3, 1.6, 1]);
+  guided.reach("right", [-0.2, 1.5, 0.4]);
+  assert.notDeepEqual(...(both(30) as [unknown, unknown]));
+  const before = guided.snapshot();
+  const next = guided.tick();
+  guided.restore(before);
+  assert.deepEqual(guided.tick(), next);
+  plain.tick();
+  guided.lookAt(null);
+  guided.reach("right", null);
+  assert.deepEqual(...(both(90) as [unknown, unknown]));
 });
 
 test("a session is restored, and figures move as each would alone", () => {

@@ -7,14 +7,15 @@ const EASED = 0.5;
 /** Shares of a straight leg's length: how much too long it stays when it bends, and short of straight where that is e times less. */
 const GIVES = [0.012, 0.006] as const;
 
-/** A thigh and a shin in one frame: hip, knee and ankle, and the axis about which the shin turns back when the knee bends. */
-export class Leg {
+/** A thigh and a shin in one frame: hip, knee and ankle, and the axis about which the shin turns back when the knee bends; or an upper
+ *  arm and a forearm: shoulder, elbow and hand. */
+export class TwoBones {
   private readonly upper: number;
   private readonly lower: number;
   private readonly axis: Vector;
   /** The part of the shin in the plane of the bend. */
   private readonly inPlane: number;
-  private readonly longest: number;
+  readonly longest: number;
 
   constructor(
     readonly hip: Vector,

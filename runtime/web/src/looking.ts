@@ -1,0 +1,99 @@
+/* Figures that look at points: head, neck and upper spine share the turn, within what people can do, as motet/motion/looking.py says. */
+import { type Follower, followed, followerAt, shownBy } from "./follower.js";
+import { BONES, HUMANOID } from "./humanoid.js";
+import { about, inverse, minus, plus, product, type Quaternion, rotated, size, STILL, type Vector, Y, Z } from "./rotations.js";
+import { clamp } from "./springs.js";
+import type { Played } from "./steering.js";
+
+/** Bones that turn, and the share of the turn that each and those below it make together. */
+const SHARES: [bone: number, share: number][] = (
+  [["chest", 0.1], ["upperChest", 0.25], ["neck", 0.55], ["head", 1]] as const
+).map(([name, share]) => [BONES.indexOf(name), share]);
+const OFFSETS = BONES.map((name) => HUMANOID.joints[HUMANOID.index(name)]!.offset);
+const SPINE = BONES.indexOf("spine");
+/** Between the eyes, from the head's joint. */
+const EYES: Vector = [0, 0.07, 0.08];
+const RADIANS = Math.PI / 180;
+/** The largest angles of the gaze, to a side and up or down; beyond the last a figure goes on looking over the same shoulder. */
+const [ASIDE, UP, BEHIND] = [85 * RADIANS, 50 * RADIANS, 150 * RADIANS];
+/** Metres: nothing nearer to the eyes is looked at, and what is less aside than the second is hardly turned to. */
+const [NEAR, UNDER] = [0.2, 0.3];
+/** Radians below which nothing is turned. */
+const LEAST = 1e-4;
+/** Radians that the gaze follows in a tick at once, and the half-life in seconds in which it catches up with more. */
+const [LEAP, HALF_LIFE] = [10 * RADIANS, 0.18];
+
+/** What a figure looks at, and the angles by which its head is turned to the left and up, more than is played. */
+export interface Look {
+  point: Vector | null;
+  turn: Follower;
+}
+
+/** Of a figure that looks at nothing. */
+export function ahead(): Look {
+  return { point: null, turn: followerAt([0, 0]) };
+}
+
+/** A pose with the head turned, a tick after the last; the look goes on. */
+export function looked(look: Look, pose: Played, seconds: number): Played {
+  if (!look.point && shownBy(look.turn).every((angle) => Math.abs(angle) <= LEAST)) return pose;
+  const seen = bonesOf(pose);
+  const now = angles(rotated(seen.at(-1)!, Z));
+  look.turn = followed(look.turn, wanted(look, pose, seen, now), LEAP, HALF_LIFE, seconds);
+  const rotations = [...pose.rotations];
+  let above: Quaternion = STILL;
+  turned(seen, now[0], shownBy(look.turn)).forEach((bone, i) => {
+    rotations[SHARES[i]![0]] = product(inverse(above), bone);
+    above = bone;
+  });
+  return { ...pose, rotations };
+}
+
+/** The turn that is wanted, to the left and up, of bones in the frame of the lower spine, the last of which looks at angles. */
+function wanted({ point, turn }: Look, pose: Played, seen: Quaternion[], now: [left: number, up: number]): number[] {
+  if (!point) return [0, 0];
+  const aim = minus(inSpine(pose, point), eyes(turned(seen, now[0], shownBy(turn)))); // as they were turned a tick ago
+  if (!(size(aim) > NEAR)) return [0, 0];
+  let [left, up] = angles(aim);
+  if (Math.abs(left) > BEHIND) left = Math.abs(left) * (now[0] + turn.wanted[0]! < 0 ? -1 : 1);
+  left *= Math.min(Math.hypot(aim[0], aim[2]) / UNDER, 1);
+  return [clamp(left, -ASIDE, ASIDE) - now[0], clamp(up, -UP, UP) - now[1]];
+}
+
+/** Rotations of the bones that turn in the frame of the lower spine. */
+function bonesOf({ rotations }: Played): Quaternion[] {
+  let above: Quaternion = STILL;
+  return SHARES.map(([bone]) => (above = product(above, rotations[bone]!)));
+}
+
+/** A point in the frame of the lower spine. */
+function inSpine({ ground: [x, z, facing], height, rotations }: Played, point: Vector): Vector {
+  const hips = product(about(Y, facing), rotations[0]!);
+  const place = plus([x, height, z], rotated(hips, OFFSETS[SPINE]!));
+  return rotated(inverse(product(hips, rotations[SPINE]!)), minus(point, place));
+}
+
+/** Where the eyes are in the frame of the lower spine. */
+function eyes(bones: Quaternion[]): Vector {
+  let [place, above]: [Vector, Quaternion] = [[0, 0, 0], STILL];
+  bones.forEach((bone, i) => {
+    place = plus(place, rotated(above, OFFSETS[SHARES[i]![0]]!));
+    above = bone;
+  });
+  return plus(place, rotated(above, EYES));
+}
+
+/** Of a direction, to the left and up. */
+function angles([x, y, z]: Vector): [left: number, up: number] {
+  return [Math.atan2(x, z), Math.atan2(y, Math.hypot(x, z))];
+}
+
+/** Bones turned by their shares of angles, from a gaze so far to the left. */
+function turned(bones: Quaternion[], gaze: number, [left, up]: number[]): Quaternion[] {
+  return bones.map((bone, i) => {
+    const share = SHARES[i]![1];
+    const [way, half] = [gaze + share * left!, (share * up!) / 2];
+    const [sine, cosine] = [Math.sin(half), Math.cos(half)];
+    return product([-Math.cos(way) * sine, 0, Math.sin(way) * sine, cosine], product(about(Y, share * left!), bone));
+  });
+}
