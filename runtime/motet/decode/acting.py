@@ -117,8 +117,7 @@ class Acting:
     def of(playback: Playback, matcher: Matcher, codes: PoseCodes, how: ActSettings) -> "Acting":
         """Of figures that play none, and stand as they are played."""
         played, _ = matcher.table.at(playback)
-        way = matcher.table.way[playback.mirror, playback.row]
-        shown = Body(*body(codes, playback, played, way))
+        shown = Body(*body(codes, playback, played))
         off, still = np.zeros((len(played), 3 * len(BONES) + 1)), np.zeros((len(played), 3))
         led, damping = still[:, 0] > 0, still[:, :1]
         return Acting(

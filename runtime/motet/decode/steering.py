@@ -93,15 +93,15 @@ def tick(matcher: Matcher, poses: PoseCodes, playback: Playback, target: Array, 
     recorded = Recorded(forward, left, turn, speed, single(way), single(matcher.creeping(target, gait)))
     _go(playback, recorded, _sprung(playback, parts(target), how, dt), how, dt)
     playback.offset, playback.offset_rate = damped(playback.offset, playback.offset_rate, damping_of(how.blend), dt)
-    rotations, height = body(poses, playback, played, way)
+    rotations, height = body(poses, playback, played)
     return Pose(playback.root, rotations, height, played[:, -2:].astype(np.float32))
 
 
-def body(poses: PoseCodes, playback: Playback, played: Array, way: Array) -> tuple[Floats, Floats]:
+def body(poses: PoseCodes, playback: Playback, played: Array) -> tuple[Floats, Floats]:
     """Rotations and height of figures that play numbers (B, K + 6) of the table, with their offset, turned and with
-    strides as they go; rows go a way (B,)."""
+    strides as they go."""
     rotations, height = poses.decode(played[:, :-6] + playback.offset)
-    strides = strided(rotations, played[:, -2:].astype(np.float32), way, playback.stride)
+    strides = strided(rotations, played[:, -2:].astype(np.float32), playback.stride)
     return warped(strides, playback.warp), height
 
 

@@ -2,7 +2,7 @@
 
 Orientation warping: hips and legs are turned towards where a figure goes, and the spine is turned back. So a recorded
 walk straight ahead goes aside, its feet pointing there and standing as they were recorded, while shoulders, arms and
-head stay as they are. Stride warping: feet are led nearer to the body, or farther from it, along the way. Letters in
+head stay as they are. Stride warping: feet are led nearer to the body, or farther from it. Letters in
 shapes: B figures, J bones.
 """
 
@@ -13,6 +13,7 @@ from motet.bundle.graph import Floats
 from motet.motion.feet.lock import joints_of, limbs, reached_by, with_legs
 from motet.motion.humanoid import BONES, HUMANOID, LEG, SOLE, SPINE
 from motet.motion.parts import (
+    Part,
     Quaternion,
     computed,
     inverse,
@@ -61,20 +62,20 @@ UNDER = HUMANOID.rest_positions[HUMANOID.index("leftFoot"), 2] + BALL[2]
 """How far in front of the hips the balls of a standing figure's feet are."""
 
 
-def strided(rotations: Floats, contacts: Floats, ways: Array, strides: Array) -> Floats:
-    """Local quaternions (B, J, 4) with the balls of the feet led so far along ways (B,), in radians from the facing,
-    that strides are these times (B,) as long."""
+def strided(rotations: Floats, contacts: Floats, strides: Array) -> Floats:
+    """Local quaternions (B, J, 4) with the balls of the feet led so far that strides are these times (B,) as long, in
+    whichever direction they go: one that changed with the row that is played would make feet leap."""
     who = _those(np.abs(strides - 1) > LEAST)
     if who is None:
         return rotations
-    sin, cos, by = parts(np.stack([np.sin(ways[who]), np.cos(ways[who]), strides[who] - 1], axis=1))
     hips: Quaternion = parts(rotations[who, 0])
+    by: Part = single(strides[who] - 1)
     legs = []
     for limb in limbs(rotations[who], contacts[who]):
         turned, places = joints_of(limb, hips, (0.0, 0.0, 0.0))
         x, _, z = plus(places[2], rotated(turned[2], BALL))
-        far = ((x - limb.offsets[0][0]) * sin + (z - UNDER) * cos) * by
-        legs.append(reached_by(hips, turned, places, plus(places[2], (far * sin, 0.0, far * cos))))
+        led = ((x - limb.offsets[0][0]) * by, 0.0, (z - UNDER) * by)
+        legs.append(reached_by(hips, turned, places, plus(places[2], led)))
     found = rotations.copy("K")
     found[who] = with_legs(rotations[who], legs)
     return found

@@ -53,7 +53,7 @@ export class Steerer {
   body(figure: Playback): Pick<Played, "rotations" | "height"> {
     this.matcher.played(figure, this.codes);
     const { rotations, height } = this.pose();
-    const legs = strided(rotations, this.matcher.way(figure), figure.stride);
+    const legs = strided(rotations, figure.stride);
     return { rotations: warped(legs, figure.warp), height };
   }
 

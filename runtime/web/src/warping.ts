@@ -27,16 +27,18 @@ const BALL = SOLES.Foot!.at(-1)!;
 /** How far in front of the hips the balls of a standing figure's feet are. */
 const UNDER = HUMANOID.rest[HUMANOID.index("leftFoot")]![2] + BALL[2];
 
-/** Local rotations with the balls of the feet led so far along a way from the facing that strides are this times as long. */
-export function strided(rotations: Quaternion[], way: number, stride: number): Quaternion[] {
+/**
+ * Local rotations with the balls of the feet led so far that strides are this times as long, in whichever direction they
+ * go: one that changed with the row that is played would make feet leap.
+ */
+export function strided(rotations: Quaternion[], stride: number): Quaternion[] {
   if (Math.abs(stride - 1) <= LEAST) return rotations;
   const found = [...rotations];
-  const [sin, cos] = [Math.sin(way), Math.cos(way)];
   SIDES.forEach((_, side) => {
     const leg = legOf(rotations, side, rotations[0]!, [0, 0, 0]);
     const [x, , z] = plus(leg.places[2]!, rotated(leg.turned[2]!, BALL));
-    const far = ((x - OFFSETS[side]![0]![0]) * sin + (z - UNDER) * cos) * (stride - 1);
-    reach(found, side, rotations[0]!, leg, [far * sin, 0, far * cos]);
+    const led: [number, number, number] = [(x - OFFSETS[side]![0]![0]) * (stride - 1), 0, (z - UNDER) * (stride - 1)];
+    reach(found, side, rotations[0]!, leg, led);
   });
   return found;
 }
