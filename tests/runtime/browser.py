@@ -98,6 +98,10 @@ class Browser:
         )
         assert self.value(waiting), self.errors
 
+    def before(self, script: str) -> None:
+        """Run a script in the next pages before their own."""
+        self._call("Page.addScriptToEvaluateOnNewDocument", source=script)
+
     def emulate(self, **features: str) -> None:
         """Media features of the next pages, such as ``prefers_reduced_motion="reduce"``."""
         named = [{"name": name.replace("_", "-"), "value": value} for name, value in features.items()]

@@ -16,7 +16,7 @@ function contextOf(canvas) {
   return null;
 }
 
-/** A program, and the places of its uniforms by name. defined: names for #define with their values. */
+/** A program, which is compiled from now on. defined: names for #define with their values. */
 function programOf(gl, vertex, fragment, defined = {}) {
   const program = gl.createProgram();
   const names = Object.entries(defined).map(([name, value]) => `#define ${name} ${value}\n`).join("");
@@ -28,6 +28,11 @@ function programOf(gl, vertex, fragment, defined = {}) {
     gl.attachShader(program, shader);
   }
   gl.linkProgram(program);
+  return program;
+}
+
+/** The places of a program's uniforms by name, once it is compiled. */
+function placesOf(gl, program) {
   if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
     const logs = gl.getAttachedShaders(program).map((shader) => gl.getShaderInfoLog(shader));
     throw new Error(`${gl.getProgramInfoLog(program)} ${logs.join(" ")}`);
@@ -37,7 +42,7 @@ function programOf(gl, vertex, fragment, defined = {}) {
     const { name } = gl.getActiveUniform(program, n);
     places[name] = gl.getUniformLocation(program, name);
   }
-  return { program, places };
+  return places;
 }
 
 /** Start a program and set its uniforms by name: numbers, whole ones as {int}, vectors, matrices (16 numbers). */

@@ -14,6 +14,12 @@ const QUALITIES = [
   { ratio: 0.65, map: 512, taps: 2, sizes: [400, 110], casters: 8, quick: true }, { ratio: 0.5, map: 512, taps: 1, sizes: [400, 110], casters: 6, quick: true },
 ];
 
+/** Vertex and fragment shaders. */
+const PROGRAMS = {
+  shadow: [CAST, SHADOW_ONLY], sky: [SKY, PLAIN], ground: [GROUND, CHECKS], shade: [SHADED, SHADE + SHADOW], marks: [MARKS, MARK],
+  body: [SHADE + LIGHT + CORNERS, SHADE + LIGHT + SURFACE],
+};
+
 /** The stage of a canvas; null where the browser cannot draw it, which the page then says. */
 function openStage(canvas) {
   const gl = contextOf(canvas);
@@ -39,6 +45,8 @@ class Stage {
     this.shades = streamOf(gl, [2]);
     this.white = textureOf(gl, null);
     for (const body of this.bodies) upload(gl, body);
+    this.level = QUALITIES[this.quality];
+    for (const name of Object.keys(PROGRAMS)) this.start(name, name === "body" ? this.lit(true) : {});
   }
 
   body(data) {
@@ -66,9 +74,16 @@ class Stage {
     }
   }
 
-  program(name, vertex, fragment, defined) {
+  /** A program at the quality of now. */
+  program(name, defined = {}) {
+    const started = this.start(name, defined);
+    return started.places ? started : Object.assign(started, { places: placesOf(this.gl, started.program) });
+  }
+
+  /** Let a program be compiled, beside what else is done. */
+  start(name, defined = {}) {
     const { taps } = this.level, key = `${name} ${taps} ${JSON.stringify(defined)}`;
-    return (this.programs[key] ??= programOf(this.gl, vertex, fragment, { TAPS: taps, ...defined }));
+    return (this.programs[key] ??= { program: programOf(this.gl, ...PROGRAMS[name], { TAPS: taps, ...defined }) });
   }
 
   /** Before the boxes of a frame: the canvas gets its size. Its size in pixels of the page, 0 where nothing is seen.
@@ -149,7 +164,7 @@ class Stage {
     gl.clear(gl.DEPTH_BUFFER_BIT);
     gl.enable(gl.POLYGON_OFFSET_FILL);
     gl.polygonOffset(1.5, 3);
-    use(gl, this.program("shadow", CAST, SHADOW_ONLY, {}), { clip: sees.clip });
+    use(gl, this.program("shadow"), { clip: sees.clip });
     for (const { cast, n } of own) this.triangles(cast, n);
     gl.disable(gl.POLYGON_OFFSET_FILL);
     gl.disable(gl.DEPTH_TEST);
@@ -161,14 +176,14 @@ class Stage {
   drawGround(shared, theme, height, slots) {
     const { gl } = this, pixel = 2 * shared.tall / height / this.ratio;
     gl.bindVertexArray(null);
-    use(gl, this.program("sky", SKY, PLAIN, {}), shared);
+    use(gl, this.program("sky"), shared);
     gl.drawArrays(gl.TRIANGLES, 0, 6 * SKY_ROWS);
     const own = { light: rgb(theme.light), dark: rgb(theme.dark), sharp: 4 * shared.eye[1] / pixel / FINE };
-    use(gl, this.program("ground", GROUND, CHECKS, {}), { ...shared, ...own });
+    use(gl, this.program("ground"), { ...shared, ...own });
     gl.drawArrays(gl.TRIANGLES, 0, 6 * SECTORS * RINGS);
     const boxes = slots.filter(({ cast }) => cast).flatMap(({ figure }) => shadeOf(figure));
     this.blended(() => {
-      use(gl, this.program("shade", SHADED, SHADE + SHADOW, {}), { ...shared, shade: theme.shade, shadows: { int: 1 } });
+      use(gl, this.program("shade"), { ...shared, shade: theme.shade, shadows: { int: 1 } });
       drawStream(gl, this.shades, covered(boxes));
     });
   }
@@ -188,17 +203,22 @@ class Stage {
     for (const figure of figures) darken(marks, figure, 0.5 * theme.shade);
     for (const spot of spots) marks.spot(spot);
     this.blended(() => {
-      use(gl, this.program("marks", MARKS, MARK, {}), shared);
+      use(gl, this.program("marks"), shared);
       drawStream(gl, this.marks, marks.made());
     });
+  }
+
+  /** What says how bodies of people are lit; shaded: whether shadows fall on them where it has to be quick. */
+  lit(shaded) {
+    return this.level.quick ? { QUICK: 1, TAPS: shaded ? 1 : 0 } : {};
   }
 
   drawFigures(slots, shared) {
     const { gl } = this;
     gl.enable(gl.DEPTH_TEST);
     for (const { figure, shown, n } of slots) {
-      const defined = figure.body.primitives[0].textured ? { TEXTURED: 1 } : this.level.quick ? { QUICK: 1, TAPS: shown === simpler(figure.body, 2) ? 0 : 1 } : {};
-      const program = this.program("body", SHADE + LIGHT + CORNERS, SHADE + LIGHT + SURFACE, defined);
+      const defined = figure.body.primitives[0].textured ? { TEXTURED: 1 } : this.lit(shown !== simpler(figure.body, 2));
+      const program = this.program("body", defined);
       use(gl, program, { ...shared, shadows: { int: 1 }, image: { int: 2 } });
       gl.uniform3fv(program.places["palette[0]"] ?? null, paletteOf(figure));
       this.triangles(shown, n, program.places);

@@ -75,15 +75,15 @@ export async function readNpz(bytes: Uint8Array, limit: number): Promise<Map<str
 
 /** Numbers of half precision. */
 export function halves(bits: Uint16Array): Float32Array {
-  return Float32Array.from(bits, (half) => {
-    const exponent = (half >> 10) & 31;
-    const fraction = half & 1023;
-    const size =
-      exponent === 0 ? fraction * 2 ** -24
-      : exponent === 31 ? (fraction ? NaN : Infinity)
-      : (1 + fraction / 1024) * 2 ** (exponent - 15);
-    return half & 0x8000 ? -size : size;
-  });
+  const found = new Float32Array(bits.length);
+  const words = new Uint32Array(found.buffer);
+  for (let at = 0; at < bits.length; at++) {
+    const half = bits[at]!;
+    const exponent = half & 0x7c00;
+    if (exponent && exponent < 0x7c00) words[at] = ((half & 0x8000) << 16) | (((half & 0x7fff) + 0x1c000) << 13);
+    else found[at] = (half & 0x8000 ? -1 : 1) * (exponent ? (half & 1023 ? NaN : Infinity) : (half & 1023) * 2 ** -24);
+  }
+  return found;
 }
 
 /** Rows of a two-dimensional array without copies. */

@@ -11,7 +11,9 @@ export interface Packed {
 
 /** The tables, row by row; halves as Float32Array. */
 export async function unpacked({ tables, bytes: text }: Packed): Promise<Record<string, ArrayLike<number>>> {
-  const pressed = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  const letters = atob(text);
+  const pressed = new Uint8Array(letters.length);
+  for (let at = 0; at < pressed.length; at++) pressed[at] = letters.charCodeAt(at);
   const stream = new Blob([pressed]).stream().pipeThrough(new DecompressionStream("gzip"));
   const bytes = new Uint8Array(await new Response(stream).arrayBuffer());
   const found: Record<string, ArrayLike<number>> = {};

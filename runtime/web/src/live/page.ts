@@ -31,6 +31,8 @@ const DONE = ["click", "change", "input", "keydown", "drop"];
 
 export class Page {
   readonly figures: Figure[] = [];
+  /** What can be typed; it comes once the first picture is drawn. */
+  repertoire!: Repertoire;
   readonly state = { gait: 0, hurry: false, strafe: false, trails: true, contacts: false, follows: true, pause: false, pace: 1 };
   /** Who steers while no hand does. */
   pilot: Pilot | null = null;
@@ -50,7 +52,6 @@ export class Page {
     readonly scene: Scene,
     readonly hands: Hands,
     readonly recorder: Recorder,
-    readonly repertoire: Repertoire,
     private readonly say: (text: string) => void,
   ) {}
 
@@ -183,24 +184,32 @@ export class Page {
 
 /** Open the page of what motet/live/page.py has written. */
 export async function open(given: Given, stage: Stage): Promise<Page> {
-  const model = await modelOf(given.net);
-  const repertoire = await Repertoire.of(given.acts, model);
-  const speeds = Object.fromEntries(model.gaits.map((gait, n) => [gait, model.abilities.speeds[n]!]));
-  const net: Net = { model, gaits: model.gaits, fps: model.fps, speeds, rows: model.steerer.matcher.rows };
   const element = (id: string) => document.getElementById(id)!;
   const canvas = element("canvas") as HTMLCanvasElement;
-  const scene = new Scene(stage, canvas, given.body, given.body.height);
-  const page = new Page(net, stage, scene, new Hands(stage, element("stick")), new Recorder(net.fps, scene, canvas), repertoire, said(element("speed")));
+  const scene = new Scene(stage, canvas, given.body, given.body.height); // its programs are compiled while tables are unpacked
+  const model = await modelOf(given.net);
+  const speeds = Object.fromEntries(model.gaits.map((gait, n) => [gait, model.abilities.speeds[n]!]));
+  const net: Net = { model, gaits: model.gaits, fps: model.fps, speeds, rows: model.steerer.matcher.rows };
+  const page = new Page(net, stage, scene, new Hands(stage, element("stick")), new Recorder(net.fps, scene, canvas), said(element("speed")));
   page.setFigures(given.characters);
-  addControls(page, given.most);
   if (!matchMedia("(prefers-reduced-motion: reduce)").matches) page.startByItself();
   for (const done of DONE) addEventListener(done, () => (stage.view.dirty = true));
-  const frame = (now: number) => {
-    page.frame(now);
-    requestAnimationFrame(frame);
-  };
-  requestAnimationFrame(frame);
+  await drawn(page);
+  page.repertoire = await Repertoire.of(given.acts, model);
+  addControls(page, given.most);
   return page;
+}
+
+/** Draw frame after frame; done once the first one is drawn. */
+function drawn(page: Page): Promise<void> {
+  return new Promise((done) => {
+    const frame = (now: number) => {
+      page.frame(now);
+      requestAnimationFrame(frame);
+      done();
+    };
+    requestAnimationFrame(frame);
+  });
 }
 
 /** Writes what changes into an element. */
