@@ -1,17 +1,20 @@
-"""Many things on all cores: a function of each, in processes, with results in the order of what was given."""
+"""Many things on all cores: a function of each, in processes, with results in the order of what was given; and shards,
+which are shared out to several machines."""
 
 import os
 import pickle
+import re
 import signal
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
 from functools import cache
 from itertools import chain, islice
 from typing import Any, TypeVar
 
-from motet.errors import MotetError
+from motet.errors import MotetError, SettingError
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -68,6 +71,29 @@ def batches(given: Sequence[T], jobs: int, most: int) -> Iterator[Sequence[T]]:
         stop = start + max(1, min(most, share))
         yield given[start:stop]
         start = stop
+
+
+@dataclass(frozen=True)
+class Shard:
+    """One of several parts of many things, such as files: every ``count``-th from the ``number``-th."""
+
+    number: int = 1
+    count: int = 1
+
+    @staticmethod
+    def parse(text: str) -> "Shard":
+        """Read "3/16"; SettingError for anything else."""
+        found = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text)
+        if found is None or not 1 <= int(found[1]) <= int(found[2]):
+            raise SettingError(f"a shard is a number and how many there are, such as 3/16, not {text!r}")
+        return Shard(int(found[1]), int(found[2]))
+
+    def of(self, things: Sequence[T]) -> Sequence[T]:
+        """Those of this shard."""
+        return things[self.number - 1 :: self.count]
+
+    def __str__(self) -> str:
+        return f"{self.number}/{self.count}"
 
 
 def cores() -> int:

@@ -10,6 +10,7 @@ import pytest
 from command_line import check_refused, run
 from fake_models import moving, search_model
 
+import motet
 from motet.formats import read_motion, write_motion
 from motet.models.load import load_as
 from motet.models.search import INDEX_FILE, Index, IndexSettings, SearchModel
@@ -132,3 +133,39 @@ def test_refusals(folder: Path, tmp_path: Path) -> None:
     check_refused(run("search", empty / "gone.bvh", folder), "gone.bvh", empty)
     check_refused(run("search", "walks", folder, "--index", empty / "no" / "x.npz"), "does not exist", empty)
     assert not (folder / INDEX_FILE).exists()
+
+
+def test_indexes_of_shards_are_merged_into_the_bytes_of_one(folder: Path, tmp_path: Path) -> None:
+    (folder / "broken.bvh").write_text("")
+    run("search", "walks", folder, "--index", tmp_path / "one.npz")
+    (tmp_path / "shards").mkdir()
+    for number in (1, 2, 3):
+        file = tmp_path / "shards" / f"{number}.npz"
+        result = run("search", "walks", folder, "--shard", f"{number}/3", "--index", file, "--json", "--count", 9)
+        said = {Path(row["path"]).name for row in json.loads(result.stdout)}
+        assert said == {path.name for path in sorted(folder.iterdir())[number - 1 :: 3]} - {"broken.bvh"}
+        changed = file.stat().st_mtime_ns
+        assert run("search", "walks", file, "--json", "--count", 9).stdout == result.stdout  # it stays a shard
+        assert file.stat().st_mtime_ns == changed
+    again = run("search", "walks", folder, "--merge", tmp_path / "shards", "--index", tmp_path / "all.npz")
+    assert again.stdout == run("search", "walks", folder, "--index", tmp_path / "one.npz").stdout
+    assert (tmp_path / "all.npz").read_bytes() == (tmp_path / "one.npz").read_bytes()
+
+
+def test_merged_shards_are_not_embedded_again(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    run("search", "walks", folder, "--shard", "1/2", "--index", tmp_path / "a.npz")
+    read, asked = motet.models.search.read_motion, list[str]()
+    monkeypatch.setattr(
+        "motet.models.search.read_motion", lambda path, **rest: asked.append(path.name) or read(path, **rest)
+    )
+    run("search", "walks", folder, "--merge", tmp_path / "a.npz")
+    assert asked == ["1.npz", "3.npz"]  # those of the shard that is missing
+
+
+def test_shards_of_an_index_that_cannot_be(folder: Path, tmp_path: Path) -> None:
+    assert "give --index FILE" in run("search", "walks", folder, "--shard", "1/2").stderr
+    assert "no indexes of shards" in run("search", "walks", folder, "--merge", tmp_path).stderr
+    refused = run("search", "walks", folder, "--shard", "9/9", "--index", tmp_path / "a.npz")
+    assert "no motion files" in refused.stderr
+    (tmp_path / "old.npz").write_text("hello")
+    assert "old.npz: not an index" in run("search", "walks", folder, "--merge", tmp_path / "old.npz").stderr

@@ -17,8 +17,9 @@ from command_line import run
 
 import motet
 from motet.corpus.answers import Answer, Verb
-from motet.corpus.parts import Part, Shard, digest, failures, merge
+from motet.corpus.parts import Part, digest, failures, merge
 from motet.corpus.sources import Source, files_of
+from motet.jobs import Shard
 
 
 @pytest.fixture(scope="module")

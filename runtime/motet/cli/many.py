@@ -18,9 +18,9 @@ from motet.cli.reading import Read
 from motet.corpus import parts as corpus_parts
 from motet.corpus import ray_engine
 from motet.corpus.answers import Answer, Hashed, Verb
-from motet.corpus.parts import Part, Shard, digest, failures
+from motet.corpus.parts import Part, digest, failures
 from motet.corpus.sources import Source, files_of
-from motet.jobs import in_batches
+from motet.jobs import Shard, in_batches
 from motet.settings import silent
 
 log = logging.getLogger(__name__)

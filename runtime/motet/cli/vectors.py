@@ -16,9 +16,10 @@ from motet.cli.many import Many, jobs_option, many_options
 from motet.cli.options import bar, bundle_option, noted, session_options, warned
 from motet.cli.reading import read_options, unit_option
 from motet.corpus.answers import Embed
-from motet.errors import TextWarning
+from motet.errors import FormatError, TextWarning
 from motet.files import check_place, write_whole
 from motet.formats import names_motion, read_motion
+from motet.jobs import Shard
 from motet.models.generate import GenerateModel
 from motet.models.load import load_as
 from motet.models.search import INDEX_FILE, Index, SearchModel
@@ -81,12 +82,23 @@ def _save(out: Path, vectors: Floats) -> None:
     write_whole(out, buffer.getvalue())
 
 
+def _indexes(folder: Path) -> list[Path]:
+    found = sorted(folder.glob("*.npz")) if folder.is_dir() else [folder]
+    if not found:
+        raise FormatError(folder, "no indexes of shards (.npz) are in it")
+    return found
+
+
 @click.command()
 @click.argument("query")
 @click.argument("folder", type=Path)
 @click.option("--count", type=click.IntRange(1, 1000), help="Motions to print. [default: the bundle's]")
 @bundle_option("search")
 @click.option("--index", "file", type=Path, help=f"File for the vectors. [default: {INDEX_FILE} in FOLDER]")
+@click.option("--shard", metavar="I/N", help="With --index: index every N-th file from the I-th, such as 3/16.")
+@click.option(
+    "--merge", multiple=True, type=Path, metavar="FOLDER", help="Take vectors from the indexes (.npz) of shards there."
+)
 @unit_option
 @jobs_option
 @session_options
@@ -99,6 +111,8 @@ def search(
     count: int | None,
     bundle: str,
     file: Path | None,
+    shard: str | None,
+    merge: tuple[Path, ...],
     unit_in: str | None,
     jobs: int | None,
     session: SessionOptions,
@@ -110,13 +124,17 @@ def search(
     each clip is a motion of its own. Those after "?" are the nearest, but not like it. The first search reads and
     embeds all motion files, and later ones those that are new or have changed.
     """
+    if shard is not None and file is None:
+        raise click.UsageError("--shard writes an index of a part: give --index FILE")
+    part = None if shard is None else Shard.parse(shard)
+    parts = [one for given in merge for one in _indexes(given)]
     model = load_as(SearchModel, bundle, session)
     motion = read_motion(query, unit=unit_in) if names_motion(query) else None
     if motion is None:
         with noted():
             model.ids(query)  # refused before all motions are read
     with bar("embedding") as progress:
-        index = Index.open(folder, model, file, unit=unit_in, jobs=jobs, progress=progress)
+        index = Index.open(folder, model, file, unit=unit_in, jobs=jobs, shard=part, merge=parts, progress=progress)
     with warnings.catch_warnings(action="ignore", category=TextWarning), warned(query):  # words are said already
         hits = index.search(query if motion is None else motion, count)
     if as_json:

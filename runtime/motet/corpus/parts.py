@@ -10,52 +10,27 @@ import hashlib
 import heapq
 import json
 import os
-import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
 from motet.corpus.answers import Answer, to_json
 from motet.corpus.sources import Source, size_of
-from motet.errors import FormatError, OutputError, SettingError
+from motet.errors import FormatError, OutputError
 from motet.files import replacing
+from motet.jobs import Shard
 
 if sys.platform != "win32":
     import fcntl
 
-T = TypeVar("T")
-
 ROWS = 10_000
 """Answers of one row group of a Parquet file."""
-
-
-@dataclass(frozen=True)
-class Shard:
-    """One of several parts of a corpus: every ``count``-th file from the ``number``-th."""
-
-    number: int = 1
-    count: int = 1
-
-    @staticmethod
-    def parse(text: str) -> "Shard":
-        """Read "3/16"; SettingError for anything else."""
-        found = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text)
-        if found is None or not 1 <= int(found[1]) <= int(found[2]):
-            raise SettingError(f"a shard is a number and how many there are, such as 3/16, not {text!r}")
-        return Shard(int(found[1]), int(found[2]))
-
-    def of(self, things: Sequence[T]) -> Sequence[T]:
-        """Those of this shard."""
-        return things[self.number - 1 :: self.count]
-
-    def __str__(self) -> str:
-        return f"{self.number}/{self.count}"
 
 
 def digest(files: Iterable[Path]) -> str:

@@ -10,7 +10,7 @@ import json
 import logging
 import zipfile
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, overload
@@ -24,7 +24,7 @@ from motet.files import files_in, write_whole
 from motet.formats import MOCAP, clips, read_motion
 from motet.formats.npz import array
 from motet.formats.text import MARK
-from motet.jobs import in_order
+from motet.jobs import Shard, in_order
 from motet.models.language import MAX_SECONDS, LanguageModel
 from motet.motion.feet.treadmill import is_in_place, with_travel
 from motet.motion.motion import Motion
@@ -126,6 +126,11 @@ class Member:
     in_place: bool = False
 
     @property
+    def state(self) -> tuple[str, int, int]:
+        """By which its file is known again: path, size and modification time."""
+        return self.path, self.size, self.changed
+
+    @property
     def name(self) -> str:
         """The path, with the clip if there is one."""
         return f"{self.path}{MARK}{self.clip}" if self.clip else self.path
@@ -136,7 +141,7 @@ class Index:
     """The searchable motions of a folder; :meth:`open` makes one.
 
     folder: root of the paths of hits. vectors: (N, E) float32, of all windows of all members. vanished: files that no
-    longer exist. unit: length unit with which :func:`motet.read` read them.
+    longer exist. unit: length unit with which :func:`motet.read` read them. shard: which of the files it has.
     """
 
     model: SearchModel
@@ -145,15 +150,18 @@ class Index:
     vectors: Floats
     vanished: tuple[Path, ...] = ()
     unit: str | float | None = None
+    shard: Shard = field(default_factory=Shard)
 
     @staticmethod
-    def open(
+    def open(  # noqa: PLR0913  options by name
         place: str | Path,
         model: SearchModel,
         file: str | Path | None = None,
         *,
         unit: str | float | None = None,
         jobs: int | None = 1,
+        shard: Shard | None = None,
+        merge: Sequence[str | Path] = (),
         progress: Progress = silent,
     ) -> "Index":
         """The index of all motion files in a folder and its subfolders; or of the folder of an index file.
@@ -164,6 +172,8 @@ class Index:
         unit: the length unit of files that do not state theirs, like in :func:`motet.read`; an index made with another
         unit is rebuilt.
         jobs: processes for many files that are new or have changed; None: one for each core.
+        shard: only these of the files, for one of several machines; None: as the index says, or all.
+        merge: indexes of shards, whose vectors are taken for files that have not changed.
         progress: called with the number of motion files done and in total.
         FormatError for a missing folder, one without motion files, or an index that is damaged or of another model;
         MotionError where no motion can be used, or for an unknown unit.
@@ -173,9 +183,13 @@ class Index:
         place = Path(place)
         kept = place if place.is_file() else Path(file or place / INDEX_FILE)
         before = _read(kept, model) if kept.is_file() else None
-        folder = before.folder if before is not None and kept == place else place
-        found = _renewed(folder, model, before, unit, jobs, progress)
-        if before is None or (before.folder, before.unit, before.members) != (folder.absolute(), unit, found.members):
+        if before is not None and kept == place:
+            folder, shard = before.folder, shard or before.shard
+        else:
+            folder, shard = place, shard or Shard()
+        known = [one for one in (before, *(_read(Path(one), model) for one in merge)) if one is not None]
+        found = _renewed(folder, model, known, unit, jobs, shard, progress)
+        if before is None or _state(before) != _state(found):
             _keep(found, kept, needed=file is not None)
         for path in found.vanished:
             log.warning("%s has vanished since it was indexed", path)
@@ -188,6 +202,14 @@ class Index:
     def failed(self) -> dict[Path, str]:
         """The motion files that could not be indexed, and why."""
         return {self.folder / member.name: member.fault for member in self.members if member.fault}
+
+    def entries(self) -> dict[tuple[str, int, int], list[tuple[Member, Floats]]]:
+        """The members of each file, by its :attr:`Member.state`, with their vectors (windows, E)."""
+        found: dict[tuple[str, int, int], list[tuple[Member, Floats]]] = {}
+        stops = np.cumsum([len(member.windows) for member in self.members])
+        for member, rows in zip(self.members, np.split(self.vectors, stops)[:-1], strict=True):
+            found.setdefault(member.state, []).append((member, rows))
+        return found
 
     @overload
     def search(  # type: ignore[overload-overlap]  # a string is a sequence of strings, too
@@ -240,35 +262,37 @@ def direction(model: SearchModel, motion: Motion) -> Floats:
 def _renewed(
     folder: Path,
     model: SearchModel,
-    before: Index | None,
+    before: Sequence[Index],
     unit: str | float | None,
     jobs: int | None,
+    shard: Shard,
     progress: Progress,
 ) -> Index:
     """The current index of a folder, reusing the entries of unchanged files."""
     known: dict[tuple[str, int, int], list[tuple[Member, Floats]]] = {}  # by path, size and modification time
-    if before is not None:
-        stops = np.cumsum([len(member.windows) for member in before.members])
-        for member, rows in zip(before.members, np.split(before.vectors, stops)[:-1], strict=True):
-            known.setdefault((member.path, member.size, member.changed), []).append((member, rows))
+    for one in before:
+        known |= one.entries() if one.unit == unit else {}
     if not folder.is_dir():
         raise FormatError(folder, "neither a folder of motion files nor an index of one")
-    paths = files_in(folder, MOCAP)
+    paths = shard.of(files_in(folder, MOCAP))
     if not paths:
-        raise FormatError(folder, f"no motion files ({' '.join(MOCAP)}) are in it")
+        raise FormatError(folder, f"no motion files ({' '.join(MOCAP)}) are in {'it' if shard == Shard() else shard}")
     files = list(map(partial(_file, folder), paths))
-    kept = known if before is not None and before.unit == unit else {}
-    new = [file for file in files if (file.path, file.size, file.changed) not in kept]
+    new = [file for file in files if file.state not in known]
     embedded, found = (
         in_order(partial(_embedded, folder, model=model, unit=unit), new, jobs),
         list[tuple[Member, Floats]](),
     )
     for done, file in enumerate(files, start=1):
-        found += kept.get((file.path, file.size, file.changed)) or next(embedded)
+        found += known.get(file.state) or next(embedded)
         progress(done, len(paths))
     members, vectors = zip(*found, strict=True)
-    gone = sorted({path for path, _, _ in known} - {member.path for member in members})
-    return Index(model, folder, members, np.concatenate(vectors), tuple(folder / path for path in gone), unit)
+    gone = sorted(path for path in {path for path, _, _ in known} if not (folder / path).exists())
+    return Index(model, folder, members, np.concatenate(vectors), tuple(folder / path for path in gone), unit, shard)
+
+
+def _state(index: Index) -> tuple[object, ...]:
+    return index.folder.absolute(), index.unit, index.shard, index.members
 
 
 def _file(folder: Path, path: Path) -> Member:
@@ -307,6 +331,7 @@ def _keep(index: Index, file: Path, needed: bool) -> None:
         "model": index.model.manifest.identity,
         "folder": str(index.folder.absolute()),
         "unit": index.unit,
+        "shard": str(index.shard),
         "members": [asdict(member) for member in index.members],
     }
     content = io.BytesIO()
@@ -326,7 +351,7 @@ def _read(file: Path, model: SearchModel) -> Index:
             vectors, text = array(archive, "vectors", "f"), array(archive, "index", "u")
         data = json.loads(text.tobytes())
         version, made = int(data["version"]), str(data["model"])
-        folder, unit = Path(data["folder"]), data.get("unit")
+        folder, unit, shard = Path(data["folder"]), data.get("unit"), Shard.parse(data.get("shard", "1/1"))
         members = tuple(_member(**entry) for entry in data["members"]) if version == VERSION else ()
     # a damaged archive makes zipfile, its unpackers, numpy and json raise errors of a dozen types
     except Exception as error:
@@ -341,7 +366,7 @@ def _read(file: Path, model: SearchModel) -> Index:
         raise FormatError(file, f"this index was made by {by}: remove it, or name another")
     if vectors.shape != (sum(len(member.windows) for member in members), model.sizes["E"]):
         raise FormatError(file, "this index is damaged: its vectors are not those of its windows; remove it")
-    return Index(model, folder, members, vectors.astype(np.float32, copy=False), unit=unit)
+    return Index(model, folder, members, vectors.astype(np.float32, copy=False), (), unit, shard)
 
 
 def _member(path: str, size: int, changed: int, windows: Any, fault: str, clip: str, in_place: bool) -> Member:

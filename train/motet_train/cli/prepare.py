@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from motet.corpus.parts import Shard
+from motet.jobs import Shard
 from motet.representation.contract import named
 from motet_train import distributed
 from motet_train.cli.train_options import unit_in, with_options

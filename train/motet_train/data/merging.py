@@ -6,9 +6,9 @@ from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
-from motet.corpus.parts import Shard
 from motet.errors import SettingError
 from motet.files import new_folder
+from motet.jobs import Shard
 from motet_train.data.corpus import NO_MOTION, Skipped
 from motet_train.data.errors import DataError
 from motet_train.data.store import FRAMES, INDEX, Entry, Store, StoreWriter

@@ -16,9 +16,9 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.corpus.parts import Shard
 from motet.errors import MotetError, MotionError
 from motet.files import new_folder
+from motet.jobs import Shard
 from motet.motion.motion import Motion
 from motet.motion.skeleton import Skeleton
 from motet.representation.contract import MotionContract, living, sequences
