@@ -43,13 +43,17 @@ def nearly_same(one: Path, other: Path) -> None:
         assert first.get("validation", 0) == pytest.approx(second.get("validation", 0), rel=1e-4)
 
 
-@pytest.mark.parametrize("verb", NETS)
-def test_the_command_gives_the_same_run(verb: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("verb", "more", "parts"), [("describe", "", 1), ("mixture", "", 1), ("describe", "\nsummary = 0.0", 2)]
+)
+def test_the_command_gives_the_same_run(verb: str, more: str, parts: int, tmp_path: Path) -> None:
     small_store(tmp_path)
     settings = tmp_path / "small.toml"
-    settings.write_text(SMALL + NETS[verb])
+    settings.write_text(SMALL + NETS[verb] + more)
     command = ("-m", "motet", "train", verb, "--data", tmp_path / "store", "--config", settings, "--out")
     subprocess.run([sys.executable, *map(str, command), str(tmp_path / "one")], check=True, capture_output=True)
+    if parts > 1:
+        settings.write_text(f"{settings.read_text()}\n[training]\naccumulate = {parts}\n")
     torchrun(*command, tmp_path / "two")
     nearly_same(tmp_path / "one", tmp_path / "two")
     training = json.loads((tmp_path / "two" / "run.json").read_text())["training"]

@@ -317,7 +317,7 @@ def test_l2_is_a_term_of_the_loss_and_leaves_biases_alone() -> None:
     training = Training(steps=1, optimiser="sgd", learning_rate=0.1, l2=0.03)
     one, other, given = regression(training), regression(training), rows(np.random.default_rng(0), 4)
     one.net.eval(), other.net.eval()
-    one.descent.step(given)
+    one.descent.step([(given, True)])
     weight = other.net.layer.weight  # type: ignore[union-attr]
     (term,) = other.net.loss(given)  # type: ignore[operator]
     loss = term.losses.mean() + 0.03 * weight.square().sum()  # type: ignore[operator]
@@ -329,9 +329,40 @@ def test_l2_is_a_term_of_the_loss_and_leaves_biases_alone() -> None:
 def test_the_gradient_is_clipped() -> None:
     training = Training(steps=1, optimiser="sgd", learning_rate=1.0)
     one, before = regression(training), regression(training)
-    one.descent.step(rows(np.random.default_rng(0), 4), clip=1e-3)
+    one.descent.step([(rows(np.random.default_rng(0), 4), True)], clip=1e-3)
     moved = [a - b for a, b in zip(one.net.parameters(), before.net.parameters(), strict=True)]
     np.testing.assert_allclose(float(torch.cat([part.flatten() for part in moved]).norm().detach()), 1e-3, rtol=1e-3)
+
+
+def ragged(rows: Tensor) -> Tensor:
+    """Which losses of a row count: one to three, as sentences have different numbers of words."""
+    return torch.arange(3) < 1 + rows[:, :1].abs() * 2
+
+
+class Words(Regression):
+    """A regression whose rows have different numbers of losses."""
+
+    def loss(self, rows: Tensor) -> Terms:
+        losses = (self.layer(rows[:, :4]) - rows[:, 4:]).square()[ragged(rows)]
+        return (Term(losses, len(losses)),)
+
+
+def test_a_batch_in_parts_is_the_step_of_the_whole(tmp_path: Path) -> None:
+    def learnt(parts: int) -> tuple[Any, list[float]]:
+        torch.manual_seed(0)
+        net, training = Words(), replace(EPOCHS, batch=7, accumulate=parts)
+
+        def batches(rng: np.random.Generator) -> Iterator[Tensor]:
+            yield from (rows(rng, 7), rows(rng, 2))  # the second has fewer rows than parts
+
+        learner = GradientLearner(net, training, net.loss, batches)
+        (tmp_path / f"{parts}").mkdir()
+        losses = [line["loss"] for line in train(learner, SEED, tmp_path / f"{parts}")]
+        return net.state_dict(), losses
+
+    whole, parts = learnt(1), learnt(3)
+    torch.testing.assert_close(whole[0], parts[0], atol=1e-5, rtol=1e-5)
+    np.testing.assert_allclose(whole[1], parts[1], rtol=1e-5)
 
 
 def test_products_in_bfloat16_learn_about_the_same(tmp_path: Path) -> None:

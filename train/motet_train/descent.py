@@ -1,7 +1,8 @@
 """Learning by gradient descent: the settings, a step, and the learner of all nets that autograd can train."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
@@ -25,9 +26,11 @@ class Training:
     """How a net is trained.
 
     epochs or steps: how long; one of the two. every: of these from one line of the log, validation and checkpoint to
-    the next. warm_up: over this many the learning rate rises, by equal steps, to the whole; falling: the share, at the
-    end, over which it falls linearly to zero; cosine: it falls to a hundredth along half a cosine; decay: a factor for
-    every so many.
+    the next. accumulate: a batch is computed in so many parts, whose gradients are added up: that takes less memory and
+    gives the same step, but for what rows of a batch have in common: terms beside the loss, as of describe's summary,
+    weigh as much in each part as in the whole. warm_up: over this many the learning rate rises, by equal steps, to the
+    whole; falling: the share, at the end, over which it falls linearly to zero; cosine: it falls to a hundredth along
+    half a cosine; decay: a factor for every so many.
     l2: the weight of the squared weights, not biases, in the loss. weight_decay: of "adamw" and "muon", apart from
     the loss. clip: the greatest norm of the gradient. adversary: the weight of a discriminator's opinion in the loss.
     average: of the running mean of weights, which is then what is kept. keep: the weights of the "best" validation or
@@ -39,6 +42,7 @@ class Training:
     steps: int = 0
     every: int = 1
     batch: int = 16
+    accumulate: int = 1
     optimiser: Literal["adam", "adamw", "muon", "nadam", "sgd"] = "adam"
     learning_rate: float = 1e-3
     warm_up: int = 0
@@ -139,15 +143,38 @@ class Descent:
         if distributed.count() > 1:
             self._called = DistributedDataParallel(self._called)
 
-    def step(self, batch: Any, clip: float | None = None, real: bool = True) -> tuple[float, float]:
-        """One step on this process' rows of a batch; its share of the mean loss, and how many things that is of.
+    def step(self, parts: Sequence[tuple[Any, bool]], clip: float | None = None) -> tuple[float, float]:
+        """One step on this process' rows of a batch, in parts whose gradients are added up; its share of the mean loss,
+        and how many things that is of.
 
-        Of several processes each weighs what it has so that their mean is the loss of the whole batch. real: False if
-        the rows are there only because a process needs some.
+        Of each part it is said whether its rows are real, or there only because a process needs some. One part is in
+        memory at a time.
+        """
+        self.optimiser.zero_grad(set_to_none=True)
+        losses, counts = list[float](), list[float]()
+        for number, (rows, real) in enumerate(parts, start=1):
+            with nullcontext() if number == len(parts) else self._apart():
+                loss, things = self._share(rows, real)
+                counts.append(things)
+                torch.autograd.backward(loss * (things / counts[0] * distributed.count()))
+            losses.append(loss.item())
+        if len(parts) > 1:
+            for parameter in self.net.parameters():
+                if parameter.grad is not None:
+                    parameter.grad *= counts[0] / sum(counts)
+        if clip is not None:
+            nn.utils.clip_grad_norm_(self.net.parameters(), clip)
+        self.optimiser.step()
+        return float(np.average(losses, weights=counts)), sum(counts)
+
+    def _share(self, rows: Any, real: bool) -> tuple[Tensor, float]:
+        """This process' share of the mean loss of a part, and how many things that is of.
+
+        Of several processes each weighs what it has so that their mean is the loss of the whole part.
         """
         device = next(self.net.parameters()).device
         with torch.autocast(device.type, torch.bfloat16, enabled=self.training.precision == "bfloat16"):
-            terms: Terms = self._called(batch.to(device))
+            terms: Terms = self._called(rows.to(device))
         counts = distributed.summed([term.things * real for term in terms], device)
         shares = [term.things * real / count for term, count in zip(terms, counts, strict=True)]
         losses = terms[0].losses
@@ -156,12 +183,12 @@ class Descent:
         loss = losses.mean() * shares[0]
         if not torch.isfinite(loss):
             raise RunError("the loss is no longer finite: start again with a lower learning rate or another seed")
-        self.optimiser.zero_grad(set_to_none=True)
-        torch.autograd.backward(loss * distributed.count())
-        if clip is not None:
-            nn.utils.clip_grad_norm_(self.net.parameters(), clip)
-        self.optimiser.step()
-        return loss.item(), counts[0]
+        return loss, counts[0]
+
+    def _apart(self) -> AbstractContextManager[None]:
+        """Processes do not tell each other the gradients of what is computed in this."""
+        several = isinstance(self._called, DistributedDataParallel)
+        return self._called.no_sync() if several else nullcontext()  # type: ignore[operator]
 
 
 class GradientLearner:
@@ -208,10 +235,16 @@ class GradientLearner:
                 group["lr"] = rate(self.training, done)
             self.told(done / self.training.length)
             for batch in self.batches(rng):
-                mine = batch[distributed.rank() :: distributed.count()]
-                real = len(mine) > 0
-                loss, weight = self.descent.step(mine if real else batch[:1], self.training.clip, real)
+                loss, weight = self.descent.step(list(self._parts(batch)), self.training.clip)
                 if self.average is not None:
                     self.average.update_parameters(self.net)
                 yield done + 1, loss, weight
         self.net.eval()
+
+    def _parts(self, batch: Batch) -> Iterator[tuple[Any, bool]]:
+        """This process' rows of each part of a batch, and whether there are any; otherwise one of another's."""
+        count = min(self.training.accumulate, len(batch))
+        for part in range(count):
+            rows = batch[part::count]
+            mine = rows[distributed.rank() :: distributed.count()]
+            yield (mine, True) if len(mine) else (rows[:1], False)

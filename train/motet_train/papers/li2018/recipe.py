@@ -126,7 +126,7 @@ class Adversary:
         normal, given = self.net.normalised(windows), self.net.seed_frames
         predicted = self.net.system.imagine(normal, given)
         false = torch.cat([normal[:, :given], predicted], dim=1)
-        self.descent.step(torch.cat([false.detach(), normal]))
+        self.descent.step([(torch.cat([false.detach(), normal]), True)])
         self.judge.requires_grad_(False)
         opinion = softplus(-self.judge(false).float()).mean()
         self.judge.requires_grad_(True)
