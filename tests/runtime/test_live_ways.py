@@ -45,6 +45,18 @@ SAVED = """(async () => {{
 }})()"""
 
 
+BUSY = """(() => {
+  const said = ["wave", "kick", "bow", "play the violin"], places = [];
+  for (let n = 0; n < 120; n++) {
+    if (n % 3 === 0) motet.told(said[n / 3 % 4]);
+    motet.tick(motet.asked());
+    places.push(motet.figures[0].shown(1).places);
+  }
+  return places;
+})()"""
+"""Places of joints, tick by tick, of a figure that is told something else ten times a second."""
+
+
 @pytest.fixture(scope="module")
 def page(tmp_path_factory: pytest.TempPathFactory, steer_model: SteerModel) -> Iterator[Browser]:
     if CHROMIUM is None:
@@ -134,6 +146,17 @@ def test_keys_and_orders_break_an_act_off(page: Browser) -> None:
         assert page.value("motet.figures[0].acting") is None
         assert np.hypot(*np.subtract(page.value(TICKS.format(60)), place)[:2]) > 1.0
         page.key("KeyW", "w", down=False)
+
+
+def test_acts_ten_times_a_second_do_not_leap(page: Browser) -> None:
+    typed(page, "stop")
+    page.value(TICKS.format(90))
+    places = np.array(page.value(BUSY))
+    moved = np.linalg.norm(np.diff(places, axis=0), axis=2)
+    assert moved.max() < 0.3  # of a hand; in recordings of gaits .47
+    assert moved[90:].max(axis=1).min() > 0  # it does not freeze either
+    typed(page, "stop")
+    page.value(TICKS.format(200))
 
 
 def test_a_click_sends_it_there_and_a_drag_does_not(page: Browser) -> None:
