@@ -122,11 +122,12 @@ class Run:
         return Run(manifest, model)
 
 
-def torch_model(manifest: Manifest, threads: int, compiled: bool = False) -> BundleModel:
-    """A bundle's model with the same sizes in torch, its weights untrained, eager or by ``torch.compile``, which fails
-    at the first call where there is no C++ compiler: the baselines of ``motet bench``."""
+def torch_model(like: BundleModel, threads: int, compiled: bool = False) -> BundleModel:
+    """A bundle's model with the same sizes and tables in torch, its weights untrained, eager or by ``torch.compile``,
+    which fails at the first call where there is no C++ compiler: the baselines of ``motet bench``."""
     torch.set_num_threads(threads)
-    model = Run(manifest.source, MODELS[manifest.model](manifest.config)).bundle_model()
+    manifest = like.manifest
+    model = build(manifest, Run(manifest.source, MODELS[manifest.model](manifest.config)).torch_graphs(), like.tables)
     if compiled:
         for graph in model.graphs.values():
             if isinstance(graph, TorchGraph):

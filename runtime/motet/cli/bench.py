@@ -72,7 +72,7 @@ def measured(
         # by name: the runtime does not depend on the training package
         runs = importlib.import_module("motet_train.runs")
         for who in ("eager", "compiled") if compile else ("eager",):
-            models[who] = runs.torch_model(model.manifest, options.threads, compiled=who == "compiled")
+            models[who] = runs.torch_model(model, options.threads, compiled=who == "compiled")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", TextWarning)
         rows = compared({who: cases(one, motion) for who, one in models.items()}, seconds)
