@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Iterator, Mapping
-from itertools import islice
+from itertools import compress, cycle, islice
 from pathlib import Path
 
 import numpy as np
@@ -109,6 +109,9 @@ def _is_frame_number(words: list[str]) -> bool:
 
 def _values(path: Path, lines: list[str], header: int, layout: Layout) -> Array:
     """All values (T, D), with every line checked against the first frame."""
+    plain = _plain_values(lines[header:], layout)
+    if plain is not None:
+        return plain
     frame = [("", 0), *layout]
     found: list[str] = []
     at = line = frames = 0
@@ -131,6 +134,24 @@ def _values(path: Path, lines: list[str], header: int, layout: Layout) -> Array:
             [value for line, words in words_of(lines, header) for value in text.numbers(words[1:], path, line)]
         )
     return values.reshape(frames, sum(count for _, count in layout))
+
+
+def _plain_values(lines: list[str], layout: Layout) -> Array | None:
+    """All values (T, D) of lines without comments that are all like in the first frame, several times as fast as line
+    by line; None for others, faulty ones included."""
+    # with an end after each line, the words of every frame are at the same places only if the lines are alike, too
+    words = " ; ".join([*filter(str.strip, lines), ""]).split()
+    kinds: list[str | None] = ["", ";"]  # of a frame's words: a name, an end, or None for a value; the first is the frame's number
+    for bone, count in layout:
+        kinds += [bone, *[None] * count, ";"]
+    frames, rest = divmod(len(words), len(kinds))
+    if rest or not frames or not all(map(str.isdigit, words[:: len(kinds)])):
+        return None
+    for place, kind in enumerate(kinds[1:], start=1):
+        if kind is not None and words[place :: len(kinds)].count(kind) < frames:
+            return None
+    values = text.finite(list(compress(words, cycle([kind is None for kind in kinds]))))
+    return None if values is None else values.reshape(frames, kinds.count(None))
 
 
 def write(file: File, motion: Motion) -> None:
