@@ -86,8 +86,14 @@ def between(graph: Graph, past: Floats, plain: Floats, after: Floats) -> Floats:
 
 def nearest(scores: Floats, count: int) -> Ids:
     """The columns (..., count) of the greatest of scores (..., N), best first, of equal ones the first."""
-    order: Ids = np.argsort(-scores, axis=-1, kind="stable")[..., :count]
-    return order
+    falling = -scores.reshape(-1, scores.shape[-1])
+    count = min(count, falling.shape[1])
+    found = np.zeros((len(falling), count), dtype=np.int64)
+    for row, chosen in zip(falling, found, strict=True):
+        last = np.partition(row, count - 1)[count - 1]
+        near = np.flatnonzero(~(row > last))  # all that are as great as the last one wanted, of which the first count
+        chosen[:] = near[np.argsort(row[near], kind="stable")][:count]
+    return found.reshape(*scores.shape[:-1], count)
 
 
 _WORDS = {"word": "*batch", "context": "batch C"}, {"log_probabilities": "batch V"}

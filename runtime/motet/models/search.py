@@ -9,7 +9,7 @@ import io
 import json
 import logging
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -241,7 +241,7 @@ class Index:
             vector, least = direction(self.model, query), how.like_motion
         scores = self.vectors @ vector
         found: dict[str, Hit] = {}
-        for row in self.model.loop.run(scores, len(scores)):
+        for row in self._best_first(scores):
             member, start, stop = self._windows[row]
             if member.name not in found:
                 place, score = self.folder / member.path, float(scores[row])
@@ -249,6 +249,14 @@ class Index:
             if len(found) == wanted:
                 break
         return list(found.values())
+
+    def _best_first(self, scores: Floats) -> Iterator[int]:
+        """The columns of scores (N,) by the model's loop: the few that are mostly enough, then more."""
+        done, count = 0, 256
+        while done < len(scores):
+            best = self.model.loop.run(scores, count)[done:].tolist()
+            yield from best
+            done, count = done + len(best), 16 * count
 
 
 def direction(model: SearchModel, motion: Motion) -> Floats:
