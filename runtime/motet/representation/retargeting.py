@@ -13,6 +13,7 @@ from motet.motion.kinematics import (
     AXES,
     continued,
     euler_of,
+    eulers_of,
     local_rotations,
     local_translations,
     skeleton_of,
@@ -162,16 +163,19 @@ def in_joints_of(motion: Motion, skeleton: Skeleton | None) -> Motion:
     reason, turned = _apart(motion.skeleton, skeleton)
     if reason:
         raise MotionError(reason)
-    for name in turned:
-        columns = motion.rotation_columns().get(name)
-        own = motion.skeleton
-        if own is None or columns is None:
-            continue
-        place, joint = own.places[name], skeleton.joints[skeleton.places[name]]
-        unit = motion.units[columns[0]]
-        angles = euler_of(local_rotations(motion, [place])[:, 0], joint) * TURN[unit] / (2 * np.pi)
-        mended = replace(own.joints[place], order=joint.order, axis=joint.axis)
-        joints = (*own.joints[:place], mended, *own.joints[place + 1 :])
-        motion = with_channels(motion, tuple(f"{name}.r{axis}" for axis in AXES), angles, (unit,) * 3)
-        motion = replace(motion, skeleton=replace(own, joints=joints))
-    return motion
+    own, columns = motion.skeleton, motion.rotation_columns()
+    turned = tuple(name for name in turned if name in columns)
+    if not turned:
+        return motion
+    places, joints = [own.places[name] for name in turned], list(own.joints)
+    wanted = [skeleton.joints[skeleton.places[name]] for name in turned]
+    units = [motion.units[columns[name][0]] for name in turned]
+    turns = np.array([TURN[unit] for unit in units])[:, None]
+    angles = eulers_of(local_rotations(motion, places), wanted) * turns / (2 * np.pi)
+    for place, like in zip(places, wanted, strict=True):
+        joints[place] = replace(own.joints[place], order=like.order, axis=like.axis)
+    # a joint's new channels stand before all others, as where the joints are taken one by one
+    names = tuple(f"{name}.r{axis}" for name in turned[::-1] for axis in AXES)
+    values = angles[:, ::-1].reshape(len(motion), len(names))
+    found = with_channels(motion, names, values, tuple(np.repeat(units[::-1], 3).tolist()))
+    return replace(found, skeleton=replace(own, joints=tuple(joints)))
