@@ -55,10 +55,7 @@ class Motion:
             object.__setattr__(self, name, value)
         if values.ndim != 2 or values.shape[1] != len(self.channels):
             raise MotionError(f"values of shape {values.shape} do not fit {len(self.channels)} channels")
-        if len(set(self.channels)) != len(self.channels):
-            raise MotionError("channel names must be unique")
-        if len(self.units) != len(self.channels) or set(self.units) - set(UNITS):
-            raise MotionError(f"a motion needs one unit per channel, from {', '.join(UNITS)}")
+        _check_channels(self.channels, self.units)
         if not (np.isfinite(self.fps) and self.fps > 0):
             raise MotionError(f"the frame rate must be a positive number, not {self.fps}")
         finite = np.isfinite(values)
@@ -113,7 +110,7 @@ class Motion:
         """The named channels in the order given, converted to ``units``; MotionError names what is missing."""
         if channels == self.channels and units in (None, self.units):
             return self
-        places = {name: column for column, name in enumerate(self.channels)}
+        places = _places(self.channels)
         missing = [name for name in channels if name not in places]
         if missing:
             raise MotionError(f"the motion lacks {len(missing)} of {len(channels)} channels: {listed(missing)}")
@@ -194,6 +191,21 @@ class Motion:
     def rotation_columns(self, letter: str = "r") -> Mapping[str, list[int]]:
         """The columns, in the order x, y, z, of each joint with Euler angles ("r") or an exponential map ("e")."""
         return _rotation_columns(self.channels, self.units, letter)
+
+
+@lru_cache(maxsize=64)
+def _check_channels(channels: tuple[str, ...], units: tuple[str, ...]) -> None:
+    """MotionError for names that are not unique, and units that are unknown or not one for each."""
+    if len(set(channels)) != len(channels):
+        raise MotionError("channel names must be unique")
+    if len(units) != len(channels) or set(units) - set(UNITS):
+        raise MotionError(f"a motion needs one unit per channel, from {', '.join(UNITS)}")
+
+
+@lru_cache(maxsize=64)
+def _places(channels: tuple[str, ...]) -> Mapping[str, int]:
+    """The column of each channel."""
+    return {name: column for column, name in enumerate(channels)}
 
 
 @lru_cache(maxsize=64)
