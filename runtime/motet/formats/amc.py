@@ -141,7 +141,8 @@ def _plain_values(lines: list[str], layout: Layout) -> Array | None:
     by line; None for others, faulty ones included."""
     # with an end after each line, the words of every frame are at the same places only if the lines are alike, too
     words = " ; ".join([*filter(str.strip, lines), ""]).split()
-    kinds: list[str | None] = ["", ";"]  # of a frame's words: a name, an end, or None for a value; the first is the frame's number
+    # of a frame's words: a name, an end, or None for a value; the first is the number of the frame
+    kinds: list[str | None] = ["", ";"]
     for bone, count in layout:
         kinds += [bone, *[None] * count, ";"]
     frames, rest = divmod(len(words), len(kinds))
