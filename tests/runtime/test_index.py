@@ -12,7 +12,7 @@ from fake_models import moving, search_model
 from motet.errors import DecodingError, FormatError, MotionError, OutputError, TextError
 from motet.formats import read_motion, write_motion
 from motet.models import search as searching
-from motet.models.search import INDEX_FILE, Hit, Index, SearchModel
+from motet.models.search import INDEX_FILE, Hit, Index, Member, SearchModel
 
 FILES = ("a.npz", "b.npz", "inner/c.npz", "d.npz")
 
@@ -54,6 +54,17 @@ def test_hits_are_those_of_a_naive_search(folder: Path, model: SearchModel) -> N
     np.testing.assert_allclose([hit.score for hit in hits], [scores[path] for path in wanted[:3]], atol=1e-6)
     assert {(hit.start, hit.stop) for hit in hits} == {(0.0, 2.0)}
     assert len(Index.open(folder, model).search("walks")) == 2  # the model's default
+
+
+def test_files_are_found_behind_many_windows_of_another(model: SearchModel, tmp_path: Path) -> None:
+    rng, query = np.random.default_rng(0), model.embed_text("a person walks")
+    spans = {"long.npz": 5000, "b.npz": 1, "c.npz": 2}
+    members = tuple(Member(name, 0, 0, ((0.0, 1.0),) * count) for name, count in spans.items())
+    nearness = np.concatenate([0.9 + 0.1 * rng.random(5000), [0.5], [0.6, 0.7]])
+    vectors = (nearness[:, None] * query).astype(np.float32)
+    hits = Index(model, tmp_path, members, vectors).search("a person walks", 3)
+    assert [hit.path.name for hit in hits] == ["long.npz", "c.npz", "b.npz"]
+    np.testing.assert_allclose([hit.score for hit in hits], [nearness[:5000].max(), 0.7, 0.5], atol=1e-6)
 
 
 def test_a_motion_is_nearest_to_itself(folder: Path, model: SearchModel) -> None:
