@@ -81,9 +81,24 @@ def test_what_is_no_comparison_is_refused_before_anything_is_measured(
 
 
 def test_a_busy_machine_is_said(monkeypatch: pytest.MonkeyPatch, quick: list[str]) -> None:
-    monkeypatch.setattr(Machine, "here", staticmethod(lambda: Machine(**{**vars(HERE), "load": 3.0})))
-    assert "the machine is busy (load 3.0 on 2 cores)" in run("bench", "--bundle", "fill").stderr
+    busy = Machine(**{**vars(HERE), "load": 1.5})
+    monkeypatch.setattr(Machine, "here", staticmethod(lambda: busy))
+    assert "the machine is busy (load 1.5 on 2 cores): figures are too low" in run("bench", "--bundle", "fill").stderr
     assert quick == ["fill"]
+
+
+def test_an_overloaded_machine_measures_nothing_without_force(
+    monkeypatch: pytest.MonkeyPatch, quick: list[str]
+) -> None:
+    busy = Machine(**{**vars(HERE), "load": 3.0})
+    monkeypatch.setattr(Machine, "here", staticmethod(lambda: busy))
+    refused = run("bench", "--bundle", "fill")
+    assert (refused.exit_code, quick) == (2, [])
+    assert "the machine is busy (load 3.0 on 2 cores): wait until" in refused.stderr
+    assert "--force" in refused.stderr
+    forced = run("bench", "--bundle", "fill", "--force")
+    assert (forced.exit_code, quick) == (0, ["fill"])
+    assert "figures are too low" in forced.stderr
 
 
 def test_the_ceilings_are_those_of_a_product_and_a_copy(monkeypatch: pytest.MonkeyPatch) -> None:

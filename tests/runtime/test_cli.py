@@ -119,7 +119,18 @@ def test_bench_describes_a_file_and_says_where_it_ran(clips: Path, monkeypatch: 
     monkeypatch.setattr("motet.bench.measure.ROUNDS", 1)
     monkeypatch.setattr("motet.cli.bench.begun", lambda name, options: [])
     monkeypatch.setattr("motet.cli.bench.with_profiles", lambda rows, *_: rows)
-    given = ("--bundle", "describe", "--seconds", 0.001, "--threads", 2, "--no-torch", "--motion", clips / WALK)
+    given = (
+        "--bundle",
+        "describe",
+        "--seconds",
+        0.001,
+        "--threads",
+        2,
+        "--no-torch",
+        "--motion",
+        clips / WALK,
+        "--force",
+    )
     lines = run("bench", *given).stdout.splitlines()
     assert lines[0] == "describe on CPUExecutionProvider, threads: 2"
     assert lines[-2].startswith("describe.file")
@@ -178,6 +189,7 @@ def test_bench_describes_a_file_and_says_where_it_ran(clips: Path, monkeypatch: 
         ),
         (2, ["describe", "{clips}/39_14.amc", "--threads", "257"], "257 is not in the range 1<=x<=256"),
         (2, ["bundle", "verify", "cmu-control", "--provider", "none"], "has no provider 'none' here"),
+        (2, ["bench", "--provider", "OpenVINO"], "in place of onnxruntime:  pip install onnxruntime-openvino"),
     ],
 )
 def test_bad_input_gets_one_message_and_writes_nothing(

@@ -42,6 +42,11 @@ class Machine:
         """Whether others work here, so that figures may be far too low."""
         return self.load is not None and self.load > 0.3
 
+    @property
+    def overloaded(self) -> bool:
+        """Whether others alone want more cores than there are, so that figures mean little."""
+        return self.load is not None and self.load > self.cores
+
     def peak(self, threads: int) -> float:
         """The ceiling of so many threads, in GFLOP/s."""
         return self.gflops["1" if threads == 1 else max(self.gflops, key=int)]
@@ -49,7 +54,7 @@ class Machine:
     @staticmethod
     def here() -> "Machine":
         """This one, measured for a second or two."""
-        load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None
+        load = round(os.getloadavg()[0], 1) if hasattr(os, "getloadavg") else None
         versions = {name: version(name) for name in ("motet", "onnxruntime", "numpy")}
         found = {str(count): fresh("ceilings", threads=count) for count in sorted({1, cores()})}
         gflops = {count: one["gflops"] for count, one in found.items()}

@@ -16,6 +16,14 @@ from motet.settings import checked_int
 
 MAX_THREADS = 256
 
+PACKAGES = {
+    "cuda": "onnxruntime-gpu",
+    "tensorrt": "onnxruntime-gpu",
+    "dml": "onnxruntime-directml",
+    "openvino": "onnxruntime-openvino",
+}
+"""The builds of ONNX Runtime that have a provider which the plain one lacks, by its name in small letters."""
+
 
 @dataclass(frozen=True)
 class SessionOptions:
@@ -43,7 +51,10 @@ class SessionOptions:
         available = onnxruntime.get_available_providers()
         for provider in self.providers:
             if provider not in available:
-                raise SettingError(f"ONNX Runtime has no provider {provider!r} here; available: {', '.join(available)}")
+                package = PACKAGES.get(provider.removesuffix("ExecutionProvider").lower())
+                remedy = f"; in place of onnxruntime:  pip install {package}" if package else ""
+                known = ", ".join(available)
+                raise SettingError(f"ONNX Runtime has no provider {provider!r} here; available: {known}{remedy}")
         if not self.providers or len(self.provider_options) not in {0, len(self.providers)}:
             raise SettingError("give at least one provider, and options for each provider or for none")
 

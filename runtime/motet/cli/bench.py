@@ -32,13 +32,25 @@ log = logging.getLogger(__name__)
 @click.option("--compile", is_flag=True, help="Measure torch.compile too, which takes minutes.")
 @click.option("--profile", is_flag=True, help="Print which kernels take the time.")
 @click.option("--compare", type=Path, metavar="OLD", help="What --json printed: also how much better each row is.")
+@click.option("--force", is_flag=True, help="Measure though other programs want more cores than there are.")
 @session_options
 @click.option("--json", "as_json", is_flag=True, help="Print the machine and, of each bundle, a list of rows.")
-def bench(bundle: str, compare: Path | None, profile: bool, as_json: bool, session: SessionOptions, **how: Any) -> None:
+def bench(
+    bundle: str,
+    compare: Path | None,
+    profile: bool,
+    force: bool,
+    as_json: bool,
+    session: SessionOptions,
+    **how: Any,
+) -> None:
     """Measure a bundle's speed, and torch's where it is installed, in turn; and the machine's own ceilings."""
     old, machine = {} if compare is None else _earlier(compare), Machine.here()
+    busy = f"the machine is busy (load {machine.load} on {machine.cores} cores)"
+    if machine.overloaded and not force:
+        raise click.UsageError(f"{busy}: wait until other programs are done, or measure with --force")
     if machine.busy:
-        log.warning("the machine is busy (load %.1f on %d cores): figures are too low", machine.load, machine.cores)
+        log.warning("%s: figures are too low", busy)
     for key in ("processor", "cores", "versions"):
         if old and old["machine"].get(key) != (now := getattr(machine, key)):
             log.warning("%s: another machine or version: %s %s, now %s", compare, key, old["machine"].get(key), now)
