@@ -85,14 +85,19 @@ def strips(motions: Sequence[Motion], titles: Sequence[str], title: str, count: 
     """
     picture, rows = panels(len(motions), 1, (9, 2.0 * len(motions)), title)
     for axes, motion, text in zip(rows, motions, titles, strict=True):
-        for n, (triangles, inks, shadow) in enumerate(shapes(motion, count)):
-            for parts, colours in ((shadow, "0.85"), (triangles, inks / 255)):
-                placed = list(np.add(parts, [SPACING * n, 0]))
-                axes.add_collection(PolyCollection(placed, facecolors=colours, edgecolors=colours, linewidths=0.3))
-        axes.set(xlim=(-SPACING, SPACING * count), ylim=(-0.15, 1.25), aspect="equal")
-        axes.axis("off")
+        bodies(axes, motion, count)
         axes.set_title(text, fontsize=8, loc="left")
     return picture
+
+
+def bodies(axes: Axes, motion: Motion, count: int) -> None:
+    """Draw ``count`` poses of a motion that can be played with the player's body, each :data:`SPACING` to the right."""
+    for n, (triangles, inks, shadow) in enumerate(shapes(motion, count)):
+        for parts, colours in ((shadow, "0.85"), (triangles, inks / 255)):
+            placed = list(np.add(parts, [SPACING * n, 0]))
+            axes.add_collection(PolyCollection(placed, facecolors=colours, edgecolors=colours, linewidths=0.3))
+    axes.set(xlim=(-SPACING, SPACING * count), ylim=(-0.15, 1.25), aspect="equal")
+    axes.axis("off")
 
 
 def error_over_time(errors: Mapping[str, Mapping[str, Array]], fps: float, unit: str) -> Figure:

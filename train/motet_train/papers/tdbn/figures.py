@@ -7,9 +7,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.rotations import Array
-from motet_train.evaluate.figures import SPACING, Drawings, bones_of, in_profile, panels, stick_figures
+from motet_train.evaluate.figures import SPACING, Drawings, bodies, panels
 from motet_train.papers.tdbn.experiments import gait_control, interrupted, late_left_leg, ramp
 from motet_train.papers.tdbn.study import ControlStudy
 
@@ -47,10 +46,10 @@ def limit_cycle(study: ControlStudy) -> Figure:
 
 
 def perturbed_walk(study: ControlStudy) -> Figure:
-    """Figure 5.3: stick figures of a walk whose left leg is suddenly half a cycle late."""
+    """Figure 5.3: a walk whose left leg is suddenly half a cycle late."""
     before, after = _made_late(study, 0.6)
     title = "The left leg is forced to be half a cycle late where the line is"
-    return _sticks(study, np.concatenate([before, after[: study.frames(1.2)]]), len(before), title)
+    return _strip(study, np.concatenate([before, after[: study.frames(1.2)]]), len(before), title)
 
 
 def synchronisation(study: ControlStudy) -> Figure:
@@ -77,11 +76,11 @@ def _made_late(study: ControlStudy, seconds: float) -> tuple[Array, Array]:
 
 
 def transition(study: ControlStudy) -> Figure:
-    """Figure 5.5: from walking to running, one stick figure in four frames."""
+    """Figure 5.5: from walking to running, one figure in four frames."""
     before, after = study.frames(1.0), study.frames(1.2)
     track = np.repeat([0.0, 1.0], [before, after])
     frames = study.play(study.start(study.phases("walk", 1)[0]), gait_control(study, track)).frames[:, 0]
-    return _sticks(study, frames, before, "Control changes from walking to running at the line")
+    return _strip(study, frames, before, "Control changes from walking to running at the line")
 
 
 def hysteresis(study: ControlStudy) -> Figure:
@@ -157,11 +156,10 @@ def _dots(axes: Axes, points: Array, colour: str, label: str | None = None) -> N
     axes.scatter(points[:, 0], points[:, 1], s=8, color=colour, alpha=0.6, label=label)
 
 
-def _sticks(study: ControlStudy, frames: Array, changed: int, title: str) -> Figure:
-    """Every fourth frame as a stick figure in profile, and a line where something changed."""
+def _strip(study: ControlStudy, frames: Array, changed: int, title: str) -> Figure:
+    """Every fourth frame as the player's body, and a line where something changed."""
     motion = study.model.contract.features(frames[::4])
-    skeleton = skeleton_of(motion)
     figure, (axes,) = panels(1, 1, (13, 2.6), title)
-    stick_figures(axes, in_profile(positions(motion), skeleton), bones_of(skeleton), ["black"] * len(frames[::4]))
+    bodies(axes, motion, len(motion))
     axes.axvline(SPACING * (changed / 4 - 0.5), color=RUN_COLOUR, linewidth=1)
     return figure
