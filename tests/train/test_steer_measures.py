@@ -31,6 +31,7 @@ from motet_train.evaluate.steer.following import (
     turn_errors,
     ways_errors,
 )
+from motet_train.evaluate.steer.players import FIGURES, reversal_figures, stick_figures
 from motet_train.evaluate.steer.report import Limits, Watch, broken, frozen, leaps, turns, wandering, watched
 
 
@@ -133,6 +134,31 @@ def test_ways_are_measured_from_the_facing(monkeypatch: pytest.MonkeyPatch) -> N
 def test_slow_walks_are_measured_in_metres_a_second() -> None:
     found = creep_errors(puppets(gain=0.9))
     assert [found["speed"], found["speed_worst"]] == pytest.approx([0.035, 0.06], abs=1e-4)
+
+
+def test_a_player_reverses_walks_and_weaves() -> None:
+    told: Any = []
+
+    class Told(Puppets):
+        def start(self, *given: Any, **how: Any) -> Any:
+            session = super().start(*given, **how)
+            control, session.control = session.control, lambda **asked: (told.append(asked), control(**asked))[1]
+            return session
+
+    model: Any = Told()
+    assert reversal_figures(model)["slide_p95_cm"] > 5  # soles glide along
+    ways = np.unique([asked["direction"] for asked in told])
+    assert ways.tolist() == [0, 180]
+    changes = np.diff([asked["direction"] for asked in told], axis=0) != 0
+    assert changes.sum() == pytest.approx(FIGURES * 23.0 / 2.0, rel=0.1)
+    told.clear()
+    stick_figures(model)
+    speeds, ways = (np.array([asked[name] for asked in told]) for name in ("speed", "direction"))
+    assert len(told) == round(23 * FPS)
+    assert (speeds.min(), speeds.max()) == (pytest.approx(0.72, abs=1e-3), pytest.approx(1.28, abs=1e-3))
+    turns = np.diff(ways, axis=0) * FPS
+    assert turns.std() == pytest.approx(85, rel=0.1)
+    assert np.corrcoef(turns[:-15].ravel(), turns[15:].ravel())[0, 1] == pytest.approx(np.exp(-1), abs=0.1)
 
 
 def test_the_tail_of_slides_is_told_beside_their_mean() -> None:

@@ -37,6 +37,7 @@ from motet_train.evaluate.steer.following import (
     turn_errors,
     ways_errors,
 )
+from motet_train.evaluate.steer.players import reversal_figures, stick_figures
 from motet_train.evaluate.steer.told import act_figures, going_figures, said_acts
 from motet_train.evaluate.tables import Goals, Report, gathered, report_table
 
@@ -57,6 +58,8 @@ STEER_GOALS: Goals = {
     "ways_run.direction_worst": (None, 8),
     "creep.speed_worst": (None, 0.05),
     "creep.slide_cm": (None, 2),
+    "stick.slide_p95_cm": (None, 5),
+    "reversals.slide_p95_cm": (None, 6),
     "act_standing.begun_worst": (None, 0.4),
     "act_walk.begun_worst": (None, 0.4),
     **{f"act_{who}.leaps": (None, 0) for who in ("standing", "walk", "run")},
@@ -278,6 +281,8 @@ def _parts(model: SteerModel, recorded: Recorded, minutes: float, characters: in
         "aside": aside_errors,
         "creep": creep_errors,
         **{f"ways_{gait}": partial(ways_errors, gait=gait) for gait in WAYS_PACES},
+        "reversals": reversal_figures,
+        "stick": stick_figures,
         "random": partial(wandering, limits=limits, seconds=60 * minutes, characters=characters),
     }
     if hasattr(model, "matcher"):
