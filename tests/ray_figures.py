@@ -70,7 +70,7 @@ def described(folder: Path, parts: Path, *options: str, kill: bool = False) -> t
         time.sleep(0.2)
         if kill and partial.exists() and partial.read_bytes().count(b"\n") > third:
             os.kill(min(workers()), signal.SIGKILL)
-            print(f"a worker was killed; others: {len(workers())}", flush=True)
+            print("a worker was killed", flush=True)
             kill = False
     assert not kill, "no worker was killed"
     return parts / "describe.1-of-1.jsonl", time.perf_counter() - start

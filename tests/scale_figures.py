@@ -28,11 +28,10 @@ class Seen:
     times: dict[int, float] = field(default_factory=dict)
     memory: dict[int, float] = field(default_factory=dict)
 
-    @property
-    def way(self) -> float:
-        """Processor time of the first process and the busiest other one."""
+    def way(self, actors: bool) -> float:
+        """Processor time of the first process and the busiest other one; of actors, of the busiest."""
         first, *others = self.times.values()
-        return first + max(others, default=0.0)
+        return max(self.times.values()) if actors else first + max(others, default=0.0)
 
 
 def children() -> dict[int, list[int]]:
@@ -85,15 +84,16 @@ def main() -> None:
     asked = parser.parse_args()
     given = asked.command[1:] if asked.command[0] == "--" else asked.command
     name = "MapWorker" if "ray" in given else ""
-    first: Seen | None = None
+    first = 0.0
     for count in asked.workers:
         with tempfile.TemporaryDirectory() as folder:
             words = [folder if word == "{}" else word for word in given]
             seen = watched([sys.executable, "-m", "motet", *words, "--jobs", str(count)], name)
-        first = first or seen
+        way = seen.way(bool(name))
+        first = first or way
         print(
             f"{count}: {seen.wall:.1f} s by the clock; processor time {sum(seen.times.values()):.1f} s in all, "
-            f"{seen.way:.1f} s the longest way, {first.way / seen.way:.2f} times as fast as the first; "
+            f"{way:.1f} s the longest way, {first / way:.2f} times as fast as the first; "
             f"at most {max(seen.memory.values()):.0f} MB a process"
         )
 

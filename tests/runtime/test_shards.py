@@ -16,9 +16,11 @@ import pytest
 from command_line import run
 
 import motet
+from motet.cli.many import Many
+from motet.cli.reading import Read
 from motet.corpus.answers import Answer, Verb
-from motet.corpus.parts import Part, digest, failures, merge
-from motet.corpus.sources import Source, files_of
+from motet.corpus.parts import Part, failures, merge
+from motet.corpus.sources import Source
 from motet.jobs import Shard
 
 
@@ -201,17 +203,28 @@ def test_a_part_begun_by_something_else_is_not_gone_on_with(corpus: Path, tmp_pa
     assert "it was begun with another reading: remove it, or name another folder" in result.stderr
 
 
-def test_a_corpus_that_changes_is_noticed(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    place = tmp_path / "corpus"
+@dataclass(frozen=True)
+class Changing(Verb):
+    """Adds a file to a folder while it is at work."""
+
+    folder: str = ""
+
+    def rows(self, answer: Answer) -> list[Any]:
+        (Path(self.folder) / "new.bvh").write_text("hello")
+        return []
+
+
+def test_a_corpus_that_changes_under_way_completes_no_part(tmp_path: Path) -> None:
+    place, parts = tmp_path / "corpus", tmp_path / "parts"
     place.mkdir()
     (place / "a.bvh").write_text("hello")
-    before = digest(files_of([place]))
-    (place / "b.bvh").write_text("hello")
-    assert digest(files_of([place])) != before
-    one, other = part(tmp_path, corpus=before), part(tmp_path, corpus=digest(files_of([place])))
-    one.write([], lambda rest: iter(()))
-    with pytest.raises(motet.OutputError, match="begun with another corpus"):
-        other.complete()
+    many, verb = Many(Read({}, None), jobs=1, parts=parts), Changing({}, str(place))
+    with pytest.raises(motet.OutputError, match=r"changing\.1-of-1\.jsonl: the files that it is of changed") as caught:
+        many.write_part(verb, many.sources([place]), [place], "changing")
+    assert "remove it, and run the same command again" in str(caught.value)
+    assert [path.name for path in parts.iterdir()] == ["changing.1-of-1.jsonl.partial"]
+    with pytest.raises(motet.OutputError, match=r"changing.1-of-1.jsonl.partial: it was begun with another corpus"):
+        many.write_part(verb, many.sources([place]), [place], "changing")
 
 
 @pytest.mark.parametrize("text", ["0/3", "4/3", "3", "a/b", "1/0", "-1/3", "1/2/3"])

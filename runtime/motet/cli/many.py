@@ -2,11 +2,11 @@
 named; and in parts, which other processes and machines write beside this one."""
 
 import functools
-import logging
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -20,10 +20,9 @@ from motet.corpus import ray_engine
 from motet.corpus.answers import Answer, Hashed, Verb
 from motet.corpus.parts import Part, digest, failures
 from motet.corpus.sources import Source, files_of
+from motet.errors import OutputError
 from motet.jobs import Shard, in_batches
 from motet.settings import silent
-
-log = logging.getLogger(__name__)
 
 jobs_option = click.option(
     "--jobs", type=click.IntRange(1, 256), metavar="N", help="Processes for many files. [default: one for each core]"
@@ -71,15 +70,20 @@ class Many:
         part = Part(self.parts, {"motet": version("motet"), **verb.about(), **corpus, "shard": str(self.shard)})
         before = part.complete()
         if not before:
-            part.write(sources, lambda rest: self.answers(Hashed.of(verb), rest, label))
-            if digest(files_of(given)) != corpus["corpus"]:
-                log.warning(
-                    "the corpus changed while %s was written: it merges only with parts begun before", part.path
-                )
+            part.write(sources, partial(self._while_it_stays, part, verb, given, label))
         count, failed = failures(part.path)
         said = "was complete already: " if before else ""
         click.echo(f"{part.path}: {said}{count} motions, {failed} failed")
         sys.exit(1 if failed else 0)
+
+    def _while_it_stays(
+        self, part: Part, verb: Verb, given: Sequence[Path], label: str, rest: Sequence[Source]
+    ) -> Iterator[Answer]:
+        """The answers for a part; OutputError in the end where the corpus is no longer that with which it began."""
+        yield from self.answers(Hashed.of(verb), rest, label)
+        if digest(files_of(given)) != part.about["corpus"]:
+            said = "the files that it is of changed while it was written: remove it, and run the same command again"
+            raise OutputError(f"cannot complete {part.path}: {said} on files that stay")
 
 
 def many_options(command: Callable[..., None]) -> Callable[..., None]:

@@ -168,12 +168,14 @@ def _complete(given: Sequence[Path]) -> list[Path]:
         shard = about.pop("shard")
         first = first or about
         if different := _different(about, first):
-            raise FormatError(path, f"it was made with another {different} than {next(iter(found.values()))}")
+            than = f"it was made with another {different} than {next(iter(found.values()))}"
+            raise FormatError(path, f"{than}: remove one, and run its command with --shard again")
         found[shard] = path
     count = Shard.parse(shard).count
     wanted = [str(Shard(number, count)) for number in range(1, count + 1)]
     if missing := [one for one in wanted if one not in found] or sorted(found.keys() - set(wanted)):
-        raise FormatError(paths[0].parent, f"these shards are missing or of another count: {', '.join(missing[:9])}")
+        said = f"these shards are missing or of another count: {', '.join(missing[:9])}"
+        raise FormatError(paths[0].parent, f"{said}; run the command with --shard for each")
     return [found[one] for one in wanted]
 
 

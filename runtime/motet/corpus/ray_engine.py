@@ -44,7 +44,7 @@ def answers(verb: Verb, sources: Sequence[Source], workers: int | None, address:
     items = [{"source": pickle.dumps(source)} for source in sources]
     if not items:
         return
-    size = max(1, min(verb.most, len(items) // (4 * count)))
+    size = max(1, min(verb.most, len(items) // (16 * count)))  # small, so that all actors end at once
     found = ray.data.from_items(items, override_num_blocks=-(-len(items) // size)).map_batches(
         Actor,
         fn_constructor_args=(pickle.dumps(verb), Path.cwd()),
@@ -71,5 +71,6 @@ def _connected(workers: int | None, address: str | None) -> Any:
         elif not ray.is_initialized():  # one core more reads and hands out what the actors work on
             ray.init(num_cpus=(workers or cores()) + 1, include_dashboard=False, **quiet)
     except (ConnectionError, OSError, RuntimeError, ValueError) as error:
-        raise MotetError(f"no Ray cluster answers at {address or 'this machine'}: {error}") from error
+        remedy = "; see ray status there, or leave --address out for a cluster of this machine" if address else ""
+        raise MotetError(f"no Ray cluster answers at {address or 'this machine'}: {error}{remedy}") from error
     return ray
