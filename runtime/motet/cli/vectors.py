@@ -4,6 +4,7 @@ import io
 import json
 import sys
 import warnings
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ from motet.formats import names_motion, read_motion
 from motet.jobs import Shard
 from motet.models.generate import GenerateModel
 from motet.models.load import load_as
-from motet.models.search import INDEX_FILE, Index, SearchModel
+from motet.models.search import INDEX_FILE, Hit, Index, SearchModel
 
 
 @click.command()
@@ -137,6 +138,16 @@ def search(
         index = Index.open(folder, model, file, unit=unit_in, jobs=jobs, shard=part, merge=parts, progress=progress)
     with warnings.catch_warnings(action="ignore", category=TextWarning), warned(query):  # words are said already
         hits = index.search(query if motion is None else motion, count)
+    _told(hits, as_json)
+    if not hits[0].like:
+        click.echo(f"motet: nothing like {query!r} is in {folder}", err=True)
+    for path, fault in index.failed.items():
+        click.echo(f"motet: {path}: {fault}", err=True)
+    sys.exit(1 if index.failed else 0)
+
+
+def _told(hits: Sequence[Hit], as_json: bool) -> None:
+    """Print hits."""
     if as_json:
         click.echo(json.dumps([{**asdict(hit), "path": str(hit.path)} for hit in hits]))
     else:
@@ -144,8 +155,3 @@ def search(
             said = ", in place: compared with the path that its feet imply" if hit.in_place else ""
             doubt = "" if hit.like else "? "
             click.echo(f"{hit.score:6.2f}  {doubt}{hit.place}  {hit.start:.1f} to {hit.stop:.1f} s{said}")
-    if not hits[0].like:
-        click.echo(f"motet: nothing like {query!r} is in {folder}", err=True)
-    for path, fault in index.failed.items():
-        click.echo(f"motet: {path}: {fault}", err=True)
-    sys.exit(1 if index.failed else 0)

@@ -191,12 +191,7 @@ class Index:
         found = _renewed(folder, model, known, unit, jobs, shard, progress)
         if before is None or _state(before) != _state(found):
             _keep(found, kept, needed=file is not None)
-        for path in found.vanished:
-            log.warning("%s has vanished since it was indexed", path)
-        if not len(found.vectors):
-            path, fault = next(iter(found.failed.items()))
-            raise MotionError(f"none of {len(found.members)} motion files of {folder} can be used: {path}: {fault}")
-        return found
+        return _usable(found)
 
     @property
     def failed(self) -> dict[Path, str]:
@@ -350,6 +345,16 @@ def _keep(index: Index, file: Path, needed: bool) -> None:
         if needed:
             raise
         log.warning("the index is not kept: %s", error)
+
+
+def _usable(found: Index) -> Index:
+    """An index, once files that vanished are logged; MotionError where it has no motion."""
+    for path in found.vanished:
+        log.warning("%s has vanished since it was indexed", path)
+    if not len(found.vectors):
+        path, fault = next(iter(found.failed.items()))
+        raise MotionError(f"none of {len(found.members)} motion files of {found.folder} can be used: {path}: {fault}")
+    return found
 
 
 def _read(file: Path, model: SearchModel) -> Index:
