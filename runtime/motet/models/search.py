@@ -198,14 +198,6 @@ class Index:
         """The motion files that could not be indexed, and why."""
         return {self.folder / member.name: member.fault for member in self.members if member.fault}
 
-    def entries(self) -> dict[tuple[str, int, int], list[tuple[Member, Floats]]]:
-        """The members of each file, by its :attr:`Member.state`, with their vectors (windows, E)."""
-        found: dict[tuple[str, int, int], list[tuple[Member, Floats]]] = {}
-        stops = np.cumsum([len(member.windows) for member in self.members])
-        for member, rows in zip(self.members, np.split(self.vectors, stops)[:-1], strict=True):
-            found.setdefault(member.state, []).append((member, rows))
-        return found
-
     @overload
     def search(  # type: ignore[overload-overlap]  # a string is a sequence of strings, too
         self, queries: Query, count: int | None = None
@@ -274,7 +266,7 @@ def _renewed(
     """The current index of a folder, reusing the entries of unchanged files."""
     known: dict[tuple[str, int, int], list[tuple[Member, Floats]]] = {}  # by path, size and modification time
     for one in before:
-        known |= one.entries() if one.unit == unit else {}
+        known |= _entries(one) if one.unit == unit else {}
     if not folder.is_dir():
         raise FormatError(folder, "neither a folder of motion files nor an index of one")
     paths = shard.of(files_in(folder, MOCAP))
@@ -292,6 +284,15 @@ def _renewed(
     members, vectors = zip(*found, strict=True)
     gone = sorted(path for path in {path for path, _, _ in known} if not (folder / path).exists())
     return Index(model, folder, members, np.concatenate(vectors), tuple(folder / path for path in gone), unit, shard)
+
+
+def _entries(index: Index) -> dict[tuple[str, int, int], list[tuple[Member, Floats]]]:
+    """The members of each file, by its :attr:`Member.state`, with their vectors (windows, E)."""
+    found: dict[tuple[str, int, int], list[tuple[Member, Floats]]] = {}
+    stops = np.cumsum([len(member.windows) for member in index.members])
+    for member, rows in zip(index.members, np.split(index.vectors, stops)[:-1], strict=True):
+        found.setdefault(member.state, []).append((member, rows))
+    return found
 
 
 def _state(index: Index) -> tuple[object, ...]:
