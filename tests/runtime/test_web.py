@@ -244,6 +244,7 @@ STEERED: list[dict[str, Any]] = [
     {"go_along": {"points": [[1.0, 4.0], [3.0, 4.0]], "gait": "run", "speed": 2.5, "who": [1]}},
     *[{}] * 4,
     {"keep_apart": None, "go_to": {"points": None}},
+    *[{}] * 4,
     {"look_at": {"points": [[3.0, 1.2, 3.0], [1.0, 2.5, 9.0]]}},
     {"reach": {"hand": "left", "points": [[-1.8, 1.3, 1.2], [3.0, 1.2, 9.0]]}, "act": {"who": [0]}},
     {"look_at": {"points": [-2.0, 0.4, -3.0], "who": [1]}, "control": {"gait": "walk", "velocity": [0.8, -0.6]}},

@@ -11,6 +11,7 @@ from motet.decode.acting import Acting
 from motet.decode.acts import Act, ActSettings
 from motet.decode.matched import Matched, matched
 from motet.decode.matching import Playback, Rows
+from motet.decode.standing import Standing
 from motet.decode.steering import tick
 from motet.errors import ControlError, ControlWarning, warn
 from motet.models.gaits import Command
@@ -38,6 +39,7 @@ class SteerSnapshot:
 
     playback: Playback
     acting: Acting
+    standing: Standing
     command: Command
     lock: FootLock | None
     poses: tuple[Pose, Pose] | None
@@ -70,6 +72,7 @@ class SteerSession(Guided):
         self._target = np.zeros((self.characters, 3))
         self._acting, self._words = self._no_acts(), words
         self._lock = self._new_lock() if hold_feet else None
+        self._standing = Standing.none(self.characters)
         self._poses: tuple[Pose, Pose] | None = None
         self._happenings: Happenings | None = None
         self._late: tuple[Event, ...] = ()  # of a tick that was to be shown next, when characters were put elsewhere
@@ -162,13 +165,16 @@ class SteerSession(Guided):
 
     def tick_to(self, target: Array) -> Pose:
         """A tick with a raw target (characters, 3): velocity along x and z in m/s, facing in radians; not checked."""
-        gait, root = self._command.gait, self._playback.root
+        gait, root, seconds = self._command.gait, self._playback.root, 1 / self.model.fps
         changed = self._acting.begin(self._playback, target, gait)
         pose = tick(self.model.matcher, self.model.pose_codes, self._playback, target, gait)
+        if self._lock is not None:
+            whole = self._acting.whole
+            self._standing = self._standing.kept(self._playback, root, pose.contacts, target, whole, seconds)
         pose = self._acting.laid(pose, self._playback, root, changed)
         self._face_as_acted()
-        pose = pose if self._lock is None else self._lock.held(pose)
-        self._guidance, pose = self._guidance.after(pose, 1 / self.model.fps)
+        pose = pose if self._lock is None else self._lock.held(self._standing.breathed(pose, seconds))
+        self._guidance, pose = self._guidance.after(pose, seconds)
         return replace(pose, events=self._happened(pose))
 
     def _happened(self, pose: Pose) -> tuple[Event, ...]:
@@ -318,7 +324,7 @@ class SteerSession(Guided):
     def snapshot(self) -> SteerSnapshot:
         """The whole state, to be restored later."""
         lock = None if self._lock is None else replace(self._lock)  # its arrays are replaced, never written into
-        told = self._playback.copy(), self._acting.copy(), self._command, lock
+        told = self._playback.copy(), self._acting.copy(), self._standing, self._command, lock
         return SteerSnapshot(*told, self._poses, self._ahead, self._guidance, self._happenings, self._late)
 
     def restore(self, snapshot: SteerSnapshot) -> None:
@@ -331,7 +337,7 @@ class SteerSession(Guided):
             has, lacks = ("without", "with") if snapshot.lock is None else ("with", "without")
             raise ControlError(f"a snapshot {has} held feet does not fit a session {lacks} them (hold_feet)")
         self._playback, self._poses, self._ahead = snapshot.playback.copy(), snapshot.poses, snapshot.ahead
-        self._acting = snapshot.acting.copy()
+        self._acting, self._standing = snapshot.acting.copy(), snapshot.standing
         self._command, (self._target, _) = command, self.model.abilities.target(command)
         self._guidance, self._happenings, self._late = snapshot.guidance, snapshot.happenings, snapshot.late
         self._lock = None if snapshot.lock is None else replace(snapshot.lock)

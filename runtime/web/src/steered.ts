@@ -9,12 +9,14 @@ import { ahead, type Look, looked } from "./looking.js";
 import type { Playback, Target } from "./matching.js";
 import type { Pose as Ground } from "./planar.js";
 import { idle, type Reach, reached } from "./reaching.js";
+import { breathed, kept, notYet, type Standing } from "./standing.js";
 import type { Played } from "./steering.js";
 
 export interface Steered {
   playback: Playback;
   acting: Acting;
   lock: Lock;
+  standing: Standing;
   command: Command;
   target: Target;
   /** The path that it is on, if any. */
@@ -33,7 +35,7 @@ export function standing(model: ControlModel, gait: number, place?: Ground, phas
   const playback = matcher.playing(matcher.stillest(gait), place, phase);
   const command = { gait, speed: 0, direction: 0, facing, facesWay: false };
   const told: Pick<Steered, "going" | "look" | "hands"> = { going: null, look: ahead(), hands: [idle(), idle()] };
-  return { playback, acting: noAct(model, playback), lock: newLock(), command, target: [0, 0, facing], ...told, happenings: null };
+  return { playback, acting: noAct(model, playback), lock: newLock(), standing: notYet(), command, target: [0, 0, facing], ...told, happenings: null };
 }
 
 /** Set where a figure goes from now on, off any path: a command, and the target that its gait makes of it. */
@@ -52,11 +54,14 @@ export function hasten(playback: Playback): void {
 export function tick(model: ControlModel, figure: Steered, holdFeet: boolean, target = figure.target): Played {
   const { playback, acting, command } = figure;
   const { steerer, lock: how, fps } = model;
-  const { root } = playback;
+  const [{ root }, dt] = [playback, 1 / fps];
   const changed = begin(model, acting, playback, target, command.gait);
-  const pose = laid(model, acting, steerer.tick(playback, target, command.gait), playback, root, changed);
-  if (acting.playing?.whole && !command.speed) stand(figure);
-  return guided(figure, holdFeet ? held(figure.lock, pose, how, 1 / fps) : pose, 1 / fps);
+  const whole = acting.playing?.whole ?? false;
+  const played = steerer.tick(playback, target, command.gait);
+  const stood = holdFeet ? kept(figure.standing, played, playback, root, target, whole, dt) : played;
+  const pose = laid(model, acting, stood, playback, root, changed);
+  if (whole && !command.speed) stand(figure);
+  return guided(figure, holdFeet ? held(figure.lock, breathed(figure.standing, pose, dt), how, dt) : pose, dt);
 }
 
 /** A pose with head and arms as the figure is told. */
