@@ -278,6 +278,21 @@ def test_a_sentence_is_acted_and_made_once(model: SteerModel, said: SaidActs) ->
     assert highest > model.start().tick().positions()[0, list(hand), 1].max() + 0.2
 
 
+def test_a_figure_that_walks_jumps_once_with_its_whole_body_and_walks_on(model: SteerModel, said: SaidActs) -> None:
+    session = model.start(words=said)
+    session.control(speed=1.3)
+    ticks(session, 60)
+    session.act("jump", upper=False)
+    poses = ticks(session, 120)
+    kinds = [event.kind for pose in poses for event in pose.events]
+    assert [kind for kind in kinds if kind in ("take-off", "landing")] == ["take-off", "landing"]
+    toes = [HUMANOID.index("leftToes"), HUMANOID.index("rightToes")]
+    assert max(pose.positions()[0, toes, 1].min() for pose in poses) > 0.2
+    assert session.acting == [None]
+    end = np.stack([pose.ground[0, :2] for pose in poses[-16:]])
+    assert np.linalg.norm(end[-1] - end[0]) / 0.5 == pytest.approx(1.3, abs=0.15)
+
+
 @pytest.mark.parametrize("sentence", ["xyzzy", "a dragon", "", "   "])
 def test_a_sentence_that_is_not_known_is_refused_and_nothing_moves(
     model: SteerModel, said: SaidActs, sentence: str
