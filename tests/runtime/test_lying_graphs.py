@@ -42,7 +42,13 @@ def tables_of(bundle: Bundle) -> dict[str, NDArray[Any]]:
 
 @pytest.mark.parametrize(
     ("column", "value", "reason"),
-    [(0, 257, "move"), (3, 625, "code"), (-2, 374, "action"), (-1, 1001, "age"), *((n, -1, "") for n in range(-6, 0))],
+    [
+        (0, 257, "move"),
+        (3, 625, "code"),
+        (-2, 1 << 14, "action"),
+        (-1, 1001, "age"),
+        *((n, -1, "") for n in range(-6, 0)),
+    ],
 )
 def test_a_memory_is_checked_as_it_is_loaded(column: int, value: int, reason: str) -> None:
     bundle = Bundle.open("generate")

@@ -267,13 +267,18 @@ def test_two_seconds_show_the_act(model: CodesModel, seed: int) -> None:
     (kick,) = model.generate("a person kicks", seed=seed, seconds=2)
     feet = [HUMANOID.names.index(f"{side}Foot") for side in ("left", "right")]
     assert kick.motion.duration == pytest.approx(2)
-    assert positions(kick.motion)[:, feet, 1].max() > 0.7
+    height = positions(kick.motion)[:, feet, 1]
+    assert height.max() > height.min() + 0.35
     (jump,) = model.generate("a person jumps", seed=seed, seconds=2)
     height = positions(jump.motion)[:, 0, 1]
     assert np.ptp(height) > 0.3
-    (bow,) = model.generate("a person bows", seed=seed, seconds=2)  # who walks first
-    trunk = np.diff(positions(bow.motion)[:, [HUMANOID.names.index(name) for name in ("hips", "neck")]], axis=1)[:, 0]
-    assert (trunk[:, 1] / np.linalg.norm(trunk, axis=1)).min() < np.cos(np.radians(20))
+
+
+@pytest.mark.parametrize("memory", [0.1, 0.9])
+def test_no_motion_ends_as_it_begins(model: CodesModel, memory: float) -> None:
+    """A writer by itself would end one jump in ten after its first step."""
+    (found,) = model.generate(["a person jumps"], 30, memory=memory)
+    assert min(len(one.frames) for one in found) > model.fps
 
 
 def test_the_length_comes_before_other_numbers(model: CodesModel) -> None:

@@ -127,6 +127,8 @@ def test_training_trials_are_those_not_held_out() -> None:
 
     names = {trial.name for trial in TRIALS}
     assert trained_on(Told(), list(TRIALS)) == names - {"16_01", "unheard_of"}  # type: ignore[arg-type]
+    Told.training["split"]["by"] = "none"  # type: ignore[assignment]
+    assert trained_on(Told(), list(TRIALS)) == names  # type: ignore[arg-type]
 
 
 def test_a_store_gives_its_motions_where_they_go(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

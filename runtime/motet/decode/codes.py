@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from motet.bundle.graph import Floats, Graph
 from motet.decode.loop import Ids, Noise, Scores, advance, zero_state
-from motet.decode.memory import PAST, Memory
+from motet.decode.memory import LEAP, PAST, Memory
 from motet.settings import Range, Settings
 
 WINDOW = 64
@@ -96,10 +96,10 @@ class Writer:
     def draw(self, actions: Ids, ends: bool = True, steps: int = 0, whole: bool = True) -> Ids:
         """The next step (B, P) of rows with the given actions (B,).
 
-        ends: whether a motion may end; else an action that would end begins again. steps: of this and those to come,
-        where they are to show the most of an action that begins. whole: whether all of an action is shown; else, of
-        long recordings, an act (:meth:`Memory.next`). Each row takes one block of uniform numbers (P + 2,) from its
-        noise.
+        ends: whether a motion may end, but no more than LEAP sooner than any remembered one; else an action that would
+        end begins again. steps: of this and those to come, where they are to show the most of an action that begins.
+        whole: whether all of an action is shown; else, of long recordings, an act (:meth:`Memory.next`). Each row takes
+        one block of uniform numbers (P + 2,) from its noise.
         """
         known, uniform, memory = self._known(actions), self.source.uniform(self.noise), self.source.memory
         codes = np.full((len(actions), self.source.parts), -1, dtype=np.int64)
@@ -117,7 +117,8 @@ class Writer:
                 over, self.done[row] = memory.over(action, place, whole)
                 codes[row] = memory.codes[place]
                 codes[row, 0] = self.source.end if over and ends else codes[row, 0]
-        again = self._parts(known, uniform[:, 2:], codes, ends)
+        begun = self.age < (1 - LEAP) * np.array([memory.shortest(int(action)) for action in actions])
+        again = self._parts(known, uniform[:, 2:], codes, ends, begun)
         self.last = np.tile(codes, (2, 1))
         self.age, self.done = np.where(again, 0, self.age + 1), np.where(again, 0.0, self.done)
         return codes
@@ -140,8 +141,11 @@ class Writer:
         known: Floats = outputs["known"]
         return known
 
-    def _parts(self, known: Floats, uniform: Scores, codes: Ids, ends: bool) -> NDArray[np.bool_]:
-        """Draw the parts of steps (B, P) one after the other where they are not given; which rows (B,) begin again."""
+    def _parts(
+        self, known: Floats, uniform: Scores, codes: Ids, ends: bool, begun: NDArray[np.bool_]
+    ) -> NDArray[np.bool_]:
+        """Draw the parts of steps (B, P) one after the other where they are not given; which rows (B,) begin again.
+        begun: rows (B,) that do not end yet."""
         drawing, end = self.drawing, self.source.end
         again: NDArray[np.bool_] = (codes[:, 0] == end) & (not ends)
         rows = np.flatnonzero((codes[:, 0] < 0) | again)
@@ -153,11 +157,13 @@ class Writer:
             with_action, without = np.split(self.source.part(asked)["log_probabilities"][:, part].astype(np.float64), 2)
             chances = without + drawing.guidance * (with_action - without)
             drawn = nucleus(chances, uniform[rows, part], temperature, drawing.top_p)
-            if part == 0 and not ends:
-                again[rows] |= drawn == end
-                chances[:, end] = -np.inf
+            if part == 0:
+                early, ended = begun[rows] | (not ends), drawn == end
+                again[rows] |= ended & (not ends)
+                chances[early, end] = -np.inf
                 other = uniform[rows, part] * 1024 % 1  # the same number would give a neighbour of the end
-                drawn = nucleus(chances, np.where(again[rows], other, uniform[rows, part]), temperature, drawing.top_p)
+                number = np.where(again[rows] | ended & early, other, uniform[rows, part])
+                drawn = nucleus(chances, number, temperature, drawing.top_p)
             codes[rows, part] = drawn
         return again
 

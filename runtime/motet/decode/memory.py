@@ -181,6 +181,11 @@ class Memory:
             return int(found[int(uniform * len(found))])
         return self._near(action, recent, 0, False, uniform, self.ages[rows], np.isin(rows, found))
 
+    def shortest(self, action: int) -> int:
+        """The steps of the shortest remembered motion of an action; 0 where there is none."""
+        rows = self.rows.get(action)
+        return 0 if rows is None else int(self.ages[self.lasts[rows]].min())
+
     def paced(self, action: int, steps: int) -> int:
         """The steps of an action to be played in the time of so many: of one that is a little longer its act, of one
         that is a little shorter all, by no more than QUICKEST; else as many as there are."""

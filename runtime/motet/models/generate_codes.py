@@ -73,7 +73,7 @@ class FamiliaritySettings(Settings):
     """
 
     FEATURE: ClassVar[str] = "familiarity"
-    confident: Annotated[float, Range(0, 1)] = 0.4
+    confident: Annotated[float, Range(0, 1)] = 0.5
     doubt: Annotated[float, Range(0, 10)] = 0.25
 
 

@@ -38,6 +38,7 @@ class SaidActs:
 
     def _known(self, sentence: str) -> str:
         """A sentence that the model knows: itself, or what a person does who is told it."""
+        self.words.vocabulary.encode(sentence)  # an order without words is none, though "a person" is known
         try:
             self.words.check(sentence)
         except TextError:

@@ -1,7 +1,7 @@
 /* Motions drawn code by code: docs/bundle.md, the loop `codes`. */
 import { integers, type NumberArray } from "./arrays.js";
 import { type Graph, taken } from "./graph.js";
-import type { Memory } from "./memory.js";
+import { LEAP, type Memory } from "./memory.js";
 import type { Noise } from "./random.js";
 
 /** Steps that the writer looks back at most. */
@@ -75,7 +75,8 @@ export class Writer {
   }
 
   /**
-   * The next step (B, P) of rows with the given actions; an action that would end begins again unless it may end.
+   * The next step (B, P) of rows with the given actions. ends: whether a motion may end, but no more than
+   * LEAP sooner than any remembered one; else an action that would end begins again.
    * steps: of this and those to come, where they are to show the most of an action that begins; else 0. whole: as for
    * the memory's `next`.
    */
@@ -88,7 +89,8 @@ export class Writer {
     this.now = { ...this.now, age: from };
     const after = places.map((place, row) => (place === undefined ? undefined : memory.after(actions[row]!, place, whole)));
     const given = places.map((place, row) => (place === undefined ? undefined : this.step(place, ends && after[row]!.end)));
-    const { codes, again } = await this.drawn(known, uniform.map((block) => block.slice(2)), given, ends);
+    const begun = actions.map((action, row) => from[row]! < (1 - LEAP) * memory.shortest(action));
+    const { codes, again } = await this.drawn(known, uniform.map((block) => block.slice(2)), given, ends, begun);
     const age = from.map((one, row) => (again[row] ? 0 : one + 1));
     const done = after.map((one, row) => (again[row] ? 0 : (one?.done ?? this.now.done[row]!)));
     this.now = { ...this.now, last: [...codes, ...codes], age, done };
@@ -149,9 +151,12 @@ export class Writer {
     return memory.next(action, recent[row]!, age[row]!, ends, uniform[1]!, done[row]!, whole);
   }
 
-  /** The codes of rows, one after the other where they are not given; and which rows begin their action again. */
+  /**
+   * The codes of rows, one after the other where they are not given; and which rows begin their action again.
+   * begun: rows that do not end yet.
+   */
   private async drawn(
-    known: NumberArray<Float32Array>, uniform: number[][], given: (number[] | undefined)[], ends: boolean,
+    known: NumberArray<Float32Array>, uniform: number[][], given: (number[] | undefined)[], ends: boolean, begun: boolean[],
   ): Promise<{ codes: number[][]; again: boolean[] }> {
     const { source, drawing } = this;
     const again = given.map((step) => step?.[0] === source.end && !ends);
@@ -163,11 +168,12 @@ export class Writer {
         const temperature = this.now.age[row] === 0 ? drawing.first_temperature : drawing.temperature;
         const own = chances[at]!;
         let number = uniform[row]![part]!;
-        if (part === 0 && !ends) {
-          again[row] ||= nucleus(own, number, temperature, drawing.top_p) === source.end;
+        if (part === 0 && (!ends || begun[row])) {
+          const ended = nucleus(own, number, temperature, drawing.top_p) === source.end;
+          again[row] ||= ended && !ends;
           own[source.end] = -Infinity;
           // the same number would give a neighbour of the end
-          if (again[row]) number = (number * 1024) % 1;
+          if (again[row] || ended) number = (number * 1024) % 1;
         }
         codes[row]![part] = nucleus(own, number, temperature, drawing.top_p);
       });

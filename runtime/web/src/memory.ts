@@ -11,7 +11,7 @@ const LATEST = 2;
 /** The share of a motion's movement in which an action is taken up that follows another. */
 const EARLY = 0.3;
 /** The share of a motion's movement that may be left out from one step to the next. */
-const LEAP = 0.3;
+export const LEAP = 0.3;
 /** What a step without movement counts beside the squared differences of codes' numbers. */
 const REST = 0.125;
 /** What the codes of a step count beside the squared differences of their numbers, where an act is looked for. */
@@ -137,6 +137,12 @@ export class Memory {
   /** Whether anything of an action is remembered. */
   knows(action: number): boolean {
     return this.rows.has(action);
+  }
+
+  /** The steps of the shortest remembered motion of an action; 0 where there is none. */
+  shortest(action: number): number {
+    const lasts = (this.rows.get(action) ?? []).filter((row) => this.ages[row + 1] !== this.ages[row]! + 1);
+    return lasts.reduce((least, row) => Math.min(least, this.ages[row]!), lasts.length ? Infinity : 0);
   }
 
   /** The codes (P) of a step. */

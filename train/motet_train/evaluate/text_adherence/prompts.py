@@ -157,6 +157,8 @@ class LookUp:
 
 
 def trained_on(manifest: Manifest, trials: Sequence[Trial]) -> set[str]:
-    """The names of the trials that are neither validation nor test motions of a model; all, where it does not say."""
+    """The names of the trials that are neither validation nor test motions of a model; all, where it does not say, and
+    where nothing was kept back: then its validation motions were trained on, too."""
     split = manifest.training.get("split", {})
-    return {trial.name for trial in trials} - {name for part in ("validation", "test") for name in split.get(part, ())}
+    parts = () if split.get("by") == "none" else ("validation", "test")
+    return {trial.name for trial in trials} - {name for part in parts for name in split.get(part, ())}
