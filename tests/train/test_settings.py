@@ -69,7 +69,7 @@ def test_options_win_over_tables_and_reach_the_field_of_their_name() -> None:
 @pytest.mark.parametrize(
     ("tables", "said"),
     [
-        ({"training": {"rate": 1.0}}, r"unknown setting training\.rate of convseq2seq: expected one of adversary, "),
+        ({"training": {"rate": 1.0}}, r"unknown setting training\.rate of convseq2seq: expected one of accumulate, "),
         ({"model": {"dimensions": 3}}, r"unknown setting model\.dimensions"),
         ({"training": {"batch": 1.5}}, r"training\.batch = 1\.5 does not fit: expected int"),
         ({"training": {"batch": True}}, r"training\.batch = true does not fit"),

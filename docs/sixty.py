@@ -1,0 +1,80 @@
+"""Draw what the bundle `generate` shows for the sentences of docs/sixty.tsv, two seeds each, and print what it says of
+them: `python docs/sixty.py`. docs/sixty.md tells how they were judged."""
+
+import csv
+import warnings
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+from PIL import Image
+
+import motet
+from motet.draw.svg import shapes
+from motet_train.evaluate.figures import SPACING, panels, save
+from motet_train.evaluate.text_adherence.track import track_of
+
+TABLE = Path(__file__).with_suffix(".tsv")
+FOLDER = Path(__file__).parent / "figures"
+SEEDS = (0, 1)
+PER_SHEET, POSES = 10, 10
+WARNED = " | warned"
+
+
+def shown(model: motet.GenerateModel, sentence: str) -> Iterator[tuple[motet.Motion | None, str]]:
+    """A motion for each seed, None where the sentence is refused, and a line that says what it is."""
+    for seed in SEEDS:
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always")
+            try:
+                found = model.generate(sentence, seed=seed)[0]
+            except motet.TextError as error:
+                yield None, f"refused: {error}"
+                continue
+        track = track_of(found.motion)
+        way = float(np.linalg.norm(np.diff(track.points[:, 0, [0, 2]], axis=0), axis=1).sum())
+        said = f"as: {found.action}" if found.action else "in parts"
+        line = f"{said} | {track.seconds:.1f} s, {way:.1f} m, {track.turn:.0f} degrees"
+        yield found.motion, line + WARNED * bool(told)
+
+
+def sheet(rows: list[tuple[str, list[tuple[motet.Motion | None, str]]]]) -> Figure:
+    """Sentences, one a row, with the strips of their seeds side by side."""
+    picture, axes = panels(len(rows), len(SEEDS), (7 * len(SEEDS), 1.45 * len(rows)))
+    places = iter(axes)
+    for sentence, motions in rows:
+        for motion, line in motions:
+            place = next(places)
+            place.set_title(f"{sentence}\n{line}", fontsize=7, loc="left")
+            place.axis("off")
+            for n, (triangles, inks, shadow) in enumerate(shapes(motion, POSES) if motion else ()):
+                for parts, colours in ((shadow, "0.85"), (triangles, inks / 255)):
+                    moved = list(np.add(parts, [SPACING * n, 0]))
+                    place.add_collection(PolyCollection(moved, facecolors=colours, edgecolors=colours, linewidths=0.3))
+            place.set(xlim=(-SPACING, SPACING * POSES), ylim=(-0.15, 1.25), aspect="equal")
+    return picture
+
+
+def main() -> None:
+    """Write the sheets, and the lines above the strips on stdout."""
+    model = motet.load("generate")
+    with TABLE.open(encoding="utf-8") as file:
+        table = list(csv.DictReader(file, delimiter="\t"))
+    asked = [(row["sentence"], list(shown(model, row["sentence"]))) for row in table]
+    for sentence, motions in asked:
+        print(sentence, *(f"    {line}" for _, line in motions), sep="\n")
+    done = [row[seed] == "yes" for row in table for seed in ("first", "second")]
+    silent = [not line.startswith("refused") and WARNED not in line for _, motions in asked for _, line in motions]
+    wrong = sum(not one and quiet for one, quiet in zip(done, silent, strict=True))
+    both = sum(map(min, done[::2], done[1::2]))
+    print(f"done: {both} sentences, {sum(done)} strips; wrong without a word: {wrong} strips")
+    sheets = [asked[start : start + PER_SHEET] for start in range(0, len(asked), PER_SHEET)]
+    for path in save({f"sixty-{n}": partial(sheet, rows) for n, rows in enumerate(sheets, 1)}, FOLDER):
+        Image.open(path).quantize(64).save(path, optimize=True)
+
+
+if __name__ == "__main__":
+    main()
