@@ -285,6 +285,6 @@ def test_the_table_of_trials_has_each_trial_once() -> None:
 
 def test_the_page_has_every_prompt_with_its_rules() -> None:
     page = (Path(__file__).parents[2] / "docs/says.md").read_text(encoding="utf-8")
-    rows = {cells[1].strip(): cells[2] for line in page.splitlines() if len(cells := line.split("|")) == 9}
+    rows = {cells[1].strip(): cells[2] for line in page.splitlines() if len(cells := line.split("|")) == 10}
     for prompt in prompts():
         assert [rule.split()[0] for rule in rows[prompt.text].split(";")] == [rule["is"] for rule in prompt.rules]
