@@ -117,7 +117,7 @@ class Writer:
                 over, self.done[row] = memory.over(action, place, whole)
                 codes[row] = memory.codes[place]
                 codes[row, 0] = self.source.end if over and ends else codes[row, 0]
-        begun = self.age < (1 - LEAP) * np.array([memory.shortest(int(action)) for action in actions])
+        begun = self.age < (1 - LEAP) * np.array([memory.shortest.get(int(action), 0) for action in actions])
         again = self._parts(known, uniform[:, 2:], codes, ends, begun)
         self.last = np.tile(codes, (2, 1))
         self.age, self.done = np.where(again, 0, self.age + 1), np.where(again, 0.0, self.done)

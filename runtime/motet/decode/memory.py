@@ -54,6 +54,7 @@ class Memory:
     lasts: (M,) int64 the last step of its motion.
 
     rows: of each action the remembered steps (R,), and keys: their (R, K L) float32 numbers of the K steps before each.
+    shortest: of each the steps of its shortest motion.
     """
 
     codes: Ids
@@ -64,6 +65,7 @@ class Memory:
     lasts: Ids
     rows: dict[int, Ids]
     keys: dict[int, Floats]
+    shortest: dict[int, int]
     _shown: dict[int, tuple[Ids, Scores]] = field(default_factory=dict, init=False)
 
     @staticmethod
@@ -96,7 +98,8 @@ class Memory:
         change[starts] = 0  # as if the figure had stood in it before
         particular = (POSE + change) * np.exp(_rarity(codes[:, 1:], done, codes[:, 0] < end)) * real[:, 0]
         parts, acts = (_over(one, starts, lasts) for one in (REST + change, particular))
-        return Memory(codes, ages, parts, particular, acts, lasts, rows, own)
+        shortest = {name: int(ages[lasts[found]].min()) for name, found in rows.items()}
+        return Memory(codes, ages, parts, particular, acts, lasts, rows, own, shortest)
 
     def next(
         self,
@@ -180,11 +183,6 @@ class Memory:
         if not recent:
             return int(found[int(uniform * len(found))])
         return self._near(action, recent, 0, False, uniform, self.ages[rows], np.isin(rows, found))
-
-    def shortest(self, action: int) -> int:
-        """The steps of the shortest remembered motion of an action; 0 where there is none."""
-        rows = self.rows.get(action)
-        return 0 if rows is None else int(self.ages[self.lasts[rows]].min())
 
     def paced(self, action: int, steps: int) -> int:
         """The steps of an action to be played in the time of so many: of one that is a little longer its act, of one

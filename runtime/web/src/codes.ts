@@ -89,7 +89,7 @@ export class Writer {
     this.now = { ...this.now, age: from };
     const after = places.map((place, row) => (place === undefined ? undefined : memory.after(actions[row]!, place, whole)));
     const given = places.map((place, row) => (place === undefined ? undefined : this.step(place, ends && after[row]!.end)));
-    const begun = actions.map((action, row) => from[row]! < (1 - LEAP) * memory.shortest(action));
+    const begun = actions.map((action, row) => from[row]! < (1 - LEAP) * (memory.shortest.get(action) ?? 0));
     const { codes, again } = await this.drawn(known, uniform.map((block) => block.slice(2)), given, ends, begun);
     const age = from.map((one, row) => (again[row] ? 0 : one + 1));
     const done = after.map((one, row) => (again[row] ? 0 : (one?.done ?? this.now.done[row]!)));

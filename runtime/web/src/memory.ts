@@ -50,6 +50,9 @@ export class Memory {
   private readonly rows = new Map<number, number[]>();
   private readonly shown = new Map<number, Course>();
 
+  /** Of each remembered action the steps of its shortest motion. */
+  readonly shortest = new Map<number, number>();
+
   /** table: (M, P + 2) codes, action, age. moves: (E, 3). body: (V, L). actions: how many there are. */
   constructor(private readonly table: NumberArray, moves: NumberArray, body: NumberArray, actions: number) {
     const [steps, columns] = [table.shape[0]!, table.shape[1]!];
@@ -59,6 +62,10 @@ export class Memory {
     this.ages = Int32Array.from({ length: steps }, (_, row) => Number(table.data[(row + 1) * columns - 1]));
     for (let row = 0; row < steps; row++) this.remember(row, moves, body, actions);
     this.lasts = lastsOf(this.ages);
+    for (const [action, rows] of this.rows) {
+      const steps = rows.map((row) => this.ages[this.lasts[row]!]!);
+      this.shortest.set(action, steps.reduce((least, one) => Math.min(least, one)));
+    }
     const changes = this.changes(moves.shape[1]!, moves.shape[0]!);
     this.parts = this.over(changes.map((change) => REST + change));
     const rare = this.rarity(body.shape[0]!, moves.shape[0]!);
@@ -137,12 +144,6 @@ export class Memory {
   /** Whether anything of an action is remembered. */
   knows(action: number): boolean {
     return this.rows.has(action);
-  }
-
-  /** The steps of the shortest remembered motion of an action; 0 where there is none. */
-  shortest(action: number): number {
-    const lasts = (this.rows.get(action) ?? []).filter((row) => this.ages[row + 1] !== this.ages[row]! + 1);
-    return lasts.reduce((least, row) => Math.min(least, this.ages[row]!), lasts.length ? Infinity : 0);
   }
 
   /** The codes (P) of a step. */
