@@ -8,13 +8,11 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from PIL import Image
 
 import motet
-from motet.draw.svg import shapes
-from motet_train.evaluate.figures import SPACING, panels, save
+from motet_train.evaluate.figures import bodies, panels, save
 from motet_train.evaluate.text_adherence.track import track_of
 
 TABLE = Path(__file__).with_suffix(".tsv")
@@ -49,12 +47,10 @@ def sheet(rows: list[tuple[str, list[tuple[motet.Motion | None, str]]]]) -> Figu
         for motion, line in motions:
             place = next(places)
             place.set_title(f"{sentence}\n{line}", fontsize=7, loc="left")
-            place.axis("off")
-            for n, (triangles, inks, shadow) in enumerate(shapes(motion, POSES) if motion else ()):
-                for parts, colours in ((shadow, "0.85"), (triangles, inks / 255)):
-                    moved = list(np.add(parts, [SPACING * n, 0]))
-                    place.add_collection(PolyCollection(moved, facecolors=colours, edgecolors=colours, linewidths=0.3))
-            place.set(xlim=(-SPACING, SPACING * POSES), ylim=(-0.15, 1.25), aspect="equal")
+            if motion is None:
+                place.axis("off")
+            else:
+                bodies(place, motion, POSES)
     return picture
 
 
