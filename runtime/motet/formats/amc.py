@@ -59,10 +59,10 @@ def _find_asf(path: Path) -> Path:
     stems = list(dict.fromkeys([path.stem, path.stem.split("_")[0]]))
     for folder in (path.parent, path.parent.parent / "asf"):
         try:
-            found = sorted(folder.iterdir()) if folder.is_dir() else []
+            found = sorted(f for f in folder.iterdir() if f.suffix.lower() == ".asf") if folder.is_dir() else []
         except OSError as error:
             raise FormatError(path, f"cannot look for a skeleton in {folder}: {error.strerror}") from error
-        by_stem = {file.stem: file for file in found if file.suffix.lower() == ".asf"}
+        by_stem = {file.stem: file for file in found}
         fitting = [by_stem[stem] for stem in stems if stem in by_stem]
         if fitting or len(by_stem) == 1:
             return (fitting or list(by_stem.values()))[0]

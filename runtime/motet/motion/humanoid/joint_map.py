@@ -42,6 +42,9 @@ LIMB_BONES = tuple(tuple(sided(side, part) for part in limb) for side in LEFT_RI
 
 UNSIDED = ("hips", "head", "spine", "neck")
 
+NO_PREFIX = "(?!)"
+"""A pattern that nothing fits."""
+
 BY_THE_TREE = "by the tree"
 """What stands for a convention where none was found."""
 
@@ -293,8 +296,11 @@ def _both_sides(of_left: dict[str, list[float]], signs: tuple[int, int, int]) ->
     return found
 
 
-def _plain(name: str) -> str:
-    """A name without what differs between files: case, separators, and the namespace before a colon."""
+@lru_cache(maxsize=2**12)  # names of joints recur from file to file
+def _plain(name: str, prefix: str = NO_PREFIX) -> str:
+    """A name without what differs between files: a prefix (a regular expression), case, separators, and the namespace
+    before a colon."""
+    name = re.sub(f"^(?:{prefix})(?=.)", "", name, flags=re.IGNORECASE)
     return re.sub(r"[^a-z0-9]", "", name.rsplit(":", maxsplit=1)[-1].lower())
 
 
@@ -305,7 +311,8 @@ def map_by_names(skeleton: Skeleton) -> JointMap | None:
     HalfKnownError where a convention fits but for bones that are missing or out of order; MotionError where the one
     that knows most of the names lacks bones of one side only, or where two joints are the hips.
     """
-    matches = [_match(convention, skeleton) for convention in conventions()]
+    shared = _shared_word(skeleton)
+    matches = [_match(convention, skeleton, shared) for convention in conventions()]
     fits = sorted(range(len(matches)), key=lambda i: matches[i][0], reverse=True)
     fullest = matches[fits[0]][1]
     whole = (matches[i] for i in fits if not missing_bones(matches[i][1]))
@@ -322,16 +329,19 @@ def map_by_names(skeleton: Skeleton) -> JointMap | None:
         raise HalfKnownError(str(error)) from error
 
 
-def _match(convention: Convention, skeleton: Skeleton) -> tuple[tuple[int, int], JointMap]:
-    """The map that a convention makes of a skeleton's names, and how well it fits: how many joints the convention has
-    names for, and less how many of its bones are absent."""
-    # without the prefixes of the convention, or the first word where nearly all names begin with it
+def _shared_word(skeleton: Skeleton) -> list[str]:
+    """A pattern of the word with which nearly all names begin, if one does."""
     first = [re.match(r"[A-Za-z]+[0-9]*[ _:.-]+(?=.)", name) for name in skeleton.names]
     words = [match[0] for match in first if match]
     common = max(words, key=words.count, default="")
-    shared = [re.escape(common)] if words.count(common) > 0.8 * len(skeleton.names) else []
-    pattern = "|".join(f"(?:{prefix})[ _:.-]*" for prefix in (*convention.prefixes, *shared)) or "(?!)"
-    names = [_plain(re.sub(f"^(?:{pattern})(?=.)", "", name, flags=re.IGNORECASE)) for name in skeleton.names]
+    return [re.escape(common)] if words.count(common) > 0.8 * len(skeleton.names) else []
+
+
+def _match(convention: Convention, skeleton: Skeleton, shared: list[str]) -> tuple[tuple[int, int], JointMap]:
+    """The map that a convention makes of a skeleton's names, without its prefixes and those that they share, and how
+    well it fits: how many joints the convention has names for, and less how many of its bones are absent."""
+    pattern = "|".join(f"(?:{prefix})[ _:.-]*" for prefix in (*convention.prefixes, *shared)) or NO_PREFIX
+    names = [_plain(name, pattern) for name in skeleton.names]
     hips = [i for i, name in enumerate(names) if name == convention.names["hips"][0] and len(skeleton.children[i]) >= 3]
     if len(hips) > 1:
         both = " and ".join(repr(skeleton.names[i]) for i in hips)
