@@ -32,7 +32,7 @@ from motet_train.evaluate.steer.following import (
     ways_errors,
 )
 from motet_train.evaluate.steer.players import FIGURES, reversal_figures, stick_figures
-from motet_train.evaluate.steer.report import Limits, Watch, broken, frozen, leaps, turns, wandering, watched
+from motet_train.evaluate.steer.report import Limits, Watch, astray, broken, frozen, leaps, turns, wandering, watched
 
 
 def puppets(**how: Any) -> Any:
@@ -226,6 +226,14 @@ def test_figures_that_do_not_go_freeze() -> None:
     assert told_long.sum() > 10
     # no joint moves: each figure freezes once
     assert frozen(watched(puppets(gain=0.5), still_limits(), 60.0, 4), FPS).sum() == 4
+
+
+def test_figures_go_astray_that_turn_too_slowly() -> None:
+    fine, slow = (watched(puppets(turning=rate), still_limits(), 60.0, 4) for rate in (360.0, 20.0))
+    assert astray(fine, FPS) == pytest.approx(0, abs=0.1)
+    # most are told to turn by more than 40 degrees, which is what they can in two seconds
+    assert len(astray(slow, FPS)) > 10
+    assert 20 < np.median(astray(slow, FPS)) < 120
 
 
 def test_watching_in_chunks_is_watching_at_once() -> None:

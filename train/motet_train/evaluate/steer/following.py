@@ -215,7 +215,7 @@ class Ground:
 
     def way_off(self, asked: Array, start: float, stop: float) -> Array:
         """By how many degrees (B,) figures go elsewhere than asked (B,), between two times; 180 for none that goes."""
-        return np.where(self.pace(start, stop) > 0.05, np.abs(_off(self.gone(start, stop), asked)), 180.0)
+        return np.where(self.pace(start, stop) > 0.05, np.abs(way_off(self.gone(start, stop), asked)), 180.0)
 
     def facing_off(self, asked: Array, start: float, stop: float) -> Array:
         """By how many degrees (B,) figures face elsewhere than is asked (B,), in the mean between two times."""
@@ -228,10 +228,10 @@ class Ground:
         asked (B,), in degrees, and stays so to the end; infinite where it does not."""
         half = round(calm * self.fps / 2)
         steps = self.places[2 * half :, :, :2] - self.places[: -2 * half, :, :2]  # around ticks half, half + 1, ...
-        return arrival(np.abs(_off(steps, asked)) <= 10, self.fps) + half / self.fps
+        return arrival(np.abs(way_off(steps, asked)) <= 10, self.fps) + half / self.fps
 
 
-def _off(velocity: Array, asked: Array) -> Array:
+def way_off(velocity: Array, asked: Array) -> Array:
     """Degrees (..., B) from the directions asked (B,) to those of velocities (..., B, 2)."""
     found: Array = np.degrees(wrapped(np.arctan2(velocity[..., 0], velocity[..., 1]) - np.radians(asked)))
     return found

@@ -35,6 +35,7 @@ from motet_train.evaluate.steer.following import (
     stretches,
     tracks_of,
     turn_errors,
+    way_off,
     ways_errors,
 )
 from motet_train.evaluate.steer.players import reversal_figures, stick_figures
@@ -117,13 +118,14 @@ def leaps(track: Track) -> Array:
 class Watch:
     """What T ticks of B figures were: each array is (T, B) but ``ground`` (T, B, 3).
 
-    asked: m/s. since: ticks since the last change, 0 at the tick that follows it. finite: whether all is. turn: degrees
-    that the bone turned which turned most. leap: how far the joint moved that went the farthest beside its limit, as a
-    share of that. height: of the hips. lowest: of the soles.
+    asked: m/s. way: degrees, where to. since: ticks since the last change, 0 at the tick that follows it. finite:
+    whether all is. turn: degrees that the bone turned which turned most. leap: how far the joint moved that went the
+    farthest beside its limit, as a share of that. height: of the hips. lowest: of the soles.
     """
 
     ground: Array
     asked: Floats
+    way: Floats
     since: NDArray[np.int32]
     finite: Flags
     turn: Floats
@@ -170,17 +172,19 @@ def watched(
     teller, ticks = _Teller(model, characters, seed), round(seconds * model.fps)
     last, parts = [teller.session.tick()], []
     for start in range(0, ticks, chunk):
-        poses, asked, since = [], [], []
+        poses, asked, ways, since = [], [], [], []
         for _ in range(min(chunk, ticks - start)):
             teller.tell()
             poses.append(teller.session.tick())
             asked.append(teller.speed.astype(np.float32))
+            ways.append(teller.direction.astype(np.float32))
             since.append(teller.since.astype(np.int32))
         track = Track.of([*last, *poses], model.fps)
         now, last = track[1:], poses[-1:]
         part = Watch(
             ground=now.ground,
             asked=np.stack(asked),
+            way=np.stack(ways),
             since=np.stack(since),
             finite=np.asarray(np.isfinite(now.places).all(axis=(2, 3)) & np.isfinite(now.ground).all(axis=2)),
             turn=turns(track).max(axis=2).astype(np.float32),
@@ -217,10 +221,24 @@ def frozen(watch: Watch, fps: float) -> Flags:
     return found
 
 
+def astray(watch: Watch, fps: float) -> Array:
+    """Degrees (N,) between where figures went for half a second and where they were told to go, of all that had been
+    told the same for 2 s by then, to go at more than 0.4 m/s."""
+    ticks, last = round(2.0 * fps), round(0.5 * fps)
+    told = (watch.since == ticks) & (watch.asked > 0.4)
+    gone = np.zeros_like(watch.ground[..., :2])
+    gone[last:] = watch.ground[last:, :, :2] - watch.ground[:-last, :, :2]
+    found: Array = np.abs(way_off(gone[told], watch.way[told]))
+    return found
+
+
 def wandering(model: SteerModel, limits: Limits, seconds: float, characters: int) -> dict[str, float]:
     """Counts, all ticks of all figures: broken poses, freezes, leaps (a joint goes a tenth farther in a tick, seen from
-    the figure, than in any recording), soles 3 cm or more under the ground; and the most of each."""
+    the figure, than in any recording), soles 3 cm or more under the ground; and the most of each. direction: degrees
+    off (:func:`astray`), their mean and 95th percentile; NaN of none."""
     watch = watched(model, limits, seconds, characters)
+    off = astray(watch, model.fps)
+    mean, most = (off.mean(), np.percentile(off, 95)) if len(off) else (np.nan, np.nan)
     return {
         "broken": float(broken(watch, limits).sum()),
         "frozen": float(frozen(watch, model.fps).sum()),
@@ -228,6 +246,8 @@ def wandering(model: SteerModel, limits: Limits, seconds: float, characters: int
         "under_ground": float((watch.lowest < -0.03).sum()),
         "largest_turn": float(watch.turn.max()),
         "largest_leap": float(watch.leap.max()),
+        "direction": float(mean),
+        "direction_p95": float(most),
         "deepest_cm": 100 * float(max(0.0, -watch.lowest.min())),
     }
 
