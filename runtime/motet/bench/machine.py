@@ -91,6 +91,7 @@ def fresh(what: str, *given: str, threads: int = 1) -> dict[str, float]:
     begin = "import sys, time; now = time.perf_counter(); from motet.bench import fresh; fresh.main(now, *sys.argv[1:])"
     command = [sys.executable, "-c", begin, what, *given]
     environment = os.environ | dict.fromkeys(POOLS, str(threads))
+    environment.pop("OPENBLAS_CORETYPE", None)  # it would have numpy take another processor's products
     done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, text=True, check=True)
     found: dict[str, float] = json.loads(done.stdout)
     return found
