@@ -23,7 +23,7 @@ def volume(places, triangles):
     return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
 
 
-@pytest.mark.parametrize(("detail", "most"), [(1.0, 5000), (0.6, 2000), (0.3, 500)])
+@pytest.mark.parametrize(("detail", "most"), [(1.0, 5000), (0.6, 2000), (0.3, 500), (0.22, 250)])
 def test_the_body_is_closed_and_carried_whole(detail, most):
     mesh = human_mesh(detail)
     assert 0.6 * most < len(mesh.triangles) <= most
@@ -50,7 +50,8 @@ def test_a_loft_of_a_square_is_a_box():
     rings = np.array([[[x, y, height] for x, y in flat] for height in (0.0, 3.0)])
     places, triangles = loft(rings)
     assert volume(places, triangles) == pytest.approx(2 * 3)
-    assert normals_of(places, triangles)[[-2, -1], 2] == pytest.approx([-1, 1])
+    assert len(triangles) == 12
+    assert np.sign(normals_of(places, triangles)[:, 2]).tolist() == [-1] * 4 + [1] * 4
 
 
 def test_ring_is_on_its_superellipse():

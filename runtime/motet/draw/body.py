@@ -135,8 +135,9 @@ def _carried(rings: Array, along: int, chain: tuple[tuple[int, float, float], ..
 
 def _flat(corners: int, power: float, across: tuple[int, int], rows: Array, detail: float) -> Array:
     """Rings (R, C, 3) in planes that two axes span, from each ring's middle (3) and half axes (2): rows (R, 5)."""
-    corners = max(4, 2 * round(corners * detail / 2))
-    rows = rows[np.unique(np.linspace(0, len(rows) - 1, max(4, round(len(rows) * detail))).round().astype(int))]
+    least = 4 if detail >= 0.3 else 3
+    corners = max(least, 2 * round(corners * detail / 2))
+    rows = rows[np.linspace(0, len(rows) - 1, max(least, round(len(rows) * detail))).round().astype(int)]
     rings = np.repeat(rows[:, None, :3], corners, axis=1)
     rings[:, :, across] += _as_large(ring(corners, power), ring(64, power)) * rows[:, None, 3:]
     return rings

@@ -188,12 +188,19 @@ function darken(marks, { places, unit: size = 1 }, alpha) {
 
 /** Corners x, z of triangles that cover boxes, and what of a body reaches out of them, once: the cells that they touch. */
 function covered(boxes) {
-  const cells = new Map(), cell = (at) => Math.floor(at / SHADE_CELL);
+  const cells = new Set(), cell = (at) => Math.floor(at / SHADE_CELL);
   for (const [low, high] of boxes) {
     const [left, near] = low.map((at) => cell(at - SHADE_AROUND)), [right, far] = high.map((at) => cell(at + SHADE_AROUND));
-    for (let x = left; x <= right; x++) for (let z = near; z <= far; z++) cells.set(x * 65536 + z, [x, z]);
+    for (let x = left; x <= right; x++) for (let z = near; z <= far; z++) cells.add(x * 65536 + z);
   }
-  const corners = [[0, 0], [1, 0], [0, 1], [0, 1], [1, 0], [1, 1]];
-  const places = [...cells.values()].flatMap(([x, z]) => corners.flatMap(([a, b]) => [x + a, z + b]));
-  return Float32Array.from(places, (at) => at * SHADE_CELL);
+  const places = new Float32Array(12 * cells.size);
+  let at = 0;
+  for (const one of cells) {
+    const x = Math.round(one / 65536), z = one - 65536 * x;
+    for (const corner of [0, 1, 2, 2, 1, 3]) {
+      places[at++] = (x + corner % 2) * SHADE_CELL;
+      places[at++] = (z + (corner >> 1)) * SHADE_CELL;
+    }
+  }
+  return places;
 }

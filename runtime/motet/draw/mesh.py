@@ -58,20 +58,15 @@ def together(meshes: Sequence[Mesh]) -> Mesh:
 def loft(rings: Array) -> tuple[Array, NDArray[np.intp]]:
     """The corners and the triangles of a closed surface through rings (R, C, 3) of C corners each.
 
-    A ring goes counterclockwise as seen from the ring after it. The first and the last are closed by their middle.
+    A ring goes counterclockwise as seen from the ring after it. The first and the last are closed.
     """
     count, around = rings.shape[:2]
-    places = np.concatenate([rings.reshape(-1, 3), rings[[0, -1]].mean(axis=1)])
     corner = np.arange(around)
-    after, first, last = (corner + 1) % around, count * around, count * around + 1
     start = around * np.arange(count - 1)[:, None]
-    below, beside = (start + corner).reshape(-1), (start + after).reshape(-1)
-    sides = [(below, beside, beside + around), (below, beside + around, below + around)]
-    ends = [
-        (0 * corner + first, after, corner),
-        (0 * corner + last, corner + last - 1 - around, after + last - 1 - around),
-    ]
-    return places, np.concatenate([np.stack(part, axis=1) for part in (*sides, *ends)])
+    below, beside = (start + corner).reshape(-1), (start + (corner + 1) % around).reshape(-1)
+    sides = np.stack([below, beside, beside + around, below, beside + around, below + around], axis=1).reshape(-1, 3)
+    fan = np.stack([0 * corner[1:-1], corner[1:-1], corner[2:]], axis=1)
+    return rings.reshape(-1, 3), np.concatenate([fan[:, ::-1], sides, fan + (count - 1) * around])
 
 
 def ring(corners: int, power: float = 2.0) -> Array:

@@ -27,13 +27,13 @@ from motet.files import File, place_of, write_whole
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, rotmat_to_quat
 
-COARSER = (0.6, 0.3)
+COARSER = (0.6, 0.3, 0.22)
 """How much of the detail coarser bodies of people have."""
 
 SHORT = 32767
 """The largest int16."""
 
-SCOPE = "const {{ openStage, FIGURE_COLOURS }} = (() => {{\n{}\nreturn {{ openStage, FIGURE_COLOURS }};\n}})();"
+SCOPE = "const openStage = (() => {{\n{}\nreturn openStage;\n}})();"
 """What keeps the names of the stage's scripts apart from those of a page."""
 
 Captions = Sequence[tuple[float, str]]
@@ -101,8 +101,9 @@ def body_data(mesh: Mesh, rest: Array) -> dict[str, Any]:
     of people also coarser ones, each within the last, for shadows and for figures that are small."""
     found: dict[str, Any] = {"rest": np.round(rest, 5).tolist(), **_mesh_data(mesh)}
     if mesh is person():
-        middle, coarse = (_mesh_data(person(detail)) for detail in COARSER)
-        found["coarse"] = {**middle, "coarse": coarse}
+        within = found
+        for detail in COARSER:
+            within["coarse"] = within = _mesh_data(person(detail))
     return found
 
 

@@ -6,12 +6,12 @@ const THEMES = {
   dark: { fog: [30, 34, 42], sky: [18, 20, 26], light: [62, 68, 80], dark: [50, 55, 66], shade: 0.6, night: 1 },
 };
 /** From sharp to fast: at most how many pixels of the screen for one of the page, the size of the shadow map, how often it
- *  is looked at, up to how many pixels the middle and the coarse body are fine enough, how many figures cast a shadow, and
+ *  is looked at, up to how many pixels the coarser bodies are fine enough, how many figures cast a shadow, and
  *  whether bodies are lit at their corners alone. */
 const QUALITIES = [
-  { ratio: 2, map: 2048, taps: 8, sizes: [160, 50], casters: 100 }, { ratio: 1, map: 1024, taps: 8, sizes: [180, 60], casters: 100 },
-  { ratio: 1, map: 1024, taps: 2, sizes: [320, 120], casters: 16, quick: true }, { ratio: 0.8, map: 1024, taps: 2, sizes: [320, 110], casters: 12, quick: true },
-  { ratio: 0.65, map: 512, taps: 2, sizes: [400, 110], casters: 8, quick: true }, { ratio: 0.5, map: 512, taps: 1, sizes: [400, 110], casters: 6, quick: true },
+  { ratio: 2, map: 2048, taps: 8, sizes: [160, 50, 25], casters: 100 }, { ratio: 1, map: 1024, taps: 8, sizes: [180, 60, 30], casters: 100 },
+  { ratio: 1, map: 1024, taps: 2, sizes: [320, 120, 60], casters: 16, quick: true }, { ratio: 0.8, map: 1024, taps: 2, sizes: [320, 110, 60], casters: 12, quick: true },
+  { ratio: 0.65, map: 512, taps: 2, sizes: [400, 110, 70], casters: 8, quick: true }, { ratio: 0.5, map: 512, taps: 1, sizes: [400, 110, 70], casters: 6, quick: true },
 ];
 
 /** Vertex and fragment shaders. */
@@ -67,9 +67,8 @@ class Stage {
     const { gl } = this;
     if (body.simple) this.drop(body.simple);
     this.bodies.delete(body);
-    for (const { slots, triangles, paints, texture } of body.primitives) {
-      for (const { array } of slots) gl.deleteVertexArray(array);
-      for (const buffer of [...slots.map((slot) => slot.buffer), triangles, paints]) gl.deleteBuffer(buffer);
+    for (const { room, texture } of body.primitives) {
+      if (room) vacate(gl, room);
       gl.deleteTexture(texture ?? null);
     }
   }
@@ -123,40 +122,47 @@ class Stage {
     if (this.lost || gl.isContextLost()) return;
     const { x, y, width, height } = box ?? { x: 0, y: 0, width: canvas.clientWidth, height: canvas.clientHeight };
     const area = [x, canvas.height / ratio - y - height, width, height].map((part) => Math.round(part * ratio));
-    const theme = THEMES[isDark() ? "dark" : "light"], slots = this.pose(figures, camera);
-    const shared = { ...sharedBy(camera, width, height, theme), ...this.castShadows(slots, camera) };
+    const theme = THEMES[isDark() ? "dark" : "light"], { groups, casters } = this.pose(figures, camera);
+    const shared = { ...sharedBy(camera, width, height, theme), ...this.castShadows(groups, casters, camera) };
     gl.viewport(...area);
     gl.enable(gl.SCISSOR_TEST);
     gl.scissor(...area);
     gl.clear(gl.DEPTH_BUFFER_BIT);
     gl.activeTexture(gl.TEXTURE1);
     gl.bindTexture(gl.TEXTURE_2D, this.shadows.texture);
-    this.drawGround(shared, theme, height, slots);
+    this.drawGround(shared, theme, height, casters);
     this.drawMarks(shared, figures, strips, spots, theme);
-    this.drawFigures(slots.filter(({ shown }) => shown), shared);
+    this.drawFigures(groups, shared);
     gl.disable(gl.SCISSOR_TEST);
   }
 
-  /** Move the corners of figures: of each the mesh that is seen, if any is, the one that casts its shadow, if it is near,
-   *  and which of the body's slots it has. Near ones come first. */
+  /** Move the corners of figures: of each into the mesh that is seen, if any is, and into the one that casts its shadow,
+   *  if it is near. Each mesh is a group with figures, of which so many are only seen, and so many are only shadows. */
   pose(figures, camera) {
-    const taken = new Map(), { sizes, casters, quick } = this.level;
+    const { sizes, casters: most, quick } = this.level, groups = new Map(), casters = [];
     const far = ([x, , z]) => Math.hypot(x - camera.target[0], z - camera.target[2]);
     const placed = figures.map((figure) => ({ figure, root: rootOf(figure), away: far(rootOf(figure)) }));
-    return placed.sort((a, b) => a.away - b.away).map(({ figure, root, away }, order) => {
-      const { body } = figure, n = taken.get(body) ?? 0, size = project(camera, root).scale * this.ratio;
-      taken.set(body, n + 1);
+    const put = (mesh, kind, one) => groups.set(mesh, groups.get(mesh) ?? [[], [], []]).get(mesh)[kind].push(one);
+    placed.sort((a, b) => a.away - b.away).forEach(({ figure, root, away }, order) => {
+      const { body } = figure, size = project(camera, root).scale * this.ratio;
       const shown = inSight(camera, root) ? simpler(body, sizes.filter((least) => size < least).length) : null;
-      const cast = order < casters && away < CAST_REACH ? simpler(body, quick ? 2 : 1) : null;
-      const rows = rowsOf(figure);
-      for (const mesh of new Set([shown, cast])) if (mesh) moveCorners(this.gl, mesh, n, rows);
-      return { figure, root, shown, cast, n };
+      const cast = order < most && away < CAST_REACH ? simpler(body, quick ? 2 : 1) : null;
+      if (!shown && !cast) return;
+      const one = { figure, root, rows: rowsOf(figure) };
+      if (cast) casters.push(one);
+      if (shown) put(shown, shown === cast ? 1 : 0, one);
+      if (cast && cast !== shown) put(cast, 2, one);
     });
+    return { casters, groups: [...groups].map(([mesh, kinds]) => {
+      moveCorners(this.gl, mesh, kinds.flat());
+      const [seen, both, shadows] = kinds.map(({ length }) => length);
+      return { mesh, seen, shadows, count: seen + both + shadows };
+    }) };
   }
 
   /** The figures as the sun sees them; what the light is looked up with. */
-  castShadows(slots, camera) {
-    const { gl } = this, { map: size } = this.level, own = slots.filter(({ cast }) => cast), sees = sunBox(own, camera);
+  castShadows(groups, casters, camera) {
+    const { gl } = this, { map: size } = this.level, sees = sunBox(casters, camera);
     if (this.shadows?.size !== size) this.shadows = shadowMap(gl, size, this.shadows);
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.shadows.frame);
     gl.viewport(0, 0, size, size);
@@ -165,7 +171,7 @@ class Stage {
     gl.enable(gl.POLYGON_OFFSET_FILL);
     gl.polygonOffset(1.5, 3);
     use(gl, this.program("shadow"), { clip: sees.clip });
-    for (const { cast, n } of own) this.triangles(cast, n);
+    for (const { mesh, seen, count } of groups) this.triangles(mesh, seen, count);
     gl.disable(gl.POLYGON_OFFSET_FILL);
     gl.disable(gl.DEPTH_TEST);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
@@ -173,7 +179,7 @@ class Stage {
   }
 
   /** Sky and ground, and over it the shadows where they may lie: to look for them takes most of the time. */
-  drawGround(shared, theme, height, slots) {
+  drawGround(shared, theme, height, casters) {
     const { gl } = this, pixel = 2 * shared.tall / height / this.ratio;
     gl.bindVertexArray(null);
     use(gl, this.program("sky"), shared);
@@ -181,7 +187,7 @@ class Stage {
     const own = { light: rgb(theme.light), dark: rgb(theme.dark), sharp: 4 * shared.eye[1] / pixel / FINE };
     use(gl, this.program("ground"), { ...shared, ...own });
     gl.drawArrays(gl.TRIANGLES, 0, 6 * SECTORS * RINGS);
-    const boxes = slots.filter(({ cast }) => cast).flatMap(({ figure }) => shadeOf(figure));
+    const boxes = casters.flatMap(({ figure }) => shadeOf(figure));
     this.blended(() => {
       use(gl, this.program("shade"), { ...shared, shade: theme.shade, shadows: { int: 1 } });
       drawStream(gl, this.shades, covered(boxes));
@@ -213,23 +219,23 @@ class Stage {
     return this.level.quick ? { QUICK: 1, TAPS: shaded ? 1 : 0 } : {};
   }
 
-  drawFigures(slots, shared) {
+  drawFigures(groups, shared) {
     const { gl } = this;
     gl.enable(gl.DEPTH_TEST);
-    for (const { figure, shown, n } of slots) {
-      const defined = figure.body.primitives[0].textured ? { TEXTURED: 1 } : this.lit(shown !== simpler(figure.body, 2));
-      const program = this.program("body", defined);
+    for (const { mesh, shadows, count } of groups) {
+      if (shadows === count) continue;
+      const program = this.program("body", mesh.primitives[0].textured ? { TEXTURED: 1 } : this.lit(mesh.coarser < 2));
       use(gl, program, { ...shared, shadows: { int: 1 }, image: { int: 2 } });
-      gl.uniform3fv(program.places["palette[0]"] ?? null, paletteOf(figure));
-      this.triangles(shown, n, program.places);
+      gl.uniform3fv(program.places["palette[0]"] ?? null, PALETTE);
+      this.triangles(mesh, 0, count - shadows, program.places);
     }
     gl.disable(gl.DEPTH_TEST);
   }
 
-  /** A figure in its slots. places: of the uniforms that its materials have. */
-  triangles(body, n, places = {}) {
+  /** The figures of a mesh from one to another. places: of the uniforms that its materials have. */
+  triangles(mesh, from, to, places = {}) {
     const { gl } = this;
-    for (const { slots, indices, texture, colour = [1, 1, 1, 1], cut = 0, twoSided } of body.primitives) {
+    if (from < to) for (const { room, indices, texture, colour = [1, 1, 1, 1], cut = 0, twoSided } of mesh.primitives) {
       gl[twoSided ? "disable" : "enable"](gl.CULL_FACE);
       if (texture && places.factor) {
         gl.activeTexture(gl.TEXTURE2);
@@ -237,8 +243,8 @@ class Stage {
         gl.uniform4fv(places.factor, colour);
         gl.uniform1f(places.cut, cut);
       }
-      gl.bindVertexArray(slots[n].array);
-      gl.drawElements(gl.TRIANGLES, indices.length, gl.UNSIGNED_INT, 0);
+      gl.bindVertexArray(room.array);
+      gl.drawElements(gl.TRIANGLES, (to - from) * indices.length, gl.UNSIGNED_INT, 4 * from * indices.length);
     }
     gl.disable(gl.CULL_FACE);
   }

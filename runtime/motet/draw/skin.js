@@ -1,11 +1,14 @@
 // Bodies: meshes that joints carry. Corners are moved here, once for a picture and its shadow, not on the graphics card:
 // so a figure costs the same with and without one.
 
-const CLOTHES = { shirt: [112, 148, 190], trousers: [70, 78, 98], skin: [232, 200, 176], dark: [58, 52, 54] };
-const FIGURE_COLOURS = [
+const CLOTHES = { trousers: [70, 78, 98], skin: [232, 200, 176], dark: [58, 52, 54] };
+const SHIRTS = [
   [112, 148, 190], [196, 140, 120], [134, 168, 130], [170, 146, 190], [202, 172, 110], [110, 168, 172], [188, 128, 150],
   [142, 150, 166],
 ];
+/** The colours of a body's parts in their order, of which the first is the shirt; and of these and further shirts, from 0 to 1. */
+const PARTS = [SHIRTS[0], CLOTHES.trousers, CLOTHES.skin, COLOURS.left, COLOURS.right, CLOTHES.dark, COLOURS.middle];
+const PALETTE = [...PARTS, ...SHIRTS.slice(1)].flat().map((x) => x / 255);
 
 const CAST = `
 uniform mat4 clip;
@@ -49,7 +52,7 @@ vec3 shown(vec3 paint, vec3 at, vec3 normal, vec3 away, float clear) {
 const CORNERS = `
 uniform mat4 clip;
 uniform vec3 eye;
-uniform vec3 palette[7];
+uniform vec3 palette[${PALETTE.length / 3}];
 uniform float reach;
 layout(location = 0) in vec3 place;
 layout(location = 1) in vec3 normal;
@@ -96,26 +99,25 @@ void main() {
   ink = vec4(paint.rgb, 1);
 }`;
 
-/** The numbers of a body out of the page's data; see motet/draw/page.py. */
-function decodedBody({ rest, coarse, step, places, normals, joints, weights, parts, triangles }) {
+/** The numbers of a body out of the page's data, see motet/draw/page.py. coarser: how often it was made coarser. */
+function decodedBody({ rest, coarse, step, places, normals, joints, weights, parts, triangles }, coarser = 0) {
   const shares = new Uint8Array(bytesOf(weights)), part = new Uint8Array(bytesOf(parts));
   const primitive = {
     positions: Float32Array.from(new Int16Array(bytesOf(places)), (x) => x * step),
     normals: Float32Array.from(new Int8Array(bytesOf(normals))),
     joints: new Uint16Array(bytesOf(joints)), weights: Float32Array.from({ length: 2 * part.length }, (_, n) => (
       n % 2 ? 255 - shares[n >> 1] : shares[n >> 1]) / 255),
-    paint: Float32Array.from({ length: 2 * part.length }, (_, n) => (n % 2 ? 0 : part[n >> 1])),
-    indices: new Uint32Array(bytesOf(triangles)),
+    parts: part, indices: new Uint32Array(bytesOf(triangles)),
   };
-  const simple = coarse ? decodedBody({ rest, ...coarse }) : null;
-  return { rest, simple, sided: part.includes(3), joints: rest.length, influences: 2, primitives: [primitive] };
+  const simple = coarse ? decodedBody({ rest, ...coarse }, coarser + 1) : null;
+  return { rest, simple, coarser, sided: part.includes(3), joints: rest.length, influences: 2, primitives: [primitive] };
 }
 
 /** A skinned mesh that was handed over, as the stage has bodies. */
 function decodedAvatar({ primitives, inverseBind }) {
   const made = primitives.map((given) => ({
     ...given, normals: given.normals ?? normalsOf(given.positions, given.indices), textured: true,
-    paint: given.uvs ?? new Float32Array(2 * given.positions.length / 3),
+    uvs: given.uvs ?? new Float32Array(2 * given.positions.length / 3),
     colour: given.colour.map((x, n) => (n < 3 ? x ** (1 / 2.2) : x)), // glTF has it linear
   }));
   return { inverseBind, joints: inverseBind.length / 16, influences: 4, primitives: made };
@@ -132,65 +134,93 @@ function normalsOf(places, triangles) {
   return found;
 }
 
-/** What of a body lies on the graphics card and stays so: its images, its triangles and its colours. */
+/** What of a body lies on the graphics card and stays so: its images. There is room for figures once they come. */
 function upload(gl, body) {
   if (body.simple) upload(gl, body.simple);
   for (const primitive of body.primitives) {
-    primitive.slots = [];
-    primitive.triangles = bufferOf(gl, gl.ELEMENT_ARRAY_BUFFER, primitive.indices);
-    primitive.paints = bufferOf(gl, gl.ARRAY_BUFFER, primitive.paint);
+    primitive.room = null;
     if (primitive.textured) primitive.texture = textureOf(gl, primitive.image);
   }
 }
 
-/** Where the n-th figure's corners go: for each its place, 3 floats, and its normal, 3 bytes and one that is not used. */
-function slotOf(gl, primitive, n) {
-  return (primitive.slots[n] ??= (() => {
-    const floats = new Float32Array(4 * primitive.positions.length / 3), buffer = bufferOf(gl, gl.ARRAY_BUFFER, floats, gl.STREAM_DRAW);
-    const array = gl.createVertexArray();
-    gl.bindVertexArray(array);
-    gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
-    gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 16, 0);
-    gl.vertexAttribPointer(1, 3, gl.BYTE, true, 16, 12);
-    gl.bindBuffer(gl.ARRAY_BUFFER, primitive.paints);
-    gl.vertexAttribPointer(2, 2, gl.FLOAT, false, 0, 0);
-    for (let place = 0; place < 3; place++) gl.enableVertexAttribArray(place);
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, primitive.triangles);
-    gl.bindVertexArray(null);
-    return { array, buffer, floats, bytes: new Int8Array(floats.buffer) };
-  })());
+/** Room for so many figures or more, one after the other. Of each corner its place, 3 floats, its normal, 3 bytes, and
+ *  which colour it has, a byte. */
+function roomFor(gl, primitive, count) {
+  if (primitive.room?.count >= count) return primitive.room;
+  if (primitive.room) vacate(gl, primitive.room);
+  const { positions, indices, uvs } = primitive, size = 2 ** Math.ceil(Math.log2(count)), corners = positions.length / 3;
+  const floats = new Float32Array(4 * corners * size), array = gl.createVertexArray();
+  const buffers = [bufferOf(gl, gl.ARRAY_BUFFER, floats, gl.STREAM_DRAW), bufferOf(gl, gl.ELEMENT_ARRAY_BUFFER, repeated(indices, size, corners))];
+  if (uvs) buffers.push(bufferOf(gl, gl.ARRAY_BUFFER, repeated(uvs, size, 0)));
+  gl.bindVertexArray(array);
+  gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffers[1]);
+  gl.bindBuffer(gl.ARRAY_BUFFER, buffers[0]);
+  gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 16, 0);
+  gl.vertexAttribPointer(1, 3, gl.BYTE, true, 16, 12);
+  gl.vertexAttribPointer(2, 1, gl.UNSIGNED_BYTE, false, 16, 15);
+  if (uvs) gl.bindBuffer(gl.ARRAY_BUFFER, buffers[2]);
+  if (uvs) gl.vertexAttribPointer(2, 2, gl.FLOAT, false, 0, 0);
+  for (let place = 0; place < 3; place++) gl.enableVertexAttribArray(place);
+  gl.bindVertexArray(null);
+  return (primitive.room = { count: size, array, buffers, floats, bytes: new Int8Array(floats.buffer) });
 }
 
-/** The corners of a figure moved by its joints' matrices (3 x 4 each, by rows) into its slots. */
-function moveCorners(gl, body, n, rows) {
-  for (const primitive of body.primitives) {
-    const slot = slotOf(gl, primitive, n);
-    blend(primitive, rows, slot, body.influences);
-    gl.bindBuffer(gl.ARRAY_BUFFER, slot.buffer);
-    gl.bufferSubData(gl.ARRAY_BUFFER, 0, slot.floats);
+function vacate(gl, { array, buffers }) {
+  gl.deleteVertexArray(array);
+  for (const buffer of buffers) gl.deleteBuffer(buffer);
+}
+
+/** Numbers so many times over, each time with so much more. */
+function repeated(values, times, more) {
+  const found = new values.constructor(times * values.length);
+  for (let n = 0, at = 0; n < times; n++) for (const value of values) found[at++] = value + n * more;
+  return found;
+}
+
+/** Corners of figures moved by their joints' matrices (rows: 3 x 4 each, by rows) into a mesh's room. */
+function moveCorners(gl, mesh, figures) {
+  for (const primitive of mesh.primitives) {
+    const room = roomFor(gl, primitive, figures.length), floats = 4 * primitive.positions.length / 3;
+    figures.forEach(({ rows, figure }, n) => blend(primitive, rows, mesh.influences, room, n * floats, shirtOf(figure)));
+    gl.bindBuffer(gl.ARRAY_BUFFER, room.buffers[0]);
+    gl.bufferSubData(gl.ARRAY_BUFFER, 0, room.floats, 0, figures.length * floats);
   }
+}
+
+/** The colour of a figure's shirt in the palette. */
+function shirtOf({ shirt = 0 }) {
+  const own = shirt % SHIRTS.length;
+  return own && PARTS.length - 1 + own;
 }
 
 const mixed = new Float32Array(12);
 
-function blend({ positions, normals, joints, weights }, rows, { floats, bytes }, influences) {
-  for (let corner = 0, p = 0; p < positions.length; corner++, p += 3) {
-    mixed.fill(0);
-    for (let k = influences * corner; k < influences * (corner + 1); k++) {
-      const weight = weights[k], from = 12 * joints[k];
-      if (weight) for (let i = 0; i < 12; i++) mixed[i] += weight * rows[from + i];
-    }
-    const x = positions[p], y = positions[p + 1], z = positions[p + 2];
-    const a = normals[p], b = normals[p + 1], c = normals[p + 2];
-    const nx = mixed[0] * a + mixed[1] * b + mixed[2] * c, ny = mixed[4] * a + mixed[5] * b + mixed[6] * c;
-    const nz = mixed[8] * a + mixed[9] * b + mixed[10] * c, scale = 127 / Math.sqrt(nx * nx + ny * ny + nz * nz || 1);
-    floats[4 * corner] = mixed[0] * x + mixed[1] * y + mixed[2] * z + mixed[3];
-    floats[4 * corner + 1] = mixed[4] * x + mixed[5] * y + mixed[6] * z + mixed[7];
-    floats[4 * corner + 2] = mixed[8] * x + mixed[9] * y + mixed[10] * z + mixed[11];
-    bytes[16 * corner + 12] = nx * scale;
-    bytes[16 * corner + 13] = ny * scale;
-    bytes[16 * corner + 14] = nz * scale;
+/** to: where in the room a figure begins. shirt: its colour in the palette. */
+function blend({ positions, normals, joints, weights, parts }, rows, influences, { floats, bytes }, to, shirt) {
+  for (let p = 0, k = 0; p < positions.length; p += 3, k += influences, to += 4) {
+    let m = rows, i = 12 * joints[k];
+    if (weights[k] !== 1) [m, i] = [mix12(rows, joints, weights, k, influences), 0];
+    const x = positions[p], y = positions[p + 1], z = positions[p + 2], a = normals[p], b = normals[p + 1], c = normals[p + 2];
+    const nx = m[i] * a + m[i + 1] * b + m[i + 2] * c, ny = m[i + 4] * a + m[i + 5] * b + m[i + 6] * c;
+    const nz = m[i + 8] * a + m[i + 9] * b + m[i + 10] * c, scale = 127 / Math.sqrt(nx * nx + ny * ny + nz * nz || 1);
+    floats[to] = m[i] * x + m[i + 1] * y + m[i + 2] * z + m[i + 3];
+    floats[to + 1] = m[i + 4] * x + m[i + 5] * y + m[i + 6] * z + m[i + 7];
+    floats[to + 2] = m[i + 8] * x + m[i + 9] * y + m[i + 10] * z + m[i + 11];
+    bytes[4 * to + 12] = nx * scale;
+    bytes[4 * to + 13] = ny * scale;
+    bytes[4 * to + 14] = nz * scale;
+    if (parts) bytes[4 * to + 15] = parts[p / 3] || shirt;
   }
+}
+
+/** The matrix of a corner that several joints carry. */
+function mix12(rows, joints, weights, first, influences) {
+  mixed.fill(0);
+  for (let k = first; k < first + influences; k++) {
+    const weight = weights[k], from = 12 * joints[k];
+    if (weight) for (let i = 0; i < 12; i++) mixed[i] += weight * rows[from + i];
+  }
+  return mixed;
 }
 
 function textureOf(gl, image) {
@@ -209,12 +239,6 @@ function rowsOf(figure) {
   if (figure.matrices) matrixRows(rows, figure.body, figure);
   else poseRows(rows, figure.body, figure);
   return rows;
-}
-
-/** The colours of a body's parts, from 0 to 1, in their order. */
-function paletteOf({ colour = CLOTHES.shirt }) {
-  const { left, right, middle } = COLOURS;
-  return [colour, CLOTHES.trousers, CLOTHES.skin, left, right, CLOTHES.dark, middle].flat().map((x) => x / 255);
 }
 
 /** Turned, scaled and moved from where the joints rest: R S (x - rest) + place. */

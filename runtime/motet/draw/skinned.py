@@ -151,6 +151,6 @@ def _capsule(bone: Bone, rest: Array, end: int | None, corners: int = 10) -> Mes
     radii = np.repeat([bone.start_radius, bone.end_radius], 3)[:, None, None]
     places, triangles = loft(middles + radii * (np.cos(turns) * around + np.sin(turns) * axis))
     carriers = (bone.carriers[0], bone.carriers[1] if end is None else end)
-    rows = np.repeat(carriers, 3 * corners).tolist() + list(carriers)
+    rows = np.repeat(carriers, 3 * corners)
     joints = np.stack([rows, rows], axis=1)
     return Mesh(places, triangles, joints, np.tile([1.0, 0.0], (len(rows), 1)), np.full(len(rows), PARTS[bone.side]))

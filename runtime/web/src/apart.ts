@@ -21,6 +21,7 @@ export function keptApart(figure: Walker, others: readonly Walker[], room: numbe
     const [u, v] = [figure.velocity[0]! - other.velocity[0]!, figure.velocity[1]! - other.velocity[1]!];
     const soon = Math.min(Math.max(-(x * u + z * v) / Math.max(u * u + v * v, 1e-6), 0), SOON);
     const [nearX, nearZ] = [x + soon * u, z + soon * v];
+    if (nearX * nearX + nearZ * nearZ >= room * room) continue;
     const by = STRENGTH * Math.min(Math.max(1 - Math.hypot(nearX, nearZ) / room, 0), 1) * (1 - soon / SOON);
     // head on there is no way away from the other: to the right of the way there
     const [rightX, rightZ] = unit(z, -x);

@@ -41,8 +41,7 @@ export class Scene {
     if (!painter) throw new Error("it has no WebGL2");
     this.painter = painter;
     const own = painter.body(body);
-    const colours = stage.FIGURE_COLOURS;
-    this.looks = ({ turned, places }, n) => ({ body: own, turned, places, unit: 1 / height, ...(n ? { colour: colours[n % colours.length]! } : {}) });
+    this.looks = ({ turned, places }, n) => ({ body: own, turned, places, unit: 1 / height, shirt: n });
   }
 
   /** From now on the first figure is an avatar. */

@@ -12,14 +12,14 @@ export interface View {
 /** From where is looked; only the stage looks into it. */
 export type Camera = { readonly camera: unique symbol };
 
-/** What is drawn of a figure: a body of the stage, where its joints are, and their rotations, or matrices instead of both. unit: heights of one unit. */
+/** What is drawn of a figure: a body of the stage, where its joints are, and their rotations, or matrices instead of both. unit: heights of one unit. shirt: which colour it has; 0 is the usual one. */
 export interface Drawn {
   body: unknown;
   unit: number;
   turned?: Quaternion[];
   places: Vector[];
   matrices?: Float32Array;
-  colour?: readonly number[];
+  shirt?: number;
 }
 
 /** A strip on the ground, in heights. fade: towards its end; arrows: little heads along it. */
@@ -73,7 +73,6 @@ export interface Stage {
   view: View;
   FIRST_VIEW: View;
   COLOURS: Record<"left" | "right" | "middle", readonly number[]>;
-  FIGURE_COLOURS: (readonly number[])[];
   openStage(canvas: HTMLCanvasElement): Painter | null;
   cameraAt(target: Vector, heading: number, away: number, width: number, height: number): Camera;
   onGround(camera: Camera, x: number, y: number): readonly [x: number, z: number] | null;
