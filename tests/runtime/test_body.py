@@ -45,6 +45,31 @@ def test_the_body_stands_on_the_ground_around_its_joints():
     np.testing.assert_allclose(np.sort(places[:, 0]), np.sort(-places[:, 0]), atol=1e-12)  # both sides are alike
 
 
+@pytest.mark.parametrize("slope", [0, 20, 40])
+def test_shoulders_go_on_from_the_neck(slope):
+    """From the front the outline falls from neck to arm without a notch or a cliff, also if collar bones slope."""
+    mesh, names = human_mesh(), [joint.name for joint in HUMANOID.joints]
+    turns, places = np.tile(np.eye(3), (len(names), 1, 1)), T_POSE.copy()
+    for at, joint in enumerate(HUMANOID.joints):
+        angle = {"leftShoulder": -slope, "leftUpperArm": slope - 80}.get(joint.name, 0)
+        if joint.parent >= 0:
+            turns[at] = turns[joint.parent] @ turned_about_z(angle)
+            places[at] = places[joint.parent] + turns[joint.parent] @ (T_POSE[at] - T_POSE[joint.parent])
+    corners = mesh.carried(turns, places - np.einsum("jab,jb->ja", turns, T_POSE))
+    left = [names.index(name) for name in ("upperChest", "leftShoulder", "leftUpperArm")]
+    own = mesh.triangles[np.isin(mesh.joints[mesh.triangles], left).all(axis=(1, 2))]
+    shares = np.array([(a, b, 8 - a - b) for a in range(9) for b in range(9 - a)]) / 8
+    x, height, _ = np.einsum("pk,tki->itp", shares, corners[own]).reshape(3, -1)
+    outline = [height[(x > at) & (x < at + 0.01)].max() for at in np.arange(0.07, 0.2, 0.01)]
+    assert np.diff(outline).max() < 0.006
+    assert np.diff(outline).min() > -0.018
+
+
+def turned_about_z(degrees):
+    cos, sin = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]])
+
+
 def test_a_loft_of_a_square_is_a_box():
     flat = ring(4)
     rings = np.array([[[x, y, height] for x, y in flat] for height in (0.0, 3.0)])

@@ -1,7 +1,8 @@
 """The body that figures of people have in pages and pictures: one mesh on the humanoid, made here from its measures.
 
 Limbs, trunk, head, hands and shoes are lofts through rings; tables give each ring's place and half axes in metres, on
-the humanoid in its T-pose. Shoulders and hips begin with balls around their joints, which look alike however they turn.
+the humanoid in its T-pose. Shoulders and hips begin with balls around their joints, which look alike however they turn;
+a yoke lies between neck and shoulder.
 """
 
 from functools import cache
@@ -10,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.draw.mesh import Mesh, loft, ring, shared, together
+from motet.draw.mesh import Mesh, eased, loft, ring, shared, together
 from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, sided
 from motet.motion.rotations import Array
 
@@ -55,6 +56,13 @@ ARM = (
     (0.600, 0.037, 0.041), (0.650, 0.032, 0.037), (0.686, 0.031, 0.036), (0.688, 0.026, 0.030),
 )  # fmt: skip
 """Of each ring of the left arm its place along x, half its height and half its depth."""
+
+YOKE = (
+    (0.010, 0.024, 0.036, 0.028), (0.045, 0.034, 0.050, 0.026), (0.085, 0.040, 0.057, 0.021),
+    (0.120, 0.046, 0.059, 0.014), (0.150, 0.051, 0.056, 0.007), (0.175, 0.044, 0.046, 0.004),
+    (0.192, 0.024, 0.024, 0.002),
+)  # fmt: skip
+"""As of the hand, of what lies on the left collar bone, from the neck to the shoulder."""
 
 HAND = (
     (0.680, 0.018, 0.024, 0.000), (0.684, 0.024, 0.030, 0.000), (0.705, 0.023, 0.032, 0.000),
@@ -157,16 +165,15 @@ def _trunk(detail: float) -> Mesh:
     middle, depth = (rows[:, 2] - rows[:, 3]) / 2, (rows[:, 2] + rows[:, 3]) / 2
     rings = _flat(16, 2.4, (2, 0), np.stack([0 * middle, rows[:, 0], middle, depth, rows[:, 1]], axis=1), detail)
     chain = tuple((_index(name), height, 0.10) for name, height in
-                  (("hips", 0.0), ("spine", 1.07), ("chest", 1.19), ("upperChest", 1.31)))  # fmt: skip
+                  (("hips", 0.0), ("spine", 1.07), ("chest", 1.17), ("upperChest", 1.27)))  # fmt: skip
     mesh = _carried(rings, 1, chain, SHIRT)
     mesh.parts[mesh.places[:, 1] < BELT] = TROUSERS
-    # towards the shoulders, the collar bones carry a part of the chest
+    # towards the shoulders the collar bones carry more and more of the chest: recorded ones often slope by 40 degrees
     x, height = mesh.places[:, 0], mesh.places[:, 1]
-    part = 0.7 * np.clip((np.abs(x) - 0.06) / 0.1, 0, 1) * (height > 1.355)
+    part = eased((np.abs(x) - 0.03) / 0.10) * eased((height - 1.29) / 0.09)
     for side, sign in zip(LEFT_RIGHT, (1, -1), strict=True):
-        on_side = part * (sign * x > 0) > 0
-        mesh.joints[on_side, 1] = _index(sided(side, "Shoulder"))
-        mesh.joints[on_side, 0] = _index("upperChest")
+        on_side = (sign * x > 0) & (part > 0)
+        mesh.joints[on_side] = [_index("upperChest"), _index(sided(side, "Shoulder"))]
         mesh.weights[on_side] = np.stack([1 - part, part], axis=1)[on_side]
     return mesh
 
@@ -222,24 +229,30 @@ def _limbs(side: str, detail: float) -> list[Mesh]:
     """Arm, hand, thumb, leg and shoe of a side: of the right one mirrored."""
     joint = {
         part: _index(sided(side, part))
-        for part in ("UpperArm", "LowerArm", "Hand", "UpperLeg", "LowerLeg", "Foot", "Toes")
+        for part in ("Shoulder", "UpperArm", "LowerArm", "Hand", "UpperLeg", "LowerLeg", "Foot", "Toes")
     }
     own = LEFT_PART if side == "left" else RIGHT_PART
     arm = ((joint["UpperArm"], 0.0, 0.0), (joint["LowerArm"], 0.45, 0.07), (joint["Hand"], 0.70, 0.04))
     leg = ((joint["UpperLeg"], 0.0, 0.0), (joint["LowerLeg"], -0.50, 0.10), (joint["Foot"], -0.09, 0.05))
     x, tall, deep = np.array(ARM).T
     arms = _flat(10, 2.0, (1, 2), np.stack([x, 0 * x + ARM_Y, 0 * x, tall, deep], axis=1), detail)
-    x, tall, deep, up = np.array(HAND).T
-    hand = _flat(8, 2.5, (1, 2), np.stack([x, ARM_Y + up, 0 * x, tall, deep], axis=1), detail)
+    hand, yoke = _along_arm(8, 2.5, HAND, detail), _along_arm(10, 2.0, YOKE, detail)
     meshes = [
         _carried(arms, 0, arm, SHIRT),
         _carried(hand, 0, arm, own),
         _leg(leg, detail),
         _carried(_shoe(detail), 2, ((joint["Foot"], 0.0, 0.0), (joint["Toes"], 0.13, 0.05)), own),
     ]
+    if detail >= 0.3:
+        meshes.append(_carried(yoke, 0, ((joint["Shoulder"], 0.0, 0.0),), SHIRT))
     if detail >= 0.5:
         meshes.insert(2, _carried(_thumb(detail), 0, ((joint["Hand"], 0.0, 0.0),), own))
     return meshes if side == "left" else [_mirrored(mesh) for mesh in meshes]
+
+
+def _along_arm(corners: int, power: float, table: tuple[tuple[float, ...], ...], detail: float) -> Array:
+    x, tall, deep, up = np.array(table).T
+    return _flat(corners, power, (1, 2), np.stack([x, ARM_Y + up, 0 * x, tall, deep], axis=1), detail)
 
 
 def _leg(chain: tuple[tuple[int, float, float], ...], detail: float) -> Mesh:

@@ -85,8 +85,15 @@ def shared(at: Array, chain: Sequence[tuple[int, float, float]]) -> tuple[NDArra
     joints = np.full((len(at), 2), chain[0][0])
     weights = np.tile([1.0, 0.0], (len(at), 1))
     for (before, _, _), (joint, start, length) in pairwise(chain):
-        part = np.clip((at - start) / length + 0.5, 0.0, 1.0)
-        smooth, taken = part * part * (3 - 2 * part), part > 0
+        part = eased((at - start) / length + 0.5)
+        taken = part > 0
         joints[taken] = [before, joint]
-        weights[taken] = np.stack([1 - smooth, smooth], axis=1)[taken]
+        weights[taken] = np.stack([1 - part, part], axis=1)[taken]
     return joints, weights
+
+
+def eased(part: Array) -> Array:
+    """From 0 to 1 as a number goes from 0 to 1, slowly at both ends."""
+    within = np.clip(part, 0.0, 1.0)
+    found: Array = within * within * (3 - 2 * within)
+    return found
