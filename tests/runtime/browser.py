@@ -121,6 +121,16 @@ class Browser:
         """A "mousePressed", "mouseMoved" or "mouseReleased" of the left button."""
         self._call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
 
+    def phone(self, width: int, height: int) -> None:
+        """Be a phone with a screen of so many pixels, for the next pages."""
+        self._call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=True)
+        self._call("Emulation.setTouchEmulationEnabled", enabled=True, maxTouchPoints=2)
+
+    def touch(self, kind: str, *points: tuple[float, float]) -> None:
+        """A "touchStart" or "touchMove" of fingers at points, or a "touchEnd" of all of them."""
+        fingers = [{"x": x, "y": y, "id": n} for n, (x, y) in enumerate(points)]
+        self._call("Input.dispatchTouchEvent", type=kind, touchPoints=fingers)
+
     def coloured(self) -> list[float]:
         """How many pixels of the page, in the first canvas, have the colour of the left side, and of the right one."""
         found: list[float] = self.value(COLOURED)

@@ -1,4 +1,4 @@
-"""Who a live page reaches: by the keyboard, by a screen reader, with reduced motion, in two tabs; in Chromium."""
+"""Who a live page reaches: by keys, by fingers, by a screen reader, with reduced motion, in two tabs; in Chromium."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,6 +13,14 @@ from motet.models.steer import SteerModel
 
 PRESSED = "document.querySelector('#{}').ariaPressed"
 GONE = "(() => { for (let n = 0; n < 90; n++) motet.tick(motet.asked()); return motet.figures[0].root; })()"
+
+DRAWN = "new Promise((done) => setTimeout(() => requestAnimationFrame(() => requestAnimationFrame(done)), 100))"
+ROUND = "(({ x, y, width }) => [x, y, width])(document.querySelector('#stick').getBoundingClientRect())"
+BEYOND = """[...document.querySelectorAll("button, summary, #text")].filter((one) => {
+  const { left, right, bottom } = one.getBoundingClientRect();
+  return one.checkVisibility() && (left < 0 || right > innerWidth || bottom > innerHeight);
+}).map((one) => one.textContent)"""
+"""What is pressed and cannot be seen without scrolling."""
 
 
 @pytest.fixture(scope="module")
@@ -73,6 +81,41 @@ def test_all_that_is_pressed_can_have_the_focus_and_is_large(page: Browser) -> N
     })""")
     assert len(sizes) > 18
     assert [name for name, focused, height in sizes if not focused or height < 43.9] == []
+
+
+def test_fingers_do_all_on_a_phone_held_upright(file: Path, tmp_path: Path) -> None:
+    with Browser(tmp_path / "profile") as page:
+        page.phone(390, 844)
+        page.open(file, ready="window.motet?.hands.buttons[9]")
+        page.value("motet.state.pause = true, motet.pilot = null")
+        assert page.value(BEYOND) == []
+        x, y, wide = page.value(
+            "(({ x, y, width }) => [x, y, width])(document.querySelector('#stick').getBoundingClientRect())"
+        )
+        page.touch("touchStart", (x + wide / 2, y + wide / 2))
+        page.touch("touchMove", (x + wide / 2, y))
+        assert np.hypot(*page.value("motet.hands.pushed")) == pytest.approx(1, abs=0.02)
+        assert page.value("Math.hypot(motet.asked().x, motet.asked().z)") > 2
+        page.touch("touchEnd")
+        assert page.value("motet.hands.pushed") == [0, 0]
+        before = page.value("motet.view")
+        page.touch("touchStart", (150, 200))
+        page.touch("touchMove", (190, 200))
+        page.touch("touchEnd")
+        assert page.value("motet.view.yaw") == pytest.approx(before["yaw"] - 16)
+        page.touch("touchStart", (150, 200), (250, 200))
+        page.touch("touchMove", (150, 200), (300, 200))
+        page.touch("touchEnd")
+        assert page.value("motet.view.zoom") == pytest.approx(1.5 * before["zoom"])
+        assert page.value("motet.pilot") is None
+        page.value(DRAWN)
+        page.touch("touchStart", (250, 600))
+        page.touch("touchEnd")
+        goal = page.value("motet.pilot.goal")
+        for _ in range(5):
+            root = page.value(GONE)
+        assert np.hypot(*np.subtract(root[:2], goal)) < 0.3
+        assert page.errors == []
 
 
 def test_a_screen_reader_is_told_names_and_states(page: Browser) -> None:

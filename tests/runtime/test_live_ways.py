@@ -13,8 +13,10 @@ from browser import CHROMIUM, Browser
 from small_character import character, packed
 
 import motet
+from motet.draw.body import human_mesh
 from motet.models.steer import SteerModel
-from motet.motion.humanoid import HUMANOID
+from motet.motion.humanoid import HUMANOID, T_POSE
+from motet.motion.rotations import Array, quat_to_rotmat
 
 TICKS = "(() => {{ for (let n = 0; n < {}; n++) motet.tick(motet.asked()); return motet.figures[0].root; }})()"
 
@@ -44,6 +46,23 @@ SAVED = """(async () => {{
   return btoa(Array.from(bytes, (byte) => String.fromCharCode(byte)).join(""));
 }})()"""
 
+
+WORN = """(() => {
+  const pose = motet.figures[0].shown(1), { body, matrices } = motet.scene.looks(pose, 0), [part] = body.primitives;
+  const { positions: places, joints, weights } = part, { inverseBind: bind } = body;
+  const numbers = { matrices, bind, places, joints, weights };
+  const found = Object.fromEntries(Object.entries(numbers).map(([name, values]) => [name, [...values]]));
+  return { ...found, turned: pose.turned, at: pose.places };
+})()"""
+"""The numbers of an avatar and of the pose that it is in."""
+
+COLOURED = """(() => {
+  const { colours } = motet.scene.body;
+  const { primitives } = motet.scene.looks(motet.figures[0].shown(1), 0).body;
+  const same = (one, other) => one.every((x, n) => Math.abs(x / 255 - other[n]) < 1e-3);
+  return primitives.filter(({ colour }) => colours.some((own) => same(own, colour))).length;
+})()"""
+"""How many parts of an avatar have colours of the usual body."""
 
 BUSY = """(() => {
   const said = ["wave", "kick", "bow", "play the violin"], places = [];
@@ -255,6 +274,17 @@ def saved(page: Browser, kind: str) -> bytes:
     return base64.b64decode(page.value(SAVED.format(kind)))
 
 
+def worn_and_usual(page: Browser) -> tuple[Array, Array]:
+    """Where corners of the avatar are in metres, and those of motet's body in the same pose."""
+    found = {name: np.array(values) for name, values in page.value(WORN).items()}
+    matrices, bind = (np.swapaxes(found[name].reshape(-1, 4, 4), 1, 2) for name in ("matrices", "bind"))
+    rows = np.einsum("vk,vkij->vij", found["weights"].reshape(-1, 4), (matrices @ bind)[found["joints"].reshape(-1, 4)])
+    places = np.column_stack([found["places"].reshape(-1, 3), np.ones(len(rows))])
+    turns = quat_to_rotmat(found["turned"])
+    usual = human_mesh().carried(turns, found["at"] - np.einsum("jab,jb->ja", turns, T_POSE))
+    return np.einsum("vij,vj->vi", rows, places)[:, :3], usual
+
+
 def test_what_was_done_is_saved(page: Browser, tmp_path: Path) -> None:
     typed(page, "walk")
     ended: Any = page.value(TICKS.format(300))
@@ -263,6 +293,13 @@ def test_what_was_done_is_saved(page: Browser, tmp_path: Path) -> None:
     assert len(motion) == 8 * 30
     hips = [motion.values[-1, motion.channels.index(f"hips.t{axis}")] for axis in "xz"]
     np.testing.assert_allclose(hips, ended[:2], atol=0.15)  # hips sway beside the root
+    (tmp_path / "out.glb").write_bytes(saved(page, "glb"))
+    again = motet.read(tmp_path / "out.glb")
+    assert again.channels == motion.channels
+    np.testing.assert_allclose(again.values, motion.values, atol=1e-6)
+    assert "out.glb is who moves now" in dropped(page, "out.glb", (tmp_path / "out.glb").read_bytes())
+    np.testing.assert_allclose(*worn_and_usual(page), atol=2e-3)
+    assert page.value(COLOURED) > 5
     image = pytest.importorskip("PIL.Image", reason="the extra plot is not installed")
     with image.open(io.BytesIO(saved(page, "gif"))) as picture:
         assert (picture.size, picture.n_frames, picture.info["duration"]) == ((320, 320), 80, 100)

@@ -110,7 +110,7 @@ function decodedBody({ rest, coarse, step, places, normals, joints, weights, par
     parts: part, indices: new Uint32Array(bytesOf(triangles)),
   };
   const simple = coarse ? decodedBody({ rest, ...coarse }, coarser + 1) : null;
-  return { rest, simple, coarser, sided: part.includes(3), joints: rest.length, influences: 2, primitives: [primitive] };
+  return { rest, simple, coarser, colours: PARTS, sided: part.includes(3), joints: rest.length, influences: 2, primitives: [primitive] };
 }
 
 /** A skinned mesh that was handed over, as the stage has bodies. */

@@ -1,29 +1,43 @@
-/* Writing VRM Animation: docs/formats.md; a GLB file whose nodes are the humanoid in a T-pose. */
+/* Writing GLB files whose nodes are the humanoid in a T-pose: VRM Animation, docs/formats.md, and motions with a body. */
 import { MotionError } from "./errors.js";
 import { relaxed } from "./fingers.js";
 import { BONES, FINGERED, groundUnder, HUMANOID, solePoints } from "./humanoid.js";
 import { checked, type Motion, worldOf } from "./motion.js";
-import { minus, type Quaternion, STILL, type Vector } from "./rotations.js";
+import { minus, plus, type Quaternion, STILL, type Vector } from "./rotations.js";
 import { END, type Skeleton } from "./skeleton.js";
 import { onHumanoid } from "./retarget.js";
 
-const FLOAT = 5126;
+type Numbers = Float32Array | Uint32Array | Uint16Array;
+
+/** A surface that joints of the humanoid carry: of each corner its place in metres, normal, and four joints with weights. Parts have colours, linear. */
+export interface Surface {
+  positions: number[][];
+  normals: number[][];
+  joints: number[][];
+  weights: number[][];
+  parts: { colour: number[]; triangles: Uint32Array }[];
+}
 
 class Buffer {
-  private readonly parts: Float32Array[] = [];
+  private readonly parts: Numbers[] = [];
   private length = 0;
   readonly bufferViews: object[] = [];
   readonly accessors: object[] = [];
 
   /** The index of a new accessor of rows of numbers. */
   add(rows: number[][], bounded = false): number {
-    const width = rows[0]!.length;
     const data = Float32Array.from(rows.flat());
     if (!data.every(Number.isFinite)) throw new MotionError("values of this motion exceed glTF's 32-bit numbers");
+    const of = (end: (...values: number[]) => number) => rows[0]!.map((_, at) => Math.fround(rows.map((row) => row[at]!).reduce((a, b) => end(a, b))));
+    return this.put(data, rows[0]!.length, bounded ? { min: of(Math.min), max: of(Math.max) } : {});
+  }
+
+  /** The same of numbers in rows of a width; the length of all of them in bytes is a multiple of four. */
+  put(data: Numbers, width: number, more: object = {}): number {
     this.bufferViews.push({ buffer: 0, byteOffset: this.length, byteLength: data.byteLength });
-    const bounds = bounded ? { min: [data.at(0)!], max: [data.at(-1)!] } : {};
-    const type = { 1: "SCALAR", 3: "VEC3", 4: "VEC4" }[width];
-    this.accessors.push({ bufferView: this.bufferViews.length - 1, componentType: FLOAT, count: rows.length, type, ...bounds });
+    const componentType = data instanceof Float32Array ? 5126 : data instanceof Uint32Array ? 5125 : 5123;
+    const type = { 1: "SCALAR", 3: "VEC3", 4: "VEC4", 16: "MAT4" }[width];
+    this.accessors.push({ bufferView: this.bufferViews.length - 1, componentType, count: data.length / width, type, ...more });
     this.parts.push(data);
     this.length += data.byteLength;
     return this.accessors.length - 1;
@@ -34,24 +48,54 @@ class Buffer {
   }
 
   bytes(): Uint8Array {
-    return new Uint8Array(Float32Array.from(this.parts.flatMap((part) => Array.from(part))).buffer);
+    const found = new Uint8Array(this.length);
+    let at = 0;
+    for (const { buffer, byteLength } of this.parts) {
+      found.set(new Uint8Array(buffer), at);
+      at += byteLength;
+    }
+    return found;
   }
 }
 
 /** The bytes of a .vrma file of a motion, which is brought to the humanoid; a VRM avatar of any proportions plays it. */
 export function toVRMA(motion: Motion): Uint8Array {
-  const found = grounded(onHumanoid(checked(motion)));
-  const buffer = new Buffer();
   const names = [...BONES, ...FINGERED.names.slice(HUMANOID.names.length)];
   const humanBones = Object.fromEntries(names.map((name) => [name, { node: FINGERED.index(name) }]));
-  const document = {
-    asset: { version: "2.0", generator: "motet" },
+  return fileOf(motion, new Buffer(), {
     extensionsUsed: ["VRMC_vrm_animation"],
     extensions: { VRMC_vrm_animation: { specVersion: "1.0", humanoid: { humanBones } } },
+  });
+}
+
+/** The bytes of a .glb file of a motion, which is brought to the humanoid, and of a surface that moves with it. */
+export function toGLB(motion: Motion, { positions, normals, joints, weights, parts }: Surface): Uint8Array {
+  const buffer = new Buffer();
+  const attributes = {
+    POSITION: buffer.add(positions, true), NORMAL: buffer.add(normals),
+    JOINTS_0: buffer.put(Uint16Array.from(joints.flat()), 4), WEIGHTS_0: buffer.add(weights),
+  };
+  const inverseBindMatrices = buffer.add(FINGERED.rest.map((place) => {
+    const [x, y, z] = plus(place, FINGERED.joints[0]!.offset);
+    return [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -x, -y, -z, 1];
+  }));
+  return fileOf(motion, buffer, {
+    skins: [{ joints: FINGERED.names.map((_, at) => at), skeleton: 0, inverseBindMatrices }],
+    meshes: [{ name: "body", primitives: parts.map(({ triangles }, material) => ({ attributes, indices: buffer.put(triangles, 1), material })) }],
+    materials: parts.map(({ colour }) => ({ pbrMetallicRoughness: { baseColorFactor: [...colour, 1], metallicFactor: 0, roughnessFactor: 0.8 } })),
+  }, [{ name: "body", mesh: 0, skin: 0 }]);
+}
+
+/** bodies: nodes beside the humanoid's. */
+function fileOf(motion: Motion, buffer: Buffer, more: object, bodies: object[] = []): Uint8Array {
+  const joints = nodesOf(FINGERED);
+  const document = {
+    asset: { version: "2.0", generator: "motet" },
+    ...more,
     scene: 0,
-    scenes: [{ nodes: [0] }],
-    nodes: nodesOf(FINGERED),
-    animations: [animation(buffer, found)],
+    scenes: [{ nodes: [0, ...bodies.map((_, at) => joints.length + at)] }],
+    nodes: [...joints, ...bodies],
+    animations: [animation(buffer, grounded(onHumanoid(checked(motion))))],
     ...buffer.document(),
   };
   return container(document, buffer.bytes());

@@ -12,7 +12,7 @@ const CROWDS = [0, 1, 2, 3, 4, 7, 11, 19, 29, 49];
 const [STILL, SHORT] = [6, 400];
 
 /** What a file is handed over as. */
-const KINDS: Record<string, string> = { vrma: "model/gltf-binary", gif: "image/gif" };
+const KINDS: Record<string, string> = { glb: "model/gltf-binary", vrma: "model/gltf-binary", gif: "image/gif" };
 
 export function addControls(page: Page, most: number): void {
   addGaits(page);

@@ -1,5 +1,5 @@
 /* The last seconds of the steered figure as a file. */
-import { toVRMA } from "../glbWrite.js";
+import { type Surface, toGLB, toVRMA } from "../glbWrite.js";
 import type { Played } from "../steering.js";
 import { motionOf, shownOf } from "./figure.js";
 import { toGIF } from "./gif.js";
@@ -29,7 +29,9 @@ export class Recorder {
 
   /** The bytes of a file of that kind. */
   file(kind: string): Uint8Array<ArrayBuffer> {
-    return kind === "gif" ? this.gif() : (toVRMA(motionOf(this.poses, this.fps)) as Uint8Array<ArrayBuffer>);
+    if (kind === "gif") return this.gif();
+    const motion = motionOf(this.poses, this.fps);
+    return (kind === "glb" ? toGLB(motion, surfaceOf(this.scene)) : toVRMA(motion)) as Uint8Array<ArrayBuffer>;
   }
 
   private gif(): Uint8Array<ArrayBuffer> {
@@ -47,6 +49,22 @@ export class Recorder {
     });
     return toGIF(pictures, SIZE, SIZE, (100 * EVERY) / this.fps);
   }
+}
+
+/** The usual body in metres, its colours linear, as glTF has them. */
+function surfaceOf({ body: { primitives: [{ positions, normals, joints, weights, parts, indices }], colours }, height }: Scene): Surface {
+  const rows = (values: ArrayLike<number>, width: number) => Array.from(parts, (_, at) => Array.from({ length: width }, (_, i) => values[width * at + i]!));
+  const size = (row: number[]) => Math.hypot(...row);
+  return {
+    positions: rows(positions, 3).map((row) => row.map((x) => x * height)),
+    normals: rows(normals, 3).map((row) => row.map((x) => x / size(row))),
+    joints: rows(joints, 2).map((row) => [...row, 0, 0]),
+    weights: rows(weights, 2).map((row) => [...row, 0, 0]),
+    parts: colours.flatMap((colour, part) => {
+      const triangles = indices.filter((_, at) => parts[indices[at - (at % 3)]!] === part);
+      return triangles.length ? [{ colour: colour.map((x) => (x / 255) ** 2.2), triangles }] : [];
+    }),
+  };
 }
 
 /** Hand a file to the browser's downloads. */

@@ -3,7 +3,7 @@ import { SIDES } from "../humanoid.js";
 import type { Vector } from "../rotations.js";
 import { FEET, type Figure, type Shown } from "./figure.js";
 import type { Avatar } from "./avatar.js";
-import type { Camera, Drawn, Painter, Spot, Stage, Strip } from "./stage.js";
+import type { Body, Camera, Drawn, Painter, Spot, Stage, Strip } from "./stage.js";
 
 /** What a figure looks like: what is drawn of it in a pose. */
 type Looks = (shown: Shown, n: number) => Drawn;
@@ -23,6 +23,8 @@ export interface Shows {
 
 export class Scene {
   readonly painter: Painter;
+  /** The usual one. */
+  readonly body: Body;
   private camera: Camera | null = null;
   private target: Vector | null = null;
   private readonly trails = new WeakMap<Figure, [x: number, z: number][]>();
@@ -35,12 +37,12 @@ export class Scene {
     private readonly stage: Stage,
     canvas: HTMLCanvasElement,
     body: unknown,
-    private readonly height: number,
+    readonly height: number,
   ) {
     const painter = stage.openStage(canvas);
     if (!painter) throw new Error("it has no WebGL2");
     this.painter = painter;
-    const own = painter.body(body);
+    const own = (this.body = painter.body(body));
     this.looks = ({ turned, places }, n) => ({ body: own, turned, places, unit: 1 / height, shirt: n });
   }
 

@@ -55,6 +55,13 @@ export interface Primitive {
   twoSided: boolean;
 }
 
+/** A body of people as the stage has it: numbers of its corners, in heights, one corner after the other, on two joints each. */
+export interface Body {
+  primitives: [{ positions: Float32Array; normals: Float32Array; joints: Uint16Array; weights: Float32Array; parts: Uint8Array; indices: Uint32Array }];
+  /** Of each part, 0 to 255. */
+  colours: readonly (readonly number[])[];
+}
+
 export interface Mesh {
   primitives: Primitive[];
   inverseBind: Float32Array;
@@ -62,7 +69,7 @@ export interface Mesh {
 
 /** Draws on one canvas. */
 export interface Painter {
-  body(given: unknown): unknown;
+  body(given: unknown): Body;
   avatar(mesh: Mesh): unknown;
   drop(body: unknown): void;
   begin(still: boolean): { width: number; height: number };
