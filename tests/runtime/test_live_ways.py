@@ -259,6 +259,9 @@ def test_a_dropped_avatar_is_who_moves(page: Browser, tmp_path: Path) -> None:
     [
         ("notes.txt", b"hello", "notes.txt cannot be used: it is neither a motion"),
         ("cut.bvh", b"HIERARCHY\nROOT a\n{\n", "cut.bvh cannot be used: not a BVH file, or cut short"),
+        ("dog.bvh", b"HIERARCHY\nROOT dog\n{\nOFFSET 0 0 0\nCHANNELS 3 Xrotation Yrotation Zrotation\n"
+            b"End Site\n{\nOFFSET 0 1 0\n}\n}\n"
+            b"MOTION\nFrames: 3\nFrame Time: 0.1\n" + 3 * b"0 0 0\n", "only human figures move here"),
         ("cut.glb", b"glTF\2\0\0\0\0\0\0\0", "cut.glb cannot be used: cut short"),
         ("no.vrm", json.dumps({"asset": {"version": "2.0"}, "meshes": [{"primitives": []}], "nodes": [{"mesh": 0}],
             "extensions": {"VRMC_vrm": {"humanoid": {"humanBones": {}}}}}).encode(), "this VRM file has no humanoid"),

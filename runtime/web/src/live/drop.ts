@@ -27,7 +27,8 @@ export async function dropped(file: File, fps: number): Promise<Dropped> {
     return await opened(file.name, new Uint8Array(await file.arrayBuffer()), fps);
   } catch (error) {
     if (!(error instanceof FormatError || error instanceof MotionError)) throw error;
-    throw new Error(`${file.name} cannot be used: ${error.message}`, { cause: error });
+    const why = error.message.replace(/[:;] give a map of bones and joints$/, ", and only human figures move here");
+    throw new Error(`${file.name} cannot be used: ${why}`, { cause: error });
   }
 }
 
