@@ -38,13 +38,14 @@ export class Recorder {
     const small = new OffscreenCanvas(SIZE, SIZE);
     const ink = small.getContext("2d", { willReadFrequently: true })!;
     ink.fillStyle = getComputedStyle(document.documentElement).getPropertyValue("--back");
-    const side = Math.min(this.canvas.width, this.canvas.height);
-    const [x, y] = [(this.canvas.width - side) / 2, (this.canvas.height - side) / 2];
     const poses = this.poses.filter((_, at) => at % EVERY === 0);
+    this.scene.cut();
     const pictures = poses.map((pose) => {
       this.scene.draw([shownOf(pose)], EVERY / this.fps, [], undefined, { trails: false, contacts: false, pause: true });
+      const { width, height } = this.canvas; // which are those of a sharp picture now
+      const side = Math.min(width, height);
       ink.fillRect(0, 0, SIZE, SIZE);
-      ink.drawImage(this.canvas, x, y, side, side, 0, 0, SIZE, SIZE);
+      ink.drawImage(this.canvas, (width - side) / 2, (height - side) / 2, side, side, 0, 0, SIZE, SIZE);
       return ink.getImageData(0, 0, SIZE, SIZE).data;
     });
     return toGIF(pictures, SIZE, SIZE, (100 * EVERY) / this.fps);

@@ -75,6 +75,11 @@ export class Scene {
     this.painter.draw(this.camera, { figures: poses.map((pose, n) => this.looks(pose, n)), strips: ways, spots });
   }
 
+  /** Let the camera be at once where it would come to. */
+  cut(): void {
+    this.target = null;
+  }
+
   /** x and z in metres where a pixel of the canvas shows the ground. */
   groundAt(x: number, y: number): [x: number, z: number] | null {
     const found = this.camera && this.stage.onGround(this.camera, x, y);
