@@ -1,14 +1,17 @@
 """A bundle as the training run that it came from: every weight is found again, whatever the exporter made of it."""
 
+import re
 from pathlib import Path
+from typing import Any
 
+import onnx
 import pytest
 import torch
 from test_codes_export import run
 
 from motet.bundle.bundle import Bundle
 from motet_export.bundles import export_run, parity_of
-from motet_export.exporter import ExportError, round_weights
+from motet_export.exporter import ExportError, export_graph, round_weights
 from motet_export.restored import restored
 
 NEW = ("writer.masked", "num_batches_tracked")
@@ -40,3 +43,32 @@ def test_8_bit_weights_are_not_those_that_were_trained(tmp_path: Path) -> None:
     export_run(run(), tmp_path / "codes.zip", int8=True)
     with pytest.raises(ExportError, match="8-bit weights"):
         restored(Bundle.open(tmp_path / "codes.zip"))
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_weights_that_are_numbered_otherwise_are_found_by_their_order(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, swapped: bool
+) -> None:
+    """As those of a net whose graph has changed since; in another order, what is found does not compute the same."""
+    export_run(run(), tmp_path / "codes.zip")
+    bundle = Bundle.open(tmp_path / "codes.zip")
+    expected = restored(bundle).model.state_dict()
+
+    def otherwise(*given: Any) -> bytes:
+        model = onnx.load_from_string(export_graph(*given))
+        tensors = [*model.graph.initializer][:: -1 if swapped else 1]
+        del model.graph.initializer[:]
+        for tensor in tensors:
+            tensor.name = re.sub(r"^val_", "other_", tensor.name)
+            model.graph.initializer.append(tensor)
+        return bytes(model.SerializeToString())
+
+    monkeypatch.setattr("motet_export.restored.export_graph", otherwise)
+    if swapped:
+        with pytest.raises(ExportError, match="golden vectors"):
+            restored(bundle)
+        return
+    found = restored(bundle).model.state_dict()
+    for name, value in expected.items():
+        if not name.endswith(NEW):
+            torch.testing.assert_close(found[name], value, rtol=0, atol=0, msg=name)
