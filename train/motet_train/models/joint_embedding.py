@@ -147,23 +147,29 @@ def contrast(scores: Tensor, groups: Tensor) -> Tensor:
 
 def of_frames(x: Tensor, lengths: Tensor) -> Tensor:
     """Frames (B, T, C) of lengths (B,) to mean, deviation, least and greatest, and the means of parts: (B, 7 C)."""
-    active, count = before(lengths, x.shape[1])[..., None], lengths[:, None]
-    mean = torch.where(active, x, 0.0).sum(dim=1) / count
-    square = torch.where(active, (x - mean[:, None]).square(), 0.0).sum(dim=1) / count
-    least, most = torch.where(active, x, torch.inf).amin(dim=1), torch.where(active, x, -torch.inf).amax(dim=1)
-    place, parts = 3 * torch.arange(x.shape[1], device=x.device) // count, []
-    for third in range(3):  # sitting down is not standing up
-        chosen = place == third
-        frames = chosen.sum(dim=1)[:, None]
-        total = torch.where(chosen[..., None], x, 0.0).sum(dim=1)
-        parts.append(torch.where(frames > 0, total / frames.clamp(min=1), mean))
-    return torch.cat([mean, (square + SMALLEST**2).sqrt(), least, most, *parts], dim=1)
+    active, count = before(lengths, x.shape[1]), lengths[:, None]
+    # sitting down is not standing up
+    place, thirds = (
+        3 * torch.arange(x.shape[1], device=x.device),
+        count[..., None] * torch.arange(3, device=x.device)[:, None],
+    )
+    parts = ((place >= thirds) & (place < thirds + count[..., None])).float()
+    sums, sizes = parts @ x, parts.sum(dim=2, keepdim=True)
+    mean = sums.sum(dim=1) / count
+    square = _sum((x - mean[:, None]).square(), active) / count
+    shown = torch.where(active[..., None], x, x[:, :1])
+    means = torch.where(sizes > 0, sums / sizes.clamp(min=1), mean[:, None]).flatten(1)
+    return torch.cat([mean, (square + SMALLEST**2).sqrt(), shown.amin(dim=1), shown.amax(dim=1), means], dim=1)
 
 
 def of_speeds(places: Tensor, lengths: Tensor) -> Tensor:
     """Places (B, T, 3 J) of joints to roots of their mean and greatest speeds (B, 2 J), per frame."""
     steps = torch.diff(places, dim=1, prepend=places[:, :1]).reshape(*places.shape[:2], -1, 3)
-    speed = torch.where(
-        before(lengths, places.shape[1])[..., None], (steps.square().sum(dim=-1) + SMALLEST**2).sqrt(), 0.0
-    )
-    return torch.cat([speed.sum(dim=1) / lengths[:, None], speed.amax(dim=1)], dim=1).sqrt()
+    active = before(lengths, places.shape[1])
+    speed = torch.where(active[..., None], (steps.square().sum(dim=-1) + SMALLEST**2).sqrt(), 0.0)
+    return torch.cat([_sum(speed, active) / lengths[:, None], speed.amax(dim=1)], dim=1).sqrt()
+
+
+def _sum(x: Tensor, active: Tensor) -> Tensor:
+    """Sums (B, C) of the active frames (B, T) of x (B, T, C), which is finite: a product, faster than a reduction."""
+    return (active[:, None].float() @ x)[:, 0]

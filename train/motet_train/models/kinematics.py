@@ -15,33 +15,44 @@ from motet.motion.humanoid import LEFT_RIGHT, sided
 from motet.motion.kinematics import AXES
 from motet.motion.skeleton import END_SUFFIX
 from motet.representation.contract import MotionContract
-from motet.representation.root_block import ROOT_BLOCK, VECTOR_KINDS, joints_of
+from motet.representation.root_block import ROOT_BLOCK, VECTOR_KINDS
 from motet.representation.root_sixd import SIXD_KINDS
 
 
-def forward_kinematics(
-    parents: Sequence[int], offsets: Tensor, root: tuple[Tensor, Tensor], local: Tensor, bones: Sequence[int]
-) -> Tensor:
-    """Places (..., J, 3) of joints, all those of one depth at once.
+def forward_kinematics(parents: Sequence[int], offsets: Tensor, local: Tensor, bones: Sequence[int]) -> Tensor:
+    """Places (N, J, 3) from the root of the joints of N poses, all those of one depth at once.
 
-    parents: each joint's, before it; -1 for the root. offsets: (J, 3) from the parents. root: its place (..., 3) and
-    rotation (..., 3, 3). local: rotations (..., K, 3, 3) of ``bones``; all other joints turn with their parents.
+    parents: each joint's, before it; -1 for the root. offsets: (J, 3) from the parents. local: rotations (3, 3, K, N)
+    of ``bones``, among them all joints that have children; that of the root, the first, is in the world.
     """
-    places, turned = [root[0]] * len(parents), [root[1]] * len(parents)
-    at = {joint: row for row, joint in enumerate(bones)}
-    level = [joint for joint, parent in enumerate(parents) if parent == 0]
-    while level:
-        above = torch.stack([turned[parents[joint]] for joint in level], dim=-3)
-        moved = (above @ offsets[level][..., None])[..., 0]
-        known = [joint for joint in level if joint in at]
-        rows = [level.index(joint) for joint in known]
-        new = above[..., rows, :, :] @ local[..., [at[joint] for joint in known], :, :]
-        for row, joint in enumerate(level):
-            places[joint], turned[joint] = places[parents[joint]] + moved[..., row, :], above[..., row, :, :]
-        for row, joint in enumerate(known):
-            turned[joint] = new[..., row, :, :]
-        level = [joint for joint, parent in enumerate(parents) if parent in level]
-    return torch.stack(places, dim=-2)
+    level, turned, place = [0], local[:, :, :1], local.new_zeros(3, 1, 1, local.shape[-1])
+    joints, places = [0], [place]
+    while inner := [joint for joint in level if joint in parents]:
+        if inner != [0]:
+            rows = [level.index(joint) for joint in inner]
+            turned = product(_at(turned, rows), _at(local, [bones.index(joint) for joint in inner]))
+            place = _at(place, rows)
+        level = [joint for joint, parent in enumerate(parents) if parent in inner]
+        rows = [inner.index(parents[joint]) for joint in level]
+        turned = _at(turned, rows)
+        place = _at(place, rows) + product(turned, offsets[level].T[:, None, :, None])
+        joints, places = joints + level, [*places, place]
+    rows = [joints.index(joint) + axis * len(joints) for joint in range(len(joints)) for axis in range(3)]
+    return torch.unflatten(_at(torch.cat(places, dim=2).flatten(0, 2), rows, dim=0).T, 1, (-1, 3))
+
+
+def _at(x: Tensor, rows: Sequence[int], dim: int = 2) -> Tensor:
+    """Some rows of an axis: exported as one Gather, or none where it would be all of them."""
+    return x if [*rows] == [*range(x.shape[dim])] else x.index_select(dim, torch.tensor(rows, device=x.device))
+
+
+def product(one: Tensor, other: Tensor) -> Tensor:
+    """Matrices (3, 3, ...) times matrices (3, M, ...): sums of elementwise products, each of long rows.
+
+    ONNX Runtime and torch multiply thousands of small matrices one by one.
+    """
+    columns, rows = torch.split(one, 1, dim=1), torch.split(other, 1, dim=0)
+    return columns[0] * rows[0] + columns[1] * rows[1] + columns[2] * rows[2]
 
 
 @dataclass(frozen=True)
@@ -77,17 +88,19 @@ class SixdPlaces(nn.Module):
 
     def forward(self, sixd: Tensor) -> Tensor:
         """Axes (..., 6 K) of the K bones to places (..., J, 3) in metres from the root, in the frame of the facing."""
-        local = axes_to_rotmat(sixd.reshape(*sixd.shape[:-1], len(self.bones), len(SIXD_KINDS)))
-        root = sixd.new_zeros(*local.shape[:-3], 3), local[..., 0, :, :]
-        return forward_kinematics(self.parents, self.offsets, root, local, self.bones)
+        axes = torch.unflatten(sixd.reshape(-1, sixd.shape[-1]).T, 0, (-1, len(SIXD_KINDS))).transpose(0, 1)
+        found = forward_kinematics(self.parents, self.offsets, axes_to_rotmat(axes), self.bones)
+        return found.reshape(*sixd.shape[:-1], len(self.parents), 3)
 
 
 def axes_to_rotmat(axes: Tensor) -> Tensor:
-    """Two axes (..., 6) to matrices (..., 3, 3), as :func:`motet.representation.root_sixd.sixd_to_rotmat`."""
-    x = functional.normalize(axes[..., :3], dim=-1, eps=1e-6)
-    y = axes[..., 3:]
-    y = functional.normalize(y - (x * y).sum(-1, keepdim=True) * x, dim=-1, eps=1e-6)
-    return torch.stack([x, y, torch.linalg.cross(x, y)], dim=-1)
+    """Two axes (6, ...) to matrices (3, 3, ...), as :func:`motet.representation.root_sixd.sixd_to_rotmat`."""
+    x = functional.normalize(axes[:3], dim=0, eps=1e-6)
+    y = axes[3:]
+    y = functional.normalize(y - (x * y).sum(0) * x, dim=0, eps=1e-6)
+    # torch.linalg.cross is exported as gathers of single numbers
+    onward, back = ([_at(axis, rows, dim=0) for axis in (x, y)] for rows in ([1, 2, 0], [2, 0, 1]))
+    return torch.stack([x, y, onward[0] * back[1] - back[0] * onward[1]], dim=1)
 
 
 class VectorPlaces(nn.Module):
@@ -105,11 +118,11 @@ class VectorPlaces(nn.Module):
         kept = [i for i, joint in enumerate(skeleton.joints) if not joint.name.endswith(END_SUFFIX)]
         self.parents = [kept.index(skeleton.joints[i].parent) if i else -1 for i in kept]
         self.register_buffer("offsets", torch.tensor([skeleton.joints[i].offset for i in kept]), persistent=False)
-        channels, joints = list(contract.channels), joints_of(contract.channels)
-        self.root = [channels.index(name) for name in ROOT_BLOCK]
-        self.vectors = [channels.index(f"{joint}.{kind}") for joint in joints for kind in VECTOR_KINDS]
-        names = [skeleton.names[i] for i in kept]
-        self.bones = [names.index(joint) for joint in joints]
+        at = {name: column for column, name in enumerate(contract.channels)}
+        self.root = [at[name] for name in ROOT_BLOCK]
+        # joints without a vector turn with their parents: they see a column of zeros
+        names = [f"{skeleton.names[i]}.{kind}" for i in kept[1:] for kind in VECTOR_KINDS]
+        self.vectors = [at.get(name, len(at)) for name in names]
         self.fps = contract.fps
 
     def forward(self, frames: Tensor) -> Tensor:
@@ -120,14 +133,15 @@ class VectorPlaces(nn.Module):
         sin, cos = before.sin(), before.cos()
         x = (root[..., 0] * sin + root[..., 1] * cos).cumsum(1) / self.fps
         z = (root[..., 0] * cos - root[..., 1] * sin).cumsum(1) / self.fps
-        turned = _turn(facing, 1) @ _turn(root[..., 4], 0) @ _turn(root[..., 5], 2)
-        place = torch.stack([x, root[..., 3], z], dim=-1)
-        local = rotvec_to_rotmat(frames[..., self.vectors].reshape(*frames.shape[:-1], -1, 3))
-        return forward_kinematics(self.parents, self.offsets, (place, turned), local, self.bones)
+        turned = product(product(_turn(facing, 1), _turn(root[..., 4], 0)), _turn(root[..., 5], 2))
+        vectors = functional.pad(frames, (0, 1))[..., self.vectors].reshape(-1, len(self.parents) - 1, 3)
+        local = torch.cat([turned.reshape(3, 3, 1, -1), rotvec_to_rotmat(vectors.permute(2, 1, 0))], dim=2)
+        found = forward_kinematics(self.parents, self.offsets, local, range(len(self.parents)))
+        return found.reshape(*frames.shape[:-1], -1, 3) + torch.stack([x, root[..., 3], z], dim=-1)[..., None, :]
 
 
 def _turn(angle: Tensor, axis: int) -> Tensor:
-    """Rotations (..., 3, 3) by angles (...) in radians about the axis 0, 1 or 2."""
+    """Rotations (3, 3, ...) by angles (...) in radians about the axis 0, 1 or 2."""
     one, zero = torch.ones_like(angle), torch.zeros_like(angle)
     sin, cos = angle.sin(), angle.cos()
     rows = {
@@ -135,18 +149,18 @@ def _turn(angle: Tensor, axis: int) -> Tensor:
         1: (cos, zero, sin, zero, one, zero, -sin, zero, cos),
         2: (cos, -sin, zero, sin, cos, zero, zero, zero, one),
     }
-    return torch.stack(rows[axis], dim=-1).reshape(*angle.shape, 3, 3)
+    return torch.unflatten(torch.stack(rows[axis]), 0, (3, 3))
 
 
 def rotvec_to_rotmat(vectors: Tensor) -> Tensor:
-    """Rotation vectors (..., 3) to matrices (..., 3, 3) by Rodrigues' formula, with gradients at 0."""
-    squared = vectors.square().sum(-1, keepdim=True)[..., None] + 1e-12
+    """Rotation vectors (3, ...) to matrices (3, 3, ...) by Rodrigues' formula, with gradients at 0."""
+    squared = vectors.square().sum(0) + 1e-12
     angle = squared.sqrt()
-    x, y, z = vectors.unbind(-1)
+    x, y, z = vectors
     zero = torch.zeros_like(x)
-    cross = torch.stack([zero, -z, y, z, zero, -x, -y, x, zero], dim=-1).reshape(*x.shape, 3, 3)
-    eye = torch.eye(3, dtype=vectors.dtype, device=vectors.device)
-    return eye + angle.sin() / angle * cross + (1 - angle.cos()) / squared * (cross @ cross)
+    cross = torch.unflatten(torch.stack([zero, -z, y, z, zero, -x, -y, x, zero]), 0, (3, 3))
+    eye = torch.eye(3, dtype=vectors.dtype, device=vectors.device).reshape(3, 3, *[1] * angle.dim())
+    return eye + angle.sin() / angle * cross + (1 - angle.cos()) / squared * product(cross, cross)
 
 
 @dataclass(frozen=True)
@@ -196,38 +210,39 @@ class EulerPlaces(nn.Module):
 
     columns: Tensor
     offsets: Tensor
-    unit: Tensor
-    along: Tensor
-    across: Tensor
+    units: Tensor
+    entries: Tensor
 
     def __init__(self, figure: Figure) -> None:
         super().__init__()
-        self.parents = figure.parents
-        axes = torch.eye(3)[torch.tensor([[AXES.index(axis) for axis in order] for order in figure.orders])]
-        crosses = torch.linalg.cross(torch.eye(3).expand(*axes.shape[:2], 3, 3), axes[..., None, :], dim=-1)
-        self.register_buffer("unit", torch.eye(3), persistent=False)
-        self.register_buffer("columns", torch.tensor(figure.columns), persistent=False)
+        self.parents, joints = figure.parents, len(figure.parents)
+        axes = torch.tensor([[AXES.index(axis) for axis in order] for order in figure.orders])
+        # angles about axes that are a mirror image of x, y, z count the other way round
+        signs = torch.linalg.det(torch.eye(3)[axes])
+        # the entry (i, j) of a joint's matrix lies where i and j are in its order
+        place = axes.argsort(dim=1).T
+        entries = (3 * place[:, None] + place) * joints + torch.arange(joints)
+        self.register_buffer("columns", torch.tensor(figure.columns).T.flatten(), persistent=False)
         self.register_buffer("offsets", torch.tensor(figure.offsets), persistent=False)
-        self.register_buffer("along", axes[..., None] * axes[..., None, :], persistent=False)
-        self.register_buffer("across", crosses, persistent=False)
+        self.register_buffer("units", torch.deg2rad(signs)[:, None], persistent=False)
+        self.register_buffer("entries", entries.flatten(), persistent=False)
 
     def forward(self, frames: Tensor) -> Tensor:
         """Frames (B, T, D), angles in degrees, to places (B, T, 3 (J - 1)) in metres from the root of the others."""
-        padded = torch.cat([frames, torch.zeros_like(frames[..., :1])], dim=-1)
-        angles = torch.deg2rad(padded[..., self.columns])[..., None, None]
-        first, second, third = (self._about(place, angles[..., place, :, :]) for place in range(3))
-        local = first @ second @ third
-        turned, found = {0: local[..., 0, :, :]}, [torch.zeros_like(frames[..., :3])]
-        for joint, parent in enumerate(self.parents[1:], start=1):
-            found.append(found[parent] + turned[parent] @ self.offsets[joint])
-            if joint in self.parents:
-                turned[joint] = turned[parent] @ local[..., joint, :, :]
-        return torch.cat(found[1:], dim=-1)
+        padded = functional.pad(frames.flatten(0, 1).T, (0, 0, 0, 1))
+        angles = torch.unflatten(padded.index_select(0, self.columns), 0, (3, -1)) * self.units
+        found = forward_kinematics(self.parents, self.offsets, self._local(angles), range(len(self.parents)))
+        return found[:, 1:].reshape(*frames.shape[:2], -1)
 
-    def _about(self, place: int, angles: Tensor) -> Tensor:
-        """Rotations (..., J, 3, 3) by angles (..., J, 1, 1) about the axis at a place in each joint's order."""
-        along = self.along[:, place]
-        return along + angles.cos() * (self.unit - along) + angles.sin() * self.across[:, place]
+    def _local(self, angles: Tensor) -> Tensor:
+        """Rotations (3, 3, J, N) by angles (3, J, N) in radians about the axes in each joint's order: Rx Ry Rz with
+        rows and columns in that order."""
+        (sin_x, sin_y, sin_z), (cos_x, cos_y, cos_z) = angles.sin(), angles.cos()
+        sin_xz, cos_xz, sin_cos, cos_sin = sin_x * sin_z, cos_x * cos_z, sin_x * cos_z, cos_x * sin_z
+        rows = [cos_y * cos_z, -cos_y * sin_z, sin_y]
+        rows += [sin_y * sin_cos + cos_sin, cos_xz - sin_y * sin_xz, -sin_x * cos_y]
+        rows += [sin_xz - sin_y * cos_xz, sin_y * cos_sin + sin_cos, cos_x * cos_y]
+        return torch.unflatten(torch.cat(rows).index_select(0, self.entries), 0, (3, 3, -1))
 
 
 def joint_weights(contract: MotionContract, parts: tuple[str, ...], times: float) -> Tensor:
