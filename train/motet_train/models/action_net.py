@@ -13,7 +13,7 @@ from torch.nn import functional
 
 from motet.bundle.graph import GraphSpec, TensorSpec
 from motet.models.language import SPECIALS, UNK
-from motet_train.models.net import Net, before
+from motet_train.models.net import Net, before, gelu
 
 UNKNOWN = SPECIALS.index(UNK)
 """The id of unknown words."""
@@ -84,7 +84,7 @@ class ActionNet(Net):
             dropped = torch.rand(words.shape, device=words.device) < self.config.word_dropout
             words = words.masked_fill(dropped, UNKNOWN)
         vectors = self.dropout(self._of(words)) * known[..., None]
-        around = functional.gelu(self.around(vectors.transpose(1, 2))) * known[:, None]
+        around = gelu(self.around(vectors.transpose(1, 2))) * known[:, None]
         count = known.sum(dim=1, keepdim=True).clamp_min(1)
         most = around.amax(dim=2).clamp_min(0)  # as if a word followed that says nothing: padding changes nothing
         seen = [around.sum(dim=2) / count, most, vectors.sum(dim=1) / count]

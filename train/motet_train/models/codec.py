@@ -20,7 +20,7 @@ from torch.nn import functional
 from motet.representation.root_sixd import ROOT_SIXD
 from motet_train.data.errors import DataError
 from motet_train.models.kinematics import SixdPlaces, Tree
-from motet_train.models.net import Net, normalised
+from motet_train.models.net import Net, gelu, normalised
 
 PATH = 3
 """Number of the decoder's first channels: the root's forward, left and turn relative to the way of the moves."""
@@ -61,7 +61,7 @@ class Residual(nn.Module):
 
     def forward(self, x: Tensor) -> Tensor:
         """(B, N, C) to the same shape."""
-        found: Tensor = x + self.second(functional.gelu(self.first(around(self.norm(x), self.ahead))))
+        found: Tensor = x + self.second(gelu(self.first(around(self.norm(x), self.ahead))))
         return found
 
 

@@ -19,7 +19,7 @@ from torch.nn import functional
 from motet.bundle.graph import GraphSpec, TensorSpec
 from motet.representation.placed import ROOT_PLACE, mirror
 from motet_train.models.kinematics import SixdPlaces, Tree
-from motet_train.models.net import Net, normalised
+from motet_train.models.net import Net, gelu, normalised
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Block(nn.Module):
         asked, keys, values = self.asked(self.norm(x)).unflatten(-1, (3, self.heads, -1)).permute(2, 0, 3, 1, 4)
         scores = asked @ keys.transpose(-1, -2) * keys.shape[-1] ** -0.5 - self.slopes * apart
         x = x + self.mixed((scores.softmax(dim=-1) @ values).transpose(1, 2).flatten(2))
-        found: Tensor = x + self.outward(functional.gelu(self.inward(self.norm_2(x))))
+        found: Tensor = x + self.outward(gelu(self.inward(self.norm_2(x))))
         return found
 
 

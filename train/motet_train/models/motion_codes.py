@@ -21,7 +21,7 @@ from torch.nn import functional
 from motet.bundle.graph import GraphSpec, TensorSpec
 from motet_train.models.action_net import ActionNet, ActionsConfig
 from motet_train.models.codec import CodecConfig, MotionCodec
-from motet_train.models.net import Net, Part
+from motet_train.models.net import Net, Part, gelu
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Block(nn.Module):
         shift, scale, gate, shift_2, scale_2, gate_2 = self.told(told).chunk(6, dim=-1)
         found, past = self._attend(functional.layer_norm(x, x.shape[-1:]) * (1 + scale) + shift, past)
         x = x + (1 + gate) * self.mixed(found)
-        inner = functional.gelu(self.inward(functional.layer_norm(x, x.shape[-1:]) * (1 + scale_2) + shift_2))
+        inner = gelu(self.inward(functional.layer_norm(x, x.shape[-1:]) * (1 + scale_2) + shift_2))
         return x + (1 + gate_2) * self.outward(inner), past
 
     def _attend(self, x: Tensor, past: Tensor) -> tuple[Tensor, Tensor]:

@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Self, get_type_hints
 import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
+from torch.nn import functional
 
 from motet.bundle.graph import GraphSpec
 from motet.motion.rotations import Array
@@ -82,6 +83,13 @@ def normalised(frames: Tensor, mean: Tensor, scale: Tensor, limit: float = Z_LIM
     """
     divisor = torch.where(scale > 0, scale, torch.inf)
     return ((frames - mean) / divisor).clamp(-limit, limit)
+
+
+def gelu(x: Tensor) -> Tensor:
+    """As in torch; exported in the one order of its products that ONNX Runtime computes in one kernel."""
+    if torch.compiler.is_exporting():
+        return x * (1 + torch.erf(x / 2**0.5)) * 0.5
+    return functional.gelu(x)
 
 
 def before(lengths: Tensor, steps: int) -> Tensor:

@@ -13,10 +13,9 @@ from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
-from torch.nn.functional import gelu
 
 from motet.bundle.graph import GraphSpec, TensorSpec
-from motet_train.models.net import Net, Part, normalised
+from motet_train.models.net import Net, Part, gelu, normalised
 
 GAIN = 3.0
 """Differences of normalised frames are multiplied by it, so that they vary about as much as poses do."""
