@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from motet.decode.loop import advance
 from motet.formats import read_motion
 from motet.models.load import load
 from motet.motion.motion import Motion
@@ -55,7 +56,13 @@ def test_predicted_frames() -> None:
     rng = np.random.default_rng(0)
     seeds = contract.mean + contract.std * 0.3 * rng.normal(size=(5, model.seed_frames, len(contract.channels)))
     count = model.horizon + 5
-    check_equal(model.next_frames(seeds, count), [model.next_frames(one[None], count)[0] for one in seeds])
+    found = model.next_frames(seeds, count)
+    check_equal(found, [model.next_frames(one[None], count)[0] for one in seeds])
+    # the step hands out, one by one, what the loop takes at once
+    state = {"trajectory": model.graphs["encoder"]({"frames": seeds.astype(np.float32)})["trajectory"]}
+    for frame in found[:, : model.horizon].swapaxes(0, 1):
+        given, state = advance(model.graphs["step"], state, {})
+        np.testing.assert_array_equal(given["frame"], frame)
 
 
 @pytest.mark.parametrize("variety", [0.0, 1.0])

@@ -50,17 +50,23 @@ def free_run(encoder: Graph, step: Graph, seed: Floats, count: int, horizon: int
 
     Inputs of the step are taken from what the encoder gives, by name: those that are fed back begin there, others stay;
     a fed back input that the encoder does not give begins as zeros. After every ``horizon`` frames the encoder is asked
-    again, about the L frames before.
+    again, about the L frames before. Where it gives them all as ``trajectory``, they are taken at once: the step would
+    only hand them out.
     """
     given = seed.shape[1]
     frames = np.concatenate([seed, np.empty((len(seed), count, seed.shape[2]), dtype=np.float32)], axis=1)
-    for n in range(count):
-        if n % horizon == 0:
-            found = encoder({"frames": np.ascontiguousarray(frames[:, n : n + given])})
-            state = zero_state(step, len(seed), found) | {k: v for k, v in found.items() if k in step.spec.feedback}
-            constant = {k: v for k, v in found.items() if k not in state and step.spec.takes(k)}
-        outputs, state = advance(step, state, constant)
-        frames[:, n + given] = outputs["frame"]
+    for n in range(0, count, horizon):
+        found = encoder({"frames": np.ascontiguousarray(frames[:, n : n + given])})
+        coming = frames[:, n + given : n + given + horizon]
+        whole = found.get("trajectory", seed[:, :0])[:, : coming.shape[1]]
+        if whole.shape == coming.shape:
+            coming[:] = whole
+            continue
+        state = zero_state(step, len(seed), found) | {k: v for k, v in found.items() if k in step.spec.feedback}
+        constant = {k: v for k, v in found.items() if k not in state and step.spec.takes(k)}
+        for frame in np.moveaxis(coming, 1, 0):
+            outputs, state = advance(step, state, constant)
+            frame[:] = outputs["frame"]
     return frames[:, given:]
 
 
