@@ -40,12 +40,16 @@ def restored(bundle: Bundle) -> Run:
         held, drawn = _tensors(bundle.read(manifest.graphs[role].file)), _tensors(export_graph(module, spec, {}))
         found = {name: known[value.tobytes()] for name, value in drawn.items() if value.tobytes() in known}
         for name, value in _paired({name: drawn[name] for name in found}, held, [*state]).items():
-            same = np.array_equal(drawn[name], other.state_dict()[found[name]].numpy())
-            weight = torch.tensor(value if same else value.T)
+            weight, like = torch.tensor(value), other.state_dict()[found[name]]
+            if weight.numel() > like.numel():
+                weight = weight[:, None, : like.shape[-1]]
+            elif not np.array_equal(drawn[name], like.numpy()):
+                weight = weight.mT
             state[found[name]].copy_(torch.where(weight.isinf(), 0, weight))  # what a scale of 0 is divided by
     for name in manifest.tables.keys() & state.keys():
         state[name].copy_(torch.from_numpy(bundle.table(name).copy()))
     run = Run(manifest.source, net.eval())
+    assert manifest.golden is not None
     try:
         replay(run.bundle_model(), bundle.read(manifest.golden.file), manifest.golden)
     except BundleError as error:
@@ -54,15 +58,17 @@ def restored(bundle: Bundle) -> Run:
 
 
 def _drawn(net: Net) -> dict[bytes, str]:
-    """The weights of a net, set at random, and those turned around, with their names."""
-    known = {}
+    """The weights of a net, set at random, those turned around, and those of biases followed by zeros (a GRU has two
+    biases), with their names."""
+    known = dict[bytes, str]()
     for name, value in net.state_dict().items():
         if value.is_floating_point():
             value.uniform_(0.5, 1.5)
         elif value.dtype == torch.int8:
             value.random_(-127, 127)
         if value.is_floating_point() or value.dtype == torch.int8:
-            known |= {part.numpy().tobytes(): name for part in (value, value.mT if value.dim() > 1 else value)}
+            forms = (value, value.mT, torch.cat([value, 0 * value], dim=-1)) if value.dim() > 1 else (value,)
+            known |= {form.numpy().tobytes(): name for form in forms}
     return known
 
 

@@ -13,19 +13,26 @@ from motet.bundle.bundle import Bundle
 from motet_export.bundles import export_run, parity_of
 from motet_export.exporter import ExportError, export_graph, round_weights
 from motet_export.restored import restored
+from motet_train.runs import Run
 
 NEW = ("writer.masked", "num_batches_tracked")
 """What only training uses."""
 
 
-@pytest.mark.parametrize("half", [False, True])
-def test_every_weight_is_found_again(tmp_path: Path, half: bool) -> None:
+@torch.no_grad()
+def distinct() -> Run:
+    """A run none of whose tensors are equal: those, as in new norms, would be exported once."""
     given = run()
     torch.manual_seed(0)
-    with torch.no_grad():
-        for name, value in given.model.state_dict().items():  # equal tensors, as in new norms, are exported once
-            if name in dict(given.model.named_parameters()) or "running" in name:
-                value.add_(0.1 * torch.rand_like(value))
+    for name, value in given.model.state_dict().items():
+        if name in dict(given.model.named_parameters()) or "running" in name:
+            value.add_(0.1 * torch.rand_like(value))
+    return given
+
+
+@pytest.mark.parametrize("half", [False, True])
+def test_every_weight_is_found_again(tmp_path: Path, half: bool) -> None:
+    given = distinct()
     export_run(given, tmp_path / "codes.zip", half=half)
     bundle = Bundle.open(tmp_path / "codes.zip")
     found = restored(bundle)
@@ -50,7 +57,7 @@ def test_weights_that_are_numbered_otherwise_are_found_by_their_order(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, swapped: bool
 ) -> None:
     """As those of a net whose graph has changed since; in another order, what is found does not compute the same."""
-    export_run(run(), tmp_path / "codes.zip")
+    export_run(distinct(), tmp_path / "codes.zip")
     bundle = Bundle.open(tmp_path / "codes.zip")
     expected = restored(bundle).model.state_dict()
 

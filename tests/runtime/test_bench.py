@@ -206,8 +206,9 @@ def kernel(name: str, given: list[list[int]], *found: list[int]) -> dict[str, An
 def test_operations_of_kernels_are_those_counted_by_hand() -> None:
     assert operations_of(kernel("Gemm", [[2, 5], [7]], [2, 7])) == 2 * 2 * 5 * 7  # its weights are packed
     assert operations_of(kernel("FusedMatMul", [[3, 2, 4], [3, 4, 6]], [3, 2, 6])) == 3 * 2 * 2 * 4 * 6
-    gru = kernel("GRU", [[9, 2, 5], [1, 12, 5], [1, 12, 4]], [9, 1, 2, 4], [1, 2, 4])
-    assert operations_of(gru) == 9 * 2 * 2 * (12 * 5 + 12 * 4)
+    for outputs in ([[9, 1, 2, 4], [1, 2, 4]], [[9, 1, 2, 4]], [[1, 2, 4]]):
+        gru = kernel("GRU", [[9, 2, 5], [1, 12, 5], [1, 12, 4]], *outputs)
+        assert operations_of(gru) == 9 * 2 * 2 * (12 * 5 + 12 * 4)
     assert operations_of(kernel("Conv", [[2, 3, 8], [4, 3, 5]], [2, 4, 4])) == 2 * (2 * 4 * 4) * 3 * 5
     assert operations_of(kernel("Mul", [[2, 5], [2, 5]], [2, 5])) == 0
 

@@ -123,7 +123,7 @@ def operations_of(kernel: Mapping[str, Any]) -> float:
     if name in PRODUCTS:
         return 2.0 * float(math.prod(found[0])) * float(given[0][-1])
     if name in GATES:
-        directions, batch, units = found[1]
+        directions, batch, units = found[-1][-3:]  # of all states or of the last ones
         return 2.0 * float(given[0][0] * directions * batch * units * GATES[name] * (given[0][2] + units))
     if name == "Conv":
         return 2.0 * float(math.prod(found[0])) * float(math.prod(given[1][1:]))

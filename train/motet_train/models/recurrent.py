@@ -19,6 +19,9 @@ GATES: dict[str, Callable[[Tensor], Tensor]] = {
 }
 """Squashing of the gates: the paper names the GRU of Cho et al., its authors' library had the piecewise linear one."""
 
+ONNX = {"sigmoid": "Sigmoid", "hard": "HardSigmoid"}
+"""What ONNX calls them."""
+
 
 def mask(module: nn.Module, rate: float, like: Tensor, *shape: int) -> Tensor | None:
     """Factors that are 0 with probability ``rate`` and else 1 / (1 - rate); None where nothing is dropped."""
@@ -80,6 +83,23 @@ class GRU(nn.Module):
         start = x.new_zeros(directions, rows, self.units)
         return recur(advance, start, given if active is None else [*given, active])
 
+    def exported(self, x: Tensor, lengths: Tensor) -> tuple[Tensor, Tensor]:
+        """Both directions over sequences (T, B, I) of the given lengths (B,), as ONNX's own GRU: one kernel.
+
+        The states (T, B, 2 N) after each step, zeros where a row has ended, and the last ones (B, 2 N).
+        """
+        weight = torch.cat([self.gate_recurrence, self.candidate_recurrence], dim=-1).mT
+        bias = functional.pad(self.bias[:, 0], (0, 3 * self.units))
+        found, last = torch.onnx.ops.symbolic_multi_out(
+            "GRU",
+            (x, self.weight.mT, weight, bias, lengths.int()),
+            {"hidden_size": self.units, "direction": "bidirectional", "activations": 2 * [ONNX[self.gates], "Tanh"]},
+            dtypes=(x.dtype, x.dtype),
+            shapes=((x.shape[0], 2, x.shape[1], self.units), (2, x.shape[1], self.units)),
+            version=18,
+        )
+        return found.transpose(1, 2).flatten(2), last.transpose(0, 1).flatten(1)
+
     def step(self, x: Tensor, state: Tensor) -> Tensor:
         """One step of a layer of one direction: inputs (B, I) and state (B, N) to the next state (B, N)."""
         gates, candidate = self.project(x[None])
@@ -137,9 +157,12 @@ class Encoder(nn.Module):
         active = torch.stack([active, active.flip(0)])
         x = x.transpose(0, 1)
         for layer in self.layers:
+            if torch.compiler.is_exporting() and type(layer) is GRU:
+                x, context = layer.exported(x, lengths)
+                continue
             states = layer(torch.stack([x, x.flip(0)]), active)
             x = torch.cat([states[0], states[1].flip(0)], dim=-1)
-        context: Tensor = states[:, -1].transpose(0, 1).flatten(1)
+            context = states[:, -1].transpose(0, 1).flatten(1)
         return context
 
 
