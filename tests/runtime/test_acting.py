@@ -160,7 +160,7 @@ def test_an_act_is_broken_off_without_a_leap(model: SteerModel) -> None:
     assert [one and one[0] for one in session.acting] == ["lift", None]
     before, *after = ticks(session, 30)
     places = np.array([pose.positions()[1] for pose in (before, *after)])
-    assert np.linalg.norm(np.diff(places, axis=0), axis=-1).max() < 0.1
+    assert np.linalg.norm(np.diff(places, axis=0), axis=-1).max() < 0.2  # metres; hands of recorded people go 0.3
     assert [one and one[0] for one in session.acting] == [None, None]
     elbow = HUMANOID.index("leftLowerArm")
     hangs, lifted = standing.positions()[1, elbow, 1], np.array([pose.positions()[:, elbow, 1] for pose in after])
@@ -278,19 +278,46 @@ def test_a_sentence_is_acted_and_made_once(model: SteerModel, said: SaidActs) ->
     assert highest > model.start().tick().positions()[0, list(hand), 1].max() + 0.2
 
 
-def test_a_figure_that_walks_jumps_once_with_its_whole_body_and_walks_on(model: SteerModel, said: SaidActs) -> None:
-    session = model.start(words=said)
-    session.control(speed=1.3)
+@pytest.mark.parametrize(("speed", "gone"), [(0.0, 0.3), (1.3, 1.0)])
+def test_a_gait_that_goes_nowhere_is_done_once_and_the_figure_goes_on(
+    model: SteerModel, speed: float, gone: float
+) -> None:
+    session = model.start()
+    session.control(speed=speed)
     ticks(session, 60)
-    session.act("jump", upper=False)
+    session.act("jump")
     poses = ticks(session, 120)
-    kinds = [event.kind for pose in poses for event in pose.events]
-    assert [kind for kind in kinds if kind in ("take-off", "landing")] == ["take-off", "landing"]
-    toes = [HUMANOID.index("leftToes"), HUMANOID.index("rightToes")]
-    assert max(pose.positions()[0, toes, 1].min() for pose in poses) > 0.2
+    happens = [(at, event.kind) for at, pose in enumerate(poses) for event in pose.events]
+    (begun, _), (left, _), (landed, _), (over, _) = (
+        next((at, kind) for at, kind in happens if kind == wanted)
+        for wanted in ("act begun", "take-off", "landing", "act ended")
+    )
+    assert begun <= left <= 0.6 * model.fps <= landed < over
+    assert [kind for _, kind in happens].count("take-off") == 1
     assert session.acting == [None]
     end = np.stack([pose.ground[0, :2] for pose in poses[-16:]])
-    assert np.linalg.norm(end[-1] - end[0]) / 0.5 == pytest.approx(1.3, abs=0.15)
+    assert np.linalg.norm(end[-1] - end[0]) / 0.5 == pytest.approx(speed, abs=0.15)
+    way = np.linalg.norm(poses[over].ground[0, :2] - poses[begun].ground[0, :2])
+    assert way < gone if speed == 0 else way > gone
+    toes = [HUMANOID.index("leftToes"), HUMANOID.index("rightToes")]
+    assert max(pose.positions()[0, toes, 1].min() for pose in poses) > 0.2
+
+
+def test_who_walks_waves_with_the_arms_alone_and_kicks_with_the_whole_body(model: SteerModel, said: SaidActs) -> None:
+    assert [said.act(one).legs for one in ("wave", "point", "drink")] == [False] * 3
+    assert [said.act(one).legs for one in ("kick", "jump", "squat", "cartwheel", "turn around")] == [True] * 5
+    session, alone = model.start(characters=2, words=said), model.start(characters=2)
+    for one in (session, alone):
+        one.control(speed=1.3)
+        ticks(one, 60)
+    session.act(["wave", "kick"])
+    acted, plain = ticks(session, 20)[-1], ticks(alone, 20)[-1]
+    legs = [BONES.index(bone) for bone in ("leftUpperLeg", "leftLowerLeg", "rightUpperLeg", "rightLowerLeg")]
+    same = np.abs(acted.rotations[:, legs] - plain.rotations[:, legs]).max(axis=(1, 2)) < 1e-6
+    assert same.tolist() == [True, False]
+    session.control(speed=1.2)  # who kicks ends the kick first
+    assert session.tick().ground[0, 1] > acted.ground[0, 1]
+    assert session.acting[1] is not None
 
 
 @pytest.mark.parametrize("sentence", ["xyzzy", "a dragon", "", "   "])

@@ -199,6 +199,31 @@ def test_buttons_and_the_stick(page: Browser) -> None:
     assert page.errors == []
 
 
+@pytest.mark.parametrize("told", ["", "Jump!"])
+def test_a_jump_is_done_once_and_the_gait_goes_on(page: Browser, told: str) -> None:
+    page.value("motet.state.pause = true, motet.state.gait = 0, motet.figures[0].act(null)")
+    jump = page.value("motet.net.gaits.indexOf('jump')")
+    page.value("for (let n = 0; n < 120; n++) motet.tick({ gait: 0, x: 0, z: 1.3, facing: 0 })")
+    if told:
+        assert page.value(f"motet.told('{told}')") == "jump"
+    else:
+        page.value(f"document.querySelectorAll('#gaits button')[{jump}].click()")
+    lowest = page.value("""(() => {
+      const found = [];
+      for (let n = 0; n < 90; n++) {
+        motet.tick({ gait: 0, x: 0, z: 1.3, facing: 0 });
+        found.push([Math.max(...motet.figures[0].pose.contacts), motet.figures[0].root[1]]);
+      }
+      return found;
+    })()""")
+    contacts, ways = np.transpose(lowest)
+    assert (contacts[:20] < 0.1).any()
+    assert np.diff(np.flatnonzero(contacts < 0.1)).max() == 1  # one flight
+    assert (ways[-1] - ways[-31]) == pytest.approx(1.3, abs=0.15)
+    assert page.value("motet.state.gait") == 0
+    assert page.value("motet.figures[0].acting") is None
+
+
 GAMEPAD = """(async () => {
   const given = (buttons, axes) => [{ mapping: "standard", axes, buttons: Array.from({ length: 17 }, (_, n) => (
     { pressed: buttons.includes(n) })) }];

@@ -1,5 +1,7 @@
 """Motion matching against naive twins: search, desired trajectory, mirror images; poses in codes; quaternions."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -61,6 +63,16 @@ def test_the_search_finds_what_looking_at_every_row_finds(table: Table, matcher:
         assert (row, mirror) == min(found, key=found.__getitem__)
         assert cost + float((wanted**2).sum()) / 2 == pytest.approx(min(found.values()), rel=1e-3)
     np.testing.assert_allclose(matcher.cost_at(matcher.query(asked), rows, mirrors), costs, atol=1e-3)
+
+
+def test_leaps_are_entered_well_before_they_fly(table: Table) -> None:
+    frames = table.frames.copy()
+    frames[:, :, -2:], frames[:, :, -3] = 1.0, 0.7
+    frames[:, 50:60, -2:] = frames[:, 150:160, -2:] = 0.0
+    frames[:, 100:, -3] = 0.0  # played at their own rate
+    goals = Matcher(replace(table, frames=frames), replace(SETTINGS, row_step=1, prepares=9), 30.0).goals
+    assert [set(range(35, 75)) - set(one.rows.tolist()) for one in goals[:1]] == [set(range(50, 60))]
+    assert set(range(135, 175)) - set(goals[1].rows.tolist()) == set(range(141, 160))
 
 
 def test_costs_are_the_same_bits_alone_and_in_blocks_in_any_order() -> None:

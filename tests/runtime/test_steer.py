@@ -11,6 +11,7 @@ from motet.decode.matching import Playback
 from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.kinematics import positions
 from motet.motion.pose import Pose
+from motet.motion.rotations import wrapped
 
 
 @pytest.fixture(scope="module")
@@ -45,6 +46,32 @@ def test_it_walks_backwards_and_stands_still(model: SteerModel) -> None:
     poses = [session.tick() for _ in range(90)]
     assert np.hypot(*(poses[-1].ground - poses[-31].ground)[0, :2]) < 0.1
     assert poses[-1].contacts.min() > 0.5
+
+
+def test_a_gait_that_only_goes_forward_goes_a_curve_to_what_is_behind(model: SteerModel) -> None:
+    """Instead of turning on the spot, for which no skip is recorded."""
+    session = model.start("skip", characters=4)
+    session.control(speed=1.2, direction=[180, -150, 120, 0])
+    poses = [session.tick() for _ in range(120)]
+    steps = np.linalg.norm(np.diff([pose.ground[:, :2] for pose in poses[:60]], axis=0), axis=2)
+    assert steps.sum(axis=0).min() > 1.2  # metres in two seconds
+    x, z = (poses[-1].ground - poses[-31].ground)[:, :2].T
+    off = np.degrees(wrapped(np.arctan2(x, z) - np.radians([180, -150, 120, 0])))
+    assert np.abs(off).max() < 15
+
+
+def test_targets_of_gaits_that_go_any_way_are_left_and_others_are_near_the_facing(model: SteerModel) -> None:
+    rng, gaits = np.random.default_rng(0), np.array([0, model.gaits.index("skip")] * 20)
+    target, facing = rng.normal(size=(40, 3)) * 2, rng.uniform(-3, 3, 40)
+    target[::8, :2] = 0
+    found = model.abilities.curved(target, gaits, facing)
+    stays = (gaits == 0) | (target[:, :2] == 0).all(axis=1)
+    assert np.array_equal(found[stays], target[stays])
+    led, goes = found[~stays], target[~stays]
+    assert np.allclose(np.hypot(*led[:, :2].T), np.hypot(*goes[:, :2].T))
+    most = model.abilities.settings.ahead + 1e-9
+    for angle in (np.arctan2(*led[:, :2].T), led[:, 2]):
+        assert np.abs(wrapped(angle - facing[~stays])).max() <= most
 
 
 def test_each_of_a_crowd_moves_as_it_would_alone(model: SteerModel) -> None:

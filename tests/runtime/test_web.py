@@ -238,6 +238,9 @@ STEERED: list[dict[str, Any]] = [
     {"control": {"speed": 0.0}},
     {"act": {"who": [1, 0]}},
     {"act": {"who": [0], "upper": False}},
+    {"control": {"gait": "walk", "speed": 1.2, "direction": [-60.0, 40.0]}},
+    {"jump": {"who": [0]}},
+    *[{}] * 2,
     {"put": [[1.0, 2.0, 30.0], [-2.0, 0.5, -90.0]], "control": {"gait": "zombie", "direction": 10.0, "speed": 0.4}},
     {"keep_apart": 0.8, "go_to": {"points": [[-2.0, 1.0], [1.5, 2.5]], "facing": [90.0, -45.0], "gait": "walk"}},
     *[{}] * 6,
@@ -264,8 +267,8 @@ def steered(model: SteerModel, hold_feet: bool) -> tuple[list[list[Any]], list[l
         warnings.simplefilter("ignore", ControlWarning)
         for calls in STEERED:
             for name, given in calls.items():
-                if name in ("act", "end"):
-                    session.act(act if name == "act" else None, **given)
+                if name in ("act", "end", "jump"):
+                    session.act({"act": act, "end": None, "jump": "jump"}[name], **given)
                 elif isinstance(given, dict):
                     getattr(session, name)(**given)
                 else:

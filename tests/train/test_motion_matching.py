@@ -12,15 +12,16 @@ from motet.decode.steering import PoseCodes, tick
 from motet.decode.steering_settings import SteeringSettings
 from motet.formats import read_motion
 from motet.models.steer import FEATURE_STEPS
+from motet.motion.humanoid import sole_points
 from motet.motion.humanoid.bones import BONES, HUMANOID
-from motet.motion.kinematics import positions
+from motet.motion.kinematics import global_transforms, positions
 from motet.motion.mirroring import mirror
 from motet.motion.motion import Motion
 from motet.motion.pose import Pose
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract, named
 from motet_train.data.cmu_trials import CMU_FOLDER
-from motet_train.data.matching_rows import MatchingRows, Recording, mirrored_poses, rows_of
+from motet_train.data.matching_rows import MatchingRows, Recording, _leaps, _levelled, mirrored_poses, rows_of
 from motet_train.data.table import Gait, read_gaits
 from motet_train.models.kinematics import tree_of
 from motet_train.models.matching import DTYPES, Matching, MatchingConfig
@@ -59,6 +60,23 @@ def net(walk: Motion, rows: MatchingRows) -> Matching:
     made = Matching(config)
     take(made, rows)
     return made
+
+
+def test_a_floor_that_rises_and_falls_is_made_level(walk: Motion) -> None:
+    features = named("root_sixd").features(walk)
+    level, height = _levelled(features), features.channels.index("root.height")
+    values = features.values.copy()
+    values[:, height] += 0.04 * np.sin(np.arange(len(values)) / 40)
+    found = _levelled(replace(features, values=values))
+    assert np.abs(found.values - level.values).max() < 0.004
+    soles = sole_points(*global_transforms(named("root_sixd").motion(found)))
+    assert np.percentile(np.abs(soles[..., 1].min(axis=1)), 90) < 0.01
+
+
+def test_leaps_are_long_flights_and_what_is_around_them() -> None:
+    flies = np.zeros(100, dtype=bool)
+    flies[10:16] = flies[50:65] = True  # a running step, and half a second
+    assert np.flatnonzero(_leaps(flies, 30.0)).tolist() == list(range(41, 74))
 
 
 def test_rows_of_a_mirrored_recording_are_mirrored_rows(walk: Motion, rows: MatchingRows) -> None:

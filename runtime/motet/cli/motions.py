@@ -283,8 +283,8 @@ def control(
     """Run SCRIPT, such as "walk 3s speed 1.4, turn left 90, run 4s, stop", and write the motion.
 
     Orders are separated by commas: a gait, "turn" or "stop", and in any order seconds ("3s"), a speed in m/s ("speed
-    1.4"), a way ("backwards", "left", "right") and a turn in degrees ("turn left 90"). "act 'wave'" does something
-    beside, as the bundle generate shows it.
+    1.4"), a way ("backwards", "left", "right") and a turn in degrees ("turn left 90"). "act jump" does something
+    once, "act 'wave'" as the bundle generate shows it.
     With --bundle cmu-control: a label and seconds; a ramp "walk>run 5s"; a mix "walk*.3+run*.7 2s".
     """
     output.check(out)
@@ -295,7 +295,8 @@ def control(
     captions = model.captions(script)
     with naming(start), noted():
         first = read(Path(start)) if start and (Path(start).suffix or names_motion(start)) else start
-        if isinstance(model, SteerModel) and any(order.act for order in parse_orders(script, model.gaits)):
+        acts = {order.act for order in parse_orders(script, model.gaits)} if isinstance(model, SteerModel) else set()
+        if isinstance(model, SteerModel) and acts - {None, *model.takes}:
             chosen["words"] = load_as(GenerateModel, "generate", session)
         motion = model.run(script, first, **chosen)
     motion = output.shaped(motion)

@@ -37,6 +37,9 @@ HANDS = slice(-6, None)
 METRE = 10.0
 """Radians that a metre of the hips' height counts as."""
 
+LONGER = 1.75
+"""Times as long that what is lost fades at most: who is to kneel at once is down in half a second."""
+
 FADED = 1e-4
 """Radians, metres and metres a second of which nothing is seen: what is added is dropped then."""
 
@@ -91,11 +94,11 @@ class Acting:
     """The acts of B figures.
 
     playing: what each plays. asked: the act that a figure begins in the next tick, None to end what it plays, and
-    whether by the upper body alone; None: by the whole body where it stands. base: bodies of the last tick without
-    acts. shown, before: as they were shown in the last tick and in the one before. led: (B,) whether an act led the
-    whole body in the last tick. offset, offset_rate: (B, 3 J + 1) what is added, as :meth:`Body.since` gives it, and
-    how fast it changes. damping: (B, 1) by which it fades. going: (B, 3) velocity over the ground, m/s along x and z
-    and rad/s. drift: (B, 3) the part of it that fades.
+    whether by the upper body alone; None: by the whole body where it stands, or where the act is one of the legs. base:
+    bodies of the last tick without acts. shown, before: as they were shown in the last tick and in the one before. led:
+    (B,) whether an act led the whole body in the last tick. offset, offset_rate: (B, 3 J + 1) what is added, as
+    :meth:`Body.since` gives it, and how fast it changes. damping: (B, 1) by which it fades. going: (B, 3) velocity over
+    the ground, m/s along x and z and rad/s. drift: (B, 3) the part of it that fades.
     """
 
     matcher: Matcher
@@ -183,7 +186,8 @@ class Acting:
         """The act that is asked for, at the frame after the one that is most like the figure."""
         now, table, how = self.playing[figure], self.matcher.table, self.how
         moves = goes or np.hypot(*playback.spring[figure, :2]) > self.matcher.settings.idle
-        whole = not moves if upper is None else not upper
+        stays = moves and act.legs  # its legs go on as it ends
+        whole = (stays or not moves) if upper is None else not upper
         is_now = table.features[playback.mirror[figure], playback.row[figure], TRAJECTORY:].astype(np.float64)
         if now is not None:
             known = slice(None) if now.whole else HANDS
@@ -191,7 +195,7 @@ class Acting:
         entries = min(round(how.entry * self.matcher.fps), (len(act) - 1) // 3) + 1
         off = self._scaled(act.features[:entries]) - is_now
         cost = (off[:, slice(None) if whole else HANDS] ** 2).sum(axis=1)
-        return Playing(act, int(cost.argmin()) + 1, 0, whole, upper is None)
+        return Playing(act, int(cost.argmin()) + 1, 0, whole, upper is None and not stays)
 
     def _scaled(self, features: Array) -> Array:
         """Features of how figures are (..., F - TRAJECTORY) as the table has them."""
@@ -268,7 +272,7 @@ class Acting:
         names = ("offset", "offset_rate", "damping", "drift")
         self.offset, self.offset_rate, self.damping, self.drift = (getattr(self, name).copy() for name in names)
         self.offset[who], self.offset_rate[who] = off, rate
-        self.damping[who, 0] = damping_of(self.how.blend) / np.maximum(far, 1)
+        self.damping[who, 0] = damping_of(self.how.blend) / far.clip(1, LONGER)
         self.drift[who[leads]] = self.going[who[leads]] - going[who[leads]]
 
     def _fade(self, dt: float) -> None:

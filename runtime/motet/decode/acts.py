@@ -4,6 +4,7 @@ Letters in shapes: T frames, J bones, J' joints, F features as in :mod:`motet.de
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from motet.bundle.graph import Floats
 from motet.decode.steering_settings import HalfLife
 from motet.errors import ControlError
-from motet.motion.feet.contacts import contacts_of
+from motet.motion.feet.contacts import SOLES, ContactSettings, contacts_of
 from motet.motion.humanoid import BONES, HUMANOID, LEFT_RIGHT, ground_under, sided, sole_points
 from motet.motion.pose import Pose
 from motet.motion.rotations import Array, quat_to_rotmat
@@ -23,9 +24,9 @@ class ActSettings(Settings):
     """Settings of acts.
 
     blend: half-life of what the pose loses where an act begins or ends. far: where a bone turns by more than this, or
-    the hips rise or fall by more than a tenth of it in metres, that takes as much longer. entry: how much of an act may
-    be left out to begin it at the pose that fits best, at most a third of it. rest: the beginning and the end of an act
-    in which no joint is faster are left out.
+    the hips rise or fall by more than a tenth of it in metres, that takes as much longer, at most 1.75 times. entry:
+    how much of an act may be left out to begin it at the pose that fits best, at most a third of it. rest: the
+    beginning and the end of an act in which no joint is faster are left out.
     """
 
     FEATURE: ClassVar[str] = "acting"
@@ -38,6 +39,16 @@ class ActSettings(Settings):
 
 SHORTEST = 3
 """Frames of an act."""
+
+STANDS = float(HUMANOID.offsets[0, 1])
+"""The height of the hips of a figure that stands straight."""
+
+BENT, RAISED, TURNED = 0.25, 0.3, np.radians(150)
+"""Metres between the highest and the lowest that hips are, or would be standing, metres above the ground of a ball of a
+foot, and radians of a turn, beyond which an act is one of the legs."""
+
+MOVES = 1.0
+"""Seconds of an act of which the rest at both ends is left out: less is a pose that is held."""
 
 WIDTH = 4 * len(BONES) + 4
 """Numbers of a frame: quaternions (x, y, z, w) of the bones, the hips' in the frame of the facing; x and z of the root
@@ -78,7 +89,8 @@ class Act:
         contacts = foot_contacts(quat_to_rotmat(turned.astype(np.float64)), places, fps)
         speeds = np.linalg.norm(np.gradient(places, axis=0), axis=2).max(axis=1) * fps
         moving = np.flatnonzero(speeds > how.rest)
-        within = slice(moving[0], moving[-1] + 1) if len(moving) and np.ptp(moving) >= SHORTEST else slice(None)
+        moves = len(moving) > 0 and np.ptp(moving) >= round(MOVES * fps)
+        within = slice(moving[0], moving[-1] + 1) if moves else slice(None)
         parts = quats, height, ground, contacts, pose_features(places, ground, fps)
         return Act(name, *(part[within] for part in parts))
 
@@ -94,6 +106,17 @@ class Act:
         """Its frames (T, :data:`WIDTH`)."""
         quats = self.rotations.reshape(len(self), -1)
         return np.column_stack([quats, self.ground, self.height]).astype(np.float32)
+
+    @cached_property
+    def legs(self) -> bool:
+        """Whether it is done by the legs: it bends them, jumps, raises a foot, or turns around."""
+        balls, turned = self.features[:, [1, 4]], np.ptp(np.unwrap(self.ground[:, 2]))
+        return bool(np.ptp([STANDS, *self.height]) > BENT or balls.max() > RAISED or turned > TURNED)
+
+    @property
+    def reach(self) -> float:
+        """Metres from where it begins to where it ends."""
+        return float(np.hypot(*(self.ground[-1] - self.ground[0])[:2]))
 
     def step(self, frame: int, facing: float) -> Array:
         """The move (3,) over the ground to a frame from the one before it, for a figure with a facing: x, z, turn."""
@@ -126,11 +149,11 @@ def seen(vectors: Array, facing: Array) -> Array:
     return np.stack([cos * vectors[:, 0] - sin * vectors[:, 1], sin * vectors[:, 0] + cos * vectors[:, 1]], axis=1)
 
 
-def foot_contacts(turned: Array, places: Array, fps: float) -> Array:
+def foot_contacts(turned: Array, places: Array, fps: float, settings: ContactSettings = SOLES) -> Array:
     """How much the left and the right foot stand (T, 2), 0 to 1, of rotations (T, J', 3, 3) and places (T, J', 3) of
     the humanoid's joints in the world."""
     soles = sole_points(turned, places)
     soles[..., 1] -= ground_under(soles)
-    touch = contacts_of(soles, fps).reshape(-1, 2, 3).max(axis=2)
+    touch = contacts_of(soles, fps, settings).reshape(-1, 2, 3).max(axis=2)
     found: Array = np.concatenate([touch[:1], touch])
     return found

@@ -242,13 +242,15 @@ class Matcher:
         self.goals, speed = list[Goals](), table.frames[0, :, -3]
         # gaits that are recorded as slow as a creep have no need to
         self.creeps = np.array([is_faster(speed[shows], settings) for shows in table.shows.T], dtype=np.bool_)
+        # what is played at its own rate leads to a leap, with arms that swing: it is entered well before
+        leaps = (speed == 0) & (np.convolve(self.flies, np.ones(settings.prepares + 1))[settings.prepares :] > 0)
         for shows in table.shows.T:
-            rows = np.flatnonzero(shows & (table.left >= self.least_left) & ~self.flies)[:: settings.row_step]
+            rows = np.flatnonzero(shows & (table.left >= self.least_left) & ~(self.flies | leaps))[:: settings.row_step]
             self.goals.append(Goals.of(rows, self.costs[:, rows].reshape(-1, FEATURES + 1), self.TILE))
 
     def stillest(self, gait: int) -> int:
-        """The row of a gait in which there is the least speed; of those that something follows."""
-        rows = np.flatnonzero(self.table.shows[:, gait] & (self.table.left >= self.reserve))
+        """The row of a gait in which there is the least speed; of those that something follows, on the ground."""
+        rows = np.flatnonzero(self.table.shows[:, gait] & (self.table.left >= self.reserve) & ~self.flies)
         return int(rows[self.table.frames[0, rows, -3].argmin()])
 
     def search(self, playback: Playback, target: Array, gait: Rows) -> None:

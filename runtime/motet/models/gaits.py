@@ -1,6 +1,7 @@
 """What steered figures are told, and what their gaits allow of it."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,12 @@ class Gaits:
             raise BundleError("manifest, config.speeds: must hold a row of 5 speeds, 0 to 100 m/s, for each gait")
         return Gaits(names, speeds, settings)
 
+    @cached_property
+    def ahead(self) -> NDArray[np.bool_]:
+        """Which gaits (G,) only go forward."""
+        found: NDArray[np.bool_] = self.speeds[:, 3:].min(axis=1) == 0
+        return found
+
     def number(self, name: str) -> int:
         """The number of a gait; ControlError for an unknown one."""
         if name not in self.names:
@@ -40,7 +47,7 @@ class Gaits:
         them: gait and message."""
         how, speeds, told, moving = self.settings, self.speeds[command.gait], command.speed, command.speed > 0
         # not all gaits go sideways and backwards: those face the way they go, or nearly
-        farthest = np.where(speeds[:, 3:].min(axis=1) > 0, np.pi, how.ahead)
+        farthest = np.where(self.ahead[command.gait], how.ahead, np.pi)
         aside = np.clip(wrapped(command.direction - command.facing), -farthest, farthest)
         facing = np.where(moving, command.direction - aside, command.facing)
         sector = np.digitize(np.abs(wrapped(command.direction - facing)), (how.aside, how.back))
@@ -54,6 +61,21 @@ class Gaits:
             for n in np.flatnonzero(np.abs(speed - told) > 1e-6).tolist()
         ]
         return np.stack([x, z, wrapped(facing)], axis=1), beyond
+
+    def curved(self, target: Array, gait: Rows, facing: Array) -> Array:
+        """Targets (B, 3) as figures with facings (B,) go for them in gaits (B,): those that only go forward lead and
+        turn no farther aside than they go anyway, so that a figure goes a curve instead of turning on the spot."""
+        ahead = self.ahead[gait]
+        if not ahead.any():
+            return target
+        x, z, to = target.T
+        direction, speed = facing + self._near(np.arctan2(x, z) - facing), np.hypot(x, z)
+        led = np.column_stack([speed * np.sin(direction), speed * np.cos(direction), facing + self._near(to - facing)])
+        return np.where((ahead & ((x != 0) | (z != 0)))[:, None], led, target)
+
+    def _near(self, angle: Array) -> Array:
+        found: Array = np.clip(wrapped(angle), -self.settings.ahead, self.settings.ahead)
+        return found
 
 
 @dataclass(frozen=True, eq=False)

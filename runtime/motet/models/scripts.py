@@ -4,7 +4,8 @@ Of steered figures, orders in words: ``walk 3s speed 1.4, turn left 90, run 4s, 
 gait, ``turn`` or ``stop``, followed in any order by a duration (``3s``; else 2 s, or 1.5 s of a turn or stop), a speed
 (``speed 1.4`` in m/s; else the gait's usual one), a way (``backwards``, ``left``, ``right``, relative to the facing,
 which does not change), and an angle in degrees to turn (``turn left 90``, or ``walk 3s turn right 45``). A turn alone
-keeps gait, speed and way. ``act 'wave'`` is a sentence of what to do beside that, with a duration after it or 3 s.
+keeps gait, speed and way. ``act 'wave'`` is a sentence of what to do beside that, with a duration after it or 3 s;
+``act jump`` is a gait that goes nowhere, done once.
 ``go to 2 -3.5`` goes to x and z in metres and stands there, facing as it comes or ``facing 90``; with a speed, or the
 gait's usual one, until the next order, after its duration or 5 s.
 

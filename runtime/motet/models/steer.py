@@ -1,6 +1,7 @@
 """Steer: figures that follow live controls over the ground."""
 
 from collections.abc import Mapping
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -155,9 +156,27 @@ class SteerModel(ControlModel):
         out. MotionError for one that is not of a human figure, ControlError for one of less than three ticks.
         """
         features = self.contract.features(self.contract.frames(self.at_own_rate(travelling(motion))))
-        steps = features.select(ROOT_SIXD[:3]).values / self.fps
-        facing, x, z = way(steps)
-        quats, height = self._bodies(features)
+        return self._act(name, *self._bodies(features), features.select(ROOT_SIXD[:3]).values)
+
+    @cached_property
+    def takes(self) -> dict[str, tuple[Act, ...]]:
+        """The recordings of gaits that go nowhere, such as "jump", as acts, by the gait's name."""
+        table, found = self.matcher.table, dict[str, tuple[Act, ...]]()
+        for gait, name in enumerate(self.gaits):
+            if not self.usual[name]:
+                rows = np.flatnonzero(table.shows[:, gait])
+                each = np.split(rows, np.flatnonzero(table.left[rows] == 0)[:-1] + 1)
+                found[name] = tuple(self._take(name, table.frames[0, part]) for part in each)
+        return found
+
+    def _take(self, name: str, frames: Floats) -> Act:
+        """Frames (T, K + 6) of the table as an act."""
+        quats, height = self.pose_codes.decode(frames[:, :-6].astype(np.float64))
+        return self._act(name, quats, height, frames[:, -6:-3])
+
+    def _act(self, name: str, quats: Floats, height: Floats, velocities: NDArray[Any]) -> Act:
+        """An act of quaternions (T, J, 4), heights (T,) of the hips and velocities (T, 3): forward, left and turn."""
+        facing, x, z = way(velocities / self.fps)
         numbers = np.column_stack([quats.reshape(len(quats), -1), x, z, facing, height]).astype(np.float32)
         return Act.of(name, numbers, self.fps, self.settings(ActSettings))
 

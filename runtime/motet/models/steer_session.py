@@ -149,7 +149,12 @@ class SteerSession(Guided):
     def tick(self) -> Pose:
         """The next pose of all characters, 1 / ``model.fps`` seconds later."""
         self._lead()
-        return self.tick_to(self._target)
+        return self.tick_to(self._way)
+
+    @property
+    def _way(self) -> Array:
+        """The target as gaits go for it."""
+        return self.model.abilities.curved(self._target, self._command.gait, self._playback.root[:, 2])
 
     def _lead(self) -> None:
         """Let those that are on a way go on, and those that move keep apart."""
@@ -186,7 +191,7 @@ class SteerSession(Guided):
     @property
     def matched(self) -> Matched:
         """The rows that are played, what they cost, and the path that is asked for."""
-        return matched(self.model.matcher, self._playback, self._target, self._command.gait)
+        return matched(self.model.matcher, self._playback, self._way, self._command.gait)
 
     def _face_as_acted(self) -> None:
         """Those who act with the whole body and are told to stand go on standing as they do then."""
@@ -201,11 +206,13 @@ class SteerSession(Guided):
         """Do something, from the next tick on, in place of what is being done.
 
         what: a motion of any human figure, without what it rests at both ends; an act, which
-            :meth:`motet.models.steer.SteerModel.act_of` makes of one once; or a sentence such as "wave", of which the
-            session's ``words`` generate one, once; None ends what is done. One for all, or one for each of ``who``.
+            :meth:`motet.models.steer.SteerModel.act_of` makes of one once; the name of a gait that goes nowhere, such
+            as "jump", which is done once, forward by who moves; or a sentence such as "wave", of which the session's
+            ``words`` generate one, once; None ends what is done. One for all, or one for each of ``who``.
         who: numbers of characters, by default all.
         upper: by the upper body alone, while the legs go on; or by the whole body (False), which goes its own way over
-            the ground. By default by the whole body where a character stands, whose legs go once it is told to.
+            the ground. By default by the whole body where a character stands, whose legs go once it is told to; or
+            where the act is one of the legs, such as a kick, after which a character that moves goes on.
         MotionError for a motion that is not of a human figure, TextError for a sentence that the model does not
         know, ControlError for a motion of less than three ticks, for characters that are not there, and for a sentence
         without ``words``; nothing changes then.
@@ -214,11 +221,21 @@ class SteerSession(Guided):
         each = [what] * len(characters) if isinstance(what, Doing) else list(what)
         if len(each) != len(characters):
             raise ControlError(f"{len(each)} acts do not fit {len(characters)} characters")
-        made = {id(one): self._act_of(one) for one in each}
-        self._acting.asked |= {i: (made[id(one)], upper) for i, one in zip(characters, each, strict=True)}
+        made = {id(one): self._acts_of(one) for one in each}
+        for i, one in zip(characters, each, strict=True):
+            acts, chosen = made[id(one)], max if self._target[i, :2].any() else min
+            self._acting.asked[i] = (chosen(acts, key=lambda act: act.reach) if acts else None, upper)
 
-    def _act_of(self, what: Doing) -> Act | None:
-        if what is None or isinstance(what, Act):
+    def _acts_of(self, what: Doing) -> tuple[Act, ...]:
+        """The acts that are meant, of which a character does one."""
+        if what is None:
+            return ()
+        if isinstance(what, str) and what in self.model.takes:
+            return self.model.takes[what]
+        return (self._act_of(what),)
+
+    def _act_of(self, what: Motion | Act | str) -> Act:
+        if isinstance(what, Act):
             return what
         if isinstance(what, Motion):
             return self.model.act_of(what)

@@ -5,7 +5,7 @@ import { BONES, LEG, SIDES } from "./humanoid.js";
 import { FEATURES, TRAJECTORY, type Playback, type Target } from "./matching.js";
 import type { Pose as Ground } from "./planar.js";
 import { inverse, nearestTurn, ofVector, product, type Quaternion, size, type Vector, vectorOf } from "./rotations.js";
-import { damped, dampingOf, wrapped } from "./springs.js";
+import { clamp, damped, dampingOf, wrapped } from "./springs.js";
 import type { Played } from "./steering.js";
 import type { ActSettings } from "./steeringSettings.js";
 
@@ -17,6 +17,8 @@ const SPINE = BONES.indexOf("spine");
 const HANDS = FEATURES - TRAJECTORY - 6;
 /** Radians that a metre of the hips' height counts as. */
 const METRE = 10;
+/** Times as long that what is lost fades at most: who is to kneel at once is down in half a second. */
+const LONGER = 1.75;
 /** Radians, metres and metres a second of which nothing is seen. */
 const FADED = 1e-4;
 
@@ -35,7 +37,8 @@ interface Playing {
 /** The act of one figure. */
 export interface Acting {
   playing: Playing | null;
-  /** Begun in the next tick, null to end what is played; upper: by the upper body alone, undefined: by the whole body where it stands. */
+  /** Begun in the next tick, null to end what is played; upper: by the upper body alone, undefined: by the whole body where it stands, or where
+   *  the act is one of the legs. */
   asked: { act: Act | null; upper: boolean | undefined } | null;
   /** Of the last tick without acts; as it was shown; and as it was shown in the tick before. */
   base: Body;
@@ -94,7 +97,8 @@ function next(now: Playing, goes: boolean): Playing | null {
 /** The act that is asked for, at the frame after the one that is most like the figure. */
 function entered({ steerer: { matcher }, acts: how, fps }: ControlModel, { playing }: Acting, act: Act, upper: boolean | undefined, playback: Playback, goes: boolean): Playing {
   const moves = goes || Math.hypot(playback.spring[0], playback.spring[1]) > matcher.how.idle;
-  const whole = upper === undefined ? !moves : !upper;
+  const stays = moves && act.legs; // its legs go on as it ends
+  const whole = upper === undefined ? stays || !moves : !upper;
   const isNow = matcher.now(playback);
   if (playing) matcher.scaled(playing.act.features[playing.frame]!).forEach((value, i) => (playing.whole || i >= HANDS) && (isNow[i] = value));
   const entries = Math.min(Math.round(how.entry * fps), Math.floor((act.height.length - 1) / 3)) + 1;
@@ -104,7 +108,7 @@ function entered({ steerer: { matcher }, acts: how, fps }: ControlModel, { playi
     const cost = (whole ? off : off.slice(HANDS)).reduce((sum, value) => sum + value * value, 0);
     if (cost < least) [best, least] = [frame, cost];
   }
-  return { act, frame: best + 1, age: 0, whole, yields: upper === undefined };
+  return { act, frame: best + 1, age: 0, whole, yields: upper === undefined && !stays };
 }
 
 /** After a tick: its pose with the act laid over it, and the figure where that leads. root: before the tick. */
@@ -153,7 +157,7 @@ function lose(acting: Acting, { blend, far }: ActSettings, base: Body, step: Gro
   acting.offsetRate = ahead.map((value, i) => (isNew(i) ? (value - off[i]!) / dt : acting.offsetRate[i]!));
   acting.offset = off.map((value, i) => (isNew(i) ? value : acting.offset[i]!));
   const farthest = Math.max(...BONES.map((_, bone) => size(vectorAt(acting.offset, bone))), METRE * Math.abs(acting.offset.at(-1)!));
-  acting.damping = dampingOf(blend) / Math.max(farthest / far, 1);
+  acting.damping = dampingOf(blend) / clamp(farthest / far, 1, LONGER);
   if (leads) acting.drift = each((i) => acting.going[i]! - step[i]! / dt);
 }
 

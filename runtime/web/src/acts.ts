@@ -7,14 +7,22 @@ import { BONES, groundUnder, HUMANOID, SIDES, solePoints } from "./humanoid.js";
 import { type Motion, type World, worldOf } from "./motion.js";
 import { moved, type Pose as Ground } from "./planar.js";
 import { about, minus, normalised, product, type Quaternion, quaternionOf, rotated, rotationOf, size, STILL, type Vector, Y } from "./rotations.js";
+import { wrapped } from "./springs.js";
 import type { Played } from "./steering.js";
 
 /** Frames of an act at least. */
 const SHORTEST = 3;
+/** Seconds of an act of which the rest at both ends is left out: less is a pose that is held. */
+const MOVES = 1;
 /** Numbers of a frame: a quaternion of each bone; x, z and facing of the root; the hips' height. */
 const WIDTH = 4 * BONES.length + 4;
 /** Of these numbers. */
 const LARGEST = 1e4;
+/** Metres between the highest and the lowest that hips are, or would be standing, metres above the ground of a ball of a foot, and
+ *  radians of a turn, beyond which an act is one of the legs. */
+const [BENT, RAISED, TURNED] = [0.25, 0.3, (150 * Math.PI) / 180];
+/** The height of the hips of a figure that stands straight. */
+const STANDS = HUMANOID.joints[0]!.offset[1];
 
 /** A motion that a steered figure can play, a frame in each tick; `actOf` makes it. */
 export interface Act {
@@ -24,6 +32,8 @@ export interface Act {
   height: number[];
   ground: Ground[];
   contacts: [left: number, right: number][];
+  /** Whether it is done by the legs: it bends them, jumps, raises a foot, or turns around. */
+  legs: boolean;
   /** How it is in each frame: the features after those of the trajectory, not scaled. */
   features: number[][];
 }
@@ -49,15 +59,25 @@ export function actOf({ fps, acts: { rest } }: ControlModel, name: string, numbe
   const places = (at: number) => world.places[at]!.flat();
   const fast = rows.map((_, at) => Math.max(...chunks(rate(places, at, frames, fps), 3).map((speed) => size(speed as Vector))) > rest);
   const [first, last] = [fast.indexOf(true), fast.lastIndexOf(true)];
-  const within = <T>(all: T[]): T[] => (first >= 0 && last - first >= SHORTEST ? all.slice(first, last + 1) : all);
-  return {
-    name,
-    rotations: within(poses.map(({ rotations }) => rotations)),
-    height: within(poses.map(({ height }) => height)),
-    ground: within(poses.map(({ ground }) => ground)),
-    contacts: within(footContacts(world, fps)),
-    features: within(poseFeatures(world, poses.map(({ ground }) => ground), fps)),
-  };
+  const within = <T>(all: T[]): T[] => (first >= 0 && last - first >= Math.round(MOVES * fps) ? all.slice(first, last + 1) : all);
+  const [height, ground] = [within(poses.map(({ height }) => height)), within(poses.map(({ ground }) => ground))];
+  const features = within(poseFeatures(world, poses.map(({ ground }) => ground), fps));
+  const contacts = within(footContacts(world, fps));
+  const legs = byLegs(height, ground, features);
+  return { name, rotations: within(poses.map(({ rotations }) => rotations)), height, ground, contacts, legs, features };
+}
+
+function byLegs(height: number[], ground: Ground[], features: number[][]): boolean {
+  const range = (values: number[]) => Math.max(...values) - Math.min(...values);
+  let facing = 0;
+  const turned = ground.map(([, , to]) => (facing += wrapped(to - facing)));
+  return range([STANDS, ...height]) > BENT || Math.max(...features.map((one) => Math.max(one[1]!, one[4]!))) > RAISED || range(turned) > TURNED;
+}
+
+/** Metres from where an act begins to where it ends. */
+export function reachOf({ ground }: Act): number {
+  const [from, to] = [ground[0]!, ground.at(-1)!];
+  return Math.hypot(to[0] - from[0], to[1] - from[1]);
 }
 
 /** The frames of a motion of any human figure, as `actOf` takes them. */

@@ -1,4 +1,5 @@
 /* Figures that are steered by motion matching; no ONNX Runtime is needed. */
+import { type Act, actOf, reachOf } from "./acts.js";
 import type { Bundle, Manifest } from "./bundle.js";
 import { ControlSession } from "./controlSession.js";
 import { BundleError, ControlError } from "./errors.js";
@@ -38,6 +39,7 @@ export class ControlModel extends Model {
   readonly steerer: Steerer;
   readonly lock: LockSettings;
   readonly acts: ActSettings;
+  private taken?: ReadonlyMap<string, readonly Act[]>;
 
   constructor(manifest: Manifest, tables: Tables) {
     super(manifest);
@@ -63,6 +65,18 @@ export class ControlModel extends Model {
     return Object.fromEntries(this.gaits.map((name, gait) => [name, of(gait)]));
   }
 
+  /** The recordings of gaits that go nowhere, such as "jump", as acts, by the gait's name. */
+  get takes(): ReadonlyMap<string, readonly Act[]> {
+    return (this.taken ??= takesOf(this));
+  }
+
+  /** The take of a gait that goes nowhere that leads the farthest for a figure that moves, and the least far for others. */
+  take(name: string, moves: boolean): Act {
+    const found = this.takes.get(name);
+    if (!found) throw new ControlError(`no act ${JSON.stringify(name)}; expected a motion, or one of ${[...this.takes.keys()].join(", ")}`);
+    return [...found].sort((a, b) => reachOf(a) - reachOf(b)).at(moves ? -1 : 0)!;
+  }
+
   /** A session of figures that stand still. ControlError for what is out of range. */
   start({ gait = this.gaits[0]!, characters = 1, places, holdFeet = true, strict = false, phases }: StartSettings = {}): ControlSession {
     if (!Number.isInteger(characters) || characters < 1 || characters > LARGEST_CROWD) {
@@ -81,6 +95,16 @@ export class ControlModel extends Model {
     if (!fits) throw new ControlError(`phases must be whole numbers from 0 to ${every - 1}, for all or for each of ${characters}`);
     return found;
   }
+}
+
+function takesOf(model: ControlModel): Map<string, Act[]> {
+  const { steerer, gaits, abilities } = model;
+  const { left } = steerer.matcher.tables;
+  const nowhere = [...gaits.keys()].filter((gait) => !abilities.speeds[gait]![1]);
+  const rows = (gait: number) => [...left.keys()].filter((row) => steerer.matcher.shows(row, gait));
+  const begins = (all: number[]) => all.filter((_, at) => !at || !left[all[at - 1]!]);
+  const take = (name: string, first: number) => actOf(model, name, steerer.recorded(first, left[first]! + 1));
+  return new Map(nowhere.map((gait) => [gaits[gait]!, begins(rows(gait)).map((first) => take(gaits[gait]!, first))]));
 }
 
 function configOf({ config, motion: { channels } }: Manifest, codes: number): { names: string[]; speeds: Speeds[]; odd: number } {

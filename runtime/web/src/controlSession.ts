@@ -33,6 +33,9 @@ export interface SteeredPose extends Pose {
   events: FigureEvent[];
 }
 
+/** What can be acted; null ends it. */
+export type Doable = Motion | Act | string | null;
+
 /** A value for all figures, or one for each. */
 export type ForAll<T> = T | readonly T[];
 
@@ -142,16 +145,22 @@ export class ControlSession {
 
   /**
    * Do something, from the next tick on, in place of what is being done: a motion of any human figure, or an act that
-   * `actOf` made of one, or null to end what is done; one for all, or one for each of `who`, the numbers of the figures. upper: by the upper body alone,
-   * or by the whole body with its own way over the ground; if neither is said, by the whole body where a figure stands, whose
-   * legs go as soon as it is told to. ControlError for figures that are not there, MotionError for what is no human's.
+   * `actOf` made of one, or the name of a gait that goes nowhere, such as "jump", done once and forward by who moves, or null to
+   * end what is done; one for all, or one for each of `who`, the numbers of the figures. upper: by the upper body alone, or by
+   * the whole body with its own way over the ground; if neither is said, by the whole body where a figure stands, whose legs go as
+   * soon as it is told to, or where the act is one of the legs, such as a kick, after which a figure that moves goes on.
+   * ControlError for figures that are not there and gaits that have no such act, MotionError for what is no human's.
    */
-  act(what: Motion | Act | null | readonly (Motion | Act | null)[], { who, upper }: { who?: readonly number[]; upper?: boolean } = {}): void {
+  act(what: Doable | readonly Doable[], { who, upper }: { who?: readonly number[]; upper?: boolean } = {}): void {
     const figures = this.who(who);
-    const given = (Array.isArray(what) ? what : Array<typeof what>(figures.length).fill(what)) as (Motion | Act | null)[];
+    const given = (Array.isArray(what) ? what : Array<typeof what>(figures.length).fill(what)) as Doable[];
     if (given.length !== figures.length) throw new ControlError(`${given.length} acts do not fit ${figures.length} figures`);
-    const made = new Map([...new Set(given)].map((one) => [one, one && "skeleton" in one ? actOf(this.model, "act", numbersOf(this.model, one)) : one]));
-    figures.forEach((at, i) => (this.state.figures[at]!.acting.asked = { act: made.get(given[i]!)!, upper }));
+    const made = new Map([...new Set(given)].map((one) => [one, one && typeof one === "object" && "skeleton" in one ? actOf(this.model, "act", numbersOf(this.model, one)) : one]));
+    const acts = figures.map((at, i) => {
+      const [what, [x, z]] = [made.get(given[i]!)!, this.state.figures[at]!.target];
+      return typeof what === "string" ? this.model.take(what, !!(x || z)) : what;
+    });
+    figures.forEach((at, i) => (this.state.figures[at]!.acting.asked = { act: acts[i]!, upper }));
   }
 
   /**

@@ -39,6 +39,16 @@ export class Gaits {
     return direction - clamp(wrapped(direction - facing), -farthest, farthest);
   }
 
+  /** A target as a figure with a facing goes for it: a gait that only goes forward leads and turns no farther aside than it
+   *  goes anyway, so that the figure goes a curve instead of turning on the spot. */
+  curved([x, z, to]: Target, gait: number, facing: number): Target {
+    const [, , , sideways, backwards] = this.speeds[gait]!;
+    if (Math.min(sideways, backwards) > 0 || !(x || z)) return [x, z, to];
+    const near = (angle: number) => facing + clamp(wrapped(angle - facing), -this.how.ahead, this.how.ahead);
+    const [direction, speed] = [near(Math.atan2(x, z)), Math.hypot(x, z)];
+    return [speed * Math.sin(direction), speed * Math.cos(direction), near(to)];
+  }
+
   /** A command's target within the gait's limits, and what is said where it exceeds them. */
   target({ gait, speed, direction, facing: told }: Command): { target: Target; beyond: string | null } {
     const [slowest, , ...fastest] = this.speeds[gait]!;

@@ -114,7 +114,10 @@ export class Matcher {
     this.codeSigns = Float64Array.from({ length: this.codes }, (_, k) => (k < this.codes - odd ? 1 : -1));
     this.features = Int16Array.from(tables.features, (step) => (step * STEPS) / TABLE_STEPS);
     const lasts = (row: number) => tables.left[row]! >= Math.max(this.reserve, how.lasting) && !this.flies(row);
-    const all = [...Array(this.rows).keys()].filter(lasts);
+    // what is played at its own rate leads to a leap, with arms that swing: it is entered well before
+    const soon = Array.from({ length: how.prepares + 1 }, (_, at) => at);
+    const leaps = (row: number) => !tables.moves[6 * row + 3] && soon.some((at) => row + at < this.rows && this.flies(row + at));
+    const all = [...Array(this.rows).keys()].filter((row) => lasts(row) && !leaps(row));
     this.goals = Array.from({ length: gaits }, (_, gait) => {
       const rows = all.filter((row) => this.shows(row, gait)).filter((_, at) => at % how.row_step === 0);
       return new Goals(this.features, FEATURES, rows, tables.feature_mean, tables.feature_scale, how.lag);
@@ -139,11 +142,11 @@ export class Matcher {
     return pace < creep ? creep / Math.max(pace, Math.min(LEAST_PACE, creep)) : 1;
   }
 
-  /** The row of a gait with the least speed, the first of them; of those that something follows. */
+  /** The row of a gait with the least speed, the first of them; of those that something follows, on the ground. */
   stillest(gait: number): number {
     let still = -1;
     for (let row = 0; row < this.rows; row++) {
-      if (!this.shows(row, gait) || this.tables.left[row]! < this.reserve) continue;
+      if (!this.shows(row, gait) || this.tables.left[row]! < this.reserve || this.flies(row)) continue;
       if (still < 0 || this.tables.moves[6 * row + 3]! < this.tables.moves[6 * still + 3]!) still = row;
     }
     return still;

@@ -50,9 +50,10 @@ export function hasten(playback: Playback): void {
   if (!playback.inTurn) playback.ticksToSearch = 0;
 }
 
-/** The next pose, 1 / fps seconds later. */
-export function tick(model: ControlModel, figure: Steered, holdFeet: boolean, target = figure.target): Played {
+/** The next pose, 1 / fps seconds later. raw: a target in place of the figure's own, gone for as it is. */
+export function tick(model: ControlModel, figure: Steered, holdFeet: boolean, raw?: Target): Played {
   const { playback, acting, command } = figure;
+  const target = raw ?? model.abilities.curved(figure.target, command.gait, playback.root[2]);
   const { steerer, lock: how, fps } = model;
   const [{ root }, dt] = [playback, 1 / fps];
   const changed = begin(model, acting, playback, target, command.gait);

@@ -1,6 +1,6 @@
 /* The step of a steered figure: docs/bundle.md, the loop `matching`. Metres, seconds and radians. */
 import { LEAST_PACE, type Matcher, type Playback, type Target } from "./matching.js";
-import type { Pose as Ground } from "./planar.js";
+import { moved, type Pose as Ground } from "./planar.js";
 import type { Quaternion } from "./rotations.js";
 import { clamp, damped, dampingOf, wrapped } from "./springs.js";
 import { strided, warped } from "./warping.js";
@@ -45,7 +45,8 @@ export class Steerer {
     this.warp(figure, moves[3]!);
     this.move(figure, moves, matcher.creeping(target, gait));
     this.fade(figure, dampingOf(how.blend));
-    const contacts: [number, number] = figure.mirror ? [moves[5]!, moves[4]!] : [moves[4]!, moves[5]!];
+    const [left, right] = [Math.fround(moves[4]!), Math.fround(moves[5]!)]; // so bounds are passed in the same ticks as in Python
+    const contacts: [number, number] = figure.mirror ? [right, left] : [left, right];
     return { ground: figure.root, ...this.body(figure), contacts };
   }
 
@@ -55,6 +56,19 @@ export class Steerer {
     const { rotations, height } = this.pose();
     const legs = strided(rotations, figure.stride);
     return { rotations: warped(legs, figure.warp), height };
+  }
+
+  /** So many rows from the first on, as `actOf` takes their frames. */
+  recorded(first: number, count: number): number[] {
+    const { tables, dt, codes } = this.matcher;
+    let ground: Ground = [0, 0, 0];
+    return Array.from({ length: count }, (_, at) => {
+      const [row, move] = [first + at, (i: number) => tables.moves[6 * (first + at) + i]! * dt];
+      if (at) ground = moved(ground, [move(0), move(1), move(2)]);
+      this.codes.set(tables.codes.subarray(row * codes, (row + 1) * codes));
+      const { rotations, height } = this.pose();
+      return [...rotations.flat(), ...ground, height];
+    }).flat();
   }
 
   /** Velocity over the ground (forward, left, turn), speed, and how much each foot stands, of the row as recorded. */

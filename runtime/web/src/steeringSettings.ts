@@ -16,6 +16,7 @@ const STEERING = {
   lasting: [20, 0, 10_000],
   jump_back: [20, 0, 10_000],
   jump_ahead: [5, 0, 10_000],
+  prepares: [9, 0, 10_000],
   row_step: [2, 1, 100],
   stands: [0.1, 0, 1],
   blend: [0.13, ...HALF_LIFE],
@@ -50,7 +51,7 @@ const LOCK = {
 
 const ACTS = { blend: [0.12, ...HALF_LIFE], far: [0.7, 0.01, 3.15], entry: [0.5, 0, 10], rest: [0.25, 0, 100] } as const satisfies Record<string, Range>;
 
-const WHOLE = ["search_every", "lasting", "jump_back", "jump_ahead", "row_step"];
+const WHOLE = ["search_every", "lasting", "jump_back", "jump_ahead", "prepares", "row_step"];
 
 export type Steering = Record<keyof typeof STEERING, number>;
 export type LockSettings = Record<keyof typeof LOCK, number>;

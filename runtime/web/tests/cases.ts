@@ -195,10 +195,11 @@ async function steers(read: Read): Promise<void> {
     type Go = Way & { points: number[][] | null };
     type Some = { who?: number[] };
     type Points = { points: number[] | number[][] | null };
-    type Call = { put?: number[][]; push?: number[]; control?: Told; act?: { who: number[]; upper?: boolean }; end?: Some; look_at?: Some & Points; reach?: Some & Points & { hand: "left" | "right" }; keep_apart?: number | null; go_to?: Go; go_along?: Go };
-    const found = (python.steering as Call[]).flatMap(({ put, push, control, act, end, keep_apart, go_to, go_along, look_at, reach }, call) => {
+    type Call = { put?: number[][]; push?: number[]; control?: Told; act?: { who: number[]; upper?: boolean }; end?: Some; jump?: Some; look_at?: Some & Points; reach?: Some & Points & { hand: "left" | "right" }; keep_apart?: number | null; go_to?: Go; go_along?: Go };
+    const found = (python.steering as Call[]).flatMap(({ put, push, control, act, end, jump, keep_apart, go_to, go_along, look_at, reach }, call) => {
       if (act) session.act(turn, act);
       if (end) session.act(null, end);
+      if (jump) session.act("jump", jump);
       if (look_at) session.lookAt(look_at.points, look_at);
       if (reach) session.reach(reach.hand, reach.points, reach);
       if (put) session.put(put);

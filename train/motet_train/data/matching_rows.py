@@ -4,16 +4,18 @@ Letters in shapes: T frames, N rows, J bones, F features, G gaits.
 """
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation, binary_opening, gaussian_filter1d
 
 from motet.decode.acts import foot_contacts, pose_features, seen
 from motet.decode.matching import HORIZONS, horizons, mirrored_features, speed_feature
 from motet.decode.steering_settings import SteeringSettings
-from motet.motion.humanoid import BONES
+from motet.motion.feet.contacts import GROUND_PERCENT, ContactSettings, contacts, ground_speeds
+from motet.motion.humanoid import BONES, sole_points
 from motet.motion.kinematics import global_transforms
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, rotmat_to_quat, rotmat_to_rotvec
@@ -36,6 +38,19 @@ GROUPS = {
 }
 """Groups of features, the length of each and its weight; most as in Holden's "Learned Motion Matching" (2020), but of
 feet a quarter more, so that fewer feet that swing are to stand at once."""
+
+
+STANDS = ContactSettings(heights=(0.03, 0.06), speeds=(0.2, 0.6))
+"""Of soles of recordings on level ground: a foot that turns on its ball is not let go, one that lands is not held."""
+
+LEVELLED = ContactSettings(heights=(0.05, 0.08))
+"""Of soles that show where the ground is."""
+
+LEAP, AROUND = 0.4, 0.3
+"""Seconds of a flight that is no running step, and before and after it that belong to it."""
+
+LEVEL_FOR = 0.1
+"""Seconds, the standard deviation of the window over which ground is level."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +81,7 @@ def recordings(store: Store, gaits: tuple[Gait, ...], held: bool = True) -> list
             continue
         features = store.motion(index)
         if held:
-            features = representation.planted(features)
+            features = _levelled(representation.planted(features))
         pieces = _jumps(features) if shown == {"jump"} else _sound(features)
         found += [Recording(piece, shown) for piece in pieces if len(piece) >= 1.5 * store.fps]
     missing = [gait.name for gait in gaits if not any(gait.name in one.gaits for one in found)]
@@ -74,6 +89,20 @@ def recordings(store: Store, gaits: tuple[Gait, ...], held: bool = True) -> list
         how = "name gaits in a column gait of the table of sentences, or give motet prepare a table of them, --gaits"
         raise DataError(f"no recording of 1.5 s shows the gait {missing[0]!r}: {how}")
     return found
+
+
+def _levelled(features: Motion) -> Motion:
+    """A recording on level ground: floors of recordings rise and fall by centimetres, even within a step, and feet that
+    seem to float are not held. The ground is where the lowest point of the soles is, as far as it is slow and low."""
+    soles = sole_points(*global_transforms(named("root_sixd").motion(features)))
+    lowest, which = soles[..., 1].min(axis=1), soles[..., 1].argmin(axis=1)
+    speeds = np.take_along_axis(ground_speeds(soles, features.fps), which[1:, None], axis=1)[:, 0]
+    stands = contacts(lowest[1:] - np.percentile(lowest, GROUND_PERCENT), speeds, LEVELLED)
+    weights, window = np.append(stands[:1], stands) + 1e-6, LEVEL_FOR * features.fps
+    ground = gaussian_filter1d(weights * lowest, window) / gaussian_filter1d(weights, window)
+    values = features.values.copy()
+    values[:, features.channels.index("root.height")] -= ground
+    return replace(features, values=values)
 
 
 def _sound(features: Motion) -> list[Motion]:
@@ -124,22 +153,32 @@ class MatchingRows:
 def rows_of(found: list[Recording], gaits: tuple[str, ...], how: SteeringSettings) -> MatchingRows:
     """The rows of recordings on the humanoid, quaternions of a bone on one half of their sphere where they can be.
 
-    Jumps have no speed, as they are played neither faster nor slower: who flies falls at a rate of its own.
+    Jumps have no speed, as they are played neither faster nor slower: who flies falls at a rate of its own. Leaps
+    within other gaits show none: nobody is told to go where they lead.
     """
     parts = [_rows(one.features, how) for one in found]
     poses, moves, speed, contacts, features = (np.concatenate(column) for column in zip(*parts, strict=True))
     lengths = [len(one.features) for one in found]
     shown = np.repeat([[gait in one.gaits for gait in gaits] for one in found], lengths, axis=0)
-    speed = np.where(np.repeat([one.gaits <= {"jump"} for one in found], lengths), 0.0, speed)
+    jumps = np.repeat([one.gaits <= {"jump"} for one in found], lengths)
+    shown[~jumps & _leaps(contacts.max(axis=1) < how.stands, found[0].features.fps)] = False
+    speed = np.where(jumps, 0.0, speed)
     left = np.concatenate([np.arange(length)[::-1] for length in lengths])
     return MatchingRows(_aligned(poses), moves, speed, contacts, features, shown, left)
+
+
+def _leaps(flies: NDArray[np.bool_], fps: float) -> NDArray[np.bool_]:
+    """The rows (N,) of flights of :data:`LEAP` seconds and more, and of :data:`AROUND` seconds before and after."""
+    shortest, around = (np.ones(2 * round(of * fps / 2) + 1, dtype=bool) for of in (LEAP, 2 * AROUND))
+    found: NDArray[np.bool_] = binary_dilation(binary_opening(flies, shortest), around)
+    return found
 
 
 def _rows(features: Motion, how: SteeringSettings) -> tuple[Array, Array, Array, Array, Array]:
     turned, places = global_transforms(named("root_sixd").motion(features))
     block = features.select(ROOT_SIXD).values
     way = poses_of(block, features.fps)  # x, z, facing
-    contacts = foot_contacts(turned, places, features.fps)
+    contacts = foot_contacts(turned, places, features.fps, STANDS)
     speed = np.hypot(block[:, 0], block[:, 1])
     window = np.ones(min(round(0.5 * features.fps), len(speed)))  # half a second
     speed = np.convolve(speed, window, "same") / np.convolve(np.ones(len(speed)), window, "same")

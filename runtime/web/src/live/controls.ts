@@ -29,7 +29,7 @@ export function addControls(page: Page, most: number): void {
   addFiles(page);
   for (const kind of Object.keys(KINDS)) element(kind).onclick = () => save(page, kind);
   page.hands.buttons = {
-    4: () => setGait(page, page.state.gait + page.net.gaits.length - 1), 5: () => setGait(page, page.state.gait + 1), 9: () => toggle(page, "pause"),
+    4: () => setGait(page, nextGait(page, -1)), 5: () => setGait(page, nextGait(page, 1)), 9: () => toggle(page, "pause"),
   };
   element("facts").textContent = `${page.net.gaits.length} gaits · ${page.net.rows} recorded poses · ${page.net.fps} ticks a second`;
 }
@@ -44,9 +44,21 @@ function toggle(page: Page, name: (typeof TOGGLES)[number]): void {
   element(name).setAttribute("aria-pressed", `${page.state[name]}`);
 }
 
+/** Move in a gait from now on; one that goes nowhere, a jump, is done once. */
 function setGait(page: Page, gait: number): void {
-  page.state.gait = gait % page.net.gaits.length;
-  [...element("gaits").children].forEach((button, n) => button.setAttribute("aria-pressed", `${n === page.state.gait}`));
+  if (!goesOn(page, gait)) return page.once(page.net.gaits[gait]!);
+  page.state.gait = gait;
+  [...element("gaits").children].forEach((button, n) => goesOn(page, n) && button.setAttribute("aria-pressed", `${n === gait}`));
+}
+
+function goesOn({ net }: Page, gait: number): boolean {
+  return net.speeds[net.gaits[gait]!]![1]! > 0;
+}
+
+/** The gait before or after that of the first figure, of those that go on. */
+function nextGait(page: Page, by: -1 | 1): number {
+  const all = [...page.net.gaits.keys()].filter((gait) => goesOn(page, gait));
+  return all.at((all.indexOf(page.state.gait) + by) % all.length)!;
 }
 
 function addGaits(page: Page): void {

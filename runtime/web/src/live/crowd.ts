@@ -85,10 +85,9 @@ export function towards(net: Net, figures: Figure[], n: number, [toX, toZ]: read
   return { gait, x: vx * ratio, z: vz * ratio, facing: speed ? Math.atan2(vx, vz) : figure.asked.facing };
 }
 
-/** The usual speed of a gait, or half the highest of one that mostly stands. */
+/** The usual speed of a gait. */
 export function usual({ gaits, speeds }: Net, gait: number): number {
-  const [, middle, high] = speeds[gaits[gait]!]!;
-  return middle! || high! / 2;
+  return speeds[gaits[gait]!]![1]!;
 }
 
 /** The gait that is the fastest mostly. */

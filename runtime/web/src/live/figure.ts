@@ -63,6 +63,10 @@ export class Figure {
     return [x, z];
   }
 
+  get goes(): boolean {
+    return Math.hypot(...this.velocity) > 0.1;
+  }
+
   /** What it was asked, within the limits of its gait. */
   get asked(): Asked {
     const [x, z, facing] = this.steered.target;

@@ -11,7 +11,7 @@ import { Scene } from "./scene.js";
 import type { Stage } from "./stage.js";
 import { stick } from "./stick.js";
 import { type Act, actOf, numbersOf } from "../acts.js";
-import { orderOf, saysAll } from "./words.js";
+import { onceOf, orderOf, saysAll } from "./words.js";
 
 /** What motet/live/page.py writes into a page. bytes: base64. */
 export interface Given {
@@ -84,6 +84,11 @@ export class Page {
       this.pilot = order;
       return order.speed ? `${this.net.gaits[order.gait]}, ${order.speed.toFixed(1)} m/s` : "standing";
     }
+    const once = onceOf(text, this.net);
+    if (once) {
+      this.once(once, saysAll(text));
+      return once;
+    }
     const found = this.repertoire.find(text);
     if (!found) return `? It knows ${KNOWN}: type ${this.repertoire.names[0]}, or choose from the list.`;
     this.act(found.act, found.arms, saysAll(text));
@@ -98,13 +103,17 @@ export class Page {
     return told;
   }
 
+  /** Do once what a gait that goes nowhere shows, of all figures or the first, and go on. */
+  once(gait: string, all = false): void {
+    for (const figure of all ? this.figures : [this.figures[0]!]) figure.act(this.net.model.take(gait, figure.goes), false);
+  }
+
   /** Begin an act, of all figures or the first; one of the whole body ends what steers it. */
   private act(act: Act, arms: boolean, all: boolean): void {
     if (!arms) this.pilot = null;
     this.whole = this.held = !arms;
     for (const figure of all ? this.figures : [this.figures[0]!]) {
-      const goes = Math.hypot(...figure.velocity) > 0.1;
-      figure.act(act, goes && !arms ? false : undefined);
+      figure.act(act, figure.goes && !arms ? false : undefined);
     }
   }
 

@@ -44,6 +44,12 @@ export function orderOf(text: string, net: Net, { asked, root }: Figure): Order 
   return found;
 }
 
+/** The gait that goes nowhere whose name is all that a sentence says: it is done once. */
+export function onceOf(text: string, net: Net): string | undefined {
+  const words = wordsOf(text).filter((word) => !IDLE.has(word) && !ALL.has(word)).map(stem);
+  return words.length === 1 ? net.gaits.find((name) => !net.speeds[name]![1] && stem(name) === words[0]) : undefined;
+}
+
 /** Finds what a sentence asks for among sentences with further words that are said of the same. */
 export class Phrases {
   private readonly stems: Set<string>[];

@@ -38,7 +38,7 @@ from motet_train.evaluate.steer.following import (
     way_off,
     ways_errors,
 )
-from motet_train.evaluate.steer.players import reversal_figures, stick_figures
+from motet_train.evaluate.steer.players import SEED, reversal_figures, stick_figures
 from motet_train.evaluate.steer.told import act_figures, going_figures, said_acts
 from motet_train.evaluate.tables import Goals, Report, gathered, report_table
 
@@ -166,7 +166,7 @@ class _Teller:
 
 
 def watched(
-    model: SteerModel, limits: Limits, seconds: float, characters: int, seed: int = 1, chunk: int = 30
+    model: SteerModel, limits: Limits, seconds: float, characters: int, seed: int = SEED, chunk: int = 30
 ) -> Watch:
     """What figures do that are told anything at random, with the foot lock. chunk: ticks looked at together."""
     teller, ticks = _Teller(model, characters, seed), round(seconds * model.fps)
