@@ -9,7 +9,6 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation, binary_opening, gaussian_filter1d
 
 from motet.decode.acts import foot_contacts, pose_features, seen
 from motet.decode.matching import HORIZONS, horizons, mirrored_features, speed_feature
@@ -94,6 +93,8 @@ def recordings(store: Store, gaits: tuple[Gait, ...], held: bool = True) -> list
 def _levelled(features: Motion) -> Motion:
     """A recording on level ground: floors of recordings rise and fall by centimetres, even within a step, and feet that
     seem to float are not held. The ground is where the lowest point of the soles is, as far as it is slow and low."""
+    from scipy.ndimage import gaussian_filter1d  # for this alone, so that other trainings do not load it
+
     soles = sole_points(*global_transforms(named("root_sixd").motion(features)))
     lowest, which = soles[..., 1].min(axis=1), soles[..., 1].argmin(axis=1)
     speeds = np.take_along_axis(ground_speeds(soles, features.fps), which[1:, None], axis=1)[:, 0]
@@ -169,6 +170,8 @@ def rows_of(found: list[Recording], gaits: tuple[str, ...], how: SteeringSetting
 
 def _leaps(flies: NDArray[np.bool_], fps: float) -> NDArray[np.bool_]:
     """The rows (N,) of flights of :data:`LEAP` seconds and more, and of :data:`AROUND` seconds before and after."""
+    from scipy.ndimage import binary_dilation, binary_opening  # for this alone, as above
+
     shortest, around = (np.ones(2 * round(of * fps / 2) + 1, dtype=bool) for of in (LEAP, 2 * AROUND))
     found: NDArray[np.bool_] = binary_dilation(binary_opening(flies, shortest), around)
     return found
