@@ -295,8 +295,9 @@ def control(
     captions = model.captions(script)
     with naming(start), noted():
         first = read(Path(start)) if start and (Path(start).suffix or names_motion(start)) else start
-        acts = {order.act for order in parse_orders(script, model.gaits)} if isinstance(model, SteerModel) else set()
-        if isinstance(model, SteerModel) and acts - {None, *model.takes}:
+        if isinstance(model, SteerModel) and any(
+            order.act and order.act not in model.takes for order in parse_orders(script, model.gaits)
+        ):
             chosen["words"] = load_as(GenerateModel, "generate", session)
         motion = model.run(script, first, **chosen)
     motion = output.shaped(motion)

@@ -55,6 +55,7 @@ test("ways that cannot be gone are refused, and change nothing", () => {
     [() => session.goTo([1, 0], { speed: 0 }), /speed must be above 0/],
     [() => session.goTo([1, 0], { facing: NaN }), /facing must be finite/],
     [() => session.goTo([1, 0], { gait: "fly" }), /unknown gait "fly"/],
+    [() => session.act(["jump", "fly"]), /no act "fly"; expected a motion, or one of jump/],
     [() => session.goAlong([]), /a path needs 1 to 10000 points/],
     [() => session.goAlong([[1, 0], [2]]), /points needs x, z/],
     ...[0, 0.05, 6, NaN].map((room): [() => void, RegExp] => [() => session.keepApart(room), /keep 0.1 to 5 m apart/]),
