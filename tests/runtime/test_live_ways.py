@@ -193,7 +193,7 @@ def test_a_click_sends_it_there_and_a_drag_does_not(page: Browser) -> None:
         page.value(TICKS.format(30))
         if page.value("motet.pilot === null"):
             break
-    assert np.hypot(*np.subtract(page.value(TICKS.format(60))[:2], goal)) < 0.3
+    assert np.hypot(*np.subtract(page.value(TICKS.format(60))[:2], goal)) < 0.02
 
 
 def test_a_phone_held_sideways_has_all_and_does_not_scroll(page: Browser) -> None:

@@ -1,9 +1,11 @@
 /* The model of a live page, and its figures. */
 import { doing, type Doing } from "../acting.js";
 import { type Act, motionOf } from "../acts.js";
+import type { Going } from "../arriving.js";
 import { ControlModel } from "../control.js";
 import type { Manifest } from "../bundle.js";
 import { HUMANOID, SIDES } from "../humanoid.js";
+import { lead } from "../leading.js";
 import type { Tables } from "../matching.js";
 import { worldOf } from "../motion.js";
 import type { Pose as Ground } from "../planar.js";
@@ -73,11 +75,21 @@ export class Figure {
     return { gait: this.steered.command.gait, x, z, facing };
   }
 
-  /** A tick later, asked anew. */
-  tick({ gait, x, z, facing }: Asked): void {
+  /** A tick later, asked anew or led along a path. */
+  tick(asked: Asked | Going): void {
+    if ("points" in asked) this.lead(asked);
+    else this.tell(asked);
+    [this.before, this.now] = [this.now, tick(this.model, this.steered, true)];
+  }
+
+  private tell({ gait, x, z, facing }: Asked): void {
     const command = { gait, speed: Math.hypot(x, z), direction: Math.atan2(x, z), facing, facesWay: false };
     tell(this.steered, command, this.model.abilities.target(command).target);
-    [this.before, this.now] = [this.now, tick(this.model, this.steered, true)];
+  }
+
+  private lead(going: Going): void {
+    this.steered.going = going;
+    lead(this.model, [this.steered], 0);
   }
 
   /** Do something, from the next tick on, or null: end what it does. `upper` as in a session's `act`. Meanwhile a whole body faces as the act does. */

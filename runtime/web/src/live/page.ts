@@ -11,6 +11,7 @@ import { Scene } from "./scene.js";
 import type { Stage } from "./stage.js";
 import { stick } from "./stick.js";
 import { type Act, actOf, numbersOf } from "../acts.js";
+import type { Going } from "../arriving.js";
 import { onceOf, orderOf, saysAll } from "./words.js";
 
 /** What motet/live/page.py writes into a page. bytes: base64. */
@@ -118,7 +119,7 @@ export class Page {
   }
 
   /** What the first figure is asked: by hand, or else by its pilot, or else to stand. */
-  asked(): Asked {
+  asked(): Asked | Going {
     const [x, y] = this.hands.pushed;
     const pushed = x !== 0 || y !== 0;
     this.held &&= pushed;
@@ -162,7 +163,7 @@ export class Page {
   }
 
   /** A tick of all figures, the first of them with a control. */
-  tick(control: Asked): void {
+  tick(control: Asked | Going): void {
     const { figures, net, state } = this;
     figures.forEach((figure, n) => figure.tick(n ? ownControl(net, figures, n, state.follows) : control));
     this.ticks++;

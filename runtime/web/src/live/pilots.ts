@@ -1,20 +1,20 @@
 /* Who steers the first figure while no hand does: a figure of eight, a point to go to, or an order. */
+import { type Going, sent } from "../arriving.js";
 import { type Asked, type Figure, inRange } from "./figure.js";
 import { fastest, type Net, towards, usual } from "./crowd.js";
-import { dampedPath, dampingOf } from "../springs.js";
 
-/** Asks a figure each tick; null when it is done. goal: where it goes, x and z in metres. */
+/** Asks a figure each tick, or leads it along a path; null when it is done. goal: where it goes, x and z in metres. */
 export interface Pilot {
   readonly goal?: readonly [number, number];
-  ask(net: Net, figure: Figure): Asked | null;
+  ask(net: Net, figure: Figure): Asked | Going | null;
 }
 
 /** Half the length of an eight, how far ahead its point is, and a step along it; metres, metres, radians. */
 const [HALF, AHEAD, STEP] = [3.2, 0.9, 0.02];
 /** m/s at which the second round is run. */
 const RUNS = 2.6;
-/** Metres from its point at which a figure has arrived, and from which on it runs there; the slowest that it goes, m/s. */
-const [NEAR, FAR_AWAY, SLOWEST] = [0.3, 5, 0.5];
+/** Metres from its point from which on a figure runs there, and within which it is there. */
+const [FAR_AWAY, THERE] = [5, 0.01];
 
 /** A figure of eight about where a figure stands, Gerono's lemniscate: walked, then run, in turns. */
 export function eight({ root: [x, z, facing] }: Figure): Pilot {
@@ -36,21 +36,16 @@ export function eight({ root: [x, z, facing] }: Figure): Pilot {
 
 /** Go to a point and stop there; run where it is far. */
 export function goTo(goal: readonly [number, number]): Pilot {
+  let going: Going | null = null;
   return {
     goal,
-    ask(net, figure) {
-      const [x, z] = figure.root;
+    ask(net, { root: [x, z] }) {
       const away = Math.hypot(goal[0] - x, goal[1] - z);
-      if (away < Math.max(NEAR, stopping(net, figure))) return null;
-      const most = away > FAR_AWAY ? usual(net, fastest(net)) : usual(net, 0);
-      return towards(net, [figure], 0, goal, Math.min(most, Math.max(SLOWEST, 1.5 * away)));
+      const gait = away > FAR_AWAY ? fastest(net) : 0;
+      going ??= sent([[x, z], goal], { gait, speed: usual(net, gait), facing: null });
+      return going.arrived && away < THERE ? null : going;
     },
   };
-}
-
-/** How far a figure goes on if it is asked to stop: by its spring, from its speed. */
-function stopping({ model }: Net, figure: Figure): number {
-  return dampedPath(Math.hypot(...figure.velocity), 0, dampingOf(model.steerer.matcher.how.velocity), 2);
 }
 
 /** An order that stays: a gait, its speed, and the way, which is faced. */
