@@ -19,7 +19,8 @@ from motet.representation.contract import MotionContract, named
 from motet_export.bundles import export_run, parity_of
 from motet_export.exporter import ExportError
 from motet_train.data.cmu_trials import CMU_FOLDER
-from motet_train.data.matching_rows import Recording, rows_of
+from motet_train.data.matching_rows import rows_of
+from motet_train.data.recorded import Recording
 from motet_train.models.kinematics import tree_of
 from motet_train.models.matching import Matching, MatchingConfig
 from motet_train.recipes.matching import take

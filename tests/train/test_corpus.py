@@ -15,13 +15,13 @@ from motet.formats.gltf_data import parse
 from motet.formats.mmm import read
 from motet.motion import in_place
 from motet.motion.feet.treadmill import with_travel
-from motet_train.data import matching_rows
+from motet_train.data import recorded
 from motet_train.data.archive import Archive
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.corpus import Record, Skipped, read_corpus, recordings
 from motet_train.data.errors import DataError
-from motet_train.data.matching_rows import gaits_of
 from motet_train.data.preparation import SIXD
+from motet_train.data.recorded import gaits_of
 from motet_train.data.store import prepare
 from motet_train.data.table import Person, person, read_gaits, read_people, read_table
 
@@ -175,7 +175,7 @@ def test_a_column_or_a_table_of_patterns_says_which_gaits_are_shown(own: Path) -
     unsaid = replace(store, records=tuple(replace(record, gaits=()) for record in store.records))
     assert gaits_of(unsaid) == read_gaits()
     with pytest.raises(DataError, match="shows the gait 'walk': name gaits in a column gait"):
-        matching_rows.recordings(unsaid, gaits_of(unsaid))
+        recorded.recordings(unsaid, gaits_of(unsaid))
     patterns.write_text('[[gait]]\nname = "sprint"\n')
     with pytest.raises(DataError, match=r"gaits\.toml is not a table of gaits"):
         read_gaits(patterns)

@@ -14,14 +14,15 @@ from motet.formats import read_motion
 from motet.models.steer import FEATURE_STEPS
 from motet.motion.humanoid import sole_points
 from motet.motion.humanoid.bones import BONES, HUMANOID
-from motet.motion.kinematics import global_transforms, positions
+from motet.motion.kinematics import global_transforms, local_rotations, posed, positions
 from motet.motion.mirroring import mirror
 from motet.motion.motion import Motion
 from motet.motion.pose import Pose
-from motet.motion.rotations import Array
+from motet.motion.rotations import Array, axis_to_rotmat
 from motet.representation.contract import MotionContract, named
 from motet_train.data.cmu_trials import CMU_FOLDER
-from motet_train.data.matching_rows import MatchingRows, Recording, _leaps, _levelled, mirrored_poses, rows_of
+from motet_train.data.matching_rows import MatchingRows, _leaps, mirrored_poses, rows_of
+from motet_train.data.recorded import SLOPE, Recording, _levelled, _with_even_collars
 from motet_train.data.table import Gait, read_gaits
 from motet_train.models.kinematics import tree_of
 from motet_train.models.matching import DTYPES, Matching, MatchingConfig
@@ -71,6 +72,21 @@ def test_a_floor_that_rises_and_falls_is_made_level(walk: Motion) -> None:
     assert np.abs(found.values - level.values).max() < 0.004
     soles = sole_points(*global_transforms(named("root_sixd").motion(found)))
     assert np.percentile(np.abs(soles[..., 1].min(axis=1)), 90) < 0.01
+
+
+@pytest.mark.parametrize("droops", [0.0, 35.0])
+def test_collars_slope_alike_whoever_is_recorded_and_arms_stay(walk: Motion, droops: float) -> None:
+    collars, arms = ([HUMANOID.index(side + part) for side in ("left", "right")] for part in ("Shoulder", "UpperArm"))
+    local = local_rotations(walk)
+    ways = axis_to_rotmat("z", np.radians([-droops, droops]))
+    turned = {HUMANOID.names[joint]: way @ local[:, joint] for way, joint in zip(ways, collars, strict=True)}
+    before = named("root_sixd").features(posed(walk, turned, {}))
+    found = named("root_sixd").motion(_with_even_collars(before))
+    bones = np.einsum("tjab,jb->tja", local_rotations(found, collars), HUMANOID.offsets[arms])
+    slopes = np.degrees(np.arctan2(-bones[..., 1], np.abs(bones[..., 0])))
+    assert slopes.mean(axis=0) == pytest.approx(SLOPE, abs=0.1)
+    turns, as_before = (global_transforms(motion)[0][:, arms] for motion in (found, named("root_sixd").motion(before)))
+    np.testing.assert_allclose(turns, as_before, atol=1e-6)
 
 
 def test_leaps_are_long_flights_and_what_is_around_them() -> None:

@@ -25,7 +25,7 @@ from motet.representation.contract import named
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.corpus import Record
 from motet_train.data.errors import DataError
-from motet_train.data.matching_rows import gaits_of, recordings
+from motet_train.data.recorded import gaits_of, recordings
 from motet_train.data.store import Store, prepare
 from motet_train.evaluate.steer import following, players, told
 from motet_train.evaluate.steer.report import Recorded, seldom, steer_report, steer_text

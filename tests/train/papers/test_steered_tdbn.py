@@ -24,7 +24,7 @@ from motet_train.cli.suites import as_steered
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.corpus import Record
 from motet_train.data.errors import DataError
-from motet_train.data.matching_rows import gaits_of, recordings
+from motet_train.data.recorded import gaits_of, recordings
 from motet_train.data.store import Store, prepare
 from motet_train.evaluate.steer import following
 from motet_train.evaluate.steer.report import Recorded, steer_report

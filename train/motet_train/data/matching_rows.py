@@ -3,9 +3,7 @@
 Letters in shapes: T frames, N rows, J bones, F features, G gaits.
 """
 
-from collections import Counter
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,18 +11,16 @@ from numpy.typing import NDArray
 from motet.decode.acts import foot_contacts, pose_features, seen
 from motet.decode.matching import HORIZONS, horizons, mirrored_features, speed_feature
 from motet.decode.steering_settings import SteeringSettings
-from motet.motion.feet.contacts import GROUND_PERCENT, ContactSettings, contacts, ground_speeds
-from motet.motion.humanoid import BONES, sole_points
+from motet.motion.feet.contacts import ContactSettings
+from motet.motion.humanoid import BONES
 from motet.motion.kinematics import global_transforms
 from motet.motion.motion import Motion
-from motet.motion.rotations import Array, rotmat_to_quat, rotmat_to_rotvec
+from motet.motion.rotations import Array, rotmat_to_quat
 from motet.motion.skeleton import partners_of
 from motet.representation.contract import named
 from motet.representation.root_sixd import ROOT_SIXD, joint_rotations
-from motet_train.data.errors import DataError
+from motet_train.data.recorded import Recording
 from motet_train.data.sixd_windows import poses_of
-from motet_train.data.store import Store
-from motet_train.data.table import Gait, read_gaits
 
 GROUPS = {
     "places": (2 * HORIZONS, 1.0),
@@ -42,91 +38,8 @@ feet a quarter more, so that fewer feet that swing are to stand at once."""
 STANDS = ContactSettings(heights=(0.03, 0.06), speeds=(0.2, 0.6))
 """Of soles of recordings on level ground: a foot that turns on its ball is not let go, one that lands is not held."""
 
-LEVELLED = ContactSettings(heights=(0.05, 0.08))
-"""Of soles that show where the ground is."""
-
 LEAP, AROUND = 0.4, 0.3
 """Seconds of a flight that is no running step, and before and after it that belong to it."""
-
-LEVEL_FOR = 0.1
-"""Seconds, the standard deviation of the window over which ground is level."""
-
-
-@dataclass(frozen=True, eq=False)
-class Recording:
-    """features: a motion in ``root_sixd``. gaits: names of those that it shows."""
-
-    features: Motion
-    gaits: frozenset[str]
-
-
-def gaits_of(store: Store) -> tuple[Gait, ...]:
-    """The gaits that a store's records name, that of the most frames first; CMU's and ACCAD's where none is named."""
-    frames = Counter[str]()
-    for record in store.records:
-        frames.update(dict.fromkeys(record.gaits, sum(stop - start for start, stop in record.spans)))
-    return tuple(Gait(name, (), ()) for name, _ in frames.most_common()) or read_gaits()
-
-
-def recordings(store: Store, gaits: tuple[Gait, ...], held: bool = True) -> list[Recording]:
-    """The recordings of a store that show gaits, of 1.5 s or more; DataError where a gait has none.
-
-    held: their feet are held to the ground.
-    """
-    representation, found = named(store.representation), list[Recording]()
-    for index, record in enumerate(store.records):
-        shown = frozenset(g.name for g in gaits if g.name in record.gaits or g.shown(record.shows, record.subject))
-        if not shown:
-            continue
-        features = store.motion(index)
-        if held:
-            features = _levelled(representation.planted(features))
-        pieces = _jumps(features) if shown == {"jump"} else _sound(features)
-        found += [Recording(piece, shown) for piece in pieces if len(piece) >= 1.5 * store.fps]
-    missing = [gait.name for gait in gaits if not any(gait.name in one.gaits for one in found)]
-    if missing:
-        how = "name gaits in a column gait of the table of sentences, or give motet prepare a table of them, --gaits"
-        raise DataError(f"no recording of 1.5 s shows the gait {missing[0]!r}: {how}")
-    return found
-
-
-def _levelled(features: Motion) -> Motion:
-    """A recording on level ground: floors of recordings rise and fall by centimetres, even within a step, and feet that
-    seem to float are not held. The ground is where the lowest point of the soles is, as far as it is slow and low."""
-    from scipy.ndimage import gaussian_filter1d  # for this alone, so that other trainings do not load it
-
-    soles = sole_points(*global_transforms(named("root_sixd").motion(features)))
-    lowest, which = soles[..., 1].min(axis=1), soles[..., 1].argmin(axis=1)
-    speeds = np.take_along_axis(ground_speeds(soles, features.fps), which[1:, None], axis=1)[:, 0]
-    stands = contacts(lowest[1:] - np.percentile(lowest, GROUND_PERCENT), speeds, LEVELLED)
-    weights, window = np.append(stands[:1], stands) + 1e-6, LEVEL_FOR * features.fps
-    ground = gaussian_filter1d(weights * lowest, window) / gaussian_filter1d(weights, window)
-    values = features.values.copy()
-    values[:, features.channels.index("root.height")] -= ground
-    return replace(features, values=values)
-
-
-def _sound(features: Motion) -> list[Motion]:
-    """The parts of a recording without flaws, where a bone other than the toes turns by over 45 degrees in a frame.
-
-    Its first and last frames, where flaws are common, are left out.
-    """
-    turns = [
-        np.degrees(np.linalg.norm(rotmat_to_rotvec(np.swapaxes(local[:-1], 1, 2) @ local[1:]), axis=1))
-        for bone, local in joint_rotations(features).items()
-        if not bone.endswith("Toes")
-    ]
-    flaws = np.flatnonzero(np.max(turns, axis=0) > 45.0)
-    edges = [1, *(flaws + 1).tolist(), len(features) - 1]
-    return [features[start:stop] for start, stop in pairwise(edges) if stop > start]
-
-
-def _jumps(features: Motion) -> list[Motion]:
-    """The parts of a recording up to half a second before and after the hips are 6 cm above their median height."""
-    height, reach = features.select(("root.height",)).values[:, 0], round(0.5 * features.fps)
-    high = np.convolve(height > np.median(height) + 0.06, np.ones(2 * reach + 1), "same") > 0
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], high, [False]]).astype(int))).reshape(-1, 2)
-    return [features[start:stop] for start, stop in edges.tolist()]
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,8 @@ from motet.models.steer import FEATURE_STEPS
 from motet.motion.feet.lock import FootLockSettings
 from motet.motion.rotations import Array
 from motet_train.data.errors import DataError
-from motet_train.data.matching_rows import MatchingRows, gaits_of, mirrored_poses, recordings, rows_of, scaling
+from motet_train.data.matching_rows import MatchingRows, mirrored_poses, rows_of, scaling
+from motet_train.data.recorded import gaits_of, recordings
 from motet_train.data.store import Store
 from motet_train.descent import GradientLearner, Term, Terms
 from motet_train.models.kinematics import Tree, joint_weights, tree_of

@@ -20,7 +20,8 @@ from motet.motion.humanoid import BONES, HUMANOID
 from motet.motion.rotations import Array
 from motet.motion.skeleton import partners_of
 from motet_train.data.errors import DataError
-from motet_train.data.matching_rows import Recording, gaits_of, recordings, rows_of
+from motet_train.data.matching_rows import rows_of
+from motet_train.data.recorded import Recording, gaits_of, recordings
 from motet_train.data.store import Store
 from motet_train.evaluate.positions import Flags, length
 from motet_train.evaluate.steer.following import (

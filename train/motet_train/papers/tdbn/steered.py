@@ -23,7 +23,7 @@ from motet.motion.rotations import Array, quat_to_rotmat, rotmat_to_quat, wrappe
 from motet.representation.contract import MotionContract, living
 from motet.representation.root_sixd import ROOT_SIXD, sixd_to_rotmat
 from motet_train.data.errors import DataError
-from motet_train.data.matching_rows import Recording, gaits_of, recordings
+from motet_train.data.recorded import Recording, gaits_of, recordings
 from motet_train.data.store import Store
 from motet_train.data.table import Gait
 from motet_train.papers.tdbn.rbm import Learning
