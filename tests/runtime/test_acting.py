@@ -81,7 +81,7 @@ def test_while_a_figure_walks_its_upper_body_acts_and_its_legs_go_on(model: Stee
     session, plain, act = walking(model), walking(model), act_of(model)
     session.act(act)
     frame = 0
-    for step in range(60):
+    for step in range(90):
         acted, walked = session.tick(), plain.tick()
         assert np.array_equal(acted.ground, walked.ground)
         assert np.array_equal(acted.height, walked.height)

@@ -36,6 +36,31 @@ def test_it_goes_as_fast_and_where_it_is_told(model: SteerModel, gait: str, spee
     assert np.degrees(poses[-1].ground[0, 2]) == pytest.approx(60, abs=8)
 
 
+@pytest.mark.parametrize("gait", ["walk", "run"])
+def test_the_slowest_that_a_gait_goes_is_no_standing_whatever_is_faced(model: SteerModel, gait: str) -> None:
+    ways, facings = (part.ravel() for part in np.meshgrid(np.arange(0, 360, 30), np.arange(0, 360, 30)))
+    session = model.start(characters=len(ways))
+    session.control(gait=gait, speed=max(0.2, model.speeds[gait][0]), direction=ways, facing=facings)
+    places = np.array([session.tick().ground[:, :2] for _ in range(150)])
+    paces = 30 * np.linalg.norm(np.diff(places[60:], axis=0), axis=2).mean(axis=0)
+    assert (paces / np.linalg.norm(session.target[:, :2], axis=1)).min() > 0.5
+
+
+def test_who_flies_lands_as_recorded_whatever_is_told_meanwhile(model: SteerModel) -> None:
+    session = model.start(characters=4)
+    session.control(gait="jump")
+    while session.tick().contacts.max() > 0.1:
+        pass
+    session.control(gait="walk", speed=[0.2, 0.4, 0.55, 1.4])  # slow walks are played at rates of their own
+    rows, rates = [], []
+    while session.tick().contacts.max() < 0.1:
+        rows.append(session._playback.row.copy())
+        rates.append(session._playback.rate.copy())
+    assert len(rows) > 8
+    assert (np.diff(rows, axis=0) == 1).all()
+    assert np.all(np.array(rates) == 1)
+
+
 def test_it_walks_backwards_and_stands_still(model: SteerModel) -> None:
     session = model.start()
     session.control(speed=1.0, direction=180, facing=0)

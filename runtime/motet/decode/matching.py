@@ -264,12 +264,14 @@ class Matcher:
             return
         playback.ticks_to_search[who] = self.settings.search_every - 1
         row, mirror, kind = playback.row[who] + (playback.part[who] > 0.5), playback.mirror[who], gait[who]
-        trajectory = self.desired_trajectory(playback, target, self.creeping(target[who], kind), who)
+        creeps = self.creeping(target[who], kind)
+        trajectory = self.desired_trajectory(playback, target, creeps, who)
         query = self.query(self.asked(trajectory, row, mirror))
         best, image, cost = self.best(query, kind)
-        stays = self.table.shows[row, kind] & (self.table.left[row] >= self.reserve)
         near = (best >= row - self.settings.jump_back) & (best <= row + self.settings.jump_ahead)  # on either side
-        stays &= near | self.flies[row] | (self.cost_at(query, row, mirror) <= cost)
+        bias = np.where(creeps, 0, self.settings.continuing)
+        fits = self.table.shows[row, kind] & (near | (self.cost_at(query, row, mirror) <= cost + bias))
+        stays = (self.flies[row] | fits) & (self.table.left[row] >= self.reserve)  # who flies lands first
         self.jump(playback, who[~stays], best[~stays], image[~stays])
 
     def creeping(self, target: Array, gait: Rows) -> NDArray[np.bool_]:

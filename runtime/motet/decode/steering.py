@@ -90,7 +90,8 @@ def tick(matcher: Matcher, poses: PoseCodes, playback: Playback, target: Array, 
     played, _ = table.at(playback)
     way = table.way[playback.mirror, playback.row]
     forward, left, turn, speed = parts(played[:, -6:-2])
-    recorded = Recorded(forward, left, turn, speed, single(way), single(matcher.creeping(target, gait)))
+    creeps = single(matcher.creeping(target, gait)) & (speed > 0)  # what has no speed, a jump, has its own rate
+    recorded = Recorded(forward, left, turn, speed, single(way), creeps)
     _go(playback, recorded, _sprung(playback, parts(target), how, dt), how, dt)
     playback.offset, playback.offset_rate = damped(playback.offset, playback.offset_rate, damping_of(how.blend), dt)
     rotations, height = body(poses, playback, played)

@@ -25,9 +25,10 @@ class SteeringSettings(Settings):
         search_every: ticks between searches. lag: the cost of each metre by which a row covers less than half the
         desired displacement within the horizon (others start, or turn aside, if not as smoothly). lasting: the fewest
         rows left after a jump target. jump_back, jump_ahead: jumps within this window are ignored, or playback would
-        loop on the spot. prepares: so many rows before a flight of rows without a speed, a leap, are no jump targets.
-        row_step: one in so many rows is a jump target. stands: the least contact of a foot in rows that are jumped to
-        and from, so that flights are played to their end.
+        loop on the spot. continuing: what is played is left only for rows that cost less by more than this, or
+        playback would go from one beginning to the next; by anything where it creeps. prepares: so many rows before a
+        flight of rows without a speed, a leap, are no jump targets. row_step: one in so many rows is a jump target.
+        stands: the least contact of a foot in rows that are jumped to and from, so flights are played to their end.
 
     The step:
         blend: half-life of the inertialization offset. slowest, fastest: limits of the playback rate. shortest,
@@ -57,6 +58,7 @@ class SteeringSettings(Settings):
     lasting: Count = 20
     jump_back: Count = 20
     jump_ahead: Count = 5
+    continuing: Annotated[float, Range(0, 1e6)] = 2.0
     prepares: Count = 9
     row_step: Annotated[int, Range(1, 100, "rows")] = 2
     stands: Share = 0.1

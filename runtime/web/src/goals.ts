@@ -2,6 +2,8 @@
 
 /** What is asked, and features of rows, are whole numbers of 1/256 of a scaled unit, so that costs are exact sums. */
 export const STEPS = 256;
+/** A cost of 1: costs are in units of 1 / (2 STEPS^2). */
+export const UNIT = 2 * STEPS ** 2;
 /** Consecutive goals that share a box, and a larger one: they follow each other in a recording, so they are alike. */
 const SIZES = [8, 32] as const;
 /** The two features of where a row leads at the last of the horizons. */
@@ -13,7 +15,7 @@ interface Boxes {
   high: Int16Array;
 }
 
-/** Features of rows, and boxes of them. Costs are in units of 1 / (2 STEPS^2). */
+/** Features of rows, and boxes of them. */
 export class Goals {
   private readonly features: Int16Array;
   private readonly small: Boxes;

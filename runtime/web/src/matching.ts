@@ -1,5 +1,5 @@
 /* Motion matching, which recorded frame a figure plays next: docs/bundle.md, the loop `matching`. Metres, seconds, radians. */
-import { Goals, STEPS } from "./goals.js";
+import { Goals, STEPS, UNIT } from "./goals.js";
 import type { Pose as Ground } from "./planar.js";
 import { clamp, damped, dampedPath, dampingOf, wrapped } from "./springs.js";
 import type { Steering } from "./steeringSettings.js";
@@ -181,13 +181,16 @@ export class Matcher {
     const { how } = this;
     figure.ticksToSearch = how.search_every - 1;
     const row = figure.row + (figure.part > 0.5 ? 1 : 0);
-    const stays = this.shows(row, gait) && this.tables.left[row]! >= this.reserve;
-    if (stays && this.flies(row)) return; // a flight is played to its end
+    const lasts = this.tables.left[row]! >= this.reserve;
+    if (lasts && this.flies(row)) return; // who flies lands first
+    const stays = lasts && this.shows(row, gait);
     const goals = this.goals[gait]!;
-    this.ask(figure, row, target, this.creeping(target, gait));
+    const creeps = this.creeping(target, gait);
+    this.ask(figure, row, target, creeps);
     const here = figure.mirror ? this.image : this.asked;
-    const cost = stays ? goals.cost(here, this.features, row * FEATURES) : Infinity;
-    const found = goals.nearest(this.asked, this.image, cost);
+    const bias = creeps ? 0 : how.continuing * UNIT;
+    const bound = stays ? goals.cost(here, this.features, row * FEATURES) - bias : Infinity;
+    const found = goals.nearest(this.asked, this.image, bound);
     if (!found) return;
     const ahead = found.row - row;
     if (!stays || ahead < -how.jump_back || ahead > how.jump_ahead) this.jump(figure, found.row, found.mirror);

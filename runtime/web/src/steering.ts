@@ -43,7 +43,7 @@ export class Steerer {
     const moves = this.moves(figure);
     approach(figure, target, dampingOf(how.velocity), dampingOf(how.facing), dt);
     this.warp(figure, moves[3]!);
-    this.move(figure, moves, matcher.creeping(target, gait));
+    this.move(figure, moves, matcher.creeping(target, gait) && moves[3]! > 0); // what has no speed, a jump, has its own rate
     this.fade(figure, dampingOf(how.blend));
     const [left, right] = [Math.fround(moves[4]!), Math.fround(moves[5]!)]; // so bounds are passed in the same ticks as in Python
     const contacts: [number, number] = figure.mirror ? [right, left] : [left, right];

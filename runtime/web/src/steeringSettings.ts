@@ -16,6 +16,7 @@ const STEERING = {
   lasting: [20, 0, 10_000],
   jump_back: [20, 0, 10_000],
   jump_ahead: [5, 0, 10_000],
+  continuing: [2, 0, 1e6],
   prepares: [9, 0, 10_000],
   row_step: [2, 1, 100],
   stands: [0.1, 0, 1],

@@ -20,7 +20,8 @@ from motet.motion.humanoid import sole_points
 from motet.motion.pose import Pose
 from motet.motion.rotations import Array, quat_to_rotmat, wrapped
 from motet.representation.root_sixd import ROOT_SIXD
-from motet_train.data.matching_rows import MatchingRows, Recording
+from motet_train.data.matching_rows import MatchingRows
+from motet_train.data.recorded import Recording
 from motet_train.data.sixd_windows import poses_of
 from motet_train.evaluate.positions import (
     BALLS,
@@ -51,7 +52,7 @@ PACES = (0.0, 0.6, 1.0, 1.4, 1.8, 2.0, 2.5, 3.0, 3.5, 4.0)
 WAYS = np.arange(-165.0, 195.0, 15.0)
 """24 directions of travel, in degrees from the facing."""
 
-WAYS_PACES = {"walk": (0.8, 1.28), "run": (2.0, 3.0)}
+WAYS_PACES = {"walk": (0.8, 1.28), "run": (1.2, 2.0, 3.0)}
 """m/s at which a gait goes there."""
 
 CREEPS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
@@ -305,8 +306,8 @@ def aside_errors(model: SteerModel) -> dict[str, float]:
 def ways_errors(model: SteerModel, gait: str) -> dict[str, float]:
     """Going in each of :data:`WAYS` with the facing kept, at each of :data:`WAYS_PACES`, from standing and from going
     ahead as fast: degrees that the direction is off, a mean, the 95th percentile and the largest; degrees that the
-    facing is off; and the error of the speed, as a share of what the gait allows that way; from 2 to 6 s after the
-    change. slide_cm, slide_p95_cm: as :func:`standing` has them, in all these seconds.
+    facing is off; the error of the speed, as a share of what the gait allows that way, and the least speed as such a
+    share; from 2 to 6 s after the change. slide_cm, slide_p95_cm: as :func:`standing` has them, in all these seconds.
     """
     asked, paces, moves = (part.ravel() for part in np.meshgrid(WAYS, WAYS_PACES[gait], (0.0, 1.0)))
     before = {**AHEAD, "gait": (gait,) * len(asked), "speed": paces * moves}
@@ -319,7 +320,8 @@ def ways_errors(model: SteerModel, gait: str) -> dict[str, float]:
     way = ground.way_off(asked, 2.0, 6.0)
     found = {"direction": way.mean(), "direction_p95": np.percentile(way, 95), "direction_worst": way.max()}
     found["facing"] = ground.facing_off(np.zeros_like(asked), 2.0, 6.0).mean()
-    found["speed"] = np.abs(ground.pace(2.0, 6.0) / allowed - 1).mean()
+    share = ground.pace(2.0, 6.0) / allowed
+    found |= {"speed": np.abs(share - 1).mean(), "speed_least": share.min()}
     return _floats(found | slide_of(tracks))
 
 

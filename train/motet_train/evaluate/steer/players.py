@@ -9,7 +9,7 @@ from motet.motion.rotations import Array
 from motet_train.evaluate.steer import following
 from motet_train.evaluate.steer.following import Track, slide_of
 
-FIGURES, SECONDS, SEED = 24, 20.0, 2
+FIGURES, SECONDS, SEED = 24, 20.0, 4
 """So many figures are steered for so long, by a seed that chose nothing of the model."""
 
 REVERSED_AT, REVERSED_AFTER = 1.28, (1.6, 2.4)
