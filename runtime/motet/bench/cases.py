@@ -189,9 +189,11 @@ def _batches(name: str, call: Callable[[int], object], unit: str, sizes: Iterabl
 
 
 def _written(name: str, motion: Motion) -> Path:
-    """A file of the motion, which lasts as long as the process."""
+    """A file of the motion, with four decimals as recordings have them, which lasts as long as the process."""
     path = Path(_folder().name) / name
     write_motion(path, motion)
+    written = read_motion(path)  # in the file's own angles
+    write_motion(path, replace(written, values=written.values.round(4)))
     return path
 
 

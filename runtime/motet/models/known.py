@@ -26,6 +26,10 @@ NOTHING = "no human motion that it knows"
 LEFT, RIGHT, STRAIGHT = 1, -1, 2
 """Where a sentence says that somebody goes; 0 if it does not say."""
 
+TILE = 8192
+"""Numbers of known vectors in a product with one vector: so few that OpenBLAS starts no threads, which would go on
+turning for milliseconds after it, beside what comes next and beside other processes."""
+
 BACKWARDS = re.compile("backward|in reverse|retreat")
 """What a sentence says that somebody goes backwards by."""
 
@@ -97,7 +101,12 @@ class Known:
 
     @cached_property
     def _bank(self) -> Floats:
-        return self.vectors.reshape(-1, self.vectors.shape[-1]).astype(np.float32) / np.float32(127)
+        """All vectors (B, T, E), in B tiles of T rows, the last filled up with zeros."""
+        rows = self.vectors.reshape(-1, self.vectors.shape[-1])
+        tile = max(1, TILE // rows.shape[1])
+        bank = np.zeros((-(-len(rows) // tile) * tile, rows.shape[1]), dtype=np.float32)
+        bank[: len(rows)] = rows / np.float32(127)
+        return bank.reshape(-1, tile, rows.shape[1])
 
     @cached_property
     def _kinds(self) -> tuple[NDArray[np.uint8], NDArray[np.intp]]:
@@ -130,7 +139,8 @@ class Known:
         """How much each action counts (N, A), 1 in all, by the motions near vectors (N, E); and the greatest
         similarity (N,)."""
         how, (motions, views) = self.settings, self.vectors.shape[:2]
-        alike = (vectors @ self._bank.T).reshape(len(vectors), motions, views).max(axis=2).astype(np.float64)
+        every = np.matmul(self._bank, vectors.T).reshape(-1, len(vectors))[: motions * views].T
+        alike = every.reshape(len(vectors), motions, views).max(axis=2).astype(np.float64)
         best = alike.max(axis=1, keepdims=True)
         least = np.sort(alike, axis=1)[:, -min(how.near, motions)][:, None]
         weights = np.where(alike >= least, np.exp((alike - best) / how.temperature), 0.0)
