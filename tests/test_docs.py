@@ -67,6 +67,14 @@ def test_the_readmes_python_type_checks_strictly(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("page", PAGES)
+def test_what_is_told_to_be_installed_is_the_clone(page: str) -> None:
+    """motet is on no package index: a first install takes the clone, by its path."""
+    code = "\n".join(re.findall(r"^ {4}.*$|^```.*?^```$", PAGES[page].read_text(), flags=re.DOTALL | re.MULTILINE))
+    by_name = re.findall(r"(?:pip|npm) install(?: -\S+)* ['\"]?motet\b.*", code)
+    assert by_name == []
+
+
+@pytest.mark.parametrize("page", PAGES)
 def test_links_lead_somewhere(page: str) -> None:
     text = re.sub(r"^```.*?^```$", "", PAGES[page].read_text(), flags=re.DOTALL | re.MULTILINE)
     found = re.findall(r"\]\(([^)\s]+)\)", text)
