@@ -8,7 +8,7 @@ from fake_models import CONTRACT, FakeGraph, describe_model, moving, spec
 
 from motet.errors import BundleError, DecodingError
 from motet.models.describe import DescribeModel
-from motet.models.known import NOTHING, AnswerSettings, Known, Seen, path_of
+from motet.models.known import NOTHING, RIGHT, AnswerSettings, Known, Seen, path_of
 from motet.representation.contract import MotionContract
 from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS
 
@@ -65,6 +65,17 @@ def test_turns_are_measured_and_told() -> None:
     assert said(WALK, 5) != ["she walks and turns left"]
     assert said(RUN, 100) == ["he runs straight ahead, turning left"]
     assert said(SIT, 100) == ["somebody sits"]
+
+
+def test_between_straight_and_turned_the_other_side_is_not_told() -> None:
+    ways = KNOWN.ways.copy()
+    ways[0, 0] = RIGHT
+    known = replace(KNOWN, ways=ways)
+    texts = {}
+    for turn in (-35.0, 35.0):
+        ((answer,),) = known.answers([Seen(WALK, 3.0, turn, 0.0)])
+        texts[turn] = answer.text
+    assert texts == {-35.0: "he strolls", 35.0: "a person walks"}
 
 
 def test_who_goes_backwards_is_told_to() -> None:

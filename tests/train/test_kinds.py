@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 import torch
 
+from motet.models.describe import DescribeModel
 from motet.models.known import LEFT, RIGHT, STRAIGHT
+from motet.models.load import load_as
 from motet.representation.root_block import ROOT_BLOCK
 from motet_train.data.batches import Views
 from motet_train.data.disguise import Disguise, seen_as
@@ -46,6 +48,20 @@ def test_where_sentences_say_that_somebody_goes() -> None:
     assert way_of("someone walks off to the left")[0] == way_of("she runs diagonally left")[0] == LEFT
     assert way_of("a man runs and changes direction to the right")[0] == RIGHT
     assert way_of("she sits")[2] == 0
+
+
+def test_a_side_is_that_of_the_path_whatever_the_verb() -> None:
+    assert way_of("a woman walks straight and then continues to the right") == (RIGHT, 0, 1)
+    assert way_of("the running man does not keep straight but bears left") == (LEFT, 0, 1)
+    assert way_of("man walks then 90 degrees right") == (RIGHT, 90, 1)
+    # who steps or jumps to a side does not turn there
+    assert way_of("quick sidestep left")[0] == way_of("a figure jumps right and stops")[0] == 0
+
+
+def test_the_ways_that_ship_are_those_of_their_sentences() -> None:
+    known = load_as(DescribeModel, "describe").known
+    assert known is not None
+    np.testing.assert_array_equal(known.ways, [way_of(sentence) for sentence in known.sentences])
 
 
 def test_disguised_motions_are_cut_moved_and_repeated() -> None:

@@ -192,20 +192,22 @@ class Known:
 
     def _fits(self, rows: NDArray[np.intp], turn: float | None) -> tuple[Array, int]:
         """How well the ways of sentences (N,) fit a path that turns by so many degrees, and its side, 0 for none."""
-        how, ways = self.settings, self.ways[rows]
-        if turn is None:
-            return np.zeros(len(rows)), 0
-        side = (LEFT if turn > 0 else RIGHT) if abs(turn) >= how.turned else 0
         fits = np.zeros(len(rows))
-        if side:
-            fits[ways[:, 0] == side] = 1
-            fits[(ways[:, 0] == -side) | (ways[:, 0] == STRAIGHT)] = -1
-        elif abs(turn) <= how.straight:
-            fits[(ways[:, 0] == STRAIGHT)] = 0.5
-            fits[np.abs(ways[:, 0]) == 1] = -1
-        told = ways[:, 1] > 0
-        fits[told & (np.abs(ways[:, 1] - abs(turn)) > 30)] = -1
-        return fits, side
+        if turn is None:
+            return fits, 0
+        side = LEFT if turn > 0 else RIGHT
+        ways = self.ways[rows, 0]
+        degrees = self.ways[rows, 1]
+        if abs(turn) >= self.settings.turned:
+            fits[ways == side] = 1
+            fits[(ways == -side) | (ways == STRAIGHT)] = -1
+        elif abs(turn) <= self.settings.straight:
+            fits[ways == STRAIGHT] = 0.5
+            fits[(ways == LEFT) | (ways == RIGHT)] = -1
+        else:  # neither is certain, but the other side is wrong
+            fits[ways == -side] = -1
+        fits[(degrees > 0) & (np.abs(degrees - abs(turn)) > 30)] = -1
+        return fits, side if abs(turn) >= self.settings.turned else 0
 
 
 def log_odds(share: Array) -> Array:

@@ -142,7 +142,8 @@ export class Known {
     const [way, degrees] = this.tables.ways.subarray(3 * row, 3 * row + 2);
     if (degrees! > 0 && Math.abs(degrees! - Math.abs(turn)) > 30) return -1;
     if (side) return way === side ? 1 : way === -side || way === STRAIGHT ? -1 : 0;
-    if (Math.abs(turn) > this.settings.straight) return 0;
+    // neither turned nor straight for certain: the other side alone is wrong
+    if (Math.abs(turn) > this.settings.straight) return way === (turn > 0 ? RIGHT : LEFT) ? -1 : 0;
     return way === STRAIGHT ? 0.5 : way === LEFT || way === RIGHT ? -1 : 0;
   }
 }

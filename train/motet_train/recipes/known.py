@@ -64,6 +64,9 @@ TURNING = r"(?<!in )\b(?:turn|veer|swerv|curv|corner|bend|angl|circl|spin|rotat|
 GOING = frozenset({"walk", "run", "skip", "backwards", "turn", "jump", "carry", "sidestep"})
 """Kinds of going, of which it is worth telling where to."""
 
+SIDEWAYS = frozenset({"sidestep", "jump"})
+"""Kinds of going to a side without turning there."""
+
 
 def train_known(store: Store, job: Job, data: str, by: str, writer: Run) -> Run:
     """Gather the known motions of a store, for the run of a net that writes sentences, of the same channels. DataError
@@ -136,15 +139,22 @@ def _gathered(found: Divided, examples: Examples, space: JointEmbedding, seen: V
 def way_of(sentence: str) -> tuple[int, int, int]:
     """Where a sentence says that somebody goes, the degrees that it gives, 0 for none, and whether it is about going
     alone."""
-    text, kinds = " ".join(RULES.words(sentence)), named(sentence)
-    turns = re.search(TURNING, text)
+    text = " ".join(RULES.words(sentence))
+    kinds = named(sentence)
+    going = bool(kinds) and kinds <= GOING
+
+    # a side is that of the path where a word of turning says so, or where the sentence is about nothing but going:
+    # "walks straight and then continues to the left"
     sides = frozenset(re.findall(r"\b(?:left|right)\b(?! angle)", text))
+    of_the_path = re.search(TURNING, text) is not None or (going and not kinds & SIDEWAYS)
+    of_a_limb = re.search(r"\b(?:foot|feet|legs?|arms?|hands?|shoulder)\b", text) is not None
     way = STRAIGHT if re.search(r"\bstraight\b", text) else 0
-    if turns and not re.search(r"\b(?:foot|feet|legs?|arms?|hands?|shoulder)\b", text):
+    if of_the_path and not of_a_limb:
         way = {frozenset({"left"}): LEFT, frozenset({"right"}): RIGHT}.get(sides, way)
+
     digits = re.search(r"\b(\d(?: ?\d)*) degrees?\b", text)
     degrees = int(digits[1].replace(" ", "")) if digits else 90 if re.search(r"right angle|quarter", text) else 0
-    return way, min(degrees, 720), int(bool(kinds) and kinds <= GOING)
+    return way, min(degrees, 720), int(going)
 
 
 class Tried(NamedTuple):
