@@ -1,10 +1,10 @@
 """How motions stand on characters: ``python tests/character_figures.py MOTION... -- CHARACTER.glb...``.
 
 Each motion is written by --like and by --onto, and played by the names of the character's nodes with kinematics that
-are not motet's. Printed for each: the lowest corner of the character's mesh (its lowest joint where it has none) over
-all frames and in the median frame, in centimetres for a figure with the legs of the humanoid; how far the trunk is off
-the humanoid's, in the median frame and at most, and the limbs at most, in degrees; and how much longer the path is than
-the humanoid's, in percent, legs made alike.
+are not motet's. Printed for each: the height of the lowest corner of the character's mesh (of its lowest joint where it
+has none), the least, median and largest over all frames, in centimetres for a figure with the legs of the humanoid; how
+far the trunk is off the humanoid's, in the median frame and at most, and the limbs at most, in degrees; and how much
+longer the path is than the humanoid's, in percent, legs made alike.
 """
 
 import sys
@@ -67,7 +67,8 @@ def measured(file: Path, played: Played, motion: motet.Motion) -> str:
     tilt = angles(up, trunk(human)[..., 1])
     limb = max(angles(figure[b] - figure[a], human[b] - human[a]).max() for a, b in BONES)
     path = 100 * (way(figure) / scale / max(way(human), 1e-9) - 1)
-    ground = f"lowest {100 * lowest.min():6.1f}, median {100 * np.median(lowest):5.1f} cm"
+    least, middle, most = (100 * height for height in (lowest.min(), np.median(lowest), lowest.max()))
+    ground = f"lowest {least:6.1f}, {middle:5.1f}, {most:5.1f} cm"
     return f"{ground}  trunk {np.median(tilt):4.1f}, {tilt.max():4.1f} limbs {limb:4.1f} deg  path {path:5.2f} %"
 
 

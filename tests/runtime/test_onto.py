@@ -54,9 +54,10 @@ def check(played: Played, motion: motet.Motion, size: float = 1.0, backwards: bo
     front = np.array([-1, 1, -1]) if backwards else np.ones(3)
     places, human = played.places(*names) * front, motet.motion.positions(motion)
     np.testing.assert_allclose(directions(places, names), directions(human, names), atol=2e-4)
-    np.testing.assert_allclose(places[:, 0] - places[0, 0], size * (human[:, 0] - human[0, 0]), atol=2e-4 * size)
+    path = (places[:, 0] - places[0, 0])[:, [0, 2]]
+    np.testing.assert_allclose(path, size * (human[:, 0] - human[0, 0])[:, [0, 2]], atol=2e-4 * size)
     lowest = played.skin(len(played.names) - 1)[..., 1].min(axis=1)
-    assert np.percentile(lowest, 5) == pytest.approx(0, abs=1e-3 * size)
+    assert lowest.min() == pytest.approx(-0.005 * size, abs=1e-3 * size)
 
 
 @pytest.mark.parametrize("above", ABOVE.values(), ids=ABOVE)
@@ -104,7 +105,7 @@ def test_a_motion_that_floats_a_little_is_laid_on_the_ground(tmp_path: Path, abo
     motet.write(tmp_path / "out.glb", replace(motion, values=values), onto=avatar)
     out = Played(tmp_path / "out.glb")
     lowest = out.play(out.clip()).skin(len(out.names) - 1)[..., 1].min(axis=1)
-    assert np.percentile(lowest, 5) == pytest.approx(left, abs=1e-3)
+    assert lowest.min() == pytest.approx(left, abs=0.01)
 
 
 @pytest.mark.parametrize("size", [0.18, 1.3, 38.0])
@@ -131,8 +132,8 @@ def test_without_a_mesh_the_soles_are_told_by_the_joints(tmp_path: Path) -> None
     with_mesh, without = (Played(tmp_path / f"{meshed}.glb") for meshed in (True, False))
     hips = [clip.play(clip.clip()).places("mixamorig:Hips")[:, 0] for clip in (with_mesh, without)]
     apart = hips[0] - hips[1]
-    np.testing.assert_allclose(apart - apart[0], 0, atol=1e-5)
-    assert apart[0, 1] == pytest.approx(0.03, abs=0.015)  # the mesh's soles are 3 cm thicker
+    np.testing.assert_allclose(apart[:, [0, 2]], 0, atol=1e-5)
+    assert np.median(apart[:, 1]) == pytest.approx(0.03, abs=0.015)  # the mesh's soles are 3 cm thicker
 
 
 def test_all_else_in_the_file_stays(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ record to :data:`FORMATS`, which help texts, the table of docs/formats.md and th
 import logging
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -229,12 +229,13 @@ def _character(like: File | Character | Motion | Skeleton) -> Character:
 
 
 def put_onto(motion: Motion, character: Character) -> Motion:
-    """A motion of any human figure on a character's skeleton; unchanged if it already is on that skeleton.
+    """A motion of any human figure on a character's skeleton; unchanged if it already is on that skeleton, up to the
+    rounding of its file.
 
     A character from a glTF file stands on the ground, and z becomes its facing direction at rest. MotionError, with the
     reason, if the motion's figure or the character is not human.
     """
-    if motion.skeleton == character.rest.skeleton:
+    if motion.skeleton and _same_figure(motion.skeleton, character.rest.skeleton):
         return motion
     found, joint_map, has_nodes = on_humanoid(motion), character.joint_map, character.nodes is not None
     try:
@@ -243,6 +244,16 @@ def put_onto(motion: Motion, character: Character) -> Motion:
     except MotionError as error:
         raise MotionError(f"the character cannot take a motion: {error}") from error
     return travel_on_root(put, joint_map)
+
+
+def _same_figure(skeleton: Skeleton, other: Skeleton | None) -> bool:
+    if other is None or skeleton.metres_per_unit != other.metres_per_unit:
+        return False
+    at_origin = [replace(joint, offset=(0.0, 0.0, 0.0)) for joint in skeleton.joints]
+    others_at_origin = [replace(joint, offset=(0.0, 0.0, 0.0)) for joint in other.joints]
+    if at_origin != others_at_origin:
+        return False
+    return bool(np.abs(skeleton.offsets - other.offsets).max() <= 1e-6 * other.height)
 
 
 def write_motion(

@@ -196,9 +196,9 @@ class Known:
         if turn is None:
             return fits, 0
         side = LEFT if turn > 0 else RIGHT
-        ways = self.ways[rows, 0]
-        degrees = self.ways[rows, 1]
-        if abs(turn) >= self.settings.turned:
+        turned = abs(turn) >= self.settings.turned
+        ways, degrees, _ = self.ways[rows].T
+        if turned:
             fits[ways == side] = 1
             fits[(ways == -side) | (ways == STRAIGHT)] = -1
         elif abs(turn) <= self.settings.straight:
@@ -207,7 +207,7 @@ class Known:
         else:  # neither is certain, but the other side is wrong
             fits[ways == -side] = -1
         fits[(degrees > 0) & (np.abs(degrees - abs(turn)) > 30)] = -1
-        return fits, side if abs(turn) >= self.settings.turned else 0
+        return fits, side if turned else 0
 
 
 def log_odds(share: Array) -> Array:

@@ -31,6 +31,7 @@ from motet.motion.humanoid.bones import (
 from motet.motion.humanoid.joint_map import BY_THE_TREE, JointMap
 from motet.motion.humanoid.joint_tree import map_of
 from motet.motion.humanoid.measure import Fitted, check_frames, fit, height_of, unit_of, upright
+from motet.motion.humanoid.soles import Mesh, on_own_soles
 from motet.motion.kinematics import (
     chained,
     global_transforms,
@@ -259,8 +260,9 @@ def from_humanoid(
     hand. The path is scaled by the ratio of the legs' lengths and the feet stay on the ground. Returns the translation
     of the hips in "length" and three angles in "deg" for each joint; the skeleton knows its unit where it did, of
     whatever size it is, or where the legs' length tells it.
-    skin: joint -> points (P, 3) of the figure's mesh, from the joint where every angle is 0; those of the feet are the
-        soles that stand on the ground. ahead: the motion's z becomes the way that the figure faces at rest.
+    skin: joint -> points (P, 3) of the figure's mesh, from the joint where every angle is 0. It stands on those of its
+        feet, and hands and head stay above the ground (:mod:`motet.motion.humanoid.soles`).
+    ahead: the motion's z becomes the way that the figure faces at rest.
     MotionError for a motion that is not the humanoid's, or a skeleton that is no human's.
     """
     if motion.skeleton != HUMANOID:
@@ -273,32 +275,39 @@ def from_humanoid(
         front = axis_to_rotmat("y", angle_of(x, z))
         source, places = product(front, source), rotated(front, places)
     turned = _figure_rotations(source, fitted, skeleton, still)
-    moved = _moved(fitted, skeleton, (source, places), turned, skin or {})
+    scale = fitted.leg / leg_length()
+    path = places[:, HIPS].mean(axis=1) * scale - fitted.body.middle(places_of(skeleton, turned), "UpperLeg")
+    mesh = Mesh(fitted.body, skin or {})
+    if mesh.has_soles() and len(motion):
+        turned, raised = on_own_soles(mesh, (source, places), turned, path, scale, motion.fps)
+        path[:, 1] += raised
+    else:
+        path[:, 1] += _rise_of_joints(fitted, (source, places), turned, path)
+    moved = _from_parent(fitted, skeleton, turned, path)
     return motion_of(skeleton, turned, {fitted.joint_map.carrier(skeleton): moved}, motion.fps)
 
 
-def _moved(
-    fitted: Fitted, skeleton: Skeleton, source: tuple[Array, Array], turned: Array, skin: Mapping[int, Array]
-) -> Array:
-    """Translations (T, 3) of a figure's carrier in its parent's frame, from rotations and positions of the humanoid's
-    joints and its own rotations (T, J, 3, 3): its path is scaled, its feet are as high over the ground."""
-    scale, joints = fitted.leg / leg_length(), fitted.body.joints
-    figure = places_of(skeleton, turned)
-    moved: Array = source[1][:, HIPS].mean(axis=1) * scale - fitted.body.middle(figure, "UpperLeg")
-    places = figure + moved[:, None]
-    # the soles are those of its mesh, else as they are measured on the humanoid
-    feet = [skeleton.subtree(skeleton.names[joints[sided(side, "Foot")]]) for side in LEFT_RIGHT]
-    own = [joint for foot in feet for joint in foot if joint in skin]
-    meshes = [places[:, joint, None] + rotated(turned[:, joint, None], skin[joint]) for joint in own]
+def _rise_of_joints(fitted: Fitted, source: tuple[Array, Array], turned: Array, path: Array) -> float:
+    """How far a figure without a mesh is raised above its root's path (T, 3), for feet as high as the humanoid's.
+
+    source: rotations and positions of the humanoid's joints. turned: rotations (T, J, 3, 3) of the figure's.
+    """
     rotations = {bone: source[0][:, HUMANOID.index(bone)] for bone in fitted.heights}
-    soles = np.concatenate(meshes, 1) if own else fitted.soles(rotations, places)
-    moved[:, 1] += scale * bones.ground_under(bones.sole_points(*source)) - bones.ground_under(soles)
+    soles = fitted.soles(rotations, places_of(fitted.body.skeleton, turned) + path[:, None])
+    ground = bones.ground_under(bones.sole_points(*source))
+    return fitted.leg / leg_length() * ground - bones.ground_under(soles)
+
+
+def _from_parent(fitted: Fitted, skeleton: Skeleton, turned: Array, path: Array) -> Array:
+    """Translations (T, 3) of a figure's carrier in its parent's frame, from rotations (T, J, 3, 3) of its joints and
+    the path (T, 3) of its root."""
     carrier = fitted.joint_map.carrier(skeleton)
-    if carrier:
-        above = skeleton.joints[carrier].parent
-        from_above = figure[:, carrier] + moved - figure[:, above] - skeleton.offsets[0]
-        moved = rotated(inverse(turned[:, above]), from_above)
-    return moved
+    if not carrier:
+        return path
+    figure = places_of(skeleton, turned)
+    above = skeleton.joints[carrier].parent
+    from_above = figure[:, carrier] + path - figure[:, above] - skeleton.offsets[0]
+    return rotated(inverse(turned[:, above]), from_above)
 
 
 def _figure_rotations(source: Array, fitted: Fitted, skeleton: Skeleton, still: Array) -> Array:
