@@ -98,8 +98,8 @@ class Count(Verb):
         return [{"name": answer.source.name}]
 
 
-def part(folder: Path, **about: Any) -> Part:
-    return Part(folder, {"verb": "Count", "shard": "1/1"} | about)
+def part(folder: Path, files: int = 6, shard: str = "1/1") -> Part:
+    return Part(folder, {"verb": "Count", "files": files, "shard": shard})
 
 
 def test_only_what_is_missing_is_done_again(tmp_path: Path) -> None:
@@ -125,12 +125,12 @@ def test_only_what_is_missing_is_done_again(tmp_path: Path) -> None:
 def test_two_jobs_do_not_write_one_part(tmp_path: Path) -> None:
     def both(rest: Sequence[Source]) -> Iterator[Answer]:
         with pytest.raises(motet.OutputError, match="another process is writing it"):
-            part(tmp_path).write(sources, both)
+            part(tmp_path, 1).write(sources, both)
         yield from Count({})(rest)
 
     sources = [Source(Path("a.bvh"))]
-    part(tmp_path).write(sources, both)
-    assert part(tmp_path).complete()
+    part(tmp_path, 1).write(sources, both)
+    assert part(tmp_path, 1).complete()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no limits of files there")
@@ -191,7 +191,7 @@ def test_parts_that_do_not_fit_are_named(spoil: Any, said: str, corpus: Path, tm
     spoil(tmp_path / "parts")
     (tmp_path / "out").mkdir()
     result = run("merge", tmp_path / "parts", "-o", tmp_path / "out" / "all.jsonl")
-    assert result.exit_code == 2
+    assert result.exit_code == 1
     assert said in result.stderr
     assert list((tmp_path / "out").iterdir()) == []
 
@@ -263,11 +263,84 @@ def test_what_does_not_go_together_is_refused(corpus: Path, tmp_path: Path) -> N
     assert "no parts" in run("merge", tmp_path, "-o", tmp_path / "a.jsonl").stderr
 
 
+def answer(file: int, **other: Any) -> str:
+    return json.dumps({"file": file, "input": f"{file}.bvh", "hash": "", "error": "", "rows": []} | other) + "\n"
+
+
+HEAD = '{"verb": "Count", "files": 6, "shard": "1/2", "answers": 3}\n'
+FIRST = [HEAD, answer(0), answer(2), answer(4)]
+TAMPERED = {
+    "a line is cut": ([*FIRST[:3], answer(4)[:30]], "line 4: .*the line is cut"),
+    "the last line is cut off": (FIRST[:3], "line 4: the answer of file 4 is missing"),
+    "a line is missing": ([HEAD, answer(0), answer(4)], "line 3: expected the answer of file 2, not of 4"),
+    "a line is doubled": ([*FIRST, answer(4)], "line 5: the answer of 4.bvh is there twice"),
+    "lines are in another order": ([HEAD, answer(2), answer(0), answer(4)], "line 2: expected the answer of file 0"),
+    "a file of the other shard": ([HEAD, answer(0), answer(1), answer(2), answer(4)], "expected the answer of file 2"),
+    "one more file": ([*FIRST, answer(6)], "line 5: expected the answer of file no more, not of 6"),
+    "a clip is lost": ([HEAD.replace("3}", "4}"), *FIRST[1:]], "it has 3 answers instead of 4"),
+    "the head is a list": (["[]\n", *FIRST[1:]], "line 1: .*expected a JSON object"),
+    "the head is a number": (["5\n", *FIRST[1:]], "line 1: .*expected a JSON object"),
+    "the head has no counts": ([HEAD.replace("6", '"6"'), *FIRST[1:]], "line 1: .*how many files"),
+    "the head has a wild shard": ([HEAD.replace("1/2", "3/2"), *FIRST[1:]], "line 1: .*a shard is a number"),
+    "a line is no JSON": ([*FIRST, "garbage\n"], "line 5: not a part"),
+    "a line is empty": ([*FIRST, "\n"], "line 5: not a part"),
+    "a line is no text": ([*FIRST, "\udcff\udcfe\n"], "line 5: not a part"),
+    "a line is nested without end": ([*FIRST, '{"file": 9, "x": ' + "[" * 100_000 + "\n"], "line 5: not a part"),
+    "a number is a word": ([HEAD, answer(0).replace("0", "true", 1), *FIRST[2:]], "line 2: expected an answer"),
+    "a number has 5,000 digits": ([HEAD, answer(0).replace("0", "9" * 5000, 1), *FIRST[2:]], "line 2: not a part"),
+    "rows are a number": ([HEAD, answer(0, rows=5), *FIRST[2:]], "line 2: expected an answer"),
+    "rows are missing": ([HEAD, '{"file": 0, "input": "0.bvh"}\n', *FIRST[2:]], "line 2: expected an answer"),
+}
+
+
+@pytest.mark.parametrize(("lines", "reason"), TAMPERED.values(), ids=TAMPERED)
+def test_what_is_cut_doubled_or_missing_is_named(tmp_path: Path, lines: list[str], reason: str) -> None:
+    parts = tmp_path / "parts"
+    parts.mkdir()
+    second = [HEAD.replace("1/2", "2/2"), answer(1), answer(3), answer(5)]
+    (parts / "count.1-of-2.jsonl").write_text("".join(FIRST))
+    (parts / "count.2-of-2.jsonl").write_text("".join(second))
+    assert merge([parts], tmp_path / "whole.jsonl") == 6
+    (parts / "count.1-of-2.jsonl").write_text("".join(lines), errors="surrogateescape")
+    result = run("merge", parts, "-o", tmp_path / "all.jsonl")
+    assert result.exit_code == 1
+    with pytest.raises(motet.FormatError, match=reason) as caught:
+        merge([parts], tmp_path / "all.jsonl")
+    assert caught.value.path == parts / "count.1-of-2.jsonl"
+    assert not (tmp_path / "all.jsonl").exists()
+
+
+def test_a_shard_that_is_there_twice_is_named(tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        (tmp_path / f"{name}.jsonl").write_text("".join([HEAD.replace("1/2", "1/1"), *map(answer, range(6))]))
+    with pytest.raises(motet.FormatError, match=r"the same shard as .*a\.jsonl: remove one"):
+        merge([tmp_path / "a.jsonl", tmp_path / "b.jsonl"], tmp_path / "all.jsonl")
+
+
+@pytest.mark.parametrize("vector", [[1.0], ["x", "y"], 5, [], [1e39, 1.0], [None, 1.0]])
+def test_vectors_of_other_lengths_are_not_merged(tmp_path: Path, vector: Any) -> None:
+    rows = [{"vector": [1.0, 2.0]}, {"vector": vector}]
+    head = '{"verb": "Embed", "files": 1, "shard": "1/1", "answers": 1}\n'
+    (tmp_path / "embed.1-of-1.jsonl").write_text(head + answer(0, rows=rows))
+    with pytest.raises(motet.FormatError, match="its vector is not of 2 numbers"):
+        merge([tmp_path], tmp_path / "all.npy")
+    assert not (tmp_path / "all.npy").exists()
+
+
+@pytest.mark.parametrize("content", ["garbage\n", "[]\n", HEAD, HEAD + answer(1), HEAD + answer(0) * 7])
+def test_a_partial_part_of_something_else_is_not_gone_on_with(tmp_path: Path, content: str) -> None:
+    (tmp_path / "count.1-of-1.jsonl.partial").write_text(content)
+    sources = [Source(Path(f"{number}.bvh"), number=number) for number in range(6)]
+    with pytest.raises((motet.FormatError, motet.OutputError), match=r"not a part|cannot go on with"):
+        part(tmp_path).write(sources, lambda rest: iter(Count({})(rest)))
+    assert (tmp_path / "count.1-of-1.jsonl.partial").read_text() == content
+
+
 def test_parts_of_clips_keep_their_order(tmp_path: Path, corpus: Path) -> None:
     sources = [Source(Path("a.glb"), clip, number=0) for clip in "ab"] + [Source(Path("b.glb"), number=1)]
     for number in (1, 2):
         own = [one for one in sources if one.number % 2 == number - 1]
-        part(tmp_path, shard=f"{number}/2").write(own, lambda rest: iter(Count({})(rest)))
+        part(tmp_path, 2, f"{number}/2").write(own, lambda rest: iter(Count({})(rest)))
     merge([tmp_path], tmp_path / "all.jsonl")
     _, *answers = map(json.loads, (tmp_path / "all.jsonl").read_text().splitlines())
     assert [answer["input"] for answer in answers] == list(map(str, sources))

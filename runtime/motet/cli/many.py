@@ -20,7 +20,7 @@ from motet.corpus import ray_engine
 from motet.corpus.answers import Answer, Hashed, Verb
 from motet.corpus.parts import Part, digest, failures
 from motet.corpus.sources import Source, files_of
-from motet.errors import OutputError
+from motet.errors import FormatError, OutputError
 from motet.jobs import Shard, in_batches
 from motet.settings import silent
 
@@ -124,8 +124,16 @@ def many_options(command: Callable[..., None]) -> Callable[..., None]:
 @click.argument("parts", nargs=-1, required=True, type=Path, metavar="FOLDER|PART...")
 @click.option("-o", "--out", required=True, type=Path, help="The .jsonl, .parquet or, of embed, .npy to write.")
 def merge(parts: tuple[Path, ...], out: Path) -> None:
-    """Merge the parts that --parts and --shard wrote, in the order of the files: the bytes are those of one part."""
-    click.echo(f"{out}: {corpus_parts.merge(parts, out)} answers")
+    """Merge the parts that --parts and --shard wrote, in the order of the files: the bytes are those of one part.
+
+    Parts that are missing, cut or changed are named, and nothing is written; then the exit code is 1.
+    """
+    try:
+        count = corpus_parts.merge(parts, out)
+    except FormatError as error:
+        click.echo(f"motet: {error}", err=True)
+        sys.exit(1)
+    click.echo(f"{out}: {count} answers")
 
 
 def print_list(rows: Iterator[str]) -> None:

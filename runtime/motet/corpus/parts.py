@@ -1,8 +1,9 @@
 """Parts of a corpus's answers, each written by one of many processes or machines, and merged in the end.
 
-A part is a file of JSON lines such as ``describe.3-of-16.jsonl``: first what its answers depend on, then an answer for
-each motion of every 16th file from the third: the number of the file, input, hash (SHA-256 of the file), error and
-rows. It is called ``.partial`` until it is complete; a second call goes on where the first one stopped.
+A part is a file of JSON lines such as ``describe.3-of-16.jsonl``: first what its answers depend on and how many they
+are, then an answer for each motion of every 16th file from the third: the number of the file, input, hash (SHA-256 of
+the file), error and rows. It is called ``.partial`` until it is complete; a second call goes on where the first one
+stopped.
 """
 
 import errno
@@ -28,6 +29,15 @@ from motet.jobs import Shard
 
 if sys.platform != "win32":
     import fcntl
+
+MOST = 10**9
+"""Files and answers that a part may say it is of."""
+
+LARGEST = 3e38
+"""Of a number of a vector: more is none in float32."""
+
+LONGEST_LINE = 64 << 20
+"""Bytes of a line that is read: of a thousand times the rows that any answer has."""
 
 ROWS = 10_000
 """Answers of one row group of a Parquet file."""
@@ -58,8 +68,7 @@ class Part:
         """Whether it is; OutputError where what is there was made of or by something else."""
         if not self.path.exists():
             return False
-        with self.path.open("rb") as file:
-            self._check(file.readline(), self.path)
+        self._check(_head(self.path), self.path)
         return True
 
     def write(self, sources: Sequence[Source], answers: Callable[[Sequence[Source]], Iterator[Answer]]) -> None:
@@ -74,7 +83,7 @@ class Part:
             with _locked(partial) as file:
                 if self.complete():  # by who had the lock
                     return
-                rest = sources[self._kept(file, partial) :]
+                rest = sources[self._kept(file, partial, sources) :]
                 for answer in answers(rest):
                     _append(file, _line(answer))
                 os.fsync(file)
@@ -85,29 +94,37 @@ class Part:
             kept = "; the answers before are kept, and the same command goes on after them"
             raise OutputError(f"cannot write {partial}: {error.strerror or error}{kept}") from error
 
-    def _kept(self, file: Any, path: Path) -> int:
-        """How many answers it has; what was being written when it was stopped is cut off."""
+    def _kept(self, file: Any, path: Path, sources: Sequence[Source]) -> int:
+        """How many answers it has; what was being written when it was stopped is cut off. OutputError where they are
+        not those of the first sources."""
         file.seek(0)
         lines = [line for line in file if line.endswith(b"\n")]
         file.truncate(sum(map(len, lines)))
         file.seek(0, os.SEEK_END)
         if not lines:
-            _append(file, json.dumps(dict(self.about)))
+            _append(file, json.dumps({**self.about, "answers": len(sources)}))
             return 0
-        self._check(lines[0], path)
-        return len(lines) - 1
+        self._check(_checked_head(lines[0], path), path)
+        kept = lines[1:]
+        for number, (line, source) in enumerate(zip(kept, sources, strict=False), start=2):
+            answer = _checked_answer(line, path, number)
+            if (answer["file"], answer["input"]) != (source.number, str(source)):
+                raise OutputError(
+                    f"cannot go on with {path}, line {number}: expected the answer of {source}: remove it"
+                )
+        if len(kept) > len(sources):
+            raise OutputError(f"cannot go on with {path}: it has more answers than there are motions: remove it")
+        return len(kept)
 
-    def _check(self, line: bytes, path: Path) -> None:
-        if different := _different(self.about, json.loads(line)):
+    def _check(self, head: dict[str, Any], path: Path) -> None:
+        if different := _different(self.about, {key: value for key, value in head.items() if key != "answers"}):
             said = f"it was begun with another {different}: remove it, or name another folder"
             raise OutputError(f"cannot go on with {path}: {said}")
 
 
 def failures(path: Path) -> tuple[int, int]:
-    """How many answers a part has, and how many of them are errors."""
-    with path.open(encoding="utf-8") as file:
-        next(file)
-        errors = [bool(json.loads(line)["error"]) for line in file]
+    """How many answers a part has, and how many of them are errors; FormatError where it is damaged."""
+    errors = [bool(answer["error"]) for _, answer in _answers(path)]
     return len(errors), sum(errors)
 
 
@@ -156,54 +173,145 @@ def merge(given: Sequence[Path], out: Path) -> int:
 
 def _complete(given: Sequence[Path]) -> list[Path]:
     """All parts of one corpus, in order."""
-    paths = [one for path in given for one in (sorted(path.glob("*.jsonl*")) if path.is_dir() else [path])]
+    paths = [file for path in given for file in (sorted(path.glob("*.jsonl*")) if path.is_dir() else [path])]
     if not paths:
         raise FormatError(given[0], "no parts (.jsonl) are in it")
-    found: dict[str, Path] = {}
+    by_shard: dict[str, Path] = {}
     first: dict[str, Any] = {}
     for path in paths:
-        about = _about(path)
+        about = _head(path)
         if path.suffix == ".partial":
             raise FormatError(path, f"it is not complete: run the command with --shard {about['shard']} again")
         shard = about.pop("shard")
+        del about["answers"]
         first = first or about
         if different := _different(about, first):
-            than = f"it was made with another {different} than {next(iter(found.values()))}"
+            than = f"it was made with another {different} than {next(iter(by_shard.values()))}"
             raise FormatError(path, f"{than}: remove one, and run its command with --shard again")
-        found[shard] = path
+        if shard in by_shard:
+            raise FormatError(path, f"it is the same shard as {by_shard[shard]}: remove one")
+        by_shard[shard] = path
     count = Shard.parse(shard).count
     wanted = [str(Shard(number, count)) for number in range(1, count + 1)]
-    if missing := [one for one in wanted if one not in found] or sorted(found.keys() - set(wanted)):
-        said = f"these shards are missing or of another count: {', '.join(missing[:9])}"
-        raise FormatError(paths[0].parent, f"{said}; run the command with --shard for each")
-    return [found[one] for one in wanted]
+    if missing := [name for name in wanted if name not in by_shard] or sorted(by_shard.keys() - set(wanted)):
+        reason = f"these shards are missing or of another count: {', '.join(missing[:9])}"
+        raise FormatError(paths[0].parent, f"{reason}; run the command with --shard for each")
+    return [by_shard[name] for name in wanted]
 
 
-def _about(path: Path) -> dict[str, Any]:
+def _head(path: Path) -> dict[str, Any]:
+    """What a part's answers depend on, the shard and their number; FormatError where it is no part."""
     try:
-        with path.open(encoding="utf-8") as file:
-            found: dict[str, Any] = json.loads(file.readline())
-        Shard.parse(found["shard"])
-        return found
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise FormatError(path, f"not a part of a corpus's answers: {error}") from error
+        with path.open("rb") as file:
+            return _checked_head(file.readline(LONGEST_LINE), path)
+    except OSError as error:
+        raise FormatError(path, f"cannot be read: {error.strerror or error}") from error
 
 
-def _lines(parts: Sequence[Path]) -> Iterator[str]:
+def _checked_head(line: bytes, path: Path) -> dict[str, Any]:
+    head = _parsed(line, path, 1)
+    numbers = [head.get(name) for name in ("files", "answers")]
+    counted = all(type(number) is int and 0 <= number <= MOST for number in numbers)
+    try:
+        if not counted or not isinstance(head.get("verb"), str):
+            raise ValueError("it does not say its verb, and how many files and answers it is of")
+        Shard.parse(str(head.get("shard")))
+    except ValueError as error:
+        raise FormatError(path, f"not a part of a corpus's answers: {error}", 1) from error
+    return head
+
+
+def _checked_answer(line: bytes, path: Path, number: int) -> dict[str, Any]:
+    """The answer of a line; FormatError for one that is cut or no answer."""
+    answer = _parsed(line, path, number)
+    rows, error = answer.get("rows"), answer.get("error")
+    if (
+        type(answer.get("file")) is not int
+        or not isinstance(answer.get("input"), str)
+        or not isinstance(answer.get("hash"), str)
+        or not (error is None or isinstance(error, str))
+        or not (isinstance(rows, list) and all(isinstance(row, dict) for row in rows))
+    ):
+        raise FormatError(path, "expected an answer: file, input, hash, error and rows", number)
+    return answer
+
+
+def _parsed(line: bytes, path: Path, number: int) -> dict[str, Any]:
+    if not line.endswith(b"\n"):
+        reason = "the line is cut" if len(line) < LONGEST_LINE else f"the line has more than {LONGEST_LINE} bytes"
+        raise FormatError(path, f"not a part of a corpus's answers: {reason}", number)
+    try:
+        parsed = json.loads(line)
+    except (ValueError, RecursionError) as error:
+        raise FormatError(path, f"not a part of a corpus's answers: {error}", number) from error
+    if not isinstance(parsed, dict):
+        raise FormatError(path, "not a part of a corpus's answers: expected a JSON object", number)
+    return parsed
+
+
+class _Order:
+    """Which answers a part is to have: of each of its shard's files, in order, as many in all as its head says."""
+
+    def __init__(self, path: Path, head: Mapping[str, Any]) -> None:
+        shard = Shard.parse(head["shard"])
+        self.path = path
+        self.files = range(shard.number - 1, head["files"], shard.count)
+        self.count = head["answers"]
+        self.begun = 0  # files
+        self.inputs: set[str] = set()  # of the last of them
+        self.line = 1
+
+    def take(self, answer: Mapping[str, Any]) -> None:
+        """The next answer: of another clip of the same file, or of the next file. FormatError for any other."""
+        self.line += 1
+        file, name = answer["file"], answer["input"]
+        if self.begun and file == self.files[self.begun - 1]:
+            if name in self.inputs:
+                raise FormatError(self.path, f"the answer of {name} is there twice", self.line)
+        elif self.begun < len(self.files) and file == self.files[self.begun]:
+            self.begun += 1
+            self.inputs.clear()
+        else:
+            wanted = self.files[self.begun] if self.begun < len(self.files) else "no more"
+            raise FormatError(self.path, f"expected the answer of file {wanted}, not of {file}", self.line)
+        self.inputs.add(name)
+
+    def end(self) -> None:
+        """FormatError where answers are missing."""
+        if self.begun < len(self.files):
+            reason = f"the answer of file {self.files[self.begun]} is missing: run the command again"
+            raise FormatError(self.path, reason, self.line + 1)
+        if self.line - 1 != self.count:
+            reason = f"it has {self.line - 1} answers instead of {self.count}: run the command again"
+            raise FormatError(self.path, reason, self.line)
+
+
+def _answers(path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
+    """The answers of a part, with their lines. FormatError where one is cut, twice, missing or out of order."""
+    with path.open("rb") as file:
+        order = _Order(path, _checked_head(file.readline(LONGEST_LINE), path))
+        while line := file.readline(LONGEST_LINE):
+            answer = _checked_answer(line, path, order.line + 1)
+            order.take(answer)
+            yield line.decode(), answer
+    order.end()
+
+
+def _in_order(parts: Sequence[Path]) -> Iterator[tuple[str, dict[str, Any]]]:
     """The answers of all parts in the order of their files, one of each in memory."""
-
-    def of(path: Path) -> Iterator[str]:
-        with path.open(encoding="utf-8") as file:
-            next(file)
-            yield from file
-
-    return heapq.merge(*map(of, parts), key=lambda line: int(line[line.index(":") + 1 : line.index(",")]))
+    return heapq.merge(*map(_answers, parts), key=lambda pair: int(pair[1]["file"]))
 
 
 def _write_lines(parts: Sequence[Path], out: Path) -> int:
+    heads = [_head(part) for part in parts]
+    head = {**heads[0], "shard": str(Shard()), "answers": sum(int(each["answers"]) for each in heads)}
+    count = 0
     with out.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(json.dumps({**_about(parts[0]), "shard": str(Shard())}) + "\n")
-        return sum(bool(file.write(line)) for line in _lines(parts))
+        file.write(json.dumps(head) + "\n")
+        for line, _ in _in_order(parts):
+            file.write(line)
+            count += 1
+    return count
 
 
 def _write_parquet(parts: Sequence[Path], out: Path) -> int:
@@ -213,7 +321,7 @@ def _write_parquet(parts: Sequence[Path], out: Path) -> int:
     except ImportError as error:
         raise OutputError("Parquet needs pyarrow: pip install 'motet[scale]'") from error
     columns, count = {"path": "input", "hash": "hash", "answer": "rows", "error": "error"}, 0
-    answers = ({**one, "rows": json.dumps(one["rows"])} for one in map(json.loads, _lines(parts)))
+    answers = ({**answer, "rows": json.dumps(answer["rows"])} for _, answer in _in_order(parts))
     schema = pa.schema([(name, pa.string()) for name in columns])
     with pq.ParquetWriter(out, schema) as writer:
         while batch := list(islice(answers, ROWS)):
@@ -224,16 +332,27 @@ def _write_parquet(parts: Sequence[Path], out: Path) -> int:
 
 
 def _write_vectors(parts: Sequence[Path], out: Path) -> int:
-    def vectors() -> Iterator[Any]:
-        for one in map(json.loads, _lines(parts)):
-            yield from (row["vector"] for row in one["rows"] if "vector" in row)
-
-    first = next(vectors(), None)
-    if first is None:
+    first: list[Any] = []
+    count = 0
+    for answer, vector in _vectors(parts):
+        first = first or vector
+        numbers = all(isinstance(value, int | float) and abs(value) <= LARGEST for value in vector)
+        if not numbers or len(vector) != len(first):
+            raise FormatError(answer["input"], f"its vector is not of {len(first)} numbers: run its command again")
+        count += 1
+    if not first:
         raise OutputError("cannot write vectors: the parts have none; they are written by motet embed")
-    size = sum(1 for _ in vectors()), len(first)
-    found = np.lib.format.open_memmap(out, "w+", np.float32, size)
-    for row, vector in zip(found, vectors(), strict=True):
+    vectors = np.lib.format.open_memmap(out, "w+", np.float32, (count, len(first)))
+    for row, (_, vector) in zip(vectors, _vectors(parts), strict=True):
         row[:] = vector
-    found.flush()
-    return size[0]
+    vectors.flush()
+    return count
+
+
+def _vectors(parts: Sequence[Path]) -> Iterator[tuple[dict[str, Any], list[Any]]]:
+    """The vectors of rows that have one, with the answer that each is of."""
+    for _, answer in _in_order(parts):
+        for row in answer["rows"]:
+            if "vector" in row:
+                vector = row["vector"]
+                yield answer, vector if isinstance(vector, list) and vector else [None]

@@ -4,17 +4,17 @@ import glob
 import hashlib
 import re
 import tempfile
-import zipfile
-import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from motet.archives import MAX_FILE, ZipFiles, copy_bounded
 from motet.errors import FormatError, MotetError, MotionError
 from motet.files import files_in, place_of
 from motet.formats import CLIPPED, MOCAP, READABLE, clips, read_motion
+from motet.formats.amc import skeleton_for
 from motet.formats.text import MARK, chosen, plain_names, split_clip
 from motet.motion.motion import Motion
 
@@ -91,7 +91,11 @@ def _files(path: Path) -> list[Path]:
     elif url := url_of(path):
         found, where = _listed(path, url), "are there"
     elif path.suffix.lower() == ".zip" and path.is_file():
-        found, where = [path / name for name in _members(path)], "are in it"
+        with ZipFiles(path) as archive:
+            found, where = (
+                [path / name for name in archive.names if PurePosixPath(name).suffix.lower() in KINDS],
+                "are in it",
+            )
     elif glob.has_magic(str(path)) and not place_of(split_clip(path, READABLE)[0]).exists():
         matching = sorted(Path(path.anchor).glob(str(path.relative_to(path.anchor))))
         found, where = [one for one in matching if one.suffix.lower() in KINDS], "have such names"
@@ -117,25 +121,24 @@ def sources_of(file: Path, clip: str | None = None, every: bool = False) -> list
     return [Source(path, name) for name in names] if len(names) > 1 else [Source(path)]
 
 
-def _members(path: Path) -> list[str]:
-    """The motion files of a zip by name, but for hidden ones."""
-    with _zip(path) as archive:
-        names = sorted(archive.namelist())
-    shown = (name for name in names if not any(part[0] in "._" for part in PurePosixPath(name).parts))
-    return [name for name in shown if PurePosixPath(name).suffix.lower() in KINDS]
-
-
 @contextmanager
 def opened(path: Path) -> Iterator[Path]:
-    """Where a file lies; one in a zip is unpacked for as long as the context lasts, with the skeletons (.asf) beside it
-    and in the folders above. Errors name it by its path in the zip."""
-    box, url = _box(path), url_of(path)
-    if (box or url) is None or path.exists():
+    """Where a file lies; one in a zip is unpacked for as long as the context lasts, with the skeleton (.asf) that an
+    .amc needs. Errors name it by its path in the zip."""
+    member, url = member_of(path), url_of(path)
+    if member is None and (url is None or path.exists()):
         yield path
         return
     with tempfile.TemporaryDirectory(prefix="motet-") as folder:
-        place = _fetched(path, url, folder) if box is None else _unpacked(path, box, folder)
-        box = box or path.parent
+        if member is None:
+            box = path.parent
+            place = _fetched(path, str(url), Path(folder))
+        else:
+            box, name = member
+            with ZipFiles(box) as archive:
+                place = archive.unpack(name, Path(folder))
+                if skeleton := _skeleton_of(name, archive.names):
+                    archive.unpack(skeleton, Path(folder))
         try:
             yield place
         except MotionError as error:
@@ -143,21 +146,25 @@ def opened(path: Path) -> Iterator[Path]:
             raise FormatError(path, str(reason).replace(folder, str(box)), line) from error
 
 
-def _box(path: Path) -> Path | None:
-    """The zip that a file is in."""
-    return next((parent for parent in path.parents if parent.suffix.lower() == ".zip" and parent.is_file()), None)
+def member_of(path: Path) -> tuple[Path, str] | None:
+    """The zip that a file is in, and its name there; None for one that is in no zip."""
+    for parent in path.parents:
+        if parent.suffix.lower() == ".zip" and parent.is_file():
+            return parent, path.relative_to(parent).as_posix()
+    return None
 
 
-def _unpacked(path: Path, box: Path, folder: str) -> Path:
-    inside = PurePosixPath(path.relative_to(box).as_posix())
-    try:
-        with _zip(box) as archive:
-            beside = (PurePosixPath(name) for name in archive.namelist() if name.lower().endswith(".asf"))
-            for name in (inside, *(name for name in beside if name.parent in inside.parents)):
-                archive.extract(str(name), folder)
-    except (KeyError, OSError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
-        raise FormatError(path, f"cannot be unpacked: {error}") from error
-    return Path(folder) / inside
+def _skeleton_of(name: str, names: Sequence[str]) -> str | None:
+    """Which of the files ``names`` is the skeleton of an .amc, by the rule of :func:`motet.formats.amc.read`."""
+    path = PurePosixPath(name)
+    if path.suffix.lower() != ".amc":
+        return None
+    for folder in (path.parent, path.parent.parent / "asf"):
+        files = [PurePosixPath(other) for other in names]
+        by_stem = {file.stem: str(file) for file in files if file.parent == folder and file.suffix.lower() == ".asf"}
+        if skeleton := skeleton_for(path.stem, by_stem):
+            return skeleton
+    return None
 
 
 def size_of(file: Path) -> int:
@@ -166,7 +173,8 @@ def size_of(file: Path) -> int:
         if (url := url_of(file)) and not file.exists():
             system, name = _system(file, url)
             return int(system.size(name))
-        return (_box(file) or file).stat().st_size
+        member = member_of(file)
+        return (member[0] if member else file).stat().st_size
     except OSError:
         return -1
 
@@ -201,20 +209,20 @@ def _listed(path: Path, url: str) -> list[Path]:
     return [one for one in shown if one.suffix.lower() in KINDS and one.name[0] != "."]
 
 
-def _fetched(path: Path, url: str | None, folder: str) -> Path:
-    """A file at a URL, with the skeletons (.asf) beside it, in a folder."""
-    system, name = _system(path, str(url))
+def _fetched(path: Path, url: str, folder: Path) -> Path:
+    """A file at a URL, with the skeleton (.asf) that an .amc needs, in a folder."""
+    system, name = _system(path, url)
     try:
-        asf = system.glob(f"{name.rpartition('/')[0]}/*.asf") if path.suffix.lower() == ".amc" else []
-        for one in (name, *asf):
-            system.get_file(one, str(Path(folder) / PurePosixPath(one).name))
-    except OSError as error:
+        above, _, own_name = name.rpartition("/")
+        files = {own_name: name}
+        if path.suffix.lower() == ".amc":
+            beside = {PurePosixPath(file).name: file for file in system.glob(f"{above}/*.asf")}
+            if skeleton := _skeleton_of(own_name, tuple(beside)):
+                files[skeleton] = beside[skeleton]
+        for plain, there in files.items():
+            with system.open(there, "rb") as source, (folder / PurePosixPath(plain).name).open("xb") as file:
+                if not copy_bounded(source, file, MAX_FILE):
+                    raise FormatError(path, f"cannot be fetched: it has more than {MAX_FILE} bytes")
+    except (OSError, RuntimeError) as error:
         raise FormatError(path, f"cannot be fetched: {error}") from error
-    return Path(folder) / PurePosixPath(name).name
-
-
-def _zip(path: Path) -> zipfile.ZipFile:
-    try:
-        return zipfile.ZipFile(path)
-    except (zipfile.BadZipFile, OSError) as error:
-        raise FormatError(path, f"not a readable zip file: {error}") from error
+    return folder / PurePosixPath(own_name).name

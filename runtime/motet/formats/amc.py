@@ -4,6 +4,7 @@ import logging
 from collections.abc import Iterator, Mapping
 from itertools import compress, cycle, islice
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -15,6 +16,8 @@ from motet.motion.kinematics import skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Joint
+
+T = TypeVar("T")
 
 log = logging.getLogger(__name__)
 
@@ -55,17 +58,25 @@ def read(file: File, asf: str | Path | None = None, fps: float | None = None, pa
     return Motion(values, tuple(map(".".join, channels)), units, fps, skeleton.skeleton)
 
 
+def skeleton_for(stem: str, skeletons: Mapping[str, T]) -> T | None:
+    """Which of the skeletons of a folder, by their stems, a motion of a stem goes with: that of its own, of what stands
+    before its first "_", or the only one; None for none."""
+    subject = stem.split("_", maxsplit=1)[0]
+    for name in (stem, subject):
+        if name in skeletons:
+            return skeletons[name]
+    return next(iter(skeletons.values())) if len(skeletons) == 1 else None
+
+
 def _find_asf(path: Path) -> Path:
-    stems = list(dict.fromkeys([path.stem, path.stem.split("_")[0]]))
+    stems = dict.fromkeys([path.stem, path.stem.split("_")[0]])
     for folder in (path.parent, path.parent.parent / "asf"):
         try:
             found = sorted(f for f in folder.iterdir() if f.suffix.lower() == ".asf") if folder.is_dir() else []
         except OSError as error:
             raise FormatError(path, f"cannot look for a skeleton in {folder}: {error.strerror}") from error
-        by_stem = {file.stem: file for file in found}
-        fitting = [by_stem[stem] for stem in stems if stem in by_stem]
-        if fitting or len(by_stem) == 1:
-            return (fitting or list(by_stem.values()))[0]
+        if skeleton := skeleton_for(path.stem, {file.stem: file for file in found}):
+            return skeleton
     names = " or ".join(f"{stem}.asf" for stem in stems)
     raise FormatError(path, f"no skeleton found: expected {names}, or a single .asf, beside it or in ../asf")
 

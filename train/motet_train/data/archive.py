@@ -2,17 +2,16 @@
 
 import shutil
 import tempfile
-import zipfile
-import zlib
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path, PurePosixPath
 
-from motet.errors import MotionError
+from motet.archives import ZipFiles
+from motet.errors import FormatError, MotionError
 from motet_train.data.errors import DataError
 
-BROKEN = (MotionError, DataError, OSError, zipfile.BadZipFile, zlib.error, RuntimeError)
-"""What reading a damaged file can raise; RuntimeError is zipfile's for an encrypted one."""
+BROKEN = (MotionError, DataError, OSError)
+"""What reading a damaged file can raise."""
 
 
 class Archive(ExitStack):
@@ -24,7 +23,7 @@ class Archive(ExitStack):
 
     def __init__(self, *paths: Path) -> None:
         super().__init__()
-        self._sources: dict[str, tuple[Path, zipfile.ZipFile | None]] = {}
+        self._sources: dict[str, tuple[Path, ZipFiles | None]] = {}
         with ExitStack() as stack:
             for path in paths:
                 if path.is_dir():
@@ -32,8 +31,7 @@ class Archive(ExitStack):
                     self._sources |= dict.fromkeys(files, (path, None))
                 else:
                     opened = stack.enter_context(_opened(path))
-                    files = (name for name in opened.namelist() if not name.endswith("/"))
-                    self._sources |= dict.fromkeys(files, (path, opened))
+                    self._sources |= dict.fromkeys(opened.names, (path, opened))
             self._borrowed = len(paths) == 1 and paths[0].is_dir()
             self._folder = paths[0]
             if not self._borrowed:
@@ -56,7 +54,8 @@ class Archive(ExitStack):
         if self._borrowed:
             return place
         if opened is not None:
-            return Path(opened.extract(name, self._folder))
+            place.unlink(missing_ok=True)
+            return opened.unpack(name, self._folder)
         place.parent.mkdir(parents=True, exist_ok=True)
         return Path(shutil.copyfile(path / name, place))
 
@@ -75,10 +74,10 @@ class Archive(ExitStack):
                 place.unlink()
 
 
-def _opened(path: Path) -> zipfile.ZipFile:
+def _opened(path: Path) -> ZipFiles:
     if not path.exists():
         raise DataError(f"no such corpus: {path}")
     try:
-        return zipfile.ZipFile(path)
-    except (zipfile.BadZipFile, OSError) as error:
-        raise DataError(f"{path} is neither a folder nor a readable zip file: {error}") from error
+        return ZipFiles(path)
+    except FormatError as error:
+        raise DataError(f"{path} is neither a folder nor a readable zip file: {error.reason}") from error
