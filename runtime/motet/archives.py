@@ -19,7 +19,7 @@ MAX_TABLE = 32 << 20
 MAX_FILE = 512 << 20
 """Bytes of a file, unpacked."""
 
-MAX_RATIO, SMALL = 200, 16 << 20
+MAX_RATIO, SMALL = 100, 16 << 20
 """How many times its packed size a file may be, unpacked, if it is not small; motions as text shrink to a tenth."""
 
 DAMAGE = (
@@ -73,6 +73,11 @@ class ZipFiles(AbstractContextManager["ZipFiles"]):
         if info is None:
             raise FormatError(shown, "cannot be unpacked: there is no plain file of this name in the zip")
         limit = min(MAX_FILE, max(SMALL, MAX_RATIO * info.compress_size))
+        too_large = FormatError(
+            shown, f"cannot be unpacked: it has more than {limit} bytes, too many for its packed size"
+        )
+        if info.file_size > limit:
+            raise too_large
         place = folder.joinpath(*PurePosixPath(name).parts)
         try:
             place.parent.mkdir(parents=True, exist_ok=True)
@@ -80,11 +85,9 @@ class ZipFiles(AbstractContextManager["ZipFiles"]):
                 copied = copy_bounded(packed, file, limit)
         except DAMAGE as error:
             raise FormatError(shown, f"cannot be unpacked: {error}") from error
-        if not copied:
+        if not copied:  # the zip announced less
             place.unlink()
-            raise FormatError(
-                shown, f"cannot be unpacked: it has more than {limit} bytes, {MAX_RATIO} times its packed size"
-            )
+            raise too_large
         return place
 
 

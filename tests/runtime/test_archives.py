@@ -85,7 +85,7 @@ def test_a_bomb_is_not_unpacked(tmp_path: Path) -> None:
         Source(packed / "a.bvh").read()
     with ZipFiles(packed) as files, pytest.raises(motet.FormatError):
         files.unpack("a.bvh", tmp_path / "out")
-    assert list((tmp_path / "out").iterdir()) == []
+    assert not (tmp_path / "out").exists()
 
 
 def test_what_a_zip_announces_is_not_trusted(tmp_path: Path) -> None:
