@@ -1,17 +1,21 @@
 """Clips for a character's own nodes, and characters with clips in them, played by kinematics that are not motet's."""
 
+import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from gltf_player import Array, Played
 from small_character import QUARTER, TEXTURE, Node, character, packed
+from test_formats_gltf import parts
 from test_retarget import SKELETONS, dancing
 
 import motet
 from motet.errors import FormatError, MotionError
-from motet.formats import Character
+from motet.formats import Character, gltf_character, read_character
 from motet.motion.humanoid.bones import HUMANOID, LEFT_RIGHT, MIXAMO
 
 SCALE: Node = {"scale": [0.01] * 3}
@@ -196,3 +200,55 @@ def test_what_is_no_character_is_refused(tmp_path: Path) -> None:
         motet.write(out, motion[:0], onto=avatar)
     with pytest.raises(MotionError, match="onto="):
         motet.write(out, {"a": motion})
+
+
+SHARED = {
+    "a mesh": lambda document: document["nodes"].extend({"mesh": 0} for _ in range(15_000)),
+    "a mesh with its skin": lambda document: document["nodes"].extend({"mesh": 0, "skin": 0} for _ in range(15_000)),
+    "a primitive": lambda document: document["meshes"][0].update(
+        primitives=document["meshes"][0]["primitives"] * 15_000
+    ),
+}
+
+
+@pytest.mark.parametrize("share", SHARED.values(), ids=SHARED)
+def test_what_many_nodes_share_is_computed_once(
+    tmp_path: Path, share: Callable[[dict[str, Any]], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = character(tmp_path / "avatar.glb")
+    document, binary = parts(file)
+    plain = read_character(file).skin
+    share(document)
+    file.write_bytes(packed(document, binary))
+    computed = list[int]()
+    skinned = gltf_character._skinned
+    monkeypatch.setattr(gltf_character, "_skinned", lambda *given: computed.append(1) or skinned(*given))
+    shared = read_character(file).skin
+    assert len(computed) == 1
+    assert shared.keys() == plain.keys()
+    if "mesh" not in document["nodes"][-1] or "skin" in document["nodes"][-1]:
+        for joint, points in plain.items():
+            np.testing.assert_array_equal(shared[joint], points)
+
+
+def test_meshes_with_too_many_points_are_not_computed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """The soles are then told by the joints, as of a character without a mesh."""
+    monkeypatch.setattr(gltf_character, "MAX_POINTS", 5)
+    monkeypatch.setattr(gltf_character, "_skinned", None)
+    with caplog.at_level("INFO"):
+        assert read_character(character(tmp_path / "avatar.glb")).skin == {}
+    assert "6 points, more than 5" in caplog.text
+    monkeypatch.setattr(gltf_character, "MAX_PRIMITIVES", 0)
+    assert read_character(character(tmp_path / "avatar.glb")).skin == {}
+
+
+def test_a_loop_of_links_is_no_buffer(tmp_path: Path) -> None:
+    (tmp_path / "a.bin").symlink_to(tmp_path / "b.bin")
+    (tmp_path / "b.bin").symlink_to(tmp_path / "a.bin")
+    document, binary = parts(character(tmp_path / "avatar.glb"))
+    document["buffers"] = [{"byteLength": len(binary), "uri": "a.bin"}]
+    (tmp_path / "a.gltf").write_text(json.dumps(document))
+    with pytest.raises(FormatError, match=r"cannot be read|is not a file in its folder"):
+        motet.read(tmp_path / "a.gltf")

@@ -27,6 +27,12 @@ from motet.motion.skeleton import Skeleton
 
 log = logging.getLogger(__name__)
 
+MAX_POINTS = 2_000_000
+"""Points of a character's meshes, each where a node or a skin puts it; games' characters have up to 100,000."""
+
+MAX_PRIMITIVES = 50_000
+"""Primitives of the meshes of all nodes together."""
+
 
 @dataclass(frozen=True)
 class Nodes:
@@ -114,7 +120,7 @@ def _skin(nodes: Nodes) -> dict[int, Array]:
     A point belongs to the joint that moves it most. Empty, with a line in the log, if meshes cannot be read.
     """
     try:
-        parts = [part for node in nodes.gltf.order for part in _meshes(nodes, node)]
+        parts = list(_meshes(nodes))
     except FormatError as error:
         log.info("estimating soles from the joints instead of the mesh: %s", error)
         return {}
@@ -132,17 +138,39 @@ def _skin(nodes: Nodes) -> dict[int, Array]:
     return found
 
 
-def _meshes(nodes: Nodes, node: int) -> Iterator[tuple[Array, NDArray[np.intp]]]:
-    """The points (P, 3) of a node's mesh in the world at rest, and the joint of each, -1 for none."""
-    gltf, found = nodes.gltf, nodes.gltf.objects("nodes")[node]
-    for primitive in gltf.objects("meshes")[found["mesh"]]["primitives"] if "mesh" in found else []:
-        attributes = primitive["attributes"]
+def _meshes(nodes: Nodes) -> Iterator[tuple[Array, NDArray[np.intp]]]:
+    """The points (P, 3) of all meshes in the world at rest, and the joint of each, -1 for none."""
+    gltf = nodes.gltf
+    for node, attributes, skin in _primitives(gltf):
         points = gltf.array(attributes["POSITION"])
-        if "skin" in found and "JOINTS_0" in attributes:
-            joints, weights = gltf.array(attributes["JOINTS_0"]).astype(np.intp), gltf.array(attributes["WEIGHTS_0"])
-            yield _skinned(nodes, gltf.objects("skins")[found["skin"]], points, joints, weights)
-        else:
+        if skin is None:
             yield points @ nodes.linear[node].T + nodes.places[node], np.full(len(points), nodes.carrier(node))
+        else:
+            joints, weights = gltf.array(attributes["JOINTS_0"]).astype(np.intp), gltf.array(attributes["WEIGHTS_0"])
+            yield _skinned(nodes, gltf.objects("skins")[skin], points, joints, weights)
+
+
+def _primitives(gltf: Gltf) -> list[tuple[int, dict[str, int], int | None]]:
+    """The node, attributes and skin of all primitives of meshes, each that a skin moves once, since it is where its
+    joints are, whatever node has it. FormatError, before anything is computed, where these are too many points."""
+    primitives: dict[tuple[object, ...], tuple[int, dict[str, int], int | None]] = {}
+    visited = 0
+    for node in gltf.order:
+        found = gltf.objects("nodes")[node]
+        listed = gltf.objects("meshes")[found["mesh"]]["primitives"] if "mesh" in found else []
+        visited += len(listed)
+        if visited > MAX_PRIMITIVES:
+            raise FormatError(gltf.path, f"its nodes have more than {MAX_PRIMITIVES} primitives of meshes")
+        for primitive in listed:
+            attributes = primitive["attributes"]
+            skin = found.get("skin") if "JOINTS_0" in attributes else None
+            place = node if skin is None else (skin, attributes["JOINTS_0"], attributes["WEIGHTS_0"])
+            primitives[place, attributes["POSITION"]] = (node, attributes, skin)
+    accessors = gltf.objects("accessors")
+    points = sum(accessors[attributes["POSITION"]]["count"] for _, attributes, _ in primitives.values())
+    if points > MAX_POINTS:
+        raise FormatError(gltf.path, f"the meshes of its nodes have {points} points, more than {MAX_POINTS}")
+    return list(primitives.values())
 
 
 def _skinned(

@@ -2,6 +2,8 @@
 
 import base64
 import json
+import os
+import stat
 import struct
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -46,6 +48,7 @@ class Gltf:
     document: dict[str, Any]
     buffers: tuple[bytes, ...]
     _arrays: dict[int, Array] = field(default_factory=dict)
+    _numbers: list[int] = field(default_factory=lambda: [0])
     _unpacked: dict[int, bytes] = field(default_factory=dict)
 
     @property
@@ -145,7 +148,8 @@ class Gltf:
                 raise FormatError(self.path, f"accessor {index} is broken: {str(error)[:200]}") from error
             if not np.isfinite(values).all():
                 raise FormatError(self.path, f"accessor {index} holds numbers that are not finite")
-            if sum(array.size for array in self._arrays.values()) + values.size > self.size:
+            self._numbers[0] += values.size
+            if self._numbers[0] > self.size:
                 raise FormatError(self.path, "its arrays overlap: they hold more numbers than the file has bytes")
             values.setflags(write=False)
             self._arrays[index] = values
@@ -253,8 +257,14 @@ def _buffer(path: Path, buffer: Mapping[str, Any], binary: bytes, beside: Path |
     place = beside / unquote(uri)
     try:
         if place.resolve().is_relative_to(beside.resolve()) and not place.is_symlink() and place.is_file():
-            with place.open("rb") as opened:
-                return opened.read(size)
-    except (OSError, ValueError) as error:
+            with open(place, "rb", opener=_without_links) as opened:
+                if stat.S_ISREG(os.fstat(opened.fileno()).st_mode):
+                    return opened.read(size)
+    except (OSError, ValueError, RuntimeError) as error:  # RuntimeError: a loop of links, before Python 3.13
         raise FormatError(path, f"its buffer {quoted(uri)} cannot be read: {error}") from error
     raise FormatError(path, f"its buffer {quoted(uri)} is not a file in its folder")
+
+
+def _without_links(name: str, flags: int) -> int:
+    """Open a file that may have been exchanged since it was looked at: a link is refused, a pipe is not waited for."""
+    return os.open(name, flags | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0))

@@ -67,15 +67,16 @@ class Mesh:
         """Whether a foot has points."""
         return any(joint in self.skin for side in LEFT_RIGHT for joint in self.under(sided(side, "Foot")))
 
-    def touching(self) -> list[int]:
-        """The joints of feet, hands and head, without what hangs from the head."""
-        limbs = [sided(side, part) for side in LEFT_RIGHT for part in ("Foot", "Hand")]
-        return [joint for bone in limbs for joint in self.under(bone)] + self.under("head")[:1]
-
     def points(self, turned: Array, places: Array, joints: Iterable[int]) -> Array:
         """The points (T, P, 3) of joints, from rotations (T, J, 3, 3) and positions (T, J, 3) of all joints."""
         parts = [places[:, i, None] + rotated(turned[:, i, None], self.skin[i]) for i in joints if i in self.skin]
         return np.concatenate(parts, axis=1) if parts else np.zeros((len(turned), 0, 3))
+
+    def lowest(self, turned: Array, places: Array) -> Array:
+        """The height (T,) of the lowest point of feet, hands and head, without what hangs from the head."""
+        limbs = [sided(side, part) for side in LEFT_RIGHT for part in ("Foot", "Hand")]
+        joints = [joint for bone in limbs for joint in self.under(bone)] + self.under("head")[:1]
+        return np.asarray(self.points(turned, places, joints)[..., 1].min(axis=1))
 
 
 class Foot:
@@ -91,8 +92,8 @@ class Foot:
         toes_bone = sided(side, "Toes")
         self.toes_joints = mesh.under(toes_bone)
         self.foot_joints = [joint for joint in mesh.under(foot_bone) if joint not in self.toes_joints]
-        self.tilt, self.foot_to_flat = _to_flat(source[:, HUMANOID.index(foot_bone), :, 1])
-        _, self.toes_to_flat = _to_flat(source[:, HUMANOID.index(toes_bone), :, 1])
+        self.tilt, self.foot_to_flat = _to_flat(source, foot_bone)
+        _, self.toes_to_flat = _to_flat(source, toes_bone)
 
         # points from the ankle, and those of the toes from their joint
         foot_joint = mesh.body.joints[foot_bone]
@@ -112,11 +113,11 @@ class Foot:
         toes_height = (self.toes_place[:, None] @ foot_up)[:, 0, 0]
         return np.asarray(self.ankle_height + np.minimum(of_foot, toes_height + of_toes))
 
-    def needed_share(self, ground: float, worth: float) -> Array:
+    def needed_share(self, ground: float, worth: float, fps: float) -> Array:
         """The share (T,) of the way to the level at which no point is below the ground, or which comes nearest to that.
 
         Less where that would raise the lowest point by less than ``worth``, so that no foot snaps for the sake of
-        millimetres, and none of it where the foot neither stands nor tips.
+        millimetres, and none of it where the foot neither stands nor tips; smoothed over time.
         """
         as_it_is = self.lowest(np.zeros(len(self.tilt)))
         reachable = np.minimum(self.lowest(np.ones(len(self.tilt))), ground)
@@ -128,7 +129,8 @@ class Foot:
             most = np.where(above, middle, most)
             least = np.where(above, least, middle)
         stands_or_tips = 1 - rise(self.tilt, *STEEP)
-        return np.asarray(most * rise(reachable - as_it_is, 0.0, worth) * stands_or_tips)
+        share = most * rise(reachable - as_it_is, 0.0, worth) * stands_or_tips
+        return np.clip(smoothed(share[:, None, None], CALM, fps)[:, 0, 0], 0, 1)
 
     def turn(self, turned: Array, share: Array) -> None:
         """Turn the foot's joints in ``turned`` by shares (T,) of the way to the level."""
@@ -138,10 +140,12 @@ class Foot:
                 turned[:, joint] = product(turn, turned[:, joint])
 
 
-def _to_flat(up: Array) -> tuple[Array, Array]:
-    """The angle (T,) between a sole's normal (T, 3) and the vertical, and the rotation vector (T, 3) that levels it."""
-    tilt = np.arccos(np.clip(up @ UP, -1, 1))
-    return tilt, unit(np.cross(up, UP)) * tilt[:, None]
+def _to_flat(source: Array, bone: str) -> tuple[Array, Array]:
+    """The angle (T,) between the sole's normal of a bone and the vertical, and the rotation vector (T, 3) that levels
+    it, from rotations (T, B, 3, 3) of the humanoid's joints."""
+    normal = source[:, HUMANOID.index(bone), :, 1]
+    tilt = np.arccos(np.clip(normal @ UP, -1, 1))
+    return tilt, unit(np.cross(normal, UP)) * tilt[:, None]
 
 
 def on_own_soles(
@@ -153,8 +157,7 @@ def on_own_soles(
     source: rotations (T, B, 3, 3) and positions (T, B, 3) of the humanoid's joints, in metres. turned: rotations of the
     character's joints. path: (T, 3), where its root would be. scale: the skeleton's units for a metre of the humanoid.
     """
-    skeleton = mesh.body.skeleton
-    places = places_of(skeleton, turned) + path[:, None]
+    places = places_of(mesh.body.skeleton, turned) + path[:, None]
     feet = [Foot(mesh, side, source[0], turned, places) for side in LEFT_RIGHT]
 
     # the body is laid where feet stand
@@ -163,13 +166,11 @@ def on_own_soles(
     # feet that would dig in are tipped less
     turned = turned.copy()
     for foot in feet:
-        share = foot.needed_share(-raised, WORTH * scale)
-        foot.turn(turned, np.clip(smoothed(share[:, None, None], CALM, fps)[:, 0, 0], 0, 1))
+        foot.turn(turned, foot.needed_share(-raised, WORTH * scale, fps))
 
     # where soles, hands or head would still be below the ground, the body is raised for that moment
-    places = places_of(skeleton, turned) + path[:, None]
-    lowest = mesh.points(turned, places, mesh.touching())[..., 1].min(axis=1)
-    depth = -DEPTH * scale - raised - lowest
+    places = places_of(mesh.body.skeleton, turned) + path[:, None]
+    depth = -DEPTH * scale - raised - mesh.lowest(turned, places)
     return turned, raised + _envelope(np.maximum(depth, 0.0), RAISED * fps)
 
 
