@@ -1,13 +1,14 @@
 """The plain files of a zip, by name and within limits: no name in it is ever used as a path of this machine."""
 
+import io
 import logging
 import stat
 import struct
 import zipfile
 import zlib
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path, PurePosixPath
-from typing import IO, BinaryIO
+from typing import IO
 
 from motet.errors import FormatError
 
@@ -35,6 +36,16 @@ DAMAGE = (
 """What reading a damaged, encrypted or strangely packed file raises."""
 
 
+class _Bounded(io.BufferedReader):
+    """A zip's bytes. zipfile reads a table of contents in one piece, whose size it takes from one of three places: what
+    is refused is a piece that is too long, wherever its size was stated."""
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        if size is not None and size > MAX_TABLE:
+            raise zipfile.BadZipFile(f"it holds too many files: its table of contents has {size} bytes")
+        return super().read(size)
+
+
 class ZipFiles(AbstractContextManager["ZipFiles"]):
     """The files of a zip: names in their order, and each unpacked alone. FormatError for a zip that is damaged or holds
     too much.
@@ -46,16 +57,13 @@ class ZipFiles(AbstractContextManager["ZipFiles"]):
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        try:
-            with path.open("rb") as file:
-                table = _size_of_table(file)
-            if table > MAX_TABLE:
-                raise FormatError(path, f"it holds too many files: its table of contents has {table} bytes")
-            self._zip = zipfile.ZipFile(path)
-        except DAMAGE as error:
-            if isinstance(error, FormatError):
-                raise
-            raise FormatError(path, f"not a readable zip file: {error}") from error
+        with ExitStack() as stack:
+            try:
+                file = stack.enter_context(_Bounded(io.FileIO(path)))
+                self._zip = stack.enter_context(zipfile.ZipFile(file))
+            except DAMAGE as error:
+                raise FormatError(path, f"not a readable zip file: {error}") from error
+            self._open = stack.pop_all()
         members = {info.orig_filename: info for info in self._zip.infolist()}
         self._members = {name: info for name, info in members.items() if _is_plain(info)}
         self.names = tuple(sorted(name for name in self._members if not _is_hidden(name)))
@@ -63,7 +71,7 @@ class ZipFiles(AbstractContextManager["ZipFiles"]):
             log.warning("%s: left out %d files that are no plain files, such as %.80r", path, len(strange), strange[0])
 
     def __exit__(self, *_: object) -> None:
-        self._zip.close()
+        self._open.close()
 
     def unpack(self, name: str, folder: Path) -> Path:
         """The place of one file, unpacked below a folder. FormatError for a name that is not there, or a file that is
@@ -104,33 +112,17 @@ def copy_bounded(source: IO[bytes], file: IO[bytes], limit: int) -> bool:
 
 def _is_plain(info: zipfile.ZipInfo) -> bool:
     """Whether a member is a plain file with a plain relative path."""
-    name = info.orig_filename
     mode = stat.S_IFMT(info.external_attr >> 16)
+    return is_plain_path(info.orig_filename) and mode in {0, stat.S_IFREG}
+
+
+def is_plain_path(name: str) -> bool:
+    """Whether a name is a relative path that stays below wherever it is put, on every system."""
     # parts are compared with the name, so that "a//b", "a/./b" and "/a" are no second names of a file
     parts = PurePosixPath(name).parts
-    relative = "/".join(parts) == name and ".." not in parts
-    return relative and name.isprintable() and not {"\\", ":"} & set(name) and mode in {0, stat.S_IFREG}
+    relative = bool(parts) and "/".join(parts) == name and ".." not in parts
+    return relative and name.isprintable() and not {"\\", ":"} & set(name)
 
 
 def _is_hidden(name: str) -> bool:
     return any(part.startswith((".", "__MACOSX")) for part in PurePosixPath(name).parts)
-
-
-def _size_of_table(file: BinaryIO) -> int:
-    """Bytes of a zip's table of contents, as its end states them, by which it will be read; 0 where there is no end."""
-    size = file.seek(0, 2)
-    start = max(0, size - (1 << 16) - 22 - 20)
-    file.seek(start)
-    tail = file.read()
-    end = tail.rfind(b"PK\x05\x06")
-    if end < 0 or len(tail) < end + 22:
-        return 0
-    (table,) = struct.unpack_from("<L", tail, end + 12)
-    # 64-bit zips state it in a record that a locator before the end leads to
-    if tail[end - 20 : end - 16] == b"PK\x06\x07" and end >= 20:
-        (place,) = struct.unpack_from("<Q", tail, end - 12)
-        file.seek(min(place, size))
-        record = file.read(56)
-        if len(record) == 56:
-            table = max(table if table != 0xFFFFFFFF else 0, struct.unpack_from("<Q", record, 40)[0])
-    return int(table)

@@ -8,6 +8,7 @@ import pytest
 from command_line import run
 
 import motet
+from motet.corpus import sources
 from motet.corpus.sources import Source, files_of, size_of
 
 fsspec = pytest.importorskip("fsspec")
@@ -47,3 +48,31 @@ def test_commands_take_urls(bucket: str) -> None:
     result = run("check", bucket, "--jobs", 1)
     assert result.exit_code == 0
     assert result.stdout.splitlines()[-1] == "2 motions: 2 understood"
+
+
+def test_what_is_fetched_is_bounded(bucket: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sources, "MAX_FILE", 1000)
+    with pytest.raises(motet.FormatError, match="cannot be fetched: it has more than 1000 bytes"):
+        Source(Path(f"{bucket}/39_14.amc")).read()
+
+
+@pytest.mark.parametrize("name", ["..", "b\\..\\c.bvh", "C:x.bvh"])
+def test_names_at_a_url_are_no_paths_of_this_machine(bucket: str, name: str) -> None:
+    with pytest.raises(motet.FormatError, match="is not a plain file name"):
+        Source(Path(f"{bucket}/{name}")).read()
+
+
+def test_whatever_fails_at_a_url_is_a_format_error(bucket: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    class OwnError(Exception):
+        """As file systems have them."""
+
+    def fail(*_: object, **__: object) -> None:
+        raise OwnError("it is closed today")
+
+    system = fsspec.filesystem("memory")
+    for name in ("isdir", "open", "size"):
+        monkeypatch.setattr(type(system), name, fail)
+    for call in (lambda: files_of([Path(bucket)]), lambda: Source(Path(f"{bucket}/39_14.amc")).read()):
+        with pytest.raises(motet.FormatError, match="cannot be fetched: it is closed today"):
+            call()
+    assert size_of(Path(f"{bucket}/39_14.amc")) == -1

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from motet.archives import MAX_FILE, ZipFiles, copy_bounded
+from motet.archives import MAX_FILE, ZipFiles, copy_bounded, is_plain_path
 from motet.errors import FormatError, MotetError, MotionError
 from motet.files import files_in, place_of
 from motet.formats import CLIPPED, MOCAP, READABLE, clips, read_motion
@@ -172,10 +172,11 @@ def size_of(file: Path) -> int:
     try:
         if (url := url_of(file)) and not file.exists():
             system, name = _system(file, url)
-            return int(system.size(name))
+            with _fetching(file):
+                return int(system.size(name))
         member = member_of(file)
         return (member[0] if member else file).stat().st_size
-    except OSError:
+    except (OSError, FormatError):
         return -1
 
 
@@ -199,12 +200,10 @@ def _system(path: Path, url: str) -> tuple[Any, str]:
 def _listed(path: Path, url: str) -> list[Path]:
     """The motion files at a URL of a folder, a pattern or one file."""
     system, name = _system(path, url)
-    try:
+    with _fetching(path):
         if not glob.has_magic(url) and not system.isdir(name):
             return [path]
         names = system.glob(name) if glob.has_magic(url) else system.find(name)
-    except OSError as error:
-        raise FormatError(path, f"nothing answers there: {error}") from error
     shown = (Path(system.unstrip_protocol(one)) for one in sorted(names))
     return [one for one in shown if one.suffix.lower() in KINDS and one.name[0] != "."]
 
@@ -212,7 +211,7 @@ def _listed(path: Path, url: str) -> list[Path]:
 def _fetched(path: Path, url: str, folder: Path) -> Path:
     """A file at a URL, with the skeleton (.asf) that an .amc needs, in a folder."""
     system, name = _system(path, url)
-    try:
+    with _fetching(path):
         above, _, own_name = name.rpartition("/")
         files = {own_name: name}
         if path.suffix.lower() == ".amc":
@@ -220,9 +219,20 @@ def _fetched(path: Path, url: str, folder: Path) -> Path:
             if skeleton := _skeleton_of(own_name, tuple(beside)):
                 files[skeleton] = beside[skeleton]
         for plain, there in files.items():
-            with system.open(there, "rb") as source, (folder / PurePosixPath(plain).name).open("xb") as file:
+            if not is_plain_path(plain):
+                raise FormatError(path, f"cannot be fetched: {plain!r} is not a plain file name")
+            with system.open(there, "rb") as source, (folder / plain).open("xb") as file:
                 if not copy_bounded(source, file, MAX_FILE):
                     raise FormatError(path, f"cannot be fetched: it has more than {MAX_FILE} bytes")
-    except (OSError, RuntimeError) as error:
+    return folder / own_name
+
+
+@contextmanager
+def _fetching(path: Path) -> Iterator[None]:
+    """What is done at a URL; FormatError where that fails, for whatever reason."""
+    try:
+        yield
+    except FormatError:
+        raise
+    except Exception as error:  # those of file systems share no base class
         raise FormatError(path, f"cannot be fetched: {error}") from error
-    return folder / PurePosixPath(own_name).name
