@@ -20,7 +20,7 @@ def test_a_graph_by_hand_runs() -> None:
     np.testing.assert_array_equal(found["y"], np.full((2, 3), 2.0))
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e38, -1e10])
 def test_outputs_that_are_not_finite_are_refused(value: float) -> None:
     lying = OnnxGraph(doubling(weight=tensor("w", values=np.full(3, value, np.float32).tobytes())), SPEC)
     with pytest.raises(BundleError, match="the graph's output 'y' is not finite"):

@@ -9,7 +9,7 @@ import numpy as np
 import onnxruntime
 from numpy.typing import NDArray
 
-from motet.bundle.fields import Fields
+from motet.bundle.fields import LARGEST, Fields
 from motet.bundle.graph_safety import check_graph
 from motet.errors import BundleError, SettingError
 from motet.settings import checked_int
@@ -232,15 +232,16 @@ class OnnxGraph:
     def __call__(self, feeds: Arrays) -> dict[str, NDArray[Any]]:
         """Named inputs to named outputs; arrays must have the contract's dtypes.
 
-        BundleError where the graph fails, or gives numbers that are not finite.
+        BundleError where the graph fails, or gives numbers that are not finite, or beyond
+        :data:`motet.bundle.fields.LARGEST`, whose squares would not be.
         """
         try:
             found = dict(zip(self._outputs, self._session.run(self._outputs, feeds), strict=True))
         except Exception as error:
             raise BundleError(f"the graph cannot be run: {str(error).partition(chr(10))[0]}") from error
         for name, array in found.items():
-            if array.dtype.kind == "f" and not np.isfinite(array).all():
-                raise BundleError(f"the graph's output {name!r} is not finite")
+            if array.dtype.kind == "f" and not -LARGEST <= array.min(initial=0) <= array.max(initial=0) <= LARGEST:
+                raise BundleError(f"the graph's output {name!r} is not finite, or beyond {LARGEST:g}")
         return found
 
 

@@ -68,7 +68,7 @@ export class Graph {
     for (const [name, tensor] of Object.entries(await this.session.run(feeds))) {
       const data = tensor.data as Float32Array | BigInt64Array;
       found[name] = { data: singles(data), shape: [...tensor.dims] }; // codes are int64, and small
-      if (!finite(found[name].data)) throw new BundleError(`graph ${this.role}: ${name} is not finite`);
+      if (!bounded(found[name].data)) throw new BundleError(`graph ${this.role}: ${name} is not finite, or beyond ${LARGEST}`);
     }
     return found;
   }
@@ -98,11 +98,13 @@ function singles(data: NumberArray["data"]): Float32Array {
   return data instanceof Float32Array ? data : Float32Array.from(data as ArrayLike<unknown>, Number);
 }
 
-/** Whether all numbers are finite: a state has a hundred thousand at every step. */
-function finite(data: Float32Array): boolean {
-  let sum = 0;
-  for (let at = 0; at < data.length; at++) sum += data[at]! * 0;
-  return sum === 0;
+/** What no output's number is beyond: squares of larger ones would not be finite. */
+const LARGEST = 1e9;
+
+/** Whether all numbers are finite and within bounds. */
+function bounded(data: Float32Array): boolean {
+  for (let at = 0; at < data.length; at++) if (!(Math.abs(data[at]!) <= LARGEST)) return false;
+  return true;
 }
 
 /** Rows of all states, in a new order, with any repeated or left out. */
