@@ -164,6 +164,8 @@ def test_what_cannot_be_composed_is_refused(script: str, said: str, tmp_path: Pa
     ("rows", "said"),
     [
         ("{", "is no JSON"),
+        ("[" * 100_000, "is no JSON"),
+        (f"[{'9' * 5000}]", "is no JSON"),
         ({"at": 0}, "a plan is a list of moments"),
         ([{"at": 0, "prompt": "a person walks"}], "moment 1: unknown key 'prompt'; expected at, text, place"),
         ([{"at": 0, "text": "a person walks"}, {"place": [0, 1]}], "moment 2: a moment is an object with its time"),
@@ -183,6 +185,21 @@ def test_files_are_refused_with_the_moment(rows: Any, said: str, tmp_path: Path)
     with pytest.raises(motet.FormatError, match=r"plan\.json") as refused:
         read_plan(path)
     assert said in str(refused.value)
+
+
+def test_a_plan_names_motion_files_anywhere_and_no_others(tmp_path: Path) -> None:
+    (tmp_path / "plans").mkdir()
+    path = tmp_path / "plans/plan.json"
+    for name in (SKELETONS / "mixamo.bvh", "../up.bvh"):
+        (tmp_path / "up.bvh").write_bytes((SKELETONS / "mixamo.bvh").read_bytes())
+        path.write_text(json.dumps([{"at": 0, "text": "a person walks"}, {"at": 2, "pose": str(name)}, {"at": 4}]))
+        found = read_plan(path, lambda file: motet.read(file, unit="cm"))
+        assert found[1].pose is not None
+    (tmp_path / "secret.txt").write_text("the password is 1234")
+    path.write_text(json.dumps([{"at": 0, "text": "a person walks"}, {"at": 2, "pose": "../secret.txt"}, {"at": 4}]))
+    with pytest.raises(motet.FormatError, match="moment 2: ") as refused:
+        read_plan(path)
+    assert "1234" not in str(refused.value)
 
 
 def test_poses_under_the_ground_and_of_no_human_are_refused(model: motet.CodesModel) -> None:

@@ -15,6 +15,8 @@ from test_predict_data import write_files
 from motet.cli import main
 from motet.formats import read_motion, write_motion
 from motet_train.data.cmu_trials import CMU_FOLDER
+from motet_train.data.errors import DataError
+from motet_train.data.table import read_gaits
 from motet_train.papers.li2018.recipe import RECIPES as SYSTEMS
 from motet_train.papers.tdbn.recipe import RECIPES as CONTROL
 from motet_train.recipes import codec, codes, language, predict
@@ -64,6 +66,18 @@ def test_options_win_over_tables_and_reach_the_field_of_their_name() -> None:
     assert found.visits.mirror == 0.5
     nested = changed(CONTROL["default"], {"model": {"rbm": {"epochs": 3}}}, {})
     assert nested.config == replace(CONTROL["default"].config, rbm=replace(CONTROL["default"].config.rbm, epochs=3))
+
+
+@pytest.mark.parametrize(
+    "value", ["9" * 5000, "[" * 100_000, "1 2", '"\udcff"'], ids=["long", "deep", "two", "no text"]
+)
+def test_what_is_no_toml_is_refused(value: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.toml"
+    path.write_text(f"seed = {value}\n", encoding="utf-8", errors="surrogateescape")
+    with pytest.raises(SettingsError, match=r"the settings .*run\.toml cannot be read"):
+        read_settings(path)
+    with pytest.raises(DataError, match=r"run\.toml is not a table of gaits"):
+        read_gaits(path)
 
 
 @pytest.mark.parametrize(

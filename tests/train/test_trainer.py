@@ -3,6 +3,7 @@
 import json
 import logging
 import math
+import os
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
@@ -24,7 +25,7 @@ from motet_train.papers.tdbn.rbm import Learning
 from motet_train.papers.tdbn.recipe import DivergenceLearner
 from motet_train.papers.tdbn.tdbn import TDBN, AngleCRBM, AngleCRBMConfig, Lessons, TDBNConfig
 from motet_train.progress import Shown
-from motet_train.runs import WEIGHTS, RunError
+from motet_train.runs import WEIGHTS, RunError, read_state
 from motet_train.trainer import CHECKPOINT, LOG, Learner, kept, train
 
 EPOCHS = Training(epochs=4, batch=8, optimiser="nadam", learning_rate=0.05, falling=0.5, clip=1.0)
@@ -387,3 +388,34 @@ def test_bad_trainings_are_named(tmp_path: Path) -> None:
     (tmp_path / CHECKPOINT).write_bytes(b"nothing")
     with pytest.raises(RunError, match="cannot be read"):
         trained(regression(EPOCHS), tmp_path)
+
+
+class Hostile:
+    """What makes a folder where it is unpickled."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def __reduce__(self) -> tuple[Callable[..., object], tuple[object, ...]]:
+        return os.mkdir, (str(self.folder),)
+
+
+@pytest.mark.parametrize("zipped", [True, False])
+def test_a_hostile_checkpoint_is_refused_and_executes_nothing(zipped: bool, tmp_path: Path) -> None:
+    path, folder = tmp_path / CHECKPOINT, tmp_path / "executed"
+    torch.save({"states": {"net": Hostile(folder)}}, path, _use_new_zipfile_serialization=zipped)
+    with pytest.raises(RunError, match="holds objects other than tensors and plain values") as refused:
+        read_state(path)
+    assert "\n" not in str(refused.value)
+    assert not folder.exists()
+    torch.load(path, weights_only=False)
+    assert folder.exists()  # it is hostile
+
+
+@pytest.mark.parametrize("cut", [0, 1, 40, 200, -1, -30])
+def test_a_damaged_checkpoint_is_refused(cut: int, tmp_path: Path) -> None:
+    path = tmp_path / CHECKPOINT
+    torch.save({"states": {"net": torch.arange(9.0)}}, path)
+    path.write_bytes(path.read_bytes()[:cut])
+    with pytest.raises(RunError, match=r"checkpoint\.pt cannot be read: \S"):
+        read_state(path)

@@ -54,6 +54,9 @@ MODELS: Mapping[str, Callable[[Mapping[str, Any]], Net]] = {
 }
 """Name of a model -> how it is built from the configuration in its manifest."""
 
+DAMAGE = (OSError, EOFError, RuntimeError, ValueError, LookupError, TypeError, AttributeError, AssertionError)
+"""What torch raises besides for a file that is damaged."""
+
 
 class RunError(MotetError, ValueError):
     """A training run that cannot be read, or not be resumed."""
@@ -143,11 +146,17 @@ def to_bytes(state: Any) -> bytes:
 
 
 def read_state(path: Path) -> Any:
-    """What was written by :func:`to_bytes`, on the CPU wherever it was; RunError where that is not possible."""
+    """What was written by :func:`to_bytes`, on the CPU wherever it was; RunError where that is not possible.
+
+    Nothing in it is executed: a file with other objects than tensors and plain values is refused.
+    """
     try:
         return torch.load(path, map_location="cpu", weights_only=True)
-    except (OSError, EOFError, RuntimeError, ValueError, pickle.UnpicklingError) as error:
-        raise RunError(f"{path} cannot be read: {error}") from error
+    except pickle.UnpicklingError as error:  # whose text is torch's, of eight lines, on how to execute it nevertheless
+        reason = "it is damaged, or holds objects other than tensors and plain values, which could execute anything"
+        raise RunError(f"{path} cannot be read: {reason}") from error
+    except DAMAGE as error:
+        raise RunError(f"{path} cannot be read: {str(error).partition(chr(10))[0] or 'it is cut off'}") from error
 
 
 def surroundings(device: str) -> dict[str, Any]:
@@ -175,7 +184,7 @@ def refuse_other(path: Path, manifest: Mapping[str, Any]) -> None:
 
     try:
         before = essence(json.loads(path.read_text()))
-    except (AttributeError, TypeError, ValueError) as error:
+    except (AttributeError, TypeError, ValueError, RecursionError) as error:
         raise RunError(f"{path} is not a run that can be resumed: {error}") from error
     different = [key for key, value in essence(manifest).items() if before.get(key) != value]
     if different:

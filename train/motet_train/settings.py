@@ -50,7 +50,7 @@ def read_stages(path: Path, stages: Collection[str]) -> dict[str, dict[str, dict
 def _read(path: Path) -> dict[str, Any]:
     try:
         return _named(tomllib.loads(path.read_text(encoding="utf-8")))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise SettingsError(f"the settings {path} cannot be read: {error}") from error
 
 

@@ -81,7 +81,7 @@ def read_plan(path: str | Path, read: Reader = read_motion) -> list[Moment]:
         rows = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise FormatError(path, error.strerror or "cannot be read") from error
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise FormatError(path, f"is no JSON: {error}", getattr(error, "lineno", None)) from error
     if not isinstance(rows, list):
         raise FormatError(path, 'a plan is a list of moments, such as [{"at": 0, "text": "a person walks"}, {"at": 3}]')

@@ -209,7 +209,7 @@ def _kit_sentences(archive: Archive, name: str) -> tuple[str, ...]:
     with archive.opened(name) as path:
         try:
             found = json.loads(path.read_text(encoding="utf-8"))
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             raise DataError(f"{path.name} is not JSON: {error}") from error
         if not (isinstance(found, list) and all(isinstance(sentence, str) for sentence in found)):
             raise DataError(f"{path.name} is not a list of sentences")

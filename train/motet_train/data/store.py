@@ -114,7 +114,7 @@ class Store:
             skipped = tuple(Skipped(**item) for item in data["skipped"])
             channels, units, fps = tuple(data["channels"]), tuple(data["units"]), float(data["fps"])
             representation = str(data["representation"])
-        except (OSError, KeyError, TypeError, ValueError, MotetError) as error:
+        except (OSError, KeyError, TypeError, ValueError, RecursionError, MotetError) as error:
             raise DataError(f"{path} is not a prepared store: {error}") from error
         stop = max((stop for entry in entries for _, stop in entry.spans), default=0)
         if frames.shape != (stop, len(channels)) or frames.dtype != np.float32:

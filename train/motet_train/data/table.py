@@ -128,5 +128,5 @@ def read_gaits(path: Path | None = None) -> tuple[Gait, ...]:
     try:
         rows = tomllib.loads(path.read_text(encoding="utf-8"))["gait"]
         return tuple(Gait(row["name"], tuple(row["actions"]), tuple(row.get("people", ["*"]))) for row in rows)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise DataError(f"{path} is not a table of gaits: {error}") from error

@@ -239,7 +239,7 @@ def _entries(path: Path) -> dict[str, list[str]]:
         content: Any = json.loads(path.read_text("utf-8"), object_pairs_hook=once)
     except OSError as error:
         raise FormatError(path, f"cannot be read: {error.strerror}") from error
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise FormatError(path, f"not a joint map in JSON: {error}") from error
     if not isinstance(content, dict):
         raise FormatError(path, "not a joint map: expected an object of bones and joints")
