@@ -1,6 +1,7 @@
 """Folders, patterns and zips of motions: which files are meant, and that every verb answers them as it does each."""
 
 import json
+import pickle
 import zipfile
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +11,8 @@ import pytest
 from command_line import check_refused, run
 
 import motet
-from motet.corpus.answers import Describe, Embed
+from motet.corpus import ray_engine
+from motet.corpus.answers import Check, Describe, Embed
 from motet.corpus.sources import Source, files_of
 from motet.jobs import FEW, in_batches
 
@@ -148,3 +150,10 @@ def test_of_long_motions_no_more_windows_than_needed_are_in_memory(
     assert [len(answer.rows) for answer in whole] == [1, 2, 1, 2]
     assert [answer.rows for answer in verb(sources)] == [answer.rows for answer in whole]
     assert at_once == [3, 3, 0]
+
+
+def test_what_goes_to_a_cluster_and_back_are_pickles(clips: Path) -> None:
+    actor = ray_engine.Actor(pickle.dumps(Check({})), Path.cwd())
+    found = actor({"source": [pickle.dumps(Source(clips / "39_14.amc"))]})
+    (answer,) = map(pickle.loads, found["answer"])
+    assert answer.rows == Check({}).alone(Source(clips / "39_14.amc")).rows

@@ -41,5 +41,6 @@ def test_a_foot_that_swings_although_it_should_stand_is_lifted(characters: int) 
     assert 0.06 < lifted(2.0, 1.0) < 0.08  # legs that are straight bend less than they are asked to
     assert 0.03 < lifted(2.0, 0.5) <= 0.04
     assert 0 < lifted(2.0, 1.0, 1) < 0.03  # not at once: its knee would pop out
+    assert 0.055 < lifted(2.0, 1.0, 3) < 0.068  # but before the foot is past
     assert abs(lifted(2.0, 0.0)) < 1e-6  # it may swing
     assert abs(lifted(0.2, 1.0, 5)) < 0.002  # it stands
