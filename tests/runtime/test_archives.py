@@ -57,6 +57,15 @@ def test_only_plain_names_are_files_of_a_zip(tmp_path: Path, name: str) -> None:
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["plain.glb"]
 
 
+@pytest.mark.parametrize("name", [name for kind, name in HOSTILE.items() if "hidden" not in kind and "Mac" not in kind])
+def test_nothing_is_unpacked_to_where_a_name_leads(tmp_path: Path, name: str) -> None:
+    name = name.format(host=tmp_path)
+    packed = zipped(tmp_path / "c.zip", (name, BVH))
+    with ZipFiles(packed) as files, pytest.raises(motet.FormatError, match="no plain file of this name"):
+        files.unpack(name, tmp_path / "a" / "b")
+    assert list(tmp_path.iterdir()) == [packed]
+
+
 def test_a_zip_of_nothing_but_strange_names_has_no_motions(tmp_path: Path) -> None:
     (tmp_path / "private.bvh").write_bytes(BVH)
     packed = zipped(tmp_path / "c.zip", (f"{tmp_path}/private.bvh", b"junk"))
