@@ -67,7 +67,7 @@ class ZipFiles(AbstractContextManager["ZipFiles"]):
         members = {info.orig_filename: info for info in self._zip.infolist()}
         self._members = {name: info for name, info in members.items() if _is_plain(info)}
         self.names = tuple(sorted(name for name in self._members if not _is_hidden(name)))
-        if strange := [name for name, info in members.items() if name not in self._members and not info.is_dir()]:
+        if strange := [name for name in members if name not in self._members and not name.endswith("/")]:
             log.warning("%s: left out %d files that are no plain files, such as %.80r", path, len(strange), strange[0])
 
     def __exit__(self, *_: object) -> None:
@@ -89,7 +89,7 @@ class ZipFiles(AbstractContextManager["ZipFiles"]):
         place = folder.joinpath(*PurePosixPath(name).parts)
         try:
             place.parent.mkdir(parents=True, exist_ok=True)
-            with self._zip.open(info) as packed, place.open("xb") as file:
+            with self._zip.open(info) as packed, place.open("wb") as file:
                 copied = copy_bounded(packed, file, limit)
         except DAMAGE as error:
             raise FormatError(shown, f"cannot be unpacked: {error}") from error

@@ -37,6 +37,8 @@ HOSTILE = {
     "two slashes": "//private.bvh",
     "dot": "./private.bvh",
     "line feed": "a\nb.bvh",
+    "NUL": "a\0.bvh",
+    "none": "",
     "hidden": ".private.bvh",
     "hidden folder": ".a/private.bvh",
     "of a Mac": "__MACOSX/private.bvh",

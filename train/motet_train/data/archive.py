@@ -54,7 +54,6 @@ class Archive(ExitStack):
         if self._borrowed:
             return place
         if opened is not None:
-            place.unlink(missing_ok=True)
             return opened.unpack(name, self._folder)
         place.parent.mkdir(parents=True, exist_ok=True)
         return Path(shutil.copyfile(path / name, place))
