@@ -290,6 +290,7 @@ TAMPERED = {
     "a number has 5,000 digits": ([HEAD, answer(0).replace("0", "9" * 5000, 1), *FIRST[2:]], "line 2: not a part"),
     "rows are a number": ([HEAD, answer(0, rows=5), *FIRST[2:]], "line 2: expected an answer"),
     "rows are missing": ([HEAD, '{"file": 0, "input": "0.bvh"}\n', *FIRST[2:]], "line 2: expected an answer"),
+    "the error is missing": ([HEAD, answer(0).replace("error", "err"), *FIRST[2:]], "line 2: expected an answer"),
 }
 
 
@@ -315,6 +316,13 @@ def test_a_shard_that_is_there_twice_is_named(tmp_path: Path) -> None:
         (tmp_path / f"{name}.jsonl").write_text("".join([HEAD.replace("1/2", "1/1"), *map(answer, range(6))]))
     with pytest.raises(motet.FormatError, match=r"the same shard as .*a\.jsonl: remove one"):
         merge([tmp_path / "a.jsonl", tmp_path / "b.jsonl"], tmp_path / "all.jsonl")
+
+
+def test_a_part_in_another_encoding_is_refused(tmp_path: Path) -> None:
+    odd = answer(0, input="\u00e9.bvh").replace("\\u00e9", "\u00e9").encode("utf-16-be")  # ends with a line feed, too
+    (tmp_path / "a.jsonl").write_bytes(HEAD.replace("1/2", "1/1").encode() + odd)
+    with pytest.raises(motet.FormatError, match="line 2: not a part"):
+        merge([tmp_path], tmp_path / "all.jsonl")
 
 
 @pytest.mark.parametrize("vector", [[1.0], ["x", "y"], 5, [], [1e39, 1.0], [None, 1.0]])

@@ -229,6 +229,7 @@ def _checked_answer(line: bytes, path: Path, number: int) -> dict[str, Any]:
         type(answer.get("file")) is not int
         or not isinstance(answer.get("input"), str)
         or not isinstance(answer.get("hash"), str)
+        or "error" not in answer
         or not (error is None or isinstance(error, str))
         or not (isinstance(rows, list) and all(isinstance(row, dict) for row in rows))
     ):
@@ -241,7 +242,7 @@ def _parsed(line: bytes, path: Path, number: int) -> dict[str, Any]:
         reason = "the line is cut" if len(line) < LONGEST_LINE else f"the line has more than {LONGEST_LINE} bytes"
         raise FormatError(path, f"not a part of a corpus's answers: {reason}", number)
     try:
-        parsed = json.loads(line)
+        parsed = json.loads(line.decode())  # as UTF-8: json would take other encodings, too
     except (ValueError, RecursionError) as error:
         raise FormatError(path, f"not a part of a corpus's answers: {error}", number) from error
     if not isinstance(parsed, dict):
