@@ -1,7 +1,8 @@
-"""The short runs of tests/fuzz_bundles.py and tests/fuzz_motions.py: the same mutants every time."""
+"""The short runs of tests/fuzz_bundles.py, fuzz_motions.py and fuzz_archives.py: the same mutants every time."""
 
 from pathlib import Path
 
+import fuzz_archives
 import fuzz_bundles
 import fuzz_motions
 import numpy as np
@@ -16,8 +17,9 @@ SECONDS, MEGABYTES = 2.0, 500.0
     [
         (fuzz_bundles.mutate, fuzz_bundles.steps, 80, {"BundleError", "runs"}),
         (fuzz_motions.mutants(fuzz_motions.own_files()), fuzz_motions.steps, 150, {"FormatError", "runs"}),
+        (fuzz_archives.mutate, fuzz_archives.steps, 150, {"FormatError", "OutputError", "runs"}),
     ],
-    ids=["bundles", "motions"],
+    ids=["bundles", "motions", "archives"],
 )
 def test_mutants_give_motets_own_errors_soon_and_in_little_memory(
     mutate: fuzz_motions.Mutate, steps: Steps, count: int, expected: set[str], tmp_path: Path
