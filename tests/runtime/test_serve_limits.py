@@ -4,14 +4,16 @@ import asyncio
 import http.client
 import importlib
 import json
+import logging
 import signal
 import socket
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Awaitable, Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from typing import Any
 
 import pytest
@@ -21,12 +23,20 @@ from motet.errors import TextError
 
 pytest.importorskip("starlette", reason="the extra serve is not installed")
 pytest.importorskip("uvicorn", reason="the extra serve is not installed")
+import uvicorn
+from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
+from starlette.routing import Mount
 from starlette.types import Message
-from websockets.sync.client import connect
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection, connect
 
+from motet.live.server import LIMITS
+from motet.serve.application import listening
 from motet.serve.batches import Batcher
+from motet.serve.endpoints import HEADER_BYTES, in_a_header
 from motet.serve.limits import Gate, Limits
+from motet.serve.protocol import OPTIONS, most_connections, quieter
 
 WALK = "/generate.npz?text=a+person+walks&seconds=1&seed="
 
@@ -72,18 +82,20 @@ def test_a_hundred_at_once_get_what_each_gets_alone(server: Process) -> None:
 def test_clients_that_leave(server: Process) -> None:
     for address in ("/stream?text=a+person+walks&seconds=200", "/generate.bvh?text=a+person+walks&seconds=200"):
         with socket.create_connection(("127.0.0.1", server.port)) as raw:
-            raw.sendall(f"GET {address} HTTP/1.1\r\nHost: x\r\n\r\n".encode())
+            raw.sendall(f"GET {address} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
             if address.startswith("/stream"):
                 assert raw.recv(1 << 12).startswith(b"HTTP/1.1 200")
     with socket.create_connection(("127.0.0.1", server.port)) as raw:  # within its body
-        raw.sendall(b"POST /describe?format=bvh HTTP/1.1\r\nHost: x\r\nContent-Length: 1000\r\n\r\nHIERARCHY")
+        raw.sendall(b"POST /describe?format=bvh HTTP/1.1\r\nHost: localhost\r\nContent-Length: 1000\r\n\r\nHIERARCHY")
     assert server.get(WALK + "1")[0] == 200
     assert server.health()["waiting"] == 0
 
 
 def test_a_body_of_a_gigabyte_is_refused_before_it_is_sent(server: Process) -> None:
     with socket.create_connection(("127.0.0.1", server.port), timeout=10) as raw:
-        raw.sendall(f"POST /describe?format=bvh HTTP/1.1\r\nHost: x\r\nContent-Length: {10**9}\r\n\r\n".encode())
+        raw.sendall(
+            f"POST /describe?format=bvh HTTP/1.1\r\nHost: localhost\r\nContent-Length: {10**9}\r\n\r\n".encode()
+        )
         head, _, body = raw.recv(1 << 12).partition(b"\r\n\r\n")
         assert head.startswith(b"HTTP/1.1 413")
         assert json.loads(body or raw.recv(1 << 12))["error"].startswith("the request is too large: expected at most")
@@ -105,6 +117,187 @@ def test_figures_are_steered_beside_it(server: Process) -> None:
         connect(address, origin="https://elsewhere.example")  # type: ignore[arg-type]
     with connect(address, origin="http://localhost:3000") as page:  # type: ignore[arg-type]
         assert json.loads(page.recv())["type"] == "hello"
+
+
+def send_pings(connection: ClientConnection, count: int) -> None:
+    for _ in range(count):
+        connection.ping()
+
+
+def receive_all(connection: ClientConnection) -> None:
+    while True:
+        connection.recv()
+
+
+def test_figures_have_the_limits_of_the_live_server(server: Process) -> None:
+    """One who sends pings without end is cut off, and one who is dropped is gone, as by ``motet live``."""
+    address = f"ws://127.0.0.1:{server.port}/live"
+    with connect(address) as flooder, connect(address) as other:
+        assert json.loads(flooder.recv())["type"] == "hello"
+        assert json.loads(other.recv())["type"] == "hello"
+        with pytest.raises((ConnectionClosed, OSError)):
+            send_pings(flooder, 100_000)
+        assert server.health()["status"] == "ok"
+        assert json.loads(other.recv())["type"] == "frame"
+    with connect(address) as large:
+        large.send("x" * (LIMITS.message_bytes + 1))
+        with pytest.raises(ConnectionClosed) as closed:
+            receive_all(large)
+        assert closed.value.rcvd is not None
+        assert closed.value.rcvd.code == 1009  # message too big
+    for foreign in ("https://elsewhere.example", "http://localhost.evil.example", "null"):
+        with pytest.raises(Exception, match="403"):
+            connect(address, origin=foreign)  # type: ignore[arg-type]
+
+
+def raw_answer(server: Process, request: bytes) -> bytes:
+    """All that comes back for the bytes of a request, until the server closes."""
+    with socket.create_connection(("127.0.0.1", server.port), timeout=60) as raw:
+        raw.sendall(request)
+        answer = b""
+        while piece := raw.recv(1 << 16):
+            answer += piece
+    return answer
+
+
+FOREIGN = {
+    "another host": (b"Host: evil.example\r\n", b"the host 'evil.example' is not served here"),
+    "no host that can be read": (b"Host: [::\r\n", b"is not served here"),
+    "a page of another site": (
+        b"Host: localhost\r\nOrigin: http://evil.example\r\n",
+        b"pages of 'http://evil.example'",
+    ),
+    "a page of a name that begins alike": (
+        b"Host: localhost\r\nOrigin: http://localhost.evil.example\r\n",
+        b"may not ask",
+    ),
+    "a page that was opened as a file": (b"Host: localhost\r\nOrigin: null\r\n", b"pages of 'null' may not ask"),
+}
+
+
+@pytest.mark.parametrize(("headers", "reason"), FOREIGN.values(), ids=FOREIGN)
+def test_pages_of_other_sites_do_not_put_the_models_to_work(server: Process, headers: bytes, reason: bytes) -> None:
+    body = b'{"text": "a person walks"}'
+    for line in (b"GET /health HTTP/1.1", b"POST /generate.bvh HTTP/1.1\r\nContent-Length: %d" % len(body)):
+        answer = raw_answer(server, line + b"\r\n" + headers + b"Connection: close\r\n\r\n" + body)
+        assert answer.startswith(b"HTTP/1.1 403")
+        assert reason in answer
+
+
+@pytest.mark.parametrize("origin", ["http://localhost:3000", "http://127.0.0.1", "http://[::1]:5173"])
+def test_pages_of_this_machine_ask(server: Process, origin: str) -> None:
+    request = f"GET /health HTTP/1.1\r\nHost: localhost\r\nOrigin: {origin}\r\nConnection: close\r\n\r\n"
+    assert raw_answer(server, request.encode()).startswith(b"HTTP/1.1 200")
+
+
+def test_a_head_without_end_is_refused(server: Process) -> None:
+    lines = b"GET /health HTTP/1.1\r\nHost: localhost\r\n" + b"X: y\r\n" * 20_000
+    with suppress(OSError):  # it was closed while the rest was sent
+        assert raw_answer(server, lines).startswith(b"HTTP/1.1 400")
+    assert server.health()["status"] == "ok"
+
+
+def bounded(scenario: Callable[[int], Awaitable[None]], **limits: Any) -> None:
+    """Runs a scenario with the port of a server in this process, whose only application says its path."""
+
+    async def application(scope: Any, receive: Any, send: Any) -> None:
+        while (await receive()).get("more_body"):
+            pass
+        await send({"type": "http.response.start", "status": 200, "headers": [(b"content-length", b"2")]})
+        await send({"type": "http.response.body", "body": b"ok"})
+
+    async def running() -> None:
+        starlette = Starlette(routes=[Mount("/", application)])
+        starlette.state.limits = Limits(**limits)
+        starlette.state.live = None
+        uvicorn_server = uvicorn.Server(uvicorn.Config(starlette, log_config=None, lifespan="off", **OPTIONS))
+        with listening("127.0.0.1", 0) as place:
+            task = asyncio.create_task(uvicorn_server.serve([place]))
+            while not uvicorn_server.started:
+                await asyncio.sleep(0.001)
+            try:
+                await scenario(place.getsockname()[1])
+            finally:
+                uvicorn_server.should_exit = True
+                await task
+
+    asyncio.run(running())
+
+
+HALF = b"GET / HTTP/1.1\r\nHost: localhost\r\n"
+
+
+def test_half_a_head_and_a_slow_body_are_cut_off() -> None:
+    async def scenario(port: int) -> None:
+        begun = [HALF, b"", b"POST / HTTP/1.1\r\nHost: x\r\nContent-Length: 1000000\r\n\r\nx", HALF + b"\r\n" + HALF]
+        for data in begun:
+            reader, writer = await asyncio.open_connection("127.0.0.1", port)
+            writer.write(data)
+            with suppress(ConnectionResetError):
+                await reader.read()  # until the server closes
+            writer.close()
+
+    bounded(scenario, head_seconds=0.05)
+
+
+def test_a_body_that_arrives_is_waited_for() -> None:
+    async def scenario(port: int) -> None:
+        reader, writer = await asyncio.open_connection("127.0.0.1", port)
+        writer.write(b"POST / HTTP/1.1\r\nHost: x\r\nConnection: close\r\nContent-Length: 5000\r\n\r\n")
+        for _ in range(50):
+            writer.write(b"x" * 100)
+            await writer.drain()
+            await asyncio.sleep(0.01)  # five times as long as a head may take, in all
+        assert (await reader.read()).startswith(b"HTTP/1.1 200")
+        writer.close()
+
+    bounded(scenario, head_seconds=0.1, body_bytes_a_second=1)
+
+
+@pytest.mark.parametrize("limits", [{"connections": 5}, {"connections_of_address": 5}])
+def test_who_waits_longest_gives_way_to_a_newcomer(limits: dict[str, int]) -> None:
+    async def scenario(port: int) -> None:
+        halves = []
+        for _ in range(20):
+            halves.append(await asyncio.open_connection("127.0.0.1", port))
+            halves[-1][1].write(HALF)
+            await halves[-1][1].drain()
+        reader, writer = await asyncio.open_connection("127.0.0.1", port)
+        writer.write(HALF + b"Connection: close\r\n\r\n")
+        assert (await reader.read()).startswith(b"HTTP/1.1 200")
+        writer.close()
+        for first, half in halves[:16]:
+            with suppress(ConnectionResetError):
+                assert await first.read() == b""
+            half.close()
+
+    bounded(scenario, **limits)
+
+
+def test_connections_are_fewer_than_the_files_of_the_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    resource = pytest.importorskip("resource", reason="no limits of files there")
+    monkeypatch.setattr(resource, "getrlimit", lambda _: (256, 1024))
+    assert most_connections(Limits()) == 156
+    assert most_connections(Limits(connections=50)) == 50
+
+
+def test_what_is_said_of_clients_fills_no_disk(caplog: pytest.LogCaptureFixture) -> None:
+    logger = logging.getLogger("motet.tests.seldom")
+    with quieter(logger.name):
+        for number in range(1000):
+            logger.warning("client %d", number)
+    assert 20 <= len(caplog.messages) <= 40  # a minute may end between
+    assert sum("more of this minute is left out" in message for message in caplog.messages) in (1, 2)
+
+
+def test_the_header_of_what_was_understood_is_short() -> None:
+    rows = [{"text": f"a person walks {number}", "nearest": ["x" * 200]} for number in range(60)]
+    assert json.loads(in_a_header(rows[:3])) == rows[:3]
+    shown = json.loads(in_a_header(rows))
+    assert shown == [*rows[:10], {"more": 50}]
+    long = [{"text": "\u0416" * 1000, "nearest": []}] * 9
+    assert json.loads(in_a_header(long)) == [{"more": 9}]
+    assert max(len(in_a_header(each)) for each in (rows, long)) <= HEADER_BYTES
 
 
 def test_two_servers_on_a_port(server: Process) -> None:

@@ -50,12 +50,13 @@ def serve(
     curl -F file=@walk.bvh localhost:8000/describe
     """
     from motet.serve.application import app, run
-    from motet.serve.limits import Limits
+    from motet.serve.limits import LOCAL_HOSTS, Limits
 
     if mmcp and (lacking := missing("mmcp")):
         raise click.UsageError(f"--mmcp needs {', '.join(lacking)}: install the extra with  pip install 'motet[mmcp]'")
     limits = Limits(body_bytes=max_megabytes << 20, motion_seconds=max_seconds, seconds=timeout, requests=requests)
-    application = app(bundles, origins=origins, limits=limits, session=session, mmcp=mmcp)
+    hosts = LOCAL_HOSTS if host in LOCAL_HOSTS else None
+    application = app(bundles, origins=origins, hosts=hosts, limits=limits, session=session, mmcp=mmcp)
     shown = f"[{host}]" if ":" in host else host
     run(
         application,

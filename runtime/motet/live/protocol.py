@@ -5,6 +5,7 @@ and x at 90.
 """
 
 import json
+import re
 import warnings
 from typing import Any
 
@@ -18,6 +19,9 @@ from motet.models.steer import SteerModel
 from motet.motion.humanoid import BONES, HUMANOID, LEFT_RIGHT
 from motet.motion.pose import Pose
 from motet.settings import checked_int
+
+LOCAL = re.compile(r"https?://(localhost|127\.0\.0\.1|\[::1\])(:\d+)?")
+"""Origins of web pages that may connect, next to programs, which have none."""
 
 CLIENT_FIGURES = 16
 """Of a client."""

@@ -5,16 +5,15 @@ It needs the library websockets, which the extra ``live`` installs. What is said
 
 import asyncio
 import logging
-import re
 import socket
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Protocol, Self
+from typing import Any, Protocol, Self
 
 from motet.errors import MotetError, OutputError, TextError
 from motet.live import protocol
-from motet.live.protocol import ClientSession, ProtocolError
+from motet.live.protocol import LOCAL, ClientSession, ProtocolError
 from motet.models.generate import GenerateModel
 from motet.models.said_acts import SaidActs
 from motet.models.steer import SteerModel
@@ -57,9 +56,6 @@ class Limits:
 
 LIMITS = Limits()
 
-LOCAL = re.compile(r"https?://(localhost|127\.0\.0\.1|\[::1\])(:\d+)?")
-"""Origins of web pages that may connect, next to programs, which have none."""
-
 
 class Connection(ServerConnection):
     """One that is cut off where its client sends too many frames that are no messages: they are answered unread."""
@@ -87,6 +83,17 @@ class Connection(ServerConnection):
             said = "dropped a client: more than %d pings, pongs and parts of messages in a second"
             log.warning(said, LIMITS.controls)
             self.transport.abort()
+
+
+def connection_options(limits: Limits) -> dict[str, Any]:
+    """The settings of :class:`Connection`."""
+    return {
+        "max_queue": 16,
+        "write_limit": limits.buffer,
+        "ping_interval": limits.ping,
+        "ping_timeout": limits.ping,
+        "close_timeout": 1,
+    }
 
 
 class Wire(Protocol):
@@ -128,6 +135,14 @@ class LiveClients:
         self.rate, self.watch, self.limits = rate or model.fps, watch, limits
         ClientSession(model, characters)  # refuses now what it would refuse every client
         self._clients: list[ClientSession] = []
+
+    async def connected(self, connection: "Connection") -> None:
+        """All of one client of a connection that is open."""
+        # the system holds no more for a client than this, either
+        connection.transport.get_extra_info("socket").setsockopt(
+            socket.SOL_SOCKET, socket.SO_SNDBUF, self.limits.buffer
+        )
+        await self.client(connection)
 
     async def client(self, connection: Wire) -> None:
         """All of one client, until it goes or is dropped: ticks and its messages, side by side."""
@@ -241,12 +256,8 @@ class LiveServer(LiveClients):
                 logger=log,
                 compression=None,
                 max_size=self.limits.message_bytes,
-                max_queue=16,
-                write_limit=self.limits.buffer,
-                ping_interval=self.limits.ping,
-                ping_timeout=self.limits.ping,
-                close_timeout=1,
                 create_connection=Connection,
+                **connection_options(self.limits),
             )
         except OSError as fault:
             raise OutputError(f"cannot listen on {self.host}:{self.port}: {fault.strerror or fault}") from fault
@@ -259,12 +270,8 @@ class LiveServer(LiveClients):
         await self._server.wait_closed()
 
     async def _connected(self, connection: ServerConnection) -> None:
-        # the system holds no more for a client than this, either
-        connection.transport.get_extra_info("socket").setsockopt(
-            socket.SOL_SOCKET, socket.SO_SNDBUF, self.limits.buffer
-        )
         assert isinstance(connection, Connection)
-        await self.client(connection)
+        await self.connected(connection)
 
 
 def run_server(server: LiveServer, ready: Callable[[], None] = lambda: None) -> None:

@@ -23,21 +23,21 @@ from motet.models.steer import SteerModel
 try:
     import python_multipart  # noqa: F401  which Starlette needs for forms
     import uvicorn
-    import websockets  # noqa: F401  which uvicorn needs for live figures
+    import websockets  # noqa: F401  which live figures need
     from starlette.applications import Starlette
     from starlette.exceptions import HTTPException
     from starlette.middleware import Middleware
     from starlette.middleware.cors import CORSMiddleware
-    from starlette.routing import Mount, WebSocketRoute
+    from starlette.routing import Mount
 except ImportError as error:
     remedy = "install the extra with  pip install 'motet[serve]'"
     raise ImportError(f"motet.serve.application needs {error.name}: {remedy}") from error
 
-from motet.live.server import LIMITS
 from motet.serve.answers import Answers
 from motet.serve.endpoints import UNDERSTOOD, broken, fault, refused, routes
-from motet.serve.limits import Gate, Limits
+from motet.serve.limits import Gate, Limits, Visitors
 from motet.serve.live import LiveDoor
+from motet.serve.protocol import OPTIONS, quieter
 
 KINDS: dict[str, type[BundleModel]] = {
     "generate": CodesModel,
@@ -52,6 +52,7 @@ def app(
     bundles: Sequence[str] = (),
     *,
     origins: Sequence[str] = (),
+    hosts: Sequence[str] | None = None,
     limits: Limits | None = None,
     session: SessionOptions | None = None,
     mmcp: bool = False,
@@ -59,8 +60,10 @@ def app(
     """The ASGI application of ``motet serve``, for any server: ``uvicorn --factory motet.serve.application:app``.
 
     bundles: names or paths of bundles that take the place of "generate", "describe", "predict" and "control".
-    origins: of web pages that may call it (CORS) and steer figures. limits: by default those of :class:`Limits`.
-    session: how graphs run. mmcp: speak the Motion Model Context Protocol, too, at /mmcp (:mod:`motet.serve.mmcp`).
+    origins: of web pages that may call it (CORS) and steer figures, beside its own and those of this machine; others
+    are refused. hosts: the names that it may be called by, without ports; by default any. limits: by default those of
+    :class:`Limits`. session: how graphs run. mmcp: speak the Motion Model Context Protocol, too, at /mmcp
+    (:mod:`motet.serve.mmcp`).
     BundleError for a bundle that cannot be used; ImportError with the remedy where the extra mmcp is missing.
     """
     kinds = KINDS | ({"fill": FillModel} if mmcp else {})
@@ -69,7 +72,8 @@ def app(
         raise BundleError(f"bundle {named[others[0]]} is for {others[0]!r}; a server takes {', '.join(kinds)}")
     models: dict[str, Any] = {verb: load_as(kind, named[verb], session) for verb, kind in kinds.items()}
     doors = _mmcp(models["generate"], models.pop("fill"), models["control"]) if mmcp else []
-    steer, answers = models.pop("control"), Answers(**models, limits=limits or Limits())
+    live = LiveDoor(models.pop("control"), origins)
+    answers = Answers(**models, limits=limits or Limits())
 
     @asynccontextmanager
     async def running(_: Starlette) -> AsyncIterator[None]:
@@ -77,15 +81,23 @@ def app(
             for category in (TextWarning, TravelWarning):
                 warnings.simplefilter("ignore", category)
             yield
+        await live.close()
         answers.close()
 
     cors = Middleware(CORSMiddleware, allow_origins=origins, allow_methods=["*"], expose_headers=[UNDERSTOOD])
-    return Starlette(
-        routes=[*routes(answers, version("motet")), WebSocketRoute("/live", LiveDoor(steer, origins).open), *doors],
-        middleware=[*([cors] if origins else []), Middleware(Gate, limits=answers.limits)],
+    application = Starlette(
+        routes=[*routes(answers, version("motet")), *doors],
+        middleware=[
+            Middleware(Visitors, origins=origins, hosts=hosts),
+            *([cors] if origins else []),
+            Middleware(Gate, limits=answers.limits),
+        ],
         exception_handlers={MotetError: fault, HTTPException: refused, Exception: broken},
         lifespan=running,
     )
+    application.state.limits = answers.limits
+    application.state.live = live
+    return application
 
 
 def _mmcp(model: CodesModel, fill: FillModel, steer: SteerModel) -> list[Mount]:
@@ -113,12 +125,12 @@ def run(
         access_log=False,
         server_header=False,
         timeout_graceful_shutdown=30,
-        ws_max_size=LIMITS.message_bytes,
-        ws_ping_interval=LIMITS.ping,
-        ws_ping_timeout=LIMITS.ping,
-        ws_per_message_deflate=False,
+        **OPTIONS,
     )
-    with listening(host, port) as place:
+    with (
+        listening(host, port) as place,
+        quieter("asyncio", "uvicorn.error", "motet.serve.endpoints", "motet.live.server"),
+    ):
         ready(place.getsockname()[1])
         before = signal.signal(signal.SIGTERM, signal.default_int_handler)
         try:

@@ -3,8 +3,8 @@
 import asyncio
 import json
 import logging
-from collections.abc import AsyncIterator, Awaitable, Callable
-from typing import TypeVar
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
+from typing import Any, TypeVar
 
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect, Request
@@ -27,6 +27,12 @@ log = logging.getLogger(__name__)
 
 UNDERSTOOD = "Motet-Understood"
 """The header of an answer with JSON: of each sentence its confidence, and what the model knows that is near."""
+
+MOST_SHOWN = 10
+"""Sentences of which it tells."""
+
+HEADER_BYTES = 3000
+"""Of it: proxies allow 4 KB for all headers together, some clients 8 or 16."""
 
 PAGE = {
     "Content-Security-Policy": "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-src 'self'",
@@ -88,8 +94,20 @@ def _response(answer: Answer, name: str) -> Response:
     shown = name.endswith((".html", ".json"))
     headers = {"X-Content-Type-Options": "nosniff"}
     headers |= {} if shown else {"Content-Disposition": f'attachment; filename="{name}"'}
-    headers |= {} if answer.understood is None else {UNDERSTOOD: json.dumps(answer.understood)}
+    headers |= {} if answer.understood is None else {UNDERSTOOD: in_a_header(answer.understood)}
     return Response(answer.content, headers=headers, media_type=answer.media)
+
+
+def in_a_header(understood: Sequence[Mapping[str, Any]]) -> str:
+    """JSON of what was understood of sentences, short enough for the headers of any client: of the first of them, and
+    how many more there are. The answer as JSON has all."""
+    count = min(len(understood), MOST_SHOWN)
+    while True:
+        more = [] if count == len(understood) else [{"more": len(understood) - count}]
+        text = json.dumps([*understood[:count], *more])
+        if len(text) <= HEADER_BYTES or not count:
+            return text
+        count -= 1
 
 
 async def _to_the_end(lines: AsyncIterator[bytes], limits: Limits) -> AsyncIterator[bytes]:

@@ -1,13 +1,19 @@
 """What a server takes and gives at most, and the gate that every request passes: too large, too many, too slow."""
 
 import asyncio
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
+from urllib.parse import urlsplit
 
+from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from motet.errors import quoted
+from motet.live.protocol import LOCAL
 
 
 @dataclass(frozen=True)
@@ -17,7 +23,9 @@ class Limits:
     body_bytes: of a request. all_bytes: of the bodies of all requests at once. requests: answered or waiting at once.
     seconds: until a request is answered, and in which a client takes a part of the answer. motion_seconds: of a motion
     that is given or asked for. fps: of an answer. text_bytes: of a body that is JSON, or a field of a form. batch:
-    requests that share a call of a model.
+    requests that share a call of a model. connections, connections_of_address: at once, in all and of one address.
+    head_seconds: until the head of a request has arrived. body_bytes_a_second: which a body brings at least, in as many
+    seconds.
     """
 
     body_bytes: int = 32 << 20
@@ -28,11 +36,56 @@ class Limits:
     fps: float = 240.0
     text_bytes: int = 1 << 16
     batch: int = 32
+    connections: int = 1000
+    connections_of_address: int = 250
+    head_seconds: float = 10.0
+    body_bytes_a_second: int = 1000
 
 
 def refusal(status: int, said: str, kind: str = "RequestError", **headers: str) -> JSONResponse:
     """An answer that says in a sentence why there is no other."""
     return JSONResponse({"error": said, "type": kind}, status, headers)
+
+
+LOCAL_HOSTS = ("localhost", "127.0.0.1", "::1")
+"""The names of this machine for itself."""
+
+
+class Visitors:
+    """Middleware that refuses with 403 what pages of other sites make a browser ask, and requests for another host.
+
+    origins: of pages that may ask, beside pages of the server itself and of this machine. hosts: names that the server
+    may be asked by; None for any. A server of this machine alone is asked by :data:`LOCAL_HOSTS`, so that a site whose
+    name is made to lead to this machine is not taken for the server's own.
+    """
+
+    def __init__(self, app: ASGIApp, origins: Sequence[str], hosts: Sequence[str] | None) -> None:
+        self.app, self.origins, self.hosts = app, frozenset(origins), hosts
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass a request on, or refuse it."""
+        if scope["type"] == "http" and (reason := self.reason(Headers(scope=scope))):
+            await refusal(403, reason)(scope, receive, send)
+        else:
+            await self.app(scope, receive, send)
+
+    def reason(self, headers: Headers) -> str:
+        """Why a request with these headers is refused; "" if it is not."""
+        host = headers.get("host", "")
+        if self.hosts is not None and _without_port(host) not in self.hosts:
+            return f"the host {quoted(host)} is not served here: expected {', '.join(self.hosts)}"
+        origin = headers.get("origin")
+        if origin is None or origin in self.origins or LOCAL.fullmatch(origin):
+            return ""
+        of_the_server = origin.partition("://")[2] == host
+        return "" if of_the_server else f"pages of {quoted(origin)} may not ask: name it with --origin"
+
+
+def _without_port(host: str) -> str | None:
+    try:
+        return urlsplit(f"//{host}").hostname
+    except ValueError:  # no address of IPv6
+        return None
 
 
 class Gate:
