@@ -168,5 +168,10 @@ def quieter(*names: str) -> Iterator[None]:
             logger.removeFilter(seldom)
 
 
-OPTIONS: dict[str, Any] = {"http": BoundedProtocol, "h11_max_incomplete_event_size": HEAD_BYTES, "ws": "none"}
+OPTIONS: dict[str, Any] = {
+    "http": BoundedProtocol,
+    "h11_max_incomplete_event_size": HEAD_BYTES,
+    "ws": "none",
+    "backlog": 128,  # connections that are accepted at once, before any of them can give way
+}
 """Of :class:`uvicorn.Config`."""
