@@ -176,9 +176,10 @@ def test_a_column_or_a_table_of_patterns_says_which_gaits_are_shown(own: Path) -
     assert gaits_of(unsaid) == read_gaits()
     with pytest.raises(DataError, match="shows the gait 'walk': name gaits in a column gait"):
         recorded.recordings(unsaid, gaits_of(unsaid))
-    patterns.write_text('[[gait]]\nname = "sprint"\n')
-    with pytest.raises(DataError, match=r"gaits\.toml is not a table of gaits"):
-        read_gaits(patterns)
+    for wrong in ('name = "sprint"', 'name = 3\nactions = ["s*"]', 'name = "sprint"\nactions = ["s*", 3]'):
+        patterns.write_text(f"[[gait]]\n{wrong}\n")
+        with pytest.raises(DataError, match=r"gaits\.toml is not a table of gaits"):
+            read_gaits(patterns)
 
 
 def test_clips_in_place_travel_and_periods_repeat(own: Path) -> None:

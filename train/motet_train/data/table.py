@@ -127,6 +127,9 @@ def read_gaits(path: Path | None = None) -> tuple[Gait, ...]:
     path = path or Path(__file__).with_name("gaits.toml")
     try:
         rows = tomllib.loads(path.read_text(encoding="utf-8"))["gait"]
-        return tuple(Gait(row["name"], tuple(row["actions"]), tuple(row.get("people", ["*"]))) for row in rows)
+        gaits = tuple(Gait(row["name"], tuple(row["actions"]), tuple(row.get("people", ["*"]))) for row in rows)
+        if not all(isinstance(text, str) for gait in gaits for text in (gait.name, *gait.actions, *gait.people)):
+            raise TypeError("names of gaits, actions and people are texts")
+        return gaits
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise DataError(f"{path} is not a table of gaits: {error}") from error
