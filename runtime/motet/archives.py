@@ -7,15 +7,15 @@ import struct
 import zipfile
 import zlib
 from contextlib import AbstractContextManager, ExitStack
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import IO
 
 from motet.errors import FormatError
 
 log = logging.getLogger(__name__)
 
-MAX_TABLE = 32 << 20
-"""Bytes of a zip's table of contents, which is read whole: of some 300,000 files."""
+MAX_TABLE = 16 << 20
+"""Bytes of a zip's table of contents, which is read whole: of some 150,000 files."""
 
 MAX_FILE = 512 << 20
 """Bytes of a file, unpacked."""
@@ -42,7 +42,8 @@ class _Bounded(io.BufferedReader):
 
     def read(self, size: int | None = -1, /) -> bytes:
         if size is not None and size > MAX_TABLE:
-            raise zipfile.BadZipFile(f"it holds too many files: its table of contents has {size} bytes")
+            more = f"{size} bytes, more than {MAX_TABLE}"
+            raise zipfile.BadZipFile(f"it holds too many files: unpack it (its table of contents has {more})")
         return super().read(size)
 
 
@@ -86,7 +87,7 @@ class ZipFiles(AbstractContextManager["ZipFiles"]):
         )
         if info.file_size > limit:
             raise too_large
-        place = folder.joinpath(*PurePosixPath(name).parts)
+        place = folder.joinpath(*name.split("/"))
         try:
             place.parent.mkdir(parents=True, exist_ok=True)
             with self._zip.open(info) as packed, place.open("wb") as file:
@@ -118,11 +119,10 @@ def _is_plain(info: zipfile.ZipInfo) -> bool:
 
 def is_plain_path(name: str) -> bool:
     """Whether a name is a relative path that stays below wherever it is put, on every system."""
-    # parts are compared with the name, so that "a//b", "a/./b" and "/a" are no second names of a file
-    parts = PurePosixPath(name).parts
-    relative = bool(parts) and "/".join(parts) == name and ".." not in parts
-    return relative and name.isprintable() and not {"\\", ":"} & set(name)
+    # also "a//b", "a/./b" and "/a", which would be second names of a file, have a part that is none
+    plain = not {"", ".", ".."} & set(name.split("/"))
+    return plain and name.isprintable() and "\\" not in name and ":" not in name
 
 
 def _is_hidden(name: str) -> bool:
-    return any(part.startswith((".", "__MACOSX")) for part in PurePosixPath(name).parts)
+    return any(part.startswith((".", "__MACOSX")) for part in name.split("/"))
