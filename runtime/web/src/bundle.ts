@@ -1,6 +1,7 @@
 import { type NumberArray, DTYPES, readNpy, readNpz } from "./arrays.js";
 import { BundleError } from "./errors.js";
 import { type GraphSpec, Graph, type SessionSettings } from "./graph.js";
+import { checkManifest, isObject } from "./manifestChecks.js";
 import { openZip, type Archive } from "./zip.js";
 
 const FORMAT = 3;
@@ -108,27 +109,15 @@ export class Bundle {
   }
 }
 
-/** What manifest.json has to hold, as far as every reader needs it. */
-const TEXTS = ["name", "verb", "loop"];
-const OBJECTS = ["files", "graphs", "tables", "golden", "motion", "defaults", "settings", "config"];
-
 function parse(bytes: Uint8Array): Manifest {
-  let manifest: Record<string, unknown>;
+  let manifest: unknown;
   try {
-    manifest = JSON.parse(new TextDecoder("utf-8", { fatal: true }).decode(bytes)) as typeof manifest;
+    manifest = JSON.parse(new TextDecoder("utf-8", { fatal: true }).decode(bytes));
   } catch {
     throw new BundleError("manifest.json is not JSON");
   }
   if (!isObject(manifest) || !("format" in manifest)) throw new BundleError("manifest.json is not a bundle's manifest");
   if (manifest.format !== FORMAT) throw new BundleError(`this is a bundle of format ${manifest.format}; format ${FORMAT} is read`);
-  for (const key of TEXTS) if (typeof manifest[key] !== "string") throw new BundleError(`manifest, ${key}: is no text`);
-  for (const key of OBJECTS) if (!isObject(manifest[key])) throw new BundleError(`manifest, ${key}: is no object`);
-  const { channels, mean, std, fps } = manifest.motion as Partial<Manifest["motion"]>;
-  const fits = [channels, mean, std].every((one) => Array.isArray(one) && one.length === channels!.length);
-  if (!fits || !(typeof fps === "number" && fps > 0)) throw new BundleError("manifest, motion: does not say what frames are");
+  checkManifest(manifest);
   return manifest as unknown as Manifest;
-}
-
-function isObject(value: unknown): value is Record<string, unknown> {
-  return typeof value === "object" && value !== null && !Array.isArray(value);
 }

@@ -299,9 +299,10 @@ export async function generateModel(bundle: Bundle, graphs: Record<string, Graph
   const { manifest } = bundle;
   const [memory, moves, body] = await Promise.all([bundle.table("memory"), bundle.table("moves"), bundle.table("body")]);
   const { step, part, encoder, decoder, tokens } = graphs as Record<string, Graph>;
-  const { ahead, hop } = manifest.config.codec as { ahead: number[]; hop: number };
+  const { ahead, hop } = (manifest.config.codec ?? {}) as { ahead: number[]; hop: number };
   const shape = decoder!.spec.outputs.find((output) => output.name === "frames")!.shape;
-  if (!Array.isArray(ahead) || hop !== shape[2]) throw new BundleError(`the bundle ${manifest.name} does not say what its decoder looks at`);
+  const looks = Array.isArray(ahead) && ahead.length <= 8 && ahead.every((steps) => [0, 1, 2].includes(steps));
+  if (!looks || hop !== shape[2]) throw new BundleError(`the bundle ${manifest.name} does not say what its decoder looks at`);
   const [actions, end] = [manifest.actions?.length ?? 0, moves.shape[0]!];
   const parts = Number(part!.spec.inputs.find((input) => input.name === "codes")!.shape[1]);
   const source: Source = { step: step!, part: part!, end, nullAction: actions, parts, memory: new Memory(memory, moves, body, actions) };

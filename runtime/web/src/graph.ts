@@ -44,6 +44,7 @@ export class Graph {
     for (const [wanted, given] of [[spec.inputs, session.inputNames], [spec.outputs, session.outputNames]] as const) {
       const names = wanted.map((tensor) => tensor.name);
       if (`${[...names].sort()}` !== `${[...given].sort()}`) {
+        await session.release();
         throw new BundleError(`graph ${role}: it has ${given.join(", ")}, and its manifest ${names.join(", ")}`);
       }
     }
@@ -64,13 +65,21 @@ export class Graph {
         ? new this.runtime.Tensor("int64", given.data, given.shape)
         : new this.runtime.Tensor("float32", singles(given.data), given.shape);
     }
+    const outputs = await this.session.run(feeds).catch((error: unknown) => {
+      throw new BundleError(`graph ${this.role}: ONNX Runtime cannot compute it: ${String(error).slice(0, 200)}`);
+    });
     const found: Record<string, NumberArray<Float32Array>> = {};
-    for (const [name, tensor] of Object.entries(await this.session.run(feeds))) {
+    for (const [name, tensor] of Object.entries(outputs)) {
       const data = tensor.data as Float32Array | BigInt64Array;
       found[name] = { data: singles(data), shape: [...tensor.dims] }; // codes are int64, and small
       if (!bounded(found[name].data)) throw new BundleError(`graph ${this.role}: ${name} is not finite, or beyond ${LARGEST}`);
     }
     return found;
+  }
+
+  /** Give back the memory of ONNX Runtime; the graph is of no use then. */
+  async release(): Promise<void> {
+    await this.session.release();
   }
 
   /** The states of so many rows before the first step: zeros. */

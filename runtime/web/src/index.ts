@@ -11,7 +11,7 @@ export {
   type Generated, GenerateModel, type GenerateSettings, type Passage, type Shown, type Story, type StorySettings, type Understood,
 } from "./generate.js";
 export type { Frames } from "./model.js";
-export { type AnyModel, load } from "./models.js";
+export { type AnyModel, load, release } from "./models.js";
 export { PredictModel } from "./predict.js";
 export { type Hit, SearchModel } from "./search.js";
 export { framesOf, type Pose, poser, posesOf } from "./poses.js";

@@ -19,7 +19,12 @@ export interface Clip {
   name: string;
   duration: number;
   tracks: Track[];
+  uuid: string;
+  blendMode: typeof NORMAL_BLENDING;
 }
+
+/** three's NormalAnimationBlendMode. */
+const NORMAL_BLENDING = 2500;
 
 /** What is needed of a VRM that @pixiv/three-vrm has loaded. */
 export interface Avatar {
@@ -37,7 +42,17 @@ export interface Avatar {
  */
 export function toThree(motion: Motion, avatar?: Avatar): Clip {
   const tracks = avatar ? avatarTracks(grounded(onHumanoid(motion)), avatar) : jointTracks(motion);
-  return { name: "motion", duration: (motion.rotations.length - 1) / motion.fps, tracks };
+  const duration = (motion.rotations.length - 1) / motion.fps;
+  return { name: "motion", duration, tracks, uuid: uuid(), blendMode: NORMAL_BLENDING };
+}
+
+/** A random UUID, also on pages without TLS. */
+function uuid(): string {
+  const bytes = crypto.getRandomValues(new Uint8Array(16));
+  bytes[6] = (bytes[6]! & 0x0f) | 0x40;
+  bytes[8] = (bytes[8]! & 0x3f) | 0x80;
+  const hex = Array.from(bytes, (byte) => byte.toString(16).padStart(2, "0")).join("");
+  return hex.replace(/^(.{8})(.{4})(.{4})(.{4})/, "$1-$2-$3-$4-");
 }
 
 function jointTracks(motion: Motion): Track[] {

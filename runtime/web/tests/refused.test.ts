@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
 import test from "node:test";
-import { Bundle, BundleError, DecodingError, FillModel, type GenerateModel, load, type PredictModel, type SearchModel, TextError } from "../src/index.js";
+import { Bundle, BundleError, DecodingError, FillModel, type GenerateModel, load, type PredictModel, release, type SearchModel, TextError } from "../src/index.js";
 import { checkGraph } from "../src/graphSafety.js";
 import { Pcg64 } from "../src/random.js";
 import { openZip } from "../src/zip.js";
@@ -127,3 +127,53 @@ test("noise is numpy's: default_rng(seed).random(3, float32), and what it spawns
   near(new Pcg64(7, 0).uniform(3), [0.30536908, 0.79785913, 0.2038976]);
   near(new Pcg64(7, 2).uniform(3), [0.3966366, 0.6320442, 0.7854183]);
 });
+
+/** A bundle with another manifest; its files stay. */
+async function changed(name: string, change: (manifest: Record<string, never>) => void): Promise<Uint8Array> {
+  const zip = openZip(await bytes(name));
+  const files: Record<string, Uint8Array> = {};
+  for (const file of zip.names) files[file] = await zip.read(file, 1 << 28);
+  const manifest = JSON.parse(new TextDecoder().decode(files["manifest.json"]));
+  change(manifest);
+  return zipped({ ...files, "manifest.json": new TextEncoder().encode(JSON.stringify(manifest)) });
+}
+
+const WRONG: Record<string, [string, (manifest: any) => void, RegExp]> = {
+  "no shape": ["predict", (m) => delete m.graphs.step.inputs[0].shape, /graphs\.step\.inputs\.0\.shape/],
+  "a shape of lists": ["predict", (m) => (m.graphs.step.inputs[0].shape = [[1], 2]), /graphs\.step\.inputs\.0\.shape/],
+  "a size of 2 ** 40": ["predict", (m) => (m.graphs.step.inputs[0].shape = [2 ** 40]), /graphs\.step\.inputs\.0\.shape/],
+  "no inputs": ["predict", (m) => (m.graphs.encoder.inputs = []), /graphs\.encoder\.inputs/],
+  "another type of tensors": ["predict", (m) => (m.graphs.step.inputs[0].dtype = "string"), /needs a name and a dtype/],
+  "a state from nowhere": ["predict", (m) => (m.graphs.step.feedback.none = "nothing"), /feedback\.none/],
+  "a start of words": ["predict", (m) => (m.graphs.step.start = { state: ["x"] }), /start\.state/],
+  "no deviation": ["predict", (m) => (m.motion.std[0] = 0), /motion\.std/],
+  "a mean of text": ["predict", (m) => (m.motion.mean[0] = "x"), /motion\.mean/],
+  "a rate of 10^6": ["predict", (m) => (m.motion.fps = 1e6), /motion\.fps/],
+  "a joint below itself": ["predict", (m) => (m.motion.skeleton.joints[1].parent = 1), /motion\.skeleton\.joints\.1/],
+  "a table of half rows": ["control", (m) => (Object.values<any>(m.tables)[0].shape = [1.5]), /tables\..*shape/],
+  "a file of no size": ["predict", (m) => (m.files["golden.npz"].size = "x"), /files\.golden\.npz/],
+  "words that are numbers": ["generate", (m) => (m.vocabulary[5] = 7), /vocabulary/],
+  "actions without words": ["generate", (m) => delete m.actions[0].words, /actions/],
+  "a decoder that looks 1,000 steps ahead": ["generate", (m) => (m.config.codec.ahead[0] = 1000), /what its decoder looks at/],
+  "no codec": ["generate", (m) => delete m.config.codec, /what its decoder looks at/],
+  "a setting without end": ["generate", (m) => (m.settings.continuation.context = 1e12), /settings\.continuation\.context/],
+};
+for (const [fault, [name, change, place]] of Object.entries(WRONG)) {
+  test(`a manifest with ${fault} is refused with its place`, async () => {
+    await assert.rejects(load(await changed(name, change)), (error: unknown) => error instanceof BundleError && place.test(error.message));
+  });
+}
+
+test("what ONNX Runtime throws while it computes is a BundleError, and a model that was released computes no more", async () => {
+  const model = await load(await bytes("search")) as SearchModel;
+  const frames = Array.from({ length: 30 }, () => model.manifest.motion.mean);
+  await model.embedMotion(frames);
+  await release(model);
+  await assert.rejects(model.embedMotion(frames), (error: unknown) => error instanceof BundleError && /cannot compute it/.test(error.message));
+});
+
+test("in Node a bundle is loaded by its path, and one that is not there is named", async () => {
+  assert.equal((await load("../motet/bundles/predict.zip")).manifest.name, "predict");
+  await assert.rejects(load("../motet/bundles/none.zip"), (error: unknown) => error instanceof BundleError && /none\.zip cannot be read/.test(error.message));
+});
+
