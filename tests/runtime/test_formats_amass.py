@@ -91,3 +91,12 @@ def test_damaged_archives_are_refused(tmp_path: Path) -> None:
             content[place] = rng.integers(256)
         with suppress(FormatError):  # and nothing else is raised
             npz.read(io.BytesIO(content))
+
+
+def test_more_frames_than_the_size_of_a_file_speaks_for_are_refused_before_they_are_unpacked(tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    for frames, reason in ((45_000, "no frame rate"), (60_000, "60000 frames are too many for a file of")):
+        shaped = {"trans": np.zeros((frames, 3), "f4"), "poses": np.zeros((frames, 66), "i1")}
+        np.savez_compressed(path, **shaped)
+        with pytest.raises(FormatError, match=reason):
+            read_motion(path)

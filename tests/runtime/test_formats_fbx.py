@@ -3,9 +3,12 @@
 import io
 import logging
 import random
+import subprocess
+import sys
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -239,3 +242,51 @@ def test_files_of_other_makers(shared: Path) -> None:
         human = motet.motion.to_humanoid(motet.read(shared / "figures" / f"{name}.fbx", unit=unit))
         assert (human.convention, human.confidence, len(human.motion)) == (maker, 1.0, frames)
         assert abs(motet.motion.positions(human.motion)[..., 1].min()) < 0.02
+
+
+UFBX = """
+class Anything:
+    def __getattr__(self, name):
+        return self
+
+def __getattr__(name):
+    return Anything()
+
+def load_memory(content, **settings):
+    bytearray(2**28 + 33 * len(content))
+    raise ValueError("it fits")
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of memory are Linux's")
+def test_the_memory_of_the_process_is_bounded_by_the_size_of_the_file(tmp_path: Path) -> None:
+    (tmp_path / "ufbx.py").write_text(UFBX)
+    command = [sys.executable, "-P", str(fbx.PROGRAM), "0"]
+    environment = {"PYTHONPATH": str(tmp_path)}
+    done = subprocess.run(command, input=bytes(1000), env=environment, capture_output=True, check=False)
+    assert (done.returncode, done.stderr) == (1, b"MemoryError")
+
+
+@pytest.mark.parametrize(
+    ("nodes", "seconds", "size", "fits"),
+    [
+        (10, 332, 0, True),
+        (10, 335, 0, False),
+        (10, 335, 10_000, True),
+        (100, 3_330, 10**9, True),
+        (100, 3_340, 10**9, False),
+    ],
+)
+def test_frames_are_bounded_by_the_size_of_the_file(nodes: int, seconds: float, size: int, fits: bool) -> None:
+    pytest.importorskip("ufbx")
+    from motet.formats import fbx_to_gltf
+
+    rate = SimpleNamespace(settings=SimpleNamespace(frames_per_second=30.0))
+    scene: Any = SimpleNamespace(size=size, near=range(nodes), scene=rate)
+    curve = SimpleNamespace(min_time=0.0, max_time=seconds, keyframes=())
+    take: Any = SimpleNamespace(curves=[curve], stack=SimpleNamespace(time_begin=0.0, time_end=seconds))
+    if fits:
+        assert len(fbx_to_gltf.frame_times(scene, take)) == 30 * seconds + 1
+        return
+    with pytest.raises(ValueError, match=f"{seconds} s at 30 fps is too many frames"):
+        fbx_to_gltf.frame_times(scene, take)

@@ -143,6 +143,7 @@ def test_csv_from_elsewhere_has_its_rate_in_its_times(tmp_path):
         ("", None, "the header must be"),
         ("# motet motion, fps 30\n0,1\n", None, "the header must be"),
         ("time,a.rx\n0,1\n", None, "the header must be"),
+        ("a,b\n0,one\n", None, "the header must be"),  # before rows are read
         ("# motet motion, fps 30\ntime,a.rx [deg]\n0,1\n1\n", 4, "expected 2 values, not 1"),
         ("# motet motion, fps 30\ntime,a.rx [deg]\n0,one\n", 3, "'one' is not a finite number"),
         ("# motet motion, fps 30\ntime,a.rx [deg]\n0,inf\n", 3, "'inf' is not a finite number"),

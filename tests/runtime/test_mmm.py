@@ -3,9 +3,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from memory import traced
 
 from motet.errors import FormatError
-from motet.formats import read_motion
+from motet.formats import mmm, read_motion
 
 FRAME = """      <MotionFrame>
         <Timestep>{time}</Timestep>
@@ -86,6 +87,29 @@ def test_what_is_no_motion_is_refused_with_its_place(tmp_path: Path, text: str, 
 
 def test_an_attribute_of_20_megabytes_takes_no_time(tmp_path: Path) -> None:
     started = time.process_time()
-    motion = read_motion(write(tmp_path, xml(frame(0), frame(0.01), name="n" * 20_000_000)))
+    motion = read_motion(write(tmp_path, xml(frame(0), frame(0.01), name="n" * 5_000_000)))
     assert len(motion) == 2
     assert time.process_time() - started < 10
+
+
+def test_elements_inside_each_other_are_bounded(tmp_path: Path) -> None:
+    for depth, reason in ((64, "truncated"), (65, "over 64 elements inside each other")):
+        with pytest.raises(FormatError, match=reason):
+            read_motion(write(tmp_path, "<a>" * depth))
+
+
+def test_elements_before_a_frame_are_bounded_and_those_of_all_frames_are_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(mmm, "MAX_ELEMENTS", 50)
+    assert len(read_motion(write(tmp_path, xml(*(frame(i / 100) for i in range(30)))))) == 30
+    for more in ("<b/>" * 50, f"<MotionFrame>{'<b/>' * 50}</MotionFrame>"):
+        with pytest.raises(FormatError, match="over 50 elements before a frame"):
+            read_motion(write(tmp_path, xml(frame(0), more, frame(0.01))))
+
+
+def test_frames_that_were_read_are_dropped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mmm, "PIECE", 2**14)
+    path = write(tmp_path, xml(*(frame(i / 100) for i in range(1_000))))
+    # all elements at once take several times as much
+    assert traced(lambda: read_motion(path)) < 3 * path.stat().st_size

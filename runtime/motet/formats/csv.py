@@ -7,6 +7,9 @@ time in seconds first. Other programs' tables need the header and, without such 
 import csv
 import io
 import re
+from array import array
+from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -20,8 +23,11 @@ COMMENT = "# motet motion, fps "
 
 def read(file: File) -> Motion:
     """Read a table: values unchanged, no skeleton. FormatError names the file and line at fault."""
-    path, fps, rows = place_of(file), None, []
+    path = place_of(file)
+    fps: float | None = None
     header: list[str] = []
+    channels: list[re.Match[str]] = []
+    values = array("d")  # row after row
     reader = csv.reader(io.StringIO(read_text(file)))
     try:
         for row in reader:
@@ -31,22 +37,34 @@ def read(file: File) -> Motion:
                     fps = frame_rate(number(comment.removeprefix(COMMENT), path, line), path, line)
             elif not header:
                 header = row
+                channels = _channels(path, header)
             elif len(row) == len(header):
-                rows.append(numbers(row, path, reader.line_num))
+                values.extend(numbers(row, path, reader.line_num))
             else:
                 raise FormatError(path, f"expected {len(header)} values, not {len(row)}", reader.line_num)
     except csv.Error as error:
         raise FormatError(path, f"not a table: {error}", reader.line_num) from error
-    found = [match for title in header[1:] if (match := re.fullmatch(r"(.+) \[(.+)\]", title))]
-    if header[:1] != ["time"] or len(found) < len(header) - 1:
-        raise FormatError(path, "the header must be 'time,CHANNEL [UNIT],...', as in 'time,root.tx [length]'")
-    table = np.array(rows).reshape(len(rows), len(header))
+    if not header:
+        raise _no_header(path)
+    table = np.array(values).reshape(-1, len(header))
     if fps is None:
         steps = np.diff(table[:, 0])
         if not len(steps) or steps.min() <= 0 or np.ptp(steps) > 0.01 * steps.mean():
             raise FormatError(path, f"times are not evenly spaced: add a comment line '{COMMENT}30'")
         fps = frame_rate(float(1 / steps.mean()), path)
-    return Motion(table[:, 1:], tuple(match[1] for match in found), tuple(match[2] for match in found), fps)
+    return Motion(table[:, 1:], tuple(match[1] for match in channels), tuple(match[2] for match in channels), fps)
+
+
+def _channels(path: Path, header: Sequence[str]) -> list[re.Match[str]]:
+    """The channels of a header, each with its unit; FormatError for another header."""
+    found = [match for title in header[1:] if (match := re.fullmatch(r"(.+) \[(.+)\]", title))]
+    if header[0] != "time" or len(found) < len(header) - 1:
+        raise _no_header(path)
+    return found
+
+
+def _no_header(path: Path) -> FormatError:
+    return FormatError(path, "the header must be 'time,CHANNEL [UNIT],...', as in 'time,root.tx [length]'")
 
 
 def write(file: File, motion: Motion) -> None:

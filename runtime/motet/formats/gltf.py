@@ -18,7 +18,7 @@ import numpy as np
 from motet.errors import FormatError, listed, quoted
 from motet.files import File, place_of
 from motet.formats.gltf_data import Gltf, broken, parse
-from motet.formats.text import Clip, Names, chosen, clip_names, split_clip
+from motet.formats.text import Clip, Names, chosen, clip_names, most_poses, split_clip
 from motet.motion.humanoid import BONES
 from motet.motion.kinematics import motion_of
 from motet.motion.motion import Motion
@@ -286,8 +286,7 @@ def _tracks(gltf: Gltf, animation: Mapping[str, Any], name: str, nodes: set[int]
     rate = 1 / step if 0 < step < 0.1 else 30.0  # keys further apart do not tell a frame rate
     fps = float(round(rate)) if abs(rate - round(rate)) < 0.01 * rate else rate
     count = (end - start) * fps + 1
-    # an hour of 90 nodes at 30 fps; for a small file a million, plus one per byte
-    if not count * len(gltf.objects("nodes")) < min(10**7, 10**6 + gltf.size):
+    if not count * len(gltf.objects("nodes")) < most_poses(gltf.size):
         raise FormatError(gltf.path, f"{end - start:g} s at {fps:g} fps is too many frames")
     frames = start + np.arange(round(count)) / fps
     return {place: _sampled(*key, frames, place[1]) for place, key in keys.items()}, fps

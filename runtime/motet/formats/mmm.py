@@ -4,9 +4,10 @@ The first ``Motion`` is read: the angles of its ``JointOrder`` in radians, each 
 file, and the root's pose. MMM has z up, millimetres, and figures facing y; here y is up, and they face z.
 """
 
+from array import array
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -15,6 +16,15 @@ from motet.errors import FormatError
 from motet.files import File, place_of
 from motet.formats.text import frame_rate, numbers, read_bytes
 from motet.motion.motion import Motion
+
+MAX_DEPTH, MAX_ELEMENTS = 64, 10**5
+"""Elements inside each other, of which MMM has seven; and before a frame ends, of which JointOrder has one per joint."""
+
+PIECE = 2**20
+"""Bytes that are parsed at once: the parser restarts on a longer token, so few large pieces are fast."""
+
+KEPT = frozenset({"JointOrder", "MotionFrame"})
+"""Elements of which all is read, at their end."""
 
 
 def read(file: File) -> Motion:
@@ -25,20 +35,21 @@ def read(file: File) -> Motion:
     """
     path = place_of(file)
     joints: list[str] = []
-    frames: list[list[float]] = []
-    for element in _elements(file):
+    flat = array("d")  # frame after frame
+    count = 0
+    for element in _ended(file):
         if element.tag == "JointOrder":
-            if joints or frames:
+            if joints or count:
                 raise FormatError(path, "a motion must have one JointOrder, before its frames")
             joints = [joint.get("name", "") for joint in element.iter("Joint")]
         elif element.tag == "MotionFrame":
-            frames.append(_frame(path, element, len(joints), len(frames)))
-            element.clear()
+            flat.extend(_frame(path, element, len(joints), count))
+            count += 1
     if len(set(joints)) != len(joints) or not all(joints):
         raise FormatError(path, "joint names in the JointOrder must be unique and not empty")
-    if not joints or not frames:
+    if not joints or not count:
         raise FormatError(path, "not an MMM motion: expected a Motion with JointOrder and MotionFrames")
-    rows = np.array(frames)
+    rows = np.array(flat).reshape(count, -1)
     # the file's angles are roll, pitch and yaw, R = Rz Ry Rx
     (x, y, z), (roll, pitch, yaw) = rows[:, 1:4].T * 0.001, rows[:, 4:7].T
     values = np.column_stack([-x, z, y, -roll, yaw, pitch, rows[:, 7:]])
@@ -55,27 +66,69 @@ def read(file: File) -> Motion:
 
 def motion_name(file: File) -> str:
     """The name of the first motion, in KIT's files the performer's; empty if it has none."""
-    return next((element.get("name", "") for element in _elements(file, "start") if element.tag == "Motion"), "")
+    begun = (element for event, element in _events(file) if event == "start")
+    return next((element.get("name", "") for element in begun if element.tag == "Motion"), "")
 
 
-def _elements(file: File, event: Literal["start", "end"] = "end") -> Iterator[ElementTree.Element]:
-    """The elements up to the end of the first motion, in order; nothing after it is read."""
+def _ended(file: File) -> Iterator[ElementTree.Element]:
+    """The elements that end, up to the first motion, in order."""
+    for event, element in _events(file):
+        if event == "end":
+            yield element
+            if element.tag == "Motion":
+                return
+
+
+def _events(file: File) -> Iterator[tuple[str, ElementTree.Element]]:
+    """("start", element) and ("end", element) in order, read piece by piece; of elements that are not KEPT, or within
+    one of these, the content is dropped."""
     path, content = place_of(file), read_bytes(file)
-    parser: ElementTree.XMLPullParser[Any] = ElementTree.XMLPullParser([event])
-    size = 2**20  # bytes per call: the parser restarts on a longer token, so few large pieces are fast
+    parser: ElementTree.XMLPullParser[Any] = ElementTree.XMLPullParser(["start", "end"])
+    opened = _Opened(path)
     try:
-        for start in range(0, len(content), size):
-            parser.feed(content[start : start + size])
+        for start in range(0, len(content), PIECE):
+            parser.feed(content[start : start + PIECE])
             events: Iterator[Any] = parser.read_events()
-            for _, element in events:
-                yield element
-                if element.tag == "Motion":
-                    return
+            for event, element in events:
+                opened.follow(event, element)
+                yield event, element
+            opened.empty()
         parser.close()
+    except FormatError:
+        raise
     except ElementTree.ParseError as error:
         raise FormatError(path, f"not XML, or truncated: {error.msg.split(':')[0]}", error.position[0]) from error
     except (LookupError, ValueError) as error:  # an encoding unknown to Python or its XML parser
         raise FormatError(path, f"unknown encoding: {error}", 1) from error
+
+
+class _Opened:
+    """The elements that have begun and not ended."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._elements: list[ElementTree.Element] = []
+        self._since = 0  # elements since one of KEPT ended
+
+    def follow(self, event: str, element: ElementTree.Element) -> None:
+        """Count an element that begins or ends; FormatError for too many inside each other, or before a frame ends."""
+        if event == "end":
+            self._elements.pop()
+            self._since = 0 if element.tag in KEPT else self._since
+            return
+        self._elements.append(element)
+        self._since += 1
+        if len(self._elements) > MAX_DEPTH:
+            raise FormatError(self._path, f"over {MAX_DEPTH} elements inside each other")
+        if self._since > MAX_ELEMENTS:
+            raise FormatError(self._path, f"over {MAX_ELEMENTS} elements before a frame")
+
+    def empty(self) -> None:
+        """Drop what is in them, of the outer ones."""
+        for element in self._elements:
+            if element.tag in KEPT:
+                return
+            del element[:]
 
 
 def _frame(path: Path, element: ElementTree.Element, joints: int, number: int) -> list[float]:

@@ -13,7 +13,7 @@ import json
 import math
 import zipfile
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.lib import format as npy
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from motet.errors import FormatError
 from motet.files import File, place_of, write_whole
-from motet.formats.text import frame_rate, read_bytes
+from motet.formats.text import frame_rate, most_poses, read_bytes
 from motet.motion.kinematics import motion_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import product, rotvec_to_rotmat
@@ -70,7 +70,7 @@ def read(file: File) -> Motion:
             names = {name.removesuffix(".npy") for name in archive.namelist()}
             if "trans" in names and names & {"poses", "pose_body"}:
                 kind = "an AMASS file"
-                return _amass(path, archive, names)
+                return _amass(path, archive, names, len(content))
             return _motet(path, archive, names)
     except FormatError:
         raise
@@ -89,18 +89,24 @@ def array(archive: zipfile.ZipFile, name: str, kinds: str) -> NDArray[Any]:
     info = archive.getinfo(f"{name}.npy")
     if info.file_size > NPZ_MAX_BYTES:
         raise ValueError(f"array {name!r} has {info.file_size} bytes: expected at most {NPZ_MAX_BYTES}")
-    content = archive.read(info)
-    stream = io.BytesIO(content)
-    headers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
-    shape, by_columns, dtype = headers[npy.read_magic(stream)](stream)
-    size = len(content) - stream.tell()
-    if dtype.kind not in kinds or math.prod(shape) * dtype.itemsize != size:
-        raise ValueError(f"array {name!r} of {dtype} {shape} does not fit {size} bytes, or is of the wrong type")
+    with archive.open(info) as stream:
+        shape, by_columns, dtype = _header(stream)
+        size = info.file_size - stream.tell()
+        if dtype.kind not in kinds or math.prod(shape) * dtype.itemsize != size:
+            raise ValueError(f"array {name!r} of {dtype} {shape} does not fit {size} bytes, or is of the wrong type")
+        content = stream.read()
     if dtype.kind == "U":  # numpy makes strings of numbers that are no code points, but they cannot be printed
-        points = np.frombuffer(content, f"{dtype.byteorder}u4", offset=stream.tell())
+        points = np.frombuffer(content, f"{dtype.byteorder}u4")
         if not ((points < 0xD800) | ((points > 0xDFFF) & (points <= 0x10FFFF))).all():
             raise ValueError(f"array {name!r} holds invalid characters")
-    return np.frombuffer(content, dtype, offset=stream.tell()).reshape(shape, order="F" if by_columns else "C")
+    return np.frombuffer(content, dtype).reshape(shape, order="F" if by_columns else "C")
+
+
+def _header(stream: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    """Shape, whether columns come first, and dtype of an array, from the beginning of its file."""
+    headers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
+    header: tuple[tuple[int, ...], bool, np.dtype[Any]] = headers[npy.read_magic(stream)](stream)
+    return header
 
 
 def _motet(path: Path, archive: zipfile.ZipFile, names: set[str]) -> Motion:
@@ -120,10 +126,14 @@ def _motet(path: Path, archive: zipfile.ZipFile, names: set[str]) -> Motion:
     return Motion(values, names_of_channels, units_of_channels, frame_rate(float(fps), path), bones)
 
 
-def _amass(path: Path, archive: zipfile.ZipFile, names: set[str]) -> Motion:
+def _amass(path: Path, archive: zipfile.ZipFile, names: set[str], size: int) -> Motion:
     rates = ("mocap_framerate", "mocap_frame_rate")
     rate = next((name for name in rates if name in names), None)
     parts = ("poses",) if "poses" in names else ("root_orient", "pose_body")
+    with archive.open(f"{parts[0]}.npy") as stream:
+        shape = _header(stream)[0]
+    if shape[0] * len(AMASS_JOINTS) >= most_poses(size):
+        raise FormatError(path, f"{shape[0]} frames are too many for a file of {size} bytes")
     poses = np.concatenate([array(archive, part, "fiu") for part in parts], axis=-1).astype(np.float64)
     width = 3 * len(AMASS_JOINTS)
     if poses.ndim != 2 or poses.shape[1] < width:

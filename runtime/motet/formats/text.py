@@ -28,6 +28,10 @@ Clip = str | int | None
 
 MARK = "#"
 
+MAX_POSES, FREE_POSES = 10**7, 10**6
+"""Poses of a file, frames times joints: an hour of 90 joints at 30 fps; and what a small file may have, and one more
+for each of its bytes."""
+
 
 def read_bytes(file: File, most: int | None = None) -> bytes:
     """All bytes of a file or file object; FormatError if it is missing, unreadable or longer than ``most``."""
@@ -104,6 +108,11 @@ def frame_rate(fps: float, path: Path, line: int | None = None) -> float:
     if not 1e-3 <= fps <= 1e6:
         raise FormatError(path, f"frame rate {fps:g} is out of range", line)
     return fps
+
+
+def most_poses(size: int) -> int:
+    """Below how many poses, frames times joints, a file of so many bytes must stay, so that small files are cheap."""
+    return min(MAX_POSES, FREE_POSES + size)
 
 
 def complete_order(axes: str) -> str:
