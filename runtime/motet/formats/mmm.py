@@ -18,7 +18,7 @@ from motet.formats.text import frame_rate, numbers, read_bytes
 from motet.motion.motion import Motion
 
 MAX_DEPTH, MAX_ELEMENTS = 64, 10**5
-"""Elements inside each other, of which MMM has seven; and before a frame ends, of which JointOrder has one per joint."""
+"""Elements inside each other, MMM has seven; and before a frame ends, of which JointOrder has one per joint."""
 
 PIECE = 2**20
 """Bytes that are parsed at once: the parser restarts on a longer token, so few large pieces are fast."""
