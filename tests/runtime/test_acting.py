@@ -17,6 +17,8 @@ from motet.motion.motion import Motion
 from motet.motion.pose import Pose
 from motet.motion.rotations import quat_product
 
+pytestmark = pytest.mark.numeric
+
 
 @pytest.fixture(scope="module")
 def model() -> SteerModel:

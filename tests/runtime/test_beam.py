@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 from motet.decode.words import Hypothesis, Limits, beam_search
 
+pytestmark = pytest.mark.numeric
+
 START, END, WORDS = 0, 1, 5
 
 

@@ -22,6 +22,8 @@ from motet.decode.codes import (
 )
 from motet.decode.memory import LEAP, PAST, Memory
 
+pytestmark = pytest.mark.numeric
+
 Array = NDArray[Any]
 PLAIN = CodesSettings()
 DRAWINGS = [

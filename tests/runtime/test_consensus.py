@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 
 from motet.decode.words import Drawn, Limits, agreement, by_consensus, draw_sequences
 
+pytestmark = pytest.mark.numeric
+
 START, END, WORDS = 0, 1, 5
 LIMITS = Limits(START, END, 6)
 

@@ -18,6 +18,8 @@ from motet.models.tdbn_control import TdbnModel
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
 
+pytestmark = pytest.mark.numeric
+
 SCRIPT = "walk .5s, walk>run .5s, run .5s, bend .5s"
 
 

@@ -19,6 +19,8 @@ from motet.motion.kinematics import local_rotations, local_translations, posed
 from motet.motion.rotations import axis_to_rotmat
 from motet.representation.placed import placed
 
+pytestmark = pytest.mark.numeric
+
 
 @pytest.fixture(scope="module")
 def model() -> FillModel:

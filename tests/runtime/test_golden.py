@@ -14,6 +14,8 @@ from motet.bundle.manifest import Golden
 from motet.errors import BundleError
 from motet.models.load import load
 
+pytestmark = pytest.mark.numeric
+
 NAMES = ["cmu-control", "cmu-generate", "describe", "fill", "generate", "predict"]
 
 

@@ -15,6 +15,8 @@ from motet.decode.words import Limits, beam_search, draw_sequences
 from motet.errors import BundleError
 from motet.models.predict import PredictModel
 
+pytestmark = pytest.mark.numeric
+
 START, END, WORDS, WIDTH = 0, 1, 5, 4
 RNG = np.random.default_rng(0)
 KEYS, VALUES, OUT = RNG.normal(size=(WORDS, WIDTH)), RNG.normal(size=(WORDS, WIDTH)), RNG.normal(size=(WIDTH, WORDS))

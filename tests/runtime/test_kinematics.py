@@ -9,6 +9,8 @@ from motet.formats import read_motion
 from motet.motion.kinematics import euler_of, global_transforms, local_rotations, positions, with_channels
 from motet.motion.motion import Motion
 
+pytestmark = pytest.mark.numeric
+
 
 def turn(axis, degrees):
     c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))

@@ -12,6 +12,8 @@ from motet.models.known import NOTHING, RIGHT, AnswerSettings, Known, Seen, path
 from motet.representation.contract import MotionContract
 from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS
 
+pytestmark = pytest.mark.numeric
+
 WALK, RUN, SIT = np.eye(3, dtype=np.float32)
 SENTENCES = ("he strolls", "a person walks", "she walks and turns left", "he runs straight ahead", "somebody sits")
 KNOWN = Known(

@@ -1,9 +1,12 @@
 """Smooth frames without delay: a character of a batch moves as it would alone, whatever the others are told."""
 
 import numpy as np
+import pytest
 
 from motet.bundle.graph import Floats
 from motet.decode.lookahead import Lookahead, LookaheadSettings, Run
+
+pytestmark = pytest.mark.numeric
 
 FPS, TICKS, CHANNELS = 30.0, 150, 4
 TURNS = np.ones(CHANNELS, dtype=np.float32)

@@ -24,6 +24,8 @@ from motet.motion.humanoid import BONES, HUMANOID, LEFT_RIGHT
 from motet.motion.pose import Pose
 from motet.motion.rotations import conjugate, quat_product, quat_rotated, quat_to_rotmat, wrapped
 
+pytestmark = pytest.mark.numeric
+
 SETTINGS = SteeringSettings()
 ROWS, CODES = 300, 4
 

@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 from motet.decode.loop import Sample
 from motet.decode.mixture import draw, log_density, mixture_search
 
+pytestmark = pytest.mark.numeric
+
 SIZE, CONTEXT = 3, 4
 
 

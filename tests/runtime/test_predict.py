@@ -20,6 +20,8 @@ from motet.motion.rotations import axis_to_rotmat
 from motet.representation.contract import MotionContract
 from motet.representation.root_block import RootVectors, joints_of, to_joint_vectors
 
+pytestmark = pytest.mark.numeric
+
 SEED, HORIZON = 4, 3
 FPS = 30.0
 

@@ -3,6 +3,8 @@ import pytest
 
 from motet.motion.rotations import frames_last, inverse, product, rotated, rotvec_to_rotmat, swing
 
+pytestmark = pytest.mark.numeric
+
 RNG = np.random.default_rng(3)
 TURNS = rotvec_to_rotmat(RNG.normal(size=(7, 5, 3)))
 PLACES = RNG.normal(size=(7, 5, 3))

@@ -16,6 +16,8 @@ from motet.motion.rotations import (
     rotvec_to_rotmat,
 )
 
+pytestmark = pytest.mark.numeric
+
 ORDERS = ["".join(order) for order in permutations("xyz")]
 RNG = np.random.default_rng(1)
 ANGLES = RNG.uniform(-np.pi, np.pi, (500, 3))

@@ -18,6 +18,8 @@ from motet.motion.kinematics import positions
 from motet.motion.looping import looped
 from motet.motion.motion import Motion
 
+pytestmark = pytest.mark.numeric
+
 WALK, JUMP = "a person walks forward", "a person jumps up"
 
 

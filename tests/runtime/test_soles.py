@@ -11,6 +11,8 @@ from motet.motion.humanoid.bones import MIXAMO
 from motet.motion.kinematics import global_transforms
 from motet.motion.rotations import Array, rotated
 
+pytestmark = pytest.mark.numeric
+
 CMU = Path(__file__).parents[2] / "train/motet_train/data/cmu"
 
 METRE = float(MIXAMO.metres_per_unit or 0)

@@ -13,6 +13,8 @@ from motet.motion.kinematics import positions
 from motet.motion.pose import Pose
 from motet.motion.rotations import wrapped
 
+pytestmark = pytest.mark.numeric
+
 
 @pytest.fixture(scope="module")
 def model() -> SteerModel:

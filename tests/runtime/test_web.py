@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 from web_cases import texts
 
@@ -34,6 +35,8 @@ from motet.motion.humanoid import BONES
 from motet.motion.kinematics import local_translations
 from motet.motion.motion import Motion
 from motet.motion.rotations import quat_product
+
+pytestmark = pytest.mark.numeric
 
 KEPT = Path(__file__).parents[2] / "runtime/web/tests/python.json"
 EVERY = 30  # frames of which one is kept
