@@ -1,8 +1,11 @@
 """Numbers in sentences become quantities, and motions have as much as was asked."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
+from motet.decode.codes import Writer
 from motet.errors import TextError, TextWarning
 from motet.models.amounts import Seen, played, short, spells, strokes
 from motet.models.composition import at_odds
@@ -129,6 +132,44 @@ def test_seconds_alone_are_the_length(model: CodesModel) -> None:
     (made,) = model.generate("a person walks for two and a half seconds")
     assert len(made.frames) == 75
     np.testing.assert_array_equal(made.frames, model.generate("a person walks forward", seconds=2.5)[0].frames)
+
+
+def test_a_long_turn_is_streamed_stretch_by_stretch(model: CodesModel, monkeypatch: pytest.MonkeyPatch) -> None:
+    story = model.story("a person walks in a circle", seconds=45, seed=3)
+    assert abs(story.passages[0].measured["degrees"]) == pytest.approx(360)
+    draws = list[int]()
+    draw = Writer.draw
+
+    def counted(self: Writer, *settings: Any, **more: Any) -> Any:
+        draws.append(len(draws))
+        return draw(self, *settings, **more)
+
+    monkeypatch.setattr(Writer, "draw", counted)
+    pieces = list[Array]()
+    drawn = list[int]()
+    for piece in model.stream("a person walks in a circle", seconds=45, seed=3):
+        pieces.append(piece.values)
+        drawn.append(len(draws))
+    assert [len(piece) for piece in pieces] == [450, 450, 450]
+    np.testing.assert_array_equal(np.concatenate(pieces), story.playable(plant=False).values)
+    # no more is drawn for a piece than it shows, and what its decoder looks ahead
+    assert drawn[0] <= model.codec.steps(15) + model.codec.field.ahead + 1
+    assert drawn[-1] == model.codec.steps(45)
+    # the turn goes on evenly, and no joint leaps where a stretch ends
+    heading = Seen.of(model.contract, story.frames).heading
+    assert np.abs(heading[[449, 899]]) == pytest.approx([120, 240], abs=5)
+    leaps = np.abs(np.diff(story.frames[:, 4:], axis=0)).max(axis=1)
+    assert max(leaps[449], leaps[899]) < 0.2  # of an axis' number in a frame
+
+
+def test_what_is_played_slower_is_the_same_in_stretches(model: CodesModel, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert model.quantities("a person bows slowly").amounts == {"pace": 0.75}
+    whole = model.story("a person bows slowly", seconds=12).frames
+    monkeypatch.setattr("motet.models.telling.STRETCH", 2.5)
+    frames = model.story("a person bows slowly", seconds=12).frames
+    assert len(frames) == 12 * model.fps
+    assert np.abs(frames[:, 3:] - whole[:, 3:]).max() < 0.05  # shown within a fraction of a frame of the same time
+    assert frames[:, :3].sum(axis=0) == pytest.approx(whole[:, :3].sum(axis=0), rel=0.02, abs=0.3)
 
 
 def test_frames_are_played_faster_over_the_same_way() -> None:

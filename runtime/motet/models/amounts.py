@@ -236,18 +236,13 @@ def enough(seen: Seen, asked: Quantities) -> bool:
     )
 
 
-def fitted(contract: MotionContract, frames: Array, asked: Quantities, length: int = 0) -> Array:
-    """Frames (T', D) of a motion that is cut, turned and played to have what was asked as far as may be.
-
-    length: where it is not cut, the frames that it is to last.
-    """
-    if not length:
-        seen = Seen.of(contract, frames)
-        frames = frames[: min(cut(seen, asked, kind) for kind in ("metres", "steps", "times", "degrees"))]
+def fitted(contract: MotionContract, frames: Array, asked: Quantities) -> Array:
+    """Frames (T', D) of a motion that is cut, turned and played to have what was asked as far as may be."""
+    seen = Seen.of(contract, frames)
+    frames = frames[: min(cut(seen, asked, kind) for kind in ("metres", "steps", "times", "degrees"))]
     if "degrees" in asked.amounts:
-        frames = turned(contract, frames, asked)
-    if length:
-        return played(frames, len(frames) / length)
+        seen = Seen.of(contract, frames)
+        frames = turned(seen, frames, turn_to_make(seen, asked))
     pace = asked.amounts.get("pace", 1.0)
     if "seconds" in asked.amounts:
         pace = len(frames) / (asked.amounts["seconds"] * contract.fps)
@@ -282,16 +277,26 @@ def _cut_path(seen: Seen, metres: float) -> int:
     return max(2, int(first[seen.soles.max(axis=1)[first].argmin()]) + 1)
 
 
-def turned(contract: MotionContract, frames: Array, asked: Quantities) -> Array:
-    """Frames whose turn is made as large as asked: where it turns or goes already, neither at once nor at the end."""
-    seen, rates = Seen.of(contract, frames), np.abs(smoothed(frames[:, None, :3], 0.1, contract.fps)[:, 0])
-    found, goal = seen.measured("degrees"), asked.amounts["degrees"]
-    if asked.either and found < 0:
-        goal = -goal
+def turn_to_make(seen: Seen, asked: Quantities) -> float:
+    """The degrees that were asked for, to the side to which a motion turns already where either will do."""
+    degrees = asked.amounts["degrees"]
+    return -degrees if asked.either and seen.measured("degrees") < 0 else degrees
+
+
+def turned(seen: Seen, frames: Array, degrees: float, *, begins: bool = True, ends: bool = True) -> Array:
+    """Frames (T, D) whose turn is made as large as asked: where the motion, as it is seen, turns or goes already.
+
+    begins, ends: whether the motion does with these frames; then it turns neither at once nor at the end. Of a motion
+    that goes on, the first frame is the last one before, which stays as it is.
+    """
+    rates = np.abs(smoothed(frames[:, None, :3], 0.1, seen.fps)[:, 0])
     weight = rates[:, 2] + 0.1 * np.hypot(rates[:, 0], rates[:, 1]) + 0.02
-    weight[: seen.brief], weight[-seen.brief :] = 0, 0
+    weight[: seen.brief if begins else 1] = 0
+    if ends:
+        weight[-seen.brief :] = 0
     bent = frames.copy()
-    bent[:, 2] += np.radians(goal - found) * contract.fps * weight / max(float(weight.sum()), 1e-9)
+    lacking = np.radians(degrees - seen.measured("degrees"))
+    bent[:, 2] += lacking * seen.fps * weight / max(float(weight.sum()), 1e-9)
     return bent
 
 

@@ -320,8 +320,9 @@ class CodesModel(GenerateModel):
         """The motion of :meth:`story` in pieces, as they are drawn: each continues the last one.
 
         Feet are as drawn, since planting them requires knowing how long they stand. Memory and the time of a piece stay
-        constant, however long the stream lasts; but what is asked for by a number other than of seconds, or played
-        faster or slower for its seconds, comes as one piece. Errors like :meth:`story`.
+        constant, however long the stream lasts. With ``seconds``, what turns by a number or is played faster or slower
+        comes in pieces of up to 20 s; what ends when it has a number of something comes as one. Errors like
+        :meth:`story`.
         """
         parts, after, drawn = self._told(sentences, **settings)  # what cannot be told is refused before the first piece
 

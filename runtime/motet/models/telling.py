@@ -1,8 +1,9 @@
 """How a story is drawn: parts one after another, in pieces as they come, or to a measure where a part has numbers."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import groupby
+from itertools import groupby, islice, pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,13 +12,16 @@ from motet.bundle.graph import Floats
 from motet.decode.codec import Codec, Context, StreamingDecoder
 from motet.decode.codes import CodesSettings, Source, Writer, drawn_actions, drawn_steps
 from motet.decode.loop import Ids, Noise
-from motet.models.amounts import Seen, enough, fitted
+from motet.models.amounts import Seen, enough, fitted, played, turn_to_make, turned
 from motet.models.quantities import Kind, Quantities
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
 
 LONGEST = 300.0
 """Seconds that a part with a number lasts at most."""
+
+STRETCH = 20.0
+"""Seconds, at most, of the stretches in which a part is made whose length comes first."""
 
 SLOWEST: Mapping[Kind, float] = {"degrees": 20.0, "metres": 0.3, "steps": 0.5, "times": 0.1}
 """How much is done in a second at least, but for ten seconds: who does less is not drawn on."""
@@ -82,7 +86,7 @@ class Teller:
                 for run in ([[one] for one in group] if alone else [group])]  # fmt: skip
         for run in runs:
             tail = [] if context is None else [context.frames]
-            for piece in (self._measured if run[0][1].to_measure else self._flowing)(run, context):
+            for piece in self._pieces_of(run, context):
                 yield piece
                 tail = [np.concatenate([*tail, piece.frames])[-self._kept :]] if run is not runs[-1] else []
             if tail:
@@ -101,6 +105,12 @@ class Teller:
 
     def _action(self, part: Part) -> Ids:
         return drawn_actions(self.source, part.context[None], self.noise, self.settings["certainty"])
+
+    def _pieces_of(self, parts: Sequence[tuple[int, Part]], context: Context | None) -> Iterator[Piece]:
+        number, part = parts[0]
+        if not part.to_measure:
+            return self._flowing(parts, context)
+        return self._timed(number, part, context) if part.exactly else self._measured(number, part, context)
 
     def _flowing(self, parts: Sequence[tuple[int, Part]], context: Context | None) -> Iterator[Piece]:
         """Pieces of a step of codes of parts without numbers; then the remaining frames."""
@@ -121,28 +131,55 @@ class Teller:
         rest = decoder.finish()[: None if limit is None else limit - given]
         yield Piece(number, int(action[0]), rest, given + len(rest) - done * self.codec.field.hop)
 
-    def _measured(self, parts: Sequence[tuple[int, Part]], context: Context | None) -> Iterator[Piece]:
+    def _timed(self, number: int, part: Part, context: Context | None) -> Iterator[Piece]:
+        """A part whose length comes first, stretch by stretch: each has its share of the turn and of the length."""
+        action = self._action(part)
+        steps = self.codec.steps(part.seconds * part.pace)
+        drawn = drawn_steps(self._writer(context), action, steps, exactly=True, whole=True)
+        decoder, asked, field = StreamingDecoder(self.codec, context), part.asked, self.codec.field
+        length = max(1, round(part.seconds * self.contract.fps))
+        edges = np.linspace(0, length, math.ceil(part.seconds / STRETCH) + 1).round().astype(int).tolist()
+        rest = np.empty((0, len(self.contract.channels)))
+        lead = rest  # the last frame before a stretch
+        pushed, total = 0, 0.0
+        for start, stop in pairwise(edges):
+            # as many frames as drawn
+            ends = stop == length
+            until = steps if ends else min(steps, math.ceil(stop * part.pace / field.hop) + field.ahead + 1)
+            codes = [row for _, step in islice(drawn, until - pushed) for row in step]
+            pushed = until
+            rest = np.concatenate([rest, decoder.push(np.array(codes)), *([decoder.finish()] if ends else [])])
+            count = round(stop * part.pace) - round(start * part.pace)
+            frames, rest = np.concatenate([lead, rest[:count]]), rest[count:]
+            # turned by their share
+            if "degrees" in asked.amounts:
+                seen = Seen.of(self.contract, frames)
+                total = total or turn_to_make(seen, asked)
+                frames = turned(seen, frames, total * (stop - start) / length, begins=start == 0, ends=ends)
+            # and played to their share of the length
+            shown = played(frames, len(frames) / (len(lead) + stop - start))[len(lead) :]
+            lead = frames[-1:]
+            yield Piece(number, int(action[0]), shown, len(shown))
+
+    def _measured(self, number: int, part: Part, context: Context | None) -> Iterator[Piece]:
         """The whole of a part: drawn again and again until it has as much as was asked, and fitted."""
-        ((number, part),) = parts
         writer, action, codes = self._writer(context), self._action(part), np.empty((0, self.source.parts), np.int64)
         times = int(part.asked.amounts.get("times", 1))
         rounds = 1 if part.asked.act else times
         slow = sum(abs(part.asked.amounts.get(kind, 0)) / least for kind, least in SLOWEST.items())
         most, steps = self.codec.steps(min(LONGEST, 10 + slow)), self.codec.steps(self.settings["max_seconds"])
-        steps, looked = self.codec.steps(part.seconds * part.pace) if part.seconds else steps, 0
+        steps, looked = self.codec.steps(part.seconds) if part.seconds else steps, 0
         while True:
-            drawn = [step for _, step in drawn_steps(writer, action, steps, part.exactly, whole=True)]
+            drawn = [step for _, step in drawn_steps(writer, action, steps, whole=True)]
             codes, rounds = np.concatenate([codes, *drawn]), rounds - 1
-            over = part.exactly or len(codes) >= most
+            over = len(codes) >= most
             if over or (rounds < 1 and len(codes) >= 1.2 * looked):  # a long one is not looked at after each draw
                 frames, looked = self._decoded(codes, context), len(codes)
                 seen = Seen.of(self.contract, frames)
                 never = "times" in part.asked.amounts and 1 - rounds >= times and not seen.done(part.asked.act)
                 if over or never or enough(seen, part.asked):
                     break
-        length = max(1, round(part.seconds * self.contract.fps)) if part.exactly else 0
-        most = round(length * part.pace) or len(frames)
-        frames = fitted(self.contract, frames[:most], part.asked, length)
+        frames = fitted(self.contract, frames, part.asked)
         yield Piece(number, int(action[0]), frames, len(frames))
 
     def _decoded(self, codes: Ids, context: Context | None) -> Array:
