@@ -1,13 +1,15 @@
 import json
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
+from renamed import names_of
 
 from motet.errors import FormatError
 from motet.formats import read_motion
 from motet.formats.text import with_names
-from motet.motion.humanoid.joint_map import conventions, map_by_names, read_map
+from motet.motion.humanoid.joint_map import JointMap, conventions, map_by_names, read_map
 from motet.motion.humanoid.retarget import to_humanoid
 from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
@@ -91,3 +93,78 @@ def test_prefixes_and_separators_do_not_count(prefix: str) -> None:
     found = map_by_names(skeleton_of(with_names(motion, names)))
     assert found is not None
     assert found.convention == "Mixamo"
+
+
+def mapped(names: Sequence[str]) -> JointMap:
+    """The map of Mixamo's figure with other names; they have to tell its joints as its own do."""
+    motion = read_motion(SKELETONS / "mixamo.bvh")
+    known, found = (map_by_names(skeleton_of(each)) for each in (motion, with_names(motion, names)))
+    assert known is not None
+    assert found is not None
+    assert (found.joints, found.spine, found.neck) == (known.joints, known.spine, known.neck)
+    return found
+
+
+NAMES = tuple(name.removeprefix("mixamorig:") for name in skeleton_of(read_motion(SKELETONS / "mixamo.bvh")).names)
+
+
+@pytest.mark.parametrize(
+    "written",
+    [
+        "mixamorig:{name}_{i:03}",  # Sketchfab
+        "mixamorig{name}_{i}",  # three.js' loader of it
+        "mixamorig:{name}.001",
+        "mixamorig:{name}_0{i}.002",
+        "{name}7",
+        "{name}_7",
+        "Remy:{name}",
+        "Armature|mixamorig:{name}",
+        "Armature|{name}",
+        "12:{name}",
+        "12_{name}",
+        "3{name}",
+        "Group_Remy_mixamorig_{name}",
+        "|root|{name}",
+    ],
+)
+def test_numbers_at_the_end_and_namespaces_do_not_count(written: str) -> None:
+    found = mapped([written.format(name=name, i=i) for i, name in enumerate(NAMES)])
+    assert (found.convention, found.confidence) == ("Mixamo", 1.0)
+
+
+@pytest.mark.parametrize("changed", ["Head", "LeftHand", "Hips", "RightLeg"])
+@pytest.mark.parametrize("number", ["_1", ".001", " 2"])
+def test_a_name_that_a_program_made_unique_is_known(changed: str, number: str) -> None:
+    assert mapped([name + number if name == changed else name for name in NAMES]).convention == "Mixamo"
+
+
+def test_numbers_that_belong_to_names_are_kept() -> None:
+    motion = read_motion(SKELETONS / "rigify.bvh")
+    found = map_by_names(skeleton_of(motion))
+    names = [f"{name}_{i}" for i, name in enumerate(skeleton_of(motion).names)]
+    numbered = map_by_names(skeleton_of(with_names(motion, names)))
+    assert found is not None
+    assert numbered is not None
+    assert (numbered.joints, numbered.spine, numbered.neck) == (found.joints, found.spine, found.neck)
+    assert numbered.convention == "Blender Rigify"
+
+
+@pytest.mark.parametrize("title", ["Blender metarig", "MikuMikuDance", "VRChat (CATS)", "VRM add-on for Blender"])
+@pytest.mark.parametrize("written", ["{name}", "{name}_{i:02}", "Remy:{name}"])
+def test_conventions_of_blender_and_mikumikudance_have_their_own_titles(title: str, written: str) -> None:
+    motion = read_motion(SKELETONS / "mixamo.bvh")
+    names = [written.format(name=name, i=i) for i, name in enumerate(names_of(motion, title))]
+    found, known = (map_by_names(skeleton_of(each)) for each in (with_names(motion, names), motion))
+    assert found is not None
+    assert known is not None
+    assert (found.convention, found.joints, found.neck) == (title, known.joints, known.neck)
+
+
+def test_names_are_told_apart_by_what_only_one_convention_has() -> None:
+    assert mapped(NAMES).convention == "Mixamo"
+    assert mapped(["LeftHandThumb" if name == "LeftHand_end" else name for name in NAMES]).convention == "Mixamo"
+    motion = read_motion(SKELETONS / "bandai-namco.bvh")
+    names = [name.replace("joint_Root", "root") for name in skeleton_of(motion).names]
+    found = map_by_names(skeleton_of(with_names(motion, names)))
+    assert found is not None
+    assert found.convention != "Bandai-Namco Research motion data"

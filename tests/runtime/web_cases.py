@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 from gltf_files import read_document
+from renamed import names_of
 from small_character import QUARTER, character, packed
 
 from motet import load
@@ -94,10 +95,14 @@ def rounded(values: Array) -> Any:
 
 
 def texts() -> dict[str, str]:
-    """BVH files of a walk, by name: plain; at rest in no body's pose; with z up; with a studio's own prefix."""
+    """BVH files of a walk, by name: plain; at rest in no body's pose; with z up; under other names."""
     walk = from_humanoid(walking(25, 16.0), MIXAMO)
     prefixed = [name.replace("mixamorig:", "Avatar01_") for name in skeleton_of(walk).names]
     found = {"walk": walk, "in line": in_line(walk), "z up": lying_axes(walk), "prefixed": with_names(walk, prefixed)}
+    numbered = [f"12|{name}_{i:03}" for i, name in enumerate(skeleton_of(walk).names)]
+    found["numbered"] = with_names(walk[:1], numbered)
+    for title in ("MikuMikuDance", "Blender metarig"):
+        found[title] = with_names(walk[:1], names_of(walk, title))
     return {name: text_of(motion) for name, motion in found.items()}
 
 

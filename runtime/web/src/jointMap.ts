@@ -40,7 +40,13 @@ export function carrierOf({ joints, spine }: JointMap, skeleton: Skeleton): numb
 interface Convention {
   title: string;
   names: Record<string, string[]>;
+  /** Names of bones as files write them. */
+  spelled: Set<string>;
   aside: Set<string>;
+  /** Of these each file of the convention has one, if there are any. */
+  marks: string[];
+  /** Bones that only some files have. */
+  optional: Set<string>;
   prefixes: string[];
   rest?: Record<string, Vector>;
   points: Record<string, Vector>;
@@ -51,14 +57,23 @@ const CONVENTIONS = TABLES.flatMap((table) => table.sides.map((sides) => convent
 
 function conventionOf(table: Table, words: [string, string]): Convention {
   const names: Record<string, string[]> = {};
+  const spelled = new Set<string>();
   for (const [bone, known] of Object.entries(table.joints)) {
-    if (UNSIDED.includes(bone)) names[bone] = known.map(plain);
-    else SIDES.forEach((side, at) => (names[side + bone] = known.map((name) => plain(name.replaceAll("{s}", words[at]!)))));
+    const sides = UNSIDED.includes(bone) ? [["", ""]] : SIDES.map((side, at) => [side, words[at]!]);
+    for (const [side, word] of sides) {
+      const written = known.map((name) => name.replaceAll("{s}", word!));
+      names[side + bone] = written.map(plain);
+      written.forEach((name) => spelled.add(name));
+    }
   }
+  const ofBoth = (known: string[] = []) => known.flatMap((name) => words.map((word) => plain(name.replaceAll("{s}", word))));
   return {
     title: table.title,
     names,
-    aside: new Set((table.aside ?? []).flatMap((name) => words.map((word) => plain(name.replaceAll("{s}", word))))),
+    spelled,
+    aside: new Set(ofBoth(table.aside)),
+    marks: ofBoth(table.marks),
+    optional: new Set((table.optional ?? []).flatMap((bone) => (UNSIDED.includes(bone) ? [bone] : SIDES.map((side) => side + bone)))),
     prefixes: table.prefixes ?? [],
     rest: table.rest && bothSides(table.rest, [1, -1, -1]),
     points: bothSides(table.points ?? {}, [-1, 1, 1]),
@@ -76,15 +91,17 @@ function bothSides(ofLeft: Record<string, Vector>, signs: Vector): Record<string
   return found;
 }
 
-/** A name without what differs between files: case, separators, and the namespace before a colon. */
+/** A name without what differs between files: case, separators, and how letters are encoded. */
 function plain(name: string): string {
-  return name.slice(name.lastIndexOf(":") + 1).toLowerCase().replace(/[^a-z0-9]/g, "");
+  return name.normalize("NFKC").toLowerCase().replace(/[^\p{L}\p{N}]/gu, "");
 }
 
 /** The map by the table that fits best; MotionError where none does, or joints are missing or out of order. */
 export function mapOf(skeleton: Skeleton): JointMap {
-  const matches = CONVENTIONS.map((convention) => match(convention, skeleton));
-  matches.sort((a, b) => b.known - a.known || a.absent - b.absent);
+  const bare = withoutNumbers(skeleton.names);
+  const written = [skeleton.names, bare, withoutNumbers(bare)].map(withoutFirstWords); // a second program adds a second number
+  const matches = written.flatMap((names) => CONVENTIONS.map((convention) => match(convention, skeleton, names)));
+  matches.sort((a, b) => b.known - a.known || b.spelled - a.spelled || a.absent - b.absent);
   const fullest = matches[0]!;
   const told = onOneSide(missing(fullest.map), fullest.map);
   const best = told ? fullest : (matches.find(({ map }) => !missing(map).length) ?? fullest);
@@ -95,8 +112,11 @@ export function mapOf(skeleton: Skeleton): JointMap {
   return checkedMap(skeleton, best.map);
 }
 
-function match(convention: Convention, skeleton: Skeleton) {
-  const names = plainNames(convention, skeleton.names);
+function match(convention: Convention, skeleton: Skeleton, written: string[]) {
+  const pattern = convention.prefixes.map((prefix) => `(?:${prefix})[ _:.-]*`).join("|") || "(?!)";
+  const prefix = new RegExp(`^(?:${pattern})(?=.)`, "i");
+  const bare = written.map((name) => name.replace(prefix, "").split(/[:|]/).at(-1)!);
+  const names = bare.map(plain);
   const chain = (bone: string) => (convention.names[bone] ?? []).map((name) => names.indexOf(name)).filter((at) => at >= 0).sort((a, b) => a - b);
   const [spine, neck] = [chain("spine"), chain("neck")];
   const hips = names.flatMap((name, at) => (name === convention.names.hips![0] && skeleton.children[at]!.length >= 3 ? [at] : []));
@@ -105,26 +125,49 @@ function match(convention: Convention, skeleton: Skeleton) {
   const found = limbs.map(([bone, known]) => [bone, known.map((name) => names.indexOf(name)).find((at) => at >= 0)] as const);
   const joints = Object.fromEntries(found.filter((pair): pair is readonly [string, number] => pair[1] !== undefined));
   const own = new Set([...Object.values(convention.names).flat(), ...convention.aside]);
-  const known = names.filter((name) => own.has(name)).length;
-  const chains = CHAINS.filter((bone) => convention.names[bone]);
+  const isMarked = !convention.marks.length || convention.marks.some((name) => names.includes(name));
+  const known = isMarked ? names.filter((name) => own.has(name)).length : 0;
+  const spelled = bare.filter((name) => convention.spelled.has(name)).length;
+  const chains = CHAINS.filter((bone) => convention.names[bone] && !(convention.optional.has(bone) && !chain(bone).length));
   const links = chains.flatMap((bone) => convention.names[bone]!).filter((name) => !names.includes(name)).length;
-  const absent = limbs.length - Object.keys(joints).length + chains.length - (spine.length ? 1 : 0) - (neck.length ? 1 : 0) + links;
+  const lacking = limbs.filter(([bone]) => joints[bone] === undefined && !convention.optional.has(bone)).length;
+  const absent = lacking + chains.filter((bone) => !chain(bone).length).length + links;
   // other makers' figures of these names have joints besides, or rest in another pose
   const whole = known >= skeleton.names.filter((name) => !name.endsWith(END)).length;
   const axes = Object.fromEntries(names.flatMap((name, at) => (convention.axes[name] ? [[at, convention.axes[name]!]] : [])));
-  const confidence = Math.round(100 * (1 - (0.3 * absent) / (absent + known))) / 100;
+  const confidence = Math.round(100 * (1 - (0.3 * absent) / Math.max(absent + known, 1))) / 100;
   const { title, rest, points } = convention;
-  return { known, absent, map: { joints, spine, neck, convention: title, confidence, rest: whole ? rest : undefined, points, axes } };
+  return { known, spelled, absent, map: { joints, spine, neck, convention: title, confidence, rest: whole ? rest : undefined, points, axes } };
 }
 
-/** Names without the convention's prefixes, or the first word where nearly all names begin with it. */
-function plainNames({ prefixes }: Convention, names: string[]): string[] {
-  const words = names.flatMap((name) => /^[A-Za-z]+[0-9]*[ _:.-]+(?=.)/.exec(name)?.[0] ?? []);
-  const count = (word: string) => words.filter((other) => other === word).length;
-  const common = words.reduce((best, word) => (count(word) > count(best) ? word : best), words[0] ?? "");
-  const shared = count(common) > 0.8 * names.length ? [common.replace(/[.\-]/g, "\\$&")] : [];
-  const pattern = [...prefixes, ...shared].map((prefix) => `(?:${prefix})[ _:.-]*`).join("|") || "(?!)";
-  return names.map((name) => plain(name.replace(new RegExp(`^(?:${pattern})(?=.)`, "i"), "")));
+function nearlyAll(count: number, names: string[]): boolean {
+  return count > 0.8 * names.length;
+}
+
+/** The value that is there most often, and how often. */
+function commonest(values: string[]): [value: string, count: number] {
+  const counts = new Map<string, number>();
+  for (const value of values) counts.set(value, (counts.get(value) ?? 0) + 1);
+  return [...counts].reduce((best, other) => (other[1] > best[1] ? other : best), ["", 0] as [string, number]);
+}
+
+/** Names without the numbers that programs add at their ends. */
+function withoutNumbers(names: string[]): string[] {
+  const bare = names.map((name) => name.replace(/(?<=.)[ ._-]+[0-9]+$/, ""));
+  if (nearlyAll(bare.filter((name, at) => name !== names[at]).length, names)) return bare;
+  const [last, count] = commonest(names.map((name) => name.slice(-1)));
+  if (/[0-9]/.test(last) && nearlyAll(count, names)) {
+    return names.map((name) => (name.length > 1 && name.endsWith(last) ? name.slice(0, -1) : name));
+  }
+  return bare.map((name, at) => (bare.indexOf(name) === bare.lastIndexOf(name) ? name : names[at]!));
+}
+
+/** Names without the words, or numbers, with which nearly all begin. */
+function withoutFirstWords(names: string[]): string[] {
+  const first = /^(?:[0-9]+[ _:.|-]*|\p{L}[\p{L}\p{N}]*[ _:.|-]+)(?=.)/u;
+  const [word, count] = commonest(names.flatMap((name) => first.exec(name)?.[0] ?? []));
+  if (!word || !nearlyAll(count, names)) return names;
+  return withoutFirstWords(names.map((name) => (name.startsWith(word) ? name.slice(word.length) : name)));
 }
 
 /** A map of a user's own: bone -> the joint's name, of spine and neck all names, upwards. MotionError says what is wrong. */

@@ -2,6 +2,7 @@
 import accad from "../../motet/motion/humanoid/conventions/accad.json";
 import bandaiNamco from "../../motet/motion/humanoid/conventions/bandai-namco.json";
 import biped from "../../motet/motion/humanoid/conventions/biped.json";
+import blenderMetarig from "../../motet/motion/humanoid/conventions/blender-metarig.json";
 import characterCreator from "../../motet/motion/humanoid/conventions/character-creator.json";
 import cmuAmc from "../../motet/motion/humanoid/conventions/cmu-amc.json";
 import cmuBvh43 from "../../motet/motion/humanoid/conventions/cmu-bvh-43.json";
@@ -11,6 +12,7 @@ import kaykit from "../../motet/motion/humanoid/conventions/kaykit.json";
 import lafan1 from "../../motet/motion/humanoid/conventions/lafan1.json";
 import makehuman from "../../motet/motion/humanoid/conventions/makehuman.json";
 import mixamo from "../../motet/motion/humanoid/conventions/mixamo.json";
+import mmd from "../../motet/motion/humanoid/conventions/mmd.json";
 import mmm from "../../motet/motion/humanoid/conventions/mmm.json";
 import perceptionNeuron from "../../motet/motion/humanoid/conventions/perception-neuron.json";
 import poser from "../../motet/motion/humanoid/conventions/poser.json";
@@ -21,6 +23,8 @@ import smpl from "../../motet/motion/humanoid/conventions/smpl.json";
 import soma from "../../motet/motion/humanoid/conventions/soma.json";
 import unity from "../../motet/motion/humanoid/conventions/unity.json";
 import unreal from "../../motet/motion/humanoid/conventions/unreal.json";
+import vrchat from "../../motet/motion/humanoid/conventions/vrchat.json";
+import vrmAddOn from "../../motet/motion/humanoid/conventions/vrm-add-on.json";
 import vroid from "../../motet/motion/humanoid/conventions/vroid.json";
 import xsensBvh from "../../motet/motion/humanoid/conventions/xsens-bvh.json";
 import xsens from "../../motet/motion/humanoid/conventions/xsens.json";
@@ -33,6 +37,8 @@ export interface Table {
   sides: [string, string][];
   joints: Record<string, string[]>;
   aside?: string[];
+  marks?: string[];
+  optional?: string[];
   rest?: Record<string, Vector>;
   points?: Record<string, Vector>;
   axes?: Record<string, string>;
@@ -40,6 +46,7 @@ export interface Table {
 
 /** In the order of their files' names. */
 export const TABLES = [
-  accad, bandaiNamco, biped, characterCreator, cmuAmc, cmuBvh43, cmuBvh, daz, kaykit, lafan1, makehuman, mixamo, mmm,
-  perceptionNeuron, poser, rigify, rokoko, sfu, smpl, soma, unity, unreal, vroid, xsensBvh, xsens,
+  accad, bandaiNamco, biped, blenderMetarig, characterCreator, cmuAmc, cmuBvh43, cmuBvh, daz, kaykit, lafan1, makehuman,
+  mixamo, mmd, mmm, perceptionNeuron, poser, rigify, rokoko, sfu, smpl, soma, unity, unreal, vrchat, vrmAddOn, vroid,
+  xsensBvh, xsens,
 ] as Table[];

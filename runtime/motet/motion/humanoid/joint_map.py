@@ -4,16 +4,19 @@ point.
 There is one table for each convention of names, in the folder conventions, a JSON object: "title"; "sides", pairs of
 what stands for left and right; "joints", bone -> the names it can have, with ``{s}`` in the place of the side (of
 "spine" and "neck" all that are there count, upwards, of others the first); "aside", other joints that files of this
-convention have and that tell it from its neighbours; "prefixes", regular expressions of what can stand before every
-name; "rest", for files that are known to rest in a T-pose of their own, what that pose is on the humanoid: bone ->
-rotation vector in degrees, of the left side, and "points", where bones point there, by which such a file is known among
-others of these names; "axes", for files that rest in no body's pose: name -> the joint's axes that point left, up and
-forward in a T-pose. Upper and lower case and separators do not count.
+convention have and that tell it from its neighbours; "marks", joints of which each of its files has one: without, the
+same names are another's; "optional", bones that only some files have; "prefixes", regular expressions of what can stand
+before every name; "rest", for files that are known to rest in a T-pose of their own, what that pose is on the humanoid:
+bone -> rotation vector in degrees, of the left side, and "points", where bones point there, by which such a file is
+known among others of these names; "axes", for files that rest in no body's pose: name -> the joint's axes that point
+left, up and forward in a T-pose. Upper and lower case and separators do not count.
 """
 
 import json
 import re
-from collections.abc import Mapping, Sequence
+import unicodedata
+from collections import Counter
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from importlib.resources import files
@@ -50,7 +53,14 @@ BY_THE_TREE = "by the tree"
 
 
 class HalfKnownError(MotionError):
-    """Names of a convention that lack needed bones or are out of order: the tree may tell more."""
+    """Names of a convention that lack needed bones or are out of order: the tree may tell more.
+
+    agreed: bone -> joint, which the tree has to agree with, where the names lack bones of one side only.
+    """
+
+    def __init__(self, message: str, agreed: Mapping[str, int] | None = None) -> None:
+        super().__init__(message)
+        self.agreed = agreed or {}
 
 
 @dataclass(frozen=True)
@@ -252,11 +262,18 @@ def _entries(path: Path) -> dict[str, list[str]]:
 
 @dataclass(frozen=True)
 class Convention:
-    """One table: for each bone the plain names that its joint can have; the same of joints that are no bones."""
+    """One table: for each bone the plain names that its joint can have; the same of joints that are no bones.
+
+    spelled: names of bones as files write them. marks: plain names of which each file has one, if there are any.
+    optional: bones that only some files have.
+    """
 
     title: str
     names: dict[str, tuple[str, ...]]
+    spelled: frozenset[str]
     aside: frozenset[str]
+    marks: frozenset[str]
+    optional: frozenset[str]
     prefixes: tuple[str, ...]
     rest: dict[str, Triple] | None
     points: dict[str, Triple]
@@ -272,19 +289,39 @@ def conventions() -> tuple[Convention, ...]:
 
 
 def _convention(content: dict[str, Any], sides: Sequence[str]) -> Convention:
-    names = {}
-    for bone, known in content["joints"].items():
-        for side, word in [("", "")] if bone in UNSIDED else zip(LEFT_RIGHT, sides, strict=True):
-            names[sided(side, bone)] = tuple(_plain(name.replace("{s}", word)) for name in known)
+    def of_both(key: str) -> frozenset[str]:
+        known = content.get(key, [])
+        return frozenset(_plain(name.replace("{s}", word)) for name in known for word in sides)
+
+    names, spelled, optional = _bones(content, sides)
     return Convention(
         content["title"],
         names,
-        frozenset(_plain(name.replace("{s}", word)) for name in content.get("aside", []) for word in sides),
+        spelled,
+        of_both("aside"),
+        of_both("marks"),
+        optional,
         tuple(content.get("prefixes", ())),
         _both_sides(content["rest"], (1, -1, -1)) if "rest" in content else None,
         _both_sides(content.get("points", {}), (-1, 1, 1)),
         {_plain(name): known for name, known in content.get("axes", {}).items()},
     )
+
+
+def _bones(
+    content: dict[str, Any], sides: Sequence[str]
+) -> tuple[dict[str, tuple[str, ...]], frozenset[str], frozenset[str]]:
+    """Of each bone the plain names, all names as they are written, and the bones that only some files have."""
+    names, spelled, optional = {}, set(), set()
+    for part, known in content["joints"].items():
+        for side, word in [("", "")] if part in UNSIDED else zip(LEFT_RIGHT, sides, strict=True):
+            written = [name.replace("{s}", word) for name in known]
+            bone = sided(side, part)
+            names[bone] = tuple(map(_plain, written))
+            spelled.update(written)
+            if part in content.get("optional", []):
+                optional.add(bone)
+    return names, frozenset(spelled), frozenset(optional)
 
 
 def _both_sides(of_left: dict[str, list[float]], signs: tuple[int, int, int]) -> dict[str, Triple]:
@@ -297,31 +334,36 @@ def _both_sides(of_left: dict[str, list[float]], signs: tuple[int, int, int]) ->
 
 
 @lru_cache(maxsize=2**12)  # names of joints recur from file to file
-def _plain(name: str, prefix: str = NO_PREFIX) -> str:
-    """A name without what differs between files: a prefix (a regular expression), case, separators, and the namespace
-    before a colon."""
+def _own(name: str, prefix: str = NO_PREFIX) -> str:
+    """A name without prefixes (a regular expression) and the namespace before a colon or a bar."""
     name = re.sub(f"^(?:{prefix})(?=.)", "", name, flags=re.IGNORECASE)
-    return re.sub(r"[^a-z0-9]", "", name.rsplit(":", maxsplit=1)[-1].lower())
+    return re.split("[:|]", name)[-1]
+
+
+@lru_cache(maxsize=2**12)
+def _plain(name: str) -> str:
+    """A name without what differs between files: case, separators, and how letters are encoded."""
+    return re.sub(r"[\W_]", "", unicodedata.normalize("NFKC", name).lower())
 
 
 @lru_cache(maxsize=256)
 def map_by_names(skeleton: Skeleton) -> JointMap | None:
     """The map by the convention that fits best, None where none does.
 
-    HalfKnownError where a convention fits but for bones that are missing or out of order; MotionError where the one
-    that knows most of the names lacks bones of one side only, or where two joints are the hips.
+    HalfKnownError where a convention fits but for bones that are missing or out of order; MotionError where two joints
+    are the hips.
     """
-    shared = _shared_word(skeleton)
-    matches = [_match(convention, skeleton, shared) for convention in conventions()]
-    fits = sorted(range(len(matches)), key=lambda i: matches[i][0], reverse=True)
-    fullest = matches[fits[0]][1]
-    whole = (matches[i] for i in fits if not missing_bones(matches[i][1]))
-    told = missing_on_one_side(missing_bones(fullest), fullest)
-    (known, _), best = matches[fits[0]] if told else next(whole, matches[fits[0]])
+    written = _written(skeleton.names)
+    matches = [_match(convention, skeleton, names) for names in written for convention in conventions()]
+    matches = sorted(matches, key=lambda match: match[0], reverse=True)
+    fullest = matches[0][1]
+    whole = (match for match in matches if not missing_bones(match[1]))
+    one_sided = missing_on_one_side(missing_bones(fullest), fullest)
+    (known, _, _), best = matches[0] if one_sided else next(whole, matches[0])
     missing = missing_bones(best)
     if missing:
         if len(best.joints) >= 6 and known > 0.5 * len(skeleton.names):
-            raise (MotionError if told else HalfKnownError)(missing_reason(missing, best))
+            raise HalfKnownError(missing_reason(missing, best), best.joints if one_sided else None)
         return None
     try:
         return check_map(skeleton, best)
@@ -329,35 +371,82 @@ def map_by_names(skeleton: Skeleton) -> JointMap | None:
         raise HalfKnownError(str(error)) from error
 
 
-def _shared_word(skeleton: Skeleton) -> list[str]:
-    """A pattern of the word with which nearly all names begin, if one does."""
-    first = [re.match(r"[A-Za-z]+[0-9]*[ _:.-]+(?=.)", name) for name in skeleton.names]
-    words = [match[0] for match in first if match]
-    common = max(words, key=words.count, default="")
-    return [re.escape(common)] if words.count(common) > 0.8 * len(skeleton.names) else []
+def _written(names: tuple[str, ...]) -> list[tuple[str, ...]]:
+    """Names without words that nearly all begin with: with numbers at their ends, without them, without two."""
+    bare = without_numbers(names)
+    kinds = dict.fromkeys((names, bare, without_numbers(bare)))
+    return [_without_first_words(kind) for kind in kinds]
 
 
-def _match(convention: Convention, skeleton: Skeleton, shared: list[str]) -> tuple[tuple[int, int], JointMap]:
-    """The map that a convention makes of a skeleton's names, without its prefixes and those that they share, and how
-    well it fits: how many joints the convention has names for, and less how many of its bones are absent."""
-    pattern = "|".join(f"(?:{prefix})[ _:.-]*" for prefix in (*convention.prefixes, *shared)) or NO_PREFIX
-    names = [_plain(name, pattern) for name in skeleton.names]
+def _commonest(words: Sequence[str]) -> tuple[str, int]:
+    """The word that is there most often, and how often."""
+    return next(iter(Counter(words).most_common(1)), ("", 0))
+
+
+def _nearly_all(count: int, names: Sequence[str]) -> bool:
+    return count > 0.8 * len(names)
+
+
+def without_numbers(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Names without the numbers that programs add at their ends: of nearly all names ("LeftArm_07", "hand.L.001"), or
+    the one digit that nearly all end in ("Hips1", "Spine11"), or of names that no other is like without them."""
+    bare = tuple(re.sub(r"(?<=.)[ ._-]+[0-9]+$", "", name) for name in names)
+    if _nearly_all(sum(map(str.__ne__, bare, names)), names):
+        return bare
+    last, count = _commonest([name[-1:] for name in names])
+    if last in set("0123456789") and _nearly_all(count, names):
+        return tuple(name.removesuffix(last) if len(name) > 1 else name for name in names)
+    counts = Counter(bare)
+    return tuple(short if counts[short] == 1 else name for short, name in zip(bare, names, strict=True))
+
+
+def _without_first_words(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Names without the words, or numbers, with which nearly all begin."""
+    while True:
+        first = [re.match(r"(?:[0-9]+[ _:.|-]*|[^\W\d_][^\W_]*[ _:.|-]+)(?=.)", name) for name in names]
+        common, count = _commonest([match[0] for match in first if match])
+        if not common or not _nearly_all(count, names):
+            return names
+        names = tuple(name.removeprefix(common) or name for name in names)
+
+
+def _absent(convention: Convention, chain: str, names: Set[str]) -> int:
+    """How many bones of back or neck are absent, and one more without any."""
+    known = convention.names.get(chain, ())
+    absent = sum(name not in names for name in known)
+    if absent < len(known):
+        return absent
+    return 0 if chain in convention.optional or not known else 1 + absent
+
+
+def _match(
+    convention: Convention, skeleton: Skeleton, written: tuple[str, ...]
+) -> tuple[tuple[int, int, int], JointMap]:
+    """The map that a convention makes of a skeleton's names, and how well it fits: how many joints the convention has
+    names for, how many are spelled as it spells them, and less how many of its bones are absent."""
+    pattern = "|".join(f"(?:{prefix})[ _:.-]*" for prefix in convention.prefixes) or NO_PREFIX
+    own = [_own(name, pattern) for name in written]
+    names = [_plain(name) for name in own]
     hips = [i for i, name in enumerate(names) if name == convention.names["hips"][0] and len(skeleton.children[i]) >= 3]
     if len(hips) > 1:
         both = " and ".join(repr(skeleton.names[i]) for i in hips)
         raise MotionError(f"this file has two hips, {both}: put each figure in a file of its own")
+    places = {name: i for i, name in reversed(list(enumerate(names)))}
     chains = {chain: convention.names.get(chain, ()) for chain in ("spine", "neck")}
-    spine, neck = (tuple(sorted(names.index(name) for name in chain if name in names)) for chain in chains.values())
+    spine, neck = (tuple(sorted(places[name] for name in chain if name in places)) for chain in chains.values())
     limbs = {bone: known for bone, known in convention.names.items() if bone not in chains}
-    found = {bone: [name for name in known if name in names] for bone, known in limbs.items()}
-    joints = {bone: names.index(there[0]) for bone, there in found.items() if there}
+    found = {bone: [name for name in known if name in places] for bone, known in limbs.items()}
+    joints = {bone: places[there[0]] for bone, there in found.items() if there}
     known = {name for bone in convention.names.values() for name in bone} | convention.aside
     count = sum(name in known for name in names)
-    absent = len(limbs) - len(joints) + sum(bone in convention.names for bone in chains) - bool(spine) - bool(neck)
-    absent += sum(name not in names for chain in chains.values() for name in chain)
+    if convention.marks and not convention.marks & places.keys():
+        count = 0
+    spelled = sum(name in convention.spelled for name in own)
+    absent = sum(bone not in joints and bone not in convention.optional for bone in limbs)
+    absent += sum(_absent(convention, chain, places.keys()) for chain in chains)
     # other makers' figures of these names have joints besides, or rest in another pose
     rest = convention.rest if count >= sum(not name.endswith(END_SUFFIX) for name in skeleton.names) else None
     axes = {i: convention.axes[name] for i, name in enumerate(names) if name in convention.axes}
-    confidence = round(1.0 - 0.3 * absent / (absent + count), 2)
+    confidence = round(1.0 - 0.3 * absent / max(absent + count, 1), 2)
     found_map = JointMap(joints, spine, neck, convention.title, confidence, rest, convention.points, axes)
-    return (count, -absent), found_map
+    return (count, spelled, -absent), found_map

@@ -5,14 +5,23 @@ limb lengths tell which joint is which. Left and right come from the halves of n
 limb lies when the feet point forward.
 """
 
+import re
+from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import combinations, pairwise
+from itertools import combinations, pairwise, permutations
 
 import numpy as np
 
 from motet.errors import MotionError
 from motet.motion.humanoid.bones import ARM, LEFT_RIGHT, LEG, sided
-from motet.motion.humanoid.joint_map import BY_THE_TREE, HalfKnownError, JointMap, check_map, map_by_names
+from motet.motion.humanoid.joint_map import (
+    BY_THE_TREE,
+    HalfKnownError,
+    JointMap,
+    check_map,
+    map_by_names,
+    without_numbers,
+)
 from motet.motion.kinematics import local_translations, positions, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, unit
@@ -20,17 +29,22 @@ from motet.motion.skeleton import END_SUFFIX, LEFT, RIGHT, Skeleton, partners_of
 
 NO_HUMAN = "this skeleton is no human's: expected hips with two legs, and a back with two arms"
 
+WORN = re.compile("hair|braid|bangs|skirt|cape|cloak|ribbon|scarf|backpack|髪|スカート|マント|リボン", re.IGNORECASE)
+"""What names of chains of joints contain that are no limbs."""
+
 Limbs = list[dict[str, int]]
 """Of both limbs of a pair the joint of each part."""
 
 
 @dataclass(frozen=True)
 class _Fork:
-    """A joint and the two similar limbs below it, by their first joints."""
+    """A joint and two similar limbs below it, by their first joints; whether names say so, and how unlike they are."""
 
     joint: int
     limbs: tuple[int, int]
     length: float
+    is_named: bool
+    unlike: float
 
 
 class _Tree:
@@ -38,6 +52,8 @@ class _Tree:
 
     def __init__(self, motion: Motion) -> None:
         self.skeleton = skeleton_of(motion)
+        self.names = without_numbers(self.skeleton.names)
+        self.partners = partners_of(self.names)
         self.lengths = np.linalg.norm(local_translations(motion)[0] if len(motion) else self.skeleton.offsets, axis=1)
         self.lengths[0] = 0.0
         self.reach = np.zeros(len(self.lengths))
@@ -56,33 +72,58 @@ class _Tree:
             path.append(self.longest(children))
         return path[:-1] if self.skeleton.names[path[-1]].endswith(END_SUFFIX) and len(path) > 1 else path
 
-    def fork(self, joint: int) -> _Fork | None:
-        """The two branches of a joint that are most alike and long enough for a limb of three joints, if there are."""
-        partners, best, least = partners_of(self.skeleton.names), None, np.inf
-        for one, other in combinations(self.skeleton.children[joint], 2):
-            longer, shorter = sorted((self.lengths[i] + self.reach[i] for i in (one, other)), reverse=True)
-            counts = len(self.path(one)), len(self.path(other))
-            # two limbs of a pair may differ in length by 15 %
-            if min(counts) < 3 or not longer or 1 - shorter / longer > 0.15:
-                continue
-            unlike = 1 - shorter / longer + 0.1 * abs(counts[0] - counts[1]) - (1.0 if partners[one] == other else 0.0)
-            if unlike < least:
-                best, least = _Fork(joint, (one, other), float(longer)), unlike
-        return best
+    def forks(self, joint: int) -> list[_Fork]:
+        """The pairs of branches of a joint that are alike and have three joints and more, the most alike first."""
+        branches = [child for child in self.skeleton.children[joint] if not WORN.search(self.names[child])]
+        branches = [child for child in branches if len(self.path(child)) >= 3]
+        pairs = [self._fork(joint, pair) for pair in combinations(branches, 2)]
+        return sorted((fork for fork in pairs if fork), key=lambda fork: fork.unlike)
+
+    def _fork(self, joint: int, pair: tuple[int, int]) -> _Fork | None:
+        shorter, longer = sorted(float(self.lengths[i] + self.reach[i]) for i in pair)
+        counts = [len(self.path(limb)) for limb in pair]
+        # two limbs of a pair may differ in length by 15 %
+        if not longer or 1 - shorter / longer > 0.15:
+            return None
+        is_named = self.partners[pair[0]] == pair[1]
+        unlike = 1 - shorter / longer + 0.1 * abs(counts[0] - counts[1]) - (1.0 if is_named else 0.0)
+        return _Fork(joint, pair, longer, is_named, unlike)
 
     def legs_and_arms(self) -> tuple[_Fork, _Fork]:
-        """The two forks with the longest limbs, the one nearer to the root first."""
-        forks = [fork for joint in range(len(self.lengths)) if (fork := self.fork(joint))]
-        limbs: list[_Fork] = []
-        for fork in sorted(forks, key=lambda fork: -fork.length):
-            above = self.skeleton.ancestors(fork.joint)
-            if not any(limb in above for other in limbs for limb in other.limbs):
-                limbs.append(fork)
+        """The two forks with the longest limbs, of those whose names say so if there are, nearer to the root first."""
+        forks = [fork for joint in range(len(self.lengths)) for fork in self.forks(joint)[:1]]
+        forks.sort(key=lambda fork: -fork.length)
+        limbs = self._apart([fork for fork in forks if fork.is_named])
+        if len(limbs) < 2 or limbs[1].length < 0.3 * forks[0].length:
+            limbs = self._apart(forks)
         if len(limbs) < 2 or limbs[1].length < 0.3 * limbs[0].length:
             found = f"one pair of limbs, at {self.skeleton.names[limbs[0].joint]!r}" if limbs else "no pair of limbs"
             raise MotionError(f"{NO_HUMAN}; found {found}")
         first, second = sorted(limbs[:2], key=lambda fork: len(self.skeleton.ancestors(fork.joint)))
         return first, second
+
+    def _apart(self, forks: list[_Fork]) -> list[_Fork]:
+        """Those forks that are not on the limbs of one before them."""
+        limbs: list[_Fork] = []
+        for fork in forks:
+            above = self.skeleton.ancestors(fork.joint)
+            if not any(limb in above for other in limbs for limb in other.limbs):
+                limbs.append(fork)
+        return limbs
+
+    def mirrored_legs_and_arms(self) -> Iterator[tuple[_Fork, _Fork]]:
+        """Other choices of legs and arms, the longest first: pairs of limbs whose bones are equally long one by one."""
+        forks = [fork for joint in range(len(self.lengths)) for fork in self.forks(joint) if self._is_mirrored(fork)]
+        forks.sort(key=lambda fork: -fork.length)
+        forks = forks[:12]  # of many strands of hair the longest
+        for legs, arms in sorted(permutations(forks, 2), key=lambda pair: -pair[0].length - pair[1].length):
+            apart = not {*legs.limbs} & {*self.skeleton.ancestors(arms.joint)}
+            if apart and legs.joint in self.skeleton.ancestors(arms.joint)[1:] and arms.length > 0.3 * legs.length:
+                yield legs, arms
+
+    def _is_mirrored(self, fork: _Fork) -> bool:
+        one, other = (self.lengths[self.path(limb)] for limb in fork.limbs)
+        return len(one) == len(other) and bool(np.abs(one - other).max() < 0.02 * fork.length)
 
     def pair(self, fork: _Fork) -> tuple[list[list[int]], list[float]]:
         """The paths of two limbs, as long as the shorter, and how far down their joints are, the mean of both."""
@@ -108,12 +149,21 @@ class _Tree:
         """
         paths, places = self.pair(fork)
         last = len(places) - 2
+        start, elbow, hand = _two_bones(places, self._wrists(paths, places))
+        parts = {"UpperArm": start, "LowerArm": elbow, "Hand": hand} | ({"Shoulder": 0} if start else {})
+        return [{part: path[k] for part, k in parts.items() if k <= last} for path in paths]
+
+    def _wrists(self, paths: list[list[int]], places: list[float]) -> list[int]:
+        """Where on an arm the hand may begin."""
+        last = len(places) - 2
         forks = [k for k, joint in enumerate(paths[0]) if k >= 2 and len(self.skeleton.children[joint]) >= 2]
         # what comes after the wrist is within this part of an arm
         near = [k for k in range(2, last + 1) if 1 - places[k] / places[-1] <= 0.35]
-        start, elbow, hand = _two_bones(places, forks[:1] or near or [last + 1])
-        parts = {"UpperArm": start, "LowerArm": elbow, "Hand": hand} | ({"Shoulder": 0} if start else {})
-        return [{part: path[k] for part, k in parts.items() if k <= last} for path in paths]
+        is_leaf = not any(self.skeleton.children[path[last]] for path in paths)
+        # a leaf that is near to the joint before it is the hand's end
+        if is_leaf and len(near) > 1 and places[-1] - places[last - 1] < 0.25 * places[-1]:
+            near = near[:-1]
+        return forks[:1] or near or [last + 1]
 
     def neck(self, arms: _Fork) -> tuple[tuple[int, ...], int | None]:
         """The joints between the arms and the head, and the head's, where there are."""
@@ -136,27 +186,45 @@ def map_of(motion: Motion) -> JointMap:
         return map_by_names(skeleton_of(motion)) or map_by_tree(motion)
     except HalfKnownError as half:
         try:
-            return map_by_tree(motion)
+            found = map_by_tree(motion)
         except MotionError:
             raise half from None
+        if not half.agreed.items() <= found.joints.items():
+            raise
+        return found
 
 
 def map_by_tree(motion: Motion) -> JointMap:
     """The map by lengths, forks and sides; MotionError where the tree is not that of a human."""
     tree, skeleton = _Tree(motion), skeleton_of(motion)
-    legs, arms = tree.legs_and_arms()
+    frames = positions(motion) if len(motion) else skeleton.rest_positions[None]
+    try:
+        return _mapped(tree, frames, *tree.legs_and_arms())
+    except MotionError as error:
+        # what a body wears and carries can be longer than its limbs; beasts do not stand with their backs upright
+        for legs, arms in tree.mirrored_legs_and_arms():
+            if _stands(skeleton.rest_positions, tree.legs(legs), arms):
+                try:
+                    return _mapped(tree, frames, legs, arms)
+                except MotionError:
+                    continue
+        raise error
+
+
+def _mapped(tree: _Tree, frames: Array, legs: _Fork, arms: _Fork) -> JointMap:
+    """The map by the tree with given legs and arms, in frames (T, J, 3)."""
+    skeleton = tree.skeleton
     hips_up = skeleton.ancestors(legs.joint)
     back = [joint for joint in skeleton.ancestors(arms.joint) if joint not in hips_up]
     if not back:
         raise MotionError(f"{NO_HUMAN}; there is no back between {skeleton.names[legs.joint]!r} and the arms")
-    frames = positions(motion) if len(motion) else skeleton.rest_positions[None]
     leg_pair, arm_pair = tree.legs(legs), tree.arms(arms)
     # legs that are folded or crossed do not tell sides, as they do at rest where the figure stands there
     shown = skeleton.rest_positions[None] if _stands(skeleton.rest_positions, leg_pair, arms) else frames
     to_left = _to_left(shown, leg_pair, skeleton)
     joints, named = {"hips": legs.joint}, False
     for pair, parts, first in ((leg_pair, LEG, "UpperLeg"), (arm_pair, ARM, "UpperArm")):
-        left_first, by_name = _left_first(skeleton, shown, to_left, [limb[first] for limb in pair])
+        left_first, by_name = _left_first(tree, shown, to_left, [limb[first] for limb in pair])
         named = named or by_name
         for side, limb in zip(LEFT_RIGHT, pair if left_first else pair[::-1], strict=True):
             joints |= {sided(side, part): limb[part] for part in parts if part in limb}
@@ -215,13 +283,13 @@ def _to_left(frames: Array, legs: Limbs, skeleton: Skeleton) -> Array:
     return np.cross(up, forward)
 
 
-def _left_first(skeleton: Skeleton, frames: Array, to_left: Array, pair: list[int]) -> tuple[bool, bool]:
+def _left_first(tree: _Tree, frames: Array, to_left: Array, pair: list[int]) -> tuple[bool, bool]:
     """Whether the first of two joints is the left one, and whether their names say so."""
-    sides = [sides_of(skeleton.names)[joint] for joint in pair]
+    sides = [sides_of(tree.names)[joint] for joint in pair]
     if sorted(sides) == sorted((LEFT, RIGHT)):
         return sides[0] == LEFT, True
     across = np.mean(np.sum((frames[:, pair[0]] - frames[:, pair[1]]) * to_left, axis=-1))
     if not across:
-        names = " and ".join(repr(skeleton.names[joint]) for joint in pair)
+        names = " and ".join(repr(tree.skeleton.names[joint]) for joint in pair)
         raise MotionError(f"left and right of {names} cannot be told apart by names or feet; give a map")
     return bool(across > 0), False
