@@ -4,7 +4,8 @@
     python tests/fuzz_motions.py --folder ../shared/data/figures
 
 Small files of every format that motet reads, or those of a folder, are altered: bytes and numbers of all, words of
-texts, values of the JSON of glTF, arrays of .npz. Each is read, every clip of it that is not too many; what is read is
+texts, values of the JSON of glTF, which also gets thousands of nodes, meshes or clips that share their parts, arrays of
+.npz. Each is read, every clip of it that is not too many; what is read is
 brought to the humanoid, measured and written, and the file is taken for the character of another motion.
 """
 
@@ -129,10 +130,27 @@ def _in_gltf(rng: Generator, data: bytes) -> tuple[bytes, str]:
         said = altered(rng, document)
         return json.dumps(document).encode(), said
     document, binary = parts(data)
-    if rng.random() < 0.2:
+    way = rng.random()
+    if way < 0.2:
         return container(document, damaged(rng, binary)), "binary"
+    if way < 0.3:
+        return container(multiplied(rng, document), binary), "multiplied"
     said = altered(rng, document)
     return container(document, binary), said
+
+
+def multiplied(rng: Generator, document: dict[str, Any]) -> dict[str, Any]:
+    """A document in which thousands share what one had: nodes a mesh and skin, meshes a primitive, files a clip."""
+    skinned = {key: 0 for key, parts in (("mesh", "meshes"), ("skin", "skins")) if document.get(parts)}
+    shared: list[tuple[list[Any], Any]] = [(document["nodes"], skinned), (document["nodes"], {"name": "a"})]
+    for mesh in document.get("meshes", []):
+        shared.append((mesh["primitives"], mesh["primitives"][0]))
+    for animation in document.get("animations", []):
+        shared.append((document["animations"], animation))
+        shared.append((animation["channels"], animation["channels"][0]))
+    places, thing = shared[int(rng.integers(len(shared)))]
+    places.extend([thing] * int(rng.integers(1, 8_000)))
+    return document
 
 
 def _in_words(rng: Generator, data: bytes) -> bytes:

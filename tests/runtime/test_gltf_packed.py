@@ -84,6 +84,15 @@ def test_a_damaged_part_is_refused(changes: dict[str, Any], said: str, plain: Pa
         motet.read(write_document(tmp_path / "b.glb", document, packed))
 
 
+@pytest.mark.parametrize(("length", "count", "fits"), [(64, 64 * 128, True), (64, 64 * 128 + 1, False)])
+def test_a_packed_part_holds_at_most_what_its_bytes_can_expand_to(length: int, count: int, fits: bool) -> None:
+    """A block of 256 equal bytes takes two bits: 1,024 bytes a byte. Beyond that nothing is unpacked at all."""
+    gltf = gltf_data.Gltf(Path("a.glb"), {}, (bytes(length),))
+    part = {"buffer": 0, "byteLength": length, "count": count, "byteStride": 8, "mode": "ATTRIBUTES"}
+    with pytest.raises(FormatError, match="is broken: Malformed" if fits else f"cannot hold {count} elements"):
+        gltf._unpack(part)
+
+
 def test_all_parts_together_are_bounded(plain: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pack(plain, tmp_path / "a.glb")
     monkeypatch.setattr("motet.formats.gltf_data.MAX_UNPACKED", 4000)
