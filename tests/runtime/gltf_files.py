@@ -14,14 +14,16 @@ from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 
 
-def write_clips(path: Path, clips: Sequence[tuple[str, Motion]], skin: bool = True) -> Path:
-    """A GLB of one figure with several named motions."""
+def write_clips(path: Path, clips: Sequence[tuple[str, Motion]], skin: bool | Sequence[str] = True) -> Path:
+    """A GLB of one figure with several named motions, and a skin of all its joints, or of those with ends of names."""
     buffer, skeleton = glb.Buffer(), skeleton_of(clips[0][1])
     document: dict[str, Any] = {"asset": {"version": "2.0"}, "nodes": glb.joint_nodes(skeleton)}
     document["animations"] = [
         glb.animation(buffer, name, motion, glb.joint_tracks(motion, skeleton)) for name, motion in clips
     ]
-    document |= {"skins": [{"joints": list(range(len(skeleton.joints)))}]} if skin else {}
+    ends = ("",) if skin is True else tuple(skin or ())
+    joints = [i for i, name in enumerate(skeleton.names) if name.endswith(ends)]
+    document |= {"skins": [{"joints": joints}]} if joints else {}
     document |= {"bufferViews": buffer.views, "accessors": buffer.accessors}
     return write_document(path, document, bytes(buffer.content))
 

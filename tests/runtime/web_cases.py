@@ -14,14 +14,14 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from gltf_files import read_document
+from gltf_files import read_document, write_clips
 from renamed import names_of
 from small_character import QUARTER, character, packed
 
 from motet import load
 from motet.formats import bvh, read_motion, write_motion
 from motet.formats.text import with_names
-from motet.motion.humanoid import BONES, HUMANOID, MIXAMO, from_humanoid, to_humanoid
+from motet.motion.humanoid import BONES, HUMANOID, MIXAMO, from_humanoid, rig, to_humanoid
 from motet.motion.humanoid.alignment import AXES_TURNS
 from motet.motion.kinematics import global_transforms, motion_of, positions, skeleton_of
 from motet.motion.motion import Motion
@@ -123,7 +123,8 @@ def figures(texts: Mapping[str, str]) -> dict[str, Any]:
 
 
 def files(folder: Path) -> dict[str, bytes]:
-    """glTF files of a walk: a character whose hips hang below a scale and a turn, the same as a VRM avatar, a .vrma."""
+    """glTF files of a walk: a character whose hips hang below a scale and a turn, the same as a VRM avatar, a .vrma,
+    and a figure whose skin moves the head alone."""
     tilted = ({"scale": [0.01] * 3, "rotation": [QUARTER, 0, 0, QUARTER]},)
     walk = walking(12, 30.0)
     write_motion(folder / "moving.glb", walk, onto=character(folder / "plain.glb", tilted))
@@ -131,7 +132,12 @@ def files(folder: Path) -> dict[str, bytes]:
     bones = with_vrm_bones(document)
     (folder / "avatar.vrm").write_bytes(packed({**document, "extensions": bones}, binary))
     write_motion(folder / "walk.vrma", walk)
-    return {name: (folder / name).read_bytes() for name in ("moving.glb", "avatar.vrm", "walk.vrma")}
+    write_clips(
+        folder / "head.glb",
+        [("motion", from_humanoid(walking(6, 30.0), rig("rigify")))],
+        skin=("spine.004", "spine.006"),
+    )
+    return {name: (folder / name).read_bytes() for name in ("moving.glb", "avatar.vrm", "walk.vrma", "head.glb")}
 
 
 def scenes(files: Mapping[str, bytes]) -> dict[str, Any]:

@@ -1,7 +1,8 @@
 """Reading glTF 2.0 (.gltf, .glb) and VRM (.vrm, .vrma): the skeleton, and its animations as clips.
 
 Joints are those of the skins and the humanoid bones of a VRM file, with all nodes between them. In a file with neither,
-such as an animation exported alone, they are the nodes that its animations move, and the descendants of these.
+such as an animation exported alone, they are the nodes that its animations move, and the descendants of these. So they
+are, besides those of the skins, where only both together are a human's: some characters' skins move the head alone.
 
 Lengths include the scales of nodes and the transforms of nodes above the skeleton. The motion's skeleton has the rest
 pose of the file's nodes, with all rotations removed: every angle 0 is that pose, whatever the nodes' own axes.
@@ -15,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from motet.errors import FormatError, listed, quoted
+from motet.errors import FormatError, MotionError, listed, quoted
 from motet.files import File, place_of
 from motet.formats.gltf_data import Gltf, broken, parse
 from motet.formats.text import Clip, Names, chosen, clip_names, most_poses, split_clip
-from motet.motion.humanoid import BONES
+from motet.motion.humanoid import BONES, map_of
 from motet.motion.kinematics import motion_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, inverse, product, rotated
@@ -167,7 +168,7 @@ def figures(gltf: Gltf, moved: set[int]) -> list[set[int]]:
     """The joints of each figure of a file, by node; of a VRM file only the humanoid's; FormatError if none.
 
     moved: the nodes that its animations move. Skins belong to one figure if one is below the other, or both are below a
-    moved node.
+    moved node. Where the skins' joints are no human's, and are one together with moved nodes, these are joints, too.
     """
     skins, bones = gltf.objects("skins"), set(gltf.humanoid().values())
     if len(skins) > 500:  # a figure has one for each of its meshes
@@ -176,8 +177,30 @@ def figures(gltf: Gltf, moved: set[int]) -> list[set[int]]:
     if strange := set().union(*given) - set(range(len(gltf.parents))):
         raise FormatError(gltf.path, f"joints that are not nodes: {listed(sorted(map(str, strange)))}")
     roots = _heads(gltf, {node for node, parent in enumerate(gltf.parents) if parent < 0})
+    animated = _animated(gltf, moved, roots)
+    if not any(given):
+        if not animated:
+            names = listed([quoted(gltf.name(node)) for node in sorted(moved)])
+            reason = f"its animations move only {names}, and nothing below"
+            reason = reason if moved else "expected a skin with joints or a VRM humanoid"
+            raise FormatError(gltf.path, f"no skeleton: {reason}; export the armature, too")
+        return _grouped(gltf, [animated], moved, roots)
+    found = _grouped(gltf, given, moved, roots)
+    if bones:
+        return [joints for joints in found if joints & bones]
+    if not animated - above(gltf, set().union(*found)):
+        return found
+    places = gltf.world()[2][0]
+    if any(_is_human(gltf, joints, places) for joints in found):
+        return found
+    wider = _grouped(gltf, [*given, animated], moved, roots)
+    return [joints for joints in wider if _is_human(gltf, joints, places)] or found
+
+
+def _grouped(gltf: Gltf, given: list[set[int]], moved: set[int], roots: Mapping[int, int]) -> list[set[int]]:
+    """Sets of joints put together that belong to one figure."""
     parts: dict[tuple[int, int], set[int]] = {}
-    for i, joints in enumerate(given if any(given) else [_animated(gltf, moved, roots)]):
+    for i, joints in enumerate(given):
         for node in joints:
             parts.setdefault((i, roots[node]), set()).add(node)
     tops = [_top(gltf, part) for part in parts.values()]
@@ -185,11 +208,22 @@ def figures(gltf: Gltf, moved: set[int]) -> list[set[int]]:
     found: dict[int, set[int]] = {}
     for part, top in zip(parts.values(), tops, strict=True):
         found.setdefault(heads[top], set()).update(part)
-    return [joints for joints in found.values() if not bones or joints & bones]
+    return list(found.values())
+
+
+def _is_human(gltf: Gltf, joints: set[int], places: Array) -> bool:
+    """Whether joints are a human's by their names or their tree, from positions (N, 3) of all nodes at rest."""
+    try:
+        figure = figure_of(gltf, joints)
+        skeleton = skeleton_at(figure.names, figure.parents, places[list(figure.nodes)])
+        map_of(Motion(np.zeros((1, 0)), (), (), 30.0, skeleton))
+    except (FormatError, MotionError):
+        return False
+    return True
 
 
 def _animated(gltf: Gltf, moved: set[int], roots: Mapping[int, int]) -> set[int]:
-    """In each tree the moved nodes and the bones below them, if some are below others."""
+    """In each tree the moved nodes and the bones below them, if some are below others; empty if none are."""
 
     def is_thing(node: int, *kinds: str) -> bool:
         found = gltf.objects("nodes")[node]
@@ -202,11 +236,6 @@ def _animated(gltf: Gltf, moved: set[int], roots: Mapping[int, int]) -> set[int]
         if held and (node in bones or not is_thing(node, "mesh", "camera")):
             hanging.add(node)
     trees = {roots[node] for node in bones & hanging}
-    if not trees:
-        names = listed([quoted(gltf.name(node)) for node in sorted(moved)])
-        reason = f"its animations move only {names}, and nothing below"
-        reason = reason if moved else "expected a skin with joints or a VRM humanoid"
-        raise FormatError(gltf.path, f"no skeleton: {reason}; export the armature, too")
     return {node for node in bones | hanging if roots[node] in trees}
 
 

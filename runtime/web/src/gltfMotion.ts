@@ -2,6 +2,7 @@
 import { FormatError, MotionError } from "./errors.js";
 import { type Animation, Gltf, type Local, type Placed } from "./gltf.js";
 import { BONES } from "./humanoid.js";
+import { mapOf } from "./jointMap.js";
 import { checked, type Motion, motionFrom } from "./motion.js";
 import { median } from "./numbers.js";
 import { cross, dot, inverse, minus, normalised, product, type Quaternion, rotated, STILL, type Vector } from "./rotations.js";
@@ -59,7 +60,10 @@ function clips(gltf: Gltf, found: Set<number>[]): Animation[] {
   return moving;
 }
 
-/** The joints of each figure by node: those of the skins and the humanoid, or else what animations move. */
+/**
+ * The joints of each figure by node: those of the skins and the humanoid, or else what animations move; both where the
+ * skins' joints are no human's, and are one together with moved nodes.
+ */
 function figures(gltf: Gltf): Set<number>[] {
   const skins = gltf.document.skins ?? [];
   if (skins.length > MOST_SKINS) throw new FormatError(`it has ${skins.length} skins: expected at most ${MOST_SKINS}`);
@@ -69,7 +73,22 @@ function figures(gltf: Gltf): Set<number>[] {
   const strange = given.flatMap((joints) => [...joints]).filter((node) => !gltf.nodes[node]);
   if (strange.length) throw new FormatError(`joints that are not nodes: ${strange.slice(0, 5).join(", ")}`);
   const roots = heads(gltf, new Set(gltf.order.filter((node) => gltf.parents[node]! < 0)));
-  const parts = (given.length ? given : [animated(gltf, moved, roots)]).flatMap((joints) => byHead(joints, roots));
+  const alone = animated(gltf, moved, roots);
+  if (!given.length) {
+    if (!alone.size) throw new FormatError("no skeleton: expected a skin with joints or a VRM humanoid; export the armature, too");
+    return grouped(gltf, [alone], moved, roots);
+  }
+  const found = grouped(gltf, given, moved, roots);
+  if (bones.size) return found.filter((joints) => [...joints].some((node) => bones.has(node)));
+  const inside = gltf.above(found.flatMap((joints) => [...joints]));
+  if ([...alone].every((node) => inside.has(node)) || found.some((joints) => isHuman(gltf, joints))) return found;
+  const wider = grouped(gltf, [...given, alone], moved, roots).filter((joints) => isHuman(gltf, joints));
+  return wider.length ? wider : found;
+}
+
+/** Sets of joints put together that belong to one figure. */
+function grouped(gltf: Gltf, given: Set<number>[], moved: Set<number>, roots: Map<number, number>): Set<number>[] {
+  const parts = given.flatMap((joints) => byHead(joints, roots));
   const tops = parts.map((part) => top(gltf, part));
   const above = heads(gltf, new Set([...moved, ...tops]));
   const found = new Map<number, Set<number>>();
@@ -77,7 +96,19 @@ function figures(gltf: Gltf): Set<number>[] {
     const head = above.get(tops[at]!)!;
     found.set(head, new Set([...(found.get(head) ?? []), ...part]));
   });
-  return [...found.values()].filter((joints) => !bones.size || [...joints].some((node) => bones.has(node)));
+  return [...found.values()];
+}
+
+/** Whether joints have names of a human's. */
+function isHuman(gltf: Gltf, joints: Set<number>): boolean {
+  try {
+    const nodes = jointsOf(gltf, joints);
+    mapOf(skeletonOf(gltf, nodes, gltf.world(gltf.above(nodes))));
+    return true;
+  } catch (error) {
+    if (error instanceof MotionError || error instanceof FormatError) return false;
+    throw error;
+  }
 }
 
 function byHead(joints: Set<number>, roots: Map<number, number>): Set<number>[] {
@@ -86,7 +117,7 @@ function byHead(joints: Set<number>, roots: Map<number, number>): Set<number>[] 
   return [...found.values()];
 }
 
-/** In each tree the moved nodes and the bones below them, if some are below others. */
+/** In each tree the moved nodes and the bones below them, if some are below others; empty if none are. */
 function animated(gltf: Gltf, moved: Set<number>, roots: Map<number, number>): Set<number> {
   const bones = new Set([...moved].filter((node) => gltf.nodes[node]!.camera === undefined));
   const hanging = new Set<number>();
@@ -95,7 +126,6 @@ function animated(gltf: Gltf, moved: Set<number>, roots: Map<number, number>): S
     if ((bones.has(parent) || hanging.has(parent)) && (bones.has(node) || (mesh === undefined && camera === undefined))) hanging.add(node);
   }
   const trees = new Set([...bones].filter((node) => hanging.has(node)).map((node) => roots.get(node)));
-  if (!trees.size) throw new FormatError("no skeleton: expected a skin with joints or a VRM humanoid; export the armature, too");
   return new Set([...bones, ...hanging].filter((node) => trees.has(roots.get(node))));
 }
 
