@@ -8,18 +8,25 @@ from functools import partial
 from pathlib import PurePath
 from typing import Any, TypeVar, cast
 
+import numpy as np
+
+from motet.draw.page import Captions
+from motet.formats import ONTO, Character
 from motet.models.describe import DescribeModel, Description
 from motet.models.generate import PLAYED, Generated
 from motet.models.generate_codes import CodesModel, Story
 from motet.models.predict import PredictModel
 from motet.motion.feet.treadmill import is_in_place
+from motet.motion.humanoid import rig
 from motet.motion.looping import looped
 from motet.motion.motion import Motion
 from motet.motion.skeleton import METRES
-from motet.serve.asked import Asked, RequestError, read_upload
+from motet.serve.asked import Asked
 from motet.serve.batches import Batcher
-from motet.serve.content import MEDIA, as_json, character_of, figure_of, file_of, frames_of, shaped
+from motet.serve.content import MEDIA, Order, as_json, content_of, figure_of, frames_of
 from motet.serve.limits import Limits
+from motet.serve.readers import Readers
+from motet.serve.uploads import Bounds, RequestError
 
 T = TypeVar("T")
 Key = frozenset[tuple[str, Any]]
@@ -41,19 +48,23 @@ class Answers:
     """Answers requests by three models. Errors are those of the models, RequestError, and FormatError for files.
 
     Models run and answers are written in one thread, one call after the other: while it writes the answers of a batch,
-    the next one gathers. Files are read in two others.
+    the next one gathers. Motions are measured in two others. Files are read, and motions written on the characters in
+    them, in processes.
     """
 
     def __init__(self, generate: CodesModel, describe: DescribeModel, predict: PredictModel, limits: Limits) -> None:
         self._writer, self._describer, self._predictor, self.limits = generate, describe, predict, limits
-        self._models, self._files = ThreadPoolExecutor(1, "models"), ThreadPoolExecutor(2, "files")
+        self._models, self._threads = ThreadPoolExecutor(1, "models"), ThreadPoolExecutor(2, "requests")
+        self._bounds = Bounds(limits.motion_seconds, 8 * limits.body_bytes)
+        self._readers = Readers(limits.body_bytes, limits.seconds)
         self._generated = Batcher(self._generate, self._models, limits.batch)
         self._described = Batcher(self._describe, self._models, limits.batch)
         self._predicted = Batcher(self._predict, self._models, limits.batch)
 
     def close(self) -> None:
-        """End the threads, once what runs is done."""
-        for pool in (self._models, self._files):
+        """End the processes, and the threads once what runs is done."""
+        self._readers.close()
+        for pool in (self._models, self._threads):
             pool.shutdown(cancel_futures=True)
 
     def state(self) -> dict[str, Any]:
@@ -66,19 +77,20 @@ class Answers:
 
     async def generate(self, asked: Asked, form: str) -> Answer:
         """The motion of a sentence, or of several as a story, in a format out of MEDIA."""
-        texts, settings = await _in(self._files, self._told, asked, asked.settings.get("story", False))
-        character = await _in(self._files, character_of, asked, form, self.limits)
+        texts, settings = await _in(self._threads, self._told, asked, asked.settings.get("story", False))
+        character = await _in(self._threads, rig_of, asked, form, self.limits)
         if asked.settings.get("story") or {"stand", "after"} & {*asked.settings, *asked.files}:
             settings |= await self._after(asked)
             result: Generated = await _in(self._models, partial(self._writer.story, texts, **settings))
         else:
             seed = settings.pop("seed", 0)
             result = await self._generated(frozenset(settings.items()), (texts[0], seed))
-        return await _in(self._models, self._shown, result, texts, asked, form, character)
+        motion, order = await _in(self._models, self._shown, result, texts, asked, form)
+        return await self._answer(motion, order, asked, character)
 
     async def stream(self, asked: Asked) -> AsyncIterator[bytes]:
         """Lines of JSON: the figure, then frames as they are drawn; errors before the first."""
-        texts, settings = await _in(self._files, self._told, asked, True)
+        texts, settings = await _in(self._threads, self._told, asked, True)
         settings |= await self._after(asked)
         pieces = await _in(self._models, partial(self._writer.stream, texts, **settings))
         understood = await _in(self._models, self._understood, texts, asked)
@@ -89,7 +101,7 @@ class Answers:
             if piece is not None:
                 yield as_json({"understood": understood, **figure_of(piece)}) + b"\n"
             while piece is not None:
-                yield await _in(self._files, lambda shown: as_json(frames_of(shown)) + b"\n", piece)
+                yield await _in(self._threads, lambda shown: as_json(frames_of(shown)) + b"\n", piece)
                 piece = await _in(self._models, next, pieces, None)
 
         return lines()
@@ -120,7 +132,7 @@ class Answers:
 
     async def _after(self, asked: Asked) -> dict[str, Motion]:
         after = asked.files.get("after")
-        return {} if after is None else {"after": await _in(self._files, read_upload, after, self.limits)}
+        return {} if after is None else {"after": await self._readers.motion(after, self._bounds, {})}
 
     def _generate(self, key: Key, asked: list[tuple[str, int]]) -> list[Generated]:
         texts, seeds = zip(*asked, strict=True)
@@ -134,32 +146,37 @@ class Answers:
         parts = [part for text in texts for part in self._parts(text, asked)]
         return [{"text": part, **asdict(self._writer.understood(part))} for part in parts]
 
-    def _shown(self, result: Generated, texts: list[str], asked: Asked, form: str, character: Any) -> Answer:
-        """The answer of what was drawn, like ``motet generate`` writes it."""
+    def _shown(self, result: Generated, texts: list[str], asked: Asked, form: str) -> tuple[Motion, Order]:
+        """What was drawn, and how it is to be given, like ``motet generate`` writes it."""
         motion = result.playable(asked.settings.get("fps", PLAYED), not asked.settings.get("no_plant", False))
-        motion = shaped(looped(motion) if asked.settings.get("loop") else motion, asked, character)
-        understood, told = self._understood(texts, asked), " / ".join(texts)
+        motion = looped(motion) if asked.settings.get("loop") else motion
         passages = [asdict(one) for one in result.passages] if isinstance(result, Story) else []
-        if form == "json":
-            said = {"understood": understood, "unknown": result.unknown, "passages": passages}
-            content = as_json({**said, "seconds": motion.duration, **figure_of(motion), **frames_of(motion)})
+        captions = [(one["start"], one["text"]) for one in passages] or None
+        understood = self._understood(texts, asked)
+        said = {"understood": understood, "unknown": result.unknown, "passages": passages}
+        return motion, order_of(asked, form, " / ".join(texts), captions, said)
+
+    async def _answer(self, motion: Motion, order: Order, asked: Asked, character: Character | None) -> Answer:
+        """A motion as it is ordered, on the character of a file in a process of its own."""
+        file = asked.files.get("onto") or asked.files.get("like")
+        if file is None:
+            content = await _in(self._models, content_of, motion, order, character)
         else:
-            captions = [(one["start"], one["text"]) for one in passages] or None
-            content = file_of(motion, form, asked, character, told, captions)
-        return Answer(content, MEDIA[form], understood)
+            content = await self._readers.content(motion, order, file)
+        return Answer(content, MEDIA[order.form], order.said.get("understood"))
 
     # ---- describe
 
     async def describe(self, asked: Asked) -> Answer:
         """What ``motet describe --json`` says of a file."""
         motion = await self._given(asked)
-        said = {"input": asked.files["file"].name, "in_place": await _in(self._files, is_in_place, motion)}
+        said = {"input": asked.files["file"].name, "in_place": await _in(self._threads, is_in_place, motion)}
         if asked.settings.get("timeline"):
             if asked.some("beams", "draws"):
                 raise RequestError("timeline gives one sentence for each part: it goes with neither beams nor draws")
             parts = await _in(self._models, self._describer.timeline, motion)
             return _said([{**said, **part.to_json()} for part in parts])
-        windows = await _in(self._files, self._describer.windows, motion)
+        windows = await _in(self._threads, self._describer.windows, motion)
         settings = asked.some("beams", "draws", "seed")
         if settings.get("draws") == 0:  # none drawn: beam search
             settings = {**settings, "draws": None, "decoding": "beam"}
@@ -184,32 +201,50 @@ class Answers:
         if unit is not None and unit not in METRES:
             raise RequestError(f"unit_in: expected one of {', '.join(METRES)}, not {unit!r}")
         options = {**asked.some("clip", "partial"), **({"unit": unit} if unit else {})}
-        return await _in(self._files, partial(read_upload, asked.files["file"], self.limits, **options))
+        return await self._readers.motion(asked.files["file"], self._bounds, options)
 
     # ---- predict
 
     async def predict(self, asked: Asked, form: str) -> Answer:
         """How the motion of a file goes on, like ``motet predict`` writes it."""
-        motion, model = await self._given(asked), self._predictor
-        character = await _in(self._files, character_of, asked, form, self.limits)
+        motion = await self._given(asked)
+        model = self._predictor
+        character = await _in(self._threads, rig_of, asked, form, self.limits)
         count = model.count(**asked.some("seconds", "frames"))
         self._check_length(count / model.fps)
         key = frozenset({"frames": count, **asked.some("append")}.items())
         result = await self._predicted(key, (motion, asked.settings.get("seed", 0)))
-        return await _in(self._models, self._continued, result, asked, form, character)
+        order = order_of(asked, form, PurePath(asked.files["file"].name).stem)
+        return await self._answer(result, order, asked, character)
 
     def _predict(self, key: Key, asked: list[tuple[Motion, int]]) -> list[Motion]:
         motions, seeds = zip(*asked, strict=True)
         options = {**dict(key), "seed": list(seeds), "beyond": self._writer}
         return self._predictor.predict(list(motions), **cast(Any, options))
 
-    def _continued(self, motion: Motion, asked: Asked, form: str, character: Any) -> Answer:
-        motion = shaped(motion, asked, character)
-        if form == "json":
-            content = as_json({"seconds": motion.duration, **figure_of(motion), **frames_of(motion)})
-        else:
-            content = file_of(motion, form, asked, character, PurePath(asked.files["file"].name).stem)
-        return Answer(content, MEDIA[form])
+
+def rig_of(asked: Asked, form: str, limits: Limits) -> Character | None:
+    """The rig "like" that a motion is to be put on. RequestError where that, or a file "like" or "onto", does not go
+    with the format, or the frame rate is out of range."""
+    like, onto = asked.files.get("like") or asked.settings.get("like"), asked.files.get("onto")
+    if not 0 < asked.settings.get("fps", 1.0) <= limits.fps:
+        raise RequestError(f"fps: expected more than 0 and at most {limits.fps:g}, not {asked.settings['fps']:g}")
+    if like and onto:
+        raise RequestError("'like' gives only the motion, 'onto' the character with it: give one of the two")
+    if onto is None and form == "vrm":
+        raise RequestError("a .vrm is an avatar: give the file of one as 'onto', or ask for .vrma")
+    if onto is not None and f".{form}" not in ONTO:
+        raise RequestError(f"'onto' gives the character itself: ask for {' or '.join(ONTO)}, not .{form}")
+    return Character(Motion(np.zeros((1, 0)), (), (), 1.0, rig(like))) if isinstance(like, str) else None
+
+
+def order_of(
+    asked: Asked, form: str, title: str, captions: Captions | None = None, said: dict[str, Any] | None = None
+) -> Order:
+    """What a request orders."""
+    settings = asked.settings
+    how = {"fps": settings.get("fps"), "in_place": settings.get("in_place", False), "onto": "onto" in asked.files}
+    return Order(form, title, **how, captions=captions, said=said or {})
 
 
 def _said(rows: list[dict[str, Any]]) -> Answer:

@@ -1,8 +1,6 @@
 """What a request asks: its settings, by the names of the command line, from the address, a form or JSON; its files."""
 
-import io
 import json
-import zipfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
@@ -13,13 +11,11 @@ from starlette.datastructures import UploadFile
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 
-from motet.errors import FormatError, MotetError, quoted
-from motet.formats import READABLE, read_motion
-from motet.motion.motion import Motion
+from motet.errors import quoted
 from motet.serve.limits import Limits
+from motet.serve.uploads import RequestError, Upload
 from motet.settings import is_number
 
-TAKES = tuple(extension for extension in READABLE if extension != ".amc")  # whose skeleton is another file
 LONGEST_TEXT, MOST_TEXTS = 1000, 100
 
 Kind = Literal["text", "texts", "number", "numbers", "whole", "flag"]
@@ -27,10 +23,6 @@ Kind = Literal["text", "texts", "number", "numbers", "whole", "flag"]
 WORDS = {"text": "a text", "texts": "a text or a list of texts", "number": "a number", "whole": "a whole number"}
 WORDS |= {"numbers": "a number or a list of numbers", "flag": "true or false"}
 FLAGS = {"true": True, "1": True, "on": True, "false": False, "0": False, "off": False}
-
-
-class RequestError(MotetError, ValueError):
-    """A request that asks for what there is not, or in words that are none."""
 
 
 @dataclass(frozen=True)
@@ -67,14 +59,6 @@ class Parameter:
             )
             return fits and (not self.choices or value in self.choices)
         return is_number(value) and (self.kind != "whole" or isinstance(value, int))
-
-
-class Upload(io.BytesIO):
-    """A file that came with a request; errors call it by ``name``, which never leads to a file of this machine."""
-
-    def __init__(self, content: bytes, name: str) -> None:
-        super().__init__(content)
-        self.name = PurePath(name.replace("\\", "/").replace("\0", "")).name or "file"
 
 
 @dataclass(frozen=True)
@@ -159,27 +143,3 @@ async def _upload(name: str, part: UploadFile, files: Sequence[str]) -> Upload:
     if name not in files:
         raise RequestError(f"{quoted(name)} is no file that is asked for: expected {' or '.join(files) or 'none'}")
     return Upload(await part.read(), part.filename or "file")
-
-
-def read_upload(file: Upload, limits: Limits, **options: Any) -> Motion:
-    """The motion of a file that came with a request; errors like :func:`motet.read`, and FormatError for one that is
-    too long, or that unpacks to much more than it is."""
-    extension = PurePath(file.name).suffix.lower()
-    if extension not in TAKES:
-        raise FormatError(file.name, f"cannot read files of type {extension!r}; expected one of {' '.join(TAKES)}")
-    if extension == ".npz" and unpacked(file) > 8 * limits.body_bytes:
-        raise FormatError(file.name, f"it unpacks to more than {8 * limits.body_bytes} bytes")
-    file.seek(0)
-    motion = read_motion(file, **options)
-    if motion.duration > limits.motion_seconds:
-        raise FormatError(file.name, f"it lasts {motion.duration:.0f} s: expected at most {limits.motion_seconds:g} s")
-    return motion
-
-
-def unpacked(file: Upload) -> int:
-    """How many bytes a zip archive says that its files have; 0 for a damaged one, as its reader will say."""
-    try:
-        with zipfile.ZipFile(file) as archive:
-            return sum(info.file_size for info in archive.infolist())
-    except Exception:  # of a dozen types
-        return 0

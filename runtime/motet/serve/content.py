@@ -1,20 +1,19 @@
 """The content of answers: the bytes of motion files, as commands write them, and motions as JSON."""
 
 import json
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from motet.draw.page import Captions
 from motet.draw.page import write as write_page
-from motet.formats import ONTO, Character, put_onto, read_character, write_all_on, write_on
-from motet.motion.humanoid import rig
+from motet.formats import Character, put_onto, write_all_on, write_on
 from motet.motion.kinematics import local_rotations, local_translations, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.root_motion import in_place
 from motet.motion.rotations import Array, rotmat_to_quat
-from motet.serve.asked import Asked, RequestError, Upload
-from motet.serve.limits import Limits
+from motet.serve.uploads import Upload
 
 MEDIA = {
     "bvh": "text/plain; charset=utf-8",
@@ -29,43 +28,35 @@ MEDIA = {
 """The formats of answers, by their extensions, and their media types."""
 
 
-def character_of(asked: Asked, form: str, limits: Limits) -> Character | None:
-    """What a motion is to be put on: the file "like" or "onto", or the rig "like". RequestError where that does not go
-    with the format, or the frame rate is out of range; FormatError for a file that is no character."""
-    like, onto = asked.files.get("like") or asked.settings.get("like"), asked.files.get("onto")
-    if not 0 < asked.settings.get("fps", 1.0) <= limits.fps:
-        raise RequestError(f"fps: expected more than 0 and at most {limits.fps:g}, not {asked.settings['fps']:g}")
-    if like and onto:
-        raise RequestError("'like' gives only the motion, 'onto' the character with it: give one of the two")
-    if onto is None and form == "vrm":
-        raise RequestError("a .vrm is an avatar: give the file of one as 'onto', or ask for .vrma")
-    if onto is not None and f".{form}" not in ONTO:
-        raise RequestError(f"'onto' gives the character itself: ask for {' or '.join(ONTO)}, not .{form}")
-    given = onto or like
-    if isinstance(given, str):
-        return Character(Motion(np.zeros((1, 0)), (), (), 1.0, rig(given)))
-    return None if given is None else read_character(given)
+@dataclass(frozen=True)
+class Order:
+    """What an answer with a motion is to be, as plain values.
 
-
-def shaped(motion: Motion, asked: Asked, character: Character | None) -> Motion:
-    """A motion as "like", "onto", "fps" and "in_place" ask for it."""
-    motion = put_onto(motion, character) if character else motion
-    motion = motion.resample(asked.settings["fps"]) if "fps" in asked.settings else motion
-    return in_place(motion) if asked.settings.get("in_place") else motion
-
-
-def file_of(
-    motion: Motion, form: str, asked: Asked, character: Character | None, title: str, captions: Captions | None = None
-) -> bytes:
-    """The bytes of a motion file of a shaped motion, in a format out of MEDIA but JSON; errors as of its writer.
-
-    title: of a page, or of the clip in a character's file. captions: of a page.
+    form: a format out of MEDIA. title: of a page, or of the clip in a character's file. captions: of a page.
+    onto: whether the character itself is given with the motion. said: what JSON says beside the motion.
     """
-    file = Upload(b"", f"motion.{form}")
-    if "onto" in asked.files and character:
-        write_all_on(file, {title: motion}, character)
-    elif form == "html":
-        write_page(file, motion, captions, title)
+
+    form: str
+    title: str
+    fps: float | None = None
+    in_place: bool = False
+    onto: bool = False
+    captions: Captions | None = None
+    said: dict[str, Any] = field(default_factory=dict)
+
+
+def content_of(motion: Motion, order: Order, character: Character | None) -> bytes:
+    """The content of an answer: a motion, on a character if there is one, as it is ordered; errors as of writers."""
+    motion = put_onto(motion, character) if character else motion
+    motion = motion if order.fps is None else motion.resample(order.fps)
+    motion = in_place(motion) if order.in_place else motion
+    if order.form == "json":
+        return as_json({**order.said, "seconds": motion.duration, **figure_of(motion), **frames_of(motion)})
+    file = Upload(b"", f"motion.{order.form}")
+    if order.onto and character:
+        write_all_on(file, {order.title: motion}, character)
+    elif order.form == "html":
+        write_page(file, motion, order.captions, order.title)
     else:
         write_on(file, motion, character)
     return file.getvalue()

@@ -6,7 +6,8 @@ from typing import Literal, get_args
 from motet.models.generate_codes import Stand
 from motet.motion.humanoid import RIGS
 from motet.motion.skeleton import METRES
-from motet.serve.asked import TAKES, Parameter
+from motet.serve.asked import Parameter
+from motet.serve.uploads import TAKES
 
 DRAWING = {
     "text": Parameter("texts", "A sentence, such as 'a person walks and turns left'; of a story, one after the other."),
