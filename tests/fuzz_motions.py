@@ -48,9 +48,9 @@ FRAME = """<MotionFrame><Timestep>{}</Timestep><RootPosition>1000 2000 900</Root
 <RootRotation>0.1 0.2 0.3</RootRotation><JointPosition>0.5 -0.25</JointPosition></MotionFrame>"""
 
 
-def own_files() -> dict[str, Files]:
+def own_files(frames: int = 24) -> dict[str, Files]:
     """A small file of each format, and those beside it."""
-    motion, found = motet.read(CLIP)[:24], dict[str, Files]()
+    motion, found = motet.read(CLIP)[:frames], dict[str, Files]()
     with tempfile.TemporaryDirectory() as folder:
         for kind in ("bvh", "npz", "csv", "glb", "vrma", "amc"):
             motet.write(Path(folder) / f"x.{kind}", motion)

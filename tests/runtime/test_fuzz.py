@@ -1,4 +1,4 @@
-"""The short runs of tests/fuzz_bundles.py, fuzz_motions.py and fuzz_archives.py: the same mutants every time."""
+"""The short runs of the fuzzers of bundles, motions, archives and uploads: the same mutants every time."""
 
 from pathlib import Path
 
@@ -24,10 +24,23 @@ SECONDS, MEGABYTES = 2.0, 500.0
 def test_mutants_give_motets_own_errors_soon_and_in_little_memory(
     mutate: fuzz_motions.Mutate, steps: Steps, count: int, expected: set[str], tmp_path: Path
 ) -> None:
+    check(mutate, steps, count, expected, tmp_path)
+
+
+def test_mutants_that_are_uploaded_are_answered(tmp_path: Path) -> None:
+    pytest.importorskip("starlette", reason="the extra serve is not installed")
+    pytest.importorskip("httpx2", reason="Starlette's test client needs it")
+    import fuzz_uploads
+
+    check(fuzz_uploads.mutate, fuzz_uploads.steps, 30, {"RequestError", "runs"}, tmp_path)
+
+
+def check(mutate: fuzz_motions.Mutate, steps: Steps, count: int, expected: set[str], folder: Path) -> None:
+    """Try some mutants, none of which may fail, and all outcomes that are expected have to come."""
     worker, outcomes = Worker(steps, address_space=4096, patience=60), set()
     for number in range(count):
         how, files = mutate(np.random.default_rng([1, number]))
-        found = worker.run(put(tmp_path / "mutant", files))
+        found = worker.run(put(folder / "mutant", files))
         assert failure(found, 10 * SECONDS, MEGABYTES) is None, (number, how, found)  # the machine may be busy
         outcomes.add(found.outcome)
     worker.close()

@@ -223,6 +223,13 @@ def test_no_file_of_the_machine_is_read(client: TestClient, tmp_path: Path) -> N
                 assert str(tmp_path) not in answer.json()["error"].replace(repr(uri), "")
 
 
+def test_an_error_that_quotes_what_is_no_character_is_sent(client: TestClient) -> None:
+    document = {"asset": {"version": "2.0"}, "nodes": [{}], "skins": [{"joints": ["\ud800"]}]}
+    answer = client.post("/describe", files={"file": ("a.gltf", json.dumps(document).encode())})
+    assert (answer.status_code, answer.json()["type"]) == (400, "FormatError")
+    assert "\\ud800" in answer.json()["error"]
+
+
 def test_no_answer_shows_a_traceback(client: TestClient, walk: Path) -> None:
     """Mutated files and settings: 200 or a sentence."""
     draw, content = random.Random(0), walk.read_bytes()[:20_000]

@@ -44,7 +44,8 @@ class Limits:
 
 def refusal(status: int, said: str, kind: str = "RequestError", **headers: str) -> JSONResponse:
     """An answer that says in a sentence why there is no other."""
-    return JSONResponse({"error": said, "type": kind}, status, headers)
+    printable = said.encode(errors="backslashreplace").decode()  # names in files may be no characters
+    return JSONResponse({"error": printable, "type": kind}, status, headers)
 
 
 LOCAL_HOSTS = ("localhost", "127.0.0.1", "::1")
