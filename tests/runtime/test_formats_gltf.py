@@ -131,6 +131,7 @@ def test_an_avatar_with_rest_rotations_of_its_own_moves_as_the_humanoid(tmp_path
 def test_vrm_0_is_read_too(tmp_path: Path) -> None:
     document, binary = parts(twisted_glb(tmp_path))
     bones = [{"bone": bone, "node": HUMANOID.index(bone)} for bone in BONES]
+    bones += [{"bone": "jaw", "node": -1}]  # as UniVRM writes what is not set
     document["extensions"] = {"VRM": {"humanoid": {"humanBones": bones}}}
     for i, node in enumerate(document["nodes"]):
         node["name"] = f"n{i}"

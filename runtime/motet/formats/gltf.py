@@ -190,11 +190,9 @@ def figures(gltf: Gltf, moved: set[int]) -> list[set[int]]:
         return [joints for joints in found if joints & bones]
     if not animated - above(gltf, set().union(*found)):
         return found
-    places = gltf.world()[2][0]
-    if any(_is_human(gltf, joints, places) for joints in found):
+    if _humans(gltf, found):
         return found
-    wider = _grouped(gltf, [*given, animated], moved, roots)
-    return [joints for joints in wider if _is_human(gltf, joints, places)] or found
+    return _humans(gltf, _grouped(gltf, [*given, animated], moved, roots)) or found
 
 
 def _grouped(gltf: Gltf, given: list[set[int]], moved: set[int], roots: Mapping[int, int]) -> list[set[int]]:
@@ -211,15 +209,18 @@ def _grouped(gltf: Gltf, given: list[set[int]], moved: set[int], roots: Mapping[
     return list(found.values())
 
 
-def _is_human(gltf: Gltf, joints: set[int], places: Array) -> bool:
-    """Whether joints are a human's by their names or their tree, from positions (N, 3) of all nodes at rest."""
-    try:
-        figure = figure_of(gltf, joints)
-        skeleton = skeleton_at(figure.names, figure.parents, places[list(figure.nodes)])
-        map_of(Motion(np.zeros((1, 0)), (), (), 30.0, skeleton))
-    except (FormatError, MotionError):
-        return False
-    return True
+def _humans(gltf: Gltf, found: list[set[int]]) -> list[set[int]]:
+    """Those figures, of the ten with the most joints, that are humans by their names or their tree at rest."""
+    places, humans = gltf.world()[2][0], []
+    for joints in sorted(found, key=len, reverse=True)[:10]:
+        try:
+            figure = figure_of(gltf, joints)
+            skeleton = skeleton_at(figure.names, figure.parents, places[list(figure.nodes)])
+            map_of(Motion(np.zeros((1, 0)), (), (), 30.0, skeleton))
+        except (FormatError, MotionError):
+            continue
+        humans.append(joints)
+    return humans
 
 
 def _animated(gltf: Gltf, moved: set[int], roots: Mapping[int, int]) -> set[int]:

@@ -91,7 +91,7 @@ class Gltf:
         extensions = self.document.get("extensions", {})
         if "VRM" in extensions:
             old = extensions["VRM"].get("humanoid", {}).get("humanBones", [])
-            return {bone["bone"]: bone["node"] for bone in old}
+            return {bone["bone"]: bone["node"] for bone in old if bone["node"] != -1}  # UniVRM's bones that are not set
         found: dict[str, Any] = next(
             (extensions[name] for name in ("VRMC_vrm", "VRMC_vrm_animation") if name in extensions), {}
         )

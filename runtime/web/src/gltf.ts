@@ -128,7 +128,10 @@ export class Gltf {
   /** Bone -> node, by VRM 0, VRM 1 or VRM Animation; empty if none. */
   humanoid(): Map<string, number> {
     const { VRM, VRMC_vrm, VRMC_vrm_animation } = this.document.extensions ?? {};
-    if (VRM) return new Map(((VRM.humanoid?.humanBones ?? []) as { bone: string; node: number }[]).map(({ bone, node }) => [bone, node]));
+    if (VRM) {
+      const old = (VRM.humanoid?.humanBones ?? []) as { bone: string; node: number }[];
+      return new Map(old.filter(({ node }) => node !== -1).map(({ bone, node }) => [bone, node])); // UniVRM's bones that are not set
+    }
     const bones = (VRMC_vrm ?? VRMC_vrm_animation)?.humanoid?.humanBones ?? {};
     return new Map(Object.entries(bones as Record<string, { node: number }>).map(([bone, { node }]) => [bone, node]));
   }

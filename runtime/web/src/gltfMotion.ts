@@ -81,8 +81,8 @@ function figures(gltf: Gltf): Set<number>[] {
   const found = grouped(gltf, given, moved, roots);
   if (bones.size) return found.filter((joints) => [...joints].some((node) => bones.has(node)));
   const inside = gltf.above(found.flatMap((joints) => [...joints]));
-  if ([...alone].every((node) => inside.has(node)) || found.some((joints) => isHuman(gltf, joints))) return found;
-  const wider = grouped(gltf, [...given, alone], moved, roots).filter((joints) => isHuman(gltf, joints));
+  if ([...alone].every((node) => inside.has(node)) || humans(gltf, found).length) return found;
+  const wider = humans(gltf, grouped(gltf, [...given, alone], moved, roots));
   return wider.length ? wider : found;
 }
 
@@ -97,6 +97,11 @@ function grouped(gltf: Gltf, given: Set<number>[], moved: Set<number>, roots: Ma
     found.set(head, new Set([...(found.get(head) ?? []), ...part]));
   });
   return [...found.values()];
+}
+
+/** Those figures, of the ten with the most joints, that have names of a human's. */
+function humans(gltf: Gltf, found: Set<number>[]): Set<number>[] {
+  return [...found].sort((a, b) => b.size - a.size).slice(0, 10).filter((joints) => isHuman(gltf, joints));
 }
 
 /** Whether joints have names of a human's. */

@@ -76,6 +76,8 @@ class _Tree:
         """The pairs of branches of a joint that are alike and have three joints and more, the most alike first."""
         branches = [child for child in self.skeleton.children[joint] if not WORN.search(self.names[child])]
         branches = [child for child in branches if len(self.path(child)) >= 3]
+        # of many, such as strands of hair, the longest: every pair is compared
+        branches = sorted(sorted(branches, key=lambda child: -self.lengths[child] - self.reach[child])[:60])
         pairs = [self._fork(joint, pair) for pair in combinations(branches, 2)]
         return sorted((fork for fork in pairs if fork), key=lambda fork: fork.unlike)
 
