@@ -109,6 +109,15 @@ def test_capabilities_say_what_it_can(url: str) -> None:
     assert not model["supports_segment_seed"]
 
 
+def test_its_manuals_which_load_from_other_sites_are_off(url: str) -> None:
+    for page in ("/docs", "/redoc", "/docs/oauth2-redirect"):
+        with pytest.raises(urllib.error.HTTPError) as refused:
+            urllib.request.urlopen(url + page)
+        assert refused.value.code == 404
+    document = json.load(urllib.request.urlopen(url + "/openapi.json"))
+    assert {"/capabilities", "/generate"} <= document["paths"].keys()
+
+
 def test_a_time_line_is_the_story_of_its_prompts(url: str, skeleton: Any) -> None:
     """Sample i of a request is the story with seed + i, on the humanoid frame by frame."""
     segments = [WALK, {**WALK, "prompt": "a person waves"}]

@@ -111,6 +111,7 @@ class Gate:
 
     async def _passed(self, scope: Scope, receive: Receive, send: Send) -> None:
         held = 0
+        begun = False  # whether the answer is
 
         async def counted() -> Message:
             nonlocal held
@@ -125,6 +126,8 @@ class Gate:
             return message
 
         async def timed(message: Message) -> None:
+            nonlocal begun
+            begun = True
             try:
                 async with asyncio.timeout(self.limits.seconds):
                     await send(message)
@@ -136,6 +139,9 @@ class Gate:
             await self.app(scope, counted, timed)
         except ClientDisconnect:
             pass  # nobody is there to be told
+        except asyncio.CancelledError:  # the server ends, and has waited for long enough
+            if not begun:
+                await refusal(503, "the server is stopping", Connection="close")(scope, receive, send)
         finally:
             self.requests, self.held = self.requests - 1, self.held - held
 

@@ -60,6 +60,10 @@ def mmcp_app(model: CodesModel, fill: FillModel, steer: SteerModel) -> FastAPI:
     ImportError with the remedy where the SDK is missing.
     """
     application: FastAPI = build_app(MotetBackbone(model, fill, steer), title="motet")
+    # FastAPI's manuals load scripts from another site; /mmcp/openapi.json says the same
+    manuals = {application.docs_url, application.redoc_url, application.swagger_ui_oauth2_redirect_url}
+    routes = application.router.routes
+    application.router.routes = [route for route in routes if getattr(route, "path", "") not in manuals]
     return application
 
 
