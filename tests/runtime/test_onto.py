@@ -237,7 +237,7 @@ def test_meshes_with_too_many_points_are_not_computed(
     """The soles are then told by the joints, as of a character without a mesh."""
     monkeypatch.setattr(gltf_character, "MAX_POINTS", 5)
     monkeypatch.setattr(gltf_character, "_skinned", None)
-    with caplog.at_level("INFO"):
+    with caplog.at_level("INFO", "motet"):
         assert read_character(character(tmp_path / "avatar.glb")).skin == {}
     assert "6 points, more than 5" in caplog.text
     monkeypatch.setattr(gltf_character, "MAX_PRIMITIVES", 0)
