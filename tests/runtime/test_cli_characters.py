@@ -134,7 +134,7 @@ def test_what_cannot_be_written_onto_is_said_before_work(tmp_path: Path) -> None
     out.mkdir()
     for options, said in (
         (("--onto", avatar, "-o", out / "a.bvh"), "cannot write files of type '.bvh'; expected one of .glb .vrm"),
-        (("--onto", "mixamo", "-o", out / "a.glb"), "--onto takes a character with its mesh (.glb .vrm)"),
+        (("--onto", "mixamo", "-o", out / "a.glb"), "--onto takes a character with its mesh (.glb .gltf .vrm)"),
         (("--onto", avatar, "--like", avatar, "-o", out / "a.glb"), "give one of the two"),
         (("--onto", tmp_path / "none.glb", "-o", out / "a.glb"), "none.glb: no such file"),
         (("--onto", avatar, "-o", out / "a.vrm"), "avatar.glb: not a VRM avatar: write it to a .glb"),

@@ -69,6 +69,9 @@ def test_without_a_clip_it_is_the_first_and_the_log_says_so(tmp_path: Path, capl
     [
         ("walk", r"no clip 'walk': expected 'Walk', 'Run', or 1 to 2"),
         ("", "no clip ''"),
+        ("ru", r"no clip 'ru': expected 'Run', 'Walk', or 1 to 2"),
+        ("rnu", r"no clip 'rnu': expected 'Walk', 'Run', or 1 to 2"),
+        ("Rnu", r"no clip 'Rnu': expected 'Run', 'Walk', or 1 to 2"),
         ("3", "no clip '3'"),
         (0, "no clip 0"),
         (-1, "no clip -1"),

@@ -1,5 +1,6 @@
 """Clips for a character's own nodes, and characters with clips in them, played by kinematics that are not motet's."""
 
+import base64
 import json
 from collections.abc import Callable
 from dataclasses import replace
@@ -185,9 +186,14 @@ def test_what_is_no_character_is_refused(tmp_path: Path) -> None:
     flat[0]["scale"] = [0, 0, 0]
     (tmp_path / "flat.glb").write_bytes(packed(document | {"nodes": flat}, Played(avatar).binary))
     for onto, place, error, said in (
-        (tmp_path / "apart.glb", out, FormatError, "apart.glb: parts of this character are in other files"),
+        (
+            tmp_path / "apart.glb",
+            out,
+            FormatError,
+            "its image 'skin.png' is a separate file, which requires a .gltf",
+        ),
         (tmp_path / "flat.glb", out, FormatError, "flat.glb: .*scale 0"),
-        (bvh, out, FormatError, "cannot write onto files of type '.bvh'; expected one of .glb .vrm"),
+        (bvh, out, FormatError, "cannot write onto files of type '.bvh'; expected one of .glb .gltf .vrm"),
         (Character(motet.read(bvh)), out, MotionError, "no mesh"),
         (avatar, tmp_path / "out.vrm", FormatError, "avatar.glb: not a VRM avatar"),
         (avatar, tmp_path / "out.bvh", FormatError, "cannot write files of type '.bvh'; expected one of .glb .vrm"),
@@ -200,6 +206,69 @@ def test_what_is_no_character_is_refused(tmp_path: Path) -> None:
         motet.write(out, motion[:0], onto=avatar)
     with pytest.raises(MotionError, match="onto="):
         motet.write(out, {"a": motion})
+
+
+@pytest.mark.parametrize("inside", [False, True])
+def test_a_character_in_text_becomes_one_file(tmp_path: Path, inside: bool) -> None:
+    avatar, motion = character(tmp_path / "avatar.glb"), walk()
+    document, binary = parts(avatar)
+    uri = "data:application/octet-stream;base64," + base64.b64encode(binary).decode() if inside else "avatar.bin"
+    (tmp_path / "avatar.bin").write_bytes(binary)
+    (tmp_path / "skin%1.png").write_bytes(TEXTURE)
+    document["buffers"] = [{"byteLength": len(binary), "uri": uri}, {"byteLength": 8, "uri": "more.bin"}]
+    (tmp_path / "more.bin").write_bytes(b"12345678")
+    document["images"].append({"uri": "skin%251.png"})
+    (tmp_path / "avatar.gltf").write_text(json.dumps(document))
+    motet.write(tmp_path / "wanted.glb", motion, onto=avatar)
+    motet.write(tmp_path / "out.glb", motion, onto=tmp_path / "avatar.gltf")
+    wanted, found = Played(tmp_path / "wanted.glb"), Played(tmp_path / "out.glb")
+    np.testing.assert_array_equal(found.play(found.clip()).worlds, wanted.play(wanted.clip()).worlds)
+    check(found.play(found.clip()), motion)
+    written, content = parts(tmp_path / "out.glb")
+    assert content[: len(binary)] == binary
+    assert "uri" not in written["buffers"][0]
+    media, _, text = written["images"][1]["uri"].partition(",")
+    assert (media, base64.b64decode(text)) == ("data:image/png;base64", TEXTURE)
+    assert base64.b64decode(written["buffers"][1]["uri"].partition(",")[2]) == b"12345678"
+
+
+@pytest.mark.parametrize(
+    ("uri", "said"),
+    [
+        ("../skin.png", "its image '../skin.png' is not a file in its folder"),
+        ("link.png", "its image 'link.png' is not a file in its folder"),
+        ("notes.txt", "its image 'notes.txt' is no PNG, JPEG, WebP or KTX picture"),
+        ("none.png", "its image 'none.png' is not a file in its folder"),
+    ],
+)
+def test_pictures_of_a_character_are_pictures_in_its_folder(tmp_path: Path, uri: str, said: str) -> None:
+    folder = tmp_path / "inside"
+    folder.mkdir()
+    document, binary = parts(character(tmp_path / "avatar.glb"))
+    (folder / "avatar.bin").write_bytes(binary)
+    (folder / "notes.txt").write_text("secret")
+    (tmp_path / "skin.png").write_bytes(TEXTURE)
+    (folder / "link.png").symlink_to(tmp_path / "skin.png")
+    document["buffers"] = [{"byteLength": len(binary), "uri": "avatar.bin"}]
+    document["images"].append({"uri": uri})
+    (folder / "avatar.gltf").write_text(json.dumps(document))
+    with pytest.raises(FormatError, match=said):
+        motet.write(tmp_path / "out.glb", walk(), onto=folder / "avatar.gltf")
+    assert not (tmp_path / "out.glb").exists()
+
+
+def test_a_clip_for_nodes_without_names_says_that_it_will_not_play(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    avatar = character(tmp_path / "avatar.glb")
+    motet.write(tmp_path / "clip.glb", walk(), like=avatar)
+    assert not caplog.messages
+    document, binary = parts(avatar)
+    for node in document["nodes"]:
+        node.pop("name", None)
+    (tmp_path / "bare.glb").write_bytes(packed(document, binary))
+    motet.write(tmp_path / "clip.glb", walk(), like=tmp_path / "bare.glb")
+    assert "bare.glb: its nodes have no names, by which a clip plays: use --onto" in caplog.messages[-1]
 
 
 SHARED = {

@@ -13,7 +13,17 @@ from motet.cli.reading import FPS
 from motet.corpus.sources import Source
 from motet.draw.page import Captions
 from motet.draw.page import write as write_page
-from motet.formats import ONTO, WRITABLE, Character, check_writable, put_onto, read_character, write_all_on, write_on
+from motet.formats import (
+    BODIES,
+    ONTO,
+    WRITABLE,
+    Character,
+    check_writable,
+    put_onto,
+    read_character,
+    write_all_on,
+    write_on,
+)
 from motet.formats.text import Names
 from motet.motion.humanoid import RIGS
 from motet.motion.motion import Motion
@@ -90,7 +100,7 @@ def write_options(command: Callable[..., None]) -> Callable[..., None]:
         "--onto",
         type=Path,
         metavar="CHARACTER",
-        help=f"Write this character ({' '.join(ONTO)}) with mesh and materials, and the results as clips in it.",
+        help=f"Write this character ({' '.join(BODIES)}) with mesh and materials, and the results as clips in it.",
     )
     @click.option("--fps", type=FPS, help="Frame rate to write, such as 24, 25, 30 or 60. [default: the result's own]")
     @click.option("--in-place", is_flag=True, help="Remove horizontal travel; height and turns stay.")
@@ -98,8 +108,8 @@ def write_options(command: Callable[..., None]) -> Callable[..., None]:
     def with_output(like: Path | None, onto: Path | None, fps: float | None, in_place: bool, **options: Any) -> None:
         if like and onto:
             raise click.UsageError("--like writes only motions, --onto the character with them: give one of the two")
-        if onto and onto.suffix.lower() not in ONTO:
-            raise click.UsageError(f"--onto takes a character with its mesh ({' '.join(ONTO)}), which {onto} is not")
+        if onto and onto.suffix.lower() not in BODIES:
+            raise click.UsageError(f"--onto takes a character with its mesh ({' '.join(BODIES)}), which {onto} is not")
         given = onto or like
         character = None if given is None else read_character(given)
         command(output=Output(character, fps, in_place, onto), **options)

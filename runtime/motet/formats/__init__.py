@@ -112,6 +112,9 @@ WRITES = ", ".join(f"{kind.extension} ({kind.name})" for kind in FORMATS if kind
 ONTO = (".glb", ".vrm")
 """Extensions for a character written with its mesh and new animations."""
 
+BODIES = (".glb", ".gltf", ".vrm")
+"""Extensions of the files that such a character can come from."""
+
 
 @dataclass(frozen=True)
 class Character:
@@ -268,20 +271,22 @@ def write_motion(
 
     like: the character whose skeleton takes the motion: its file (.bvh, .glb, .vrm, ...), a motion of it, its
         skeleton, or the name of a rig ("mixamo", "rigify", "unity", "unreal").
-    onto: a character's .glb or .vrm; it is written with its mesh and materials and the motion, or several motions by
-        clip name, as animations.
+    onto: a character's .glb, .gltf or .vrm; it is written with its mesh and materials and the motion, or several
+        motions by clip name, as animations.
 
     FormatError, MotionError or OutputError if that is impossible; then nothing is written.
     """
     if onto is None:
         if isinstance(motion, Mapping):
-            raise MotionError("writing several motions into one file requires onto= and a character's .glb or .vrm")
+            raise MotionError(
+                "writing several motions into one file requires onto= and a character's .glb, .gltf or .vrm"
+            )
         check_writable(file, format)
         character = None if like is None else _character(like)
         return write_on(file, motion if character is None else put_onto(motion, character), character, format=format)
     check_writable(file, format, ONTO)
     if not isinstance(onto, Character):
-        _format(onto, None, ONTO, "write onto")
+        _format(onto, None, BODIES, "write onto")
         onto = read_character(onto)
     motions = motion if isinstance(motion, Mapping) else {"motion": motion}
     return write_all_on(file, {name: put_onto(each, onto) for name, each in motions.items()}, onto)
@@ -303,7 +308,7 @@ def write_on(file: File, motion: Motion, character: Character | None, *, format:
 def write_all_on(file: File, motions: Mapping[str, Motion], character: Character) -> None:
     """Write a character with motions that are on its skeleton already."""
     if character.nodes is None:
-        raise MotionError(f"the character has no mesh to write: expected a file of it, one of {' '.join(ONTO)}")
+        raise MotionError(f"the character has no mesh to write: expected a file of it, one of {' '.join(BODIES)}")
     from motet.formats import gltf_character
 
     with np.errstate(over="ignore", invalid="ignore"):

@@ -31,6 +31,9 @@ log = logging.getLogger(__name__)
 PATHS = {"rotation": 4, "translation": 3, "scale": 3}
 """The animated properties of a node, and how many numbers each has; mesh weights are left out."""
 
+LATE_START = 0.5
+"""Seconds before the first key from which on a file's start is told; many programs count frames from 1."""
+
 Tracks = Mapping[tuple[int, str], Array]
 """(Node, property) -> values (T, 3 or 4)."""
 
@@ -126,8 +129,44 @@ def _take(scene: _Scene, index: int | None) -> _Take:
     figure = figure_of(gltf, likeliest(gltf, scene.figures, moved(animation)))
     near = above(gltf, figure.nodes)
     values, fps = ({}, 30.0) if index is None else _tracks(gltf, animation, scene.names[index], near)
-    rest, poses = ([part[:, list(figure.nodes)] for part in gltf.world(near, each)[1:]] for each in ({}, values))
-    return _Take(figure, poses[0], poses[1], rest[0][0], rest[1][0], fps)
+    _, rest_turns, rest_places = (part[0, list(figure.nodes)] for part in gltf.world(near))
+    linear, turns, places = (part[:, list(figure.nodes)] for part in gltf.world(near, values))
+    _turn_with_bones(figure, linear, turns, places, rest_turns, rest_places)
+    return _Take(figure, turns, places, rest_turns, rest_places, fps)
+
+
+def _turn_with_bones(
+    figure: Figure, linear: Array, turns: Array, places: Array, rest_turns: Array, rest_places: Array
+) -> None:
+    """Turn joints (T, J, 3, 3), in place, that unequal scales above them shear, so that their bones point where the
+    linear maps (T, J, 3, 3) put them: by rotations alone, limbs would be some degrees off.
+    """
+    for joint in range(len(figure.nodes)):
+        children = [child for child, parent in enumerate(figure.parents) if parent == joint]
+        if children and _is_sheared(linear[:, joint]):
+            at_rest = rest_places[children] - rest_places[joint]
+            bones = places[:, children] - places[:, [joint]]
+            turned = product(turns[:, joint], rest_turns[None, joint].swapaxes(-1, -2))
+            turns[:, joint] = _turned_onto(at_rest, bones, turned) @ rest_turns[joint]
+
+
+def _is_sheared(linear: Array) -> bool:
+    """Whether linear maps (T, 3, 3) have columns of different lengths, or not at right angles, in some frame."""
+    columns = product(linear.swapaxes(-1, -2), linear)
+    size = np.trace(columns, axis1=-2, axis2=-1)[:, None, None] / 3
+    return bool(np.abs(columns - size * np.eye(3)).max(initial=0.0) > 1e-3 * size.max(initial=0.0))
+
+
+def _turned_onto(at_rest: Array, bones: Array, turned: Array) -> Array:
+    """The rotations (T, 3, 3) that take directions (B, 3) closest to others (T, B, 3), and turn like ``turned``
+    (T, 3, 3) where these leave that open, as one bone does."""
+    lengths = np.linalg.norm(at_rest, axis=-1) * np.linalg.norm(bones, axis=-1)
+    weights = np.where(lengths > 0, 1 / np.maximum(lengths, 1e-12), 0.0)
+    wanted = 1e-4 * turned + np.einsum("tb,tbi,bj->tij", weights, bones, at_rest)
+    left, _, right = np.linalg.svd(wanted)
+    left[:, :, 2] *= np.linalg.det(left @ right)[:, None]  # no reflections
+    closest: Array = left @ right
+    return closest
 
 
 def _rested(take: _Take, stance: Mapping[str, Array]) -> tuple[Array, Array]:
@@ -180,6 +219,8 @@ def figures(gltf: Gltf, moved: set[int]) -> list[set[int]]:
     animated = _animated(gltf, moved, roots)
     if not any(given):
         if not animated:
+            if gltf.document.get("extensions", {}).get("VRMC_vrm_animation", {}).get("expressions"):
+                raise FormatError(gltf.path, "it animates only expressions of a face, and no bones: it has no motion")
             names = listed([quoted(gltf.name(node)) for node in sorted(moved)])
             reason = f"its animations move only {names}, and nothing below"
             reason = reason if moved else "expected a skin with joints or a VRM humanoid"
@@ -301,25 +342,70 @@ def moved(animation: Mapping[str, Any]) -> set[int]:
 
 def _tracks(gltf: Gltf, animation: Mapping[str, Any], name: str, nodes: set[int]) -> tuple[Tracks, float]:
     """The values of some nodes at every frame of the animation ``name``, and its frame rate."""
-    samplers, keys = animation.get("samplers", []), {}
-    for channel in animation.get("channels", []):
-        node, path = channel["target"].get("node"), channel["target"].get("path")
-        if node in nodes and path in PATHS:
-            sampler = samplers[channel["sampler"]]
-            at, values = gltf.array(sampler["input"]), gltf.array(sampler["output"])
-            keys[node, path] = at.reshape(-1), values, sampler.get("interpolation", "LINEAR")
+    keys = _keys(gltf, animation, name, nodes)
     times = [at for at, _, _ in keys.values()]
     if not all(map(len, times)):
         raise FormatError(gltf.path, f"its animation {quoted(name)} has tracks without keys")
     start, end = min(at[0] for at in times), max(at[-1] for at in times)
-    step = min((float(np.median(np.diff(at))) for at in times if len(at) > 1), default=0.0)
-    rate = 1 / step if 0 < step < 0.1 else 30.0  # keys further apart do not tell a frame rate
-    fps = float(round(rate)) if abs(rate - round(rate)) < 0.01 * rate else rate
+    if start > LATE_START:
+        log.warning("%s: its animation %s starts at %.3g s: read from there", gltf.path, quoted(name), start)
+    fps = _rate(times)
     count = (end - start) * fps + 1
     if not count * len(gltf.objects("nodes")) < most_poses(gltf.size):
         raise FormatError(gltf.path, f"{end - start:g} s at {fps:g} fps is too many frames")
     frames = start + np.arange(round(count)) / fps
     return {place: _sampled(*key, frames, place[1]) for place, key in keys.items()}, fps
+
+
+Keys = dict[tuple[int, str], tuple[Array, Array, str]]
+"""(Node, property) -> times (K,), values (K, 3 or 4), or three times as many for splines, and the interpolation."""
+
+
+def _keys(gltf: Gltf, animation: Mapping[str, Any], name: str, nodes: set[int]) -> Keys:
+    """The keys of some nodes; FormatError where times and values differ in number."""
+    samplers = animation.get("samplers", [])
+    keys: Keys = {}
+    for channel in animation.get("channels", []):
+        node, path = channel["target"].get("node"), channel["target"].get("path")
+        if node not in nodes or path not in PATHS:
+            continue
+        sampler = samplers[channel["sampler"]]
+        times = gltf.array(sampler["input"])
+        values = gltf.array(sampler["output"])
+        kind = sampler.get("interpolation", "LINEAR")
+        expected = times.size * (3 if kind == "CUBICSPLINE" else 1)  # a spline's keys have tangents
+        if values.size != expected * PATHS[path]:
+            counts = f"{times.size} times and {len(values)} values, not {expected},"
+            place = f"the {path} of {quoted(gltf.name(node))}"
+            raise FormatError(gltf.path, f"its animation {quoted(name)} has {counts} for {place}: export it again")
+        keys[node, path] = times.reshape(-1), values, kind
+    return keys
+
+
+def _rate(times: Iterable[Array]) -> float:
+    """The frame rate that the times of keys tell, in seconds, each (K,): that of the closest keys, 30 if none is near.
+
+    Times are 32-bit numbers, so a step between two is rough: it is measured over all whole steps of its track.
+    """
+    least = 0.0
+    for at in times:
+        if len(at) < 2:
+            continue
+        gaps = np.diff(at)
+        step = float(np.median(gaps))
+        if step > 0:
+            whole = np.rint(gaps / step)
+            if np.abs(gaps - whole * step).max() < 0.01 * step and whole.sum() > 0:
+                step = float((at[-1] - at[0]) / whole.sum())
+        least = min(least, step) if least else step
+    if not 0 < least < 0.1:  # keys further apart do not tell a frame rate
+        return 30.0
+    rate = 1 / least
+    # a rate is whole, or like 29.97, where the times cannot tell it from that
+    for digits, error in ((0, 1e-4), (2, 1e-6), (3, 1e-6)):
+        if abs(rate - round(rate, digits)) < error * rate:
+            return float(round(rate, digits))
+    return rate
 
 
 def _sampled(times: Array, values: Array, kind: str, frames: Array, name: str) -> Array:

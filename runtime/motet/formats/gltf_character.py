@@ -5,6 +5,7 @@ are below a node with scale .01. A track is in the frame of the node's parent, s
 written into the character's file, with mesh and materials, or as a clip without them, which plays by node names.
 """
 
+import base64
 import logging
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -13,12 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.errors import FormatError
+from motet.errors import FormatError, quoted
 from motet.files import File, place_of, write_whole
 from motet.formats import Character
 from motet.formats.glb import Buffer, Track, animation, container, with_body
 from motet.formats.gltf import figure_of, figures, likeliest, moved, skeleton_at
-from motet.formats.gltf_data import Gltf, broken, parse
+from motet.formats.gltf_data import GLTF_MAX_BYTES, Gltf, broken, parse, read_beside
 from motet.motion.humanoid import BONES, REQUIRED, JointMap, check_map
 from motet.motion.kinematics import local_rotations, local_translations
 from motet.motion.motion import Motion
@@ -32,6 +33,10 @@ MAX_POINTS = 2_000_000
 
 MAX_PRIMITIVES = 50_000
 """Primitives of the meshes of all nodes together."""
+
+
+PICTURES = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg", b"RIFF": "image/webp", b"\xabKTX": "image/ktx2"}
+"""How the pictures of glTF begin, and their media types."""
 
 
 @dataclass(frozen=True)
@@ -193,17 +198,16 @@ def write_onto(file: File, clips: Mapping[str, Motion], nodes: Nodes) -> None:
     """Write a character's file with an animation for each named motion; the motions are on its skeleton.
 
     Everything else in the file is kept; its own animations follow the new ones, except those of the same names.
-    FormatError for a character in several files, or a .vrm of one that is not a VRM avatar; MotionError for a motion
-    without frames, OutputError if the file cannot be written.
+    Buffers and pictures beside a .gltf, or within its text, become parts of the file. FormatError for those that cannot
+    be read, or a .vrm of a character that is not a VRM avatar; MotionError for a motion without frames, OutputError if
+    the file cannot be written.
     """
     gltf = nodes.gltf
     if place_of(file).suffix.lower() == ".vrm" and not gltf.humanoid():
         raise FormatError(gltf.path, "not a VRM avatar: write it to a .glb")
     with broken(gltf.path):
-        buffers = gltf.objects("buffers")
-        uris = [part.get("uri", "data:") for part in (*buffers, *gltf.objects("images"))]
-        if not all(uri.startswith("data:") for uri in uris) or any("uri" in buffer for buffer in buffers[:1]):
-            raise FormatError(gltf.path, "parts of this character are in other files or text: export one .glb or .vrm")
+        buffers = _embedded_buffers(gltf)
+        images = _embedded_images(gltf)
         buffer = Buffer(gltf.document, gltf.buffers[0] if buffers else b"")
         made = [animation(buffer, name, motion, nodes.tracks(motion)) for name, motion in clips.items()]
         kept = [old for old in gltf.objects("animations") if old.get("name") not in clips]
@@ -211,8 +215,46 @@ def write_onto(file: File, clips: Mapping[str, Motion], nodes: Nodes) -> None:
         all_nodes = [nodes.turnable(i) if i in targets else node for i, node in enumerate(gltf.objects("nodes"))]
         sizes = [{**(buffers[0] if buffers else {}), "byteLength": len(buffer.content)}, *buffers[1:]]
         document = {**gltf.document, "nodes": all_nodes, "animations": made + kept, **buffer.parts(), "buffers": sizes}
+        document |= {"images": images} if images else {}
         content = container(document, bytes(buffer.content))
     write_whole(file, content)
+
+
+def _embedded_buffers(gltf: Gltf) -> list[dict[str, Any]]:
+    """The buffers without references to files: the first is the binary part, others are data: URIs."""
+    buffers = []
+    for index, buffer in enumerate(gltf.objects("buffers")):
+        embedded = dict(buffer)
+        if index == 0:
+            embedded.pop("uri", None)
+        elif not buffer.get("uri", "data:").startswith("data:"):
+            embedded["uri"] = _data_uri("application/octet-stream", gltf.buffers[index])
+        buffers.append(embedded)
+    return buffers
+
+
+def _embedded_images(gltf: Gltf) -> list[dict[str, Any]]:
+    """The images without references to files; FormatError for one not in the folder of a .gltf, or no picture."""
+    images = []
+    room = GLTF_MAX_BYTES - gltf.size
+    for image in gltf.objects("images"):
+        embedded = dict(image)
+        uri = image.get("uri", "data:")
+        if not uri.startswith("data:"):
+            content = read_beside(gltf.path, "image", uri, room + 1, gltf.beside)
+            room -= len(content)
+            media = next((PICTURES[start] for start in PICTURES if content.startswith(start)), None)
+            if media is None:
+                raise FormatError(gltf.path, f"its image {quoted(uri)} is no PNG, JPEG, WebP or KTX picture")
+            if room < 0:
+                raise FormatError(gltf.path, f"its buffers and images are over {GLTF_MAX_BYTES} bytes in total")
+            embedded["uri"] = _data_uri(media, content)
+        images.append(embedded)
+    return images
+
+
+def _data_uri(media: str, content: bytes) -> str:
+    return f"data:{media};base64,{base64.b64encode(content).decode()}"
 
 
 def write_clip(file: File, motion: Motion, nodes: Nodes) -> None:
@@ -221,6 +263,9 @@ def write_clip(file: File, motion: Motion, nodes: Nodes) -> None:
     MotionError and OutputError like :func:`write_onto`.
     """
     gltf, buffer = nodes.gltf, Buffer()
+    if not any(gltf.objects("nodes")[node].get("name") for node in nodes.joints):
+        remedy = "which writes the character itself"
+        log.warning("%s: its nodes have no names, by which a clip plays: use --onto (onto=), %s", gltf.path, remedy)
     kept = list(nodes.joints)
     while gltf.parents[kept[0]] >= 0:
         kept.insert(0, gltf.parents[kept[0]])

@@ -16,6 +16,7 @@ from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
+from numpy.typing import NDArray
 
 from motet.errors import FormatError, MotionError, quoted
 from motet.files import File, place_of
@@ -42,11 +43,12 @@ def broken(path: Path) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Gltf:
-    """A parsed file: its JSON object and its buffers."""
+    """A parsed file: its JSON object, its buffers, and the folder of the files that it may name, if any."""
 
     path: Path
     document: dict[str, Any]
     buffers: tuple[bytes, ...]
+    beside: Path | None = None
     _arrays: dict[int, Array] = field(default_factory=dict)
     _numbers: list[int] = field(default_factory=lambda: [0])
     _unpacked: dict[int, bytes] = field(default_factory=dict)
@@ -159,19 +161,42 @@ class Gltf:
         accessor = self.objects("accessors")[index]
         width = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}[accessor["type"]]
         kind, count = np.dtype(COMPONENTS[accessor["componentType"]]), accessor["count"]
-        if "bufferView" not in accessor or "sparse" in accessor:
-            raise FormatError(self.path, f"accessor {index} is sparse: export it without compression")
+        if "bufferView" in accessor:
+            values = self._rows(index, accessor, kind, count, width).astype(np.float64)
+        else:
+            if count * width > self.size:
+                raise FormatError(self.path, f"accessor {index} has more zeros than the file has bytes")
+            values = np.zeros((count, width))
+        if "sparse" in accessor:
+            sparse = accessor["sparse"]
+            changed = self._sparse_places(index, sparse, count)
+            values[changed] = self._rows(index, sparse["values"], kind, len(changed), width)
+        return np.maximum(values / np.iinfo(kind).max, -1.0) if accessor.get("normalized") else values
+
+    def _sparse_places(self, index: int, sparse: Mapping[str, Any], count: int) -> NDArray[np.int64]:
+        """The rows, of ``count``, that a sparse accessor replaces, in rising order; FormatError if they are not."""
+        indices = sparse["indices"]
+        kind = np.dtype(COMPONENTS[indices["componentType"]])
+        if kind.kind != "u":
+            raise FormatError(self.path, f"accessor {index} is broken: its sparse indices are not unsigned integers")
+        places = self._rows(index, indices, kind, sparse["count"], 1)[:, 0].astype(np.int64)
+        if (np.diff(places) <= 0).any() or (places >= count).any():
+            reason = f"its sparse indices do not rise, or reach beyond its {count} elements"
+            raise FormatError(self.path, f"accessor {index} is broken: {reason}")
+        return places
+
+    def _rows(self, index: int, part: Mapping[str, Any], kind: np.dtype[Any], count: int, width: int) -> NDArray[Any]:
+        """Elements (count, width) of a part of an accessor, which names a view; FormatError beyond its buffer."""
         size = kind.itemsize * width
-        content, start, stride = self._view(accessor["bufferView"])
-        start, stride = start + accessor.get("byteOffset", 0), stride or size
+        content, start, stride = self._view(part["bufferView"])
+        start, stride = start + part.get("byteOffset", 0), stride or size
         beyond = count and start + stride * (count - 1) + size > len(content)
         if count < 0 or start < 0 or stride < size or beyond:
             raise FormatError(self.path, f"accessor {index} extends beyond its buffer: the file is truncated")
         rows = np.lib.stride_tricks.as_strided(
             np.frombuffer(content, np.uint8, offset=start), (count, size), (stride, 1), writeable=False
         )
-        values = np.ascontiguousarray(rows).view(kind).astype(np.float64)
-        return np.maximum(values / np.iinfo(kind).max, -1.0) if accessor.get("normalized") else values
+        return np.ascontiguousarray(rows).view(kind)
 
     def _view(self, index: int) -> tuple[bytes, int, int]:
         """A buffer, the start of a view of it, and the stride in bytes; 0 if dense."""
@@ -227,7 +252,7 @@ def parse(file: File) -> Gltf:
     if not all(isinstance(size, int) and size >= 0 for size in sizes) or sum(sizes) > GLTF_MAX_BYTES:
         raise FormatError(path, f"its buffers declare invalid sizes, or over {GLTF_MAX_BYTES} bytes in total")
     beside = path.parent if isinstance(file, str | Path) and content[:4] != b"glTF" else None
-    return Gltf(path, document, tuple(_buffer(path, buffer, binary, beside) for buffer in buffers))
+    return Gltf(path, document, tuple(_buffer(path, buffer, binary, beside) for buffer in buffers), beside)
 
 
 def _chunks(path: Path, content: bytes) -> tuple[bytes, bytes]:
@@ -252,8 +277,13 @@ def _buffer(path: Path, buffer: Mapping[str, Any], binary: bytes, beside: Path |
         return binary[:size]
     if uri.startswith("data:"):
         return base64.b64decode(uri.partition(",")[2])[:size]
+    return read_beside(path, "buffer", uri, size, beside)
+
+
+def read_beside(path: Path, what: str, uri: str, size: int, beside: Path | None) -> bytes:
+    """At most ``size`` bytes of a file that a .gltf names; FormatError if it is none in the folder ``beside``."""
     if beside is None:
-        raise FormatError(path, f"its buffer {quoted(uri)} is a separate file, which requires a .gltf given by path")
+        raise FormatError(path, f"its {what} {quoted(uri)} is a separate file, which requires a .gltf given by path")
     place = beside / unquote(uri)
     try:
         if place.resolve().is_relative_to(beside.resolve()) and not place.is_symlink() and place.is_file():
@@ -261,8 +291,8 @@ def _buffer(path: Path, buffer: Mapping[str, Any], binary: bytes, beside: Path |
                 if stat.S_ISREG(os.fstat(opened.fileno()).st_mode):
                     return opened.read(size)
     except (OSError, ValueError, RuntimeError) as error:  # RuntimeError: a loop of links, before Python 3.13
-        raise FormatError(path, f"its buffer {quoted(uri)} cannot be read: {error}") from error
-    raise FormatError(path, f"its buffer {quoted(uri)} is not a file in its folder")
+        raise FormatError(path, f"its {what} {quoted(uri)} cannot be read: {error}") from error
+    raise FormatError(path, f"its {what} {quoted(uri)} is not a file in its folder")
 
 
 def _without_links(name: str, flags: int) -> int:

@@ -7,6 +7,7 @@ import logging
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from difflib import get_close_matches
 from itertools import permutations
 from pathlib import Path
 
@@ -214,8 +215,20 @@ def chosen(path: Path, names: Sequence[str], clip: Clip) -> int:
     at = int(clip) if isinstance(clip, int) or (clip.isdecimal() and len(clip) < 10) else 0
     if 1 <= at <= len(names):
         return at - 1
-    known = f"{listed([quoted(name) for name in names])}, or 1 to {len(names)}" if names else "none"
+    known = (
+        f"{listed([quoted(name) for name in _nearest_first(str(clip), names)])}, or 1 to {len(names)}"
+        if names
+        else "none"
+    )
     raise FormatError(path, f"no clip {clip if isinstance(clip, int) else quoted(clip)}: expected {known}")
+
+
+def _nearest_first(clip: str, names: Sequence[str]) -> list[str]:
+    """Names of clips, first those that an unknown one is a part of or is spelt like."""
+    wanted, known = clip.casefold(), names[:1000]
+    holding = [name for name in known if wanted and wanted in name.casefold()]
+    alike = get_close_matches(clip[:200], [name for name in known if name not in set(holding)])
+    return list(dict.fromkeys([*sorted(holding, key=len), *alike, *names]))
 
 
 def split_clip(file: File, extensions: Sequence[str]) -> tuple[File, str | None]:

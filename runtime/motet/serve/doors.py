@@ -39,7 +39,7 @@ FILES = {
     "file": f"A motion of any human figure ({' '.join(TAKES)}).",
     "after": "A motion to continue.",
     "like": "A character whose skeleton takes the motion.",
-    "onto": "A character (.glb, .vrm), which comes back with its mesh and the motion.",
+    "onto": "A character (.glb, .gltf with all data in it, .vrm), which comes back with its mesh and the motion.",
 }
 
 
