@@ -4,6 +4,7 @@ import sys
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 
 
@@ -17,29 +18,44 @@ def listed(names: Sequence[str], most: int = 6) -> str:
     return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
-def warn(said: str, category: type[Warning]) -> None:
-    """Warn at the nearest line outside of this package: that of the caller, who can do something about it."""
+_collecting: ContextVar[tuple[tuple[tuple[type[Warning], ...], list[Warning]], ...]] = ContextVar("motet", default=())
+"""What this thread or task collects instead of warning of it: categories, and where they go; the innermost last."""
+
+
+@contextmanager
+def collected(*categories: type[Warning]) -> Iterator[list[Warning]]:
+    """What motet warns of in these categories is put into a list instead, in this thread or task alone.
+
+    The filters of Python's own warnings are those of all threads, so a library leaves them alone.
+    """
+    notes: list[Warning] = []
+    token = _collecting.set((*_collecting.get(), (categories, notes)))
+    try:
+        yield notes
+    finally:
+        _collecting.reset(token)
+
+
+def warn(text: str, category: type[Warning]) -> None:
+    """Warn at the nearest line outside of this package: that of the caller, who can do something about it. Or add it to
+    what the caller collects (:func:`collected`)."""
+    for categories, notes in reversed(_collecting.get()):
+        if issubclass(category, categories):
+            notes.append(category(text))
+            return
     level, frame = 1, sys._getframe(0)
     while frame.f_back is not None and Path(frame.f_code.co_filename).is_relative_to(Path(__file__).parent):
         level, frame = level + 1, frame.f_back
-    warnings.warn(said, category, stacklevel=level)
+    warnings.warn(text, category, stacklevel=level)
+
+
+def each_once(notes: Sequence[Warning]) -> list[str]:
+    """The texts of what was collected, each once."""
+    return list(dict.fromkeys(map(str, notes)))
 
 
 class TravelWarning(UserWarning):
     """A clip in place was given the path over the ground that its feet imply."""
-
-
-@contextmanager
-def travel_warnings() -> Iterator[list[warnings.WarningMessage]]:
-    """What is warned of clips in place, in the end each once; other warnings go on."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", TravelWarning)
-        yield caught
-    for warning in caught:
-        if not issubclass(warning.category, TravelWarning):
-            warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
-    travel = {str(warning.message): warning for warning in caught if issubclass(warning.category, TravelWarning)}
-    caught[:] = travel.values()
 
 
 class MotetError(Exception):

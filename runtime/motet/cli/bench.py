@@ -4,7 +4,6 @@ import importlib
 import importlib.util
 import json
 import logging
-import warnings
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ from motet.bench.profile import with_profiles
 from motet.bundle.bundle import list_bundles
 from motet.bundle.graph import SessionOptions
 from motet.cli.options import session_options
-from motet.errors import FormatError, TextWarning
+from motet.errors import FormatError, TextWarning, collected
 from motet.models.load import load
 
 log = logging.getLogger(__name__)
@@ -85,8 +84,7 @@ def measured(
         runs = importlib.import_module("motet_train.runs")
         for who in ("eager", "compiled") if compile else ("eager",):
             models[who] = runs.torch_model(model, options.threads, compiled=who == "compiled")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", TextWarning)
+    with collected(TextWarning):
         rows = compared({who: cases(one, motion) for who, one in models.items()}, seconds)
         if model.graphs:
             rows = with_profiles(rows, options, lambda given: cases(load(name, given), motion), machine, seconds / 5)

@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from motet.bundle.graph import SessionOptions
-from motet.cli.options import Tries, bar, bundle_option, in_place, naming, noted, session_options, warned
+from motet.cli.options import Tries, bar, bundle_option, naming, noted, session_options, warned
 from motet.cli.reading import Read, read_options
 from motet.cli.writing import Output, out_option, places, size, spare, write_options
 from motet.errors import ControlError, MotionError, quoted
@@ -81,7 +81,7 @@ def predict(
         with tries.of(source) as caught:
             futures, expected = _futures(model, read(source), writer, samples, count, **drawn)
             said = _written(futures, own, source.title, output, count, drawn["seed"])
-            said |= {"in_place": in_place(caught), "beyond": writer and beyond}
+            said |= {"in_place": bool(caught), "beyond": writer and beyond}
             rows.append({"input": str(source), **said, **expected})
             if not as_json:
                 click.echo("\n".join(_lines(rows[-1], drawn["append"])))

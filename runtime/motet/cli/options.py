@@ -3,7 +3,6 @@
 import functools
 import logging
 import sys
-import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,7 +13,16 @@ import onnxruntime
 
 from motet.bundle.graph import MAX_THREADS, SessionOptions
 from motet.corpus.answers import Answer, named
-from motet.errors import ControlWarning, MotetError, MotionError, TextWarning, TravelWarning, quoted, travel_warnings
+from motet.errors import (
+    ControlWarning,
+    MotetError,
+    MotionError,
+    TextWarning,
+    TravelWarning,
+    collected,
+    each_once,
+    quoted,
+)
 from motet.settings import Progress, silent
 
 log = logging.getLogger("motet")
@@ -64,30 +72,19 @@ class StderrHandler(logging.Handler):
 @contextmanager
 def noted() -> Iterator[None]:
     """Log what motet warns of, words that are not known and speeds that a gait does not have, each once."""
-    with warnings.catch_warnings(record=True) as caught:
-        for category in (TextWarning, ControlWarning):
-            warnings.simplefilter("always", category)
+    with collected(TextWarning, ControlWarning) as notes:
         yield
-    for text in dict.fromkeys(str(warning.message) for warning in caught):
+    for text in each_once(notes):
         log.warning(text)
 
 
-Warned = list[warnings.WarningMessage]
-"""What was warned of so far."""
-
-
 @contextmanager
-def warned(given: object) -> Iterator[Warned]:
-    """Log what motet warns of a motion, each once, with what was given; other warnings go on."""
-    with travel_warnings() as caught:
-        yield caught
-    for warning in caught:
-        log.warning("%s: %s", given, warning.message)
-
-
-def in_place(caught: Warned) -> bool:
-    """Whether a motion was a clip in place."""
-    return any(issubclass(warning.category, TravelWarning) for warning in caught)
+def warned(given: object) -> Iterator[list[Warning]]:
+    """Log what motet warns of a motion, each once, with what was given."""
+    with collected(TravelWarning) as notes:
+        yield notes
+    for text in each_once(notes):
+        log.warning("%s: %s", given, text)
 
 
 @contextmanager
@@ -112,7 +109,7 @@ class Tries:
         self.failed = 0
 
     @contextmanager
-    def of(self, given: object) -> Iterator["Warned"]:
+    def of(self, given: object) -> Iterator[list[Warning]]:
         """What is done for one file or text; motet's own errors end only this. What it was warned of meanwhile is said,
         once, of the file."""
         try:

@@ -3,7 +3,6 @@
 import io
 import json
 import sys
-import warnings
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -17,7 +16,7 @@ from motet.cli.many import Many, jobs_option, many_options
 from motet.cli.options import bar, bundle_option, noted, session_options, warned
 from motet.cli.reading import read_options, unit_option
 from motet.corpus.answers import Embed
-from motet.errors import FormatError, TextWarning
+from motet.errors import FormatError, TextWarning, collected
 from motet.files import check_place, write_whole
 from motet.formats import names_motion, read_motion
 from motet.jobs import Shard
@@ -136,7 +135,7 @@ def search(
             model.ids(query)  # refused before all motions are read
     with bar("embedding") as progress:
         index = Index.open(folder, model, file, unit=unit_in, jobs=jobs, shard=part, merge=parts, progress=progress)
-    with warnings.catch_warnings(action="ignore", category=TextWarning), warned(query):  # words are said already
+    with collected(TextWarning), warned(query):  # words are said already
         hits = index.search(query if motion is None else motion, count)
     _told(hits, as_json)
     if not hits[0].like:

@@ -17,7 +17,7 @@ from motet.bundle.bundle import Bundle
 from motet.bundle.graph import SessionOptions
 from motet.checked import Checked
 from motet.corpus.sources import Source, opened
-from motet.errors import MotetError, UnitError, travel_warnings
+from motet.errors import MotetError, TravelWarning, UnitError, collected, each_once
 from motet.models.describe import DescribeModel
 from motet.models.load import load_as
 from motet.motion.motion import Motion
@@ -48,12 +48,12 @@ class Answer:
     @contextmanager
     def tried(self) -> Iterator[None]:
         """What is done for this motion; motet's own errors end only that, and are kept with the warnings."""
-        with travel_warnings() as caught:
+        with collected(TravelWarning) as notes:
             try:
                 yield
             except MotetError as error:
                 self.error = named(self.source, error)
-        self.warned = tuple(str(warning.message) for warning in caught)
+        self.warned = tuple(each_once(notes))
 
 
 def named(given: object, error: MotetError) -> str:

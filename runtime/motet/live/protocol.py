@@ -6,13 +6,12 @@ and x at 90.
 
 import json
 import re
-import warnings
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.errors import ControlError, ControlWarning, MotetError, TextError, quoted
+from motet.errors import ControlError, ControlWarning, MotetError, TextError, collected, quoted
 from motet.models.guided import LARGEST_COMMAND
 from motet.models.said_acts import SaidActs
 from motet.models.steer import SteerModel
@@ -60,11 +59,10 @@ class ClientSession:
         ProtocolError or ControlError for one that cannot be obeyed; nothing has changed then.
         """
         kind, given = parsed(text)
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always", ControlWarning)
+        with collected(ControlWarning) as notes:
             unknown = self._obey(kind, given)
         self.heard += 1
-        return [*unknown, *(str(warning.message) for warning in caught)]
+        return [*unknown, *map(str, notes)]
 
     def _obey(self, kind: str, given: dict[str, Any]) -> list[str]:
         """Do what a message says; why an act is not known."""

@@ -1,7 +1,6 @@
 """Generate: motions for a sentence. What all such models share, and those that draw frame by frame from mixtures of
 Gaussians (section 4.3 of Plappert et al. 2017)."""
 
-import warnings
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -14,7 +13,7 @@ from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
 from motet.decode.loop import Noise, Recorded, Sample
 from motet.decode.mixture import score_frames
-from motet.errors import DecodingError, TextError, TextWarning
+from motet.errors import DecodingError, TextError, TextWarning, collected
 from motet.files import File
 from motet.formats import Character, write_motion
 from motet.models.language import LanguageModel
@@ -224,8 +223,7 @@ class GenerateModel(LanguageModel):
 
     def check(self, sentence: str, whole: bool = False, numbers: bool = True) -> None:
         """TextError where the model does not know all of a sentence, or of its parts; see :meth:`note`."""
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", TextWarning)
+        with collected(TextWarning):
             for said in [sentence] if whole else self.parts(sentence):
                 part = self.quantities(said).text if numbers else said
                 self.note(part, self.embed(part), strict=True)

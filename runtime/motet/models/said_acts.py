@@ -1,10 +1,9 @@
 """Acts by sentence: what a figure that is steered is told to do in words, made by a generate model."""
 
-import warnings
 from typing import TYPE_CHECKING
 
 from motet.decode.acts import Act
-from motet.errors import TextError, TextWarning
+from motet.errors import TextError, TextWarning, collected
 from motet.models.generate import GenerateModel
 
 if TYPE_CHECKING:
@@ -28,8 +27,7 @@ class SaidActs:
     def act(self, sentence: str) -> Act:
         """The act of a sentence, such as "wave" or "sit down"; TextError for one that the model does not know."""
         if sentence not in self._made:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", TextWarning)  # of a sentence that was checked
+            with collected(TextWarning):  # of a sentence that was checked
                 (found,) = self.words.generate(self._known(sentence), 1, seconds=SECONDS)
             if len(self._made) >= KEPT:
                 del self._made[next(iter(self._made))]

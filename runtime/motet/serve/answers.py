@@ -4,13 +4,14 @@ import asyncio
 from collections.abc import AsyncIterator, Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
-from functools import partial
+from functools import partial, wraps
 from pathlib import PurePath
-from typing import Any, TypeVar, cast
+from typing import Any, ParamSpec, TypeVar, cast
 
 import numpy as np
 
 from motet.draw.page import Captions
+from motet.errors import TextWarning, TravelWarning, collected
 from motet.formats import ONTO, Character
 from motet.models.describe import DescribeModel, Description
 from motet.models.generate import PLAYED, Generated
@@ -29,6 +30,7 @@ from motet.serve.readers import Readers
 from motet.serve.uploads import Bounds, RequestError
 
 T = TypeVar("T")
+P = ParamSpec("P")
 Key = frozenset[tuple[str, Any]]
 
 MODEL = ("seed", "max_seconds", "temperature", "top_p", "strict", "whole")
@@ -57,9 +59,9 @@ class Answers:
         self._models, self._threads = ThreadPoolExecutor(1, "models"), ThreadPoolExecutor(2, "requests")
         self._bounds = Bounds(limits.motion_seconds, 8 * limits.body_bytes)
         self._readers = Readers(limits.body_bytes, limits.seconds)
-        self._generated = Batcher(self._generate, self._models, limits.batch)
-        self._described = Batcher(self._describe, self._models, limits.batch)
-        self._predicted = Batcher(self._predict, self._models, limits.batch)
+        self._generated = Batcher(unwarned(self._generate), self._models, limits.batch)
+        self._described = Batcher(unwarned(self._describe), self._models, limits.batch)
+        self._predicted = Batcher(unwarned(self._predict), self._models, limits.batch)
 
     def close(self) -> None:
         """End the processes, and the threads once what runs is done."""
@@ -253,4 +255,15 @@ def _said(rows: list[dict[str, Any]]) -> Answer:
 
 async def _in(pool: ThreadPoolExecutor, call: Callable[..., T], *given: Any) -> T:
     """What a call gives, made in a thread of a pool."""
-    return await asyncio.get_running_loop().run_in_executor(pool, call, *given)
+    return await asyncio.get_running_loop().run_in_executor(pool, unwarned(call), *given)
+
+
+def unwarned(call: Callable[P, T]) -> Callable[P, T]:
+    """A call of which nothing is warned: the answers say what was not understood."""
+
+    @wraps(call)
+    def without_warnings(*given: P.args, **settings: P.kwargs) -> T:
+        with collected(TextWarning, TravelWarning):
+            return call(*given, **settings)
+
+    return without_warnings

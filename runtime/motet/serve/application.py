@@ -3,7 +3,6 @@
 import asyncio
 import signal
 import socket
-import warnings
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
 from importlib.metadata import version
@@ -11,7 +10,7 @@ from typing import Any
 
 from motet.bundle.bundle import Bundle
 from motet.bundle.graph import SessionOptions
-from motet.errors import BundleError, MotetError, OutputError, TextWarning, TravelWarning
+from motet.errors import BundleError, MotetError, OutputError
 from motet.models.base import BundleModel
 from motet.models.describe import DescribeModel
 from motet.models.fill import FillModel
@@ -77,10 +76,7 @@ def app(
 
     @asynccontextmanager
     async def running(_: Starlette) -> AsyncIterator[None]:
-        with warnings.catch_warnings():  # the answers say what was not understood
-            for category in (TextWarning, TravelWarning):
-                warnings.simplefilter("ignore", category)
-            yield
+        yield
         await live.close()
         answers.close()
 

@@ -28,6 +28,7 @@ from motet.motion.motion import Motion, spline
 from motet.motion.rotations import Array, quat_to_rotmat, rotmat_to_quat
 from motet.motion.skeleton import Joint, Skeleton
 from motet.representation.placed import placed, unplaced
+from motet.serve.answers import unwarned
 
 try:
     from fastapi import FastAPI
@@ -96,7 +97,7 @@ class MotetBackbone(Backbone):  # type: ignore[misc]  # the SDK has no types
 
     async def generate(self, request: GenerateRequest) -> MotionResult:
         """A motion for a request, in a thread; ProtocolError for one that cannot be answered."""
-        return await asyncio.to_thread(self.answer, request)
+        return await asyncio.to_thread(unwarned(self.answer), request)
 
     def answer(self, request: GenerateRequest) -> MotionResult:
         """See :meth:`generate`."""
