@@ -11,7 +11,6 @@ import logging
 import os
 import sys
 import traceback
-import warnings
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -142,7 +141,6 @@ def is_used() -> bool:
 def main() -> None:
     """Answer requests until the input ends."""
     logging.disable()
-    warnings.simplefilter("ignore")
     requests, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever prints does not break into a message
     with suppress(AttributeError, OSError):

@@ -35,7 +35,7 @@ class _Reader:
     """A process. It leads a group of its own, to which processes that it starts belong."""
 
     def __init__(self, memory: int) -> None:
-        command = [sys.executable, *PROGRAM, str(memory)]
+        command = [sys.executable, "-W", "ignore", *PROGRAM, str(memory)]
         try:
             self._process = subprocess.Popen(
                 command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
