@@ -29,10 +29,16 @@ BOUNDS = Bounds(seconds=60, unpacked=10**6)
 
 HANGS = """
 import subprocess, sys
-stays = "import sys, time; file = open(sys.argv[1], 'w'); print('begun', file=file, flush=True); time.sleep(1000)"
+stays = '''
+import sys, time
+file = open(sys.argv[1], "w")
+print("begun", file=file, flush=True)
+time.sleep(100)
+print("left alone", file=file)
+'''
 subprocess.run([sys.executable, "-c", stays, {pipe!r}])
 """
-"""A process that starts another, which says so in a pipe and holds it open; both stay."""
+"""A process that starts another, which says so in a pipe and holds it open, until it says that nobody ended it."""
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="limits of memory are Linux's")
 posix = pytest.mark.skipif(not hasattr(os, "killpg"), reason="processes have no groups")
