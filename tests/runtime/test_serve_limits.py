@@ -199,7 +199,7 @@ def test_a_head_without_end_is_refused(server: Process) -> None:
     assert server.health()["status"] == "ok"
 
 
-def bounded(scenario: Callable[[int], Awaitable[None]], **limits: Any) -> None:
+def bounded(scenario: Callable[[int], Awaitable[None]], live: object = None, **limits: Any) -> None:
     """Runs a scenario with the port of a server in this process, whose only application says its path."""
 
     async def application(scope: Any, receive: Any, send: Any) -> None:
@@ -211,7 +211,7 @@ def bounded(scenario: Callable[[int], Awaitable[None]], **limits: Any) -> None:
     async def running() -> None:
         starlette = Starlette(routes=[Mount("/", application)])
         starlette.state.limits = Limits(**limits)
-        starlette.state.live = None
+        starlette.state.live = live
         config = uvicorn.Config(starlette, log_config=None, lifespan="off", timeout_keep_alive=1, **OPTIONS)
         uvicorn_server = uvicorn.Server(config)
         with listening("127.0.0.1", 0) as place:
@@ -264,6 +264,30 @@ def test_a_body_that_arrives_is_waited_for(monkeypatch: pytest.MonkeyPatch) -> N
 
     monkeypatch.setattr(BoundedProtocol, "_late", counted)
     bounded(scenario, head_seconds=0.05, body_bytes_a_second=0)
+
+
+def test_a_connection_that_was_handed_over_is_not_cut_off() -> None:
+    class Door:
+        """Greets who comes."""
+
+        def take(self, transport: asyncio.Transport, head: bytes) -> None:
+            self.before = transport.get_protocol()
+            transport.set_protocol(asyncio.Protocol())
+            transport.write(b"hello")
+            assert b"upgrade: websocket" in head
+
+    door = Door()
+
+    async def scenario(port: int) -> None:
+        reader, writer = await asyncio.open_connection("127.0.0.1", port)
+        upgrade = b"Connection: Upgrade\r\nUpgrade: websocket\r\n\r\n"
+        writer.write(b"GET /live HTTP/1.1\r\nHost: localhost\r\n" + upgrade)
+        assert await reader.readexactly(5) == b"hello"
+        assert isinstance(door.before, BoundedProtocol)
+        assert door.before.timer is None  # nothing waits to cut it off
+        writer.close()
+
+    bounded(scenario, live=door)
 
 
 @pytest.mark.parametrize("limits", [{"connections": 5}, {"connections_of_address": 5}])

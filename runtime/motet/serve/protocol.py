@@ -67,7 +67,8 @@ class BoundedProtocol(H11Protocol):
         self.arrived += len(data)
         super().data_received(data)
         sends_body = self.conn.their_state is h11.SEND_BODY
-        if self.transport.is_closing() or not (self.waits() or sends_body):
+        handed_over = self.transport.get_protocol() is not self
+        if handed_over or self.transport.is_closing() or not (self.waits() or sends_body):
             self._end_timer()
         elif self.timer is None or (waited and sends_body):
             self._set_timer(self.limits.head_seconds)
