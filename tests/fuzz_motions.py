@@ -60,6 +60,7 @@ def own_files(frames: int = 24) -> dict[str, Files]:
     animations = [{**document["animations"][0], "name": name} for name in ("Walk", "Walk", "Run")]
     found["clips"] = {"x.glb": container({**document, "animations": animations}, binary)}
     inside = "data:application/octet-stream;base64," + base64.b64encode(binary).decode()
+    found["sparse"] = {"x.glb": _sparse(document, binary)}
     found["gltf, inside"] = {"x.gltf": _gltf(document, binary, inside)}
     found["gltf, beside"] = {"x.gltf": _gltf(document, binary, "x.bin"), "x.bin": binary}
     found["vrm"] = {"x.vrm": avatar()}
@@ -72,6 +73,18 @@ def own_files(frames: int = 24) -> dict[str, Files]:
     found["xml"] = {"x.xml": MMM.format("".join(FRAME.format(time / 100) for time in range(8))).encode()}
     found["amass"] = {"x.npz": _amass()}
     return found
+
+
+def _sparse(document: dict[str, Any], binary: bytes) -> bytes:
+    """A GLB whose animation has sparse values: each replaces its first two by themselves."""
+    document = json.loads(json.dumps(document))
+    indices = {"bufferView": len(document["bufferViews"]), "componentType": 5123}
+    document["bufferViews"].append({"buffer": 0, "byteOffset": len(binary), "byteLength": 4})
+    for index in {sampler["output"] for sampler in document["animations"][0]["samplers"]}:
+        accessor = document["accessors"][index]
+        accessor["sparse"] = {"count": 2, "indices": indices, "values": {"bufferView": accessor["bufferView"]}}
+    binary += struct.pack("<HH", 0, 1)
+    return container({**document, "buffers": [{"byteLength": len(binary)}]}, binary)
 
 
 def _gltf(document: dict[str, Any], binary: bytes, uri: str) -> bytes:

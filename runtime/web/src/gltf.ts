@@ -45,10 +45,23 @@ export interface Document {
   textures?: { source?: number }[];
   images?: { bufferView?: number; uri?: string; mimeType?: string }[];
   animations?: Animation[];
-  accessors?: { bufferView?: number; byteOffset?: number; componentType: number; count: number; type: string; normalized?: boolean; sparse?: object }[];
+  accessors?: { bufferView?: number; byteOffset?: number; componentType: number; count: number; type: string; normalized?: boolean; sparse?: Sparse }[];
   bufferViews?: { buffer: number; byteOffset?: number; byteLength: number; byteStride?: number; extensions?: object }[];
   buffers?: { byteLength: number; uri?: string }[];
   extensions?: Record<string, { humanoid?: { humanBones?: unknown } }>;
+}
+
+/** Where elements of an accessor are. */
+interface Part {
+  bufferView: number;
+  byteOffset?: number;
+}
+
+/** Elements that replace those of an accessor, at rising indices. */
+interface Sparse {
+  count: number;
+  indices: Part & { componentType: number };
+  values: Part;
 }
 
 /** Where a node is in the world: its rotation without scale, its linear map as columns, and its place. */
@@ -169,24 +182,60 @@ export class Gltf {
 
   /** The rows of an accessor; FormatError if it is not in the file. */
   array(index: number): number[][] {
-    const { bufferView, byteOffset = 0, componentType, count, type, normalized, sparse } = this.document.accessors![index]!;
-    if (bufferView === undefined || sparse) throw new FormatError(`accessor ${index} is sparse: export it without compression`);
+    const { bufferView, byteOffset, componentType, count, type, normalized, sparse } = this.document.accessors![index]!;
+    const width = WIDTHS[type]!;
+    if (!Number.isInteger(count)) throw new FormatError(`accessor ${index} is broken: its count is not a whole number`);
+    let rows: number[][];
+    if (bufferView === undefined) {
+      this.count(count * width);
+      rows = Array.from({ length: count }, () => Array<number>(width).fill(0));
+    } else {
+      rows = this.rows(index, { bufferView, byteOffset }, componentType, count, width);
+    }
+    if (sparse) {
+      const places = this.sparsePlaces(index, sparse, count);
+      const values = this.rows(index, sparse.values, componentType, places.length, width);
+      places.forEach((place, at) => (rows[place] = values[at]!));
+    }
+    if (!normalized) return rows;
+    const [, most] = READERS[componentType]!;
+    return rows.map((row) => row.map((value) => Math.max(value / most, -1)));
+  }
+
+  /** The rows, of some, that a sparse accessor replaces. */
+  private sparsePlaces(index: number, { count, indices }: Sparse, rows: number): number[] {
+    if (![5121, 5123, 5125].includes(indices.componentType)) throw new FormatError(`accessor ${index} is broken: its sparse indices are not unsigned integers`);
+    const places = this.rows(index, indices, indices.componentType, count, 1).map(([place]) => place!);
+    if (places.some((place, at) => place >= rows || (at > 0 && place <= places[at - 1]!))) {
+      throw new FormatError(`accessor ${index} is broken: its sparse indices do not rise, or reach beyond its ${rows} elements`);
+    }
+    return places;
+  }
+
+  /** Elements of a part of an accessor, which names a view; FormatError beyond its buffer. */
+  private rows(index: number, { bufferView, byteOffset = 0 }: Part, componentType: number, count: number, width: number): number[][] {
     const view = this.document.bufferViews![bufferView]!;
     if (view.extensions && Object.keys(view.extensions).length) throw new FormatError("its animations are packed by meshoptimizer: unpack the file first");
-    const [[size, most, read], width, content] = [READERS[componentType]!, WIDTHS[type]!, this.buffers[view.buffer]!];
+    const [[size, , read], content] = [READERS[componentType]!, this.buffers[view.buffer]!];
     const [start, stride] = [(view.byteOffset ?? 0) + byteOffset, view.byteStride || size * width];
     const fits = Number.isInteger(count) && count >= 0 && start >= 0 && stride >= size * width && (!count || start + stride * (count - 1) + size * width <= content.length);
     if (!fits) throw new FormatError(`accessor ${index} extends beyond its buffer: the file is cut short`);
-    this.numbers += count * width;
-    if (this.numbers > 4 * this.buffers.reduce((sum, buffer) => sum + buffer.length, 0)) throw new FormatError("its arrays overlap");
+    this.count(count * width);
     const data = new DataView(content.buffer, content.byteOffset, content.byteLength);
     return Array.from({ length: count }, (_, row) =>
       Array.from({ length: width }, (_, column) => {
         const value = read(data, start + row * stride + column * size);
         if (!Number.isFinite(value)) throw new FormatError(`accessor ${index} holds numbers that are not finite`);
-        return normalized ? Math.max(value / most, -1) : value;
+        return value;
       }),
     );
+  }
+
+  /** Count numbers that are read, which a file has no more of than it can hold. */
+  private count(numbers: number): void {
+    this.numbers += numbers;
+    const bytes = this.buffers.reduce((sum, buffer) => sum + buffer.length, 0);
+    if (!(numbers >= 0 && this.numbers <= 4 * bytes)) throw new FormatError("its arrays overlap: they hold more numbers than the file has bytes");
   }
 
   /** The bytes of a view of a buffer. */

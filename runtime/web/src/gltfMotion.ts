@@ -4,7 +4,7 @@ import { type Animation, Gltf, type Local, type Placed } from "./gltf.js";
 import { BONES } from "./humanoid.js";
 import { mapOf } from "./jointMap.js";
 import { checked, type Motion, motionFrom } from "./motion.js";
-import { median } from "./numbers.js";
+import { median, rounded } from "./numbers.js";
 import { cross, dot, inverse, minus, normalised, product, type Quaternion, rotated, STILL, type Vector } from "./rotations.js";
 import { END, type Joint, type RestNode, Skeleton, unique } from "./skeleton.js";
 
@@ -246,10 +246,7 @@ function tracks(gltf: Gltf, animation: Animation, nodes: Set<number>): { frames:
     keys.push({ node, path, times, values, kind: interpolation });
   }
   const [start, end] = [Math.min(...keys.map(({ times }) => times[0]!)), Math.max(...keys.map(({ times }) => times.at(-1)!))];
-  const steps = keys.filter(({ times }) => times.length > 1).map(({ times }) => median(times.slice(1).map((time, at) => time - times[at]!)));
-  const step = steps.length ? Math.min(...steps) : 0;
-  const rate = step > 0 && step < 0.1 ? 1 / step : 30; // keys further apart do not tell a frame rate
-  const fps = Math.abs(rate - Math.round(rate)) < 0.01 * rate ? Math.round(rate) : rate;
+  const fps = rateOf(keys.map(({ times }) => times));
   const count = (end - start) * fps + 1;
   if (!(count * gltf.nodes.length < 1e7)) throw new FormatError(`${end - start} s at ${fps} fps is too many frames`);
   const frames = Array.from({ length: Math.round(count) }, (_, frame) => {
@@ -258,6 +255,33 @@ function tracks(gltf: Gltf, animation: Animation, nodes: Set<number>): { frames:
     return moved;
   });
   return { frames, fps };
+}
+
+/**
+ * The frame rate that the times of keys tell, in seconds: that of the closest keys, 30 if none is near.
+ *
+ * Times are 32-bit numbers, so a step between two is rough: it is measured over all whole steps of its track.
+ */
+export function rateOf(tracks: number[][]): number {
+  let least = 0;
+  for (const times of tracks.filter(({ length }) => length > 1)) {
+    const gaps = times.slice(1).map((time, at) => time - times[at]!);
+    let step = median(gaps);
+    if (step > 0) {
+      const whole = gaps.map((gap) => rounded(gap / step));
+      const total = whole.reduce((sum, count) => sum + count, 0);
+      if (total > 0 && gaps.every((gap, at) => Math.abs(gap - whole[at]! * step) < 0.01 * step)) step = (times.at(-1)! - times[0]!) / total;
+    }
+    least = least ? Math.min(least, step) : step;
+  }
+  if (!(least > 0 && least < 0.1)) return 30; // keys further apart do not tell a frame rate
+  const rate = 1 / least;
+  // a rate is whole, or like 29.97, where the times cannot tell it from that
+  for (const [digits, error] of [[0, 1e-4], [2, 1e-6], [3, 1e-6]] as const) {
+    const near = Math.round(rate * 10 ** digits) / 10 ** digits;
+    if (Math.abs(rate - near) < error * rate) return near;
+  }
+  return rate;
 }
 
 /** A track's value at a time: linear (turns the shortest way), in steps, or by the tangents of splines. */

@@ -3,6 +3,7 @@ import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import test from "node:test";
 import { clipsOf, FormatError, fromHumanoid, holdFeet, MotionError, readBVH, readGLB, Skeleton, toHumanoid } from "../src/index.js";
+import { rateOf } from "../src/gltfMotion.js";
 
 const mixamo = readFileSync("../../tests/runtime/skeletons/mixamo.bvh", "utf8");
 
@@ -75,6 +76,31 @@ function changed(change: (document: any) => void): Uint8Array {
   return file;
 }
 
+/** The first track's values as zeros with all rows put in, at indices in a buffer of their own. */
+function sparsely(document: any, changes: object = {}): void {
+  const accessor = document.accessors[document.animations[0].samplers[0].output];
+  const { bufferView, byteOffset = 0, count } = accessor;
+  const indices = Buffer.from(Uint16Array.from({ length: count }, (_, at) => at).buffer);
+  document.buffers.push({ byteLength: indices.length, uri: `data:;base64,${indices.toString("base64")}` });
+  document.bufferViews.push({ buffer: document.buffers.length - 1, byteLength: indices.length });
+  delete accessor.bufferView;
+  delete accessor.byteOffset;
+  const places = { bufferView: document.bufferViews.length - 1, componentType: 5123 };
+  accessor.sparse = { count, indices: places, values: { bufferView, byteOffset }, ...changes };
+}
+
+test("sparse arrays of glTF are read as plain ones", () => {
+  assert.deepEqual(readGLB(changed((document) => sparsely(document))), readGLB(avatar));
+});
+
+test("frame rates of keys are read as written", () => {
+  for (const fps of [23.976, 24, 25, 29.97, 30, 59.94, 60, 119.88, 120]) {
+    const times = Array.from({ length: 3000 }, (_, frame) => Math.fround(frame / fps));
+    assert.equal(rateOf([times, times.filter((_, at) => at % 3 === 0), times.filter((_, at) => at % 7 !== 3)]), fps);
+  }
+  assert.equal(rateOf([[0, 1], [5]]), 30);
+});
+
 test("glTF files that are wrong are refused by name", () => {
   const bones = (document: any) => document.extensions.VRMC_vrm.humanoid.humanBones;
   const wrong: [Uint8Array, RegExp][] = [
@@ -91,6 +117,12 @@ test("glTF files that are wrong are refused by name", () => {
     [changed((d) => (d.accessors[d.animations[0].samplers[0].output].count = 2 ** 40)), /beyond its buffer/],
     [changed((d) => (d.accessors[d.animations[0].samplers[0].output].type = "VEC9")), /broken glTF file|beyond/],
     [changed((d) => (d.bufferViews = 7)), /broken glTF file/],
+    [changed((d) => { const accessor = d.accessors[d.animations[0].samplers[0].output]; delete accessor.bufferView; accessor.count = 2 ** 40; }), /its arrays overlap/],
+    [changed((d) => sparsely(d, { count: 1e9 })), /beyond its buffer/],
+    [changed((d) => sparsely(d, { count: -1 })), /beyond its buffer/],
+    [changed((d) => sparsely(d, { indices: { bufferView: 0, componentType: 5126 } })), /sparse indices are not unsigned/],
+    [changed((d) => sparsely(d, { indices: { bufferView: 0, componentType: 5125 } })), /sparse indices do not rise/],
+    [changed((d) => sparsely(d, { indices: undefined })), /broken glTF file/],
     [changed((d) => (d.buffers[0].uri = "other.bin")), /is a file of its own/],
     [changed((d) => (d.bufferViews.at(-1).extensions = { EXT_meshopt_compression: {} })), /packed by meshoptimizer/],
   ];
