@@ -30,19 +30,43 @@ def distinct() -> Run:
     return given
 
 
-@pytest.mark.parametrize("half", [False, True])
-def test_every_weight_is_found_again(tmp_path: Path, half: bool) -> None:
-    given = distinct()
-    export_run(given, tmp_path / "codes.zip", half=half)
-    bundle = Bundle.open(tmp_path / "codes.zip")
-    found = restored(bundle)
-    assert found.manifest["training"] == given.manifest["training"]
-    if half:
-        round_weights(given.model)
+@pytest.fixture(scope="module")
+def given() -> Run:
+    return distinct()
+
+
+@pytest.fixture(scope="module")
+def bundle(given: Run, tmp_path_factory: pytest.TempPathFactory) -> Bundle:
+    place = tmp_path_factory.mktemp("exported") / "codes.zip"
+    export_run(given, place)
+    return Bundle.open(place)
+
+
+@pytest.fixture(scope="module")
+def again(bundle: Bundle) -> Run:
+    return restored(bundle)
+
+
+def check_equal(found: Run, wanted: Run) -> None:
     state = found.model.state_dict()
-    for name, value in given.model.state_dict().items():
+    for name, value in wanted.model.state_dict().items():
         if not name.endswith(NEW):
             torch.testing.assert_close(state[name], value, rtol=0, atol=0, msg=name)
+
+
+def test_every_weight_is_found_again(given: Run, bundle: Bundle, again: Run) -> None:
+    assert again.manifest["training"] == given.manifest["training"]
+    check_equal(again, given)
+    parity_of(again, bundle)
+
+
+def test_every_weight_of_16_bits_is_found_again(tmp_path: Path) -> None:
+    run_of_16_bits = distinct()
+    export_run(run_of_16_bits, tmp_path / "codes.zip", half=True)
+    bundle = Bundle.open(tmp_path / "codes.zip")
+    found = restored(bundle)
+    round_weights(run_of_16_bits.model)
+    check_equal(found, run_of_16_bits)
     parity_of(found, bundle)
 
 
@@ -54,12 +78,9 @@ def test_8_bit_weights_are_not_those_that_were_trained(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("swapped", [False, True])
 def test_weights_that_are_numbered_otherwise_are_found_by_their_order(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, swapped: bool
+    bundle: Bundle, again: Run, monkeypatch: pytest.MonkeyPatch, swapped: bool
 ) -> None:
     """As those of a net whose graph has changed since; in another order, what is found does not compute the same."""
-    export_run(distinct(), tmp_path / "codes.zip")
-    bundle = Bundle.open(tmp_path / "codes.zip")
-    expected = restored(bundle).model.state_dict()
 
     def otherwise(*given: Any) -> bytes:
         model = onnx.load_from_string(export_graph(*given))
@@ -74,8 +95,5 @@ def test_weights_that_are_numbered_otherwise_are_found_by_their_order(
     if swapped:
         with pytest.raises(ExportError, match="golden vectors"):
             restored(bundle)
-        return
-    found = restored(bundle).model.state_dict()
-    for name, value in expected.items():
-        if not name.endswith(NEW):
-            torch.testing.assert_close(found[name], value, rtol=0, atol=0, msg=name)
+    else:
+        check_equal(restored(bundle), again)
