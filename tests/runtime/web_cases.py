@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from gltf_files import read_document, write_clips
+from gltf_files import read_document, write_clips, write_document
 from renamed import names_of
 from small_character import QUARTER, character, packed
 
@@ -124,7 +124,7 @@ def figures(texts: Mapping[str, str]) -> dict[str, Any]:
 
 def files(folder: Path) -> dict[str, bytes]:
     """glTF files of a walk: a character whose hips hang below a scale and a turn, the same as a VRM avatar, a .vrma,
-    and a figure whose skin moves the head alone."""
+    a figure whose skin moves the head alone, and one whose chest has a scale that shears its arms."""
     tilted = ({"scale": [0.01] * 3, "rotation": [QUARTER, 0, 0, QUARTER]},)
     walk = walking(12, 30.0)
     write_motion(folder / "moving.glb", walk, onto=character(folder / "plain.glb", tilted))
@@ -137,7 +137,11 @@ def files(folder: Path) -> dict[str, bytes]:
         [("motion", from_humanoid(walking(6, 30.0), rig("rigify")))],
         skin=("spine.004", "spine.006"),
     )
-    return {name: (folder / name).read_bytes() for name in ("moving.glb", "avatar.vrm", "walk.vrma", "head.glb")}
+    document, binary = read_document(write_clips(folder / "plain.glb", [("motion", walking(6, 30.0))]))
+    next(node for node in document["nodes"] if node["name"] == "chest")["scale"] = [1.2, 0.9, 1.1]
+    write_document(folder / "sheared.glb", document, binary)
+    names = ("moving.glb", "avatar.vrm", "walk.vrma", "head.glb", "sheared.glb")
+    return {name: (folder / name).read_bytes() for name in names}
 
 
 def scenes(files: Mapping[str, bytes]) -> dict[str, Any]:

@@ -5,7 +5,7 @@ import { BONES } from "./humanoid.js";
 import { mapOf } from "./jointMap.js";
 import { checked, type Motion, motionFrom } from "./motion.js";
 import { median, rounded } from "./numbers.js";
-import { cross, dot, inverse, minus, normalised, product, type Quaternion, rotated, STILL, type Vector } from "./rotations.js";
+import { cross, dot, inverse, mean, minus, normalised, ofVector, product, type Quaternion, rotated, size, STILL, unit, type Vector } from "./rotations.js";
 import { END, type Joint, type RestNode, Skeleton, unique } from "./skeleton.js";
 
 const PATHS: Record<string, number> = { rotation: 4, translation: 3, scale: 3 };
@@ -173,12 +173,36 @@ function taken(gltf: Gltf, found: Set<number>[], animation?: Animation): Motion 
   const skeleton = skeletonOf(gltf, joints, rest);
   const turns: Quaternion[][] = [];
   const places: Vector[][] = [];
-  for (const values of frames) {
-    const world = gltf.world(near, values);
-    turns.push(joints.map((node) => product(world.get(node)!.turn, inverse(rest.get(node)!.turn))));
+  const children = joints.map((node) => joints.filter((other) => gltf.parents[other] === node));
+  const worlds = frames.map((values) => gltf.world(near, values));
+  const sheared = joints.map((node, at) => children[at]!.length > 0 && worlds.some((world) => isSheared(world.get(node)!)));
+  for (const world of worlds) {
+    const turned = (node: number, at: number): Quaternion => {
+      const turn = product(world.get(node)!.turn, inverse(rest.get(node)!.turn));
+      if (!sheared[at]) return turn;
+      const [place, atRest] = [world.get(node)!.place, rest.get(node)!.place];
+      return turnedOnto(turn, children[at]!.map((child) => [minus(rest.get(child)!.place, atRest), minus(world.get(child)!.place, place)]));
+    };
+    turns.push(joints.map(turned));
     places.push(joints.map((node) => world.get(node)!.place));
   }
   return checked({ ...motionFrom(skeleton, turns, moving(skeleton, turns, places), fps), travels: animation !== undefined });
+}
+
+/** Whether unequal scales above a node stretch it, so that its map has columns of other lengths or not at right angles. */
+function isSheared({ linear }: Placed): boolean {
+  const size = linear.reduce((sum, column) => sum + dot(column, column), 0) / 3;
+  return linear.some((column, i) => linear.some((other, j) => Math.abs(dot(column, other) - (i === j ? size : 0)) > 1e-3 * size));
+}
+
+/** The rotation that takes bones at rest closest to what they are: a few steps from one that is some degrees off. */
+function turnedOnto(turn: Quaternion, bones: [atRest: Vector, bone: Vector][]): Quaternion {
+  const long = bones.filter(([atRest, bone]) => size(atRest) > 0 && size(bone) > 0).map(([atRest, bone]) => [unit(atRest), unit(bone)] as const);
+  let found = turn;
+  for (let step = 0; step < 30 && long.length; step++) {
+    found = product(ofVector(mean(long.map(([atRest, bone]) => cross(rotated(found, atRest), bone)))), found);
+  }
+  return normalised(found);
 }
 
 /** The joints and the nodes between them, with the ends attached to them, parents first. */
