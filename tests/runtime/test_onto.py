@@ -185,7 +185,18 @@ def test_what_is_no_character_is_refused(tmp_path: Path) -> None:
     flat = [dict(node) for node in document["nodes"]]
     flat[0]["scale"] = [0, 0, 0]
     (tmp_path / "flat.glb").write_bytes(packed(document | {"nodes": flat}, Played(avatar).binary))
+    bent = [dict(node) for node in document["nodes"]]
+    turns = np.random.default_rng(1).normal(size=(len(bent), 4))
+    for node, turn in zip(bent, turns, strict=True):
+        node["rotation"] = (turn / np.linalg.norm(turn)).tolist()
+    (tmp_path / "bent.glb").write_bytes(packed(document | {"nodes": bent}, Played(avatar).binary))
     for onto, place, error, said in (
+        (
+            tmp_path / "bent.glb",
+            out,
+            MotionError,
+            "not a standing body: use a file of this figure that rests in a T-pose",
+        ),
         (
             tmp_path / "apart.glb",
             out,

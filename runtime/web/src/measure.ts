@@ -74,7 +74,7 @@ function fittedAtRest(body: Body, leg: number, stands: Quaternion): Fitted {
 function fittedInFrames(body: Body, world: World, leg: number, known: boolean, moving: boolean): Fitted {
   const { turns, places } = world;
   if (!known) {
-    if (places.length < 2) throw new MotionError("the rest pose is not a standing body: give a motion of it, or a file that rests in a T-pose");
+    if (places.length < 2) throw new MotionError("the rest pose is not a standing body: use a file of this figure that rests in a T-pose");
     checkStance(body, places);
     const left = places.map((pose) => unit(body.toLeft(pose, "UpperLeg")));
     checkFrames(body, places, { left, right: left });

@@ -106,7 +106,7 @@ def _fit(body: Body, rotations: Array, places: Array) -> Fitted:
         return Fitted(body, aligned, leg, _heights(body, leg, places[0] @ first[:, 1]), None, 0.95, (note,))
     if not known:
         if len(places) < 2:
-            remedy = "give a motion of it with another file's T-pose (rest=, --rest), or a file that rests in one"
+            remedy = "use a file of this figure that rests in a T-pose (to read a motion, as its rest=, --rest)"
             raise MotionError(f"the rest pose is not a standing body: {remedy}")
         check_stance(body, places)
         check_frames(body, places, dict.fromkeys(LEFT_RIGHT, unit(body.to_left(places, "UpperLeg"))))
