@@ -112,7 +112,7 @@ def test_a_unit_counts_for_gltf_where_its_metre_is_no_better(
 def test_options_that_a_format_does_not_take_are_refused(tmp_path: Path) -> None:
     write_motion(tmp_path / "a.bvh", walker())
     for options, said in (
-        ({"fps": 30}, "'fps' is an option for .amc files only"),
+        ({"fps": 30}, "'fps' is an option for .amc .npz files only"),
         ({"asf": "a.asf"}, "'asf' is an option for .amc files only"),
         ({"format": "npz", "partial": True}, "'partial' is an option for .amc .bvh files only"),
     ):

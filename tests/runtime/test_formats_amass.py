@@ -2,6 +2,7 @@ import io
 import zipfile
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +12,9 @@ from motet.formats import npz, read_motion
 from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.humanoid.retarget import to_humanoid
 from motet.motion.kinematics import positions
-from motet.motion.rotations import Array
+from motet.motion.rotations import Array, rotmat_to_rotvec, rotvec_to_rotmat
+
+Z_TO_Y = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 
 STANDING = np.array([np.pi / 2, 0.0, 0.0])
 """The root's rotation vector of a figure that stands in a world with z up: it faces -y there, +z here."""
@@ -52,11 +55,70 @@ def test_the_newer_names_of_arrays_are_known(tmp_path: Path) -> None:
     assert old.fps == new.fps == 60
 
 
+def test_mocap_of_videos_is_read(tmp_path: Path) -> None:
+    """Of ROMP, WHAM and others, whose y is up: as vectors in one array or two, and as matrices."""
+    vectors, trans = poses()
+    np.savez(tmp_path / "amass.npz", poses=vectors, trans=trans, mocap_framerate=30.0)
+    wanted = npz.read(tmp_path / "amass.npz")
+    root = rotmat_to_rotvec(Z_TO_Y @ rotvec_to_rotmat(vectors[:, :3]))
+    body = vectors[:, 3:66].reshape(-1, 21, 3)
+    more = np.concatenate([body, np.zeros((len(body), 2, 3))], axis=1)  # hands, which are left out
+    ways = {
+        "vectors": {"global_orient": root, "body_pose": body.reshape(-1, 63)},
+        "joints": {"global_orient": root[:, None], "body_pose": more},
+        "matrices": {"global_orient": rotvec_to_rotmat(root)[:, None], "body_pose": rotvec_to_rotmat(body)},
+        "one matrix": {"global_orient": rotvec_to_rotmat(root), "body_pose": rotvec_to_rotmat(body)},
+    }
+    for name, arrays in ways.items():
+        np.savez(tmp_path / "video.npz", transl=trans @ Z_TO_Y.T, betas=np.zeros((8, 10)), **arrays)
+        found = read_motion(tmp_path / "video.npz", fps=30)
+        np.testing.assert_allclose(positions(found), positions(wanted), atol=1e-9, err_msg=name)
+    with pytest.raises(FormatError, match=r"no frame rate.*--fps-in"):
+        read_motion(tmp_path / "video.npz")
+
+
+def test_poses_of_joints_and_a_rate_that_is_given(tmp_path: Path) -> None:
+    vectors, trans = poses()
+    np.savez(tmp_path / "a.npz", poses=vectors[:, :72].reshape(-1, 24, 3), trans=trans)
+    assert read_motion(tmp_path / "a.npz", fps=25).fps == 25
+    np.savez(tmp_path / "a.npz", poses=vectors, trans=trans, mocap_framerate=50.0)
+    assert read_motion(tmp_path / "a.npz", fps=50).fps == 50
+    with pytest.raises(FormatError, match="states 50 fps, but 60 was given"):
+        read_motion(tmp_path / "a.npz", fps=60)
+
+
+WRONG = {
+    "poses that are not finite": ({"poses": np.full((8, 66), np.nan)}, "poses holds numbers that are not finite"),
+    "matrices that are none": (
+        {"global_orient": np.ones((8, 1, 3, 3)), "body_pose": np.ones((8, 21, 3, 3))},
+        "global_orient holds matrices that are no rotations",
+    ),
+    "a few joints": ({"global_orient": np.zeros((8, 3)), "body_pose": np.zeros((8, 30))}, "11 joints, expected 22"),
+    "another shape": ({"poses": np.zeros((8, 65))}, r"poses of shape \(8, 65\): expected"),
+    "a path of another length": ({"poses": np.zeros((8, 66)), "trans": np.zeros((5, 3))}, r"trans must be \(8, 3\)"),
+    "no path": ({"poses": np.zeros((8, 66)), "trans": None}, "no translation of the root"),
+    "places alone": ({"joints": np.zeros((8, 22, 3)), "trans": None}, "places of joints, as of HumanML3D"),
+    "a shape alone": ({"betas": np.zeros(16), "trans": None}, "a body's shape without its poses"),
+    "a rate of 10^6": ({"poses": np.zeros((8, 66)), "fps": 1e6}, r"frame rate 1e\+06 is out of range"),
+}
+
+
+@pytest.mark.parametrize(("arrays", "reason"), WRONG.values(), ids=WRONG)
+def test_what_is_wrong_is_named(tmp_path: Path, arrays: dict[str, Any], reason: str) -> None:
+    given = {"trans": np.zeros((8, 3)), "fps": 30.0, **arrays}
+    np.savez(tmp_path / "a.npz", **{name: values for name, values in given.items() if values is not None})
+    with pytest.raises(FormatError, match=reason):
+        npz.read(tmp_path / "a.npz")
+
+
 def test_other_files_are_refused(tmp_path: Path) -> None:
     vectors, trans = poses()
     cases = {
         "no rate": ({"poses": vectors, "trans": trans}, "no frame rate"),
-        "narrow": ({"poses": vectors[:, :60], "trans": trans, "mocap_framerate": 30.0}, "expected .frames, 66"),
+        "narrow": (
+            {"poses": vectors[:, :60], "trans": trans, "mocap_framerate": 30.0},
+            "20 joints, expected",
+        ),
         "path": ({"poses": vectors, "trans": trans[:3], "mocap_framerate": 30.0}, "trans must be"),
         "nan": ({"poses": vectors * np.nan, "trans": trans, "mocap_framerate": 30.0}, "finite"),
         "other": ({"values": trans}, "not an .npz motion"),

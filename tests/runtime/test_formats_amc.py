@@ -159,6 +159,8 @@ def test_faults_are_named_with_file_and_line(pair, old, new, line, words):
         ("", {}, 120),
         ("", {"fps": 60}, 60),
         ("# fps 50\n", {}, 50),
+        (":SAMPLES-PER-SECOND 60\n", {}, 60),
+        (":SAMPLES-PER-SECOND x\n", {}, "line 1: 'x' is not a finite number"),
         ("# fps 50\n", {"fps": 50}, 50),
         ("# fps 50\n", {"fps": 60}, "but 60 was given"),
         ("# fps 0\n", {}, "line 1: frame rate 0 is out of range"),

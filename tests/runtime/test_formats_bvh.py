@@ -212,6 +212,7 @@ def test_more_frames_than_declared_are_taken_and_said(read, caplog):
         ("Xposition", "Xscale", 5, "'Xscale': expected one of"),
         ("0.033333", "0", 18, "frame time 0 s is out of range"),
         ("0.033333", "fast", 18, "'fast' is not a finite number"),
+        ("0.033333", "0,033333", 18, "'0,033333' is not a finite number: decimals are written with a point"),
         ("Frames: 2", "Frames: two", 17, "'Frames: N'"),
         ("0.033333", "1e-320", 18, "frame rate inf is out of range"),
         ("0.033333", "1e9", 18, "frame rate 1e-09 is out of range"),

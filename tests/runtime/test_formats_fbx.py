@@ -91,6 +91,21 @@ def test_a_clip_is_named_behind_the_path(tmp_path: Path) -> None:
     assert [len(motet.read(f"{path}#{clip}")) for clip in ("a/b", "c", "2")] == [9, 12, 12]
 
 
+def test_a_few_curves_of_dense_keys_do_not_tell_the_rate() -> None:
+    """As those that a program baked at 300 a second, among a figure's at the file's own rate."""
+    from motet.formats import fbx_to_gltf
+
+    def curve(fps: float) -> Any:
+        return SimpleNamespace(keyframes=[SimpleNamespace(time=i / fps) for i in range(round(fps) + 1)])
+
+    scene: Any = SimpleNamespace(scene=SimpleNamespace(settings=SimpleNamespace(frames_per_second=30.0)))
+    for dense, wanted in ((3, 30.0), (7, 300.0)):
+        take: Any = SimpleNamespace(curves=[curve(300)] * dense + [curve(30)] * (10 - dense))
+        assert fbx_to_gltf.frame_rate(scene, take) == pytest.approx(wanted)
+    still: Any = SimpleNamespace(curves=[])
+    assert fbx_to_gltf.frame_rate(scene, still) == 30.0
+
+
 def test_keys_denser_than_the_file_s_rate_tell_the_rate() -> None:
     assert load(ascii_fbx(document(ARM, [swing(frames=121, fps=120)], settings(Y_UP)))).fps == 120.0
     sparse = swing(frames=5, fps=2)

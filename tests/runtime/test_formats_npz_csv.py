@@ -141,6 +141,8 @@ def test_csv_from_elsewhere_has_its_rate_in_its_times(tmp_path):
     ("text", "line", "words"),
     [
         ("", None, "the header must be"),
+        ("Format Version,1.23,Take Name,Take\n", None, "this is a table of Motive"),
+        ("time;a.rx [deg]\n0,0;1,5\n", None, "separated by semicolons"),
         ("# motet motion, fps 30\n0,1\n", None, "the header must be"),
         ("time,a.rx\n0,1\n", None, "the header must be"),
         ("a,b\n0,one\n", None, "the header must be"),  # before rows are read

@@ -11,6 +11,7 @@ import pytest
 from command_line import run
 
 import motet
+from motet.errors import quoted
 from motet.motion.kinematics import positions
 from motet.motion.rotations import quat_to_rotmat
 
@@ -219,8 +220,9 @@ def test_no_file_of_the_machine_is_read(client: TestClient, tmp_path: Path) -> N
                 told = {} if field == "file" else {"text": "he runs"}
                 answer = client.post(address, data=told, files={field: (name, content)})
                 assert answer.status_code == 400, (name, uri, field)
-                assert "secret" not in answer.json()["error"].replace(repr(uri), "").replace("secret.bin: ", "")
-                assert str(tmp_path) not in answer.json()["error"].replace(repr(uri), "")
+                error = answer.json()["error"].replace(quoted(uri), "")  # errors quote the beginning of a long one
+                assert "secret" not in error.replace("secret.bin: ", "")
+                assert str(tmp_path) not in error
 
 
 def test_an_error_that_quotes_what_is_no_character_is_sent(client: TestClient) -> None:

@@ -71,9 +71,9 @@ class Format:
 
 _CHARACTER = "a skeleton and its animations, each a clip, or its rest pose"
 _KEEPS = {
-    ".amc": "everything; AMC has no frame rate: 120 unless `fps=` or a comment written by motet gives another",
+    ".amc": "everything; AMC need not state its frame rate: 120 unless the file or `fps=` gives another",
     ".bvh": "everything but the unit of length",
-    ".npz": "everything, bit for bit; from AMASS, the body joints",
+    ".npz": "everything, bit for bit; from AMASS and mocap of videos (SMPL), the body joints",
     ".csv": "values, units and frame rate, no skeleton",
     ".xml": "angles and root; the skeleton is not in the file",
     ".glb": "a skeleton and its animations, each a clip; written with a body, for viewers and engines",
@@ -89,7 +89,7 @@ _NODES = ("clip", "rest")
 FORMATS = (
     Format(".amc", "Acclaim, with its .asf", "formats.amc", "formats.amc.write", ("asf", "fps", "partial"), mocap=True),
     Format(".bvh", "Biovision", "formats.bvh", "formats.bvh.write", ("partial",), mocap=True),
-    Format(".npz", "motet's own; AMASS", "formats.npz", "formats.npz.write", mocap=True),
+    Format(".npz", "motet's own; SMPL", "formats.npz", "formats.npz.write", ("fps",), mocap=True),
     Format(".csv", "table", "formats.csv", "formats.csv.write"),
     Format(".xml", "MMM of KIT", "formats.mmm"),
     Format(".glb", "glTF 2.0", "formats.gltf", "formats.glb.write", _NODES, mocap=True, loose=True),
@@ -145,7 +145,7 @@ def read_motion(  # noqa: PLR0913  options, each of which has a default
 ) -> Motion:
     """Read a motion file or a binary file object; "file.glb#Walk" is the clip Walk of file.glb.
 
-    fps: the frame rate, for AMC, which states none.
+    fps: the frame rate of a file that states none, such as AMC's and some of SMPL's.
     asf: the skeleton of an AMC file; by default it is looked for beside it.
     unit: the length unit if the file states none: "m", "cm", "mm", "inch" or a number of metres. For glTF, whose metre
         is only a convention, it applies unless the figure is human-sized in metres and not in that unit.

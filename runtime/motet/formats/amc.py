@@ -1,6 +1,7 @@
 """AMC motion with its ASF skeleton (Acclaim), the format of the CMU motion capture database."""
 
 import logging
+import re
 from collections.abc import Iterator, Mapping
 from itertools import compress, cycle, islice
 from pathlib import Path
@@ -30,7 +31,8 @@ def read(file: File, asf: str | Path | None = None, fps: float | None = None, pa
 
     asf: the skeleton; if not given, the file of the same stem, else of the same subject (``39.asf`` for
         ``39_14.amc``), else the only ASF file, looked for beside the motion and then in ``../asf``.
-    fps: AMC does not state it. Default: the file's comment ``# fps 60`` (motet writes one), else 120, the rate of
+    fps: AMC does not state it. Default: the file's comment ``# fps 60`` (motet writes one) or its line
+        ``:SAMPLES-PER-SECOND 60``, else 120, the rate of
         nearly all of CMU. A comment that contradicts it is an error.
     partial: read the complete frames of a file whose last frame is truncated instead of refusing it.
     Channels come in the file's order of bones, units "length" for translations, "deg" or "rad" as in the file.
@@ -41,8 +43,7 @@ def read(file: File, asf: str | Path | None = None, fps: float | None = None, pa
         raise FormatError(path, "a file object has no folder to find the skeleton in: pass it as asf")
     skeleton = read_skeleton(asf if asf is not None else _find_asf(path))
     header, unit, said = _header(path, lines, skeleton)
-    if said is not None and fps is not None and abs(said - fps) > 1e-6 * said:
-        raise FormatError(path, f"the file states {said:g} fps, but {fps:g} was given")
+    text.check_rate(path, said, fps)
     layout = _layout(path, words_of(lines, header), skeleton.dofs)
     try:
         values = _values(path, lines, header, layout)
@@ -88,8 +89,8 @@ def _header(path: Path, lines: list[str], asf: Asf) -> tuple[int, str, float | N
         word = content.strip().lower()
         if word in (":degrees", ":radians"):
             unit = word[1:4]
-        elif word.startswith("# fps "):
-            fps = text.frame_rate(text.number(word.removeprefix("# fps "), path, line + 1), path, line + 1)
+        elif rate := re.fullmatch(r"(?:# fps|:samples-per-second)\s+(\S+)", word):
+            fps = text.frame_rate(text.number(rate[1], path, line + 1), path, line + 1)
         elif word and word[0] not in "#:":
             return line, unit, fps
     return len(lines), unit, fps

@@ -58,6 +58,10 @@ def read(file: File) -> Motion:
 def _channels(path: Path, header: Sequence[str]) -> list[re.Match[str]]:
     """The channels of a header, each with its unit; FormatError for another header."""
     found = [match for title in header[1:] if (match := re.fullmatch(r"(.+) \[(.+)\]", title))]
+    if header[0] == "Format Version":
+        raise FormatError(path, "this is a table of Motive, which has no skeleton: export BVH or FBX there")
+    if len(header) == 1 and ";" in header[0]:
+        raise FormatError(path, "its columns are separated by semicolons: expected commas, and decimals with a point")
     if header[0] != "time" or len(found) < len(header) - 1:
         raise _no_header(path)
     return found

@@ -183,15 +183,20 @@ def frame_times(scene: Scene, take: Take) -> list[float]:
 
 
 def frame_rate(scene: Scene, take: Take, highest: float = 1000.0) -> float:
-    """The file's, or that of the take's keys if they are denser; 30 if neither is known."""
-    said = scene.scene.settings.frames_per_second
-    keys = max((curve.keyframes for curve in take.curves), key=len, default=())
-    times = [key.time for key in keys]
+    """The file's, or that of the take's keys if most of its curves are denser; 30 if neither is known."""
+    stated = scene.scene.settings.frames_per_second
+    rates = sorted(key_rate(curve, highest) for curve in take.curves)
+    keyed = rates[len(rates) // 2] if rates else 0.0
+    fps = keyed if keyed > 1.01 * stated else stated
+    return fps if 0 < fps <= highest else 30.0
+
+
+def key_rate(curve: Any, highest: float) -> float:
+    """Keys a second of a curve, by its median step; 0 for one of few keys, or of too many."""
+    times = [key.time for key in curve.keyframes]
     steps = sorted(later - time for time, later in pairwise(times))
     step = steps[len(steps) // 2] if len(steps) > 1 else 0.0
-    keyed = 1 / step if step * highest >= 1 else 0.0
-    fps = keyed if keyed > 1.01 * said else said
-    return fps if 0 < fps <= highest else 30.0
+    return 1 / step if step * highest >= 1 else 0.0
 
 
 def as_gltf(scene: Scene, take: Take | None) -> dict[str, Any]:

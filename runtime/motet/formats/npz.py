@@ -3,8 +3,10 @@
 motet's arrays: ``values`` (T, D) float64, ``channels`` (D,) and ``units`` (D,) text, ``fps`` float64, and ``skeleton``,
 the JSON of :meth:`motet.motion.skeleton.Skeleton.to_json`, empty for a motion without skeleton.
 
-SMPL's arrays: ``trans`` (T, 3) in metres, and ``poses`` (T, 66 or more) or ``root_orient`` (T, 3) with ``pose_body``
-(T, 63): rotation vectors of the joints in SMPL's order; the fingers, jaw and eyes that follow are left out. z is up.
+SMPL's arrays: ``trans`` or ``transl`` (T, 3) in metres, and the rotations of the joints in SMPL's order: ``poses``,
+``root_orient`` with ``pose_body`` (AMASS), or ``global_orient`` with ``body_pose`` (mocap from video: ROMP, 4D-Humans,
+WHAM, GVHMR). Each is of rotation vectors, (T, 3 J) or (T, J, 3), or of matrices (T, J, 3, 3); fingers, jaw and eyes
+that follow the 22 joints of the body are left out. AMASS has z up, mocap from video y.
 The body shape would need the body model, which is not read: the skeleton is a plain one with an adult's proportions.
 """
 
@@ -21,7 +23,7 @@ from numpy.typing import NDArray
 
 from motet.errors import FormatError
 from motet.files import File, place_of, write_whole
-from motet.formats.text import frame_rate, most_poses, read_bytes
+from motet.formats.text import check_rate, frame_rate, most_poses, read_bytes
 from motet.motion.kinematics import motion_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import product, rotvec_to_rotmat
@@ -57,21 +59,31 @@ AMASS_JOINTS = (
 """SMPL's joints in order, with offsets in metres of a plain body in a T-pose, facing z, y up."""
 
 
-def read(file: File) -> Motion:
-    """Read a motion written by :func:`write`, or the 22 body joints of a file of AMASS.
+ROTATIONS = (("poses",), ("root_orient", "pose_body"), ("global_orient", "body_pose"))
+"""Arrays that hold the rotations of SMPL's joints, one kind or another."""
 
-    AMASS has the root's translation in "length" (metres), angles in "deg", y up. FormatError where arrays are missing,
-    do not fit or are of another kind.
+RATES = ("mocap_framerate", "mocap_frame_rate", "fps")
+"""Arrays that hold the frame rate of SMPL's, one or another."""
+
+
+def read(file: File, fps: float | None = None) -> Motion:
+    """Read a motion written by :func:`write`, or the 22 body joints of a file of SMPL bodies, such as AMASS.
+
+    SMPL's has the root's translation in "length" (metres), angles in "deg", y up. fps: of one that states no frame
+    rate. FormatError where arrays are missing, do not fit or are of another kind, or where the file states another
+    rate.
     """
     path, content = place_of(file), read_bytes(file)
     kind = "an .npz motion written by motet"
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             names = {name.removesuffix(".npy") for name in archive.namelist()}
-            if "trans" in names and names & {"poses", "pose_body"}:
-                kind = "an AMASS file"
-                return _amass(path, archive, names, len(content))
-            return _motet(path, archive, names)
+            if parts := next((parts for parts in ROTATIONS if names >= set(parts)), None):
+                kind = "a file of SMPL bodies"
+                return _smpl(path, archive, names, parts, len(content), fps)
+            motion = _motet(path, archive, names)
+            check_rate(path, motion.fps, fps)
+            return motion
     except FormatError:
         raise
     # a damaged archive makes zipfile, its unpackers, numpy and json raise errors of a dozen types
@@ -116,41 +128,73 @@ def _motet(path: Path, archive: zipfile.ZipFile, names: set[str]) -> Motion:
         "body_pos_w": "a robot's motion for training controllers, not a human's",
         "dof_pos": "the motor angles of a robot, not a human's motion",
         "joint_pos": "the motor angles of a robot, not a human's motion",
+        "joints": "places of joints, as of HumanML3D, without rotations",
+        "betas": "a body's shape without its poses",
     }
     for name, kind in others.items():
         if name in names and not names >= arrays.keys():
-            raise FormatError(path, f"this is {kind}; expected a motion from motet or AMASS")
+            raise FormatError(path, f"this is {kind}; expected a motion from motet, AMASS or other SMPL bodies")
     values, channels, units, fps, skeleton = (array(archive, name, kinds) for name, kinds in arrays.items())
     bones = Skeleton.from_json(json.loads(str(skeleton))) if str(skeleton) else None
     names_of_channels, units_of_channels = (tuple(map(str, words.tolist())) for words in (channels, units))
     return Motion(values, names_of_channels, units_of_channels, frame_rate(float(fps), path), bones)
 
 
-def _amass(path: Path, archive: zipfile.ZipFile, names: set[str], size: int) -> Motion:
-    rates = ("mocap_framerate", "mocap_frame_rate")
-    rate = next((name for name in rates if name in names), None)
-    parts = ("poses",) if "poses" in names else ("root_orient", "pose_body")
+def _smpl(
+    path: Path, archive: zipfile.ZipFile, names: set[str], parts: tuple[str, ...], size: int, fps: float | None
+) -> Motion:
     with archive.open(f"{parts[0]}.npy") as stream:
         shape = _header(stream)[0]
+    if not shape:
+        raise FormatError(path, f"{parts[0]} is a single number: expected its frames")
     if shape[0] * len(AMASS_JOINTS) >= most_poses(size):
         raise FormatError(path, f"{shape[0]} frames are too many for a file of {size} bytes")
-    poses = np.concatenate([array(archive, part, "fiu") for part in parts], axis=-1).astype(np.float64)
-    width = 3 * len(AMASS_JOINTS)
-    if poses.ndim != 2 or poses.shape[1] < width:
-        raise FormatError(path, f"poses of shape {poses.shape}: expected (frames, {width} or more)")
-    trans = array(archive, "trans", "fiu").astype(np.float64)
-    if rate is None:
-        raise FormatError(path, f"no frame rate: expected an array {' or '.join(rates)}")
-    fps = frame_rate(float(array(archive, rate, "fiu")), path)
-    vectors = poses[:, :width].reshape(len(poses), len(AMASS_JOINTS), 3)
-    if trans.shape != (len(vectors), 3) or not (np.isfinite(vectors).all() and np.isfinite(trans).all()):
-        raise FormatError(path, f"trans must be ({len(vectors)}, 3) finite numbers, not {trans.shape}")
-    turned = rotvec_to_rotmat(vectors)
-    z_to_y = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-    turned[:, 0] = z_to_y @ turned[:, 0]
+    arrays = {part: array(archive, part, "fiu").astype(np.float64) for part in parts}
+    turned = np.concatenate([_rotations(path, part, values) for part, values in arrays.items()], axis=1)
+    if turned.shape[1] < len(AMASS_JOINTS):
+        expected = f"expected {len(AMASS_JOINTS)} or more"
+        raise FormatError(path, f"{' and '.join(parts)}: {turned.shape[1]} joints, {expected}")
+    turned = turned[:, : len(AMASS_JOINTS)]
+
+    place = next((name for name in ("trans", "transl") if name in names), None)
+    if place is None:
+        raise FormatError(path, "no translation of the root: expected an array trans or transl")
+    trans = array(archive, place, "fiu").astype(np.float64)
+    if trans.shape != (len(turned), 3) or not np.isfinite(trans).all():
+        raise FormatError(path, f"{place} must be ({len(turned)}, 3) finite numbers, not {trans.shape}")
+
+    rate = next((name for name in RATES if name in names), None)
+    stated = None if rate is None else frame_rate(float(array(archive, rate, "fiu")), path)
+    if stated is None and fps is None:
+        raise FormatError(path, f"no frame rate, as an array {' or '.join(RATES)}: give it by --fps-in, in Python fps=")
+    check_rate(path, stated, fps)
+
+    # rotations in the world, y up
+    if parts[-1] != "body_pose":
+        z_to_y = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+        turned[:, 0] = z_to_y @ turned[:, 0]
+        trans = trans @ z_to_y.T
     for i, joint in enumerate(AMASS_JOINTS[1:], start=1):
         turned[:, i] = product(turned[:, joint.parent], turned[:, i])
-    return motion_of(Skeleton(AMASS_JOINTS, metres_per_unit=1.0), turned, {0: trans @ z_to_y.T}, fps)
+    rate_of_motion = frame_rate(float(fps or 0), path) if stated is None else stated
+    return motion_of(Skeleton(AMASS_JOINTS, metres_per_unit=1.0), turned, {0: trans}, rate_of_motion)
+
+
+def _rotations(path: Path, name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotations (T, J, 3, 3) of joints, from vectors (T, 3 J) or (T, J, 3), or matrices (T, J, 3, 3) or (T, 3, 3)."""
+    if not np.isfinite(values).all():
+        raise FormatError(path, f"{name} holds numbers that are not finite")
+    if values.ndim == 3 and values.shape[1:] == (3, 3) and name in ("global_orient", "root_orient"):
+        values = values[:, None]
+    if values.ndim == 4 and values.shape[2:] == (3, 3):
+        off = np.abs(values @ np.swapaxes(values, -1, -2) - np.eye(3)).max(initial=0.0)
+        if off > 0.01 or np.linalg.det(values).min(initial=1.0) < 0:
+            raise FormatError(path, f"{name} holds matrices that are no rotations")
+        return np.array(values)
+    if values.ndim not in (2, 3) or math.prod(values.shape[1:]) % 3:
+        shapes = "(frames, 3 times joints), (frames, joints, 3) or (frames, joints, 3, 3)"
+        raise FormatError(path, f"{name} of shape {values.shape}: expected {shapes}")
+    return rotvec_to_rotmat(values.reshape(len(values), -1, 3))
 
 
 def write(file: File, motion: Motion) -> None:

@@ -78,11 +78,18 @@ def finite(words: Sequence[str]) -> Array | None:
     return None if "_" in "".join(words) or not np.isfinite(values).all() else values
 
 
+def check_rate(path: Path, stated: float | None, given: float | None) -> None:
+    """FormatError where a file states another frame rate than the one that was given for it."""
+    if stated is not None and given is not None and abs(stated - given) > 1e-6 * stated:
+        raise FormatError(path, f"the file states {stated:g} fps, but {given:g} was given")
+
+
 def numbers(words: Sequence[str], path: Path, line: int | None) -> list[float]:
     """Finite numbers; FormatError with file and line for any other word."""
     if finite(words) is None:
         wrong = next(word for word in words if finite([word]) is None)
-        raise FormatError(path, f"{quoted(wrong)} is not a finite number", line)
+        comma = ": decimals are written with a point, not a comma" if re.fullmatch(r"[-+]?\d*,\d+", wrong) else ""
+        raise FormatError(path, f"{quoted(wrong)} is not a finite number{comma}", line)
     return [float(word) for word in words]
 
 
@@ -105,8 +112,8 @@ def spaced(values: Iterable[float]) -> str:
 
 
 def frame_rate(fps: float, path: Path, line: int | None = None) -> float:
-    """A file's frame rate; FormatError if a motion cannot have it."""
-    if not 1e-3 <= fps <= 1e6:
+    """A file's frame rate; FormatError if a motion cannot have it: at most 100,000, ten times what cameras take."""
+    if not 1e-3 <= fps <= 1e5:
         raise FormatError(path, f"frame rate {fps:g} is out of range", line)
     return fps
 
